@@ -1,0 +1,16 @@
+/// A fixed-length array whose length a trait leaves open: `[Item; N]` for every `N`.
+pub trait Array<Item>: Copy + AsRef<[Item]> + AsMut<[Item]> {
+    /// The number of items.
+    const LEN: usize;
+
+    /// The array whose `i`-th item is `item(i)`.
+    fn from_fn(item: impl FnMut(usize) -> Item) -> Self;
+}
+
+impl<Item: Copy, const N: usize> Array<Item> for [Item; N] {
+    const LEN: usize = N;
+
+    fn from_fn(item: impl FnMut(usize) -> Item) -> Self {
+        std::array::from_fn(item)
+    }
+}

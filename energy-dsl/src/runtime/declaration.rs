@@ -1,0 +1,100 @@
+/// What a declaration describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A scalar U(x).
+    Energy,
+    /// A scalar or vector C(x).
+    Constraint,
+    /// One vector per point, f(x, v).
+    Force,
+    /// A vector r(u).
+    Residual,
+}
+
+impl Kind {
+    /// The keyword that declares it.
+    #[must_use]
+    pub const fn keyword(self) -> &'static str {
+        match self {
+            Self::Energy => "energy",
+            Self::Constraint => "constraint",
+            Self::Force => "force",
+            Self::Residual => "residual",
+        }
+    }
+}
+
+/// One named input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its name as declared.
+    pub name: &'static str,
+    /// How many numbers it holds.
+    pub size: usize,
+    /// Its unit as declared; empty when none was given.
+    pub unit: &'static str,
+}
+
+/// The arithmetic of one routine, after simplification.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OperationCount {
+    /// Additions, subtractions, multiplications, negations, minima, maxima, absolute values, comparisons and selections.
+    pub basic: usize,
+    /// Divisions and square roots.
+    pub divisions_and_roots: usize,
+    /// sin, cos, exp, log, atan2, pow.
+    pub transcendental: usize,
+    /// Exact rounding-error terms (two-sum and two-product tails), counted apart because their cost depends on the target: with
+    /// fused multiply-add a product's tail is one instruction; a sum's tail is five.
+    pub error_terms: usize,
+}
+
+impl OperationCount {
+    /// All of them, an error term counting as one.
+    #[must_use]
+    pub const fn total(&self) -> usize {
+        self.basic + self.divisions_and_roots + self.transcendental + self.error_terms
+    }
+}
+
+/// One generated routine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Routine {
+    /// `value`, `gradient`, `hessian`, `force`, `jacobians`, ….
+    pub name: &'static str,
+    /// What it costs in the reduced coordinates, before the constant expansion to points.
+    pub reduced: OperationCount,
+    /// What it costs in all.
+    pub full: OperationCount,
+}
+
+/// What was declared, carried by the generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Declaration {
+    /// The name of the generated type.
+    pub name: &'static str,
+    /// What it describes.
+    pub kind: Kind,
+    /// The doc comment.
+    pub docs: &'static str,
+    /// The body as written, on one line.
+    pub formula: &'static str,
+    /// The whole declaration, which parses again to the same program.
+    pub source: &'static str,
+    /// Points (or a residual's unknowns).
+    pub points: &'static [Field],
+    /// Rest-shape inputs.
+    pub rest: &'static [Field],
+    /// Parameters.
+    pub parameters: &'static [Field],
+    /// Rows: 1 for an energy, the length of C or r, three per point for a force.
+    pub rows: usize,
+    /// Whether the points enter only through their differences (proved on the expression graph).
+    pub translation_invariant: bool,
+    /// Coordinates the derivatives are taken in, after input reduction.
+    pub reduced_coordinates: usize,
+    /// The robust primitives the formula was compiled to.
+    pub primitives: &'static [&'static str],
+    /// Each routine and its cost.
+    pub routines: &'static [Routine],
+}

@@ -1,0 +1,250 @@
+//! The traits that generated elements implement. An element's value holds its parameters and whatever its rest shape
+//! alone determines; its methods take the moving points.
+//!
+//! Storage: a block is 3×3, row = component of the first point. A *triangle* of an N-point element holds the blocks
+//! (i, j) with i ≤ j in the order (0,0), (0,1), …, (0,N−1), (1,1), …; see [`triangle_index`]. A *square* holds all
+//! N×N blocks row by row.
+
+use super::array::Array;
+use super::declaration::Declaration;
+use super::flags::Flags;
+use super::real::{Number, Real};
+
+/// A point or vector.
+pub type Vector3<T> = [T; 3];
+/// A 3×3 block, row by row.
+pub type Block<T> = [[T; 3]; 3];
+
+/// The place of block (i, j), i ≤ j < `points`, in a triangle.
+///
+/// ```
+/// use energy_dsl::triangle_index;
+/// assert_eq!((triangle_index(4, 0, 3), triangle_index(4, 1, 1), triangle_index(4, 3, 3)), (3, 4, 9));
+/// ```
+#[must_use]
+pub const fn triangle_index(points: usize, i: usize, j: usize) -> usize {
+    i * points - i * (i + 1) / 2 + j
+}
+
+/// A rest shape from which an element cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RestError {
+    /// The element's name.
+    pub element: &'static str,
+}
+
+impl std::fmt::Display for RestError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: the rest shape is degenerate (zero length or area, or not finite)", self.element)
+    }
+}
+
+impl std::error::Error for RestError {}
+
+/// A scalar routine's result without derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Value<T: Number> {
+    /// U.
+    pub value: T,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// U and ∇U.
+#[derive(Clone, Copy, Debug)]
+pub struct Gradient<T: Number, Points> {
+    /// U.
+    pub value: T,
+    /// ∂U/∂x, one vector per point. The force is its negative.
+    pub gradient: Points,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// U, ∇U and ∇²U.
+#[derive(Clone, Copy, Debug)]
+pub struct Hessian<T: Number, Points, Triangle> {
+    /// U.
+    pub value: T,
+    /// ∂U/∂x, one vector per point.
+    pub gradient: Points,
+    /// ∂²U/∂x², one triangle of blocks; the diagonal blocks are exactly symmetric.
+    pub hessian: Triangle,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// f.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceValue<T: Number, Points> {
+    /// The force on each point.
+    pub force: Points,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// f, ∂f/∂x and ∂f/∂v.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceJacobians<T: Number, Points, Square> {
+    /// The force on each point.
+    pub force: Points,
+    /// ∂f/∂x: block (i, j), at i·N + j, is the derivative of the force on point i by point j. Not symmetric in general.
+    pub by_position: Square,
+    /// ∂f/∂v, laid out likewise.
+    pub by_velocity: Square,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// C and J = ∂C/∂x.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstraintJacobian<T: Number, Rows, Jacobian> {
+    /// C.
+    pub value: Rows,
+    /// ∂C/∂x, row by row, one vector per point.
+    pub jacobian: Jacobian,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// C, J and ∂²C/∂x².
+#[derive(Clone, Copy, Debug)]
+pub struct ConstraintHessian<T: Number, Rows, Jacobian, Triangles> {
+    /// C.
+    pub value: Rows,
+    /// ∂C/∂x, row by row, one vector per point.
+    pub jacobian: Jacobian,
+    /// ∂²C/∂x², one triangle of blocks per row of C.
+    pub hessians: Triangles,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// r.
+#[derive(Clone, Copy, Debug)]
+pub struct ResidualValue<T: Number, Rows> {
+    /// The residual.
+    pub value: Rows,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// r and J = ∂r/∂(unknowns).
+#[derive(Clone, Copy, Debug)]
+pub struct ResidualJacobian<T: Number, Rows, Jacobian> {
+    /// The residual.
+    pub value: Rows,
+    /// ∂r/∂u, row-major: row of r, then unknown in declared order.
+    pub jacobian: Jacobian,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// The numbers an element is evaluated on, flattened in declared order: the way in for tools that handle every element
+/// alike. The typed traits are the fast way.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a, T> {
+    /// Parameters; of a constraint, its stiffness k_s and damping k_d follow the declared ones.
+    pub parameters: &'a [T],
+    /// Rest shape.
+    pub rest: &'a [T],
+    /// Positions, three to a point, or a residual's unknowns.
+    pub positions: &'a [T],
+    /// Velocities, three to a point; empty means zero.
+    pub velocities: &'a [T],
+}
+
+/// Every block of an element, flattened row-major over all coordinates (no triangle, nothing left out).
+#[derive(Clone, Debug)]
+pub struct Outputs<T: Number> {
+    /// Block name and its numbers. Energies: `energy`, `grad`, `hess`. Forces: `force`, `dfdx`, `dfdv`. Constraints: all six and
+    /// `constraint`, `jacobian`. Residuals: `residual`, `jacobian`.
+    pub blocks: Vec<(&'static str, Vec<T>)>,
+    /// Conditions met, by order of derivative: value, first, second.
+    pub flags: [Flags<T>; 3],
+}
+
+/// What every generated element offers, whatever its kind.
+pub trait Element: Copy {
+    /// What was declared, and what it costs.
+    const DECLARATION: &'static Declaration;
+
+    /// The same element over another number type.
+    type Over<T: Real>: Element;
+
+    /// Evaluates every block on flattened inputs.
+    ///
+    /// # Errors
+    /// When the rest shape is degenerate.
+    fn evaluate<T: Real>(inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError>;
+}
+
+/// A potential energy U(x).
+pub trait Potential<T: Real>: Element {
+    /// One vector per point: `[Vector3<T>; N]`.
+    type Points: Array<Vector3<T>>;
+    /// The blocks on and above the diagonal: `[Block<T>; N (N + 1) / 2]`.
+    type Triangle: Array<Block<T>>;
+
+    /// U.
+    fn value(&self, x: &Self::Points) -> Value<T>;
+    /// U and ∇U.
+    fn gradient(&self, x: &Self::Points) -> Gradient<T, Self::Points>;
+    /// U, ∇U and ∇²U.
+    fn hessian(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle>;
+}
+
+/// A force f(x, v), not necessarily the gradient of anything.
+pub trait ForceLaw<T: Real>: Element {
+    /// One vector per point: `[Vector3<T>; N]`.
+    type Points: Array<Vector3<T>>;
+    /// All blocks: `[Block<T>; N * N]`.
+    type Square: Array<Block<T>>;
+
+    /// f.
+    fn force(&self, x: &Self::Points, v: &Self::Points) -> ForceValue<T, Self::Points>;
+    /// f, ∂f/∂x and ∂f/∂v.
+    fn jacobians(&self, x: &Self::Points, v: &Self::Points) -> ForceJacobians<T, Self::Points, Self::Square>;
+}
+
+/// A constraint C(x) with its compliant forms: as a [`Potential`] it is ½ k_s CᵀC, as a [`ForceLaw`] the force
+/// −Jᵀ (k_s C + k_d Ċ), Ċ = J v (Witkin).
+pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
+    /// One number per row of C: `[T; M]`.
+    type Rows: Array<T>;
+    /// One vector per row and point: `[Vector3<T>; M * N]`.
+    type Jacobian: Array<Vector3<T>>;
+    /// One triangle per row: `[Block<T>; M * N (N + 1) / 2]`.
+    type Triangles: Array<Block<T>>;
+
+    /// C and J.
+    fn constraint_jacobian(
+        &self,
+        x: &<Self as Potential<T>>::Points,
+    ) -> ConstraintJacobian<T, Self::Rows, Self::Jacobian>;
+    /// C, J and ∂²C.
+    fn constraint_hessian(
+        &self,
+        x: &<Self as Potential<T>>::Points,
+    ) -> ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles>;
+    /// The always positive semi-definite part k_s JᵀJ of the Hessian of ½ k_s CᵀC, with value and gradient.
+    fn gauss_newton(
+        &self,
+        x: &<Self as Potential<T>>::Points,
+    ) -> Hessian<T, <Self as Potential<T>>::Points, <Self as Potential<T>>::Triangle>;
+}
+
+/// A residual r(u) of unknowns that need not be points.
+pub trait Residual<T: Real>: Element {
+    /// All unknowns, in declared order: `[T; U]`.
+    type Unknowns: Array<T>;
+    /// One number per row: `[T; M]`.
+    type Rows: Array<T>;
+    /// Row-major: `[T; M * U]`.
+    type Jacobian: Array<T>;
+
+    /// r.
+    fn residual(&self, u: &Self::Unknowns) -> ResidualValue<T, Self::Rows>;
+    /// r and J.
+    fn jacobian(&self, u: &Self::Unknowns) -> ResidualJacobian<T, Self::Rows, Self::Jacobian>;
+}

@@ -1,0 +1,202 @@
+use std::fmt::Debug;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// The outcome of a comparison: `bool`, or one per lane.
+pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
+    /// False everywhere.
+    fn none() -> Self;
+    /// Whether it is true anywhere.
+    fn any(self) -> bool;
+}
+
+impl Mask for bool {
+    fn none() -> Self {
+        false
+    }
+
+    fn any(self) -> bool {
+        self
+    }
+}
+
+/// The arithmetic that a formula needs. Generated code runs over any [`Real`]; the interpreter over any `Number`, which
+/// need not be `Copy` (multi-precision numbers are not).
+pub trait Number:
+    Clone + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// What a comparison yields.
+    type Mask: Mask;
+
+    /// The number nearest to a double.
+    fn from_f64(value: f64) -> Self;
+    /// √self.
+    fn sqrt(self) -> Self;
+    /// |self|.
+    fn abs(self) -> Self;
+    /// The smaller of the two.
+    fn min(self, other: Self) -> Self;
+    /// The larger of the two.
+    fn max(self, other: Self) -> Self;
+    /// Sine of an angle in radians.
+    fn sin(self) -> Self;
+    /// Cosine of an angle in radians.
+    fn cos(self) -> Self;
+    /// eˣ.
+    fn exp(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self;
+    /// The angle of the point (`x`, `self`), in (−π, π].
+    fn atan2(self, x: Self) -> Self;
+    /// self to a real power.
+    fn powf(self, exponent: Self) -> Self;
+    /// What rounding `self + other` lost: (self + other) − fl(self + other), exactly. Zero in exact arithmetic.
+    fn sum_error(self, other: Self) -> Self;
+    /// What rounding `self · other` lost: self·other − fl(self·other), exactly unless it underflows. Zero in exact arithmetic.
+    fn product_error(self, other: Self) -> Self;
+    /// A power of two s with 1 ≤ s·|self| < 2, for |self| a normal number; 1 for zero, infinity and NaN. Multiplying by it
+    /// is exact. Its derivative is taken as zero: formulas that use it are invariant to it.
+    fn power_of_two_scale(self) -> Self;
+    /// self < other.
+    fn less(self, other: Self) -> Self::Mask;
+    /// self ≤ other.
+    fn less_or_equal(self, other: Self) -> Self::Mask;
+    /// self = other.
+    fn equal(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask holds, `no` elsewhere.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+}
+
+/// A [`Number`] that generated code can run over.
+pub trait Real: Number + Copy {}
+
+impl<T: Number + Copy> Real for T {}
+
+macro_rules! number_for_float {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $split:literal) => {
+        impl Number for $float {
+            type Mask = bool;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                value as $float
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $float::sqrt(self)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $float::abs(self)
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                if other < self { other } else { self }
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if other > self { other } else { self }
+            }
+            #[inline(always)]
+            fn sin(self) -> Self {
+                $float::sin(self)
+            }
+            #[inline(always)]
+            fn cos(self) -> Self {
+                $float::cos(self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                $float::exp(self)
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                $float::ln(self)
+            }
+            #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                $float::atan2(self, x)
+            }
+            #[inline(always)]
+            fn powf(self, exponent: Self) -> Self {
+                $float::powf(self, exponent)
+            }
+            #[inline(always)]
+            fn sum_error(self, other: Self) -> Self {
+                // Knuth's TwoSum.
+                let sum = self + other;
+                let virtual_other = sum - self;
+                (self - (sum - virtual_other)) + (other - virtual_other)
+            }
+            #[inline(always)]
+            fn product_error(self, other: Self) -> Self {
+                let product = self * other;
+                if cfg!(target_feature = "fma") {
+                    return self.mul_add(other, -product);
+                }
+                // Dekker's product: `mul_add` is a slow library call where the target has no fused instruction.
+                let halves = |value: $float| {
+                    let shifted = $split * value;
+                    let high = shifted - (shifted - value);
+                    (high, value - high)
+                };
+                let ((a, b), (c, d)) = (halves(self), halves(other));
+                ((a * c - product) + a * d + b * c) + b * d
+            }
+            #[inline(always)]
+            fn power_of_two_scale(self) -> Self {
+                let exponent = (self.to_bits() >> $mantissa_bits) & $exponent_mask;
+                let inverse: $bits = match exponent {
+                    0 if self != 0.0 => 2 * $bias, // subnormal: the largest power of two there is
+                    0 | $exponent_mask => $bias,   // zero, infinity, NaN: 1
+                    _ => (2 * $bias - exponent).max(1),
+                };
+                $float::from_bits(inverse << $mantissa_bits)
+            }
+            #[inline(always)]
+            fn less(self, other: Self) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn less_or_equal(self, other: Self) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn equal(self, other: Self) -> bool {
+                self == other
+            }
+            #[inline(always)]
+            fn select(mask: bool, yes: Self, no: Self) -> Self {
+                if mask { yes } else { no }
+            }
+        }
+    };
+}
+
+number_for_float!(f64, u64, 52, 0x7ff, 1023, 134_217_729.0);
+number_for_float!(f32, u32, 23, 0xff, 127, 4097.0);
+
+#[cfg(test)]
+mod tests {
+    use super::Number;
+
+    #[test]
+    fn error_terms_are_exact() {
+        let u = f64::EPSILON / 2.0;
+        // (1 + 2u)(1 − u) = 1 + u − 2u² rounds to 1.
+        assert_eq!((1.0 + 2.0 * u).product_error(1.0 - u), u - 2.0 * u * u);
+        // Doubles are 2 apart at 1e16: 1e16 + 1 + 2u rounds up.
+        assert_eq!(1e16_f64.sum_error(1.0 + 2.0 * u), -1.0 + 2.0 * u);
+        assert_eq!(1.0_f32.sum_error(1e-10), 1e-10);
+    }
+
+    #[test]
+    fn scales_are_powers_of_two_and_bring_numbers_near_one() {
+        for value in [1.0, 1.5, -3.0, 1e300, 1e-300, f64::MAX, f64::MIN_POSITIVE, 7e-160] {
+            let scaled = (value * value.power_of_two_scale()).abs();
+            assert!((1.0..2.0).contains(&scaled) || value == f64::MAX, "{value} scaled to {scaled}");
+        }
+        assert_eq!(0.0.power_of_two_scale(), 1.0);
+        assert_eq!(f64::INFINITY.power_of_two_scale(), 1.0);
+        assert_eq!(3e-30_f32.power_of_two_scale().to_bits() << 9, 0);
+    }
+}
