@@ -167,11 +167,12 @@ pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
         return None;
     }
     let (d, length) = (rule.arguments.clone(), rule.value);
-    if let Some(power) = g.as_constant(exponent) {
-        if power > 0.0 && power % 2.0 == 0.0 {
-            let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
-            return Some(g.plain_pow(square, half));
-        }
+    if let Some(power) = g.as_constant(exponent)
+        && power > 0.0
+        && power % 2.0 == 0.0
+    {
+        let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
+        return Some(g.plain_pow(square, half));
     }
     let at = direction(g, &d);
     let (null, one, two) = (g.constant(0.0), g.constant(1.0), g.constant(2.0));

@@ -114,10 +114,10 @@ impl Graph {
         if self.is(b, 0.0) {
             return a;
         }
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_difference(self, a, b) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_difference(self, a, b)
+        {
+            return recognised;
         }
         match (self.magnitude(a), self.magnitude(b)) {
             ((x, true), (y, true)) => self.sub(y, x),
@@ -151,20 +151,21 @@ impl Graph {
             }
         }
         let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
-        if a == b && self.form() == Form::Robust {
-            if let Some(half_square) = self.rule(a).and_then(|r| r.half_square) {
-                let two = self.constant(2.0);
-                let square = self.mul(two, half_square);
-                return self.signed(square, minus_a != minus_b);
-            }
+        if a == b
+            && self.form() == Form::Robust
+            && let Some(half_square) = self.rule(a).and_then(|r| r.half_square)
+        {
+            let two = self.constant(2.0);
+            let square = self.mul(two, half_square);
+            return self.signed(square, minus_a != minus_b);
         }
         // (2ⁿ x)(2ᵐ y) = 2ⁿ⁺ᵐ (x y), exactly.
-        if let (Some((c, x)), Some((d, y))) = (self.scaled_by_constant(a), self.scaled_by_constant(b)) {
-            if [c, d].into_iter().all(|k| self.as_constant(k).is_some_and(is_power_of_two)) {
-                let (constants, product) = (self.mul(c, d), self.mul(x, y));
-                let product = self.mul(constants, product);
-                return self.signed(product, minus_a != minus_b);
-            }
+        if let (Some((c, x)), Some((d, y))) = (self.scaled_by_constant(a), self.scaled_by_constant(b))
+            && [c, d].into_iter().all(|k| self.as_constant(k).is_some_and(is_power_of_two))
+        {
+            let (constants, product) = (self.mul(c, d), self.mul(x, y));
+            let product = self.mul(constants, product);
+            return self.signed(product, minus_a != minus_b);
         }
         let product = self.node(Op::Mul(a.min(b), a.max(b)));
         self.signed(product, minus_a != minus_b)
@@ -229,20 +230,20 @@ impl Graph {
 
     /// sin a; of a dihedral angle or its half, without the angle.
     pub fn sin(&mut self, a: NodeId) -> NodeId {
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralSine) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralSine)
+        {
+            return recognised;
         }
         self.unary(a, f64::sin, Op::Sin)
     }
 
     /// cos a; of a dihedral angle or its half, without the angle.
     pub fn cos(&mut self, a: NodeId) -> NodeId {
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralCosine) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralCosine)
+        {
+            return recognised;
         }
         self.unary(a, f64::cos, Op::Cos)
     }
@@ -274,10 +275,10 @@ impl Graph {
 
     /// a^b: products for integers, a root for halves, `powf` for what is left. A power of a norm is its own primitive.
     pub fn pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_norm_power(self, a, b) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_norm_power(self, a, b)
+        {
+            return recognised;
         }
         self.plain_pow(a, b)
     }
