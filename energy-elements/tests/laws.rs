@@ -3,8 +3,8 @@
 
 use energy_dsl::{ForceLaw, Inputs, Kind, Outputs, Potential};
 use energy_elements::{
-    BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring, StVK,
-    ViscousDrag, ZeroLengthSpring, catalogue, find,
+    BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
+    StVK, ViscousDrag, ZeroLengthSpring, catalogue, find,
 };
 use proptest::prelude::*;
 
@@ -102,7 +102,9 @@ fn coincident_points_return_what_is_documented() {
     let distance = Distance::<f64>::new().hessian(&both);
     assert_eq!((distance.value, distance.gradient, distance.flags.degenerate), (0.0, [ORIGIN; 2], true));
     assert!(!Distance::<f64>::new().value(&both).flags.any(), "the distance itself is regular");
-    for (power, first, second) in [(3.0, false, false), (2.0, false, false), (1.5, false, true), (1.0, true, true), (0.5, true, true)] {
+    for (power, first, second) in
+        [(3.0, false, false), (2.0, false, false), (1.5, false, true), (1.0, true, true), (0.5, true, true)]
+    {
         let law = PowerLaw::new(power);
         assert_eq!(law.gradient(&both).flags.degenerate, first, "α = {power}");
         assert_eq!(law.hessian(&both).flags.degenerate, second, "α = {power}");
@@ -151,7 +153,11 @@ fn springs_pull_by_hookes_law() {
     let x = [ORIGIN, [3.0, 0.0, 4.0]];
     let hooke = HookeSpring::new(10.0, 4.5).gradient(&x);
     assert_eq!(hooke.value, 1.25);
-    assert_eq!(hooke.gradient[0].map(|g| (g * 1e12).round() / 1e12), [-3.0, 0.0, -4.0], "K (PQ − L P̂Q) pulls P towards Q");
+    assert_eq!(
+        hooke.gradient[0].map(|g| (g * 1e12).round() / 1e12),
+        [-3.0, 0.0, -4.0],
+        "K (PQ − L P̂Q) pulls P towards Q"
+    );
     let witkin = Spring::new(4.5, 10.0, 2.0).force(&x, &[ORIGIN, [1.0, 1.0, 0.0]]).force[0];
     // k_s C + k_d n·v = 5 + 2 · 0.6, along the spring.
     for (found, expected) in witkin.iter().zip([6.2 * 0.6, 0.0, 6.2 * 0.8]) {
