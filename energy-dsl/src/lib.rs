@@ -1,5 +1,68 @@
-//! placeholder
+//! A small language for energies, constraints, forces and residuals of points, and its compiler.
+//!
+//! A declaration is a formula with typed inputs. The compiler (feature `compiler`, used by the macro `energy!` of the crate
+//! `energy-macros`) turns it into Rust code for its value and its exact first and second derivatives:
+//!
+//! ```text
+//! text ─ syntax ─► tree ─ check ─► typed program ─ lower ─► graph ─ diff ─► routines ─ emit ─► Rust
+//! ```
+//!
+//! Without that feature the crate is the small runtime that generated code calls: number types ([`Real`]), the traits of
+//! elements ([`Potential`], [`ForceLaw`], [`Constraint`], [`Residual`]) and their self-description ([`Declaration`]).
 #![forbid(unsafe_code)]
+
 extern crate self as energy_dsl;
+
 mod runtime;
+
+#[cfg(feature = "compiler")]
+mod check;
+#[cfg(feature = "compiler")]
+mod diagnostic;
+#[cfg(feature = "compiler")]
+mod diff;
+#[cfg(feature = "compiler")]
+mod emit;
+#[cfg(feature = "compiler")]
+mod functions;
+#[cfg(feature = "compiler")]
+mod graph;
+#[cfg(feature = "compiler")]
+mod interpret;
+#[cfg(feature = "compiler")]
+mod lower;
+#[cfg(feature = "compiler")]
+mod routines;
+#[cfg(feature = "compiler")]
+mod syntax;
+#[cfg(feature = "compiler")]
+mod textbook;
+
 pub use runtime::*;
+
+#[cfg(feature = "compiler")]
+pub use diagnostic::{Diagnostic, Diagnostics};
+#[cfg(feature = "compiler")]
+pub use functions::{Function, all as functions};
+#[cfg(feature = "compiler")]
+pub use textbook::Textbook;
+
+/// Compiles declarations to Rust: the whole of what `energy!` does. Errors become `compile_error!` at their places, beside
+/// stubs of what was declared.
+///
+/// ```
+/// let code = energy_dsl::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());
+/// assert!(code.to_string().contains("struct Spring"));
+/// ```
+#[cfg(feature = "compiler")]
+#[must_use]
+pub fn compile(declarations: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
+    let mut diagnostics = Diagnostics::default();
+    let items = syntax::parse(declarations, &mut diagnostics);
+    let programs = check::check(&items, &mut diagnostics);
+    let code: proc_macro2::TokenStream =
+        programs.iter().map(|program| emit::emit(program, &routines::differentiate(program))).collect();
+    let errors: proc_macro2::TokenStream =
+        diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error()).collect();
+    quote::quote!(#code #errors)
+}

@@ -1,1 +1,45 @@
+//! Declared energies, constraints and forces, one file each: formula, source, and a test that audits its derivatives.
+//!
+//! ```
+//! use energy_dsl::Potential;
+//! use energy_elements::HairBend;
+//!
+//! // A right angle costs k/2.
+//! let bend = HairBend::new(3.0);
+//! let at = bend.value(&[[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+//! assert_eq!(at.value, 1.5);
+//! ```
+#![forbid(unsafe_code)]
+// Formulas keep the symbols of their sources; these lints look at the whole crate, so only the crate can allow them.
+#![allow(confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
+mod catalogue;
+
+pub use catalogue::{CatalogueEntry, catalogue, find};
+
+macro_rules! elements {
+    ($($file:ident: $($name:ident),+;)*) => {
+        $(mod $file; pub use $file::{$($name),+};)*
+    };
+}
+
+elements! {
+    bridson_bending: BridsonBending;
+    bridson_force: BridsonForce;
+    bridson_force_damped: BridsonForceDamped;
+    distance: Distance;
+    distance_squared: DistanceSquared;
+    gravity: Gravity;
+    hair_bend: HairBend;
+    hinge_angle: HingeAngle;
+    hinge_cos: HingeCos;
+    hinge_cos_half: HingeCosHalf;
+    hinge_sin_half: HingeSinHalf;
+    hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
+    power_law: PowerLaw;
+    quadratic_hinge: QuadraticHinge;
+    spring: Spring;
+    stvk: StVK;
+    viscous_drag: ViscousDrag;
+    zero_length_spring: ZeroLengthSpring;
+}

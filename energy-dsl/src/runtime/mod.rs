@@ -4,6 +4,7 @@
 mod array;
 mod declaration;
 mod element;
+mod evaluate;
 mod flags;
 mod real;
 
@@ -14,5 +15,6 @@ pub use element::{
     Hessian, Inputs, Outputs, Potential, Residual, ResidualJacobian, ResidualValue, RestError, Value, Vector3,
     triangle_index,
 };
+pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};
 pub use real::{Mask, Number, Real};

@@ -1,0 +1,146 @@
+use std::collections::BTreeMap;
+
+use super::coordinates::Coordinates;
+use super::differentiable;
+use super::local::local;
+use crate::graph::{Graph, NodeId, Op};
+
+/// Dual parts that are not identically zero, by ascending coordinate.
+pub type Sparse = Vec<(usize, NodeId)>;
+
+/// Σ factorᵢ · partsᵢ.
+pub(super) fn combine(g: &mut Graph, terms: &[(NodeId, &Sparse)]) -> Sparse {
+    let mut sums: BTreeMap<usize, NodeId> = BTreeMap::new();
+    for &(factor, parts) in terms {
+        for &(coordinate, part) in parts {
+            let term = g.mul(factor, part);
+            let sum = match sums.get(&coordinate) {
+                Some(&sum) => g.add(sum, term),
+                None => term,
+            };
+            sums.insert(coordinate, sum);
+        }
+    }
+    sums.into_iter().filter(|&(_, sum)| !g.is(sum, 0.0)).collect()
+}
+
+/// mask ? a : b, part by part.
+pub(super) fn choose(g: &mut Graph, mask: NodeId, a: &Sparse, b: &Sparse) -> Sparse {
+    let zero = g.constant(0.0);
+    let mut places: Vec<usize> = a.iter().chain(b).map(|&(c, _)| c).collect();
+    places.sort_unstable();
+    places.dedup();
+    let find = |parts: &Sparse, place: usize| parts.iter().find(|&&(c, _)| c == place).map_or(zero, |&(_, n)| n);
+    places.into_iter().map(|c| (c, g.select(mask, find(a, c), find(b, c)))).collect()
+}
+
+/// First derivatives of all nodes between the coordinates and `outputs`.
+pub(super) fn tangents(
+    g: &mut Graph,
+    outputs: &[NodeId],
+    coordinates: &Coordinates,
+    second_order: bool,
+) -> BTreeMap<NodeId, Sparse> {
+    let mut tangents: BTreeMap<NodeId, Sparse> = coordinates.seeds.clone();
+    for node in differentiable(g, outputs, second_order) {
+        if tangents.contains_key(&node) {
+            continue;
+        }
+        let none = Sparse::new();
+        let parts = match g.op(node) {
+            Op::Select(mask, a, b) => {
+                let (a, b) = (tangents.get(&a).unwrap_or(&none), tangents.get(&b).unwrap_or(&none));
+                choose(g, mask, a, b)
+            }
+            _ => {
+                let local = local(g, node, second_order);
+                let terms: Vec<_> =
+                    local.operands.iter().zip(&local.first).filter_map(|(o, &f)| Some((f, tangents.get(o)?))).collect();
+                combine(g, &terms)
+            }
+        };
+        tangents.insert(node, parts);
+    }
+    tangents
+}
+
+/// First derivatives of each output by each coordinate, zeros included.
+pub fn first_derivatives(g: &mut Graph, outputs: &[NodeId], coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
+    let tangents = tangents(g, outputs, coordinates, false);
+    let zero = g.constant(0.0);
+    outputs
+        .iter()
+        .map(|output| {
+            let mut dense = vec![zero; coordinates.len()];
+            for &(c, part) in tangents.get(output).into_iter().flatten() {
+                dense[c] = part;
+            }
+            dense
+        })
+        .collect()
+}
+
+/// Second dual parts: entries (i, j), i ≤ j, at i·n + j.
+pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<usize, NodeId> {
+    let n = coordinates.len();
+    let tangents = tangents(g, &[output], coordinates, true);
+    let mut curvatures: BTreeMap<NodeId, Sparse> = BTreeMap::new();
+    let none = Sparse::new();
+    for node in differentiable(g, &[output], true) {
+        if coordinates.seeds.contains_key(&node) {
+            continue;
+        }
+        if let Op::Select(mask, a, b) = g.op(node) {
+            let (a, b) = (curvatures.get(&a).unwrap_or(&none), curvatures.get(&b).unwrap_or(&none));
+            let parts = choose(g, mask, a, b);
+            curvatures.insert(node, parts);
+            continue;
+        }
+        let local = local(g, node, true);
+        let mut own: Vec<(NodeId, Sparse)> = Vec::new();
+        for &(i, j, factor) in &local.second {
+            let (a, b) = (&local.operands[i], &local.operands[j]);
+            let (Some(a), Some(b)) = (tangents.get(a), tangents.get(b)) else { continue };
+            own.push((factor, products(g, a, b, i == j, n)));
+        }
+        let chained = local
+            .operands
+            .iter()
+            .zip(&local.first)
+            .filter_map(|(o, &f)| Some((f, curvatures.get(o)?)))
+            .collect::<Vec<_>>();
+        let terms: Vec<_> = chained.into_iter().chain(own.iter().map(|(f, p)| (*f, p))).collect();
+        let parts = combine(g, &terms);
+        curvatures.insert(node, parts);
+    }
+    curvatures.remove(&output).unwrap_or_default().into_iter().collect()
+}
+
+/// The upper triangle of a aᵀ, or of a bᵀ + b aᵀ.
+pub(super) fn products(g: &mut Graph, a: &Sparse, b: &Sparse, same: bool, n: usize) -> Sparse {
+    let mut sums: BTreeMap<usize, NodeId> = BTreeMap::new();
+    let mut add = |g: &mut Graph, place: usize, term: NodeId| {
+        let sum = match sums.get(&place) {
+            Some(&sum) => g.add(sum, term),
+            None => term,
+        };
+        sums.insert(place, sum);
+    };
+    for &(i, x) in a {
+        for &(j, y) in b {
+            if same && i > j {
+                continue;
+            }
+            let product = g.mul(x, y);
+            match (same, i.cmp(&j)) {
+                (false, std::cmp::Ordering::Equal) => {
+                    let two = g.constant(2.0);
+                    let doubled = g.mul(two, product);
+                    add(g, i * n + j, doubled);
+                }
+                _ => add(g, i.min(j) * n + i.max(j), product),
+            }
+        }
+    }
+    sums.into_iter().collect()
+}

@@ -1,0 +1,182 @@
+use crate::graph::{Graph, NodeId, Op, symmetric_index};
+
+/// An operation's derivatives by its own operands.
+pub(super) struct Local {
+    /// The operands, each once.
+    pub(super) operands: Vec<NodeId>,
+    /// First derivatives.
+    pub(super) first: Vec<NodeId>,
+    /// Second derivatives that are not identically zero: operands i ≤ j.
+    pub(super) second: Vec<(usize, usize, NodeId)>,
+}
+
+impl Local {
+    fn linear(operands: Vec<NodeId>, first: Vec<NodeId>) -> Self {
+        Self { operands, first, second: Vec::new() }
+    }
+
+    fn unary(operand: NodeId, first: NodeId, second: NodeId) -> Self {
+        Self { operands: vec![operand], first: vec![first], second: vec![(0, 0, second)] }
+    }
+}
+
+/// The derivatives of `node` by its operands; second ones only where asked for.
+pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
+    let one = g.constant(1.0);
+    let zero = g.constant(0.0);
+    let two = g.constant(2.0);
+    match g.op(node) {
+        Op::Rule(_) => of_rule(g, node, second_order),
+        Op::Neg(a) => {
+            let minus = g.neg(one);
+            Local::linear(vec![a], vec![minus])
+        }
+        Op::Add(a, b) if a == b => Local::linear(vec![a], vec![two]),
+        Op::Add(a, b) => Local::linear(vec![a, b], vec![one, one]),
+        Op::Sub(a, b) => {
+            let minus = g.neg(one);
+            Local::linear(vec![a, b], vec![one, minus])
+        }
+        Op::Mul(a, b) if a == b => {
+            let slope = g.mul(two, a);
+            Local::unary(a, slope, two)
+        }
+        Op::Mul(a, b) => Local { operands: vec![a, b], first: vec![b, a], second: vec![(0, 1, one)] },
+        Op::Div(a, b) => of_quotient(g, node, a, b),
+        Op::Sqrt(a) => {
+            // p = 1/(2√a); p′ = −2 p³.
+            let half = g.constant(0.5);
+            let slope = g.div(half, node);
+            let square = g.mul(slope, slope);
+            let cube = g.mul(square, slope);
+            let curvature = g.mul(two, cube);
+            let curvature = g.neg(curvature);
+            Local::unary(a, slope, curvature)
+        }
+        Op::Abs(a) => {
+            let minus = g.neg(one);
+            let (negative, at_zero) = (g.less(a, zero), g.equal(a, zero));
+            let sign = g.select(negative, minus, one);
+            let sign = g.select(at_zero, zero, sign);
+            Local::linear(vec![a], vec![sign])
+        }
+        Op::Min(a, b) => {
+            let second = g.less(b, a);
+            choose(g, second, b, a)
+        }
+        Op::Max(a, b) => {
+            let second = g.less(a, b);
+            choose(g, second, b, a)
+        }
+        Op::Select(mask, a, b) => choose(g, mask, a, b),
+        Op::Sin(a) => {
+            let cosine = g.cos(a);
+            let curvature = g.neg(node);
+            Local::unary(a, cosine, curvature)
+        }
+        Op::Cos(a) => {
+            let sine = g.sin(a);
+            let (slope, curvature) = (g.neg(sine), g.neg(node));
+            Local::unary(a, slope, curvature)
+        }
+        Op::Exp(a) => Local::unary(a, node, node),
+        Op::Ln(a) => {
+            let slope = g.div(one, a);
+            let square = g.mul(slope, slope);
+            let curvature = g.neg(square);
+            Local::unary(a, slope, curvature)
+        }
+        Op::Atan2(y, x) => of_atan2(g, y, x),
+        Op::Pow(a, b) => of_power(g, node, a, b),
+        Op::Constant(_)
+        | Op::Pi
+        | Op::Input(_)
+        | Op::SumError(..)
+        | Op::DifferenceError(..)
+        | Op::ProductError(..)
+        | Op::PowerOfTwoScale(_)
+        | Op::Less(..)
+        | Op::LessOrEqual(..)
+        | Op::Equal(..)
+        | Op::And(..)
+        | Op::Or(..)
+        | Op::Not(_) => Local::linear(Vec::new(), Vec::new()),
+    }
+}
+
+fn of_rule(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
+    let rule = g.rule(node).expect("a rule").clone();
+    let n = rule.arguments.len();
+    let Some(second) = rule.second.as_ref().filter(|_| second_order) else {
+        if second_order {
+            let one = g.constant(1.0);
+            return Local::linear(vec![rule.value], vec![one]);
+        }
+        let first = (0..n).map(|i| g.partial(node, i)).collect();
+        return Local::linear(rule.arguments, first);
+    };
+    let second = (0..n)
+        .flat_map(|i| (i..n).map(move |j| (i, j)))
+        .map(|(i, j)| (i, j, second[symmetric_index(n, i, j)]))
+        .filter(|&(_, _, entry)| !g.is(entry, 0.0))
+        .collect();
+    Local { operands: rule.arguments, first: rule.first, second }
+}
+
+/// `mask ? a : b`, whose derivative chooses likewise.
+fn choose(g: &mut Graph, mask: NodeId, a: NodeId, b: NodeId) -> Local {
+    let (one, zero) = (g.constant(1.0), g.constant(0.0));
+    let (by_a, by_b) = (g.select(mask, one, zero), g.select(mask, zero, one));
+    Local::linear(vec![a, b], vec![by_a, by_b])
+}
+
+fn of_quotient(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
+    let one = g.constant(1.0);
+    let reciprocal = g.div(one, b);
+    let slope = g.mul(node, reciprocal);
+    let by_b = g.neg(slope);
+    let square = g.mul(reciprocal, reciprocal);
+    let mixed = g.neg(square);
+    let two = g.constant(2.0);
+    let curvature = g.mul(slope, reciprocal);
+    let curvature = g.mul(two, curvature);
+    Local { operands: vec![a, b], first: vec![reciprocal, by_b], second: vec![(0, 1, mixed), (1, 1, curvature)] }
+}
+
+fn of_atan2(g: &mut Graph, y: NodeId, x: NodeId) -> Local {
+    let square = g.dot(&[x, y], &[x, y]);
+    let (by_y, by_x) = (g.div(x, square), g.div(y, square));
+    let by_x = g.neg(by_x);
+    let two = g.constant(2.0);
+    // With p = ∂/∂y and q = ∂/∂x: ∂²/∂y² = 2pq, ∂²/∂x² = −2pq, ∂²/∂x∂y = q² − p².
+    let product = g.mul(by_y, by_x);
+    let curvature = g.mul(two, product);
+    let opposite = g.neg(curvature);
+    let (pp, qq) = (g.mul(by_y, by_y), g.mul(by_x, by_x));
+    let mixed = g.sub(qq, pp);
+    Local {
+        operands: vec![y, x],
+        first: vec![by_y, by_x],
+        second: vec![(0, 0, curvature), (0, 1, mixed), (1, 1, opposite)],
+    }
+}
+
+fn of_power(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
+    let (one, two) = (g.constant(1.0), g.constant(2.0));
+    let (less_one, less_two) = (g.sub(b, one), g.sub(b, two));
+    let (lower, lowest) = (g.plain_pow(a, less_one), g.plain_pow(a, less_two));
+    let by_a = g.mul(b, lower);
+    let factor = g.mul(b, less_one);
+    let by_aa = g.mul(factor, lowest);
+    if !g.varies(b) {
+        return Local::unary(a, by_a, by_aa);
+    }
+    let log = g.ln(a);
+    let by_b = g.mul(node, log);
+    let by_bb = g.mul(by_b, log);
+    // ∂²/∂a∂b = a^(b−1) (1 + b ln a).
+    let product = g.mul(b, log);
+    let sum = g.add(one, product);
+    let by_ab = g.mul(lower, sum);
+    Local { operands: vec![a, b], first: vec![by_a, by_b], second: vec![(0, 0, by_aa), (0, 1, by_ab), (1, 1, by_bb)] }
+}

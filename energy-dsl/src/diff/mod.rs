@@ -1,0 +1,38 @@
+//! Derivatives of graph nodes, as nodes of the same graph.
+//!
+//! Inputs are first *reduced*: where points enter only through differences, derivatives are taken by those differences
+//! (`coordinates.rs`). First derivatives go forward as sparse dual parts (`forward.rs`); second derivatives either forward
+//! too, or weighted by adjoints (`adjoint.rs`): `plan.rs` takes whichever needs less arithmetic.
+
+mod adjoint;
+mod coordinates;
+mod expand;
+mod forward;
+mod local;
+mod plan;
+
+pub use coordinates::{Coordinates, Moving};
+pub use forward::first_derivatives;
+pub use plan::second_order;
+
+use std::collections::BTreeSet;
+
+use crate::graph::{Graph, NodeId};
+
+/// The nodes through which `outputs` depend on what moves, in topological order. A rule leads on to its arguments, or to its
+/// value where only that can be differentiated.
+fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTreeSet<NodeId> {
+    let mut seen = BTreeSet::new();
+    let mut stack: Vec<NodeId> = outputs.to_vec();
+    while let Some(node) = stack.pop() {
+        if !graph.varies(node) || !seen.insert(node) {
+            continue;
+        }
+        match graph.rule(node) {
+            Some(rule) if second_order && rule.second.is_none() => stack.push(rule.value),
+            Some(rule) => stack.extend(&rule.arguments),
+            None => stack.extend(graph.op(node).operands()),
+        }
+    }
+    seen
+}

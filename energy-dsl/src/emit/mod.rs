@@ -1,0 +1,7 @@
+//! Routines to Rust.
+
+mod declaration;
+mod items;
+mod schedule;
+
+pub use items::emit;

@@ -1,0 +1,151 @@
+use std::collections::BTreeMap;
+
+use proc_macro2::{Literal, TokenStream};
+use quote::{format_ident, quote};
+
+use crate::graph::{Graph, Input, NodeId, Op};
+
+/// How generated code reads an input.
+pub(super) type Reader<'a> = &'a dyn Fn(Input) -> TokenStream;
+
+/// Straight-line code for some nodes: each is computed just before its first use.
+pub(super) struct Schedule<'a> {
+    graph: &'a Graph,
+    read: Reader<'a>,
+    places: BTreeMap<NodeId, TokenStream>,
+    statements: Vec<TokenStream>,
+}
+
+impl<'a> Schedule<'a> {
+    pub(super) fn new(graph: &'a Graph, read: Reader<'a>) -> Self {
+        Self { graph, read, places: BTreeMap::new(), statements: Vec::new() }
+    }
+
+    /// The statements so far.
+    pub(super) fn statements(self) -> TokenStream {
+        self.statements.into_iter().collect()
+    }
+
+    /// The expression that stands for a node, after whatever statements compute it.
+    pub(super) fn value(&mut self, node: NodeId) -> TokenStream {
+        let node = self.graph.resolve(node);
+        // An explicit stack: expressions may be deep.
+        let mut stack = vec![node];
+        while let Some(&next) = stack.last() {
+            if self.places.contains_key(&next) {
+                stack.pop();
+                continue;
+            }
+            let missing: Vec<NodeId> = self
+                .graph
+                .op(next)
+                .operands()
+                .map(|o| self.graph.resolve(o))
+                .filter(|o| !self.places.contains_key(o))
+                .collect();
+            if missing.is_empty() {
+                self.compute(next);
+                stack.pop();
+            } else {
+                stack.extend(missing.into_iter().rev());
+            }
+        }
+        self.places[&node].clone()
+    }
+
+    /// An array of nodes.
+    pub(super) fn array(&mut self, nodes: &[NodeId]) -> TokenStream {
+        let values: Vec<_> = nodes.iter().map(|&n| self.value(n)).collect();
+        quote!([#(#values),*])
+    }
+
+    /// An array of 3-vectors.
+    pub(super) fn vectors(&mut self, nodes: &[NodeId]) -> TokenStream {
+        let vectors: Vec<_> = nodes.chunks(3).map(|v| self.array(v)).collect();
+        quote!([#(#vectors),*])
+    }
+
+    /// An array of 3×3 blocks.
+    pub(super) fn blocks(&mut self, nodes: &[NodeId]) -> TokenStream {
+        let blocks: Vec<_> = nodes.chunks(9).map(|b| self.vectors(b)).collect();
+        quote!([#(#blocks),*])
+    }
+
+    /// A mask, false if there is none.
+    pub(super) fn mask(&mut self, node: Option<NodeId>) -> TokenStream {
+        match node {
+            Some(node) => self.value(node),
+            None => quote!(<T::Mask as ::energy_dsl::Mask>::none()),
+        }
+    }
+
+    fn compute(&mut self, node: NodeId) {
+        if let Op::Input(input) = self.graph.op(node) {
+            self.places.insert(node, (self.read)(input));
+            return;
+        }
+        let expression = self.expression(node);
+        let name = format_ident!("t{}", self.statements.len());
+        self.statements.push(quote!(let #name = #expression;));
+        self.places.insert(node, quote!(#name));
+    }
+
+    fn expression(&self, node: NodeId) -> TokenStream {
+        let p = |node: NodeId| &self.places[&self.graph.resolve(node)];
+        let infix = |a, operator: TokenStream, b| {
+            let (a, b) = (p(a), p(b));
+            quote!(#a #operator #b)
+        };
+        let method = |name: &str, a: NodeId, rest: &[NodeId]| {
+            let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
+            quote!(#a.#name(#(#rest),*))
+        };
+        match self.graph.op(node) {
+            Op::Constant(bits) => {
+                let literal = Literal::f64_suffixed(f64::from_bits(bits).abs());
+                let sign = if f64::from_bits(bits) < 0.0 { quote!(-) } else { quote!() };
+                quote!(T::from_f64(#sign #literal))
+            }
+            Op::Pi => quote!(T::from_f64(::core::f64::consts::PI)),
+            Op::Neg(a) => {
+                let a = p(a);
+                quote!(-#a)
+            }
+            Op::Add(a, b) => infix(a, quote!(+), b),
+            Op::Sub(a, b) => infix(a, quote!(-), b),
+            Op::Mul(a, b) => infix(a, quote!(*), b),
+            Op::Div(a, b) => infix(a, quote!(/), b),
+            Op::And(a, b) => infix(a, quote!(&), b),
+            Op::Or(a, b) => infix(a, quote!(|), b),
+            Op::Not(a) => {
+                let a = p(a);
+                quote!(!#a)
+            }
+            Op::Sqrt(a) => method("sqrt", a, &[]),
+            Op::Abs(a) => method("abs", a, &[]),
+            Op::Min(a, b) => method("min", a, &[b]),
+            Op::Max(a, b) => method("max", a, &[b]),
+            Op::Sin(a) => method("sin", a, &[]),
+            Op::Cos(a) => method("cos", a, &[]),
+            Op::Exp(a) => method("exp", a, &[]),
+            Op::Ln(a) => method("ln", a, &[]),
+            Op::Atan2(a, b) => method("atan2", a, &[b]),
+            Op::Pow(a, b) => method("powf", a, &[b]),
+            Op::SumError(a, b) => method("sum_error", a, &[b]),
+            Op::DifferenceError(a, b) => {
+                let (a, b) = (p(a), p(b));
+                quote!(#a.sum_error(-#b))
+            }
+            Op::ProductError(a, b) => method("product_error", a, &[b]),
+            Op::PowerOfTwoScale(a) => method("power_of_two_scale", a, &[]),
+            Op::Less(a, b) => method("less", a, &[b]),
+            Op::LessOrEqual(a, b) => method("less_or_equal", a, &[b]),
+            Op::Equal(a, b) => method("equal", a, &[b]),
+            Op::Select(mask, a, b) => {
+                let (mask, a, b) = (p(mask), p(a), p(b));
+                quote!(T::select(#mask, #a, #b))
+            }
+            Op::Input(_) | Op::Rule(_) => unreachable!("compiler bug: inputs are read and rules resolved elsewhere"),
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! `+ − · / ^` and their likes, on numbers, vectors and matrices.
+
+use super::{Function, Lowered, Shape};
+use crate::graph::Graph;
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function { name: "+", usage: "a + b", docs: "Sum of equal shapes.", shape: same, lower: add, accuracy: "" },
+    Function { name: "-", usage: "a - b", docs: "Difference of equal shapes.", shape: same, lower: sub, accuracy: "" },
+    Function { name: "neg", usage: "-a", docs: "Negative.", shape: one, lower: neg, accuracy: "" },
+    Function {
+        name: "*",
+        usage: "a * b",
+        docs: "Product: of numbers, of a number with anything, of matrices, of a matrix with a vector.",
+        shape: product,
+        lower: mul,
+        accuracy: "",
+    },
+    Function { name: "/", usage: "a / b", docs: "Quotient by a number.", shape: quotient, lower: div, accuracy: "" },
+    Function {
+        name: "^",
+        usage: "a ^ b",
+        docs: "Power of a number. Integers and halves become products and roots; `norm(d)^α` is one robust primitive; `M^(-1)` is the inverse of a matrix.",
+        shape: power,
+        lower: pow,
+        accuracy: "norm(d)^α: 3 / 3 / 6",
+    },
+];
+
+fn same(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes {
+        [a, b] if a == b && *a != Shape::Truth => Ok(*a),
+        [a, b] => Err(format!("both sides must have the same shape, but the left is {a} and the right is {b}")),
+        _ => Err("takes two operands".into()),
+    }
+}
+
+fn one(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes {
+        [Shape::Truth] => Err("a comparison has no negative; swap its sides".into()),
+        [a] => Ok(*a),
+        _ => Err("takes one operand".into()),
+    }
+}
+
+fn product(shapes: &[Shape]) -> Result<Shape, String> {
+    use Shape::{Matrix, Scalar, Truth, Vector};
+    match *shapes {
+        [Truth, _] | [_, Truth] => Err("a comparison is not a number; use if … { } else { }".into()),
+        [Scalar, other] | [other, Scalar] => Ok(other),
+        [Matrix(r, c), Matrix(r2, c2)] if c == r2 => Ok(Matrix(r, c2)),
+        [Matrix(r, c), Vector(n)] if c == n => Ok(if r == 1 { Scalar } else { Vector(r) }),
+        [Vector(_), Vector(_)] => {
+            Err("two vectors have no product `*`; did you mean dot(a, b), cross(a, b) or outer(a, b)?".into())
+        }
+        [a, b] => Err(format!("inner sizes must agree, but this is {a} times {b}")),
+        _ => Err("takes two operands".into()),
+    }
+}
+
+fn quotient(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Truth, _] => Err("a comparison cannot be divided".into()),
+        [a, Shape::Scalar] => Ok(a),
+        [_, b] => Err(format!("the divisor must be a scalar, but it is {b}")),
+        _ => Err("takes two operands".into()),
+    }
+}
+
+fn power(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Vector(_), _] => Err("a vector has no power; did you mean norm_squared(a)?".into()),
+        [Shape::Matrix(..), _] => Err("a matrix has no power but the inverse, M^(-1) or inverse(M)".into()),
+        [a, Shape::Scalar] => Err(format!("the base must be a scalar, but it is {a}")),
+        [_, b] => Err(format!("the exponent must be a scalar, but it is {b}")),
+        _ => Err("takes two operands".into()),
+    }
+}
+
+fn by_parts(
+    g: &mut Graph,
+    args: &[Lowered],
+    op: fn(&mut Graph, crate::graph::NodeId, crate::graph::NodeId) -> crate::graph::NodeId,
+) -> Lowered {
+    let parts = args[0].parts.iter().zip(&args[1].parts).map(|(&a, &b)| op(g, a, b)).collect();
+    Lowered { shape: args[0].shape, parts }
+}
+
+fn add(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    by_parts(g, args, Graph::add)
+}
+
+fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    by_parts(g, args, Graph::sub)
+}
+
+fn neg(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    Lowered { shape: args[0].shape, parts: args[0].parts.iter().map(|&a| g.neg(a)).collect() }
+}
+
+fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    let (a, b) = (&args[0], &args[1]);
+    match (a.shape, b.shape) {
+        (Shape::Scalar, _) => Lowered { shape: b.shape, parts: g.scaled(a.node(), &b.parts) },
+        (_, Shape::Scalar) => Lowered { shape: a.shape, parts: g.scaled(b.node(), &a.parts) },
+        _ => {
+            let ((rows, inner), (_, columns)) = (a.dimensions(), b.dimensions());
+            let mut parts = Vec::with_capacity(rows * columns);
+            for i in 0..rows {
+                for j in 0..columns {
+                    let terms: Vec<_> = (0..inner).map(|k| g.mul(a.at(i, k), b.at(k, j))).collect();
+                    parts.push(g.sum(terms));
+                }
+            }
+            match b.shape {
+                Shape::Vector(_) if rows == 1 => Lowered::scalar(parts[0]),
+                Shape::Vector(_) => Lowered::vector(parts),
+                _ => Lowered::matrix(rows, columns, parts),
+            }
+        }
+    }
+}
+
+fn div(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    let divisor = args[1].node();
+    Lowered { shape: args[0].shape, parts: args[0].parts.iter().map(|&a| g.div(a, divisor)).collect() }
+}
+
+fn pow(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    Lowered::scalar(g.pow(args[0].node(), args[1].node()))
+}

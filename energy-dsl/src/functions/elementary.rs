@@ -1,0 +1,151 @@
+//! Functions of one number, and of two.
+
+use super::{Function, Lowered, Shape};
+use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+
+macro_rules! scalar_function {
+    ($name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal, |$g:ident, $args:ident| $body:expr) => {
+        Function {
+            name: $name,
+            usage: $usage,
+            docs: $docs,
+            shape: $shape,
+            lower: |$g, $args| Lowered::scalar($body),
+            accuracy: $accuracy,
+        }
+    };
+}
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    scalar_function!("sqrt", "sqrt(x)", "√x, x ≥ 0.", one_scalar, "1", |g, a| g.sqrt(a[0].node())),
+    scalar_function!("exp", "exp(x)", "eˣ.", one_scalar, "1", |g, a| g.exp(a[0].node())),
+    scalar_function!("log", "log(x)", "Natural logarithm, x > 0.", one_scalar, "1", |g, a| g.ln(a[0].node())),
+    scalar_function!(
+        "sin",
+        "sin(x)",
+        "Sine of an angle in radians; of a dihedral angle or its half without the angle.",
+        one_scalar,
+        "1",
+        |g, a| g.sin(a[0].node())
+    ),
+    scalar_function!(
+        "cos",
+        "cos(x)",
+        "Cosine of an angle in radians; of a dihedral angle or its half without the angle.",
+        one_scalar,
+        "1",
+        |g, a| g.cos(a[0].node())
+    ),
+    scalar_function!("sin_half", "sin_half(x)", "sin(x/2).", one_scalar, "4 / 5 / 9 for a dihedral angle", |g, a| {
+        let half = half(g, a[0].node());
+        g.sin(half)
+    }),
+    scalar_function!("cos_half", "cos_half(x)", "cos(x/2).", one_scalar, "4 / 5 / 9 for a dihedral angle", |g, a| {
+        let half = half(g, a[0].node());
+        g.cos(half)
+    }),
+    scalar_function!(
+        "atan2",
+        "atan2(y, x)",
+        "The angle of the point (x, y), in (−π, π].",
+        two_scalars,
+        "1",
+        |g, a| g.atan2(a[0].node(), a[1].node())
+    ),
+    scalar_function!("abs", "abs(x)", "|x|; its derivative at 0 is taken as 0.", one_scalar, "0", |g, a| g
+        .abs(a[0].node())),
+    scalar_function!(
+        "min",
+        "min(a, b)",
+        "The smaller; where equal, the derivative of the first.",
+        two_scalars,
+        "0",
+        |g, a| g.min(a[0].node(), a[1].node())
+    ),
+    scalar_function!(
+        "max",
+        "max(a, b)",
+        "The larger; where equal, the derivative of the first.",
+        two_scalars,
+        "0",
+        |g, a| g.max(a[0].node(), a[1].node())
+    ),
+    scalar_function!(
+        "one_minus_cos",
+        "one_minus_cos(x)",
+        "1 − cos x = 2 sin²(x/2), without cancellation at 0.",
+        one_scalar,
+        "2 / 1 / 1",
+        |g, a| versine(g, a[0].node())
+    ),
+    scalar_function!(
+        "x_minus_sin",
+        "x_minus_sin(x)",
+        "x − sin x, by its series for |x| < 1, without cancellation at 0.",
+        one_scalar,
+        "5 / 2 / 1",
+        |g, a| sine_remainder(g, a[0].node())
+    ),
+];
+
+pub(super) fn one_scalar(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes {
+        [Shape::Scalar] => Ok(Shape::Scalar),
+        [other] => Err(format!("takes a scalar, but this is {other}")),
+        _ => Err(format!("takes one scalar, but there are {} arguments", shapes.len())),
+    }
+}
+
+pub(super) fn two_scalars(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes {
+        [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
+        [a, b] => Err(format!("takes two scalars, but these are {a} and {b}")),
+        _ => Err(format!("takes two scalars, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn half(g: &mut Graph, x: NodeId) -> NodeId {
+    let half = g.constant(0.5);
+    g.mul(half, x)
+}
+
+/// 1 − cos x: first derivative sin x, second cos x.
+fn versine(g: &mut Graph, x: NodeId) -> NodeId {
+    let cosine = g.cos(x);
+    if g.form() == Form::Textbook {
+        let one = g.constant(1.0);
+        return g.sub(one, cosine);
+    }
+    let half = half(g, x);
+    let sine_half = g.sin(half);
+    let (square, two) = (g.mul(sine_half, sine_half), g.constant(2.0));
+    let value = g.mul(two, square);
+    let sine = g.sin(x);
+    g.add_rule(Rule::smooth(Primitive::Versine, vec![x], value, vec![sine], vec![cosine]), &[])
+}
+
+/// x − sin x: first derivative 1 − cos x, second sin x.
+fn sine_remainder(g: &mut Graph, x: NodeId) -> NodeId {
+    let sine = g.sin(x);
+    let direct = g.sub(x, sine);
+    if g.form() == Form::Textbook {
+        return direct;
+    }
+    // x³/6 (1 − x²/(4·5) (1 − x²/(6·7) (…))): eight terms reach 1e-17 at |x| = 1.
+    let (one, square) = (g.constant(1.0), g.mul(x, x));
+    let mut series = one;
+    for k in (2..=8).rev() {
+        let divisor = g.constant(f64::from(2 * k * (2 * k + 1)));
+        let ratio = g.div(square, divisor);
+        let term = g.mul(ratio, series);
+        series = g.sub(one, term);
+    }
+    let (six, cube) = (g.constant(6.0), g.mul(square, x));
+    let leading = g.div(cube, six);
+    let small = g.mul(leading, series);
+    let magnitude = g.abs(x);
+    let near = g.less(magnitude, one);
+    let value = g.select(near, small, direct);
+    let first = versine(g, x);
+    g.add_rule(Rule::smooth(Primitive::SineRemainder, vec![x], value, vec![first], vec![sine]), &[])
+}

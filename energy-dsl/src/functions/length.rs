@@ -1,0 +1,283 @@
+//! Lengths: ‖d‖, d/‖d‖, ‖d‖^α, ‖d‖ − L and its square, with their own derivatives.
+//!
+//! Vectors are scaled by a power of two first, so that no square overflows or vanishes. With n = d/‖d‖, r = ‖d‖ and
+//! P = I − n nᵀ: ∇r = n and ∇²r = P/r, the diagonal of P being the sum of the *other* squares, never 1 − nᵢ².
+
+use super::{Function, Lowered, Shape};
+use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use crate::runtime::Flag;
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
+        name: "norm",
+        usage: "norm(d) or ‖d‖",
+        docs: "Length of a vector. At 0 its derivatives are taken as 0 and flagged. `norm(d) - L` is the elongation, one robust primitive, and so is its square.",
+        shape: vector_to_scalar,
+        lower: norm,
+        accuracy: "2 / 2 / 6",
+    },
+    Function {
+        name: "norm_squared",
+        usage: "norm_squared(d) or ‖d‖²",
+        docs: "d·d.",
+        shape: vector_to_scalar,
+        lower: norm_squared,
+        accuracy: "3 / 1 / 0",
+    },
+    Function {
+        name: "unit",
+        usage: "unit(d) or â",
+        docs: "d/‖d‖. At 0 it is taken as 0 and flagged.",
+        shape: vector_to_vector,
+        lower: unit,
+        accuracy: "2 / 5 / 8",
+    },
+];
+
+fn vector_to_scalar(shapes: &[Shape]) -> Result<Shape, String> {
+    vector_to_vector(shapes).map(|_| Shape::Scalar)
+}
+
+fn vector_to_vector(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [v @ Shape::Vector(_)] => Ok(v),
+        [other] => Err(format!("takes a vector, but this is {other}")),
+        _ => Err(format!("takes one vector, but there are {} arguments", shapes.len())),
+    }
+}
+
+/// A vector d, scaled, with its length and direction.
+pub(super) struct Direction {
+    /// The power of two.
+    pub(super) scale: NodeId,
+    /// scale · d.
+    pub(super) scaled: Vec<NodeId>,
+    /// ‖scale · d‖.
+    pub(super) length: NodeId,
+    /// Whether d = 0.
+    pub(super) zero: NodeId,
+    /// 1/‖scale · d‖, or 0 where d = 0.
+    pub(super) reciprocal: NodeId,
+    /// d/‖d‖, or 0 where d = 0.
+    pub(super) unit: Vec<NodeId>,
+}
+
+/// A power of two that brings the largest of the numbers near 1.
+pub(super) fn common_scale(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
+    let magnitudes: Vec<_> = numbers.iter().map(|&x| g.abs(x)).collect();
+    let largest = magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components");
+    g.power_of_two_scale(largest)
+}
+
+/// Scales `d` by `scale` and finds its direction.
+pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Direction {
+    let scaled = g.scaled(scale, d);
+    let square = g.sum_of_squares(&scaled);
+    let length = g.sqrt(square);
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let zero = g.equal(square, null);
+    let reciprocal = g.div(one, length);
+    let reciprocal = g.select(zero, null, reciprocal);
+    let unit = g.scaled(reciprocal, &scaled);
+    Direction { scale, scaled, length, zero, reciprocal, unit }
+}
+
+/// Finds the direction of `d`.
+pub(super) fn direction(g: &mut Graph, d: &[NodeId]) -> Direction {
+    let scale = common_scale(g, d);
+    direction_scaled(g, d, scale)
+}
+
+/// The entries of P = I − n nᵀ, each by `entry(i, j)`: off the diagonal −nᵢ nⱼ, on it the other squares.
+pub(super) fn projector(g: &mut Graph, n: &[NodeId], i: usize, j: usize) -> NodeId {
+    if i == j {
+        let others: Vec<_> = n.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, &x)| x).collect();
+        return g.sum_of_squares(&others);
+    }
+    let product = g.mul(n[i], n[j]);
+    g.neg(product)
+}
+
+/// All (i, j) with i ≤ j < n.
+pub(super) fn upper(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
+}
+
+fn norm(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    let d = &args[0].parts;
+    if g.form() == Form::Textbook {
+        let square = g.sum_of_squares(d);
+        return Lowered::scalar(g.sqrt(square));
+    }
+    let at = direction(g, d);
+    let value = g.div(at.length, at.scale);
+    let curvature = g.mul(at.reciprocal, at.scale);
+    let second = upper(d.len())
+        .map(|(i, j)| {
+            let entry = projector(g, &at.unit, i, j);
+            g.mul(curvature, entry)
+        })
+        .collect();
+    let rule = Rule::smooth(Primitive::Norm, d.clone(), value, at.unit.clone(), second);
+    Lowered::scalar(g.add_rule(rule.flagged(1, Flag::Degenerate, at.zero), &[]))
+}
+
+fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    Lowered::scalar(g.sum_of_squares(&args[0].parts))
+}
+
+fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    let d = &args[0].parts;
+    if g.form() == Form::Textbook {
+        let square = g.sum_of_squares(d);
+        let length = g.sqrt(square);
+        return Lowered::vector(d.iter().map(|&x| g.div(x, length)).collect::<Vec<_>>());
+    }
+    let at = direction(g, d);
+    let (n, m) = (&at.unit, d.len());
+    let curvature = g.mul(at.reciprocal, at.scale);
+    let square = g.mul(curvature, curvature);
+    let component = |g: &mut Graph, i: usize| {
+        let first = (0..m)
+            .map(|j| {
+                let entry = projector(g, n, i, j);
+                g.mul(curvature, entry)
+            })
+            .collect();
+        // ∂²nᵢ/∂dⱼ∂dₖ = −(Pᵢⱼ nₖ + Pᵢₖ nⱼ + Pⱼₖ nᵢ)/r².
+        let second = upper(m)
+            .map(|(j, k)| {
+                let p = [projector(g, n, i, j), projector(g, n, i, k), projector(g, n, j, k)];
+                let sum = g.dot(&p, &[n[k], n[j], n[i]]);
+                let entry = g.mul(square, sum);
+                g.neg(entry)
+            })
+            .collect();
+        let rule = Rule::smooth(Primitive::Unit(i as u8), d.clone(), n[i], first, second);
+        g.add_rule(rule.flagged(0, Flag::Degenerate, at.zero), &[])
+    };
+    Lowered::vector((0..m).map(|i| component(g, i)).collect::<Vec<_>>())
+}
+
+/// ‖d‖^α with α a parameter or a constant: gradient h d, Hessian h (I + (α − 2) n nᵀ), h = α ‖d‖^(α−2). An even constant
+/// power is a polynomial of d·d. At d = 0 both are their limits, or 0 and flagged where there is none.
+pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId) -> Option<NodeId> {
+    let rule = g.rule(base).filter(|r| r.primitive == Primitive::Norm)?;
+    if g.varies(exponent) {
+        return None;
+    }
+    let (d, length) = (rule.arguments.clone(), rule.value);
+    if let Some(power) = g.as_constant(exponent) {
+        if power > 0.0 && power % 2.0 == 0.0 {
+            let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
+            return Some(g.plain_pow(square, half));
+        }
+    }
+    let at = direction(g, &d);
+    let (null, one, two) = (g.constant(0.0), g.constant(1.0), g.constant(2.0));
+    let value = g.plain_pow(length, exponent);
+    let less_two = g.sub(exponent, two);
+    let power = g.plain_pow(length, less_two);
+    let slope = g.mul(exponent, power);
+    let below_two = g.less(exponent, two);
+    let singular = g.and(at.zero, below_two);
+    let slope = g.select(singular, null, slope);
+    let first = g.scaled(slope, &d);
+    let second = upper(d.len())
+        .map(|(i, j)| {
+            let product = g.mul(at.unit[i], at.unit[j]);
+            let mut entry = g.mul(less_two, product);
+            if i == j {
+                entry = g.add(one, entry);
+            }
+            g.mul(slope, entry)
+        })
+        .collect();
+    let at_most_one = g.less_or_equal(exponent, one);
+    let cone = g.and(at.zero, at_most_one);
+    let rule = Rule::smooth(Primitive::NormPower, d, value, first, second);
+    let rule = rule.flagged(1, Flag::Degenerate, cone).flagged(2, Flag::Degenerate, singular);
+    Some(g.add_rule(rule, &[exponent]))
+}
+
+/// ‖d‖ − L with L a length that does not move: C = (d·d − L²)/(‖d‖ + L), the numerator in double-double arithmetic with the
+/// rounding errors of the edge itself. Its half square ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ,
+/// which are right at d = 0 too where L = 0.
+pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: NodeId) -> Option<NodeId> {
+    let rule = g.rule(norm).filter(|r| r.primitive == Primitive::Norm)?;
+    if g.varies(rest_length) {
+        return None;
+    }
+    let d = rule.arguments.clone();
+    let mut sizes = d.clone();
+    sizes.push(rest_length);
+    let scale = common_scale(g, &sizes);
+    let at = direction_scaled(g, &d, scale);
+    let length = g.mul(scale, rest_length);
+    let numerator = excess_of_squares(g, &d, &at, length);
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let sum = g.add(at.length, length);
+    let slack = g.equal(length, null);
+    let regular_at_zero = g.and(at.zero, slack);
+    let denominator = g.select(regular_at_zero, one, sum);
+    let scaled_value = g.div(numerator, denominator);
+    let value = g.div(scaled_value, scale);
+
+    let curvature = g.mul(at.reciprocal, scale);
+    let second = upper(d.len())
+        .map(|(i, j)| {
+            let entry = projector(g, &at.unit, i, j);
+            g.mul(curvature, entry)
+        })
+        .collect();
+
+    // C/r, at d = 0 its limit 1 for a spring without rest length, else 0.
+    let ratio = g.mul(scaled_value, at.reciprocal);
+    let at_zero = g.select(slack, one, null);
+    let ratio = g.select(at.zero, at_zero, ratio);
+    let inverse_stretch = g.mul(length, at.reciprocal);
+    let along = g.scaled(inverse_stretch, &at.unit);
+    let half = g.constant(0.5);
+    let square = g.mul(value, value);
+    let half_value = g.mul(half, square);
+    let half_first = g.scaled(ratio, &d);
+    let half_second = upper(d.len())
+        .map(|(i, j)| {
+            let entry = g.mul(along[i], at.unit[j]);
+            if i == j { g.add(ratio, entry) } else { entry }
+        })
+        .collect();
+    let not_slack = g.not(slack);
+    let collapsed = g.and(at.zero, not_slack);
+    let half_square = Rule::smooth(Primitive::HalfElongationSquared, d.clone(), half_value, half_first, half_second)
+        .flagged(1, Flag::Degenerate, collapsed);
+    let half_square = g.add_rule(half_square, &[rest_length]);
+
+    let mut rule =
+        Rule::smooth(Primitive::Elongation, d, value, at.unit.clone(), second).flagged(1, Flag::Degenerate, at.zero);
+    rule.half_square = Some(half_square);
+    Some(g.add_rule(rule, &[rest_length]))
+}
+
+/// d·d − L² of the scaled vector and length, as if in twice the precision, including what rounding d lost.
+fn excess_of_squares(g: &mut Graph, d: &[NodeId], at: &Direction, length: NodeId) -> NodeId {
+    let squares: Vec<_> = at.scaled.iter().map(|&e| g.mul(e, e)).collect();
+    let length_squared = g.mul(length, length);
+    let mut errors: Vec<_> = at.scaled.iter().map(|&e| g.product_error(e, e)).collect();
+    let mut sum = squares[0];
+    for &square in &squares[1..] {
+        errors.push(g.sum_error(sum, square));
+        sum = g.add(sum, square);
+    }
+    errors.push(g.difference_error(sum, length_squared));
+    let excess = g.sub(sum, length_squared);
+    let length_error = g.product_error(length, length);
+    let tails: Vec<_> = d.iter().map(|&x| g.rounding_tail(x)).collect();
+    let along = g.dot(&at.scaled, &tails);
+    let two = g.constant(2.0);
+    let twice = g.mul(two, at.scale);
+    errors.push(g.mul(twice, along));
+    let errors = g.sum(errors);
+    let errors = g.sub(errors, length_error);
+    g.add(excess, errors)
+}

@@ -1,0 +1,257 @@
+//! Products, transposes and inverses of vectors and matrices, and how they are put together.
+
+use super::{Function, Lowered, Shape};
+use crate::graph::{Graph, NodeId};
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
+        name: "dot",
+        usage: "dot(a, b) or a·b",
+        docs: "Inner product; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive.",
+        shape: dot_shape,
+        lower: dot,
+        accuracy: "",
+    },
+    Function {
+        name: "cross",
+        usage: "cross(a, b) or a × b",
+        docs: "Cross product of 3-vectors; of two numbers, their product.",
+        shape: cross_shape,
+        lower: cross,
+        accuracy: "",
+    },
+    Function { name: "outer", usage: "outer(a, b)", docs: "a bᵀ.", shape: outer_shape, lower: outer, accuracy: "" },
+    Function {
+        name: "ddot",
+        usage: "ddot(A, B)",
+        docs: "Σᵢⱼ Aᵢⱼ Bᵢⱼ = tr AᵀB.",
+        shape: ddot_shape,
+        lower: dot,
+        accuracy: "",
+    },
+    Function {
+        name: "transpose",
+        usage: "transpose(A) or Aᵀ",
+        docs: "Transpose; of a vector, a row.",
+        shape: transpose_shape,
+        lower: transpose,
+        accuracy: "",
+    },
+    Function {
+        name: "trace",
+        usage: "trace(A)",
+        docs: "Sum of the diagonal.",
+        shape: square_to_scalar,
+        lower: trace,
+        accuracy: "",
+    },
+    Function {
+        name: "det",
+        usage: "det(A)",
+        docs: "Determinant of a 2×2 or 3×3 matrix.",
+        shape: square_to_scalar,
+        lower: det,
+        accuracy: "",
+    },
+    Function {
+        name: "inverse",
+        usage: "inverse(A)",
+        docs: "Inverse of a 2×2 or 3×3 matrix.",
+        shape: square_to_square,
+        lower: inverse,
+        accuracy: "",
+    },
+    Function {
+        name: "identity",
+        usage: "identity(2) or identity(3)",
+        docs: "Unit matrix.",
+        shape: identity_shape,
+        lower: identity,
+        accuracy: "0",
+    },
+    Function {
+        name: "columns",
+        usage: "columns(a, b, …)",
+        docs: "The matrix of those columns.",
+        shape: columns_shape,
+        lower: columns,
+        accuracy: "0",
+    },
+    Function {
+        name: "vector",
+        usage: "vector(x, y, …)",
+        docs: "The vector of those numbers.",
+        shape: vector_shape,
+        lower: vector,
+        accuracy: "0",
+    },
+];
+
+fn dot_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Vector(a), Shape::Vector(b)] if a == b => Ok(Shape::Scalar),
+        [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Scalar, other] | [other, Shape::Scalar] => Ok(other),
+        [a, b] => Err(format!("takes two vectors of the same length, but these are {a} and {b}")),
+        _ => Err(format!("takes two vectors, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn cross_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Vector(3), Shape::Vector(3)] => Ok(Shape::Vector(3)),
+        [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Scalar, other] | [other, Shape::Scalar] => Ok(other),
+        [a, b] => Err(format!("takes two 3-vectors, but these are {a} and {b}")),
+        _ => Err(format!("takes two 3-vectors, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn outer_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Vector(a), Shape::Vector(b)] => Ok(Shape::Matrix(a, b)),
+        [a, b] => Err(format!("takes two vectors, but these are {a} and {b}")),
+        _ => Err(format!("takes two vectors, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn ddot_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [a @ Shape::Matrix(..), b] if a == b => Ok(Shape::Scalar),
+        [a, b] => Err(format!("takes two matrices of the same shape, but these are {a} and {b}")),
+        _ => Err(format!("takes two matrices, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn transpose_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Matrix(r, c)] => Ok(Shape::Matrix(c, r)),
+        [Shape::Vector(n)] => Ok(Shape::Matrix(1, n)),
+        [other] => Err(format!("takes a matrix or a vector, but this is {other}")),
+        _ => Err(format!("takes one matrix, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn square_to_square(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Matrix(r @ (2 | 3), c)] if r == c => Ok(shapes[0]),
+        [other] => Err(format!("takes a 2×2 or 3×3 matrix, but this is {other}")),
+        _ => Err(format!("takes one matrix, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn square_to_scalar(shapes: &[Shape]) -> Result<Shape, String> {
+    square_to_square(shapes).map(|_| Shape::Scalar)
+}
+
+/// The checker has turned `identity(n)` into n numbers: the shape follows from their count.
+fn identity_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes.len() {
+        n @ (2 | 3) => Ok(Shape::Matrix(n as u8, n as u8)),
+        _ => Err("takes the number 2 or 3".into()),
+    }
+}
+
+fn columns_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Vector(n), ref rest @ ..]
+            if rest.iter().all(|s| *s == Shape::Vector(n)) && (1..=2).contains(&rest.len()) =>
+        {
+            Ok(Shape::Matrix(n, rest.len() as u8 + 1))
+        }
+        _ => Err("takes two or three vectors of the same length".into()),
+    }
+}
+
+fn vector_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes.len() {
+        n @ 2..=4 if shapes.iter().all(|s| *s == Shape::Scalar) => Ok(Shape::Vector(n as u8)),
+        _ => Err("takes two to four scalars".into()),
+    }
+}
+
+fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let (x, y) = (&a[0], &a[1]);
+    match (x.shape, y.shape) {
+        (Shape::Scalar, _) => Lowered { shape: y.shape, parts: g.scaled(x.node(), &y.parts) },
+        (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
+        _ => match super::angle::recognise_cosine(g, &x.parts, &y.parts) {
+            Some(cosine) => Lowered::scalar(cosine),
+            None => Lowered::scalar(g.dot(&x.parts, &y.parts)),
+        },
+    }
+}
+
+fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let (x, y) = (&a[0], &a[1]);
+    match (x.shape, y.shape) {
+        (Shape::Scalar, _) => Lowered { shape: y.shape, parts: g.scaled(x.node(), &y.parts) },
+        (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
+        _ => Lowered::vector(g.cross(&x.parts, &y.parts)),
+    }
+}
+
+fn outer(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let mut parts = Vec::new();
+    for &x in &a[0].parts {
+        parts.extend(g.scaled(x, &a[1].parts));
+    }
+    Lowered::matrix(a[0].parts.len(), a[1].parts.len(), parts)
+}
+
+fn transpose(_: &mut Graph, a: &[Lowered]) -> Lowered {
+    let (rows, columns) = a[0].dimensions();
+    let parts = (0..columns).flat_map(|j| (0..rows).map(move |i| (i, j))).map(|(i, j)| a[0].at(i, j)).collect();
+    Lowered::matrix(columns, rows, parts)
+}
+
+fn trace(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let n = a[0].dimensions().0;
+    let diagonal: Vec<_> = (0..n).map(|i| a[0].at(i, i)).collect();
+    Lowered::scalar(g.sum(diagonal))
+}
+
+fn minor(g: &mut Graph, m: &Lowered, (i, j): (usize, usize), (k, l): (usize, usize)) -> NodeId {
+    let (plus, minus) = (g.mul(m.at(i, k), m.at(j, l)), g.mul(m.at(i, l), m.at(j, k)));
+    g.sub(plus, minus)
+}
+
+/// Cofactors of a 3×3 matrix, row by row; of a 2×2 matrix likewise.
+fn cofactors(g: &mut Graph, m: &Lowered) -> Vec<NodeId> {
+    if m.dimensions().0 == 2 {
+        let (b, c) = (g.neg(m.at(0, 1)), g.neg(m.at(1, 0)));
+        return vec![m.at(1, 1), c, b, m.at(0, 0)];
+    }
+    let others = |i: usize| ((i + 1) % 3, (i + 2) % 3);
+    (0..9).map(|e| minor(g, m, others(e / 3), others(e % 3))).collect()
+}
+
+fn det(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let n = a[0].dimensions().0;
+    let cofactors = cofactors(g, &a[0]);
+    Lowered::scalar(g.dot(&a[0].parts[..n], &cofactors[..n]))
+}
+
+fn inverse(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let n = a[0].dimensions().0;
+    let cofactors = cofactors(g, &a[0]);
+    let determinant = g.dot(&a[0].parts[..n], &cofactors[..n]);
+    let parts = (0..n * n).map(|e| g.div(cofactors[(e % n) * n + e / n], determinant)).collect();
+    Lowered::matrix(n, n, parts)
+}
+
+fn identity(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let n = a.len();
+    let parts = (0..n * n).map(|e| g.constant(f64::from(u8::from(e / n == e % n)))).collect();
+    Lowered::matrix(n, n, parts)
+}
+
+fn columns(_: &mut Graph, a: &[Lowered]) -> Lowered {
+    let rows = a[0].parts.len();
+    let parts = (0..rows).flat_map(|i| a.iter().map(move |column| column.parts[i])).collect();
+    Lowered::matrix(rows, a.len(), parts)
+}
+
+fn vector(_: &mut Graph, a: &[Lowered]) -> Lowered {
+    Lowered::vector(a.iter().map(Lowered::node).collect::<Vec<_>>())
+}

@@ -1,0 +1,429 @@
+//! Constructors of nodes. They fold constants, zeros and ones, move signs outwards, and order the operands of what commutes,
+//! so that equal expressions meet. No rewrite here changes how a result is rounded, save that a product with constants
+//! that are powers of two is regrouped, which is exact.
+
+use super::{Form, Graph, Input, NodeId, Op, Primitive};
+
+impl Graph {
+    pub(crate) fn push(&mut self, op: Op, varies: bool) -> NodeId {
+        let id = NodeId(u32::try_from(self.nodes.len()).expect("fewer than 2³² nodes"));
+        self.nodes.push(op);
+        self.varies.push(varies);
+        id
+    }
+
+    fn node(&mut self, op: Op) -> NodeId {
+        if let Some(&id) = self.index.get(&op) {
+            return id;
+        }
+        let varies = match op {
+            Op::Input(Input::Position(_) | Input::Velocity(_)) => true,
+            _ => op.operands().any(|o| self.varies(o)),
+        };
+        let id = self.push(op, varies);
+        self.index.insert(op, id);
+        id
+    }
+
+    /// A constant.
+    pub fn constant(&mut self, value: f64) -> NodeId {
+        // One zero: where its sign matters, code asks for it by a selection.
+        self.node(Op::Constant((value + 0.0).to_bits()))
+    }
+
+    /// π.
+    pub fn pi(&mut self) -> NodeId {
+        self.node(Op::Pi)
+    }
+
+    /// An input.
+    pub fn input(&mut self, input: Input) -> NodeId {
+        self.node(Op::Input(input))
+    }
+
+    /// The number a node always is, if it is one.
+    #[must_use]
+    pub fn as_constant(&self, node: NodeId) -> Option<f64> {
+        match self.op(node) {
+            Op::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// Whether the node is the constant `value`.
+    #[must_use]
+    pub fn is(&self, node: NodeId, value: f64) -> bool {
+        self.as_constant(node) == Some(value)
+    }
+
+    /// The node without its leading minus sign, and whether it had one.
+    fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
+        match self.op(node) {
+            Op::Neg(a) => (a, true),
+            _ => (node, false),
+        }
+    }
+
+    fn signed(&mut self, node: NodeId, negative: bool) -> NodeId {
+        if negative { self.neg(node) } else { node }
+    }
+
+    /// −a.
+    pub fn neg(&mut self, a: NodeId) -> NodeId {
+        match self.op(a) {
+            Op::Constant(bits) => self.constant(-f64::from_bits(bits)),
+            Op::Neg(b) => b,
+            Op::Sub(b, c) => self.node(Op::Sub(c, b)),
+            _ => self.node(Op::Neg(a)),
+        }
+    }
+
+    /// a + b.
+    pub fn add(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
+            return self.constant(x + y);
+        }
+        if self.is(a, 0.0) {
+            return b;
+        }
+        if self.is(b, 0.0) {
+            return a;
+        }
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => {
+                let sum = self.add(x, y);
+                self.neg(sum)
+            }
+            ((x, true), (y, false)) => self.sub(y, x),
+            ((x, false), (y, true)) => self.sub(x, y),
+            _ => self.node(Op::Add(a.min(b), a.max(b))),
+        }
+    }
+
+    /// a − b. With a = 1 and b a cosine between vectors, 1 − cos of the angle; with a = ‖d‖ and b a length, the elongation.
+    pub fn sub(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
+            return self.constant(x - y);
+        }
+        if a == b {
+            return self.constant(0.0);
+        }
+        if self.is(a, 0.0) {
+            return self.neg(b);
+        }
+        if self.is(b, 0.0) {
+            return a;
+        }
+        if self.form() == Form::Robust {
+            if let Some(recognised) = crate::functions::recognise_difference(self, a, b) {
+                return recognised;
+            }
+        }
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => self.sub(y, x),
+            ((x, true), (y, false)) => {
+                let sum = self.add(x, y);
+                self.neg(sum)
+            }
+            ((x, false), (y, true)) => self.add(x, y),
+            _ => {
+                // The opposite difference may be there already.
+                if let Some(&opposite) = self.index.get(&Op::Sub(b, a)) {
+                    return self.node(Op::Neg(opposite));
+                }
+                self.node(Op::Sub(a, b))
+            }
+        }
+    }
+
+    /// a · b. A squared elongation becomes its own primitive.
+    pub fn mul(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
+            return self.constant(x * y);
+        }
+        let (a, b) = if self.as_constant(b).is_some() { (b, a) } else { (a, b) };
+        if let Some(x) = self.as_constant(a) {
+            if x == 0.0 || x == 1.0 || x == -1.0 {
+                return if x == 0.0 { a } else { self.signed(b, x < 0.0) };
+            }
+            if let Some(regrouped) = self.regroup(x, b) {
+                return regrouped;
+            }
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        if a == b && self.form() == Form::Robust {
+            if let Some(half_square) = self.rule(a).and_then(|r| r.half_square) {
+                let two = self.constant(2.0);
+                let square = self.mul(two, half_square);
+                return self.signed(square, minus_a != minus_b);
+            }
+        }
+        // (2ⁿ x) y = 2ⁿ (x y), exactly: constants gather in front, where they meet others.
+        for (scaled, other) in [(a, b), (b, a)] {
+            if let Op::Mul(c, x) = self.op(scaled) {
+                if self.as_constant(c).is_some_and(is_power_of_two) {
+                    let product = self.mul(x, other);
+                    let product = self.mul(c, product);
+                    return self.signed(product, minus_a != minus_b);
+                }
+            }
+        }
+        let product = self.node(Op::Mul(a.min(b), a.max(b)));
+        self.signed(product, minus_a != minus_b)
+    }
+
+    /// x · (c · y) with both constants powers of two.
+    fn regroup(&mut self, x: f64, b: NodeId) -> Option<NodeId> {
+        let Op::Mul(c, y) = self.op(b) else { return None };
+        let c = self.as_constant(c)?;
+        if !(is_power_of_two(x) && is_power_of_two(c)) {
+            return None;
+        }
+        let factor = self.constant(x * c);
+        Some(self.mul(factor, y))
+    }
+
+    /// a / b; by a power of two, a product.
+    pub fn div(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.is(a, 0.0) {
+            return a;
+        }
+        if let Some(y) = self.as_constant(b) {
+            if let Some(x) = self.as_constant(a) {
+                return self.constant(x / y);
+            }
+            if is_power_of_two(y) {
+                let reciprocal = self.constant(1.0 / y);
+                return self.mul(reciprocal, a);
+            }
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let quotient = self.node(Op::Div(a, b));
+        self.signed(quotient, minus_a != minus_b)
+    }
+
+    fn unary(&mut self, a: NodeId, fold: fn(f64) -> f64, op: fn(NodeId) -> Op) -> NodeId {
+        match self.as_constant(a) {
+            Some(x) => self.constant(fold(x)),
+            None => self.node(op(a)),
+        }
+    }
+
+    /// √a.
+    pub fn sqrt(&mut self, a: NodeId) -> NodeId {
+        self.unary(a, f64::sqrt, Op::Sqrt)
+    }
+
+    /// |a|.
+    pub fn abs(&mut self, a: NodeId) -> NodeId {
+        let (a, _) = self.magnitude(a);
+        self.unary(a, f64::abs, Op::Abs)
+    }
+
+    /// sin a; of a dihedral angle or its half, without the angle.
+    pub fn sin(&mut self, a: NodeId) -> NodeId {
+        if self.form() == Form::Robust {
+            if let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralSine) {
+                return recognised;
+            }
+        }
+        self.unary(a, f64::sin, Op::Sin)
+    }
+
+    /// cos a; of a dihedral angle or its half, without the angle.
+    pub fn cos(&mut self, a: NodeId) -> NodeId {
+        if self.form() == Form::Robust {
+            if let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralCosine) {
+                return recognised;
+            }
+        }
+        self.unary(a, f64::cos, Op::Cos)
+    }
+
+    /// eᵃ.
+    pub fn exp(&mut self, a: NodeId) -> NodeId {
+        self.unary(a, f64::exp, Op::Exp)
+    }
+
+    /// ln a.
+    pub fn ln(&mut self, a: NodeId) -> NodeId {
+        self.unary(a, f64::ln, Op::Ln)
+    }
+
+    /// atan2(y, x).
+    pub fn atan2(&mut self, y: NodeId, x: NodeId) -> NodeId {
+        self.node(Op::Atan2(y, x))
+    }
+
+    /// min(a, b).
+    pub fn min(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if a == b { a } else { self.node(Op::Min(a.min(b), a.max(b))) }
+    }
+
+    /// max(a, b).
+    pub fn max(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if a == b { a } else { self.node(Op::Max(a.min(b), a.max(b))) }
+    }
+
+    /// a^b: products for integers, a root for halves, `powf` for what is left. A power of a norm is its own primitive.
+    pub fn pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.form() == Form::Robust {
+            if let Some(recognised) = crate::functions::recognise_norm_power(self, a, b) {
+                return recognised;
+            }
+        }
+        self.plain_pow(a, b)
+    }
+
+    /// a^b without recognition.
+    pub(crate) fn plain_pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        let Some(exponent) = self.as_constant(b) else { return self.node(Op::Pow(a, b)) };
+        if let Some(x) = self.as_constant(a) {
+            return self.constant(x.powf(exponent));
+        }
+        let doubled = 2.0 * exponent;
+        if doubled.fract() != 0.0 || doubled.abs() > 64.0 {
+            return self.node(Op::Pow(a, b));
+        }
+        let whole = exponent.abs().floor();
+        let mut power = self.integer_power(a, whole as u32);
+        if exponent.fract() != 0.0 {
+            let root = self.sqrt(a);
+            power = self.mul(power, root);
+        }
+        if exponent < 0.0 {
+            let one = self.constant(1.0);
+            power = self.div(one, power);
+        }
+        power
+    }
+
+    fn integer_power(&mut self, a: NodeId, exponent: u32) -> NodeId {
+        match exponent {
+            0 => self.constant(1.0),
+            1 => a,
+            n => {
+                let half = self.integer_power(a, n / 2);
+                let square = self.mul(half, half);
+                if n % 2 == 1 { self.mul(square, a) } else { square }
+            }
+        }
+    }
+
+    /// What rounding a + b lost.
+    pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.is(a, 0.0) || self.is(b, 0.0) {
+            return self.constant(0.0);
+        }
+        self.node(Op::SumError(a.min(b), a.max(b)))
+    }
+
+    /// What rounding a − b lost.
+    pub fn difference_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.is(a, 0.0) || self.is(b, 0.0) {
+            return self.constant(0.0);
+        }
+        self.node(Op::DifferenceError(a, b))
+    }
+
+    /// What rounding a · b lost.
+    pub fn product_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.as_constant(a).is_some_and(is_power_of_two) || self.as_constant(b).is_some_and(is_power_of_two) {
+            return self.constant(0.0);
+        }
+        self.node(Op::ProductError(a.min(b), a.max(b)))
+    }
+
+    /// What rounding lost when this node was computed as a difference of two others; zero for other nodes.
+    pub fn rounding_tail(&mut self, node: NodeId) -> NodeId {
+        match self.op(node) {
+            Op::Sub(a, b) => self.difference_error(a, b),
+            Op::Neg(a) => {
+                let tail = self.rounding_tail(a);
+                self.neg(tail)
+            }
+            _ => self.constant(0.0),
+        }
+    }
+
+    /// A power of two that brings |a| into [1, 2).
+    pub fn power_of_two_scale(&mut self, a: NodeId) -> NodeId {
+        self.node(Op::PowerOfTwoScale(a))
+    }
+
+    /// a < b.
+    pub fn less(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Less(a, b))
+    }
+
+    /// a ≤ b.
+    pub fn less_or_equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::LessOrEqual(a, b))
+    }
+
+    /// a = b.
+    pub fn equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Equal(a.min(b), a.max(b)))
+    }
+
+    /// Both.
+    pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if a == b { a } else { self.node(Op::And(a.min(b), a.max(b))) }
+    }
+
+    /// Either.
+    pub fn or(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if a == b { a } else { self.node(Op::Or(a.min(b), a.max(b))) }
+    }
+
+    /// Not.
+    pub fn not(&mut self, a: NodeId) -> NodeId {
+        match self.op(a) {
+            Op::Not(b) => b,
+            _ => self.node(Op::Not(a)),
+        }
+    }
+
+    /// A selection.
+    pub fn select(&mut self, mask: NodeId, yes: NodeId, no: NodeId) -> NodeId {
+        if yes == no { yes } else { self.node(Op::Select(mask, yes, no)) }
+    }
+
+    /// Σ terms, left to right.
+    pub fn sum(&mut self, terms: impl IntoIterator<Item = NodeId>) -> NodeId {
+        let mut terms = terms.into_iter();
+        match terms.next() {
+            None => self.constant(0.0),
+            Some(first) => terms.fold(first, |sum, term| self.add(sum, term)),
+        }
+    }
+
+    /// Σ aᵢ bᵢ.
+    pub fn dot(&mut self, a: &[NodeId], b: &[NodeId]) -> NodeId {
+        let products: Vec<_> = a.iter().zip(b).map(|(&x, &y)| self.mul(x, y)).collect();
+        self.sum(products)
+    }
+
+    /// Σ aᵢ².
+    pub fn sum_of_squares(&mut self, a: &[NodeId]) -> NodeId {
+        self.dot(a, a)
+    }
+
+    /// a × b.
+    pub fn cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let (plus, minus) = (self.mul(a[j], b[k]), self.mul(a[k], b[j]));
+            self.sub(plus, minus)
+        })
+    }
+
+    /// factor · a.
+    pub fn scaled(&mut self, factor: NodeId, a: &[NodeId]) -> Vec<NodeId> {
+        a.iter().map(|&x| self.mul(factor, x)).collect()
+    }
+}
+
+fn is_power_of_two(value: f64) -> bool {
+    value != 0.0 && value.is_normal() && value.to_bits() & ((1 << 52) - 1) == 0
+}

@@ -1,0 +1,96 @@
+//! The hash-consed scalar expression graph. Equal expressions are one node, so sharing is found by construction, and
+//! nodes are numbered in topological order: operands before their uses.
+
+mod build;
+mod count;
+mod node;
+mod rule;
+
+pub use count::{count, reachable};
+pub use node::{Input, NodeId, Op};
+pub use rule::{DihedralParts, Primitive, Rule, symmetric_index};
+
+use std::collections::HashMap;
+
+/// How language functions are lowered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// To robust primitives with their own derivative rules; naive spellings of them are recognised.
+    Robust,
+    /// As a textbook prints them: the audit's independent form.
+    Textbook,
+}
+
+/// The graph. Only its constructors in `build.rs` add nodes, and they simplify.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    form: Form,
+    nodes: Vec<Op>,
+    varies: Vec<bool>,
+    index: HashMap<Op, NodeId>,
+    rules: Vec<Rule>,
+    rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
+}
+
+impl Graph {
+    /// An empty graph.
+    #[must_use]
+    pub fn new(form: Form) -> Self {
+        Self {
+            form,
+            nodes: Vec::new(),
+            varies: Vec::new(),
+            index: HashMap::new(),
+            rules: Vec::new(),
+            rule_index: HashMap::new(),
+        }
+    }
+
+    /// How functions are lowered into it.
+    #[must_use]
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// The number of nodes ever made.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether it has no nodes.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// What a node computes.
+    #[must_use]
+    pub fn op(&self, node: NodeId) -> Op {
+        self.nodes[node.0 as usize]
+    }
+
+    /// Whether the node depends on positions, velocities or unknowns (and not on parameters and rest shape alone).
+    #[must_use]
+    pub fn varies(&self, node: NodeId) -> bool {
+        self.varies[node.0 as usize]
+    }
+
+    /// The rule behind a node, if it is a robust primitive.
+    #[must_use]
+    pub fn rule(&self, node: NodeId) -> Option<&Rule> {
+        match self.op(node) {
+            Op::Rule(id) => Some(&self.rules[id as usize]),
+            _ => None,
+        }
+    }
+
+    /// The node that computes the value: a rule's own expression, or the node itself.
+    #[must_use]
+    pub fn resolve(&self, mut node: NodeId) -> NodeId {
+        while let Some(rule) = self.rule(node) {
+            node = rule.value;
+        }
+        node
+    }
+}

@@ -1,0 +1,129 @@
+/// A node's number. Operands have smaller numbers than their uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(pub(crate) u32);
+
+/// Where a number comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Input {
+    /// Coordinate of the positions (point · 3 + axis), or an unknown of a residual.
+    Position(u16),
+    /// Coordinate of the velocities.
+    Velocity(u16),
+    /// Number of the parameters.
+    Parameter(u16),
+    /// Number of the rest shape.
+    Rest(u16),
+    /// Number that the `rest` block computed once for the element.
+    Precomputed(u16),
+}
+
+/// One scalar operation. Comparisons and connectives yield masks, all others numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Op {
+    /// A constant, as the bits of a double.
+    Constant(u64),
+    /// π, to the precision of the number type at hand.
+    Pi,
+    /// An input.
+    Input(Input),
+    /// −a.
+    Neg(NodeId),
+    /// a + b.
+    Add(NodeId, NodeId),
+    /// a − b.
+    Sub(NodeId, NodeId),
+    /// a · b.
+    Mul(NodeId, NodeId),
+    /// a / b.
+    Div(NodeId, NodeId),
+    /// √a.
+    Sqrt(NodeId),
+    /// |a|.
+    Abs(NodeId),
+    /// min(a, b).
+    Min(NodeId, NodeId),
+    /// max(a, b).
+    Max(NodeId, NodeId),
+    /// sin a.
+    Sin(NodeId),
+    /// cos a.
+    Cos(NodeId),
+    /// eᵃ.
+    Exp(NodeId),
+    /// ln a.
+    Ln(NodeId),
+    /// The angle of the point (x = b, y = a).
+    Atan2(NodeId, NodeId),
+    /// a to the power b.
+    Pow(NodeId, NodeId),
+    /// What rounding a + b lost; zero derivative.
+    SumError(NodeId, NodeId),
+    /// What rounding a − b lost; zero derivative.
+    DifferenceError(NodeId, NodeId),
+    /// What rounding a · b lost; zero derivative.
+    ProductError(NodeId, NodeId),
+    /// A power of two that brings |a| into [1, 2); zero derivative.
+    PowerOfTwoScale(NodeId),
+    /// a < b.
+    Less(NodeId, NodeId),
+    /// a ≤ b.
+    LessOrEqual(NodeId, NodeId),
+    /// a = b.
+    Equal(NodeId, NodeId),
+    /// Both masks.
+    And(NodeId, NodeId),
+    /// Either mask.
+    Or(NodeId, NodeId),
+    /// The opposite mask.
+    Not(NodeId),
+    /// Where the mask holds the second, elsewhere the third.
+    Select(NodeId, NodeId, NodeId),
+    /// A robust primitive with its own derivatives.
+    Rule(u32),
+}
+
+impl Op {
+    /// The operands of an elementary operation (a rule's are its own affair).
+    #[must_use]
+    pub fn operands(self) -> impl Iterator<Item = NodeId> {
+        let (count, list) = match self {
+            Self::Constant(_) | Self::Pi | Self::Input(_) | Self::Rule(_) => (0, [NodeId(0); 3]),
+            Self::Neg(a)
+            | Self::Sqrt(a)
+            | Self::Abs(a)
+            | Self::Sin(a)
+            | Self::Cos(a)
+            | Self::Exp(a)
+            | Self::Ln(a)
+            | Self::PowerOfTwoScale(a)
+            | Self::Not(a) => (1, [a; 3]),
+            Self::Add(a, b)
+            | Self::Sub(a, b)
+            | Self::Mul(a, b)
+            | Self::Div(a, b)
+            | Self::Min(a, b)
+            | Self::Max(a, b)
+            | Self::Atan2(a, b)
+            | Self::Pow(a, b)
+            | Self::SumError(a, b)
+            | Self::DifferenceError(a, b)
+            | Self::ProductError(a, b)
+            | Self::Less(a, b)
+            | Self::LessOrEqual(a, b)
+            | Self::Equal(a, b)
+            | Self::And(a, b)
+            | Self::Or(a, b) => (2, [a, b, b]),
+            Self::Select(m, a, b) => (3, [m, a, b]),
+        };
+        list.into_iter().take(count)
+    }
+
+    /// Whether the node is a mask and not a number.
+    #[must_use]
+    pub fn is_mask(self) -> bool {
+        matches!(
+            self,
+            Self::Less(..) | Self::LessOrEqual(..) | Self::Equal(..) | Self::And(..) | Self::Or(..) | Self::Not(_)
+        )
+    }
+}

@@ -1,0 +1,85 @@
+//! Evaluates a graph over any number type: doubles, dual numbers, multi-precision. The audit's way in.
+
+use crate::graph::{Graph, Input, NodeId, Op, reachable};
+use crate::runtime::{Inputs, Number};
+
+#[derive(Clone)]
+enum Computed<T: Number> {
+    Number(T),
+    Mask(T::Mask),
+}
+
+/// The values of `outputs`, none of which may be a mask.
+pub fn interpret<T: Number>(graph: &Graph, outputs: &[NodeId], inputs: &Inputs<'_, T>) -> Vec<T> {
+    let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
+    for node in reachable(graph, outputs) {
+        values[node.0 as usize] = Some(compute(graph, node, inputs, &values));
+    }
+    outputs.iter().map(|&o| number(graph, &values, o)).collect()
+}
+
+fn number<T: Number>(graph: &Graph, values: &[Option<Computed<T>>], node: NodeId) -> T {
+    match &values[graph.resolve(node).0 as usize] {
+        Some(Computed::Number(value)) => value.clone(),
+        _ => unreachable!("compiler bug: a number was expected of {node:?}"),
+    }
+}
+
+fn mask<T: Number>(graph: &Graph, values: &[Option<Computed<T>>], node: NodeId) -> T::Mask {
+    match &values[graph.resolve(node).0 as usize] {
+        Some(Computed::Mask(value)) => *value,
+        _ => unreachable!("compiler bug: a mask was expected of {node:?}"),
+    }
+}
+
+fn compute<T: Number>(
+    graph: &Graph,
+    node: NodeId,
+    inputs: &Inputs<'_, T>,
+    values: &[Option<Computed<T>>],
+) -> Computed<T> {
+    let n = |node| number(graph, values, node);
+    let m = |node| mask::<T>(graph, values, node);
+    Computed::Number(match graph.op(node) {
+        Op::Constant(bits) => T::from_f64(f64::from_bits(bits)),
+        Op::Pi => T::from_f64(0.0).atan2(T::from_f64(-1.0)),
+        Op::Input(input) => read(input, inputs),
+        Op::Neg(a) => -n(a),
+        Op::Add(a, b) => n(a) + n(b),
+        Op::Sub(a, b) => n(a) - n(b),
+        Op::Mul(a, b) => n(a) * n(b),
+        Op::Div(a, b) => n(a) / n(b),
+        Op::Sqrt(a) => n(a).sqrt(),
+        Op::Abs(a) => n(a).abs(),
+        Op::Min(a, b) => n(a).min(n(b)),
+        Op::Max(a, b) => n(a).max(n(b)),
+        Op::Sin(a) => n(a).sin(),
+        Op::Cos(a) => n(a).cos(),
+        Op::Exp(a) => n(a).exp(),
+        Op::Ln(a) => n(a).ln(),
+        Op::Atan2(a, b) => n(a).atan2(n(b)),
+        Op::Pow(a, b) => n(a).powf(n(b)),
+        Op::SumError(a, b) => n(a).sum_error(n(b)),
+        Op::DifferenceError(a, b) => n(a).sum_error(-n(b)),
+        Op::ProductError(a, b) => n(a).product_error(n(b)),
+        Op::PowerOfTwoScale(a) => n(a).power_of_two_scale(),
+        Op::Select(mask, a, b) => T::select(m(mask), n(a), n(b)),
+        Op::Less(a, b) => return Computed::Mask(n(a).less(n(b))),
+        Op::LessOrEqual(a, b) => return Computed::Mask(n(a).less_or_equal(n(b))),
+        Op::Equal(a, b) => return Computed::Mask(n(a).equal(n(b))),
+        Op::And(a, b) => return Computed::Mask(m(a) & m(b)),
+        Op::Or(a, b) => return Computed::Mask(m(a) | m(b)),
+        Op::Not(a) => return Computed::Mask(!m(a)),
+        Op::Rule(_) => unreachable!("compiler bug: rules are resolved to their values"),
+    })
+}
+
+fn read<T: Number>(input: Input, inputs: &Inputs<'_, T>) -> T {
+    match input {
+        Input::Position(i) => inputs.positions[usize::from(i)].clone(),
+        Input::Velocity(i) => inputs.velocities.get(usize::from(i)).cloned().unwrap_or_else(|| T::from_f64(0.0)),
+        Input::Parameter(i) => inputs.parameters[usize::from(i)].clone(),
+        Input::Rest(i) => inputs.rest[usize::from(i)].clone(),
+        Input::Precomputed(_) => unreachable!("compiler bug: the interpreter runs whole programs"),
+    }
+}

@@ -1,0 +1,146 @@
+//! Typed program to scalar graph.
+
+use std::collections::BTreeMap;
+
+use crate::check::{Program, Source, Typed, TypedKind};
+use crate::diff::{Coordinates, Moving, first_derivatives};
+use crate::functions::{Lowered, Shape};
+use crate::graph::{Form, Graph, Input, NodeId};
+
+/// A program as a graph.
+#[derive(Clone, Debug)]
+pub struct Formula {
+    /// The graph.
+    pub graph: Graph,
+    /// The result, row by row.
+    pub outputs: Vec<NodeId>,
+}
+
+/// A program's `rest` block as a graph: what it computes once for an element.
+#[derive(Clone, Debug)]
+pub struct RestFormula {
+    /// The graph.
+    pub graph: Graph,
+    /// The numbers to store, in the order of [`Input::Precomputed`].
+    pub outputs: Vec<NodeId>,
+}
+
+/// The robust form, split into what the rest shape decides and what moves.
+#[must_use]
+pub fn lower(program: &Program) -> (RestFormula, Formula) {
+    let mut rest = Lowering::new(program, Form::Robust, None);
+    let stored = stored_bindings(program);
+    let mut outputs = Vec::new();
+    let mut slots = BTreeMap::new();
+    for &binding in &stored {
+        slots.insert(binding, outputs.len());
+        outputs.extend(rest.binding(binding).parts);
+    }
+    let rest = RestFormula { graph: rest.graph, outputs };
+    let mut moving = Lowering::new(program, Form::Robust, Some(slots));
+    let outputs = moving.expression(&program.result).parts;
+    (rest, Formula { graph: moving.graph, outputs })
+}
+
+/// The whole program in its textbook form.
+#[must_use]
+pub fn lower_textbook(program: &Program) -> Formula {
+    let mut lowering = Lowering::new(program, Form::Textbook, None);
+    let outputs = lowering.expression(&program.result).parts;
+    Formula { graph: lowering.graph, outputs }
+}
+
+/// The bindings of the `rest` block that the moving part reads, in order.
+fn stored_bindings(program: &Program) -> Vec<usize> {
+    fn visit(program: &Program, expression: &Typed, seen: &mut [bool]) {
+        match &expression.kind {
+            TypedKind::Binding(number) => {
+                if !std::mem::replace(&mut seen[*number], true) && !program.bindings[*number].rest {
+                    visit(program, &program.bindings[*number].value, seen);
+                }
+            }
+            TypedKind::Call(_, list) | TypedKind::Forces(list) => list.iter().for_each(|e| visit(program, e, seen)),
+            TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|e| visit(program, e, seen)),
+            TypedKind::Gradient(of, _) => visit(program, of, seen),
+            TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
+        }
+    }
+    let mut seen = vec![false; program.bindings.len()];
+    visit(program, &program.result, &mut seen);
+    (0..seen.len()).filter(|&b| seen[b] && program.bindings[b].rest).collect()
+}
+
+struct Lowering<'a> {
+    program: &'a Program,
+    graph: Graph,
+    done: BTreeMap<usize, Lowered>,
+    /// Where the stored bindings start, when they are read and not computed.
+    slots: Option<BTreeMap<usize, usize>>,
+}
+
+impl<'a> Lowering<'a> {
+    fn new(program: &'a Program, form: Form, slots: Option<BTreeMap<usize, usize>>) -> Self {
+        Self { program, graph: Graph::new(form), done: BTreeMap::new(), slots }
+    }
+
+    fn inputs(&mut self, shape: Shape, first: usize, input: fn(u16) -> Input) -> Lowered {
+        let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
+        Lowered { shape, parts: (0..shape.size()).map(|i| self.graph.input(input(number(i)))).collect() }
+    }
+
+    fn binding(&mut self, number: usize) -> Lowered {
+        if let Some(value) = self.done.get(&number) {
+            return value.clone();
+        }
+        let binding = &self.program.bindings[number];
+        let slot = self.slots.as_ref().filter(|_| binding.rest).map(|slots| slots[&number]);
+        let value = match slot {
+            Some(slot) => self.inputs(binding.value.shape, slot, Input::Precomputed),
+            None => self.expression(&binding.value),
+        };
+        self.done.insert(number, value.clone());
+        value
+    }
+
+    fn expression(&mut self, expression: &Typed) -> Lowered {
+        match &expression.kind {
+            TypedKind::Constant(value) => Lowered::scalar(self.graph.constant(*value)),
+            TypedKind::Pi => Lowered::scalar(self.graph.pi()),
+            TypedKind::Input(source, first) => {
+                let input = match source {
+                    Source::Position => Input::Position,
+                    Source::Velocity => Input::Velocity,
+                    Source::Rest => Input::Rest,
+                    Source::Parameter => Input::Parameter,
+                };
+                self.inputs(expression.shape, *first, input)
+            }
+            TypedKind::Binding(number) => self.binding(*number),
+            TypedKind::Call(function, arguments) => {
+                let arguments: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
+                (function.lower)(&mut self.graph, &arguments)
+            }
+            TypedKind::Select(condition, yes, no) => {
+                let mask = self.expression(condition).node();
+                let (yes, no) = (self.expression(yes), self.expression(no));
+                let parts = yes.parts.iter().zip(&no.parts).map(|(&y, &n)| self.graph.select(mask, y, n)).collect();
+                Lowered { shape: expression.shape, parts }
+            }
+            TypedKind::Forces(list) => {
+                let parts = list.iter().flat_map(|f| self.expression(f).parts).collect();
+                Lowered { shape: expression.shape, parts }
+            }
+            TypedKind::Gradient(of, point) => {
+                let of = self.expression(of).node();
+                Lowered::vector(self.gradient(of, *point))
+            }
+        }
+    }
+
+    fn gradient(&mut self, of: NodeId, point: usize) -> Vec<NodeId> {
+        let g = &mut self.graph;
+        let coordinates = Coordinates::of_points(g, &[of], Moving::Positions);
+        let reduced = first_derivatives(g, &[of], &coordinates).remove(0);
+        coordinates.expand(g, &reduced, point)
+    }
+}

@@ -1,0 +1,91 @@
+//! Every block of an element on flattened inputs: what tools that handle all elements alike call.
+
+use super::array::Array;
+use super::element::{Block, Constraint, ForceLaw, Inputs, Outputs, Potential, Residual, Vector3, triangle_index};
+use super::flags::Flags;
+use super::real::Real;
+
+fn points<T: Real, P: Array<Vector3<T>>>(numbers: &[T]) -> P {
+    P::from_fn(|i| std::array::from_fn(|axis| numbers.get(3 * i + axis).copied().unwrap_or_else(|| T::from_f64(0.0))))
+}
+
+fn flat<T: Real>(vectors: &[Vector3<T>]) -> Vec<T> {
+    vectors.iter().flatten().copied().collect()
+}
+
+/// A triangle as a full matrix, row by row.
+fn full_triangle<T: Real>(points: usize, triangle: &[Block<T>]) -> Vec<T> {
+    let mut full = Vec::with_capacity(9 * points * points);
+    for row in 0..3 * points {
+        for column in 0..3 * points {
+            let ((i, r), (j, c)) = ((row / 3, row % 3), (column / 3, column % 3));
+            full.push(if i <= j {
+                triangle[triangle_index(points, i, j)][r][c]
+            } else {
+                triangle[triangle_index(points, j, i)][c][r]
+            });
+        }
+    }
+    full
+}
+
+/// A square as a full matrix, row by row.
+fn full_square<T: Real>(points: usize, square: &[Block<T>]) -> Vec<T> {
+    let entries = (0..3 * points).flat_map(|row| (0..3 * points).map(move |column| (row, column)));
+    entries.map(|(row, column)| square[row / 3 * points + column / 3][row % 3][column % 3]).collect()
+}
+
+/// Blocks `energy`, `grad`, `hess`.
+#[doc(hidden)]
+pub fn evaluate_potential<T: Real, E: Potential<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let x: E::Points = points(inputs.positions);
+    let (value, gradient, hessian) = (element.value(&x), element.gradient(&x), element.hessian(&x));
+    Outputs {
+        blocks: vec![
+            ("energy", vec![value.value]),
+            ("grad", flat(gradient.gradient.as_ref())),
+            ("hess", full_triangle(E::Points::LEN, hessian.hessian.as_ref())),
+        ],
+        flags: [value.flags, gradient.flags, hessian.flags],
+    }
+}
+
+/// Blocks `force`, `dfdx`, `dfdv`.
+#[doc(hidden)]
+pub fn evaluate_force_law<T: Real, E: ForceLaw<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let (x, v): (E::Points, E::Points) = (points(inputs.positions), points(inputs.velocities));
+    let (force, jacobians) = (element.force(&x, &v), element.jacobians(&x, &v));
+    let n = E::Points::LEN;
+    Outputs {
+        blocks: vec![
+            ("force", flat(force.force.as_ref())),
+            ("dfdx", full_square(n, jacobians.by_position.as_ref())),
+            ("dfdv", full_square(n, jacobians.by_velocity.as_ref())),
+        ],
+        flags: [force.flags, jacobians.flags, jacobians.flags],
+    }
+}
+
+/// The blocks of both, and `constraint`, `jacobian`.
+#[doc(hidden)]
+pub fn evaluate_constraint<T: Real, E: Constraint<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let mut outputs = evaluate_potential(element, inputs);
+    let force = evaluate_force_law(element, inputs);
+    let x: <E as Potential<T>>::Points = points(inputs.positions);
+    let jacobian = element.constraint_jacobian(&x);
+    outputs.blocks.extend(force.blocks);
+    outputs.blocks.push(("constraint", jacobian.value.as_ref().to_vec()));
+    outputs.blocks.push(("jacobian", flat(jacobian.jacobian.as_ref())));
+    outputs
+}
+
+/// Blocks `residual`, `jacobian`.
+#[doc(hidden)]
+pub fn evaluate_residual<T: Real, E: Residual<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let u = E::Unknowns::from_fn(|i| inputs.positions[i]);
+    let (residual, jacobian) = (element.residual(&u), element.jacobian(&u));
+    Outputs {
+        blocks: vec![("residual", residual.value.as_ref().to_vec()), ("jacobian", jacobian.jacobian.as_ref().to_vec())],
+        flags: [residual.flags, jacobian.flags, Flags::clear()],
+    }
+}

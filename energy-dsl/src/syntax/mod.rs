@@ -1,0 +1,12 @@
+//! Text to syntax tree. Rust tokens and mathematical notation become the same tokens, and one parser reads both.
+
+mod ast;
+mod name;
+mod notation;
+mod parse;
+mod tokens;
+
+pub use ast::{Body, Declaration, Expression, ExpressionKind, InputType, Item, Section, UserFunction};
+pub use name::{Name, canonical};
+pub(crate) use notation::unhatted;
+pub use parse::parse;

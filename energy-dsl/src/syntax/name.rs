@@ -1,0 +1,60 @@
+use crate::diagnostic::Span;
+
+/// A name as written, and the form by which names are compared.
+#[derive(Clone, Debug)]
+pub struct Name {
+    /// As written.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+}
+
+impl Name {
+    /// What it is compared by.
+    #[must_use]
+    pub fn canonical(&self) -> String {
+        canonical(&self.text)
+    }
+}
+
+/// Spellings of one symbol agree: `θ₀`, `θ_0` and `θ0`; `p_ℓ`, `p_l` and `pl`; `θ` and `theta`.
+#[must_use]
+pub fn canonical(name: &str) -> String {
+    let mut plain = String::with_capacity(name.len());
+    for c in name.chars() {
+        match c {
+            '_' => {}
+            'ℓ' => plain.push('l'),
+            '₀'..='₉' => plain.push(char::from(b'0' + (c as u32 - '₀' as u32) as u8)),
+            '′' | '\'' => plain.push_str("prime"),
+            other => match GREEK.iter().find(|(letter, _)| *letter == other) {
+                Some((_, spelled)) => plain.push_str(spelled),
+                None => plain.push(other),
+            },
+        }
+    }
+    plain
+}
+
+pub(super) const GREEK: &[(char, &str)] = &[
+    ('α', "alpha"),
+    ('β', "beta"),
+    ('γ', "gamma"),
+    ('δ', "delta"),
+    ('ε', "epsilon"),
+    ('ζ', "zeta"),
+    ('η', "eta"),
+    ('θ', "theta"),
+    ('κ', "kappa"),
+    ('λ', "lambda"),
+    ('μ', "mu"),
+    ('ν', "nu"),
+    ('ξ', "xi"),
+    ('ρ', "rho"),
+    ('σ', "sigma"),
+    ('τ', "tau"),
+    ('φ', "phi"),
+    ('χ', "chi"),
+    ('ψ', "psi"),
+    ('ω', "omega"),
+];

@@ -1,0 +1,236 @@
+//! Mathematical notation, as printed in papers, to the tokens that the Rust-like spelling has.
+
+use std::rc::Rc;
+
+use super::name::GREEK;
+use super::tokens::{Kind, Token};
+use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
+
+/// Splits a formula into tokens. `literal` is where the string stands.
+pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
+    let text: Rc<str> = text.into();
+    let mut lexer = Lexer { text: text.clone(), at: 0, literal, tokens: Vec::new() };
+    while let Some(c) = lexer.peek() {
+        let start = lexer.at;
+        if let Err(message) = lexer.token(c) {
+            diagnostics.push(Diagnostic::new(&lexer.span(start), message));
+            if lexer.at == start {
+                lexer.advance();
+            }
+        }
+    }
+    lexer.tokens
+}
+
+struct Lexer<'a> {
+    text: Rc<str>,
+    at: usize,
+    literal: &'a Span,
+    tokens: Vec<Token>,
+}
+
+const HAT: char = '\u{302}';
+
+impl Lexer<'_> {
+    fn peek(&self) -> Option<char> {
+        self.text[self.at..].chars().next()
+    }
+
+    fn advance(&mut self) {
+        self.at += self.peek().map_or(0, char::len_utf8);
+    }
+
+    fn span(&self, start: usize) -> Span {
+        let excerpt = Excerpt { text: self.text.clone(), start, end: self.at.max(start) };
+        Span { token: self.literal.token, excerpt: Some(excerpt) }
+    }
+
+    fn push(&mut self, kind: Kind, start: usize) {
+        let span = self.span(start);
+        let text = self.text[start..self.at].to_owned();
+        self.tokens.push(Token { kind, span, notation: true, text });
+    }
+
+    fn symbol(&mut self, symbol: &str, start: usize) {
+        self.push(Kind::Symbol(symbol.into()), start);
+    }
+
+    fn token(&mut self, c: char) -> Result<(), String> {
+        let start = self.at;
+        if c.is_ascii_digit() {
+            return self.number();
+        }
+        if c == '\\' {
+            return self.command();
+        }
+        if is_name_start(c) {
+            self.name();
+            return Ok(());
+        }
+        self.advance();
+        match c {
+            ' ' | '\t' | '\r' | '\n' | '\u{a0}' | '\u{2009}' | '\u{202f}' => {}
+            '−' | '–' => self.symbol("-", start),
+            '·' | 'ᐧ' | '⋅' | '∙' => self.symbol("·", start),
+            '×' => self.symbol("×", start),
+            '÷' => self.symbol("/", start),
+            '≤' => self.symbol("<=", start),
+            '≥' => self.symbol(">=", start),
+            '≠' => self.symbol("!=", start),
+            '½' => self.push(Kind::Number(0.5), start),
+            '¼' => self.push(Kind::Number(0.25), start),
+            '¾' => self.push(Kind::Number(0.75), start),
+            'ᵀ' => self.symbol("ᵀ", start),
+            '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';' | ':'
+            | '=' | '<' | '>' | '!' | '&' => {
+                let mut symbol = c.to_string();
+                if let Some(next) = self.peek() {
+                    let pair = format!("{c}{next}");
+                    if ["==", "!=", "<=", ">=", "&&"].contains(&pair.as_str()) {
+                        symbol = pair;
+                        self.advance();
+                    }
+                }
+                self.symbol(&symbol, start);
+            }
+            '⁻' | '⁰' | '¹' | '²' | '³' | '⁴'..='⁹' => {
+                let mut digits = superscript(c).to_string();
+                while let Some(next) = self.peek().filter(|&n| superscript(n) != ' ') {
+                    digits.push(superscript(next));
+                    self.advance();
+                }
+                let power = digits.parse().map_err(|_| format!("`{digits}` is not a superscript number"))?;
+                self.symbol("^", start);
+                self.push(Kind::Number(power), start);
+            }
+            other => {
+                return Err(format!("the character `{other}` has no meaning in a formula"));
+            }
+        }
+        Ok(())
+    }
+
+    fn number(&mut self) -> Result<(), String> {
+        let start = self.at;
+        let rest = &self.text[start..];
+        let mut end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        // An exponent is digits after `e`, else `e` is a name.
+        let bytes = rest.as_bytes();
+        if bytes.get(end).is_some_and(|b| b.eq_ignore_ascii_case(&b'e')) {
+            let sign = usize::from(bytes.get(end + 1).is_some_and(|b| b"+-".contains(b)));
+            let digits = rest[end + 1 + sign..].bytes().take_while(u8::is_ascii_digit).count();
+            if digits > 0 {
+                end += 1 + sign + digits;
+            }
+        }
+        self.at += end;
+        let text = &self.text[start..self.at];
+        let value = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
+        self.push(Kind::Number(value), start);
+        Ok(())
+    }
+
+    /// A LaTeX command: `\hat a`, `\cdot`, `\times`, `\theta`, ….
+    fn command(&mut self) -> Result<(), String> {
+        let start = self.at;
+        self.advance();
+        let name_start = self.at;
+        while self.peek().is_some_and(|c| c.is_ascii_alphabetic()) {
+            self.advance();
+        }
+        let command = self.text[name_start..self.at].to_owned();
+        match command.as_str() {
+            "hat" => {
+                while self.peek().is_some_and(|c| c == ' ' || c == '{') {
+                    self.advance();
+                }
+                if !self.peek().is_some_and(is_name_start) {
+                    return Err("expected the name of a vector after \\hat".into());
+                }
+                self.symbol("hat", start);
+                self.name();
+                if self.peek() == Some('}') {
+                    self.advance();
+                }
+            }
+            "cdot" => self.symbol("·", start),
+            "times" => self.symbol("×", start),
+            "pi" => self.push(Kind::Name("π".into()), start),
+            other => match GREEK.iter().find(|(_, spelled)| *spelled == other) {
+                Some((letter, _)) => {
+                    let mut name = letter.to_string();
+                    while let Some(c) = self.peek().filter(|&c| is_name_part(c)) {
+                        name.push(c);
+                        self.advance();
+                    }
+                    self.push(Kind::Name(name), start);
+                }
+                None => return Err(format!("the command \\{other} has no meaning in a formula")),
+            },
+        }
+        Ok(())
+    }
+
+    fn name(&mut self) {
+        let start = self.at;
+        let mut name = String::new();
+        let mut hat = false;
+        while let Some(c) = self.peek().filter(|&c| is_name_part(c) || c == HAT) {
+            match unhatted(c) {
+                _ if c == HAT => hat = true,
+                Some(plain) => {
+                    hat = true;
+                    name.push(plain);
+                }
+                None => name.push(c),
+            }
+            self.advance();
+        }
+        if hat {
+            self.symbol("hat", start);
+        }
+        self.push(Kind::Name(name), start);
+    }
+}
+
+/// The letter under a precomposed hat.
+pub(crate) fn unhatted(c: char) -> Option<char> {
+    Some(match c {
+        'â' => 'a',
+        'ê' => 'e',
+        'î' => 'i',
+        'ô' => 'o',
+        'û' => 'u',
+        'ŵ' => 'w',
+        'ŷ' => 'y',
+        'ẑ' => 'z',
+        'ĉ' => 'c',
+        'ĝ' => 'g',
+        'ĥ' => 'h',
+        'ĵ' => 'j',
+        'ŝ' => 's',
+        'Â' => 'A',
+        'Ê' => 'E',
+        _ => return None,
+    })
+}
+
+fn is_name_start(c: char) -> bool {
+    (c.is_alphabetic() && !"ᵀᐧ".contains(c)) || c == '_'
+}
+
+fn is_name_part(c: char) -> bool {
+    is_name_start(c) || c.is_ascii_digit() || c == '′' || c == '\'' || ('₀'..='₉').contains(&c)
+}
+
+fn superscript(c: char) -> char {
+    match c {
+        '⁻' => '-',
+        '⁰' => '0',
+        '¹' => '1',
+        '²' => '2',
+        '³' => '3',
+        '⁴'..='⁹' => char::from(b'4' + (c as u32 - '⁴' as u32) as u8),
+        _ => ' ',
+    }
+}

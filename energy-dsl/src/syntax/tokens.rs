@@ -1,0 +1,130 @@
+use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
+
+use super::notation;
+use crate::diagnostic::{Diagnostic, Diagnostics, Span};
+
+/// What a token is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Kind {
+    Name(String),
+    Number(f64),
+    /// A string literal, its content already split into tokens.
+    Notation(Vec<Token>),
+    /// Any other string.
+    Text(String),
+    /// Operators, brackets, separators.
+    Symbol(String),
+}
+
+/// A token.
+#[derive(Clone, Debug)]
+pub(super) struct Token {
+    pub(super) kind: Kind,
+    pub(super) span: Span,
+    /// From mathematical notation, where standing side by side means a product.
+    pub(super) notation: bool,
+    /// As written.
+    pub(super) text: String,
+}
+
+/// Tokens as text that reads well and lexes to the same tokens.
+pub(super) fn text(tokens: &[Token]) -> String {
+    let mut text = String::new();
+    let mut glue = true;
+    for token in tokens {
+        let closing = matches!(token.text.as_str(), ")" | "]" | "," | ";" | ":");
+        let opening = matches!(token.text.as_str(), "(" | "[");
+        let after_name = text.ends_with(|c: char| c.is_alphanumeric() || c == '_');
+        if !(glue || closing || opening && after_name) {
+            text.push(' ');
+        }
+        text.push_str(&token.text);
+        glue = opening;
+    }
+    text
+}
+
+impl PartialEq for Token {
+    fn eq(&self, other: &Self) -> bool {
+        self.kind == other.kind
+    }
+}
+
+const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->"];
+
+/// Rust tokens as ours. Attributes' strings stay text; every other string literal is notation.
+pub(super) fn from_rust(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Token> {
+    let mut tokens = Vec::new();
+    flatten(stream, &mut tokens, false, diagnostics);
+    tokens
+}
+
+fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, attribute: bool, diagnostics: &mut Diagnostics) {
+    let mut trees = stream.into_iter().peekable();
+    let mut after_hash = false;
+    while let Some(tree) = trees.next() {
+        let span = Span::of(tree.span());
+        let mut push = |kind, span, text| tokens.push(Token { kind, span, notation: false, text });
+        let hash = matches!(&tree, TokenTree::Punct(p) if p.as_char() == '#');
+        match tree {
+            TokenTree::Ident(name) => push(Kind::Name(name.to_string()), span, name.to_string()),
+            TokenTree::Literal(literal) => {
+                let kind = literal_kind(&literal.to_string(), &span, attribute, diagnostics);
+                push(kind, span, literal.to_string());
+            }
+            TokenTree::Punct(first) => {
+                let mut symbol = first.as_char().to_string();
+                if let (Spacing::Joint, Some(TokenTree::Punct(second))) = (first.spacing(), trees.peek()) {
+                    let pair = format!("{symbol}{}", second.as_char());
+                    if OPERATORS.contains(&pair.as_str()) {
+                        symbol = pair;
+                        trees.next();
+                    }
+                }
+                push(Kind::Symbol(symbol.clone()), span, symbol);
+            }
+            TokenTree::Group(group) => {
+                let (open, close) = match group.delimiter() {
+                    Delimiter::Parenthesis => ("(", ")"),
+                    Delimiter::Brace => ("{", "}"),
+                    Delimiter::Bracket => ("[", "]"),
+                    Delimiter::None => ("", ""),
+                };
+                if !open.is_empty() {
+                    push(Kind::Symbol(open.into()), Span::of(group.span_open()), open.into());
+                }
+                flatten(group.stream(), tokens, attribute || after_hash, diagnostics);
+                if !close.is_empty() {
+                    tokens.push(Token {
+                        kind: Kind::Symbol(close.into()),
+                        span: Span::of(group.span_close()),
+                        notation: false,
+                        text: close.into(),
+                    });
+                }
+            }
+        }
+        after_hash = hash;
+    }
+}
+
+fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
+    if let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
+        let content = string.value();
+        return if attribute {
+            Kind::Text(content)
+        } else {
+            Kind::Notation(notation::tokens(&content, span, diagnostics))
+        };
+    }
+    let plain = text.replace('_', "");
+    let plain = plain.trim_end_matches("f64").trim_end_matches("f32");
+    if let Ok(number) = plain.parse() {
+        return Kind::Number(number);
+    }
+    diagnostics.push(
+        Diagnostic::new(span, format!("expected a number or a string with a formula, found the literal {text}"))
+            .help("write numbers as 2, 0.5 or 1e-3"),
+    );
+    Kind::Number(0.0)
+}

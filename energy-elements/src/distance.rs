@@ -1,0 +1,7 @@
+use energy_macros::energy;
+
+energy! {
+    /// Distance of two points (Khungurn 2019, §4). Where they coincide the derivatives are 0 and flagged.
+    #[audit]
+    pub energy Distance(p_k, p_l: Point) = "‖p_k − p_ℓ‖";
+}

@@ -1,0 +1,7 @@
+use energy_macros::energy;
+
+energy! {
+    /// cos θ of a hinge.
+    #[audit]
+    pub energy HingeCos(x1, x2, x3, x4: Point) { cos(dihedral(x1, x2, x3, x4)) }
+}

@@ -1,0 +1,18 @@
+use energy_macros::energy;
+
+energy! {
+    /// Hooke's spring of the mass–spring cloth model: F_P = K (PQ − L P̂Q), PQ = Q − P (the source prints the opposite sign). It is the
+    /// gradient of −K/2 (‖PQ‖ − L)².
+    #[audit]
+    pub energy HookeSpring(P, Q: Point; K: Scalar[N/m], L: Scalar[m]) {
+        let PQ = Q - P;
+        K / 2 * (norm(PQ) - L)^2
+    }
+}
+
+/// A spring between neighbours along the threads of the sheet, which resists stretch.
+pub type StructuralSpring<T = f64> = HookeSpring<T>;
+/// A spring across a cell of the sheet, which resists shear.
+pub type ShearSpring<T = f64> = HookeSpring<T>;
+/// A spring between second neighbours along the threads, which resists bending.
+pub type BendingSpring<T = f64> = HookeSpring<T>;

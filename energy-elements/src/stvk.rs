@@ -1,0 +1,18 @@
+use energy_macros::energy;
+
+energy! {
+    /// St. Venant–Kirchhoff membrane on a triangle: A (μ ‖E‖² + λ/2 tr² E), E = (FᵀF − 1)/2 the Green strain. λ and μ are per length: for
+    /// Young's modulus Y, Poisson's ratio ν and thickness h in plane stress, λ = Y h ν/(1 − ν²), μ = Y h/(2 (1 + ν)). The rest shape
+    /// is given by material coordinates in its plane, of positive area; a polynomial, regular everywhere.
+    #[audit]
+    pub energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
+        rest {
+            let D_m = columns(u1 - u0, u2 - u0);
+            let B = inverse(D_m);
+            let A = det(D_m) / 2;
+        }
+        let F = columns(x1 - x0, x2 - x0) * B;
+        let E = (transpose(F) * F - identity(2)) / 2;
+        A * (μ * ddot(E, E) + λ / 2 * trace(E)^2)
+    }
+}
