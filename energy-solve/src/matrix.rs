@@ -100,6 +100,16 @@ impl BlockMatrix {
         &mut self.values
     }
 
+    /// Σ_j |a_ij| of every row i, by block rows: bounds on the eigenvalues (Gershgorin).
+    #[must_use]
+    pub fn absolute_row_sums(&self) -> Vec<Vector3<f64>> {
+        let size = |row: &Vector3<f64>| row.iter().map(|entry| entry.abs()).sum::<f64>();
+        let sum = |range: &[usize]| -> Vector3<f64> {
+            std::array::from_fn(|axis| self.values[range[0]..range[1]].iter().map(|block| size(&block[axis])).sum())
+        };
+        self.pattern.row_start.windows(2).map(sum).collect()
+    }
+
     /// y ← A x.
     pub fn multiply(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
         let Pattern { row_start, columns, .. } = &*self.pattern;

@@ -131,6 +131,12 @@ impl System {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
+    /// Whether a matrix comes from [`System::matrix`] of this system.
+    #[must_use]
+    pub fn owns(&self, matrix: &BlockMatrix) -> bool {
+        Arc::ptr_eq(matrix.pattern(), &self.pattern)
+    }
+
     /// What all terms' forces have in common.
     #[must_use]
     pub fn character(&self) -> Character {
@@ -201,7 +207,7 @@ impl System {
         matrix: &mut BlockMatrix,
     ) -> Result<LinearisedForces, EvaluationError> {
         self.check(state)?;
-        assert!(Arc::ptr_eq(matrix.pattern(), &self.pattern), "the matrix must come from the same system");
+        assert!(self.owns(matrix), "the matrix must come from the same system");
         matrix.clear();
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
         let mut stiffness_times_velocity = force.clone();

@@ -1,4 +1,4 @@
-use energy_dsl::{Array, Block, Declaration, ForceLaw, Potential, Vector3, triangle_index};
+use energy_dsl::{Array, Block, Declaration, Element, ForceLaw, Potential, Value, Vector3, triangle_index};
 
 use crate::counts::Tally;
 use crate::list::ElementList;
@@ -131,17 +131,29 @@ impl<E: Potential<f64>> PotentialTerm<E> {
 }
 
 /// A term with a force law f(x, v).
-#[derive(Clone, Debug)]
-pub struct ForceTerm<E> {
+#[derive(Clone)]
+pub struct ForceTerm<E: ForceLaw<f64>> {
     list: ElementList<E>,
     character: Character,
+    energy: Option<fn(&E, &E::Points) -> Value<f64>>,
 }
 
 impl<E: ForceLaw<f64>> ForceTerm<E> {
     /// The sum of the forces of a list, of which nothing is assumed.
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
-        Self { list, character: Character { symmetric: false, velocity_dependent: true, curved: true } }
+        let character = Character { symmetric: false, velocity_dependent: true, curved: true };
+        Self { list, character, energy: None }
+    }
+
+    /// Reports the potential of the elements (damped springs have one) as the term's energy.
+    #[must_use]
+    pub fn with_energy(mut self) -> Self
+    where
+        E: Potential<f64, Points = <E as ForceLaw<f64>>::Points>,
+    {
+        self.energy = Some(<E as Potential<f64>>::value);
+        self
     }
 
     /// Claims that the Jacobians are symmetric (as those of viscous drag are), so that conjugate gradients may be used.
@@ -156,6 +168,15 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     pub fn without_velocity(mut self) -> Self {
         self.character.velocity_dependent = false;
         self
+    }
+}
+
+impl<E: ForceLaw<f64> + std::fmt::Debug> std::fmt::Debug for ForceTerm<E> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ForceTerm")
+            .field("list", &self.list)
+            .field("character", &self.character)
+            .finish_non_exhaustive()
     }
 }
 
@@ -177,13 +198,7 @@ impl<E: Potential<f64> + std::fmt::Debug> Term for PotentialTerm<E> {
     }
 
     fn energy(&self, active: &[usize], x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        let (mut sum, mut tally) = (0.0, Tally::default());
-        for &index in active {
-            let result = self.list.elements()[index].value(&gather(self.list.stencil(index), x));
-            sum += result.value;
-            count(&mut tally, result.flags.any());
-        }
-        Some((sum, tally))
+        Some(sum_of_values(&self.list, active, x, E::value))
     }
 
     fn add_force(&self, active: &[usize], state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -246,8 +261,8 @@ impl<E: ForceLaw<f64> + std::fmt::Debug> Term for ForceTerm<E> {
         Stencils { arity: self.list.arity(), vertices: self.list.vertices() }
     }
 
-    fn energy(&self, _: &[usize], _: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        None
+    fn energy(&self, active: &[usize], x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        self.energy.map(|value| sum_of_values(&self.list, active, x, value))
     }
 
     fn add_force(&self, active: &[usize], state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -308,6 +323,21 @@ impl Linearisation<'_> {
             self.stiffness_times_velocity[stencil[i]][axis] += product[axis];
         }
     }
+}
+
+fn sum_of_values<E: Element, Points: Array<Vector3<f64>>>(
+    list: &ElementList<E>,
+    active: &[usize],
+    x: &[Vector3<f64>],
+    value: fn(&E, &Points) -> Value<f64>,
+) -> (f64, Tally) {
+    let (mut sum, mut tally) = (0.0, Tally::default());
+    for &index in active {
+        let result = value(&list.elements()[index], &gather(list.stencil(index), x));
+        sum += result.value;
+        count(&mut tally, result.flags.any());
+    }
+    (sum, tally)
 }
 
 fn gather<Points: Array<Vector3<f64>>>(stencil: &[usize], all: &[Vector3<f64>]) -> Points {

@@ -46,8 +46,8 @@ pub enum ObjError {
 /// # Errors
 /// When the file cannot be read, a line cannot be understood, or the mesh is unfit; with the line's number where one is to blame.
 pub fn read_obj(path: &Path) -> Result<TriangleMesh, ObjError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
+    let text =
+        std::fs::read_to_string(path).map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
     Lines::of(&text).read(path)
 }
 
@@ -182,7 +182,11 @@ mod tests {
     fn errors_name_the_line() {
         let message = |more: &str| read(&format!("{VERTICES}{more}")).unwrap_err();
         assert!(read("").unwrap_err().starts_with("sheet.obj: the mesh has 0 vertices"));
-        assert!(message("f 1 2 3\nf 1 3 9\n").starts_with("sheet.obj:7: the face names a vertex"), "{}", message("f 1 3 9\n"));
+        assert!(
+            message("f 1 2 3\nf 1 3 9\n").starts_with("sheet.obj:7: the face names a vertex"),
+            "{}",
+            message("f 1 3 9\n")
+        );
         assert!(message("f 1 2 3\nf 1 0 4\n").starts_with("sheet.obj:7: "));
         assert!(message("f 1 2 3\nf 1 x 4\n").starts_with("sheet.obj:7: "), "{}", message("f 1 2 3\nf 1 x 4\n"));
         assert!(message("v 1 2 z\nf 1 2 3\n").starts_with("sheet.obj:6: position parse error"));

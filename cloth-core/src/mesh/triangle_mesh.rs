@@ -138,9 +138,7 @@ fn check_references(vertices: usize, triangles: &[[usize; 3]]) -> Result<(), Mes
     let mut used = vec![false; vertices];
     triangles.iter().flatten().for_each(|&corner| used[corner] = true);
     match used.iter().position(|&used| !used) {
-        Some(vertex) => {
-            Err(MeshError::Unreferenced { vertex, count: used.iter().filter(|&&used| !used).count() })
-        }
+        Some(vertex) => Err(MeshError::Unreferenced { vertex, count: used.iter().filter(|&&used| !used).count() }),
         None => Ok(()),
     }
 }
