@@ -2,7 +2,8 @@
 
 #![forbid(unsafe_code)]
 
-use std::path::{Path, PathBuf};
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
@@ -55,10 +56,7 @@ fn main() -> Result<()> {
             let folder = OutputFolder::open(&output, overwrite)?;
             run(simulation, &scene, &folder)
         }
-        Command::Materials => {
-            print!("{}", materials::listing());
-            Ok(())
-        }
+        Command::Materials => print(&materials::listing()),
     }
 }
 
@@ -70,7 +68,7 @@ fn run(mut simulation: Simulation, scene: &Scene, folder: &OutputFolder) -> Resu
     let triangles = simulation.mesh().triangles().to_vec();
     let mut frames: Vec<Vec<Vector3<f64>>> = Vec::new();
     loop {
-        if simulation.steps_done() % per_frame == 0 {
+        if simulation.steps_done().is_multiple_of(per_frame) {
             folder.write_frame(frames.len(), &obj_text(&simulation.body().x, &triangles))?;
             frames.push(simulation.body().x.clone());
         }
@@ -84,19 +82,25 @@ fn run(mut simulation: Simulation, scene: &Scene, folder: &OutputFolder) -> Resu
 
     let animation = animation_glb(&frames, &triangles, per_frame as f64 * scene.dt).context("the animation")?;
     let summary = simulation.summary()?.to_string();
-    println!("{summary}\n");
     let written = [
         folder.write(OutputFolder::PICTURE, &picture_png(&simulation.body().x, &triangles)?)?,
         folder.write(OutputFolder::ANIMATION, &animation)?,
         folder.write(OutputFolder::SUMMARY, format!("{summary}\n").as_bytes())?,
     ];
-    report(&written, folder.path(), frames.len());
-    Ok(())
+    let files: String = written.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    print(&format!(
+        "{summary}\n\n{files}wrote {} frames to {}\n",
+        frames.len(),
+        folder.path().join(OutputFolder::FRAMES).display()
+    ))
 }
 
-fn report(written: &[PathBuf], folder: &Path, frames: usize) {
-    written.iter().for_each(|path| println!("wrote {}", path.display()));
-    println!("wrote {} frames to {}", frames, folder.join("frames").display());
+/// Prints to standard output. A reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("cannot print"),
+        _ => Ok(()),
+    }
 }
 
 /// Hidden where standard error is not a terminal.

@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::fabric::{self, FabricError, Surroundings};
 use crate::integrator::{Integrator, StepError};
 use crate::mesh::TriangleMesh;
-use crate::scene::{MeshSourceError, PinError, Scene, pinned_vertices};
+use crate::scene::{MeshSourceError, PinError, Scene, Shape, pinned_vertices};
 use crate::summary::Summary;
 
 /// A scene that cannot be set up or moved on.
@@ -57,12 +57,11 @@ impl Simulation {
     /// # Errors
     /// When the mesh, the pins or the fabric are unfit.
     pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
-        let (mesh, springs) = scene.build_mesh()?;
-        let pinned = pinned_vertices(&scene.pins, mesh.vertices())?;
+        let Shape { mesh, start: x, springs } = scene.shape()?;
+        let pinned = pinned_vertices(&scene.pins, &x)?;
         let surroundings = Surroundings { gravity: scene.gravity, drag: scene.drag };
         let garment = fabric::terms(&scene.fabric, &mesh, &springs, &surroundings)?;
         let system = System::new(garment.terms, &pinned)?;
-        let x = mesh.vertices().to_vec();
         let mut body = Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system };
         let integrator = scene.integrator.integrator();
         let mut summary = Summary { left_out: garment.left_out, integrator: integrator.name(), ..Summary::default() };

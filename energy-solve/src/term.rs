@@ -130,12 +130,15 @@ impl<E: Potential<f64>> PotentialTerm<E> {
     }
 }
 
+/// A method that evaluates an element's energy.
+type ValueOf<E, Points> = fn(&E, &Points) -> Value<f64>;
+
 /// A term with a force law f(x, v).
 #[derive(Clone)]
 pub struct ForceTerm<E: ForceLaw<f64>> {
     list: ElementList<E>,
     character: Character,
-    energy: Option<fn(&E, &E::Points) -> Value<f64>>,
+    energy: Option<ValueOf<E, E::Points>>,
 }
 
 impl<E: ForceLaw<f64>> ForceTerm<E> {
@@ -329,7 +332,7 @@ fn sum_of_values<E: Element, Points: Array<Vector3<f64>>>(
     list: &ElementList<E>,
     active: &[usize],
     x: &[Vector3<f64>],
-    value: fn(&E, &Points) -> Value<f64>,
+    value: ValueOf<E, Points>,
 ) -> (f64, Tally) {
     let (mut sum, mut tally) = (0.0, Tally::default());
     for &index in active {

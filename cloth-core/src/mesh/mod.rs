@@ -8,7 +8,7 @@ mod triangle_mesh;
 
 pub use obj::{ObjError, read_obj};
 pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle};
-pub use sheet::{Diagonals, Plane, Sheet};
+pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};
 pub use topology::{Hinge, SpringNetwork, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
 

@@ -96,8 +96,8 @@ impl<'a> Lines<'a> {
         })
     }
 
-    /// The shape as one object. The parser numbers vertices by first use and drops unused ones; a point element for every vertex
-    /// ahead of the faces keeps the file's own numbers, which pins refer to, and lets unused vertices be reported.
+    /// The shape as one object. The parser numbers vertices by first use and drops unused ones; an element of one point for every
+    /// vertex ahead of the faces keeps the file's own numbers, which pins refer to, and lets unused vertices be reported.
     fn single_object(&self) -> String {
         let mut text = String::new();
         for (_, line) in &self.vertices {
@@ -105,7 +105,7 @@ impl<'a> Lines<'a> {
             text.push('\n');
         }
         for number in 1..=self.vertices.len() {
-            writeln!(text, "p {number}").expect("writing to a string succeeds");
+            writeln!(text, "l {number}").expect("writing to a string succeeds");
         }
         for (_, line) in &self.faces {
             text.push_str(line);

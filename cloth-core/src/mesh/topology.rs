@@ -100,7 +100,8 @@ mod tests {
     use crate::mesh::{Diagonals, Plane, rest_angle};
 
     fn sheet(columns: usize, rows: usize) -> Sheet {
-        Sheet { cells: [columns, rows], size: [1.0, 1.0], diagonals: Diagonals::Regular, plane: Plane::Horizontal }
+        let (diagonals, plane) = (Diagonals::Regular, Plane::Horizontal);
+        Sheet { cells: [columns, rows], size: [1.0, 1.0], diagonals, plane, pleats: None }
     }
 
     #[test]
@@ -116,9 +117,9 @@ mod tests {
 
     #[test]
     fn the_angle_grows_when_apexes_turn_against_the_normals() {
-        // x₃ = 0, x₄ along x; the apexes to both sides in y; the second folded up by 0.3 rad.
+        // x₃ = 0, x₄ along x; the apexes to both sides in y; the normals up; the second apex folded down by 0.3 rad.
         let (sine, cosine) = 0.3_f64.sin_cos();
-        let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, -cosine, sine]];
+        let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, -cosine, -sine]];
         let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [1, 0, 3]]).unwrap();
         let hinge = Topology::of(&mesh).hinges[0];
         assert_eq!(hinge.vertices, [2, 3, 0, 1]);

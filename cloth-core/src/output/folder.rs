@@ -41,6 +41,8 @@ impl OutputFolder {
     pub const ANIMATION: &'static str = "cloth.glb";
     /// The summary's name.
     pub const SUMMARY: &'static str = "summary.txt";
+    /// The name of the folder of OBJ frames.
+    pub const FRAMES: &'static str = "frames";
 
     /// Makes the folder and checks that it can be written to, before anything is computed. Frames of an earlier run are removed when
     /// overwriting, so that no sequence mixes two runs.
@@ -91,11 +93,11 @@ impl OutputFolder {
     /// # Errors
     /// When it cannot be written.
     pub fn write_frame(&self, number: usize, obj: &str) -> Result<PathBuf, OutputError> {
-        self.write(&format!("frames/cloth_{number:04}.obj"), obj.as_bytes())
+        self.write(&format!("{}/cloth_{number:04}.obj", Self::FRAMES), obj.as_bytes())
     }
 
     fn frames(&self) -> PathBuf {
-        self.path.join("frames")
+        self.path.join(Self::FRAMES)
     }
 
     fn existing_frames(&self) -> std::io::Result<Vec<PathBuf>> {

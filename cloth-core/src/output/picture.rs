@@ -19,7 +19,7 @@ const HEIGHT: u32 = 1000;
 const OVERSAMPLING: u32 = 3;
 /// From the cloth to the eye and to the lamp.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
-const LAMP: Vector3<f64> = [-0.35, -0.55, 0.9];
+const LAMP: Vector3<f64> = [-0.25, -0.45, 1.0];
 /// Darkest and brightest colour of the front and of the back.
 const FRONT: [[f32; 3]; 2] = [[0.03, 0.10, 0.19], [0.40, 0.66, 0.86]];
 const BACK: [[f32; 3]; 2] = [[0.20, 0.08, 0.05], [0.94, 0.66, 0.46]];
@@ -138,12 +138,16 @@ fn draw_background(canvas: &mut Pixmap) {
     }
 }
 
-/// The points' shadows on a floor a little below the lowest, under a lamp straight above.
+/// The points' shadows on a floor a little below the lowest.
 fn shadow_points(positions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let range = |pick: fn(f64, f64) -> f64, start| positions.iter().map(|p| p[2]).fold(start, pick);
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
-    let floor = low - 0.12 * (high - low);
-    positions.iter().map(|p| [p[0], p[1], floor]).collect()
+    let floor = low - 0.08 * (high - low);
+    let cast = |p: &Vector3<f64>| {
+        let way = (p[2] - floor) / LAMP[2];
+        [p[0] - way * LAMP[0], p[1] - way * LAMP[1], floor]
+    };
+    positions.iter().map(cast).collect()
 }
 
 /// Drawn small and enlarged, which makes it soft.

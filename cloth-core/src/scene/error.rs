@@ -32,7 +32,13 @@ impl SceneError {
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
         let suggestion = suggest(error.message()).map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
-        let message = format!("{}{suggestion}", error.message().replace('\n', " "));
+        let message = match error.message() {
+            // The parser's words for a table that stands for a choice.
+            several if several.starts_with("wanted exactly 1 element") => {
+                "exactly one of the alternatives must be given here".to_owned()
+            }
+            other => format!("{}{suggestion}", other.replace('\n', " ")),
+        };
         Self::Invalid { path: path.to_owned(), line, column, message }
     }
 }
@@ -65,7 +71,7 @@ stiffness = 1e-5
 
     fn message(from: &str, to: &str) -> String {
         assert!(SCENE.contains(from));
-        Scene::parse(&SCENE.replacen(from, to, 1), "s.toml".as_ref()).unwrap_err().to_string()
+        Scene::parse(&SCENE.replace(from, to), "s.toml".as_ref()).unwrap_err().to_string()
     }
 
     #[test]
@@ -78,10 +84,15 @@ stiffness = 1e-5
         let text = message("density", "densty");
         assert!(text.starts_with("s.toml:7:1: unknown field `densty`"), "{text}");
         assert!(text.ends_with("did you mean `density`?"), "{text}");
-        let text = message("material.stvk]", "material.stkv]");
+        let text = message("material.stvk", "material.stkv");
         assert!(text.starts_with("s.toml:8:") && text.ends_with("did you mean `stvk`?"), "{text}");
         let text = message("poisson_ratio", "poison_ratio");
         assert!(text.starts_with("s.toml:10:1: ") && text.ends_with("did you mean `poisson_ratio`?"), "{text}");
+        let text = message("[fabric.material.stvk]", "[fabric.material.mass-spring]\n[fabric.material.stvk]");
+        assert!(
+            text.starts_with("s.toml:8:") && text.ends_with("exactly one of the alternatives must be given here"),
+            "{text}"
+        );
         assert!(!message("density", "colour").contains("did you mean"));
     }
 

@@ -13,7 +13,7 @@ pub use pins::{Pin, PinError, pinned_vertices};
 
 use crate::fabric::Fabric;
 use crate::integrator::Scheme;
-use crate::mesh::{MeshError, ObjError, Sheet, SpringNetwork, Topology, TriangleMesh, read_obj};
+use crate::mesh::{MeshError, ObjError, PleatsError, Sheet, SpringNetwork, Topology, TriangleMesh, read_obj};
 use numbers::{finite_triple, non_negative, positive};
 
 /// A scene.
@@ -72,6 +72,20 @@ pub enum MeshSourceError {
     /// The sheet.
     #[error("mesh.sheet: {0}")]
     Sheet(#[from] MeshError),
+    /// Its folds.
+    #[error("mesh.sheet.pleats: {0}")]
+    Pleats(#[from] PleatsError),
+}
+
+/// The shape of a cloth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// At rest.
+    pub mesh: TriangleMesh,
+    /// The vertices at the start, in m.
+    pub start: Vec<[f64; 3]>,
+    /// The pairs of vertices that springs would join.
+    pub springs: SpringNetwork,
 }
 
 impl Scene {
@@ -95,17 +109,19 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The mesh and the pairs of vertices that springs would join.
+    /// The cloth's shape.
     ///
     /// # Errors
     /// When the file cannot be read or the mesh is unfit.
-    pub fn build_mesh(&self) -> Result<(TriangleMesh, SpringNetwork), MeshSourceError> {
+    pub fn shape(&self) -> Result<Shape, MeshSourceError> {
         match &self.mesh {
-            Mesh::Sheet(sheet) => Ok((sheet.mesh()?, SpringNetwork::of_sheet(sheet))),
+            Mesh::Sheet(sheet) => {
+                Ok(Shape { mesh: sheet.mesh()?, start: sheet.start()?, springs: SpringNetwork::of_sheet(sheet) })
+            }
             Mesh::Obj { path } => {
                 let mesh = read_obj(&self.folder.join(path))?;
-                let network = SpringNetwork::of_mesh(&Topology::of(&mesh));
-                Ok((mesh, network))
+                let springs = SpringNetwork::of_mesh(&Topology::of(&mesh));
+                Ok(Shape { start: mesh.vertices().to_vec(), mesh, springs })
             }
         }
     }
