@@ -1,1 +1,50 @@
+//! Cloth made of declared elements: triangle meshes, fabrics, integrators, scenes and output. The binary `cloth` runs it.
+//!
+//! A [`scene::Scene`] names a mesh, a fabric, pins and an integrator; [`Simulation`] moves it.
+//!
+//! ```
+//! use cloth_core::{Simulation, scene::Scene};
+//!
+//! let scene: Scene = Scene::parse(
+//!     r#"
+//!     dt = 0.01
+//!     duration = 0.05
+//!     gravity = [0.0, 0.0, -9.81]
+//!     [mesh.sheet]
+//!     cells = [4, 4]
+//!     size = [1.0, 1.0]
+//!     [fabric]
+//!     density = 0.15
+//!     [fabric.material.stvk]
+//!     stretch_stiffness = 50.0
+//!     poisson_ratio = 0.3
+//!     [[pins]]
+//!     nearest = [-0.5, 0.5, 0.0]
+//!     "#,
+//!     "scene.toml".as_ref(),
+//! )?;
+//! let mut simulation = Simulation::new(&scene)?;
+//! while !simulation.is_finished() {
+//!     simulation.step()?;
+//! }
+//! assert!(simulation.body().x[0][2] < -0.001, "the free corner falls");
+//! # Ok::<(), anyhow::Error>(())
+//! ```
 
+#![forbid(unsafe_code)]
+
+mod body;
+mod simulation;
+mod summary;
+
+pub mod demo;
+pub mod fabric;
+pub mod integrator;
+pub mod materials;
+pub mod mesh;
+pub mod output;
+pub mod scene;
+
+pub use body::Body;
+pub use simulation::{Simulation, SimulationError};
+pub use summary::Summary;

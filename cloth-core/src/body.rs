@@ -1,0 +1,53 @@
+use energy_dsl::Vector3;
+use energy_solve::{State, System};
+
+/// A cloth in motion.
+#[derive(Debug)]
+pub struct Body {
+    /// Positions, in m.
+    pub x: Vec<Vector3<f64>>,
+    /// Velocities, in m/s; zero for pinned vertices.
+    pub v: Vec<Vector3<f64>>,
+    /// Masses, in kg.
+    pub masses: Vec<f64>,
+    /// The forces on it. Its pinned vertices never move.
+    pub system: System,
+}
+
+impl Body {
+    /// Positions and velocities.
+    #[must_use]
+    pub fn state(&self) -> State<'_> {
+        State { x: &self.x, v: &self.v }
+    }
+
+    /// ½ Σ m v², in J.
+    #[must_use]
+    pub fn kinetic_energy(&self) -> f64 {
+        let square = |v: &Vector3<f64>| v.iter().map(|component| component * component).sum::<f64>();
+        self.masses.iter().zip(&self.v).map(|(mass, v)| 0.5 * mass * square(v)).sum()
+    }
+
+    /// Σ m v, in kg m/s.
+    #[must_use]
+    pub fn momentum(&self) -> Vector3<f64> {
+        self.sum(|_, v| v)
+    }
+
+    /// Σ m x × v about the origin, in kg m²/s.
+    #[must_use]
+    pub fn angular_momentum(&self) -> Vector3<f64> {
+        self.sum(crate::mesh::cross)
+    }
+
+    fn sum(&self, of: impl Fn(Vector3<f64>, Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
+        let mut total = [0.0; 3];
+        for ((mass, x), v) in self.masses.iter().zip(&self.x).zip(&self.v) {
+            let part = of(*x, *v);
+            for axis in 0..3 {
+                total[axis] += mass * part[axis];
+            }
+        }
+        total
+    }
+}

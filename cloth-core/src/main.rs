@@ -1,0 +1,110 @@
+//! `cloth`: runs scenes, shows a demonstration, lists materials.
+
+#![forbid(unsafe_code)]
+
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+use cloth_core::output::{OutputFolder, animation_glb, obj_text, picture_png};
+use cloth_core::scene::Scene;
+use cloth_core::{Simulation, demo, materials};
+use energy_dsl::Vector3;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Cloth simulated with audited derivatives.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Audits the materials of a sheet hung by two corners, simulates it, and writes a picture, an animation and OBJ frames.
+    Demo {
+        /// Where the files go; those of an earlier demo are replaced.
+        #[arg(short, long, default_value = "out")]
+        output: PathBuf,
+    },
+    /// Simulates a scene and writes a picture, an animation and OBJ frames.
+    Run {
+        /// The scene file (TOML).
+        scene: PathBuf,
+        /// Where the files go.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Replace the files of an earlier run.
+        #[arg(long)]
+        overwrite: bool,
+    },
+    /// Lists the declared elements: formula, parameters with units, operations per routine.
+    Materials,
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().command {
+        Command::Demo { output } => {
+            let folder = OutputFolder::open(&output, true)?;
+            run(Simulation::new(&demo::scene()?)?, &demo::scene()?, &folder)
+        }
+        Command::Run { scene, output, overwrite } => {
+            let scene = Scene::read(&scene)?;
+            let simulation = Simulation::new(&scene)?;
+            let folder = OutputFolder::open(&output, overwrite)?;
+            run(simulation, &scene, &folder)
+        }
+        Command::Materials => print(&materials::listing()),
+    }
+}
+
+/// Simulates to the end and writes everything.
+fn run(mut simulation: Simulation, scene: &Scene, folder: &OutputFolder) -> Result<()> {
+    simulation.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    let per_frame = scene.steps_per_frame();
+    let progress = progress_bar(simulation.steps());
+    let triangles = simulation.mesh().triangles().to_vec();
+    let mut frames: Vec<Vec<Vector3<f64>>> = Vec::new();
+    loop {
+        if simulation.steps_done().is_multiple_of(per_frame) {
+            folder.write_frame(frames.len(), &obj_text(&simulation.body().x, &triangles))?;
+            frames.push(simulation.body().x.clone());
+        }
+        if simulation.is_finished() {
+            break;
+        }
+        simulation.step()?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+
+    let animation = animation_glb(&frames, &triangles, per_frame as f64 * scene.dt).context("the animation")?;
+    let summary = simulation.summary()?.to_string();
+    let written = [
+        folder.write(OutputFolder::PICTURE, &picture_png(&simulation.body().x, &triangles)?)?,
+        folder.write(OutputFolder::ANIMATION, &animation)?,
+        folder.write(OutputFolder::SUMMARY, format!("{summary}\n").as_bytes())?,
+    ];
+    let files: String = written.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    print(&format!(
+        "{summary}\n\n{files}wrote {} frames to {}\n",
+        frames.len(),
+        folder.path().join(OutputFolder::FRAMES).display()
+    ))
+}
+
+/// Prints to standard output. A reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("cannot print"),
+        _ => Ok(()),
+    }
+}
+
+/// Hidden where standard error is not a terminal.
+fn progress_bar(steps: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{wide_bar} step {pos}/{len}, {eta} left").expect("the template is valid");
+    ProgressBar::new(steps).with_style(style)
+}

@@ -1,0 +1,198 @@
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use tobj::{LoadError, LoadOptions};
+
+use super::{MeshError, TriangleMesh};
+
+/// An OBJ file that is no cloth.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjError {
+    /// The file cannot be read.
+    #[error("cannot read {}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A line cannot be understood.
+    #[error("{}:{line}: {reason}: `{text}`", .path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+        /// What it says.
+        text: String,
+    },
+    /// The lines can be understood but the mesh is unfit.
+    #[error("{}{}: {source}", .path.display(), .line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Unfit {
+        /// The file.
+        path: PathBuf,
+        /// The line of the vertex or triangle to blame, from 1.
+        line: Option<usize>,
+        /// What is wrong.
+        source: MeshError,
+    },
+}
+
+/// Reads a mesh from an OBJ file. Polygons are cut into fans; groups, normals, texture coordinates and materials are ignored.
+/// Vertices are numbered as in the file, but from 0.
+///
+/// # Errors
+/// When the file cannot be read, a line cannot be understood, or the mesh is unfit; with the line's number where one is to blame.
+pub fn read_obj(path: &Path) -> Result<TriangleMesh, ObjError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
+    Lines::of(&text).read(path)
+}
+
+/// The lines of an OBJ file that make its shape, with their numbers from 1.
+struct Lines<'a> {
+    vertices: Vec<(usize, &'a str)>,
+    faces: Vec<(usize, &'a str)>,
+}
+
+impl<'a> Lines<'a> {
+    fn of(text: &'a str) -> Self {
+        let starting = |keyword: &'static str| {
+            let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+            numbered.filter(move |(_, line)| line.split_whitespace().next() == Some(keyword)).collect()
+        };
+        Self { vertices: starting("v"), faces: starting("f") }
+    }
+
+    fn read(&self, path: &Path) -> Result<TriangleMesh, ObjError> {
+        let models = parse(&self.single_object()).map_err(|error| self.locate(path, error))?;
+        let mut vertices = Vec::new();
+        let mut triangles = Vec::new();
+        let mut line_of_triangle = Vec::new();
+        for model in &models {
+            vertices.extend(model.mesh.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
+            let polygons = self.polygons(&model.mesh);
+            for (corners, &(line, _)) in polygons.iter().zip(&self.faces) {
+                for next in 2..corners.len() {
+                    triangles.push([corners[0], corners[next - 1], corners[next]]);
+                    line_of_triangle.push(line);
+                }
+            }
+        }
+        TriangleMesh::new(vertices, triangles).map_err(|source| {
+            let line = match &source {
+                MeshError::NonFiniteVertex { vertex, .. } | MeshError::Unreferenced { vertex, .. } => {
+                    Some(self.vertices[*vertex].0)
+                }
+                MeshError::VertexOutOfRange { triangle, .. } | MeshError::ZeroArea { triangle, .. } => {
+                    Some(line_of_triangle[*triangle])
+                }
+                MeshError::NonManifoldEdge { triangles, .. } => triangles.last().map(|&last| line_of_triangle[last]),
+                MeshError::Empty { .. } => None,
+            };
+            ObjError::Unfit { path: path.to_owned(), line, source }
+        })
+    }
+
+    /// The shape as one object. The parser numbers vertices by first use and drops unused ones; an element of one point for every
+    /// vertex ahead of the faces keeps the file's own numbers, which pins refer to, and lets unused vertices be reported.
+    fn single_object(&self) -> String {
+        let mut text = String::new();
+        for (_, line) in &self.vertices {
+            text.push_str(line);
+            text.push('\n');
+        }
+        for number in 1..=self.vertices.len() {
+            writeln!(text, "l {number}").expect("writing to a string succeeds");
+        }
+        for (_, line) in &self.faces {
+            text.push_str(line);
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The corners of each face, the point elements left out.
+    fn polygons(&self, mesh: &tobj::Mesh) -> Vec<Vec<usize>> {
+        let mut start = 0;
+        let all = mesh.face_arities.iter().map(|&arity| {
+            let corners = mesh.indices[start..start + arity as usize].iter().map(|&corner| corner as usize).collect();
+            start += arity as usize;
+            corners
+        });
+        all.skip(self.vertices.len()).collect()
+    }
+
+    /// The first line that the parser's complaint can be about.
+    fn locate(&self, path: &Path, error: LoadError) -> ObjError {
+        let fails_alone = |line: &&(usize, &str)| match parse(line.1) {
+            Err(LoadError::FaceVertexOutOfBounds) | Ok(_) => false,
+            Err(_) => true,
+        };
+        let broken = self.vertices.iter().chain(&self.faces).find(fails_alone);
+        let culprit = broken.or_else(|| self.faces.iter().find(|(_, line)| self.is_out_of_range(line)));
+        match culprit {
+            Some(&(line, text)) => {
+                let reason = match (broken, self.vertices.len()) {
+                    (None, count) => format!("the face names a vertex that is not among the {count} of the file"),
+                    (Some(_), _) => error.to_string(),
+                };
+                ObjError::Line { path: path.to_owned(), line, reason, text: text.to_owned() }
+            }
+            None => ObjError::Line { path: path.to_owned(), line: 1, reason: error.to_string(), text: String::new() },
+        }
+    }
+
+    fn is_out_of_range(&self, face: &str) -> bool {
+        let count = self.vertices.len() as i64;
+        face.split_whitespace().skip(1).any(|corner| {
+            let number = corner.split('/').next().and_then(|number| number.parse::<i64>().ok());
+            number.is_none_or(|number| number == 0 || number.abs() > count)
+        })
+    }
+}
+
+fn parse(text: &str) -> Result<Vec<tobj::Model>, LoadError> {
+    let options = LoadOptions::default();
+    let no_materials = |_: &Path| Err(LoadError::GenericFailure);
+    tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials).map(|(models, _)| models)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TriangleMesh, String> {
+        Lines::of(text).read(Path::new("sheet.obj")).map_err(|error| error.to_string())
+    }
+
+    const VERTICES: &str = "# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn vertices_keep_the_numbers_of_the_file() {
+        let mesh = read(&format!("{VERTICES}o part\nf 3/1/1 4//2 1\ng other\nusemtl red\nf -4 -3 -2\n")).unwrap();
+        assert_eq!(mesh.triangles(), [[2, 3, 0], [0, 1, 2]]);
+        assert_eq!(mesh.vertices()[3], [0.0, 1.0, 0.0]);
+        assert_eq!(read(&format!("{VERTICES}f 1 2 3 4\n")).unwrap().triangles(), [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let message = |more: &str| read(&format!("{VERTICES}{more}")).unwrap_err();
+        assert!(read("").unwrap_err().starts_with("sheet.obj: the mesh has 0 vertices"));
+        assert!(
+            message("f 1 2 3\nf 1 3 9\n").starts_with("sheet.obj:7: the face names a vertex"),
+            "{}",
+            message("f 1 3 9\n")
+        );
+        assert!(message("f 1 2 3\nf 1 0 4\n").starts_with("sheet.obj:7: "));
+        assert!(message("f 1 2 3\nf 1 x 4\n").starts_with("sheet.obj:7: "), "{}", message("f 1 2 3\nf 1 x 4\n"));
+        assert!(message("v 1 2 z\nf 1 2 3\n").starts_with("sheet.obj:6: position parse error"));
+        assert!(message("v 1 NaN 0\nf 1 2 3\nf 3 4 5\n").starts_with("sheet.obj:6: vertex 4 is not finite"));
+        assert!(message("f 1 2 3\n").starts_with("sheet.obj:5: vertex 3 belongs to no triangle"));
+        assert!(message("f 1 2 3\nf 1 3 4\nf 1 3 2\n").starts_with("sheet.obj:8: edge 0–2 is shared by 3"));
+        assert!(message("f 1 2 3\nf 1 1 4\n").starts_with("sheet.obj:7: triangle 1"));
+    }
+}

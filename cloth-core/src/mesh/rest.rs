@@ -1,0 +1,46 @@
+use energy_dsl::Vector3;
+
+use super::topology::Hinge;
+use super::{TriangleMesh, cross, dot, norm, subtract};
+
+/// A triangle at rest, laid in its own plane: the 2-D material coordinates of its corners, in m, anticlockwise.
+pub type MaterialTriangle = [[f64; 2]; 3];
+
+/// Lays a triangle in the plane: the first corner at the origin, the second on the positive first axis.
+///
+/// ```
+/// use cloth_core::mesh::material_triangle;
+/// let laid = material_triangle([[1.0, 1.0, 1.0], [1.0, 1.0, 3.0], [1.0, 4.0, 1.0]]);
+/// assert_eq!(laid, [[0.0, 0.0], [2.0, 0.0], [0.0, 3.0]]);
+/// ```
+#[must_use]
+pub fn material_triangle([a, b, c]: [Vector3<f64>; 3]) -> MaterialTriangle {
+    let (base, side) = (subtract(b, a), subtract(c, a));
+    let length = norm(base);
+    [[0.0; 2], [length, 0.0], [dot(base, side) / length, norm(cross(base, side)) / length]]
+}
+
+/// The mass of each vertex, in kg: a third of σ A of every triangle it is a corner of. σ in kg/m².
+#[must_use]
+pub fn lumped_masses(mesh: &TriangleMesh, density: f64) -> Vec<f64> {
+    let mut masses = vec![0.0; mesh.vertices().len()];
+    for (triangle, corners) in mesh.triangles().iter().enumerate() {
+        let [a, b, c] = mesh.corners(triangle);
+        let area = 0.5 * norm(cross(subtract(b, a), subtract(c, a)));
+        for &corner in corners {
+            masses[corner] += density * area / 3.0;
+        }
+    }
+    masses
+}
+
+/// The dihedral angle of a hinge at rest, in radians: 0 when flat, in (−π, π].
+///
+/// With E = x₄ − x₃, N₁ = E × (x₁ − x₃), N₂ = −E × (x₂ − x₃): cos θ = n₁·n₂, sin θ = (n₁ × n₂)·E/‖E‖.
+#[must_use]
+pub fn rest_angle(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
+    let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
+    let edge = subtract(x4, x3);
+    let (n1, n2) = (cross(edge, subtract(x1, x3)), cross(subtract(x2, x3), edge));
+    (dot(cross(n1, n2), edge) / norm(edge)).atan2(dot(n1, n2))
+}

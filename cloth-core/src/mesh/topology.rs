@@ -1,0 +1,137 @@
+use std::collections::BTreeMap;
+
+use super::{Sheet, TriangleMesh};
+
+/// Two triangles that share an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hinge {
+    /// [x₁, x₂, x₃, x₄]: the two apexes, then the shared edge, which the triangle of x₁ runs through from x₃ to x₄. The normals
+    /// E × (x₁ − x₃) and −E × (x₂ − x₃), E = x₄ − x₃, point to the same side when the hinge is flat.
+    pub vertices: [usize; 4],
+    /// The triangles of x₁ and x₂.
+    pub triangles: [usize; 2],
+}
+
+/// The edges of a mesh and the hinges along its inner edges, each ordered by their vertices.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topology {
+    /// Every edge once, the smaller vertex first.
+    pub edges: Vec<[usize; 2]>,
+    /// Every pair of triangles along an edge.
+    pub hinges: Vec<Hinge>,
+}
+
+impl Topology {
+    /// The edges and hinges of a mesh.
+    #[must_use]
+    pub fn of(mesh: &TriangleMesh) -> Self {
+        // For each edge the sides along it: triangle, apex, and the edge as the triangle runs through it.
+        let mut sides: BTreeMap<[usize; 2], Vec<(usize, usize, [usize; 2])>> = BTreeMap::new();
+        for (triangle, &[a, b, c]) in mesh.triangles().iter().enumerate() {
+            for (start, end, apex) in [(a, b, c), (b, c, a), (c, a, b)] {
+                sides.entry([start.min(end), start.max(end)]).or_default().push((triangle, apex, [start, end]));
+            }
+        }
+        let hinge = |sides: &Vec<(usize, usize, [usize; 2])>| match sides[..] {
+            [(first, x1, [x3, x4]), (second, x2, _)] => {
+                Some(Hinge { vertices: [x1, x2, x3, x4], triangles: [first, second] })
+            }
+            _ => None,
+        };
+        Self { hinges: sides.values().filter_map(hinge).collect(), edges: sides.into_keys().collect() }
+    }
+}
+
+/// The vertex pairs that a mass-spring fabric joins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SpringNetwork {
+    /// Neighbours along warp and weft.
+    pub structural: Vec<[usize; 2]>,
+    /// Across the cells.
+    pub shear: Vec<[usize; 2]>,
+    /// Second neighbours, which come closer when the fabric bends.
+    pub bending: Vec<[usize; 2]>,
+}
+
+impl SpringNetwork {
+    /// On a sheet: structural springs along the grid lines, shear springs along both diagonals of each cell, bending springs
+    /// between second neighbours along the grid lines.
+    #[must_use]
+    pub fn of_sheet(sheet: &Sheet) -> Self {
+        let [columns, rows] = sheet.cells.map(|cells| cells + 1);
+        let mut network = Self { structural: Vec::new(), shear: Vec::new(), bending: Vec::new() };
+        let at = |column, row| sheet.vertex(column, row);
+        for row in 0..rows {
+            for column in 0..columns {
+                let here = at(column, row);
+                let (right, up) = (column + 1 < columns, row + 1 < rows);
+                let mut join = |pairs: fn(&mut Self) -> &mut Vec<[usize; 2]>, exists: bool, to: (usize, usize)| {
+                    if exists {
+                        pairs(&mut network).push([here, at(to.0, to.1)]);
+                    }
+                };
+                join(|n| &mut n.structural, right, (column + 1, row));
+                join(|n| &mut n.structural, up, (column, row + 1));
+                join(|n| &mut n.shear, right && up, (column + 1, row + 1));
+                join(|n| &mut n.shear, column > 0 && up, (column.wrapping_sub(1), row + 1));
+                join(|n| &mut n.bending, column + 2 < columns, (column + 2, row));
+                join(|n| &mut n.bending, row + 2 < rows, (column, row + 2));
+            }
+        }
+        network
+    }
+
+    /// On any mesh: structural springs along the edges, bending springs between the apexes of each hinge, which also resist
+    /// shear; no separate shear springs.
+    #[must_use]
+    pub fn of_mesh(topology: &Topology) -> Self {
+        let apexes = |hinge: &Hinge| [hinge.vertices[0], hinge.vertices[1]];
+        Self {
+            structural: topology.edges.clone(),
+            shear: Vec::new(),
+            bending: topology.hinges.iter().map(apexes).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Diagonals, Plane, rest_angle};
+
+    fn sheet(columns: usize, rows: usize) -> Sheet {
+        let (diagonals, plane) = (Diagonals::Regular, Plane::Horizontal);
+        Sheet { cells: [columns, rows], size: [1.0, 1.0], diagonals, plane, pleats: None }
+    }
+
+    #[test]
+    fn a_sheet_has_the_edges_and_hinges_that_euler_counts() {
+        let mesh = sheet(3, 2).mesh().unwrap();
+        let topology = Topology::of(&mesh);
+        let (vertices, triangles) = (12, 12);
+        assert_eq!(topology.edges.len(), vertices + triangles - 1);
+        let boundary = 2 * (3 + 2);
+        assert_eq!(topology.hinges.len(), topology.edges.len() - boundary);
+        assert!(topology.hinges.iter().all(|hinge| rest_angle(&mesh, hinge) == 0.0));
+    }
+
+    #[test]
+    fn the_angle_grows_when_apexes_turn_against_the_normals() {
+        // x₃ = 0, x₄ along x; the apexes to both sides in y; the normals up; the second apex folded down by 0.3 rad.
+        let (sine, cosine) = 0.3_f64.sin_cos();
+        let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, -cosine, -sine]];
+        let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [1, 0, 3]]).unwrap();
+        let hinge = Topology::of(&mesh).hinges[0];
+        assert_eq!(hinge.vertices, [2, 3, 0, 1]);
+        assert!((rest_angle(&mesh, &hinge) - 0.3).abs() < 1e-15, "{}", rest_angle(&mesh, &hinge));
+    }
+
+    #[test]
+    fn springs_of_a_sheet() {
+        let network = SpringNetwork::of_sheet(&sheet(3, 2));
+        assert_eq!(network.structural.len(), 3 * 3 + 4 * 2);
+        assert_eq!(network.shear.len(), 2 * 6);
+        assert_eq!(network.bending.len(), 2 * 3 + 4);
+        assert!(network.shear.contains(&[1, 4]), "{:?}", network.shear);
+    }
+}

@@ -1,0 +1,183 @@
+use std::collections::BTreeMap;
+
+use energy_dsl::Vector3;
+
+use super::{cross, norm, subtract};
+
+/// What makes vertices and triangles unfit to be a cloth. Vertices and triangles are numbered from 0.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// There is nothing to simulate.
+    #[error("the mesh has {vertices} vertices and {triangles} triangles; a cloth needs at least one triangle")]
+    Empty {
+        /// Vertices given.
+        vertices: usize,
+        /// Triangles given.
+        triangles: usize,
+    },
+    /// A vertex is not a point.
+    #[error("vertex {vertex} is not finite: {position:?}")]
+    NonFiniteVertex {
+        /// The vertex.
+        vertex: usize,
+        /// Its coordinates.
+        position: Vector3<f64>,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertex {vertex}, but there are only {vertices} vertices")]
+    VertexOutOfRange {
+        /// The triangle.
+        triangle: usize,
+        /// The vertex it names.
+        vertex: usize,
+        /// The number of vertices.
+        vertices: usize,
+    },
+    /// A triangle has no area, so that its rest shape is undefined.
+    #[error("triangle {triangle} (vertices {corners:?}) has no area; remove it or move a corner")]
+    ZeroArea {
+        /// The triangle.
+        triangle: usize,
+        /// Its vertices.
+        corners: [usize; 3],
+    },
+    /// More than two triangles meet along an edge.
+    #[error("edge {}–{} is shared by {} triangles {triangles:?}; a cloth has at most two along an edge", .edge[0], .edge[1], .triangles.len())]
+    NonManifoldEdge {
+        /// Its ends.
+        edge: [usize; 2],
+        /// The triangles along it.
+        triangles: Vec<usize>,
+    },
+    /// A vertex of no triangle would have no mass.
+    #[error("vertex {vertex} belongs to no triangle, so it would have no mass ({count} such vertices); remove it")]
+    Unreferenced {
+        /// The first such vertex.
+        vertex: usize,
+        /// How many there are.
+        count: usize,
+    },
+}
+
+/// A mesh of triangles that passed validation: finite, no zero areas, at most two triangles along an edge, no loose vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TriangleMesh {
+    vertices: Vec<Vector3<f64>>,
+    triangles: Vec<[usize; 3]>,
+}
+
+impl TriangleMesh {
+    /// A mesh from its rest positions, in m, and triangles, anticlockwise seen from the front.
+    ///
+    /// # Errors
+    /// The first thing wrong; see [`MeshError`].
+    pub fn new(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Result<Self, MeshError> {
+        if triangles.is_empty() {
+            return Err(MeshError::Empty { vertices: vertices.len(), triangles: 0 });
+        }
+        let is_finite = |position: &Vector3<f64>| position.iter().all(|coordinate| coordinate.is_finite());
+        if let Some(vertex) = vertices.iter().position(|position| !is_finite(position)) {
+            return Err(MeshError::NonFiniteVertex { vertex, position: vertices[vertex] });
+        }
+        for (triangle, corners) in triangles.iter().enumerate() {
+            check_triangle(triangle, *corners, &vertices)?;
+        }
+        check_edges(&triangles)?;
+        check_references(vertices.len(), &triangles)?;
+        Ok(Self { vertices, triangles })
+    }
+
+    /// Rest positions, in m.
+    #[must_use]
+    pub fn vertices(&self) -> &[Vector3<f64>] {
+        &self.vertices
+    }
+
+    /// The corners of each triangle.
+    #[must_use]
+    pub fn triangles(&self) -> &[[usize; 3]] {
+        &self.triangles
+    }
+
+    /// The rest positions of a triangle's corners.
+    #[must_use]
+    pub fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
+        self.triangles[triangle].map(|corner| self.vertices[corner])
+    }
+}
+
+fn check_triangle(triangle: usize, corners: [usize; 3], positions: &[Vector3<f64>]) -> Result<(), MeshError> {
+    let vertices = positions.len();
+    if let Some(&vertex) = corners.iter().find(|&&corner| corner >= vertices) {
+        return Err(MeshError::VertexOutOfRange { triangle, vertex, vertices });
+    }
+    let [a, b, c] = corners.map(|corner| positions[corner]);
+    let longest = norm(subtract(b, a)).max(norm(subtract(c, b))).max(norm(subtract(a, c)));
+    // Relative to the triangle's own size: below this, a corner's rounding error decides the shape.
+    let negligible = 1e-14 * longest * longest;
+    if norm(cross(subtract(b, a), subtract(c, a))) <= negligible {
+        return Err(MeshError::ZeroArea { triangle, corners });
+    }
+    Ok(())
+}
+
+fn check_edges(triangles: &[[usize; 3]]) -> Result<(), MeshError> {
+    let mut along: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
+    for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
+        for (start, end) in [(a, b), (b, c), (c, a)] {
+            along.entry([start.min(end), start.max(end)]).or_default().push(triangle);
+        }
+    }
+    match along.into_iter().find(|(_, triangles)| triangles.len() > 2) {
+        Some((edge, triangles)) => Err(MeshError::NonManifoldEdge { edge, triangles }),
+        None => Ok(()),
+    }
+}
+
+fn check_references(vertices: usize, triangles: &[[usize; 3]]) -> Result<(), MeshError> {
+    let mut used = vec![false; vertices];
+    triangles.iter().flatten().for_each(|&corner| used[corner] = true);
+    match used.iter().position(|&used| !used) {
+        Some(vertex) => Err(MeshError::Unreferenced { vertex, count: used.iter().filter(|&&used| !used).count() }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> Vec<Vector3<f64>> {
+        vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+    }
+
+    #[test]
+    fn unfit_meshes_are_refused_with_numbers() {
+        let message = |vertices, triangles| TriangleMesh::new(vertices, triangles).unwrap_err().to_string();
+        assert!(message(square(), vec![]).contains("0 triangles"));
+        assert!(message(square(), vec![[0, 1, 2], [0, 2, 9]]).starts_with("triangle 1 names vertex 9"));
+        let mut broken = square();
+        broken[3][2] = f64::NAN;
+        assert!(message(broken, vec![[0, 1, 2], [0, 2, 3]]).starts_with("vertex 3 is not finite"));
+        let mut line = square();
+        line[3] = [0.5, 0.5, 0.0];
+        assert!(message(line, vec![[0, 1, 2], [0, 2, 3]]).starts_with("triangle 1 (vertices [0, 2, 3]) has no area"));
+        assert!(message(square(), vec![[0, 1, 2]]).starts_with("vertex 3 belongs to no triangle"));
+        assert!(message(square(), vec![[0, 1, 1], [1, 2, 3]]).contains("no area"));
+    }
+
+    #[test]
+    fn a_third_triangle_along_an_edge_is_refused() {
+        let mut vertices = square();
+        vertices.push([0.5, 0.5, 1.0]);
+        let error = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3], [0, 2, 4]]).unwrap_err();
+        assert_eq!(error, MeshError::NonManifoldEdge { edge: [0, 2], triangles: vec![0, 1, 2] });
+        assert!(error.to_string().starts_with("edge 0–2 is shared by 3 triangles [0, 1, 2]"));
+    }
+
+    #[test]
+    fn tiny_but_well_shaped_triangles_are_fine() {
+        let vertices = square().into_iter().map(|p| p.map(|c| c * 1e-9)).collect();
+        assert!(TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).is_ok());
+    }
+}

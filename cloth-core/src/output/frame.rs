@@ -1,0 +1,25 @@
+use std::fmt::Write as _;
+
+use energy_dsl::Vector3;
+
+use super::vertex_normals;
+
+/// A frame as OBJ text: vertices in m, to 9 digits, with normals.
+#[must_use]
+pub fn obj_text(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> String {
+    let mut text = String::with_capacity(80 * positions.len() + 32 * triangles.len());
+    let mut line = |arguments: std::fmt::Arguments<'_>| {
+        text.write_fmt(arguments).expect("writing to a string succeeds");
+    };
+    for p in positions {
+        line(format_args!("v {:.9} {:.9} {:.9}\n", p[0], p[1], p[2]));
+    }
+    for n in vertex_normals(positions, triangles) {
+        line(format_args!("vn {:.6} {:.6} {:.6}\n", n[0], n[1], n[2]));
+    }
+    for corners in triangles {
+        let [a, b, c] = corners.map(|corner| corner + 1);
+        line(format_args!("f {a}//{a} {b}//{b} {c}//{c}\n"));
+    }
+    text
+}

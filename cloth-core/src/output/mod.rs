@@ -1,0 +1,35 @@
+//! Files: OBJ frames, an animated glTF file, a picture.
+
+mod animation;
+mod folder;
+mod frame;
+mod picture;
+mod projection;
+
+pub use animation::animation_glb;
+pub use folder::{OutputError, OutputFolder};
+pub use frame::obj_text;
+pub use picture::{PictureError, picture_png};
+
+use energy_dsl::Vector3;
+
+use crate::mesh::{cross, norm, subtract};
+
+/// Unit normals at the vertices, each the mean of its triangles' by area.
+#[must_use]
+pub fn vertex_normals(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Vec<Vector3<f64>> {
+    let mut normals = vec![[0.0; 3]; positions.len()];
+    for &corners in triangles {
+        let [a, b, c] = corners.map(|corner| positions[corner]);
+        let normal = cross(subtract(b, a), subtract(c, a));
+        for corner in corners {
+            (0..3).for_each(|axis| normals[corner][axis] += normal[axis]);
+        }
+    }
+    for normal in &mut normals {
+        let length = norm(*normal);
+        // Triangles folded onto each other may cancel: any unit vector will do for shading.
+        *normal = if length > 0.0 { normal.map(|component| component / length) } else { [0.0, 0.0, 1.0] };
+    }
+    normals
+}

@@ -1,0 +1,52 @@
+//! Numbers with a range, so that an impossible one is refused where it is written.
+
+use serde::de::{Deserialize, Deserializer, Error};
+
+fn checked<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    fits: impl Fn(f64) -> bool,
+    range: &str,
+) -> Result<f64, D::Error> {
+    let number = f64::deserialize(deserializer)?;
+    if fits(number) { Ok(number) } else { Err(D::Error::custom(format!("{number} must be {range}"))) }
+}
+
+pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |number| number.is_finite() && number > 0.0, "a finite number above 0")
+}
+
+pub(crate) fn non_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |number| number.is_finite() && number >= 0.0, "a finite number, 0 or above")
+}
+
+pub(crate) fn poisson_ratio<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |number| number > -1.0 && number < 1.0, "between −1 and 1, both excluded")
+}
+
+pub(crate) fn finite_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+    let numbers = <[f64; 3]>::deserialize(deserializer)?;
+    if numbers.iter().all(|number| number.is_finite()) {
+        Ok(numbers)
+    } else {
+        Err(D::Error::custom(format!("{numbers:?} must hold finite numbers only")))
+    }
+}
+
+pub(crate) fn positive_pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 2], D::Error> {
+    let numbers = <[f64; 2]>::deserialize(deserializer)?;
+    if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
+        Ok(numbers)
+    } else {
+        Err(D::Error::custom(format!("{numbers:?} must hold finite numbers above 0 only")))
+    }
+}
+
+pub(crate) fn cell_counts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[usize; 2], D::Error> {
+    const MOST: usize = 4096;
+    let counts = <[usize; 2]>::deserialize(deserializer)?;
+    if counts.iter().all(|count| (1..=MOST).contains(count)) {
+        Ok(counts)
+    } else {
+        Err(D::Error::custom(format!("{counts:?}: each number of cells must be between 1 and {MOST}")))
+    }
+}

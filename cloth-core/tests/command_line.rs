@@ -1,0 +1,180 @@
+//! The binary from outside: what it writes, and how it refuses.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+const SCENE: &str = r#"dt = 0.01
+duration = 0.1
+frames_per_second = 50
+
+[mesh.sheet]
+cells = [6, 6]
+size = [1.0, 1.0]
+
+[fabric]
+density = 0.15
+
+[fabric.material.stvk]
+stretch_stiffness = 50.0
+poisson_ratio = 0.3
+
+[[pins]]
+nearest = [-0.5, 0.5, 0.0]
+"#;
+
+fn cloth(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_cloth")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+/// Runs a scene that must be refused; returns what it says.
+fn refused(text: &str, files: &[(&str, &str)]) -> String {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    for (name, contents) in files {
+        std::fs::write(folder.path().join(name), contents).unwrap();
+    }
+    let output = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    assert!(!folder.path().join("out/cloth.png").exists());
+    message
+}
+
+fn refused_obj(obj: &str) -> String {
+    let sheet = "[mesh.sheet]\ncells = [6, 6]\nsize = [1.0, 1.0]\n";
+    refused(&SCENE.replace(sheet, "[mesh.obj]\npath = \"shape.obj\"\n"), &[("shape.obj", obj)])
+}
+
+#[test]
+fn a_run_writes_picture_animation_and_frames() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let output = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in ["10 steps", "membrane", "StVK", "left out: bending: zero", "kinetic energy", "wrote 6 frames"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let read = |name: &str| std::fs::read(folder.path().join("out").join(name)).unwrap();
+    assert!(read("cloth.png").starts_with(b"\x89PNG"));
+    assert!(String::from_utf8(read("summary.txt")).unwrap().contains("10 steps"));
+    let last = String::from_utf8(read("frames/cloth_0005.obj")).unwrap();
+    assert_eq!(last.lines().filter(|line| line.starts_with("v ")).count(), 49);
+    assert_eq!(last.lines().filter(|line| line.starts_with("f ")).count(), 72);
+    assert_ne!(read("frames/cloth_0000.obj"), read("frames/cloth_0005.obj"));
+    let names: Vec<_> = std::fs::read_dir(folder.path().join("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names.len(), 4, "nothing temporary is left: {names:?}");
+
+    // A second run is refused, unless told to overwrite; then no frame of the first is left.
+    let again = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
+    assert_eq!(again.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("pass --overwrite"));
+    std::fs::write(folder.path().join("scene.toml"), SCENE.replace("duration = 0.1", "duration = 0.02")).unwrap();
+    assert!(cloth(&["run", "scene.toml", "-o", "out", "--overwrite"], folder.path()).status.success());
+    assert_eq!(std::fs::read_dir(folder.path().join("out/frames")).unwrap().count(), 2);
+}
+
+#[test]
+fn the_animation_is_a_glb_file_whose_parts_fit() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    assert!(cloth(&["run", "scene.toml", "-o", "out"], folder.path()).status.success());
+    let file = std::fs::read(folder.path().join("out/cloth.glb")).unwrap();
+    let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!((&file[..4], word(4), word(8)), (&b"glTF"[..], 2, file.len()));
+    let json_length = word(12);
+    let data = 20 + json_length + 8;
+    assert_eq!((word(20 + json_length), file.len()), (file.len() - data, data + word(20 + json_length)));
+    let root = gltf_json::Root::from_slice(&file[20..20 + json_length]).unwrap();
+    let mut problems = Vec::new();
+    use gltf_json::validation::Validate;
+    root.validate(&root, gltf_json::Path::new, &mut |path, error| problems.push(format!("{} {error}", path())));
+    assert!(problems.is_empty(), "{problems:?}");
+    let primitive = &root.meshes[0].primitives[0];
+    assert_eq!(primitive.targets.as_ref().unwrap().len(), 5);
+    // The last morph target moves the free corner (vertex 6 of 49) down, which is −y in glTF.
+    let accessor = primitive.targets.as_ref().unwrap()[4].positions.unwrap();
+    let view = &root.buffer_views[root.accessors[accessor.value()].buffer_view.unwrap().value()];
+    let y = data + view.byte_offset.unwrap().0 as usize + 12 * 6 + 4;
+    assert!(f32::from_le_bytes(file[y..y + 4].try_into().unwrap()) < -0.02);
+}
+
+#[test]
+fn bad_scenes_are_refused_with_place_and_reason() {
+    let expect = |from: &str, to: &str, parts: &[&str]| {
+        assert!(SCENE.contains(from));
+        let message = refused(&SCENE.replace(from, to), &[]);
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    };
+    expect("density", "densty", &["scene.toml:10:1", "unknown field `densty`", "did you mean `density`?"]);
+    expect("dt = 0.01", "dt = nan", &["scene.toml:1:6", "NaN must be a finite number above 0"]);
+    expect("50.0", "-50.0", &["scene.toml:13:21", "-50 must be"]);
+    expect("nearest = [-0.5, 0.5, 0.0]", "vertex = 99", &["pins[0]: there is no vertex 99"]);
+    expect("duration = 0.1", "duration = 0.1\nduration = 0.2", &["scene.toml:3:1", "duplicate"]);
+    let obj = "[mesh.obj]\npath = \"missing.obj\"";
+    expect("[mesh.sheet]\ncells = [6, 6]\nsize = [1.0, 1.0]", obj, &["cannot read missing.obj", "No such file"]);
+}
+
+#[test]
+fn bad_meshes_are_refused_with_line_and_reason() {
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    let expect = |obj: &str, part: &str| {
+        let message = refused_obj(obj);
+        assert!(message.contains(part), "{message}");
+    };
+    expect("", "shape.obj: the mesh has 0 vertices and 0 triangles");
+    expect(&format!("{square}f 1 2 3\nf 1 3 7\n"), "shape.obj:6: the face names a vertex");
+    expect(&format!("{square}f 1 2 3\nf 1 3 4\nf 3 1 2\n"), "shape.obj:7: edge 0–2 is shared by 3 triangles");
+    expect(&square.replace("1 1 0", "1 nan 0"), "shape.obj");
+    expect(&format!("{}f 1 2 3\nf 1 3 4\n", square.replace("1 1 0", "1 nan 0")), "shape.obj:3: vertex 2 is not finite");
+    expect(&format!("{square}f 1 2 3\nf 1 3 3\n"), "shape.obj:6: triangle 1 (vertices [0, 2, 2]) has no area");
+    expect(&format!("{square}f 1 2 3\n"), "shape.obj:4: vertex 3 belongs to no triangle");
+}
+
+#[test]
+fn missing_scenes_and_unwritable_folders_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let message = |arguments: &[&str]| {
+        let output = cloth(arguments, folder.path());
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let missing = message(&["run", "nothing.toml", "-o", "out"]);
+    assert!(missing.contains("cannot read the scene nothing.toml") && missing.contains("No such file"), "{missing}");
+    assert!(!folder.path().join("out").exists(), "nothing is made for a scene that does not exist");
+
+    // A file where the folder should be cannot be written into by anybody, not even by root.
+    std::fs::write(folder.path().join("taken"), "").unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let taken = message(&["run", "scene.toml", "-o", "taken"]);
+    assert!(taken.contains("cannot write to the folder taken; choose another with -o"), "{taken}");
+}
+
+#[cfg(unix)]
+#[test]
+fn read_only_folders_are_refused() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let locked = folder.path().join("locked");
+    std::fs::create_dir(&locked).unwrap();
+    std::fs::set_permissions(&locked, std::fs::Permissions::from_mode(0o555)).unwrap();
+    if std::fs::write(locked.join("probe"), "").is_ok() {
+        return; // root may write anywhere: nothing to test
+    }
+    let output = cloth(&["run", "scene.toml", "-o", "locked"], folder.path());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("cannot write to the folder locked"));
+}
+
+#[test]
+fn materials_are_listed_with_formula_units_and_costs() {
+    let output = cloth(&["materials"], Path::new("."));
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in ["StVK (energy)", "Spring (constraint)", "BridsonForceDamped (force)", "K [N/m]", "operations"] {
+        assert!(text.contains(part), "{part}");
+    }
+}

@@ -1,0 +1,197 @@
+//! Laws that any cloth obeys, and the orders of the schemes.
+
+use cloth_core::fabric::{Surroundings, terms};
+use cloth_core::integrator::{ImplicitEuler, Integrator, SymplecticEuler};
+use cloth_core::mesh::{SpringNetwork, Topology, TriangleMesh};
+use cloth_core::scene::Scene;
+use cloth_core::{Body, Simulation};
+use energy_solve::{SolveOptions, State, System};
+
+fn scene(head: &str, fabric: &str) -> Scene {
+    let text = format!("{head}\n[mesh.sheet]\ncells = [6, 5]\nsize = [0.6, 0.5]\n[fabric]\ndensity = 0.2\n{fabric}");
+    Scene::parse(&text, "test.toml".as_ref()).unwrap()
+}
+
+const STVK: &str = "[fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+                    [fabric.material.stvk.bending.bridson]\nstiffness = 1e-4\n";
+const PRINTED: &str = "[fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+                       [fabric.material.stvk.bending.bridson-force]\nstiffness = 1e-4\ndamping = 1e-5\n";
+const SPRINGS: &str = "[fabric.material.mass-spring]\nstructural = 40.0\nshear = 20.0\nbending = 1.0\ndamping = 0.01\n";
+const CORNER: &str = "[[pins]]\nnearest = [-0.3, 0.25, 0.0]\n";
+
+fn finished(scene: &Scene) -> Simulation {
+    let mut simulation = Simulation::new(scene).unwrap();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+    }
+    simulation
+}
+
+#[test]
+fn free_fall_is_that_of_a_point_mass() {
+    for fabric in [STVK, PRINTED, SPRINGS] {
+        for integrator in ["implicit-euler", "symplectic-euler"] {
+            let head = format!("dt = 0.001\nduration = 0.05\nintegrator = \"{integrator}\"");
+            let simulation = finished(&scene(&head, fabric));
+            let (n, h) = (50.0, 0.001);
+            let drop = 9.81 * h * h * n * (n + 1.0) / 2.0;
+            for (now, rest) in simulation.body().x.iter().zip(simulation.mesh().vertices()) {
+                // Implicit steps are as exact as their linear solves.
+                let tolerance = if integrator == "implicit-euler" { 1e-5 * drop } else { 1e-13 };
+                let fell = rest[2] - now[2];
+                assert!((fell - drop).abs() < tolerance, "{integrator}: fell {fell}, not {drop}");
+                assert!((now[0] - rest[0]).abs() < tolerance);
+            }
+        }
+    }
+}
+
+/// A free sheet, wrinkled and stretched, at rest and without weight.
+fn distorted(fabric: &str) -> Body {
+    let scene = scene("dt = 1.0\nduration = 1.0", fabric);
+    let shape = scene.shape().unwrap();
+    let nothing = Surroundings { gravity: [0.0; 3], drag: 0.0 };
+    let garment = terms(&scene.fabric, &shape.mesh, &shape.springs, &nothing).unwrap();
+    let wave = |p: &[f64; 3]| [1.1 * p[0], p[1] + 0.05 * p[0], 0.03 * (9.0 * p[0] + 4.0 * p[1]).sin()];
+    let x: Vec<[f64; 3]> = shape.start.iter().map(wave).collect();
+    let system = System::new(garment.terms, &vec![false; x.len()]).unwrap();
+    Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system }
+}
+
+#[test]
+fn inner_forces_leave_momentum_alone() {
+    let precise = SolveOptions { relative_tolerance: 1e-13, iteration_limit: 10_000 };
+    for fabric in [STVK, PRINTED, SPRINGS] {
+        let schemes: [(Box<dyn Integrator>, f64); 2] =
+            [(Box::new(SymplecticEuler), 5e-4), (Box::new(ImplicitEuler::with_options(precise)), 5e-3)];
+        for (mut scheme, dt) in schemes {
+            let mut body = distorted(fabric);
+            for _ in 0..50 {
+                scheme.step(&mut body, dt).unwrap();
+            }
+            let mass: f64 = body.masses.iter().sum();
+            let speed = (2.0 * body.kinetic_energy() / mass).sqrt();
+            assert!(speed > 0.01, "{}: it must move for this to mean anything: {speed}", scheme.name());
+            let relative = body.momentum().map(|component| component / (mass * speed));
+            assert!(relative.iter().all(|part| part.abs() < 1e-11), "{}: {relative:?}", scheme.name());
+            if scheme.name() == "symplectic-euler" {
+                let angular = body.angular_momentum().map(|component| component / (mass * speed * 0.5));
+                assert!(angular.iter().all(|part| part.abs() < 1e-11), "{}: {angular:?}", scheme.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn symplectic_euler_keeps_energy_and_implicit_euler_loses_it() {
+    let after = |scheme: &mut dyn Integrator, dt: f64| {
+        let mut body = distorted(STVK);
+        let total = |body: &mut Body| {
+            let kinetic = body.kinetic_energy();
+            let potential = body.system.energies(&body.x).unwrap();
+            kinetic + potential.iter().filter_map(|term| term.energy).sum::<f64>()
+        };
+        let before = total(&mut body);
+        for _ in 0..(0.2 / dt) as usize {
+            scheme.step(&mut body, dt).unwrap();
+        }
+        total(&mut body) / before
+    };
+    let kept = after(&mut SymplecticEuler, 2e-4);
+    assert!((kept - 1.0).abs() < 0.02, "{kept}");
+    let left = after(&mut ImplicitEuler::default(), 5e-3);
+    assert!((0.0..0.9).contains(&left), "{left}");
+}
+
+#[test]
+fn a_creased_mesh_is_at_rest_in_its_own_shape() {
+    let vertices = vec![[0.0; 3], [0.1, 0.0, 0.0], [0.05, 0.1, 0.0], [0.05, -0.06, 0.07]];
+    let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [1, 0, 3]]).unwrap();
+    let springs = SpringNetwork::of_mesh(&Topology::of(&mesh));
+    let nothing = Surroundings { gravity: [0.0; 3], drag: 0.0 };
+    for fabric in [STVK, PRINTED, SPRINGS] {
+        let garment = terms(&scene("dt = 1.0\nduration = 1.0", fabric).fabric, &mesh, &springs, &nothing).unwrap();
+        let mut system = System::new(garment.terms, &[false; 4]).unwrap();
+        let force = system.forces(State { x: mesh.vertices(), v: &[[0.0; 3]; 4] }).unwrap();
+        assert!(force.iter().flatten().all(|component| component.abs() < 1e-15), "{force:?}");
+        let mut bent = mesh.vertices().to_vec();
+        bent[3][2] += 0.01;
+        let force = system.forces(State { x: &bent, v: &[[0.0; 3]; 4] }).unwrap();
+        assert!(force[3][2] < -1e-6, "{force:?}");
+    }
+}
+
+#[test]
+fn schemes_are_of_first_order() {
+    for (integrator, fabric) in [("implicit-euler", STVK), ("implicit-euler", SPRINGS), ("symplectic-euler", STVK)] {
+        let height = |dt: f64| {
+            let head = format!("dt = {dt}\nduration = 0.05\nintegrator = \"{integrator}\"");
+            let simulation = finished(&scene(&head, &format!("{fabric}{CORNER}")));
+            simulation.body().x[6][2] // the corner across
+        };
+        let heights = [0.002, 0.001, 0.0005].map(height);
+        let order = ((heights[0] - heights[1]) / (heights[1] - heights[2])).abs().log2();
+        assert!((order - 1.0).abs() < 0.15, "{integrator}: order {order}, heights {heights:?}");
+    }
+}
+
+#[test]
+fn schemes_and_bending_forms_agree_at_small_steps() {
+    let height = |integrator: &str, fabric: &str| {
+        let head = format!("dt = 0.0002\nduration = 0.1\nintegrator = \"{integrator}\"");
+        finished(&scene(&head, &format!("{fabric}{CORNER}"))).body().x[6][2]
+    };
+    let fine = height("symplectic-euler", STVK);
+    assert!(fine < -0.02);
+    assert!((height("implicit-euler", STVK) / fine - 1.0).abs() < 0.01);
+    // Bending hardly matters here, so that the two forms must lie close together.
+    assert!((height("implicit-euler", PRINTED) / fine - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_hanging_cloth_comes_to_rest_with_its_weight_on_the_pins() {
+    let head = "dt = 0.02\nduration = 12.0\ndrag = 4.0";
+    let pins = "[[pins]]\nbox = { min = [-1.0, 0.249, -1.0], max = [1.0, 1.0, 1.0] }\n";
+    let mut simulation = finished(&scene(head, &format!("{SPRINGS}{pins}")));
+    let summary = simulation.summary().unwrap();
+    let held: f64 = simulation.body().masses.iter().take(7 * 5).sum(); // all rows but the pinned one
+    assert!(summary.kinetic_energy < 1e-8, "{}", summary.kinetic_energy);
+    assert!((summary.pin_force[2] + 9.81 * held).abs() < 1e-3 * 9.81 * held, "{:?}", summary.pin_force);
+    assert!(simulation.body().x[0][2] < -0.45);
+}
+
+#[test]
+fn the_same_scene_gives_the_same_bits() {
+    let scene = scene("dt = 0.01\nduration = 0.3", &format!("{STVK}{CORNER}"));
+    let (a, b) = (finished(&scene), finished(&scene));
+    assert_eq!(a.body().x, b.body().x);
+    assert_eq!(a.body().v, b.body().v);
+}
+
+#[test]
+fn too_large_explicit_steps_are_warned_of_and_stopped() {
+    let text = format!("{STVK}{CORNER}");
+    let small =
+        Simulation::new(&scene("dt = 0.001\nduration = 1.0\nintegrator = \"symplectic-euler\"", &text)).unwrap();
+    assert!(small.warnings().is_empty(), "{:?}", small.warnings());
+    let large = scene("dt = 0.02\nduration = 100.0\nintegrator = \"symplectic-euler\"", &text);
+    let mut simulation = Simulation::new(&large).unwrap();
+    assert!(simulation.warnings()[0].contains("may blow up"));
+    let error = loop {
+        if let Err(error) = simulation.step() {
+            break error.to_string();
+        }
+        assert!(!simulation.is_finished(), "an unstable run must not end as if nothing were wrong");
+    };
+    assert!(error.starts_with("step ") && (error.contains("vertex") || error.contains("vertices")), "{error}");
+    assert!(simulation.body().x.iter().flatten().all(|coordinate| coordinate.is_finite()));
+}
+
+#[test]
+fn zero_stiffness_leaves_the_term_out() {
+    let fabric = "[fabric.material.mass-spring]\nstructural = 40.0\nshear = 0.0\nbending = 0.0\n";
+    let mut simulation = finished(&scene("dt = 0.01\nduration = 0.05\ngravity = [0.0, 0.0, 0.0]", fabric));
+    let summary = simulation.summary().unwrap();
+    assert_eq!(summary.terms.iter().map(|term| term.element).collect::<Vec<_>>(), ["HookeSpring"]);
+    assert_eq!(summary.left_out, ["shear springs: zero", "bending springs: zero", "gravity: zero", "drag: zero"]);
+}

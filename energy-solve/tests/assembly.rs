@@ -1,0 +1,196 @@
+//! The assembled matrix is the derivative of the assembled force; pinning removes rows and columns.
+
+mod elements;
+
+use elements::{Damper, Spring};
+use energy_dsl::Vector3;
+use energy_solve::{
+    BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, ListError, PotentialTerm, State, System,
+    SystemError, Term, Weights,
+};
+
+const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [4, 1]];
+
+fn positions() -> Vec<Vector3<f64>> {
+    vec![[0.0, 0.1, 0.0], [1.0, -0.1, 0.2], [1.2, 1.0, -0.3], [0.1, 1.1, 0.4], [2.0, 0.3, 0.5]]
+}
+
+fn velocities() -> Vec<Vector3<f64>> {
+    vec![[0.3, -0.2, 0.1], [-0.5, 0.4, 0.2], [0.1, 0.7, -0.6], [0.2, -0.3, 0.8], [0.0, 0.5, -0.4]]
+}
+
+fn springs() -> Box<dyn Term> {
+    let elements = (0..EDGES.len()).map(|i| Spring { stiffness: 10.0 + i as f64, length: 0.8 }).collect();
+    Box::new(PotentialTerm::new(ElementList::new("springs", elements, &EDGES).unwrap()))
+}
+
+fn dampers() -> Box<dyn Term> {
+    let elements = (0..EDGES.len()).map(|i| Damper { c: 0.5 + 0.1 * i as f64, e: [0.3, -0.2, 0.7] }).collect();
+    Box::new(ForceTerm::new(ElementList::new("dampers", elements, &EDGES).unwrap()))
+}
+
+fn system(pinned: &[usize]) -> System {
+    let pinned: Vec<bool> = (0..5).map(|vertex| pinned.contains(&vertex)).collect();
+    System::new(vec![springs(), dampers()], &pinned).unwrap()
+}
+
+fn assembled(system: &mut System, weights: Weights) -> BlockMatrix {
+    let (x, v) = (positions(), velocities());
+    let mut matrix = system.matrix();
+    system.linearise(State { x: &x, v: &v }, weights, Curvature::Exact, &mut matrix).unwrap();
+    matrix
+}
+
+#[test]
+fn matrix_is_the_derivative_of_the_force() {
+    let mut system = system(&[3]);
+    let free = system.dofs().free().to_vec();
+    for by_velocity in [false, true] {
+        let weights = Weights { position: f64::from(!by_velocity), velocity: f64::from(by_velocity) };
+        let matrix = assembled(&mut system, weights);
+        for (column, &vertex) in free.iter().enumerate() {
+            for axis in 0..3 {
+                let mut force_at = |step: f64| {
+                    let (mut x, mut v) = (positions(), velocities());
+                    if by_velocity {
+                        v[vertex][axis] += step
+                    } else {
+                        x[vertex][axis] += step
+                    }
+                    system.forces(State { x: &x, v: &v }).unwrap()
+                };
+                let (after, before) = (force_at(1e-5), force_at(-1e-5));
+                for (row, &touched) in free.iter().enumerate() {
+                    for component in 0..3 {
+                        let expected = (after[touched][component] - before[touched][component]) / 2e-5;
+                        let got = matrix.block(row, column)[component][axis];
+                        assert!(
+                            (got - expected).abs() < 1e-7,
+                            "by velocity: {by_velocity}, block ({row}, {column}), entry ({component}, {axis}): {got} {expected}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn force_is_minus_the_derivative_of_the_energy() {
+    let mut system = System::new(vec![springs()], &[false; 5]).unwrap();
+    let v = vec![[0.0; 3]; 5];
+    let x = positions();
+    let force = system.forces(State { x: &x, v: &v }).unwrap();
+    for vertex in 0..5 {
+        for axis in 0..3 {
+            let mut energy_at = |step: f64| {
+                let mut x = positions();
+                x[vertex][axis] += step;
+                system.energies(&x).unwrap()[0].energy.unwrap()
+            };
+            let slope = (energy_at(1e-5) - energy_at(-1e-5)) / 2e-5;
+            assert!((force[vertex][axis] + slope).abs() < 1e-7);
+        }
+    }
+}
+
+#[test]
+fn stiffness_times_velocity_is_the_directional_derivative() {
+    let mut system = system(&[3]);
+    let (x, v) = (positions(), velocities());
+    let mut matrix = system.matrix();
+    let weights = Weights { position: 1.0, velocity: 0.0 };
+    let got = system.linearise(State { x: &x, v: &v }, weights, Curvature::Exact, &mut matrix).unwrap();
+    let mut force_at = |step: f64| {
+        let moved: Vec<Vector3<f64>> =
+            x.iter().zip(&v).map(|(x, v)| std::array::from_fn(|axis| x[axis] + step * v[axis])).collect();
+        system.forces(State { x: &moved, v: &v }).unwrap()
+    };
+    let (after, before) = (force_at(1e-5), force_at(-1e-5));
+    for vertex in 0..5 {
+        for axis in 0..3 {
+            let expected = (after[vertex][axis] - before[vertex][axis]) / 2e-5;
+            assert!((got.stiffness_times_velocity[vertex][axis] - expected).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn pinning_removes_rows_and_columns() {
+    let weights = Weights { position: 1.0, velocity: 0.5 };
+    let whole = assembled(&mut system(&[]), weights);
+    let mut pinned = system(&[0, 3]);
+    let part = assembled(&mut pinned, weights);
+    let free = [1, 2, 4];
+    assert_eq!(pinned.dofs().free(), free);
+    assert_eq!(part.pattern().rows(), 3);
+    for (row, &i) in free.iter().enumerate() {
+        for (column, &j) in free.iter().enumerate() {
+            assert_eq!(part.block(row, column), whole.block(i, j), "block ({i}, {j})");
+        }
+    }
+}
+
+#[test]
+fn counts_say_what_was_evaluated_and_skipped() {
+    let mut system = system(&[0, 3]);
+    assembled(&mut system, Weights { position: 1.0, velocity: 0.0 });
+    system.energies(&positions()).unwrap();
+    let counts: Vec<_> = system.terms().map(|(_, counts)| counts).collect();
+    // Only edge 3–0 has both ends pinned.
+    assert_eq!((counts[0].hessian.evaluated, counts[0].hessian.skipped), (5, 1));
+    assert_eq!((counts[0].value.evaluated, counts[0].gradient.evaluated), (5, 0));
+    assert_eq!((counts[1].hessian.evaluated, counts[1].value.evaluated), (5, 0), "a force law has no energy");
+}
+
+#[test]
+fn projection_leaves_no_negative_curvature() {
+    let list = ElementList::new("strut", vec![Spring { stiffness: 1.0, length: 2.0 }], &[[0, 1]]).unwrap();
+    let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &[false, true]).unwrap();
+    let state = State { x: &[[1.0, 0.0, 0.0], [0.0; 3]], v: &[[0.0; 3]; 2] };
+    let mut matrix = system.matrix();
+    let weights = Weights { position: -1.0, velocity: 0.0 };
+    system.linearise(state, weights, Curvature::Exact, &mut matrix).unwrap();
+    assert_eq!(*matrix.diagonal(0), [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]);
+    system.linearise(state, weights, Curvature::Projected, &mut matrix).unwrap();
+    for row in 0..3 {
+        for column in 0..3 {
+            let expected = if (row, column) == (0, 0) { 1.0 } else { 0.0 };
+            assert!((matrix.diagonal(0)[row][column] - expected).abs() < 1e-14);
+        }
+    }
+}
+
+#[test]
+fn stencils_that_do_not_fit_are_named() {
+    let spring = Spring { stiffness: 1.0, length: 1.0 };
+    let arity = ElementList::new("hinges", vec![spring], &[[0, 1, 2]]).unwrap_err();
+    assert_eq!(arity.to_string(), "hinges: Spring acts on 2 points, but its stencils have 3 vertices");
+    let repeated = ElementList::new("springs", vec![spring; 2], &[[0, 1], [4, 4]]).unwrap_err();
+    assert_eq!(repeated, ListError::RepeatedVertex { list: "springs".into(), index: 1, vertex: 4 });
+    assert!(matches!(ElementList::new("s", vec![spring], &[[0, 1], [1, 2]]), Err(ListError::CountMismatch { .. })));
+    let list = ElementList::new("springs", vec![spring; 2], &[[0, 1], [1, 7]]).unwrap();
+    let range = System::new(vec![Box::new(PotentialTerm::new(list))], &[false; 3]).unwrap_err();
+    let SystemError::VertexOutOfRange { element, vertex, .. } = &range;
+    assert_eq!((*element, *vertex), (1, 7));
+    assert_eq!(range.to_string(), "springs: element 1 names vertex 7, but there are only 3 vertices (0 to 2)");
+}
+
+#[test]
+fn non_finite_numbers_are_traced_to_their_source() {
+    let mut system = system(&[]);
+    let (mut x, v) = (positions(), velocities());
+    x[2][1] = f64::NAN;
+    let state = system.forces(State { x: &x, v: &v }).unwrap_err();
+    assert!(matches!(state, EvaluationError::NonFiniteState { what: "position", vertex: 2, .. }), "{state}");
+
+    // Coincident ends: this spring, unlike the robust ones, divides by zero.
+    x[2] = x[1];
+    let element = system.forces(State { x: &x, v: &v }).unwrap_err();
+    assert_eq!(
+        element,
+        EvaluationError::NonFiniteElement { term: "springs".into(), element: 1, vertices: vec![1, 2], what: "force" }
+    );
+    let short = system.forces(State { x: &x[..4], v: &v }).unwrap_err();
+    assert_eq!(short.to_string(), "the system has 5 vertices, but 4 positions were given");
+}

@@ -1,0 +1,135 @@
+//! The iterative solvers against a dense factorisation, and why they stop.
+
+use std::sync::Arc;
+
+use energy_dsl::Vector3;
+use energy_solve::{
+    BlockJacobi, BlockMatrix, Pattern, SolveOptions, SolveReport, StopReason, bicgstab, conjugate_gradients,
+};
+use nalgebra::{DMatrix, DVector};
+
+const ROWS: usize = 12;
+
+/// A chain with second neighbours; numbers from a fixed recurrence, `skew` added above the diagonal only.
+fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
+    let stencils: Vec<Vec<usize>> = (2..ROWS).map(|row| vec![row - 2, row - 1, row]).collect();
+    let pattern = Arc::new(Pattern::from_stencils(ROWS, &stencils));
+    let mut matrix = BlockMatrix::zeros(Arc::clone(&pattern));
+    let mut seed = 1_u64;
+    let mut number = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    for row in 0..ROWS {
+        for column in (row..ROWS).filter(|&column| pattern.slot(row, column).is_some()) {
+            for i in 0..3 {
+                for j in if row == column { i } else { 0 }..3 {
+                    let entry = number() + if (row, i) == (column, j) { diagonal } else { 0.0 };
+                    matrix.values_mut()[pattern.slot(row, column).unwrap()][i][j] = entry + skew;
+                    matrix.values_mut()[pattern.slot(column, row).unwrap()][j][i] = entry;
+                }
+            }
+        }
+    }
+    matrix
+}
+
+fn dense(matrix: &BlockMatrix) -> DMatrix<f64> {
+    DMatrix::from_fn(3 * ROWS, 3 * ROWS, |row, column| matrix.block(row / 3, column / 3)[row % 3][column % 3])
+}
+
+fn right_hand_side() -> Vec<Vector3<f64>> {
+    (0..ROWS).map(|row| [1.0, row as f64, (row as f64).sin()]).collect()
+}
+
+type Solver = fn(&BlockMatrix, &BlockJacobi, &[Vector3<f64>], &mut [Vector3<f64>], &SolveOptions) -> SolveReport;
+
+fn solve(
+    solver: Solver,
+    matrix: &BlockMatrix,
+    b: &[Vector3<f64>],
+    options: &SolveOptions,
+) -> (Vec<Vector3<f64>>, SolveReport) {
+    let mut x = vec![[0.0; 3]; ROWS];
+    let report = solver(matrix, &BlockJacobi::new(matrix).unwrap(), b, &mut x, options);
+    (x, report)
+}
+
+fn assert_solves(solver: Solver, matrix: &BlockMatrix) {
+    let b = right_hand_side();
+    let options = SolveOptions { relative_tolerance: 1e-12, ..SolveOptions::default() };
+    let (x, report) = solve(solver, matrix, &b, &options);
+    assert!(report.converged(), "{report:?}");
+    let expected = dense(matrix).lu().solve(&DVector::from_iterator(3 * ROWS, b.into_iter().flatten())).unwrap();
+    for (got, expected) in x.iter().flatten().zip(expected.iter()) {
+        assert!((got - expected).abs() < 1e-10, "{got} {expected}");
+    }
+}
+
+#[test]
+fn conjugate_gradients_agree_with_a_dense_solve() {
+    assert_solves(conjugate_gradients, &matrix(6.0, 0.0));
+}
+
+#[test]
+fn bicgstab_agrees_with_a_dense_solve_on_an_unsymmetric_matrix() {
+    assert_solves(bicgstab, &matrix(6.0, 0.3));
+}
+
+#[test]
+fn tolerance_is_relative_to_the_right_hand_side() {
+    let matrix = matrix(6.0, 0.0);
+    let b = right_hand_side();
+    let tiny: Vec<_> = b.iter().map(|row| row.map(|entry| entry * 2.0_f64.powi(-200))).collect();
+    let options = SolveOptions { relative_tolerance: 1e-6, ..SolveOptions::default() };
+    for solver in [conjugate_gradients as Solver, bicgstab] {
+        let ((x, whole), (y, scaled)) = (solve(solver, &matrix, &b, &options), solve(solver, &matrix, &tiny, &options));
+        assert_eq!(whole.iterations, scaled.iterations);
+        assert_eq!(x[3][1] * 2.0_f64.powi(-200), y[3][1]);
+    }
+}
+
+#[test]
+fn indefinite_curvature_is_reported() {
+    let mut matrix = matrix(6.0, 0.0);
+    matrix.diagonal_mut(4)[1][1] = -6.0;
+    let (x, report) = solve(conjugate_gradients, &matrix, &right_hand_side(), &SolveOptions::default());
+    assert_eq!(report.stopped, StopReason::IndefiniteCurvature);
+    assert!(x.iter().flatten().all(|entry| entry.is_finite()));
+
+    // Every diagonal block is positive definite here, but no chain of such strong links is.
+    let mut linked = BlockMatrix::zeros(Arc::clone(matrix.pattern()));
+    for row in 0..ROWS {
+        *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for column in [row.wrapping_sub(1), row + 1] {
+            if column < ROWS {
+                let slot = linked.pattern().slot(row, column).unwrap();
+                linked.values_mut()[slot][0][0] = -2.0;
+            }
+        }
+    }
+    let (_, report) = solve(conjugate_gradients, &linked, &right_hand_side(), &SolveOptions::default());
+    assert_eq!(report.stopped, StopReason::IndefiniteCurvature);
+}
+
+#[test]
+fn limits_zero_loads_and_broken_numbers_are_reported() {
+    let matrix = matrix(6.0, 0.0);
+    let few = SolveOptions { relative_tolerance: 1e-14, iteration_limit: 2 };
+    let mut broken = right_hand_side();
+    broken[3][1] = f64::NAN;
+    for solver in [conjugate_gradients as Solver, bicgstab] {
+        let (_, limited) = solve(solver, &matrix, &right_hand_side(), &few);
+        assert_eq!((limited.stopped, limited.iterations), (StopReason::IterationLimit, 2));
+        let (x, idle) = solve(solver, &matrix, &[[0.0; 3]; ROWS], &few);
+        assert!(idle.converged() && idle.iterations == 0 && x == vec![[0.0; 3]; ROWS]);
+        assert_eq!(solve(solver, &matrix, &broken, &few).1.stopped, StopReason::NonFinite);
+    }
+}
+
+#[test]
+fn singular_diagonal_blocks_are_named() {
+    let mut matrix = matrix(6.0, 0.0);
+    *matrix.diagonal_mut(7) = [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    assert_eq!(BlockJacobi::new(&matrix).unwrap_err().row, 7);
+}
