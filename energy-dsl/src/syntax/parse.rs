@@ -286,7 +286,7 @@ impl<'a> Parser<'a> {
             }
             self.at += 1;
         }
-        let unit = self.tokens[start..self.at].iter().map(|t| t.text.as_str()).collect();
+        let unit = tokens::unit_text(&self.tokens[start..self.at]);
         self.at += 1;
         Ok(unit)
     }

@@ -27,10 +27,24 @@ pub(super) struct Token {
     pub(super) text: String,
 }
 
+/// A unit as it is written: a space stands for a product.
+pub(super) fn unit_text(tokens: &[Token]) -> String {
+    let mut unit = String::new();
+    for token in tokens {
+        let is_name = matches!(token.kind, Kind::Name(_));
+        if is_name && unit.ends_with(char::is_alphanumeric) {
+            unit.push(' ');
+        }
+        unit.push_str(&token.text);
+    }
+    unit
+}
+
 /// Tokens as text that reads well and lexes to the same tokens.
 pub(super) fn text(tokens: &[Token]) -> String {
     let mut text = String::new();
     let mut glue = true;
+    let mut previous: Option<&Token> = None;
     for token in tokens {
         let closing = matches!(token.text.as_str(), ")" | "]" | "," | ";" | ":");
         let opening = matches!(token.text.as_str(), "(" | "[");
@@ -39,7 +53,10 @@ pub(super) fn text(tokens: &[Token]) -> String {
             text.push(' ');
         }
         text.push_str(&token.text);
-        glue = opening;
+        let operand_before =
+            previous.is_some_and(|t| matches!(t.text.as_str(), ")" | "]") || !matches!(t.kind, Kind::Symbol(_)));
+        glue = opening || token.text == "-" && !operand_before;
+        previous = Some(token);
     }
     text
 }

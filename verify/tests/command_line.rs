@@ -1,0 +1,134 @@
+//! The binary, end to end.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn verify(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_verify")).args(arguments).output().expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn data(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials").join(file)
+}
+
+#[test]
+fn the_audit_of_named_elements_passes_and_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("audit.json");
+    let output = verify(&["audit", "Spring", "HairBend", "--samples", "5", "--json", json.to_str().unwrap()]);
+    let printed = text(&output.stdout);
+    assert!(output.status.success(), "{printed}{}", text(&output.stderr));
+    assert!(printed.contains("2 elements") && printed.contains("0 failed"), "{printed}");
+    let report: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    assert!(report["lines"].as_array().unwrap().iter().all(|line| line["passed"] == true));
+}
+
+#[test]
+fn an_unknown_element_is_refused_with_the_known_ones() {
+    let output = verify(&["audit", "Sprin"]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = text(&output.stderr);
+    assert!(message.contains("Sprin") && message.contains("HairBend"), "{message}");
+}
+
+#[test]
+fn the_reference_values_are_met() {
+    let output = verify(&["reference"]);
+    let printed = text(&output.stdout);
+    assert!(output.status.success(), "{printed}{}", text(&output.stderr));
+    // Everything but what is listed here is within tier A, and within tier B where it applies.
+    assert!(printed.contains("beyond tier A: stvk_membrane/014 (energy), stvk_membrane/014 (grad)\n"), "{printed}");
+    assert!(printed.contains("beyond tier B: witkin_spring/017 (energy), witkin_spring/017 (grad)\n"), "{printed}");
+    assert!(printed.contains("105 of 105 blocks at degenerate inputs as documented"), "{printed}");
+}
+
+#[test]
+fn evaluated_records_read_back_as_the_same_doubles() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["hinge_theta.json", "witkin_spring_damped.json", "stvk_membrane.json"] {
+        let out = folder.path().join(file);
+        let output = verify(&["eval", data(file).to_str().unwrap(), "-o", out.to_str().unwrap()]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let read = |path: &Path| -> serde_json::Value {
+            serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+        };
+        let (before, after) = (read(&data(file)), read(&out));
+        let (before, after) = (before["records"].as_array().unwrap(), after["records"].as_array().unwrap());
+        assert_eq!(before.len(), after.len());
+        for (truth, found) in before.iter().zip(after) {
+            assert_eq!(truth["x"], found["x"]);
+            for (block, digits) in found["out"].as_object().unwrap() {
+                assert!(truth["out"].get(block).is_some(), "{block} was not asked for");
+                assert_eq!(found["flags"][block]["degenerate"], false);
+                let list = digits.as_array().cloned().unwrap_or_else(|| vec![digits.clone()]);
+                for number in list {
+                    let text = number.as_str().unwrap();
+                    assert_eq!(format!("{:.16e}", text.parse::<f64>().unwrap()), text);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn degenerate_records_are_evaluated_with_flags() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.json");
+    std::fs::write(
+        &input,
+        r#"{"records": [{"id": "a", "potential": "distance", "x": ["1", "2", "3", "1", "2", "3"], "params": {}},
+            {"id": "b", "potential": "stvk_membrane", "x": ["0","0","0","1","0","0","0","1","0"],
+             "params": {"mu": "1", "lambda": "1", "rest_uv": ["0","0","1","0","2","0"]}}]}"#,
+    )
+    .unwrap();
+    let out = folder.path().join("out.json");
+    let output = verify(&["eval", input.to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let written: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(out).unwrap()).unwrap();
+    assert_eq!(written["records"][0]["flags"]["grad"]["degenerate"], true);
+    assert_eq!(written["records"][0]["flags"]["energy"]["degenerate"], false);
+    assert!(written["records"][1]["error"].as_str().unwrap().contains("degenerate"));
+}
+
+#[test]
+fn bad_records_are_refused_by_name_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, out) = (folder.path().join("in.json"), folder.path().join("out.json"));
+    for (content, expected) in [
+        ("{", "in.json:1:1"),
+        ("{}", "records"),
+        (r#"{"records": [{"id": "r7", "x": []}]}"#, "record r7: `potential` is missing"),
+        (r#"{"potential": "dist", "records": [{"id": "r7", "x": []}]}"#, "record r7: no declared element"),
+        (r#"{"potential": "distance", "records": [{"id": "r7"}]}"#, "missing field `x`"),
+        (r#"{"potential": "distance", "records": [{"id": "r7", "x": ["1", "2"]}]}"#, "2 numbers, expected 6"),
+        (
+            r#"{"potential": "distance", "records": [{"id": "r7", "x": ["1", "2", "3", "a", "5", "6"]}]}"#,
+            "`a` is not a number",
+        ),
+        (
+            r#"{"potential": "distance", "records": [{"id": "r7", "x": ["1", "2", "3", "NaN", "5", "6"]}]}"#,
+            "not finite",
+        ),
+        (
+            r#"{"potential": "hair_bend", "records": [{"id": "r7", "x": ["1","2","3","4","5","6","7","8","0"]}]}"#,
+            "parameter `k` is missing",
+        ),
+    ] {
+        std::fs::write(&input, content).unwrap();
+        let output = verify(&["eval", input.to_str().unwrap(), "-o", out.to_str().unwrap()]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{content}");
+        assert!(message.contains(expected), "{content}: {message}");
+        assert!(!out.exists(), "{content}");
+    }
+    let output = verify(&["reference", folder.path().join("nowhere").to_str().unwrap()]);
+    assert!(text(&output.stderr).contains("nowhere"));
+    std::fs::write(&input, r#"{"records": []}"#).unwrap();
+    let output =
+        verify(&["eval", input.to_str().unwrap(), "-o", folder.path().join("no/folder.json").to_str().unwrap()]);
+    assert!(text(&output.stderr).contains("folder.json"), "{}", text(&output.stderr));
+}
