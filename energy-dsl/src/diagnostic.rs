@@ -79,7 +79,7 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// All errors of a text, in the order they were found.
+/// All errors of a text, in the order they were found. Displayed with line:column in the text.
 #[derive(Clone, Debug, Default)]
 pub struct Diagnostics(pub Vec<Diagnostic>);
 
@@ -110,7 +110,8 @@ impl fmt::Display for Diagnostics {
             if number > 0 {
                 f.write_str("\n\n")?;
             }
-            write!(f, "error: {diagnostic}")?;
+            let start = diagnostic.span.token.start();
+            write!(f, "error at {}:{}: {diagnostic}", start.line, start.column + 1)?;
         }
         Ok(())
     }
@@ -121,7 +122,9 @@ impl std::error::Error for Diagnostics {}
 /// The name among `known` that `name` was likely meant to be.
 #[must_use]
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let limit = 1 + name.chars().count() / 4;
+    // A single letter is like every other single letter.
+    let length = name.chars().count();
+    let limit = (1 + length / 4).min(length.saturating_sub(1));
     known.into_iter().map(|k| (edit_distance(name, k), k)).filter(|&(d, _)| d <= limit).min().map(|(_, k)| k)
 }
 

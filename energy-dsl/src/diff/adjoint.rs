@@ -20,7 +20,7 @@ fn adjoints(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMa
             if !g.varies(operand) {
                 continue;
             }
-            let term = g.mul(weight, first);
+            let term = g.product(Some(weight), &first);
             let sum = match adjoints.get(&operand) {
                 Some(&sum) => g.add(sum, term),
                 None => term,
@@ -67,10 +67,10 @@ pub(super) fn second_derivatives(
         }
         let Some(&weight) = adjoints.get(&node) else { continue };
         let local = local(g, node, true);
-        for (i, j, factor) in local.second {
+        for (i, j, products_of) in local.second {
             let a = tangents.get(&local.operands[i]).unwrap_or(&none);
             let b = tangents.get(&local.operands[j]).unwrap_or(&none);
-            let weight = g.mul(weight, factor);
+            let weight = g.sum_of_products(Some(weight), &products_of);
             // The weight goes into the shorter factor, which is multiplied least often.
             let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
             let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();

@@ -37,12 +37,6 @@ impl Coordinates {
         self.vectors.len() * self.components
     }
 
-    /// Whether nothing moves.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.vectors.is_empty()
-    }
-
     /// Each of `unknowns` numbers is its own coordinate.
     pub fn of_unknowns(g: &mut Graph, unknowns: usize) -> Self {
         let one = g.constant(1.0);
@@ -74,14 +68,13 @@ impl Coordinates {
             }
         }
         for node in differentiable(g, outputs, true) {
-            if let Op::Sub(a, b) = g.op(node) {
-                if let (Some((p, axis)), Some((q, other))) = (coordinate(g, a), coordinate(g, b)) {
-                    if axis == other {
-                        use_edge(p, q);
-                        fronts.push((node, p, q, axis));
-                        continue;
-                    }
-                }
+            if let Op::Sub(a, b) = g.op(node)
+                && let (Some((p, axis)), Some((q, other))) = (coordinate(g, a), coordinate(g, b))
+                && axis == other
+            {
+                use_edge(p, q);
+                fronts.push((node, p, q, axis));
+                continue;
             }
             let operands: Vec<NodeId> = match g.rule(node) {
                 Some(rule) => rule.arguments.clone(),

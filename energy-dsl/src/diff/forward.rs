@@ -54,8 +54,9 @@ pub(super) fn tangents(
             }
             _ => {
                 let local = local(g, node, second_order);
+                let factors: Vec<_> = local.first.iter().map(|f| g.product(None, f)).collect();
                 let terms: Vec<_> =
-                    local.operands.iter().zip(&local.first).filter_map(|(o, &f)| Some((f, tangents.get(o)?))).collect();
+                    local.operands.iter().zip(factors).filter_map(|(o, f)| Some((f, tangents.get(o)?))).collect();
                 combine(g, &terms)
             }
         };
@@ -98,17 +99,16 @@ pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Co
         }
         let local = local(g, node, true);
         let mut own: Vec<(NodeId, Sparse)> = Vec::new();
-        for &(i, j, factor) in &local.second {
+        for (i, j, products_of) in &local.second {
+            let (i, j) = (*i, *j);
+            let factor = g.sum_of_products(None, products_of);
             let (a, b) = (&local.operands[i], &local.operands[j]);
             let (Some(a), Some(b)) = (tangents.get(a), tangents.get(b)) else { continue };
             own.push((factor, products(g, a, b, i == j, n)));
         }
-        let chained = local
-            .operands
-            .iter()
-            .zip(&local.first)
-            .filter_map(|(o, &f)| Some((f, curvatures.get(o)?)))
-            .collect::<Vec<_>>();
+        let factors: Vec<_> = local.first.iter().map(|f| g.product(None, f)).collect();
+        let chained =
+            local.operands.iter().zip(factors).filter_map(|(o, f)| Some((f, curvatures.get(o)?))).collect::<Vec<_>>();
         let terms: Vec<_> = chained.into_iter().chain(own.iter().map(|(f, p)| (*f, p))).collect();
         let parts = combine(g, &terms);
         curvatures.insert(node, parts);

@@ -1,22 +1,28 @@
-use crate::graph::{Graph, NodeId, Op, symmetric_index};
+use crate::graph::{Graph, NodeId, Op, Product, symmetric_index};
 
 /// An operation's derivatives by its own operands.
 pub(super) struct Local {
     /// The operands, each once.
     pub(super) operands: Vec<NodeId>,
     /// First derivatives.
-    pub(super) first: Vec<NodeId>,
+    pub(super) first: Vec<Product>,
     /// Second derivatives that are not identically zero: operands i ≤ j.
-    pub(super) second: Vec<(usize, usize, NodeId)>,
+    pub(super) second: Vec<(usize, usize, Vec<Product>)>,
 }
 
 impl Local {
+    fn new(operands: Vec<NodeId>, first: Vec<NodeId>, second: Vec<(usize, usize, NodeId)>) -> Self {
+        let first = first.into_iter().map(|entry| vec![entry]).collect();
+        let second = second.into_iter().map(|(i, j, entry)| (i, j, vec![vec![entry]])).collect();
+        Self { operands, first, second }
+    }
+
     fn linear(operands: Vec<NodeId>, first: Vec<NodeId>) -> Self {
-        Self { operands, first, second: Vec::new() }
+        Self::new(operands, first, Vec::new())
     }
 
     fn unary(operand: NodeId, first: NodeId, second: NodeId) -> Self {
-        Self { operands: vec![operand], first: vec![first], second: vec![(0, 0, second)] }
+        Self::new(vec![operand], vec![first], vec![(0, 0, second)])
     }
 }
 
@@ -41,7 +47,7 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
             let slope = g.mul(two, a);
             Local::unary(a, slope, two)
         }
-        Op::Mul(a, b) => Local { operands: vec![a, b], first: vec![b, a], second: vec![(0, 1, one)] },
+        Op::Mul(a, b) => Local::new(vec![a, b], vec![b, a], vec![(0, 1, one)]),
         Op::Div(a, b) => of_quotient(g, node, a, b),
         Op::Sqrt(a) => {
             // p = 1/(2√a); p′ = −2 p³.
@@ -117,8 +123,8 @@ fn of_rule(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
     };
     let second = (0..n)
         .flat_map(|i| (i..n).map(move |j| (i, j)))
-        .map(|(i, j)| (i, j, second[symmetric_index(n, i, j)]))
-        .filter(|&(_, _, entry)| !g.is(entry, 0.0))
+        .map(|(i, j)| (i, j, second[symmetric_index(n, i, j)].clone()))
+        .filter(|(_, _, entry)| !g.vanishes(entry))
         .collect();
     Local { operands: rule.arguments, first: rule.first, second }
 }
@@ -140,7 +146,7 @@ fn of_quotient(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
     let two = g.constant(2.0);
     let curvature = g.mul(slope, reciprocal);
     let curvature = g.mul(two, curvature);
-    Local { operands: vec![a, b], first: vec![reciprocal, by_b], second: vec![(0, 1, mixed), (1, 1, curvature)] }
+    Local::new(vec![a, b], vec![reciprocal, by_b], vec![(0, 1, mixed), (1, 1, curvature)])
 }
 
 fn of_atan2(g: &mut Graph, y: NodeId, x: NodeId) -> Local {
@@ -154,11 +160,7 @@ fn of_atan2(g: &mut Graph, y: NodeId, x: NodeId) -> Local {
     let opposite = g.neg(curvature);
     let (pp, qq) = (g.mul(by_y, by_y), g.mul(by_x, by_x));
     let mixed = g.sub(qq, pp);
-    Local {
-        operands: vec![y, x],
-        first: vec![by_y, by_x],
-        second: vec![(0, 0, curvature), (0, 1, mixed), (1, 1, opposite)],
-    }
+    Local::new(vec![y, x], vec![by_y, by_x], vec![(0, 0, curvature), (0, 1, mixed), (1, 1, opposite)])
 }
 
 fn of_power(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
@@ -178,5 +180,5 @@ fn of_power(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
     let product = g.mul(b, log);
     let sum = g.add(one, product);
     let by_ab = g.mul(lower, sum);
-    Local { operands: vec![a, b], first: vec![by_a, by_b], second: vec![(0, 0, by_aa), (0, 1, by_ab), (1, 1, by_bb)] }
+    Local::new(vec![a, b], vec![by_a, by_b], vec![(0, 0, by_aa), (0, 1, by_ab), (1, 1, by_bb)])
 }

@@ -2,15 +2,6 @@ use super::coordinates::Coordinates;
 use super::{adjoint, forward};
 use crate::graph::{Graph, NodeId, count, symmetric_index};
 
-/// How second derivatives were found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Route {
-    /// Forward over forward.
-    Forward,
-    /// Second derivatives weighted by adjoints.
-    Adjoint,
-}
-
 /// U, ∇U and the upper triangle of ∇²U in reduced coordinates.
 #[derive(Clone, Debug)]
 pub struct SecondOrder {
@@ -20,8 +11,6 @@ pub struct SecondOrder {
     pub gradient: Vec<NodeId>,
     /// ∇²U, upper triangle row by row.
     pub hessian: Vec<NodeId>,
-    /// The route taken.
-    pub route: Route,
 }
 
 /// First and second derivatives of a scalar by the route that needs less arithmetic.
@@ -38,14 +27,14 @@ pub fn second_order(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> 
     let gradients =
         [forward::first_derivatives(g, &[value], coordinates).remove(0), adjoint::gradient(g, value, coordinates)];
     let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
-    let mut routes = vec![(Route::Forward, forward_hessian)];
+    let mut hessians = vec![forward_hessian];
     if let Some(entries) = adjoint::second_derivatives(g, value, coordinates) {
-        routes.push((Route::Adjoint, dense(entries)));
+        hessians.push(dense(entries));
     }
-    routes
+    hessians
         .into_iter()
-        .flat_map(|(route, hessian)| gradients.clone().map(|gradient| (route, gradient, hessian.clone())))
-        .map(|(route, gradient, hessian)| SecondOrder { value, gradient, hessian, route })
+        .flat_map(|hessian| gradients.clone().map(|gradient| (gradient, hessian.clone())))
+        .map(|(gradient, hessian)| SecondOrder { value, gradient, hessian })
         .min_by_key(|plan| {
             let outputs: Vec<_> = std::iter::once(plan.value)
                 .chain(plan.gradient.iter().copied())

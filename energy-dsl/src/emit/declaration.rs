@@ -17,7 +17,10 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     };
     let docs = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect::<Vec<_>>().join("\n");
     let (formula, source) = (&program.formula, &program.source);
-    let (points, rest, parameters) = (fields(&program.moving), fields(&program.rest), fields(&program.parameters));
+    // A constraint's stiffness and damping are implied by its kind.
+    let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
+    let declared = &program.parameters[..program.parameters.len() - implied];
+    let (points, rest, parameters) = (fields(&program.moving), fields(&program.rest), fields(declared));
     let rows = program.rows();
     let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
     let primitives = &routines.primitives;

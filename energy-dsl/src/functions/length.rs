@@ -64,9 +64,13 @@ pub(super) struct Direction {
 
 /// A power of two that brings the largest of the numbers near 1.
 pub(super) fn common_scale(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
-    let magnitudes: Vec<_> = numbers.iter().map(|&x| g.abs(x)).collect();
-    let largest = magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components");
+    let largest = largest_magnitude(g, numbers);
     g.power_of_two_scale(largest)
+}
+
+fn largest_magnitude(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
+    let magnitudes: Vec<_> = numbers.iter().map(|&x| g.abs(x)).collect();
+    magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components")
 }
 
 /// Scales `d` by `scale` and finds its direction.
@@ -112,13 +116,9 @@ fn norm(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let at = direction(g, d);
     let value = g.div(at.length, at.scale);
     let curvature = g.mul(at.reciprocal, at.scale);
-    let second = upper(d.len())
-        .map(|(i, j)| {
-            let entry = projector(g, &at.unit, i, j);
-            g.mul(curvature, entry)
-        })
-        .collect();
-    let rule = Rule::smooth(Primitive::Norm, d.clone(), value, at.unit.clone(), second);
+    let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
+    let first = at.unit.iter().map(|&n| vec![n]).collect();
+    let rule = Rule::factored(Primitive::Norm, d.clone(), value, first, second);
     Lowered::scalar(g.add_rule(rule.flagged(1, Flag::Degenerate, at.zero), &[]))
 }
 
@@ -167,11 +167,12 @@ pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
         return None;
     }
     let (d, length) = (rule.arguments.clone(), rule.value);
-    if let Some(power) = g.as_constant(exponent) {
-        if power > 0.0 && power % 2.0 == 0.0 {
-            let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
-            return Some(g.plain_pow(square, half));
-        }
+    if let Some(power) = g.as_constant(exponent)
+        && power > 0.0
+        && power % 2.0 == 0.0
+    {
+        let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
+        return Some(g.plain_pow(square, half));
     }
     let at = direction(g, &d);
     let (null, one, two) = (g.constant(0.0), g.constant(1.0), g.constant(2.0));
@@ -182,20 +183,16 @@ pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
     let below_two = g.less(exponent, two);
     let singular = g.and(at.zero, below_two);
     let slope = g.select(singular, null, slope);
-    let first = g.scaled(slope, &d);
+    let first = d.iter().map(|&x| vec![slope, x]).collect();
     let second = upper(d.len())
         .map(|(i, j)| {
-            let product = g.mul(at.unit[i], at.unit[j]);
-            let mut entry = g.mul(less_two, product);
-            if i == j {
-                entry = g.add(one, entry);
-            }
-            g.mul(slope, entry)
+            let along = vec![slope, less_two, at.unit[i], at.unit[j]];
+            if i == j { vec![vec![slope], along] } else { vec![along] }
         })
         .collect();
     let at_most_one = g.less_or_equal(exponent, one);
     let cone = g.and(at.zero, at_most_one);
-    let rule = Rule::smooth(Primitive::NormPower, d, value, first, second);
+    let rule = Rule::factored(Primitive::NormPower, d, value, first, second);
     let rule = rule.flagged(1, Flag::Degenerate, cone).flagged(2, Flag::Degenerate, singular);
     Some(g.add_rule(rule, &[exponent]))
 }
@@ -209,9 +206,10 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
         return None;
     }
     let d = rule.arguments.clone();
-    let mut sizes = d.clone();
-    sizes.push(rest_length);
-    let scale = common_scale(g, &sizes);
+    // A length is not negative, so the largest size is found without its magnitude.
+    let largest = largest_magnitude(g, &d);
+    let largest = g.max(largest, rest_length);
+    let scale = g.power_of_two_scale(largest);
     let at = direction_scaled(g, &d, scale);
     let length = g.mul(scale, rest_length);
     let numerator = excess_of_squares(g, &d, &at, length);
@@ -224,37 +222,34 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let value = g.div(scaled_value, scale);
 
     let curvature = g.mul(at.reciprocal, scale);
-    let second = upper(d.len())
-        .map(|(i, j)| {
-            let entry = projector(g, &at.unit, i, j);
-            g.mul(curvature, entry)
-        })
-        .collect();
+    let first = at.unit.iter().map(|&n| vec![n]).collect();
+    let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
 
     // C/r, at d = 0 its limit 1 for a spring without rest length, else 0.
     let ratio = g.mul(scaled_value, at.reciprocal);
     let at_zero = g.select(slack, one, null);
     let ratio = g.select(at.zero, at_zero, ratio);
+    // (L/r) n nᵀ = (L/r³) d dᵀ, of the scaled vector.
+    let reciprocal_squared = g.mul(at.reciprocal, at.reciprocal);
     let inverse_stretch = g.mul(length, at.reciprocal);
-    let along = g.scaled(inverse_stretch, &at.unit);
+    let along = g.mul(inverse_stretch, reciprocal_squared);
     let half = g.constant(0.5);
     let square = g.mul(value, value);
     let half_value = g.mul(half, square);
-    let half_first = g.scaled(ratio, &d);
+    let half_first = d.iter().map(|&x| vec![ratio, x]).collect();
     let half_second = upper(d.len())
         .map(|(i, j)| {
-            let entry = g.mul(along[i], at.unit[j]);
-            if i == j { g.add(ratio, entry) } else { entry }
+            let stretching = vec![along, at.scaled[i], at.scaled[j]];
+            if i == j { vec![vec![ratio], stretching] } else { vec![stretching] }
         })
         .collect();
     let not_slack = g.not(slack);
     let collapsed = g.and(at.zero, not_slack);
-    let half_square = Rule::smooth(Primitive::HalfElongationSquared, d.clone(), half_value, half_first, half_second)
+    let half_square = Rule::factored(Primitive::HalfElongationSquared, d.clone(), half_value, half_first, half_second)
         .flagged(1, Flag::Degenerate, collapsed);
     let half_square = g.add_rule(half_square, &[rest_length]);
 
-    let mut rule =
-        Rule::smooth(Primitive::Elongation, d, value, at.unit.clone(), second).flagged(1, Flag::Degenerate, at.zero);
+    let mut rule = Rule::factored(Primitive::Elongation, d, value, first, second).flagged(1, Flag::Degenerate, at.zero);
     rule.half_square = Some(half_square);
     Some(g.add_rule(rule, &[rest_length]))
 }

@@ -114,10 +114,10 @@ impl Graph {
         if self.is(b, 0.0) {
             return a;
         }
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_difference(self, a, b) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_difference(self, a, b)
+        {
+            return recognised;
         }
         match (self.magnitude(a), self.magnitude(b)) {
             ((x, true), (y, true)) => self.sub(y, x),
@@ -151,30 +151,38 @@ impl Graph {
             }
         }
         let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
-        if a == b && self.form() == Form::Robust {
-            if let Some(half_square) = self.rule(a).and_then(|r| r.half_square) {
-                let two = self.constant(2.0);
-                let square = self.mul(two, half_square);
-                return self.signed(square, minus_a != minus_b);
-            }
+        if a == b
+            && self.form() == Form::Robust
+            && let Some(half_square) = self.rule(a).and_then(|r| r.half_square)
+        {
+            let two = self.constant(2.0);
+            let square = self.mul(two, half_square);
+            return self.signed(square, minus_a != minus_b);
         }
-        // (2ⁿ x) y = 2ⁿ (x y), exactly: constants gather in front, where they meet others.
-        for (scaled, other) in [(a, b), (b, a)] {
-            if let Op::Mul(c, x) = self.op(scaled) {
-                if self.as_constant(c).is_some_and(is_power_of_two) {
-                    let product = self.mul(x, other);
-                    let product = self.mul(c, product);
-                    return self.signed(product, minus_a != minus_b);
-                }
-            }
+        // (2ⁿ x)(2ᵐ y) = 2ⁿ⁺ᵐ (x y), exactly.
+        if let (Some((c, x)), Some((d, y))) = (self.scaled_by_constant(a), self.scaled_by_constant(b))
+            && [c, d].into_iter().all(|k| self.as_constant(k).is_some_and(is_power_of_two))
+        {
+            let (constants, product) = (self.mul(c, d), self.mul(x, y));
+            let product = self.mul(constants, product);
+            return self.signed(product, minus_a != minus_b);
         }
         let product = self.node(Op::Mul(a.min(b), a.max(b)));
         self.signed(product, minus_a != minus_b)
     }
 
+    /// The constant and the other factor of a product.
+    fn scaled_by_constant(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
+        match self.op(node) {
+            Op::Mul(c, y) if self.as_constant(c).is_some() => Some((c, y)),
+            Op::Mul(y, c) if self.as_constant(c).is_some() => Some((c, y)),
+            _ => None,
+        }
+    }
+
     /// x · (c · y) with both constants powers of two.
     fn regroup(&mut self, x: f64, b: NodeId) -> Option<NodeId> {
-        let Op::Mul(c, y) = self.op(b) else { return None };
+        let (c, y) = self.scaled_by_constant(b)?;
         let c = self.as_constant(c)?;
         if !(is_power_of_two(x) && is_power_of_two(c)) {
             return None;
@@ -222,20 +230,20 @@ impl Graph {
 
     /// sin a; of a dihedral angle or its half, without the angle.
     pub fn sin(&mut self, a: NodeId) -> NodeId {
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralSine) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralSine)
+        {
+            return recognised;
         }
         self.unary(a, f64::sin, Op::Sin)
     }
 
     /// cos a; of a dihedral angle or its half, without the angle.
     pub fn cos(&mut self, a: NodeId) -> NodeId {
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralCosine) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_dihedral(self, a, Primitive::DihedralCosine)
+        {
+            return recognised;
         }
         self.unary(a, f64::cos, Op::Cos)
     }
@@ -267,10 +275,10 @@ impl Graph {
 
     /// a^b: products for integers, a root for halves, `powf` for what is left. A power of a norm is its own primitive.
     pub fn pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.form() == Form::Robust {
-            if let Some(recognised) = crate::functions::recognise_norm_power(self, a, b) {
-                return recognised;
-            }
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_norm_power(self, a, b)
+        {
+            return recognised;
         }
         self.plain_pow(a, b)
     }
@@ -416,6 +424,24 @@ impl Graph {
             let (plus, minus) = (self.mul(a[j], b[k]), self.mul(a[k], b[j]));
             self.sub(plus, minus)
         })
+    }
+
+    /// weight · the factors, from left to right.
+    pub fn product(&mut self, weight: Option<NodeId>, factors: &[NodeId]) -> NodeId {
+        let one = self.constant(1.0);
+        factors.iter().fold(weight.unwrap_or(one), |product, &factor| self.mul(product, factor))
+    }
+
+    /// weight · Σ products, the weight going into each.
+    pub fn sum_of_products(&mut self, weight: Option<NodeId>, products: &[Vec<NodeId>]) -> NodeId {
+        let terms: Vec<_> = products.iter().map(|factors| self.product(weight, factors)).collect();
+        self.sum(terms)
+    }
+
+    /// Whether each product has a factor 0.
+    #[must_use]
+    pub fn vanishes(&self, products: &[Vec<NodeId>]) -> bool {
+        products.iter().all(|factors| factors.iter().any(|&f| self.is(f, 0.0)))
     }
 
     /// factor · a.

@@ -8,7 +8,7 @@ mod rule;
 
 pub use count::{count, reachable};
 pub use node::{Input, NodeId, Op};
-pub use rule::{DihedralParts, Primitive, Rule, symmetric_index};
+pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 
 use std::collections::HashMap;
 

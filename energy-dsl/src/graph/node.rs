@@ -84,7 +84,6 @@ pub enum Op {
 
 impl Op {
     /// The operands of an elementary operation (a rule's are its own affair).
-    #[must_use]
     pub fn operands(self) -> impl Iterator<Item = NodeId> {
         let (count, list) = match self {
             Self::Constant(_) | Self::Pi | Self::Input(_) | Self::Rule(_) => (0, [NodeId(0); 3]),

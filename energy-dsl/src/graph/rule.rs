@@ -90,9 +90,10 @@ pub struct Rule {
     /// The expression that computes it.
     pub value: NodeId,
     /// ∂value/∂argument.
-    pub first: Vec<NodeId>,
-    /// ∂²value/∂argument², upper triangle row by row (see [`symmetric_index`]); `None`: differentiate `value` instead.
-    pub second: Option<Vec<NodeId>>,
+    pub first: Vec<Product>,
+    /// ∂²value/∂argument², upper triangle row by row (see [`symmetric_index`]), each a sum of products; `None`: differentiate
+    /// `value` instead.
+    pub second: Option<Vec<Vec<Product>>>,
     /// Conditions.
     pub flags: Vec<RuleFlag>,
     /// Of a dihedral angle: the pieces its sine and cosine are made of.
@@ -100,6 +101,10 @@ pub struct Rule {
     /// Of an elongation: its rule's square.
     pub half_square: Option<NodeId>,
 }
+
+/// Factors, to be multiplied from left to right: what weighs the product multiplies the first, so that entries that share
+/// their leading factors share those products too.
+pub type Product = Vec<NodeId>;
 
 /// The functions of a dihedral angle that are better computed without it.
 #[derive(Clone, Copy, Debug)]
@@ -149,13 +154,13 @@ impl Graph {
     /// Node of ∂(rule output)/∂(its `by`-th argument), itself a rule where second derivatives are known.
     pub(crate) fn partial(&mut self, of: NodeId, by: usize) -> NodeId {
         let rule = self.rule(of).expect("only rules have partials of their own").clone();
-        let value = rule.first[by];
+        let value = self.product(None, &rule.first[by]);
         let n = rule.arguments.len();
         let Some(second) = &rule.second else { return value };
         if self.rule(value).is_some() || !self.varies(value) {
             return value;
         }
-        let first = (0..n).map(|j| second[symmetric_index(n, by, j)]).collect();
+        let first = (0..n).map(|j| vec![self.sum_of_products(None, &second[symmetric_index(n, by, j)])]).collect();
         let flags = rule.flags.iter().map(|f| RuleFlag { order: f.order.saturating_sub(1), ..*f }).collect();
         let by = u8::try_from(by).expect("few arguments");
         self.add_rule(
@@ -184,16 +189,22 @@ impl Rule {
         first: Vec<NodeId>,
         second: Vec<NodeId>,
     ) -> Self {
-        Self {
-            primitive,
-            arguments,
-            value,
-            first,
-            second: Some(second),
-            flags: Vec::new(),
-            dihedral: None,
-            half_square: None,
-        }
+        let first = first.into_iter().map(|entry| vec![entry]).collect();
+        let second = second.into_iter().map(|entry| vec![vec![entry]]).collect();
+        Self::factored(primitive, arguments, value, first, second)
+    }
+
+    /// A rule without conditions whose derivatives are products.
+    #[must_use]
+    pub fn factored(
+        primitive: Primitive,
+        arguments: Vec<NodeId>,
+        value: NodeId,
+        first: Vec<Product>,
+        second: Vec<Vec<Product>>,
+    ) -> Self {
+        let second = Some(second);
+        Self { primitive, arguments, value, first, second, flags: Vec::new(), dihedral: None, half_square: None }
     }
 
     /// The same with a condition.

@@ -85,7 +85,7 @@ pub struct Declaration {
     pub points: &'static [Field],
     /// Rest-shape inputs.
     pub rest: &'static [Field],
-    /// Parameters.
+    /// Parameters, without the stiffness and damping that every constraint has.
     pub parameters: &'static [Field],
     /// Rows: 1 for an energy, the length of C or r, three per point for a force.
     pub rows: usize,

@@ -230,10 +230,10 @@ impl<'a> Parser<'a> {
         let found = self.found();
         let mut diagnostic =
             Diagnostic::new(&self.span(), format!("expected energy, constraint, force, residual or fn, found {found}"));
-        if let Some(Token { kind: TokenKind::Name(name), .. }) = self.peek() {
-            if let Some(near) = nearest(name, KINDS.map(Kind::keyword)) {
-                diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
-            }
+        if let Some(Token { kind: TokenKind::Name(name), .. }) = self.peek()
+            && let Some(near) = nearest(name, KINDS.map(Kind::keyword))
+        {
+            diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
         }
         Err(Box::new(diagnostic))
     }

@@ -1,0 +1,47 @@
+//! Texts of the compiler that users read, against recorded ones. `UPDATE_GOLDEN=1 cargo test` records anew.
+
+use std::path::Path;
+
+use energy_dsl::{Textbook, compile};
+
+fn assert_golden(name: &str, actual: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, actual).unwrap();
+    }
+    let recorded = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(recorded == actual, "{name} differs from what was recorded; it is now:\n{actual}");
+}
+
+#[test]
+fn every_mistake_gets_a_message_with_its_place_and_its_remedy() {
+    let broken = include_str!("golden/broken.txt");
+    let mut messages = String::new();
+    for source in broken.split("\n\n").map(str::trim) {
+        let errors = Textbook::from_source(source).err().map_or_else(|| "accepted".into(), |e| e.to_string());
+        messages += &format!("{source}\n---\n{errors}\n\n==========\n\n");
+    }
+    assert!(!messages.contains("\naccepted\n"), "{messages}");
+    assert_golden("broken.messages.txt", &messages);
+}
+
+#[test]
+fn generated_code_is_stable_and_readable() {
+    let source = "energy Pull(p, q: Point; k: Scalar[N/m]) = \"k/2 ‖p − q‖²\";";
+    let code: syn::File = syn::parse2(compile(source.parse().unwrap())).unwrap();
+    assert_golden("pull.rs.txt", &prettyplease::unparse(&code));
+}
+
+#[test]
+fn a_broken_declaration_still_declares_its_type() {
+    for source in [
+        "pub energy Broken(p, q: Point; k: Scalar) { k * norm(p - r) }",
+        "pub force Broken(p, q: Point; k: Scalar) { [k * (p - q)] }",
+        "pub constraint Broken(p, q: Point; L: Scalar) = \"‖p − q − L\";",
+    ] {
+        let code = compile(source.parse().unwrap()).to_string();
+        assert!(code.contains("compile_error"), "{source}: no error");
+        assert!(code.contains("pub struct Broken"), "{source}: no stub");
+        assert_eq!(code.matches("compile_error").count(), 1, "{source}: one mistake, one error");
+    }
+}

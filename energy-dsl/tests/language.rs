@@ -1,0 +1,100 @@
+//! What a text means: both spellings, every function, and derivatives of what they compile to.
+
+use approx::assert_relative_eq;
+use energy_dsl::{Inputs, Textbook};
+
+/// The value of a formula of the points p = (1, 2, 2), q = (3, −1, 4) and the parameters k = 3, L = 0.5, θ₀ = 0.25.
+fn value(body: &str) -> f64 {
+    // Every input is used, so that a formula need not.
+    let source =
+        format!("constraint Test(p_k, p_l: Point; k, L, θ0: Scalar) {{ vector({body}, dot(p_k, p_l) * k * L * θ0) }}");
+    let program = Textbook::from_source(&source).unwrap_or_else(|e| panic!("{source}\n{e}"));
+    let positions = [1.0, 2.0, 2.0, 3.0, -1.0, 4.0];
+    program.evaluate(&Inputs { parameters: &[3.0, 0.5, 0.25], rest: &[], positions: &positions, velocities: &[] })[0]
+}
+
+#[test]
+fn both_spellings_mean_the_same() {
+    for (printed, rust) in [
+        ("‖p_k − p_ℓ‖ − L", "norm(p_k - p_l) - L"),
+        ("k/2 (1 − p̂_k·p̂_ℓ)", "k / 2 * (1 - dot(unit(p_k), unit(p_l)))"),
+        ("k (sin(L/2) − sin(θ₀/2))", "k * (sin(L / 2) - sin(θ0 / 2))"),
+        ("½ k ‖p_k‖² L³", "0.5 * k * norm_squared(p_k) * L^3"),
+        ("√k ‖p_k × p_ℓ‖", "sqrt(k) * norm(cross(p_k, p_l))"),
+        ("p_k ᐧ p_ℓ + p_k ⋅ p_ℓ", "2 * dot(p_k, p_l)"),
+        ("2π sin θ₀", "2 * pi * sin(θ0)"),
+        ("\\hat{p_k} \\cdot \\hat{p_l} \\theta_0", "dot(unit(p_k), unit(p_l)) * θ0"),
+        ("|L − k|^1.5", "abs(L - k)^(3/2)"),
+        ("a = p_k − p_ℓ; k ‖a‖ ‖a‖", "k * norm_squared(p_k - p_l)"),
+        ("k^2^L", "k^(2^L)"),
+        ("-L^2", "-(L * L)"),
+        ("k L⁻²", "k / L / L"),
+    ] {
+        let printed_value = value(&format!("\"{}\"", printed.replace('\\', "\\\\")));
+        assert_relative_eq!(printed_value, value(rust), max_relative = 1e-14);
+    }
+}
+
+#[test]
+fn functions_compute_what_they_say() {
+    let (p, q) = ([1.0_f64, 2.0, 2.0], [3.0_f64, -1.0, 4.0]);
+    let dot = p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    let angle = (dot / (3.0 * 26.0_f64.sqrt())).acos();
+    for (formula, expected) in [
+        ("angle(p_k, p_l)", angle),
+        ("trace(outer(p_k, p_l))", dot),
+        ("det(columns(p_k, p_l, cross(p_k, p_l)))", 9.0 * 26.0 - dot * dot),
+        ("ddot(identity(3), outer(p_k, p_l))", dot),
+        ("dot(inverse(columns(p_k, p_l, cross(p_k, p_l))) * p_l, vector(1, 10, 100))", 10.0),
+        ("norm(transpose(outer(p_k, p_l)) * p_k)", 9.0 * 26.0_f64.sqrt()),
+        ("min(k, L) + 10 * max(k, L)", 30.5),
+        ("exp(log(k)) + atan2(1, 1) * 4 - π", 3.0),
+        ("if k < L { 1 } else if L < k && k == 3 { 2 } else { 3 }", 2.0),
+        ("sin_half(θ0) - sin(0.125)", 0.0),
+        ("cos_half(θ0) - cos(0.125)", 0.0),
+        ("one_minus_cos(L) - 1 + cos(L)", 0.0),
+        ("x_minus_sin(L) - L + sin(L)", 0.0),
+        ("{ fn twice(x) { x + x } twice(twice(k)) }", 12.0),
+        ("{ let a = unit(p_k); dot(â, a) }", 1.0),
+        ("dot(gradient(norm_squared(p_k - p_l), p_k), vector(1, 0, 0))", -4.0),
+    ] {
+        let found = value(formula);
+        assert!((found - expected).abs() <= 1e-13 * expected.abs().max(1.0), "{formula}: {found}, expected {expected}");
+    }
+}
+
+#[test]
+fn hostile_texts_are_refused_without_panic() {
+    for source in [
+        "",
+        "energy",
+        "energy A",
+        "energy A(",
+        "energy A()",
+        "energy A() {}",
+        "energy A(p: Point)",
+        "pub",
+        "pub(",
+        "#",
+        "#[doc",
+        "fn",
+        "fn f",
+        "fn f(",
+        "force A(p: Point) { [] }",
+        "energy A(p: Point) = ;",
+        "energy A(p: Point) = \"\";",
+        "energy A(p: Point) = \"‖‖\";",
+        "energy A(p: Point) = \"((((\";",
+        "energy A(p: Point) = \"\\\\hat\";",
+        "energy A(p: Point) { let }",
+        "energy A(p: Point) { rest }",
+        "energy A(p: Point[) { 1 }",
+        "1 2 3",
+        "\"‖\"",
+    ] {
+        assert!(Textbook::from_source(source).is_err(), "accepted: {source}");
+        if let Ok(tokens) = source.parse::<proc_macro2::TokenStream>() {
+            let _ = energy_dsl::compile(tokens);
+        }
+    }
+}

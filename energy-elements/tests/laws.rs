@@ -1,0 +1,186 @@
+//! Laws that hold to the last bit, and values known by hand.
+#![allow(missing_docs)]
+
+use energy_dsl::{ForceLaw, Inputs, Kind, Outputs, Potential};
+use energy_elements::{
+    BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
+    StVK, ViscousDrag, ZeroLengthSpring, catalogue, find,
+};
+use proptest::prelude::*;
+
+fn evaluate(name: &str, parameters: &[f64], rest: &[f64], positions: &[f64], velocities: &[f64]) -> Outputs<f64> {
+    (find(name).unwrap().evaluate)(&Inputs { parameters, rest, positions, velocities }).unwrap()
+}
+
+fn block<'a>(outputs: &'a Outputs<f64>, name: &str) -> &'a [f64] {
+    &outputs.blocks.iter().find(|(n, _)| *n == name).unwrap().1
+}
+
+/// Positions on a grid of 2⁻²⁰, so that a translation on the same grid is exact.
+fn points(n: usize) -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec((-(1_i32 << 20)..(1 << 20)).prop_map(|i| f64::from(i) / f64::from(1 << 20)), 3 * n)
+}
+
+/// Parameters and rest shape with which an element is an ordinary one.
+fn ordinary(name: &str) -> (Vec<f64>, Vec<f64>) {
+    let declaration = find(name).unwrap().declaration;
+    let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
+    let parameters = declaration.parameters.iter().map(|p| p.size).sum::<usize>() + implied;
+    let rest = if declaration.rest.is_empty() { vec![] } else { vec![0.1, 0.0, 1.0, 0.25, 0.0, 0.75] };
+    (vec![0.75; parameters], rest)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// An exactly representable translation changes no bit of any element that sees differences only.
+    #[test]
+    fn translation_is_exact(x in points(4), shift in points(1), v in points(4)) {
+        for entry in catalogue().iter().filter(|e| e.declaration.translation_invariant) {
+            let (name, n) = (entry.declaration.name, 3 * entry.declaration.points.len());
+            let (parameters, rest) = ordinary(name);
+            let moved: Vec<f64> = x[..n].iter().enumerate().map(|(i, c)| c + shift[i % 3]).collect();
+            let (here, there) = (evaluate(name, &parameters, &rest, &x[..n], &v[..n]), evaluate(name, &parameters, &rest, &moved, &v[..n]));
+            prop_assert_eq!(here.blocks, there.blocks, "{}", name);
+        }
+    }
+
+    /// Angles do not change, and lengths scale exactly, when space is scaled by a power of two.
+    #[test]
+    fn scaling_by_a_power_of_two_is_exact(x in points(4), exponent in -300_i32..300) {
+        let factor = 2.0_f64.powi(exponent);
+        let scaled: Vec<f64> = x.iter().map(|c| c * factor).collect();
+        for (name, degree) in [("HingeAngle", 0), ("HingeSinHalf", 0), ("HingeCosHalf", 0), ("HingeCos", 0), ("Distance", 1)] {
+            let n = 3 * find(name).unwrap().declaration.points.len();
+            let (here, there) = (evaluate(name, &[], &[], &x[..n], &[]), evaluate(name, &[], &[], &scaled[..n], &[]));
+            for (order, block_name) in ["energy", "grad", "hess"].into_iter().enumerate() {
+                let power = 2.0_f64.powi(exponent * (degree - order as i32));
+                for (a, b) in block(&here, block_name).iter().zip(block(&there, block_name)) {
+                    prop_assert_eq!(a * power, *b, "{} {}", name, block_name);
+                }
+            }
+        }
+    }
+
+    /// One triangle is computed: the Hessian is symmetric to the last bit, and so are its diagonal blocks.
+    #[test]
+    fn hessians_are_exactly_symmetric(x in points(4)) {
+        for entry in catalogue().iter().filter(|e| e.declaration.kind == Kind::Energy) {
+            let (name, n) = (entry.declaration.name, 3 * entry.declaration.points.len());
+            let (parameters, rest) = ordinary(name);
+            let outputs = evaluate(name, &parameters, &rest, &x[..n], &[]);
+            let hessian = block(&outputs, "hess");
+            for i in 0..n {
+                for j in 0..i {
+                    prop_assert_eq!(hessian[i * n + j].to_bits(), hessian[j * n + i].to_bits(), "{}", name);
+                }
+            }
+        }
+    }
+
+    /// A body that moves as a whole is not damped.
+    #[test]
+    fn rigid_translation_is_not_damped(x in points(4), velocity in points(1)) {
+        let v = velocity.repeat(4);
+        for (name, parameters, still) in [
+            ("Spring", vec![0.5, 3.0, 7.0], vec![0.5, 3.0, 0.0]),
+            ("ZeroLengthSpring", vec![3.0, 7.0], vec![3.0, 0.0]),
+            ("BridsonForceDamped", vec![2.0, 7.0, 0.25], vec![2.0, 0.0, 0.25]),
+        ] {
+            let n = 3 * find(name).unwrap().declaration.points.len();
+            let (damped, undamped) = (evaluate(name, &parameters, &[], &x[..n], &v[..n]), evaluate(name, &still, &[], &x[..n], &v[..n]));
+            prop_assert_eq!(block(&damped, "force"), block(&undamped, "force"), "{}", name);
+        }
+    }
+}
+
+const ORIGIN: [f64; 3] = [0.0; 3];
+
+#[test]
+fn coincident_points_return_what_is_documented() {
+    let both = [[0.25, -1.5, 3.0]; 2];
+    let distance = Distance::<f64>::new().hessian(&both);
+    assert_eq!((distance.value, distance.gradient, distance.flags.degenerate), (0.0, [ORIGIN; 2], true));
+    assert!(!Distance::<f64>::new().value(&both).flags.any(), "the distance itself is regular");
+    for (power, first, second) in
+        [(3.0, false, false), (2.0, false, false), (1.5, false, true), (1.0, true, true), (0.5, true, true)]
+    {
+        let law = PowerLaw::new(power);
+        assert_eq!(law.gradient(&both).flags.degenerate, first, "α = {power}");
+        assert_eq!(law.hessian(&both).flags.degenerate, second, "α = {power}");
+        assert_eq!(law.gradient(&both).gradient, [ORIGIN; 2], "α = {power}");
+    }
+    assert_eq!(PowerLaw::new(2.0).hessian(&both).hessian[0], [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]);
+    assert_eq!(PowerLaw::new(-1.0).value(&both).value, f64::INFINITY);
+    // Without rest length the spring is regular; with one its direction is lost.
+    let slack = Spring::new(0.0, 100.0, 0.0).hessian(&both);
+    assert_eq!((slack.hessian[0][0], slack.flags.any()), ([100.0, 0.0, 0.0], false));
+    let collapsed = Spring::new(0.5, 100.0, 0.0).hessian(&both);
+    assert_eq!((collapsed.value, collapsed.gradient, collapsed.flags.degenerate), (12.5, [ORIGIN; 2], true));
+}
+
+#[test]
+fn hinges_are_regular_when_flat_and_documented_when_folded_or_degenerate() {
+    let flat = [[1.0, 0.25, 0.0], [-0.75, 0.5, 0.0], ORIGIN, [0.0, 1.0, 0.0]];
+    let theta = HingeAngle::<f64>::new().hessian(&flat);
+    assert_eq!((theta.value, theta.flags.any()), (0.0, false));
+    assert_eq!(theta.gradient[0], [0.0, 0.0, 1.0], "−n/h of the first triangle, n = −z");
+    let folded = [[1.0, 0.25, 0.0], [0.5, 0.5, 0.0], ORIGIN, [0.0, 1.0, 0.0]];
+    assert_eq!(HingeAngle::<f64>::new().value(&folded).value, std::f64::consts::PI);
+    assert_eq!(HingeSinHalf::<f64>::new().value(&folded).value, 1.0);
+    let kink = HingeCosHalf::<f64>::new().gradient(&folded);
+    assert_eq!((kink.value, kink.flags.kink), (0.0, true));
+    assert!(kink.gradient.as_flattened().iter().all(|g| g.is_finite()));
+    let on_edge = [[0.0, 0.5, 0.0], [-1.0, 0.5, 0.0], ORIGIN, [0.0, 1.0, 0.0]];
+    let degenerate = HingeAngle::<f64>::new().hessian(&on_edge);
+    assert_eq!((degenerate.value, degenerate.gradient, degenerate.flags.degenerate), (0.0, [ORIGIN; 4], true));
+    assert!(degenerate.hessian.as_flattened().as_flattened().iter().all(|h| *h == 0.0));
+    let at_rest = BridsonBending::new(2.0, 0.0).gradient(&flat);
+    assert_eq!((at_rest.value, at_rest.gradient), (0.0, [ORIGIN; 4]));
+}
+
+#[test]
+fn hair_is_exact_when_straight_and_flagged_without_a_segment() {
+    let straight = HairBend::new(2.0).gradient(&[[-0.5, -0.25, -1.0], ORIGIN, [1.0, 0.5, 2.0]]);
+    assert_eq!((straight.value, straight.gradient), (0.0, [ORIGIN; 3]));
+    let reversed = HairBend::new(2.0).gradient(&[[0.5, 0.25, 1.0], ORIGIN, [1.0, 0.5, 2.0]]);
+    assert_eq!((reversed.value, reversed.gradient), (2.0, [ORIGIN; 3]));
+    assert!(HairBend::new(2.0).value(&[ORIGIN, ORIGIN, [1.0, 0.5, 2.0]]).flags.degenerate);
+}
+
+#[test]
+fn springs_pull_by_hookes_law() {
+    let x = [ORIGIN, [3.0, 0.0, 4.0]];
+    let hooke = HookeSpring::new(10.0, 4.5).gradient(&x);
+    assert_eq!(hooke.value, 1.25);
+    assert_eq!(
+        hooke.gradient[0].map(|g| (g * 1e12).round() / 1e12),
+        [-3.0, 0.0, -4.0],
+        "K (PQ − L P̂Q) pulls P towards Q"
+    );
+    let witkin = Spring::new(4.5, 10.0, 2.0).force(&x, &[ORIGIN, [1.0, 1.0, 0.0]]).force[0];
+    // k_s C + k_d n·v = 5 + 2 · 0.6, along the spring.
+    for (found, expected) in witkin.iter().zip([6.2 * 0.6, 0.0, 6.2 * 0.8]) {
+        assert!((found - expected).abs() < 1e-14);
+    }
+    let zero = ZeroLengthSpring::new(2.0, 0.5).force(&x, &[ORIGIN, [0.0, 4.0, 0.0]]).force;
+    assert_eq!(zero, [[6.0, 2.0, 8.0], [-6.0, -2.0, -8.0]]);
+}
+
+#[test]
+fn membranes_stretch_and_refuse_a_flat_rest_shape() {
+    let (mu, lambda, strain) = (3.0, 5.0, 0.25);
+    let sheet = StVK::new([0.0, 0.0], [1.0, 0.0], [0.0, 1.0], lambda, mu).unwrap();
+    let at = sheet.value(&[ORIGIN, [1.0 + strain, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let green = strain + strain * strain / 2.0;
+    assert_eq!(at.value, 0.5 * (mu + lambda / 2.0) * green * green);
+    assert!(StVK::new([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], lambda, mu).is_err());
+}
+
+#[test]
+fn weight_and_drag() {
+    let weight = Gravity::new(2.0, [0.0, 0.0, -9.81]).hessian(&[[1.0, 2.0, 3.0]]);
+    assert_eq!((weight.value, weight.gradient[0]), (2.0 * 9.81 * 3.0, [0.0, 0.0, 2.0 * 9.81]));
+    let drag = ViscousDrag::new(0.5).jacobians(&[ORIGIN], &[[2.0, 0.0, -4.0]]);
+    assert_eq!((drag.force[0], drag.by_velocity[0][1]), ([-1.0, 0.0, 2.0], [0.0, -0.5, 0.0]));
+}

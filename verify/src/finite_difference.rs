@@ -1,0 +1,95 @@
+//! Central differences, extrapolated once, over a sweep of steps: the error falls with the step, then rises as rounding takes
+//! over; the least error found and the order of the fall are what tell a right derivative from a wrong one.
+
+use crate::blocks::{BlockName, NoAnswer, largest};
+use crate::sample::Sample;
+
+/// Which inputs are stepped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stepped {
+    Positions,
+    Velocities,
+}
+
+/// The block one order below, whose differences a block must equal, and by what.
+pub(crate) fn antiderivative(block: BlockName) -> Option<(BlockName, Stepped)> {
+    match block {
+        BlockName::Gradient => Some((BlockName::Energy, Stepped::Positions)),
+        BlockName::Hessian => Some((BlockName::Gradient, Stepped::Positions)),
+        BlockName::ForceByPosition => Some((BlockName::Force, Stepped::Positions)),
+        BlockName::ForceByVelocity => Some((BlockName::Force, Stepped::Velocities)),
+        BlockName::Energy | BlockName::Force | BlockName::Constraint | BlockName::Residual | BlockName::Jacobian => {
+            None
+        }
+    }
+}
+
+/// A sweep over steps.
+#[derive(Clone, Debug)]
+pub(crate) struct Sweep {
+    /// The differences at the best step, row-major: row of the lower block, then stepped input.
+    pub(crate) best: Vec<f64>,
+    /// Observed order of the plain central difference, if its error fell far enough to be measured.
+    pub(crate) order: Option<f64>,
+}
+
+/// Differences of `lower`, a function of the stepped inputs, against `block`.
+pub(crate) fn sweep(
+    sample: &Sample,
+    stepped: Stepped,
+    length: f64,
+    block: &[f64],
+    lower: impl Fn(&Sample) -> Result<Vec<f64>, NoAnswer>,
+) -> Result<Sweep, NoAnswer> {
+    const STEPS: [i32; 5] = [-6, -8, -10, -12, -14];
+    let inputs = match stepped {
+        Stepped::Positions => sample.positions.len(),
+        Stepped::Velocities => sample.velocities.len(),
+    };
+    let central = |step: f64| -> Result<Vec<f64>, NoAnswer> {
+        let rows = block.len() / inputs.max(1);
+        let mut differences = vec![0.0; block.len()];
+        for input in 0..inputs {
+            let at = |offset: f64| {
+                let mut moved = sample.clone();
+                let list = if stepped == Stepped::Positions { &mut moved.positions } else { &mut moved.velocities };
+                list[input] += offset;
+                let there = list[input];
+                lower(&moved).map(|values| (there, values))
+            };
+            let ((high, plus), (low, minus)) = (at(step)?, at(-step)?);
+            for row in 0..rows {
+                differences[row * inputs + input] = (plus[row] - minus[row]) / (high - low);
+            }
+        }
+        Ok(differences)
+    };
+    let deviation = |differences: &[f64]| {
+        differences
+            .iter()
+            .zip(block)
+            .map(|(d, b)| (d - b).abs())
+            .fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) })
+    };
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    let mut plain = Vec::new();
+    for exponent in STEPS {
+        let step = length * f64::from(exponent).exp2();
+        let (whole, half) = (central(step)?, central(step / 2.0)?);
+        plain.push((deviation(&whole), deviation(&half)));
+        let extrapolated: Vec<f64> = whole.iter().zip(&half).map(|(w, h)| (4.0 * h - w) / 3.0).collect();
+        for candidate in [whole, extrapolated] {
+            let error = deviation(&candidate);
+            if best.as_ref().is_none_or(|(least, _)| error < *least || least.is_nan()) {
+                best = Some((error, candidate));
+            }
+        }
+    }
+    let (error, best) = best.unwrap_or_default();
+    // The first step's fall, where it is not yet lost in rounding.
+    let order = plain
+        .first()
+        .filter(|(whole, half)| *half > 1e3 * error && *half > 1e-10 * largest(block) && *whole > *half)
+        .map(|(w, h)| (w / h).log2());
+    Ok(Sweep { best, order })
+}

@@ -1,0 +1,88 @@
+use std::io::Write;
+use std::path::Path;
+
+use energy_dsl::Flags;
+use serde_json::{Map, Value, json};
+
+use super::file::{Record, RecordError, read};
+use super::mapping::mapping;
+use crate::blocks::{NoAnswer, evaluate};
+
+/// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the same records with `out` filled by the
+/// generated code, 17 digits, and `flags`: by block, whether it is `degenerate` or a `kink`. A degenerate rest shape leaves `out`
+/// empty and says so in `error`. Returns the number of records.
+///
+/// # Errors
+/// When the input is malformed or names an unknown potential, or the output cannot be written; nothing is written then.
+pub fn evaluate_file(input: &Path, output: &Path) -> Result<usize, RecordError> {
+    let mut file: Value = read(input)?;
+    let common = file.get("potential").and_then(Value::as_str).map(str::to_owned);
+    let Some(records) = file.get_mut("records").and_then(Value::as_array_mut) else {
+        return Err(RecordError::record(input, "(the file)", "expected a list `records`"));
+    };
+    for record in records.iter_mut() {
+        let id = record.get("id").and_then(Value::as_str).unwrap_or("without id").to_owned();
+        let own = record.get("potential").and_then(Value::as_str).map(str::to_owned);
+        let fail = |message: String| RecordError::record(input, &id, message);
+        let potential = own.or_else(|| common.clone()).ok_or_else(|| fail("`potential` is missing".into()))?;
+        evaluate_record(record, &potential).map_err(fail)?;
+    }
+    let count = records.len();
+    let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
+    write_whole(output, &text).map_err(|e| RecordError::file(output, e))?;
+    Ok(count)
+}
+
+fn evaluate_record(value: &mut Value, potential: &str) -> Result<(), String> {
+    let mapping =
+        mapping(potential).ok_or_else(|| format!("no declared element computes the potential `{potential}`"))?;
+    let record: Record = serde_json::from_value(value.clone()).map_err(|e| e.to_string())?;
+    let sample = record.sample(&mapping)?;
+    let declaration = mapping.entry.declaration;
+    let fields = value.as_object_mut().ok_or("a record is an object")?;
+    // Which of a constraint's blocks are meant follows from what the reference has, if it has any.
+    let asked: Option<Vec<String>> = ["out", "blocks"]
+        .iter()
+        .find_map(|key| fields.get(*key).and_then(Value::as_object))
+        .map(|blocks| blocks.keys().cloned().collect());
+    let (mut out, mut flags) = (Map::new(), Map::new());
+    match evaluate(declaration, mapping.entry.evaluate, &sample.inputs()) {
+        Ok(answer) => {
+            for block in &answer.blocks {
+                let name = block.name.name();
+                if asked.as_ref().is_some_and(|asked| !asked.iter().any(|a| a == name)) {
+                    continue;
+                }
+                let digits: Vec<Value> = block.numbers.iter().map(|x| json!(format!("{x:.16e}"))).collect();
+                let single = digits.len() == 1 && name == "energy";
+                out.insert(name.into(), if single { digits[0].clone() } else { Value::Array(digits) });
+                let Flags { degenerate, kink } = answer.flags[block.name.order(declaration.kind)];
+                flags.insert(name.into(), json!({ "degenerate": degenerate, "kink": kink }));
+            }
+        }
+        Err(NoAnswer::Rest(error)) => {
+            fields.insert("error".into(), json!(error.to_string()));
+        }
+        Err(other) => return Err(other.to_string()),
+    }
+    fields.insert("out".into(), Value::Object(out));
+    fields.insert("flags".into(), Value::Object(flags));
+    Ok(())
+}
+
+/// Writes beside the file and renames: the name never stands for half a file.
+///
+/// # Errors
+/// When the folder or the file cannot be written.
+pub fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let beside = std::path::PathBuf::from(beside);
+    let written = std::fs::File::create(&beside)
+        .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
+        .and_then(|()| std::fs::rename(&beside, path));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&beside);
+    }
+    written
+}

@@ -1,0 +1,145 @@
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::sample::Sample;
+
+/// What is wrong with a file of records.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// It cannot be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is not JSON, or not of the schema.
+    #[error("{path}:{line}:{column}: {message}")]
+    Syntax {
+        /// The file.
+        path: String,
+        /// Line.
+        line: usize,
+        /// Column.
+        column: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// A record is wrong.
+    #[error("{path}: record {record}: {message}")]
+    Record {
+        /// The file.
+        path: String,
+        /// The record's id.
+        record: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+impl RecordError {
+    pub(super) fn file(path: &Path, source: std::io::Error) -> Self {
+        Self::File { path: path.display().to_string(), source }
+    }
+
+    pub(super) fn record(path: &Path, record: &str, message: impl Into<String>) -> Self {
+        Self::Record { path: path.display().to_string(), record: record.into(), message: message.into() }
+    }
+}
+
+/// Reads a JSON file into anything.
+pub(super) fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, RecordError> {
+    let text = std::fs::read_to_string(path).map_err(|e| RecordError::file(path, e))?;
+    serde_json::from_str(&text).map_err(|error| RecordError::Syntax {
+        path: path.display().to_string(),
+        line: error.line(),
+        column: error.column(),
+        message: error.to_string(),
+    })
+}
+
+/// One record: where the potential is evaluated.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Record {
+    /// Its id.
+    pub id: String,
+    /// Coordinates as decimal strings that are doubles exactly.
+    pub x: Vec<String>,
+    /// Velocities likewise; of forces.
+    #[serde(default)]
+    pub v: Vec<String>,
+    /// Parameters by name: a number as string, or a list of them.
+    #[serde(default)]
+    pub params: BTreeMap<String, Value>,
+    /// Amplification of rounded edges, by block.
+    #[serde(default)]
+    pub kappa: BTreeMap<String, Option<f64>>,
+    /// `f64_overflow`, `f64_underflow`.
+    #[serde(default)]
+    pub range: Vec<String>,
+}
+
+impl Record {
+    /// The numbers an element takes, its parameters and rest shape found by name.
+    pub(super) fn sample(&self, mapping: &super::Mapping) -> Result<Sample, String> {
+        let numbers = |list: &[String], what: &str| -> Result<Vec<f64>, String> {
+            list.iter().map(|text| number(text).map_err(|e| format!("{what}: {e}"))).collect()
+        };
+        let positions = numbers(&self.x, "x")?;
+        let expected: usize = mapping.entry.declaration.points.iter().map(|p| p.size).sum();
+        if positions.len() != expected {
+            return Err(format!("x holds {} numbers, expected {expected}", positions.len()));
+        }
+        let velocities = numbers(&self.v, "v")?;
+        if !velocities.is_empty() && velocities.len() != expected {
+            return Err(format!("v holds {} numbers, expected {expected}", velocities.len()));
+        }
+        let mut parameters = Vec::new();
+        for &name in mapping.parameters {
+            match name {
+                "" => parameters.push(0.0),
+                _ => parameters.push(self.parameter(name)?),
+            }
+        }
+        let rest = match mapping.rest {
+            None => Vec::new(),
+            Some(name) => {
+                let list = self.params.get(name).and_then(Value::as_array);
+                let list = list.ok_or_else(|| format!("the list `{name}` is missing from params"))?;
+                let rest: Result<Vec<f64>, String> = list.iter().map(value).collect();
+                let rest = rest.map_err(|e| format!("{name}: {e}"))?;
+                let expected: usize = mapping.entry.declaration.rest.iter().map(|r| r.size).sum();
+                if rest.len() != expected {
+                    return Err(format!("{name} holds {} numbers, expected {expected}", rest.len()));
+                }
+                rest
+            }
+        };
+        Ok(Sample { parameters, rest, positions, velocities })
+    }
+
+    fn parameter(&self, name: &str) -> Result<f64, String> {
+        let found = self.params.get(name).ok_or_else(|| format!("the parameter `{name}` is missing from params"))?;
+        value(found).map_err(|e| format!("{name}: {e}"))
+    }
+}
+
+fn value(value: &Value) -> Result<f64, String> {
+    match value {
+        Value::String(text) => number(text),
+        Value::Number(n) => n.as_f64().ok_or_else(|| format!("{n} is not a double")),
+        other => Err(format!("expected a number, found {other}")),
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        Ok(x) => Err(format!("{x} is not finite")),
+        Err(_) => Err(format!("`{text}` is not a number")),
+    }
+}

@@ -1,0 +1,60 @@
+use energy_elements::{CatalogueEntry, find};
+
+/// Which element computes a reference potential, and from which of the record's parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Mapping {
+    /// The reference potential.
+    pub potential: &'static str,
+    /// The element.
+    pub entry: &'static CatalogueEntry,
+    /// The record's names of the element's parameters in order; an empty name is 0.
+    pub parameters: &'static [&'static str],
+    /// The record's name of the rest shape.
+    pub rest: Option<&'static str>,
+    /// Whether edges rounded before they arrive are no excuse (tier B).
+    pub kappa_free: bool,
+}
+
+/// potential, element, parameters, rest shape, tier B.
+const TABLE: &[(&str, &str, &[&str], Option<&str>, bool)] = &[
+    ("bridson_conservative", "BridsonBending", &["Kprime", "theta0"], None, false),
+    ("bridson_force", "BridsonForce", &["K", "theta0"], None, false),
+    ("bridson_force_damped", "BridsonForceDamped", &["K", "k_d", "theta0"], None, false),
+    ("distance", "Distance", &[], None, true),
+    ("distance_squared", "DistanceSquared", &[], None, true),
+    ("hair_bend", "HairBend", &["k"], None, true),
+    ("hinge_cos_half", "HingeCosHalf", &[], None, true),
+    ("hinge_cos_theta", "HingeCos", &[], None, true),
+    ("hinge_quadratic", "QuadraticHinge", &["k", "theta0"], None, false),
+    ("hinge_sin_half", "HingeSinHalf", &[], None, true),
+    ("hinge_theta", "HingeAngle", &[], None, true),
+    ("power_law", "PowerLaw", &["alpha"], None, true),
+    ("stvk_membrane", "StVK", &["lambda", "mu"], Some("rest_uv"), false),
+    ("witkin_spring", "Spring", &["L", "k_s", ""], None, true),
+    ("witkin_spring_damped", "Spring", &["L", "k_s", "k_d"], None, false),
+    ("witkin_vector", "ZeroLengthSpring", &["k_s", ""], None, true),
+    ("witkin_vector_damped", "ZeroLengthSpring", &["k_s", "k_d"], None, false),
+];
+
+/// The element of a reference potential, if one is declared.
+#[must_use]
+pub fn mapping(potential: &str) -> Option<Mapping> {
+    let &(potential, element, parameters, rest, kappa_free) = TABLE.iter().find(|row| row.0 == potential)?;
+    let entry = find(element).expect("the table names declared elements");
+    Some(Mapping { potential, entry, parameters, rest, kappa_free })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{TABLE, mapping};
+
+    #[test]
+    fn every_row_names_a_declared_element_with_that_many_parameters() {
+        for row in TABLE {
+            let declaration = mapping(row.0).unwrap().entry.declaration;
+            let implied = if declaration.kind == energy_dsl::Kind::Constraint { 2 } else { 0 };
+            assert_eq!(declaration.parameters.len() + implied, row.2.len(), "{}", row.0);
+            assert_eq!(declaration.rest.is_empty(), row.3.is_none(), "{}", row.0);
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Generated code against multi-precision reference values (schema `potref-1`, see `data/potentials/README.md`), and against the
+//! documented behaviour at degenerate inputs (`potref-policy-1`).
+
+mod eval;
+mod exact;
+mod file;
+mod mapping;
+mod policy;
+mod report;
+
+pub use eval::{evaluate_file, write_whole};
+pub use exact::Truth;
+pub use file::{Record, RecordError};
+pub use mapping::{Mapping, mapping};
+pub use policy::{PolicyLine, policy};
+pub use report::{BlockLine, ReferenceReport, reference};
+
+/// Unit roundoff of doubles.
+pub const ROUNDOFF: f64 = f64::EPSILON / 2.0;

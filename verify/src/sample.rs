@@ -1,0 +1,197 @@
+//! Random inputs away from degeneracy, reproducible from a seed.
+
+use std::fmt;
+
+use energy_dsl::{Declaration, Field, Inputs, Kind};
+use fastrand::Rng;
+
+use crate::geometry::{Rotation, difference, is_well_shaped, rotate, shortest_distance};
+
+/// One input of an element, flattened in declared order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// Parameters; a constraint's stiffness and damping at the end.
+    pub parameters: Vec<f64>,
+    /// Rest shape.
+    pub rest: Vec<f64>,
+    /// Positions, or a residual's unknowns.
+    pub positions: Vec<f64>,
+    /// Velocities; empty for an energy or a residual.
+    pub velocities: Vec<f64>,
+}
+
+impl Sample {
+    /// As an element takes it.
+    #[must_use]
+    pub fn inputs(&self) -> Inputs<'_, f64> {
+        Inputs {
+            parameters: &self.parameters,
+            rest: &self.rest,
+            positions: &self.positions,
+            velocities: &self.velocities,
+        }
+    }
+
+    /// k_s and k_d, the last two parameters of a constraint.
+    pub(crate) fn stiffness_and_damping(&self) -> (f64, f64) {
+        match self.parameters[..] {
+            [.., stiffness, damping] => (stiffness, damping),
+            _ => (1.0, 0.0),
+        }
+    }
+
+    /// The length over which an element may change its shape: the shortest distance between points, 1 without a pair.
+    pub(crate) fn feature_length(&self, declaration: &Declaration) -> f64 {
+        if has_points(declaration) { shortest_distance(&self.positions).unwrap_or(1.0) } else { 1.0 }
+    }
+
+    /// The numbers by name with 17 significant digits, from which the very same doubles can be read back.
+    pub(crate) fn describe(&self, declaration: &Declaration) -> String {
+        let mut text = String::new();
+        let mut add = |title: &str, fields: &[(String, usize)], numbers: &[f64]| {
+            let mut rest = numbers;
+            for (name, size) in fields {
+                let (own, others) = rest.split_at((*size).min(rest.len()));
+                rest = others;
+                text += &format!("\n    {title}{name} = {}", Numbers(own));
+            }
+        };
+        let named =
+            |fields: &[Field]| fields.iter().map(|field| (field.name.to_owned(), field.size)).collect::<Vec<_>>();
+        let mut parameters = named(declaration.parameters);
+        if declaration.kind == Kind::Constraint {
+            parameters.extend([("(stiffness k_s)".to_owned(), 1), ("(damping k_d)".to_owned(), 1)]);
+        }
+        add("", &named(declaration.points), &self.positions);
+        if !self.velocities.is_empty() {
+            add("velocity of ", &named(declaration.points), &self.velocities);
+        }
+        add("rest ", &named(declaration.rest), &self.rest);
+        add("parameter ", &parameters, &self.parameters);
+        text
+    }
+}
+
+/// Numbers with 17 significant digits.
+struct Numbers<'a>(&'a [f64]);
+
+impl fmt::Display for Numbers<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            [one] => write!(f, "{one:.16e}"),
+            many => {
+                let texts: Vec<String> = many.iter().map(|x| format!("{x:.16e}")).collect();
+                write!(f, "[{}]", texts.join(", "))
+            }
+        }
+    }
+}
+
+/// Whether the positions are points in space, and not other unknowns.
+pub(crate) fn has_points(declaration: &Declaration) -> bool {
+    !declaration.points.is_empty() && declaration.points.iter().all(|point| point.size == 3)
+}
+
+/// Draws samples for one declaration.
+pub(crate) struct Sampler {
+    declaration: &'static Declaration,
+    random: Rng,
+}
+
+impl Sampler {
+    /// The samples of a declaration depend on the seed and its name alone, not on what else is audited.
+    pub(crate) fn new(declaration: &'static Declaration, seed: u64) -> Self {
+        // FNV-1a
+        let name = declaration
+            .name
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+        Self { declaration, random: Rng::with_seed(seed ^ name) }
+    }
+
+    /// Uniform in [low, high).
+    fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.random.f64()
+    }
+
+    fn uniforms(&mut self, count: usize, low: f64, high: f64) -> Vec<f64> {
+        (0..count).map(|_| self.uniform(low, high)).collect()
+    }
+
+    /// One input: points of order one to eight apart, anywhere within a few units of the origin.
+    pub(crate) fn sample(&mut self) -> Sample {
+        let declaration = self.declaration;
+        let count: usize = declaration.points.iter().map(|point| point.size).sum();
+        let positions = if has_points(declaration) { self.points(count) } else { self.uniforms(count, -1.0, 1.0) };
+        let rest = self.rest();
+        let mut parameters = Vec::new();
+        for parameter in declaration.parameters {
+            parameters.extend(self.parameter(parameter));
+        }
+        let mut velocities = Vec::new();
+        if declaration.kind == Kind::Constraint {
+            parameters.extend(self.uniforms(2, 0.5, 2.0));
+        }
+        if matches!(declaration.kind, Kind::Constraint | Kind::Force) {
+            velocities = self.uniforms(count, -1.0, 1.0);
+        }
+        Sample { parameters, rest, positions, velocities }
+    }
+
+    /// Well-shaped points, scaled and moved at random.
+    fn points(&mut self, count: usize) -> Vec<f64> {
+        let mut points = self.uniforms(count, -1.0, 1.0);
+        while !is_well_shaped(&points, 3) {
+            points = self.uniforms(count, -1.0, 1.0);
+        }
+        let scale = self.uniform(-1.0, 2.0).exp2();
+        let turn = self.rotation();
+        let offset = self.uniforms(3, -2.0, 2.0);
+        points.chunks(3).flat_map(|p| rotate(&turn, p)).enumerate().map(|(i, x)| scale * x + offset[i % 3]).collect()
+    }
+
+    /// A rest shape: points in the plane (a triangle has positive area) or in space, else plain numbers.
+    fn rest(&mut self) -> Vec<f64> {
+        let fields = self.declaration.rest;
+        let count = fields.iter().map(|field| field.size).sum();
+        let dimension = fields.first().map_or(0, |field| field.size);
+        if !(2..=3).contains(&dimension) || fields.iter().any(|field| field.size != dimension) {
+            return fields.iter().flat_map(|field| self.parameter(field)).collect();
+        }
+        loop {
+            let points = self.uniforms(count, -1.0, 1.0);
+            if is_well_shaped(&points, dimension) && has_positive_area(&points, dimension) {
+                return points;
+            }
+        }
+    }
+
+    /// Angles in (−2, 2), other scalars in [0.5, 2); vectors of either sign.
+    fn parameter(&mut self, field: &Field) -> Vec<f64> {
+        match (field.unit, field.size) {
+            ("rad", size) => self.uniforms(size, -2.0, 2.0),
+            (_, 1) => self.uniforms(1, 0.5, 2.0),
+            (_, size) => self.uniforms(size, -2.0, 2.0),
+        }
+    }
+
+    /// A random rotation.
+    pub(crate) fn rotation(&mut self) -> Rotation {
+        loop {
+            let quaternion = [(); 4].map(|()| self.uniform(-1.0, 1.0));
+            let length = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
+            // Reject the corners, which would make some directions likelier, and the centre.
+            if (0.1..1.0).contains(&length) {
+                return Rotation::from_unit_quaternion(quaternion.map(|q| q / length));
+            }
+        }
+    }
+}
+
+/// Whether a plane triangle is counter-clockwise; true of anything else.
+fn has_positive_area(points: &[f64], dimension: usize) -> bool {
+    let corners: Vec<&[f64]> = points.chunks(2).collect();
+    let (2, [a, b, c]) = (dimension, corners.as_slice()) else { return true };
+    let (u, v) = (difference(b, a), difference(c, a));
+    u[0] * v[1] - u[1] * v[0] > 0.0
+}
