@@ -21,13 +21,13 @@ pub fn listing() -> String {
 #[must_use]
 pub fn describe(declaration: &Declaration) -> String {
     let mut text = format!("{} ({})\n", declaration.name, declaration.kind.keyword());
-    let first_sentence = declaration.docs.trim().split_inclusive(". ").next().unwrap_or_default();
+    let first_paragraph = declaration.docs.trim().split("\n\n").next().unwrap_or_default();
     let row = |text: &mut String, name: &str, value: &str| {
         if !value.is_empty() {
             writeln!(text, "  {name:<11} {value}").expect("writing to a string succeeds");
         }
     };
-    row(&mut text, "", &first_sentence.split_whitespace().collect::<Vec<_>>().join(" "));
+    row(&mut text, "", &first_paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
     row(&mut text, "formula", declaration.formula);
     row(&mut text, "points", &names(declaration.points));
     row(&mut text, "rest", &names(declaration.rest));
