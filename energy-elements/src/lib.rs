@@ -43,3 +43,8 @@ elements! {
     viscous_drag: ViscousDrag;
     zero_length_spring: ZeroLengthSpring;
 }
+
+/// The README's example, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

@@ -120,9 +120,7 @@ impl Block {
 
 /// The largest magnitude; NaN if there is one.
 pub(crate) fn largest(numbers: &[f64]) -> f64 {
-    numbers
-        .iter()
-        .fold(0.0, |most, x| if x.is_nan() || most > x.abs() { most + (x - x) } else { x.abs() + (most - most) })
+    numbers.iter().map(|x| x.abs()).fold(0.0, |most, x| if most.is_nan() || x <= most { most } else { x })
 }
 
 /// An element's answer, its blocks checked for completeness.

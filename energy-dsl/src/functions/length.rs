@@ -159,7 +159,7 @@ fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
     Lowered::vector((0..m).map(|i| component(g, i)).collect::<Vec<_>>())
 }
 
-/// ‖d‖^α with α a parameter or a constant: gradient h d, Hessian h (I + (α − 2) n nᵀ), h = α ‖d‖^(α−2). An even constant
+/// ‖d‖^α with α a parameter or a constant: gradient g n, Hessian (g/r) (I + (α − 2) n nᵀ), g = α ‖d‖^(α−1). An even constant
 /// power is a polynomial of d·d. At d = 0 both are their limits, or 0 and flagged where there is none.
 pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId) -> Option<NodeId> {
     let rule = g.rule(base).filter(|r| r.primitive == Primitive::Norm)?;
@@ -167,31 +167,35 @@ pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
         return None;
     }
     let (d, length) = (rule.arguments.clone(), rule.value);
-    if let Some(power) = g.as_constant(exponent)
-        && power > 0.0
-        && power % 2.0 == 0.0
-    {
+    if let Some(power) = g.as_constant(exponent).filter(|power| *power > 0.0 && power % 2.0 == 0.0) {
         let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
         return Some(g.plain_pow(square, half));
     }
     let at = direction(g, &d);
     let (null, one, two) = (g.constant(0.0), g.constant(1.0), g.constant(2.0));
     let value = g.plain_pow(length, exponent);
-    let less_two = g.sub(exponent, two);
-    let power = g.plain_pow(length, less_two);
+    let less_one = g.sub(exponent, one);
+    let power = g.plain_pow(length, less_one);
     let slope = g.mul(exponent, power);
-    let below_two = g.less(exponent, two);
-    let singular = g.and(at.zero, below_two);
-    let slope = g.select(singular, null, slope);
-    let first = d.iter().map(|&x| vec![slope, x]).collect();
+    let slope = g.select(at.zero, null, slope);
+    let first = at.unit.iter().map(|&n| vec![slope, n]).collect();
+
+    let reciprocal = g.mul(at.reciprocal, at.scale);
+    let ratio = g.mul(slope, reciprocal);
+    let quadratic = g.equal(exponent, two);
+    let at_zero = g.select(quadratic, two, null);
+    let ratio = g.select(at.zero, at_zero, ratio);
+    let less_two = g.sub(exponent, two);
     let second = upper(d.len())
         .map(|(i, j)| {
-            let along = vec![slope, less_two, at.unit[i], at.unit[j]];
-            if i == j { vec![vec![slope], along] } else { vec![along] }
+            let along = g.product(None, &[less_two, at.unit[i], at.unit[j]]);
+            // Not as a sum of two products: where the power overflows they could be opposite infinities.
+            let entry = if i == j { g.add(one, along) } else { along };
+            vec![vec![ratio, entry]]
         })
         .collect();
-    let at_most_one = g.less_or_equal(exponent, one);
-    let cone = g.and(at.zero, at_most_one);
+    let (at_most_one, below_two) = (g.less_or_equal(exponent, one), g.less(exponent, two));
+    let (cone, singular) = (g.and(at.zero, at_most_one), g.and(at.zero, below_two));
     let rule = Rule::factored(Primitive::NormPower, d, value, first, second);
     let rule = rule.flagged(1, Flag::Degenerate, cone).flagged(2, Flag::Degenerate, singular);
     Some(g.add_rule(rule, &[exponent]))

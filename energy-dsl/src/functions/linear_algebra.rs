@@ -1,7 +1,7 @@
 //! Products, transposes and inverses of vectors and matrices, and how they are put together.
 
 use super::{Function, Lowered, Shape};
-use crate::graph::{Graph, NodeId};
+use crate::graph::{Form, Graph, NodeId};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
@@ -187,6 +187,8 @@ fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
     match (x.shape, y.shape) {
         (Shape::Scalar, _) => Lowered { shape: y.shape, parts: g.scaled(x.node(), &y.parts) },
         (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
+        // Needle triangles: each component to about one rounding.
+        _ if g.form() == Form::Robust => Lowered::vector(super::angle::accurate_cross(g, &x.parts, &y.parts)),
         _ => Lowered::vector(g.cross(&x.parts, &y.parts)),
     }
 }

@@ -15,8 +15,10 @@ pub struct Mapping {
     pub kappa_free: bool,
 }
 
-/// potential, element, parameters, rest shape, tier B.
-const TABLE: &[(&str, &str, &[&str], Option<&str>, bool)] = &[
+/// Potential, element, parameters, rest shape, tier B.
+type Row = (&'static str, &'static str, &'static [&'static str], Option<&'static str>, bool);
+
+const TABLE: &[Row] = &[
     ("bridson_conservative", "BridsonBending", &["Kprime", "theta0"], None, false),
     ("bridson_force", "BridsonForce", &["K", "theta0"], None, false),
     ("bridson_force_damped", "BridsonForceDamped", &["K", "k_d", "theta0"], None, false),

@@ -170,8 +170,8 @@ fn add(line: &mut BlockLine, record: &Record, got: &[f64], truth: &[Truth], kapp
         return;
     }
     // Below the normal numbers a relative error means nothing.
-    let scale = largest.max(f64::MIN_POSITIVE) * ROUNDOFF;
-    let error = got.iter().zip(truth).map(|(g, t)| t.error_of(*g)).fold(0.0, f64::max) / scale;
+    let scale = largest.max(f64::MIN_POSITIVE);
+    let error = got.iter().zip(truth).map(|(g, t)| t.error_of(*g)).fold(0.0, f64::max) / scale / ROUNDOFF;
     let by_kappa = error / kappa.unwrap_or(1.0).max(1.0);
     if error > line.worst {
         (line.worst, line.worst_record) = (error, record.id.clone());
