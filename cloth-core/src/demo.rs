@@ -1,8 +1,13 @@
-//! The demonstration: a sheet of cotton, horizontal at first, held by two corners.
+//! The demonstration: a sheet of cotton, horizontal at first, held by two corners, made of elements that are audited before use.
+
+use std::fmt::Write as _;
+
+use verify::audit::{Check, Options, Report, audit_catalogue, describe_failure};
 
 use crate::scene::{Scene, SceneError};
+use crate::simulation::Simulation;
 
-/// The demonstration's scene; also in `scenes/hang.toml`.
+/// The demonstration's scene, `scenes/hang.toml`.
 pub const SCENE: &str = include_str!("../../scenes/hang.toml");
 
 /// The scene.
@@ -11,4 +16,60 @@ pub const SCENE: &str = include_str!("../../scenes/hang.toml");
 /// Never, unless the file was changed.
 pub fn scene() -> Result<Scene, SceneError> {
     Scene::parse(SCENE, "scenes/hang.toml".as_ref())
+}
+
+/// Elements whose derivatives are wrong, or that could not be audited.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the audit failed; nothing was simulated\n{0}")]
+pub struct AuditError(String);
+
+/// Audits every declared element that a simulation is made of, and says how far each is from independent derivatives.
+///
+/// # Errors
+/// When a check fails, with the element, the entry and both values.
+pub fn audit_materials(simulation: &Simulation) -> Result<String, AuditError> {
+    let mut elements: Vec<&str> = simulation.body().system.terms().map(|(term, _)| term.declaration().name).collect();
+    elements.sort_unstable();
+    elements.dedup();
+    let options = Options::default();
+    let report = audit_catalogue(&elements, options).map_err(AuditError)?;
+    if !report.passed() {
+        return Err(AuditError(failures(&report)));
+    }
+    let mut text = format!("audit of {} elements on {} random inputs each: passed\n", elements.len(), options.samples);
+    for element in elements {
+        let worst = |check| worst_error(&report, element, check);
+        writeln!(
+            text,
+            "  {element:<20} worst relative error {} by dual numbers, {} by finite differences",
+            worst(Check::DualNumbers),
+            worst(Check::FiniteDifferences),
+        )
+        .expect("writing to a string succeeds");
+    }
+    Ok(text)
+}
+
+fn failures(report: &Report) -> String {
+    let failed = report.failures().map(describe_failure);
+    let refused = report.refused.iter().map(|(element, reason)| format!("{element}: {reason}"));
+    failed.chain(refused).collect::<Vec<_>>().join("\n")
+}
+
+fn worst_error(report: &Report, element: &str, check: Check) -> String {
+    let lines = report.lines.iter().filter(|line| line.element == element && line.check == check);
+    lines.map(|line| line.worst).reduce(f64::max).map_or("–".into(), |worst| format!("{worst:.0e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_audit_covers_what_the_demonstration_is_made_of() {
+        let text = audit_materials(&Simulation::new(&scene().unwrap()).unwrap()).unwrap();
+        for element in ["StVK", "BridsonBending", "Gravity", "ViscousDrag"] {
+            assert!(text.contains(element), "{text}");
+        }
+    }
 }

@@ -48,7 +48,10 @@ fn main() -> Result<()> {
     match Arguments::parse().command {
         Command::Demo { output } => {
             let folder = OutputFolder::open(&output, true)?;
-            run(Simulation::new(&demo::scene()?)?, &demo::scene()?, &folder)
+            let scene = demo::scene()?;
+            let simulation = Simulation::new(&scene)?;
+            print(&format!("{}\n", demo::audit_materials(&simulation)?))?;
+            run(simulation, &scene, &folder)
         }
         Command::Run { scene, output, overwrite } => {
             let scene = Scene::read(&scene)?;

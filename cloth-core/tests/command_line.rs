@@ -78,6 +78,19 @@ fn a_run_writes_picture_animation_and_frames() {
 }
 
 #[test]
+fn the_demonstration_audits_simulates_and_repeats() {
+    let folder = TempDir::new().unwrap();
+    for _ in 0..2 {
+        let output = cloth(&["demo"], folder.path());
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+        assert!(text.starts_with("audit of 4 elements") && text.contains("150 steps"), "{text}");
+    }
+    // 1.5 s at 25 frames a second, and the first frame.
+    assert_eq!(std::fs::read_dir(folder.path().join("out/frames")).unwrap().count(), 38);
+}
+
+#[test]
 fn the_animation_is_a_glb_file_whose_parts_fit() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();

@@ -5,7 +5,7 @@ use cloth_core::integrator::{ImplicitEuler, Integrator, SymplecticEuler};
 use cloth_core::mesh::{SpringNetwork, Topology, TriangleMesh};
 use cloth_core::scene::Scene;
 use cloth_core::{Body, Simulation};
-use energy_solve::{SolveOptions, State, System};
+use energy_solve::{Curvature, SolveOptions, State, System, Weights};
 
 fn scene(head: &str, fabric: &str) -> Scene {
     let text = format!("{head}\n[mesh.sheet]\ncells = [6, 5]\nsize = [0.6, 0.5]\n[fabric]\ndensity = 0.2\n{fabric}");
@@ -77,6 +77,34 @@ fn inner_forces_leave_momentum_alone() {
             if scheme.name() == "symplectic-euler" {
                 let angular = body.angular_momentum().map(|component| component / (mass * speed * 0.5));
                 assert!(angular.iter().all(|part| part.abs() < 1e-11), "{}: {angular:?}", scheme.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn assembled_jacobians_are_derivatives_of_the_assembled_forces() {
+    for fabric in [STVK, PRINTED, SPRINGS] {
+        let mut body = distorted(fabric);
+        let v: Vec<[f64; 3]> = body.x.iter().map(|x| [x[1], (20.0 * x[0]).sin(), x[0] * x[1]]).collect();
+        let mut matrix = body.system.matrix();
+        let weights = Weights { position: 1.0, velocity: 0.0 };
+        let state = State { x: &body.x, v: &v };
+        body.system.linearise(state, weights, Curvature::Exact, &mut matrix).unwrap();
+        let scale = (0..42).map(|row| matrix.diagonal(row)[0][0].abs()).fold(0.0, f64::max);
+        for (vertex, axis) in [(0, 2), (9, 0), (17, 1), (24, 2)] {
+            let mut force_at = |step: f64| {
+                let mut x = body.x.clone();
+                x[vertex][axis] += step;
+                body.system.forces(State { x: &x, v: &v }).unwrap()
+            };
+            let (after, before) = (force_at(1e-6), force_at(-1e-6));
+            for row in 0..42 {
+                for component in 0..3 {
+                    let expected = (after[row][component] - before[row][component]) / 2e-6;
+                    let got = matrix.block(row, vertex)[component][axis];
+                    assert!((got - expected).abs() < 1e-7 * scale, "({row}, {vertex}): {got} {expected}\n{fabric}");
+                }
             }
         }
     }

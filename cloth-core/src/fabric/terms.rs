@@ -1,7 +1,6 @@
 use energy_dsl::{ForceLaw, Potential, RestError, Vector3};
 use energy_elements::{
-    BendingSpring, BridsonBending, BridsonForce, BridsonForceDamped, Gravity, HookeSpring, ShearSpring, Spring, StVK,
-    StructuralSpring, ViscousDrag,
+    BridsonBending, BridsonForce, BridsonForceDamped, Gravity, HookeSpring, Spring, StVK, ViscousDrag,
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
@@ -73,21 +72,23 @@ impl Garment {
         mesh: &TriangleMesh,
         springs: &SpringNetwork,
     ) -> Result<(), FabricError> {
-        let damping = material.damping;
-        let length = |&[p, q]: &[usize; 2]| norm(subtract(mesh.vertices()[p], mesh.vertices()[q]));
-        let kinds: [(&str, f64, &[[usize; 2]], fn(f64, f64) -> HookeSpring); 3] = [
-            ("structural springs", material.structural, &springs.structural, StructuralSpring::new),
-            ("shear springs", material.shear, &springs.shear, ShearSpring::new),
-            ("bending springs", material.bending, &springs.bending, BendingSpring::new),
-        ];
-        for (name, stiffness, pairs, undamped) in kinds {
+        let MassSpring { structural, shear, bending, damping } = *material;
+        let lengths = |pairs: &[[usize; 2]]| -> Vec<f64> {
+            pairs.iter().map(|&[p, q]| norm(subtract(mesh.vertices()[p], mesh.vertices()[q]))).collect()
+        };
+        for (name, stiffness, pairs) in [
+            ("structural springs", structural, &springs.structural),
+            ("shear springs", shear, &springs.shear),
+            ("bending springs", bending, &springs.bending),
+        ] {
             if self.leave_out(name, stiffness == 0.0, pairs.len()) {
                 continue;
             }
+            let lengths = lengths(pairs).into_iter();
             if damping == 0.0 {
-                self.add_potential(name, pairs, pairs.iter().map(|pair| undamped(stiffness, length(pair))).collect())?;
+                self.add_potential(name, pairs, lengths.map(|length| HookeSpring::new(stiffness, length)).collect())?;
             } else {
-                let damped = pairs.iter().map(|pair| Spring::new(length(pair), stiffness, damping)).collect();
+                let damped = lengths.map(|length| Spring::new(length, stiffness, damping)).collect();
                 let list = ElementList::new(name, damped, pairs)?;
                 self.terms.push(Box::new(ForceTerm::new(list).with_energy()));
             }

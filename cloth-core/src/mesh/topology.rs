@@ -25,21 +25,32 @@ impl Topology {
     /// The edges and hinges of a mesh.
     #[must_use]
     pub fn of(mesh: &TriangleMesh) -> Self {
-        // For each edge the sides along it: triangle, apex, and the edge as the triangle runs through it.
-        let mut sides: BTreeMap<[usize; 2], Vec<(usize, usize, [usize; 2])>> = BTreeMap::new();
+        let mut sides: BTreeMap<[usize; 2], Vec<Side>> = BTreeMap::new();
         for (triangle, &[a, b, c]) in mesh.triangles().iter().enumerate() {
             for (start, end, apex) in [(a, b, c), (b, c, a), (c, a, b)] {
-                sides.entry([start.min(end), start.max(end)]).or_default().push((triangle, apex, [start, end]));
+                sides.entry([start.min(end), start.max(end)]).or_default().push(Side {
+                    triangle,
+                    apex,
+                    edge: [start, end],
+                });
             }
         }
-        let hinge = |sides: &Vec<(usize, usize, [usize; 2])>| match sides[..] {
-            [(first, x1, [x3, x4]), (second, x2, _)] => {
-                Some(Hinge { vertices: [x1, x2, x3, x4], triangles: [first, second] })
-            }
+        let hinge = |sides: &Vec<Side>| match &sides[..] {
+            [first, second] => Some(Hinge {
+                vertices: [first.apex, second.apex, first.edge[0], first.edge[1]],
+                triangles: [first.triangle, second.triangle],
+            }),
             _ => None,
         };
         Self { hinges: sides.values().filter_map(hinge).collect(), edges: sides.into_keys().collect() }
     }
+}
+
+/// A triangle along an edge, which it runs through from the first to the second end.
+struct Side {
+    triangle: usize,
+    apex: usize,
+    edge: [usize; 2],
 }
 
 /// The vertex pairs that a mass-spring fabric joins.
