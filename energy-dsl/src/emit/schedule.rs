@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use proc_macro2::{Literal, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
 use crate::graph::{Graph, Input, NodeId, Op};
@@ -13,17 +13,47 @@ pub(super) struct Schedule<'a> {
     graph: &'a Graph,
     read: Reader<'a>,
     places: BTreeMap<NodeId, TokenStream>,
-    statements: Vec<TokenStream>,
+    statements: Vec<Statement>,
+    /// The statement that reads a node last; [`RETURNED`] for what is returned.
+    last_use: BTreeMap<NodeId, usize>,
 }
+
+/// `let name = expression;`
+struct Statement {
+    name: Ident,
+    node: NodeId,
+    expression: TokenStream,
+}
+
+const RETURNED: usize = usize::MAX;
+
+/// Each `let` opens a scope inside the one before it, and the Rust compiler recurses over scopes: long routines are cut
+/// into blocks of this many statements, which hand on what later ones read.
+const BLOCK: usize = 128;
 
 impl<'a> Schedule<'a> {
     pub(super) fn new(graph: &'a Graph, read: Reader<'a>) -> Self {
-        Self { graph, read, places: BTreeMap::new(), statements: Vec::new() }
+        Self { graph, read, places: BTreeMap::new(), statements: Vec::new(), last_use: BTreeMap::new() }
     }
 
     /// The statements so far.
     pub(super) fn statements(self) -> TokenStream {
-        self.statements.into_iter().collect()
+        if self.statements.len() <= 2 * BLOCK {
+            return lets(&self.statements);
+        }
+        let blocks = self.statements.chunks(BLOCK).enumerate();
+        blocks
+            .map(|(number, block)| {
+                let end = number * BLOCK + block.len();
+                let handed_on: Vec<&Ident> = block
+                    .iter()
+                    .filter(|s| self.last_use.get(&s.node).is_some_and(|&u| u >= end))
+                    .map(|s| &s.name)
+                    .collect();
+                let lets = lets(block);
+                quote!(let (#(#handed_on,)*) = { #lets (#(#handed_on,)*) };)
+            })
+            .collect()
     }
 
     /// The expression that stands for a node, after whatever statements compute it.
@@ -50,6 +80,7 @@ impl<'a> Schedule<'a> {
                 stack.extend(missing.into_iter().rev());
             }
         }
+        self.last_use.insert(node, RETURNED);
         self.places[&node].clone()
     }
 
@@ -85,9 +116,14 @@ impl<'a> Schedule<'a> {
             return;
         }
         let expression = self.expression(node);
-        let name = format_ident!("t{}", self.statements.len());
-        self.statements.push(quote!(let #name = #expression;));
+        let number = self.statements.len();
+        for operand in self.graph.op(node).operands() {
+            let last = self.last_use.entry(self.graph.resolve(operand)).or_default();
+            *last = number.max(*last);
+        }
+        let name = format_ident!("t{number}");
         self.places.insert(node, quote!(#name));
+        self.statements.push(Statement { name, node, expression });
     }
 
     fn expression(&self, node: NodeId) -> TokenStream {
@@ -148,4 +184,8 @@ impl<'a> Schedule<'a> {
             Op::Input(_) | Op::Rule(_) => unreachable!("compiler bug: inputs are read and rules resolved elsewhere"),
         }
     }
+}
+
+fn lets(statements: &[Statement]) -> TokenStream {
+    statements.iter().map(|Statement { name, expression, .. }| quote!(let #name = #expression;)).collect()
 }

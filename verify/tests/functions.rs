@@ -1,0 +1,75 @@
+//! Every function of the language is differentiated rightly, alone and in company.
+#![allow(missing_docs, mixed_script_confusables)]
+
+use energy_macros::energy;
+
+energy! {
+    #[audit(samples = 50)]
+    energy AngleBetween(p, q, r: Point; k: Scalar) { k * angle(q - p, r - q)^2 }
+
+    #[audit(samples = 50)]
+    energy UnitVectors(p, q, r: Point; w: Vec3) { dot(w, unit(q - p)) * dot(w, unit(r - p)) + norm(unit(q - p) - unit(r - q)) }
+
+    #[audit(samples = 50)]
+    energy Cosines(p, q, r: Point; k: Scalar) { exp(k * dot(unit(q - p), unit(r - q))) + (1 - dot(unit(p), unit(q)))^2 }
+
+    #[audit(samples = 50)]
+    energy Powers(p, q: Point; a, b: Scalar) {
+        let r = norm(p - q);
+        r^a + r^(-2) + r^2.5 + r^3 + (1 + r * r)^b + b^(r / 4) + (2 + dot(p, q)^2)^(norm(p) / 4)
+    }
+
+    #[audit(samples = 50)]
+    energy Elongations(p, q, r: Point; L: Scalar) {
+        let C = norm(p - q) - L;
+        let D = L - norm(q - r);
+        C * C + C * D + exp(-D) + C^3 + norm(p - r) * norm(q)
+    }
+
+    #[audit(samples = 50)]
+    energy Elementary(p, q: Point; k: Scalar) {
+        let s = dot(p, q) / k;
+        sin(s) * cos(s) + exp(-s * s) + log(1 + s * s) + sqrt(1 + s^2) + atan2(s, 2 + norm(q)) + 1 / (2 + s * s)
+    }
+
+    #[audit(samples = 50)]
+    energy Remainders(p, q: Point; k: Scalar) {
+        let s = dot(p, q) / (2 * k);
+        one_minus_cos(s) + k * x_minus_sin(s) + sin_half(s) * cos_half(s)
+    }
+}
+
+energy! {
+    #[audit(samples = 50)]
+    energy Choices(p, q: Point; k: Scalar) {
+        let s = norm_squared(p);
+        let t = norm_squared(q);
+        abs(s - t) + min(s, t)^2 + max(s, k * t) + if s < t && t > k { s * s } else { t * s }
+    }
+
+    #[audit(samples = 50)]
+    energy Matrices(p, q, r: Point; k: Scalar) {
+        let M = columns(p - q, q - r, cross(p, r)) + 4 * identity(3);
+        let G = transpose(M) * M;
+        k * det(M) + trace(inverse(G)) + ddot(G, outer(p, q)) + dot(p, M * q) + norm(vector(dot(p, q), 2, 3))
+    }
+
+    #[audit(samples = 50)]
+    energy HingeFunctions(x1, x2, x3, x4: Point; a: Scalar) {
+        let θ = dihedral(x1, x2, x3, x4);
+        a * sin(θ) + cos(θ)^2 + sin_half(θ) * cos_half(θ) + exp(cos_half(θ)) + θ^3 + norm(x1 - x2) * θ
+    }
+
+    #[audit(samples = 50)]
+    force Gradients(p, q, r: Point, u, v, w: Velocity; k: Scalar) {
+        let U = k * angle(q - p, r - q) + (norm(p - r) - 1)^2;
+        let rate = dot(gradient(U, p), u - v) + dot(gradient(U, r), w - v);
+        [-rate * gradient(U, p), cross(u, v) * norm(q), rate * unit(r - q)]
+    }
+
+    #[audit(samples = 50)]
+    constraint Angles(p, q, r: Point; φ: Scalar) { vector(angle(q - p, r - q) - φ, norm(p - r)^3) }
+
+    #[audit(samples = 50)]
+    residual Fit(a: Vec3, s, t: Scalar; m: Vec3) { vector(norm(a - m), sin(s) * t, dot(a, m)^2, atan2(s, 2 + t^2)) }
+}
