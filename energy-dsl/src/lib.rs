@@ -9,6 +9,8 @@
 //!
 //! Without that feature the crate is the small runtime that generated code calls: number types ([`Real`]), the traits of
 //! elements ([`Potential`], [`ForceLaw`], [`Constraint`], [`Residual`]) and their self-description ([`Declaration`]).
+//!
+#![doc = include_str!("../LANGUAGE.md")]
 #![forbid(unsafe_code)]
 
 extern crate self as energy_dsl;

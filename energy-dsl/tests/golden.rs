@@ -45,3 +45,22 @@ fn a_broken_declaration_still_declares_its_type() {
         assert_eq!(code.matches("compile_error").count(), 1, "{source}: one mistake, one error");
     }
 }
+
+/// LANGUAGE.md ends with the table of functions; it is the table that the compiler reads.
+#[test]
+fn the_table_of_functions_is_the_compilers() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("LANGUAGE.md");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (before, _) = text.split_once("| usage |").unwrap_or((&text, ""));
+    let mut table = String::from("| usage | what it is | accuracy, u |\n|---|---|---|\n");
+    for function in energy_dsl::functions() {
+        let usage = function.usage.replace('|', "\\|");
+        table += &format!("| `{usage}` | {} | {} |\n", function.docs, function.accuracy);
+    }
+    table += "| `gradient(U, p)` | The derivative of a scalar by a point. |  |\n";
+    let expected = format!("{before}{table}");
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, &expected).unwrap();
+    }
+    assert!(text == expected || std::env::var_os("UPDATE_GOLDEN").is_some(), "LANGUAGE.md is behind the compiler");
+}
