@@ -46,6 +46,16 @@ fn free_fall_is_that_of_a_point_mass() {
     }
 }
 
+#[test]
+fn drag_is_taken_at_the_end_of_an_implicit_step() {
+    let simulation = finished(&scene("dt = 0.02\nduration = 0.4\ndrag = 5.0", STVK));
+    // v' = (v − h g)/(1 + h c), twenty times.
+    let speed = 9.81 / 5.0 * (1.0 - (1.0 + 0.02_f64 * 5.0).powi(-20));
+    for v in &simulation.body().v {
+        assert!((v[2] + speed).abs() < 1e-4 * speed, "{} {speed}", -v[2]);
+    }
+}
+
 /// A free sheet, wrinkled and stretched, at rest and without weight.
 fn distorted(fabric: &str) -> Body {
     let scene = scene("dt = 1.0\nduration = 1.0", fabric);
