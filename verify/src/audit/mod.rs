@@ -1,13 +1,20 @@
 //! What is checked of a declared element, and the report of it.
 
+mod entry;
+mod momentum;
+mod report;
+
 use energy_dsl::{Declaration, Element, Kind, Textbook};
-use serde::Serialize;
 
 use crate::blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate, largest};
 use crate::finite_difference::{Stepped, antiderivative, sweep};
 use crate::formula::{expected_blocks, rows};
-use crate::geometry::{cross, difference, rotate_all};
+use crate::geometry::rotate_all;
 use crate::sample::{Sample, Sampler, has_points};
+
+use self::entry::entry_name;
+use self::momentum::momentum_errors;
+pub use self::report::{Check, Line, Report, describe_failure};
 
 /// How thorough an audit is.
 #[derive(Clone, Copy, Debug)]
@@ -21,105 +28,6 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self { samples: 200, seed: 1 }
-    }
-}
-
-/// What is looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Check {
-    /// Equal to hyper-dual numbers run through the textbook form.
-    DualNumbers,
-    /// Equal to finite differences of the block one order below.
-    FiniteDifferences,
-    /// Exactly symmetric.
-    Symmetry,
-    /// Σ f = 0.
-    LinearMomentum,
-    /// Σ x × f = 0.
-    AngularMomentum,
-    /// No number is NaN or infinite, and no condition is flagged, at an ordinary input.
-    Finite,
-}
-
-impl Check {
-    /// How a person calls it.
-    #[must_use]
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::DualNumbers => "dual numbers",
-            Self::FiniteDifferences => "finite differences",
-            Self::Symmetry => "symmetry",
-            Self::LinearMomentum => "Σ f = 0",
-            Self::AngularMomentum => "Σ x × f = 0",
-            Self::Finite => "finite",
-        }
-    }
-
-    /// The largest error allowed, relative to the largest number of the block (or of what is summed).
-    #[must_use]
-    pub fn tolerance(self) -> f64 {
-        match self {
-            // The textbook form loses digits: what it leaves of them.
-            Self::DualNumbers => 1e-9,
-            Self::FiniteDifferences => 2e-7,
-            Self::Symmetry | Self::Finite => 0.0,
-            Self::LinearMomentum => 16.0 * f64::EPSILON / 2.0,
-            Self::AngularMomentum => 1e-13,
-        }
-    }
-}
-
-/// One line of the report: the worst of a check of a block over all samples.
-#[derive(Clone, Debug, Serialize)]
-pub struct Line {
-    /// The element.
-    pub element: &'static str,
-    /// The block.
-    pub block: BlockName,
-    /// What was checked.
-    pub check: Check,
-    /// The worst relative error.
-    pub worst: f64,
-    /// The error allowed.
-    pub tolerance: f64,
-    /// Whether it held.
-    pub passed: bool,
-    /// The least order of convergence that was observed, of finite differences.
-    pub order: Option<f64>,
-    /// Which entry, both values, and the input they were found at.
-    pub detail: String,
-}
-
-/// The audit of one or more elements.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Report {
-    /// All lines, element by element.
-    pub lines: Vec<Line>,
-    /// Elements that could not be audited, with the reason.
-    pub refused: Vec<(String, String)>,
-}
-
-impl Report {
-    /// Whether every check of every element held.
-    #[must_use]
-    pub fn passed(&self) -> bool {
-        self.refused.is_empty() && self.lines.iter().all(|line| line.passed)
-    }
-
-    /// The lines that failed.
-    pub fn failures(&self) -> impl Iterator<Item = &Line> {
-        self.lines.iter().filter(|line| !line.passed)
-    }
-
-    /// How many different elements the report is about.
-    #[must_use]
-    pub fn elements(&self) -> usize {
-        let mut names: Vec<&str> =
-            self.lines.iter().map(|l| l.element).chain(self.refused.iter().map(|(name, _)| name.as_str())).collect();
-        names.sort_unstable();
-        names.dedup();
-        names.len()
     }
 }
 
@@ -172,25 +80,19 @@ pub fn assert_derivatives<E: Element>(samples: usize) {
     assert!(problems.is_empty(), "\n{}", problems.join("\n"));
 }
 
-/// A failed check in words.
-#[must_use]
-pub fn describe_failure(line: &Line) -> String {
-    format!(
-        "{}: {} of block `{}` fails: error {:.2e}, allowed {:.2e}\n{}",
-        line.element,
-        line.check.title(),
-        line.block,
-        line.worst,
-        line.tolerance,
-        line.detail
-    )
-}
-
 struct Auditor {
     declaration: &'static Declaration,
     evaluate: Evaluate,
     formula: Textbook,
     lines: Vec<Line>,
+}
+
+/// A block found another way.
+struct Route<'a> {
+    name: String,
+    numbers: &'a [f64],
+    /// The order of convergence, where it was observed.
+    order: Option<f64>,
 }
 
 impl Auditor {
@@ -202,14 +104,9 @@ impl Auditor {
             let answer = self.answer(&sample)?;
             self.finite(&sample, &answer);
             for (block, expected) in answer.blocks.iter().zip(self.expected(&sample, &answer)) {
-                self.compare(
-                    Check::DualNumbers,
-                    &sample,
-                    block,
-                    &expected.numbers,
-                    "textbook form by dual numbers",
-                    None,
-                );
+                let route =
+                    Route { name: "textbook form by dual numbers".into(), numbers: &expected.numbers, order: None };
+                self.compare(Check::DualNumbers, &sample, &answer, block, &route);
             }
             self.differences(&sample, &answer)?;
             self.symmetry(&sample, &answer);
@@ -271,29 +168,37 @@ impl Auditor {
         }
     }
 
-    /// Compares a block with what it should be, number by number, relative to the largest.
-    fn compare(
-        &mut self,
-        check: Check,
-        sample: &Sample,
-        block: &Block,
-        expected: &[f64],
-        source: &str,
-        order: Option<f64>,
-    ) {
-        let scale = largest(expected).max(largest(&block.numbers));
-        let errors = block.numbers.iter().zip(expected).map(|(got, want)| (got - want).abs());
+    /// The length over which stepping an input changes an element.
+    fn length(&self, sample: &Sample, stepped: Stepped) -> f64 {
+        if stepped == Stepped::Positions { sample.feature_length(self.declaration) } else { 1.0 }
+    }
+
+    /// How large a block is by nature: what its antiderivative would need to change by its own size over a length. A derivative
+    /// that vanishes is rounding error of about a unit of roundoff of this, on every route.
+    fn natural_size(&self, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
+        antiderivative(block, self.declaration.kind).map_or(0.0, |(lower, stepped)| {
+            let lower_size = answer.block(lower).largest().max(self.natural_size(sample, answer, lower));
+            lower_size / self.length(sample, stepped)
+        })
+    }
+
+    /// Compares a block with what it should be, number by number, relative to the largest (or its natural size).
+    fn compare(&mut self, check: Check, sample: &Sample, answer: &Answer, block: &Block, route: &Route<'_>) {
+        let scale =
+            largest(route.numbers).max(largest(&block.numbers)).max(self.natural_size(sample, answer, block.name));
+        let errors = block.numbers.iter().zip(route.numbers).map(|(got, want)| (got - want).abs());
         let (entry, error) = errors
             .enumerate()
             .fold((0, 0.0_f64), |worst, next| if next.1 > worst.1 || next.1.is_nan() { next } else { worst });
         let relative = if scale == 0.0 { 0.0 } else { error / scale };
         let declaration = self.declaration;
-        self.record(check, block.name, relative, order, || {
+        self.record(check, block.name, relative, route.order, || {
             format!(
-                "  entry {}: generated code gives {:.17e}, {source} gives {:.17e}, at{}",
+                "  entry {}: generated code gives {:.17e}, {} gives {:.17e}, at{}",
                 entry_name(declaration, block, entry),
                 block.numbers[entry],
-                expected[entry],
+                route.name,
+                route.numbers[entry],
                 sample.describe(declaration)
             )
         });
@@ -320,18 +225,13 @@ impl Auditor {
     fn differences(&mut self, sample: &Sample, answer: &Answer) -> Result<(), NoAnswer> {
         let kind = self.declaration.kind;
         for block in &answer.blocks {
-            let lower = match (block.name, kind) {
-                (BlockName::Jacobian, Kind::Residual) => Some((BlockName::Residual, Stepped::Positions)),
-                (BlockName::Jacobian, _) => Some((BlockName::Constraint, Stepped::Positions)),
-                (name, _) => antiderivative(name),
-            };
-            let Some((lower, stepped)) = lower else { continue };
-            let length = if stepped == Stepped::Positions { sample.feature_length(self.declaration) } else { 1.0 };
+            let Some((lower, stepped)) = antiderivative(block.name, kind) else { continue };
+            let length = self.length(sample, stepped);
             let found = sweep(sample, stepped, length, &block.numbers, |moved| {
                 self.answer(moved).map(|answer| answer.block(lower).numbers.clone())
             })?;
-            let source = format!("differences of `{lower}`");
-            self.compare(Check::FiniteDifferences, sample, block, &found.best, &source, found.order);
+            let route = Route { name: format!("differences of `{lower}`"), numbers: &found.best, order: found.order };
+            self.compare(Check::FiniteDifferences, sample, answer, block, &route);
         }
         Ok(())
     }
@@ -372,7 +272,7 @@ impl Auditor {
                 (BlockName::Force, true, invariant),
             ],
             Kind::Force => {
-                let (linear, angular) = momentum_errors(&sample.positions, &here);
+                let (linear, angular) = momentum_errors(&sample.positions, &here, 0.0);
                 vec![(BlockName::Force, linear < 1e-10, angular < 1e-10)]
             }
             Kind::Residual => Vec::new(),
@@ -381,7 +281,8 @@ impl Auditor {
         let detail =
             || format!("  summed over {} points, at{}", declaration.points.len(), sample.describe(declaration));
         for (block, linear_is_law, angular_is_law) in laws {
-            let (linear, angular) = momentum_errors(&sample.positions, &answer.block(block).numbers);
+            let natural = self.natural_size(sample, answer, block);
+            let (linear, angular) = momentum_errors(&sample.positions, &answer.block(block).numbers, natural);
             if linear_is_law {
                 self.record(Check::LinearMomentum, block, linear, None, detail);
             }
@@ -389,45 +290,5 @@ impl Auditor {
                 self.record(Check::AngularMomentum, block, angular, None, detail);
             }
         }
-    }
-}
-
-/// |Σ f| and |Σ (x − x₀) × f|, relative to the largest force and the largest torque.
-fn momentum_errors(positions: &[f64], force: &[f64]) -> (f64, f64) {
-    let (mut sum, mut torque, mut lever) = ([0.0; 3], [0.0; 3], 0.0_f64);
-    for (x, f) in positions.chunks(3).zip(force.chunks(3)) {
-        let arm = difference(x, &positions[..3]);
-        let turning = cross(&arm, f);
-        for axis in 0..3 {
-            sum[axis] += f[axis];
-            torque[axis] += turning[axis];
-        }
-        lever = lever.max(largest(&arm) * largest(f));
-    }
-    let relative = |value: f64, scale: f64| if scale == 0.0 { value } else { value / scale };
-    (relative(largest(&sum), largest(force)), relative(largest(&torque), lever))
-}
-
-/// An entry by points and axes, as in `(x1.y, x3.z)`.
-fn entry_name(declaration: &Declaration, block: &Block, entry: usize) -> String {
-    let coordinate = |number: usize| {
-        let mut number = number;
-        for point in declaration.points {
-            if number < point.size {
-                let axis =
-                    if point.size == 1 { String::new() } else { format!(".{}", ["x", "y", "z", "w"][number.min(3)]) };
-                return format!("{}{axis}", point.name);
-            }
-            number -= point.size;
-        }
-        format!("component {number}")
-    };
-    let (row, column) = (entry / block.columns.max(1), entry % block.columns.max(1));
-    match block.name {
-        BlockName::Energy => "U".into(),
-        BlockName::Constraint | BlockName::Residual => format!("row {column}"),
-        BlockName::Gradient | BlockName::Force => coordinate(column),
-        BlockName::Jacobian => format!("(row {row}, {})", coordinate(column)),
-        _ => format!("({}, {})", coordinate(row), coordinate(column)),
     }
 }
