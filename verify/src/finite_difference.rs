@@ -1,6 +1,8 @@
 //! Central differences, extrapolated once, over a sweep of steps: the error falls with the step, then rises as rounding takes
 //! over; the least error found and the order of the fall are what tell a right derivative from a wrong one.
 
+use energy_dsl::Kind;
+
 use crate::blocks::{BlockName, NoAnswer, largest};
 use crate::sample::Sample;
 
@@ -12,15 +14,15 @@ pub(crate) enum Stepped {
 }
 
 /// The block one order below, whose differences a block must equal, and by what.
-pub(crate) fn antiderivative(block: BlockName) -> Option<(BlockName, Stepped)> {
+pub(crate) fn antiderivative(block: BlockName, kind: Kind) -> Option<(BlockName, Stepped)> {
     match block {
+        BlockName::Jacobian if kind == Kind::Residual => Some((BlockName::Residual, Stepped::Positions)),
+        BlockName::Jacobian => Some((BlockName::Constraint, Stepped::Positions)),
         BlockName::Gradient => Some((BlockName::Energy, Stepped::Positions)),
         BlockName::Hessian => Some((BlockName::Gradient, Stepped::Positions)),
         BlockName::ForceByPosition => Some((BlockName::Force, Stepped::Positions)),
         BlockName::ForceByVelocity => Some((BlockName::Force, Stepped::Velocities)),
-        BlockName::Energy | BlockName::Force | BlockName::Constraint | BlockName::Residual | BlockName::Jacobian => {
-            None
-        }
+        BlockName::Energy | BlockName::Force | BlockName::Constraint | BlockName::Residual => None,
     }
 }
 

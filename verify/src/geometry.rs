@@ -53,23 +53,24 @@ fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Whether points are well apart, no three are near a line and no four (in space) near a plane: textbook forms lose
-/// digits near all of these, and the audit would measure that loss.
-pub(crate) fn is_well_shaped(points: &[f64], dimension: usize) -> bool {
+/// digits near all of these, and the audit would measure that loss. `demand` is 1 for the full distances and angles; many
+/// points do not fit a box with that and must make do with less.
+pub(crate) fn is_well_shaped(points: &[f64], dimension: usize, demand: f64) -> bool {
     let points: Vec<&[f64]> = points.chunks(dimension).collect();
     let edge = |i: usize, j: usize| difference(points[j], points[i]);
-    let apart = pairs(points.len()).all(|(i, j)| norm(&edge(i, j)) > 0.4);
+    let apart = pairs(points.len()).all(|(i, j)| norm(&edge(i, j)) > 0.4 * demand);
     let triples = || pairs(points.len()).flat_map(|(i, j)| (j + 1..points.len()).map(move |k| (i, j, k)));
     let open = || {
         triples().all(|(i, j, k)| {
             let (a, b) = (edge(i, j), edge(i, k));
             let cosine = dot(&a, &b) / (norm(&a) * norm(&b));
-            cosine.abs() < 0.95
+            cosine.abs() < 1.0 - 0.05 * demand
         })
     };
     let solid = || {
         triples().flat_map(|(i, j, k)| (k + 1..points.len()).map(move |l| (i, j, k, l))).all(|(i, j, k, l)| {
             let (a, b, c) = (edge(i, j), edge(i, k), edge(i, l));
-            dot(&cross(&a, &b), &c).abs() > 0.15 * norm(&a) * norm(&b) * norm(&c)
+            dot(&cross(&a, &b), &c).abs() > 0.15 * demand * norm(&a) * norm(&b) * norm(&c)
         })
     };
     apart && open() && (dimension < 3 || solid())
@@ -81,10 +82,13 @@ mod tests {
 
     #[test]
     fn degenerate_shapes_are_turned_down() {
-        assert!(is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3));
-        assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 3), "too close");
-        assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.1, 0.0], 3), "in line");
-        assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, -1.0, 0.02], 3), "in a plane");
+        assert!(is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3, 1.0));
+        assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 3, 1.0), "too close");
+        assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.1, 0.0], 3, 1.0), "in line");
+        assert!(
+            !is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, -1.0, 0.02], 3, 1.0),
+            "in a plane"
+        );
     }
 
     #[test]

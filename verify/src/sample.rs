@@ -140,10 +140,7 @@ impl Sampler {
 
     /// Well-shaped points, scaled and moved at random.
     fn points(&mut self, count: usize) -> Vec<f64> {
-        let mut points = self.uniforms(count, -1.0, 1.0);
-        while !is_well_shaped(&points, 3) {
-            points = self.uniforms(count, -1.0, 1.0);
-        }
+        let points = self.shape(count, 3);
         let scale = self.uniform(-1.0, 2.0).exp2();
         let turn = self.rotation();
         let offset = self.uniforms(3, -2.0, 2.0);
@@ -158,11 +155,21 @@ impl Sampler {
         if !(2..=3).contains(&dimension) || fields.iter().any(|field| field.size != dimension) {
             return fields.iter().flat_map(|field| self.parameter(field)).collect();
         }
+        self.shape(count, dimension)
+    }
+
+    /// Points in the box (−1, 1) that are well apart, the less so the longer they are looked for; a plane triangle has positive
+    /// area.
+    fn shape(&mut self, count: usize, dimension: usize) -> Vec<f64> {
+        let mut demand = 1.0;
         loop {
-            let points = self.uniforms(count, -1.0, 1.0);
-            if is_well_shaped(&points, dimension) && has_positive_area(&points, dimension) {
-                return points;
+            for _ in 0..1000 {
+                let points = self.uniforms(count, -1.0, 1.0);
+                if is_well_shaped(&points, dimension, demand) && has_positive_area(&points, dimension) {
+                    return points;
+                }
             }
+            demand /= 2.0;
         }
     }
 

@@ -94,6 +94,40 @@ fn degenerate_records_are_evaluated_with_flags() {
     assert!(written["records"][1]["error"].as_str().unwrap().contains("degenerate"));
 }
 
+/// A file may mix potentials, of which some have no element yet.
+#[test]
+fn the_degenerate_inputs_are_evaluated_as_far_as_declared() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("policy.json");
+    let output = verify(&["eval", data("policy.json").to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let written: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(out).unwrap()).unwrap();
+    let without: Vec<&str> = written["records"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|record| record.get("error").is_some())
+        .map(|record| record["potential"].as_str().unwrap())
+        .collect();
+    assert!(without.contains(&"ipc_barrier") && without.contains(&"stvk_membrane"), "{without:?}");
+    assert!(!without.contains(&"distance") && !without.contains(&"hinge_theta"), "{without:?}");
+}
+
+/// A decimal that is not the double that was meant is a damaged file, not a slightly different input.
+#[test]
+fn a_number_that_disagrees_with_its_bits_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, out) = (folder.path().join("in.json"), folder.path().join("out.json"));
+    let original = std::fs::read_to_string(data("distance.json")).unwrap();
+    let damaged = original.replacen("-1.7330773331989477e-01", "-1.7330773331989480e-01", 1);
+    assert_ne!(original, damaged);
+    std::fs::write(&input, damaged).unwrap();
+    let output = verify(&["eval", input.to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    let message = text(&output.stderr);
+    assert!(message.contains("distance/000") && message.contains("x_bits has 0xbfc62ef2a3605cfb"), "{message}");
+    assert!(!out.exists());
+}
+
 #[test]
 fn bad_records_are_refused_by_name_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,6 +146,16 @@ fn bad_records_are_refused_by_name_and_nothing_is_written() {
         (
             r#"{"potential": "distance", "records": [{"id": "r7", "x": ["1", "2", "3", "NaN", "5", "6"]}]}"#,
             "not finite",
+        ),
+        (
+            r#"{"potential": "witkin_vector_damped", "records": [{"id": "r7", "x": ["1","2","3","4","5","6"],
+                "params": {"k_s": "1", "k_d": "1"}}]}"#,
+            "record r7: the velocities `v` are missing",
+        ),
+        (
+            r#"{"potential": "distance", "records": [{"id": "r7", "x": ["1","2","3","4","5","6"],
+                "x_bits": ["0x3ff0000000000000"]}]}"#,
+            "x_bits holds 1 numbers, x holds 6",
         ),
         (
             r#"{"potential": "hair_bend", "records": [{"id": "r7", "x": ["1","2","3","4","5","6","7","8","0"]}]}"#,

@@ -5,12 +5,12 @@ use energy_dsl::Flags;
 use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
-use super::mapping::mapping;
+use super::mapping::{is_undeclared, mapping};
 use crate::blocks::{NoAnswer, evaluate};
 
 /// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the same records with `out` filled by the
-/// generated code, 17 digits, and `flags`: by block, whether it is `degenerate` or a `kink`. A degenerate rest shape leaves `out`
-/// empty and says so in `error`. Returns the number of records.
+/// generated code, 17 digits, and `flags`: by block, whether it is `degenerate` or a `kink`. A degenerate rest shape, or a potential
+/// of the reference set that no element computes yet, leaves `out` empty and says so in `error`. Returns the number of records.
 ///
 /// # Errors
 /// When the input is malformed or names an unknown potential, or the output cannot be written; nothing is written then.
@@ -34,12 +34,20 @@ pub fn evaluate_file(input: &Path, output: &Path) -> Result<usize, RecordError> 
 }
 
 fn evaluate_record(value: &mut Value, potential: &str) -> Result<(), String> {
-    let mapping =
-        mapping(potential).ok_or_else(|| format!("no declared element computes the potential `{potential}`"))?;
     let record: Record = serde_json::from_value(value.clone()).map_err(|e| e.to_string())?;
+    let fields = value.as_object_mut().ok_or("a record is an object")?;
+    let without_answer = |fields: &mut Map<String, Value>, why: String| {
+        fields.insert("out".into(), json!({}));
+        fields.insert("flags".into(), json!({}));
+        fields.insert("error".into(), json!(why));
+        Ok(())
+    };
+    let Some(mapping) = mapping(potential) else {
+        let why = format!("no declared element computes the potential `{potential}`");
+        return if is_undeclared(potential) { without_answer(fields, why) } else { Err(why) };
+    };
     let sample = record.sample(&mapping)?;
     let declaration = mapping.entry.declaration;
-    let fields = value.as_object_mut().ok_or("a record is an object")?;
     // Which of a constraint's blocks are meant follows from what the reference has, if it has any.
     let asked: Option<Vec<String>> = ["out", "blocks"]
         .iter()
@@ -60,9 +68,7 @@ fn evaluate_record(value: &mut Value, potential: &str) -> Result<(), String> {
                 flags.insert(name.into(), json!({ "degenerate": degenerate, "kink": kink }));
             }
         }
-        Err(NoAnswer::Rest(error)) => {
-            fields.insert("error".into(), json!(error.to_string()));
-        }
+        Err(NoAnswer::Rest(error)) => return without_answer(fields, error.to_string()),
         Err(other) => return Err(other.to_string()),
     }
     fields.insert("out".into(), Value::Object(out));

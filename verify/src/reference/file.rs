@@ -69,15 +69,24 @@ pub struct Record {
     pub id: String,
     /// Coordinates as decimal strings that are doubles exactly.
     pub x: Vec<String>,
+    /// The same doubles as big-endian hexadecimal digits, to check the reading of `x`; may be left out.
+    #[serde(default)]
+    pub x_bits: Vec<String>,
     /// Velocities likewise; of forces.
     #[serde(default)]
     pub v: Vec<String>,
+    /// Their bits; may be left out.
+    #[serde(default)]
+    pub v_bits: Vec<String>,
     /// Parameters by name: a number as string, or a list of them.
     #[serde(default)]
     pub params: BTreeMap<String, Value>,
     /// Amplification of rounded edges, by block.
     #[serde(default)]
     pub kappa: BTreeMap<String, Option<f64>>,
+    /// Whether every difference of coordinates is a double exactly.
+    #[serde(default)]
+    pub exact_edges: bool,
     /// `f64_overflow`, `f64_underflow`.
     #[serde(default)]
     pub range: Vec<String>,
@@ -86,15 +95,15 @@ pub struct Record {
 impl Record {
     /// The numbers an element takes, its parameters and rest shape found by name.
     pub(super) fn sample(&self, mapping: &super::Mapping) -> Result<Sample, String> {
-        let numbers = |list: &[String], what: &str| -> Result<Vec<f64>, String> {
-            list.iter().map(|text| number(text).map_err(|e| format!("{what}: {e}"))).collect()
-        };
-        let positions = numbers(&self.x, "x")?;
+        let positions = numbers(&self.x, &self.x_bits, "x")?;
         let expected: usize = mapping.entry.declaration.points.iter().map(|p| p.size).sum();
         if positions.len() != expected {
             return Err(format!("x holds {} numbers, expected {expected}", positions.len()));
         }
-        let velocities = numbers(&self.v, "v")?;
+        let velocities = numbers(&self.v, &self.v_bits, "v")?;
+        if velocities.is_empty() && mapping.needs_velocities() {
+            return Err(format!("the velocities `v` are missing: {} is a force", mapping.potential));
+        }
         if !velocities.is_empty() && velocities.len() != expected {
             return Err(format!("v holds {} numbers, expected {expected}", velocities.len()));
         }
@@ -126,6 +135,26 @@ impl Record {
         let found = self.params.get(name).ok_or_else(|| format!("the parameter `{name}` is missing from params"))?;
         value(found).map_err(|e| format!("{name}: {e}"))
     }
+}
+
+/// Decimal strings as doubles, each held against its bits where those are given.
+fn numbers(list: &[String], bits: &[String], what: &str) -> Result<Vec<f64>, String> {
+    if !bits.is_empty() && bits.len() != list.len() {
+        return Err(format!("{what}_bits holds {} numbers, {what} holds {}", bits.len(), list.len()));
+    }
+    let numbers: Vec<f64> =
+        list.iter().map(|text| number(text).map_err(|e| format!("{what}: {e}"))).collect::<Result<_, _>>()?;
+    for (at, (x, hexadecimal)) in numbers.iter().zip(bits).enumerate() {
+        let expected = hexadecimal.strip_prefix("0x").and_then(|digits| u64::from_str_radix(digits, 16).ok());
+        let expected = expected.ok_or_else(|| format!("{what}_bits[{at}]: `{hexadecimal}` is not hexadecimal"))?;
+        if x.to_bits() != expected {
+            return Err(format!(
+                "{what}[{at}] is {x:e}, whose bits are {:#018x}; {what}_bits has {hexadecimal}",
+                x.to_bits()
+            ));
+        }
+    }
+    Ok(numbers)
 }
 
 fn value(value: &Value) -> Result<f64, String> {

@@ -38,6 +38,22 @@ const TABLE: &[Row] = &[
     ("witkin_vector_damped", "ZeroLengthSpring", &["k_s", "k_d"], None, false),
 ];
 
+/// Potentials of the reference set whose elements are still to be declared.
+const UNDECLARED: &[&str] =
+    &["arap_membrane", "bw_shear", "bw_stretch", "ipc_barrier", "ipc_barrier_sq", "snh_log_membrane", "snh_membrane"];
+
+impl Mapping {
+    /// Whether the potential is a force, so that its records hold velocities.
+    pub(super) fn needs_velocities(&self) -> bool {
+        self.entry.declaration.kind == energy_dsl::Kind::Force || self.parameters.contains(&"k_d")
+    }
+}
+
+/// Whether a potential belongs to the reference set but has no element yet.
+pub(super) fn is_undeclared(potential: &str) -> bool {
+    UNDECLARED.contains(&potential)
+}
+
 /// The element of a reference potential, if one is declared.
 #[must_use]
 pub fn mapping(potential: &str) -> Option<Mapping> {
@@ -48,7 +64,12 @@ pub fn mapping(potential: &str) -> Option<Mapping> {
 
 #[cfg(test)]
 mod tests {
-    use super::{TABLE, mapping};
+    use super::{TABLE, UNDECLARED, mapping};
+
+    #[test]
+    fn a_potential_is_declared_or_listed_as_not() {
+        assert!(UNDECLARED.iter().all(|name| mapping(name).is_none()), "an element has come: strike it off the list");
+    }
 
     #[test]
     fn every_row_names_a_declared_element_with_that_many_parameters() {

@@ -31,6 +31,9 @@ pub struct BlockLine {
     pub worst_kappa: f64,
     /// Its record.
     pub worst_kappa_record: String,
+    /// Worst error in u over the records whose edges are exact in doubles, where κ excuses nothing of the points. (It still
+    /// excuses rounded parameters and rest shapes, so that no bound is set.)
+    pub worst_exact_edges: Option<f64>,
     /// Records beyond tier A: 8 u max(1, κ), exactly zero where the truth is.
     pub beyond_tier_a: Vec<String>,
     /// The κ-free bound in u, where there is one.
@@ -132,6 +135,7 @@ fn compare(path: &Path, mapping: &Mapping, records: &[Value]) -> Result<Vec<Bloc
                     worst_record: String::new(),
                     worst_kappa: 0.0,
                     worst_kappa_record: String::new(),
+                    worst_exact_edges: None,
                     beyond_tier_a: Vec::new(),
                     tier_b: tier_b(mapping, block),
                     beyond_tier_b: Vec::new(),
@@ -175,6 +179,9 @@ fn add(line: &mut BlockLine, record: &Record, got: &[f64], truth: &[Truth], kapp
     let by_kappa = error / kappa.unwrap_or(1.0).max(1.0);
     if error > line.worst {
         (line.worst, line.worst_record) = (error, record.id.clone());
+    }
+    if record.exact_edges {
+        line.worst_exact_edges = Some(line.worst_exact_edges.map_or(error, |worst| worst.max(error)));
     }
     if by_kappa > line.worst_kappa {
         (line.worst_kappa, line.worst_kappa_record) = (by_kappa, record.id.clone());
