@@ -184,3 +184,21 @@ fn weight_and_drag() {
     let drag = ViscousDrag::new(0.5).jacobians(&[ORIGIN], &[[2.0, 0.0, -4.0]]);
     assert_eq!((drag.force[0], drag.by_velocity[0][1]), ([-1.0, 0.0, 2.0], [0.0, -0.5, 0.0]));
 }
+
+/// What a solver may rely on is proved on the expression graph, not claimed.
+#[test]
+fn declarations_say_what_solvers_may_skip() {
+    for (name, curved, velocity_dependent, symmetric) in [
+        ("Gravity", false, false, true),
+        ("StVK", true, false, true),
+        ("ViscousDrag", false, true, true),
+        ("ZeroLengthSpring", true, true, true),
+        ("Spring", true, true, false),
+        ("BridsonForce", true, false, false),
+        ("BridsonForceDamped", true, true, false),
+    ] {
+        let declaration = find(name).unwrap().declaration;
+        let found = (declaration.curved, declaration.velocity_dependent, declaration.symmetric);
+        assert_eq!(found, (curved, velocity_dependent, symmetric), "{name}");
+    }
+}
