@@ -175,6 +175,10 @@ fn membranes_stretch_and_refuse_a_flat_rest_shape() {
     let green = strain + strain * strain / 2.0;
     assert_eq!(at.value, 0.5 * (mu + lambda / 2.0) * green * green);
     assert!(StVK::new([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], lambda, mu).is_err());
+    // Turned by the angle of the 3-4-5 triangle, whose edges are exact, it is exactly at rest.
+    let sheet = StVK::new([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], lambda, mu).unwrap();
+    let turned = sheet.gradient(&[ORIGIN, [3.0, 4.0, 0.0], [-4.0, 3.0, 0.0]]);
+    assert_eq!((turned.value, turned.gradient), (0.0, [ORIGIN; 3]));
 }
 
 #[test]
