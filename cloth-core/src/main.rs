@@ -83,7 +83,7 @@ fn run(mut simulation: Simulation, scene: &Scene, folder: &OutputFolder) -> Resu
     }
     progress.finish_and_clear();
 
-    let animation = animation_glb(&frames, &triangles, per_frame as f64 * scene.dt).context("the animation")?;
+    let animation = animation_glb(&frames, &triangles, per_frame as f64 * scene.dt)?;
     let summary = simulation.summary()?.to_string();
     let written = [
         folder.write(OutputFolder::PICTURE, &picture_png(&simulation.body().x, &triangles)?)?,

@@ -5,7 +5,7 @@ energy! {
     /// Its prefactor moves with the points, so it is not the gradient of anything and ∂f/∂x is not symmetric; for a potential see
     /// `BridsonBending`.
     #[audit]
-    pub force BridsonForce(x1, x2, x3, x4: Point; K: Scalar[N], θ0: Scalar[rad]) {
+    pub force BridsonForce(x1, x2, x3, x4: Point; K: Scalar[J], θ0: Scalar[rad]) {
         let E = x4 - x3;
         let N1 = cross(E, x1 - x3);
         let N2 = cross(x2 - x3, E);

@@ -4,7 +4,7 @@ energy! {
     /// Bridson's bending force with damping (Bridson et al. 2003): `BridsonForce` and −k_d ‖E‖ (Σ u_j·v_j) u_i. Written so, the damping needs
     /// no convention for the sign of θ; the rate Σ u_j·v_j sees velocity differences only.
     #[audit]
-    pub force BridsonForceDamped(x1, x2, x3, x4: Point, v1, v2, v3, v4: Velocity; K: Scalar[N], k_d: Scalar[N s/m], θ0: Scalar[rad]) {
+    pub force BridsonForceDamped(x1, x2, x3, x4: Point, v1, v2, v3, v4: Velocity; K: Scalar[J], k_d: Scalar[N s], θ0: Scalar[rad]) {
         let E = x4 - x3;
         let N1 = cross(E, x1 - x3);
         let N2 = cross(x2 - x3, E);

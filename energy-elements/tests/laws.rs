@@ -175,6 +175,10 @@ fn membranes_stretch_and_refuse_a_flat_rest_shape() {
     let green = strain + strain * strain / 2.0;
     assert_eq!(at.value, 0.5 * (mu + lambda / 2.0) * green * green);
     assert!(StVK::new([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], lambda, mu).is_err());
+    // Turned by the angle of the 3-4-5 triangle, whose edges are exact, it is exactly at rest.
+    let sheet = StVK::new([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], lambda, mu).unwrap();
+    let turned = sheet.gradient(&[ORIGIN, [3.0, 4.0, 0.0], [-4.0, 3.0, 0.0]]);
+    assert_eq!((turned.value, turned.gradient), (0.0, [ORIGIN; 3]));
 }
 
 #[test]
@@ -183,4 +187,22 @@ fn weight_and_drag() {
     assert_eq!((weight.value, weight.gradient[0]), (2.0 * 9.81 * 3.0, [0.0, 0.0, 2.0 * 9.81]));
     let drag = ViscousDrag::new(0.5).jacobians(&[ORIGIN], &[[2.0, 0.0, -4.0]]);
     assert_eq!((drag.force[0], drag.by_velocity[0][1]), ([-1.0, 0.0, 2.0], [0.0, -0.5, 0.0]));
+}
+
+/// What a solver may rely on is proved on the expression graph, not claimed.
+#[test]
+fn declarations_say_what_solvers_may_skip() {
+    for (name, curved, velocity_dependent, symmetric) in [
+        ("Gravity", false, false, true),
+        ("StVK", true, false, true),
+        ("ViscousDrag", false, true, true),
+        ("ZeroLengthSpring", true, true, true),
+        ("Spring", true, true, false),
+        ("BridsonForce", true, false, false),
+        ("BridsonForceDamped", true, true, false),
+    ] {
+        let declaration = find(name).unwrap().declaration;
+        let found = (declaration.curved, declaration.velocity_dependent, declaration.symmetric);
+        assert_eq!(found, (curved, velocity_dependent, symmetric), "{name}");
+    }
 }

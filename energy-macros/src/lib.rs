@@ -15,7 +15,7 @@ use proc_macro::TokenStream;
 ///     pub energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) = "k/2 (‖p − q‖ − L)²";
 /// }
 ///
-/// let spring = Spring::new(8.0, 1.0);
+/// let spring: Spring = Spring::new(8.0, 1.0);
 /// let at = spring.gradient(&[[0.0, 0.0, 0.0], [3.0, 0.0, 4.0]]);
 /// assert_eq!(at.value, 64.0);
 /// assert!((at.gradient[1][2] - 8.0 * 4.0 * 0.8).abs() < 1e-14);

@@ -113,20 +113,13 @@ pub trait Term: std::fmt::Debug {
 #[derive(Clone, Debug)]
 pub struct PotentialTerm<E> {
     list: ElementList<E>,
-    curved: bool,
 }
 
 impl<E: Potential<f64>> PotentialTerm<E> {
-    /// The sum of the potentials of a list.
+    /// The sum of the potentials of a list. Hessians that the declaration proves zero (gravity's) are never evaluated.
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
-        Self { list, curved: true }
-    }
-
-    /// The sum of potentials that are linear in the positions (gravity): their Hessians, which are zero, are never evaluated.
-    #[must_use]
-    pub fn linear(list: ElementList<E>) -> Self {
-        Self { list, curved: false }
+        Self { list }
     }
 }
 
@@ -137,16 +130,15 @@ type ValueOf<E, Points> = fn(&E, &Points) -> Value<f64>;
 #[derive(Clone)]
 pub struct ForceTerm<E: ForceLaw<f64>> {
     list: ElementList<E>,
-    character: Character,
     energy: Option<ValueOf<E, E::Points>>,
 }
 
 impl<E: ForceLaw<f64>> ForceTerm<E> {
-    /// The sum of the forces of a list, of which nothing is assumed.
+    /// The sum of the forces of a list. What they depend on, and whether conjugate gradients may be used, is what the declaration
+    /// proves.
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
-        let character = Character { symmetric: false, velocity_dependent: true, curved: true };
-        Self { list, character, energy: None }
+        Self { list, energy: None }
     }
 
     /// Reports the potential of the elements (damped springs have one) as the term's energy.
@@ -158,28 +150,11 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
         self.energy = Some(<E as Potential<f64>>::value);
         self
     }
-
-    /// Claims that the Jacobians are symmetric (as those of viscous drag are), so that conjugate gradients may be used.
-    #[must_use]
-    pub fn with_symmetric_jacobians(mut self) -> Self {
-        self.character.symmetric = true;
-        self
-    }
-
-    /// Claims that the force does not depend on velocities.
-    #[must_use]
-    pub fn without_velocity(mut self) -> Self {
-        self.character.velocity_dependent = false;
-        self
-    }
 }
 
 impl<E: ForceLaw<f64> + std::fmt::Debug> std::fmt::Debug for ForceTerm<E> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("ForceTerm")
-            .field("list", &self.list)
-            .field("character", &self.character)
-            .finish_non_exhaustive()
+        f.debug_struct("ForceTerm").field("list", &self.list).finish_non_exhaustive()
     }
 }
 
@@ -193,7 +168,7 @@ impl<E: Potential<f64> + std::fmt::Debug> Term for PotentialTerm<E> {
     }
 
     fn character(&self) -> Character {
-        Character { symmetric: true, velocity_dependent: false, curved: self.curved }
+        Character { symmetric: true, velocity_dependent: false, curved: E::DECLARATION.curved }
     }
 
     fn stencils(&self) -> Stencils<'_> {
@@ -257,7 +232,8 @@ impl<E: ForceLaw<f64> + std::fmt::Debug> Term for ForceTerm<E> {
     }
 
     fn character(&self) -> Character {
-        self.character
+        let Declaration { symmetric, velocity_dependent, curved, .. } = *E::DECLARATION;
+        Character { symmetric, velocity_dependent, curved: curved || velocity_dependent }
     }
 
     fn stencils(&self) -> Stencils<'_> {
@@ -295,7 +271,7 @@ impl<E: ForceLaw<f64> + std::fmt::Debug> Term for ForceTerm<E> {
             for (place, block) in result.by_position.as_ref().iter().enumerate() {
                 sum.add_by_position(stencil, (place / points, place % points), slots[place], block, state.v);
             }
-            if self.character.velocity_dependent {
+            if E::DECLARATION.velocity_dependent {
                 for (slot, block) in slots.iter().zip(result.by_velocity.as_ref()) {
                     if let Some(slot) = *slot {
                         add_scaled_block(&mut sum.matrix[slot], sum.weights.velocity, block);

@@ -128,10 +128,8 @@ impl Garment {
                 self.add_potential("bending", &stencils, hinges.iter().map(element).collect())
             }
             Bending::BridsonForce { .. } if damping == 0.0 => {
-                let elements = hinges.iter().map(|hinge| BridsonForce::new(stiffness, angle(hinge))).collect();
-                let list = ElementList::new("bending", elements, &stencils)?;
-                self.terms.push(Box::new(ForceTerm::new(list).without_velocity()));
-                Ok(())
+                let element = |hinge| BridsonForce::new(stiffness, angle(hinge));
+                self.add_force("bending", &stencils, hinges.iter().map(element).collect())
             }
             Bending::BridsonForce { .. } => {
                 let element = |hinge| BridsonForceDamped::new(stiffness, damping, angle(hinge));
@@ -144,13 +142,11 @@ impl Garment {
         let vertices: Vec<[usize; 1]> = (0..self.masses.len()).map(|vertex| [vertex]).collect();
         if !self.leave_out("gravity", surroundings.gravity == [0.0; 3], vertices.len()) {
             let elements = self.masses.iter().map(|&mass| Gravity::new(mass, surroundings.gravity)).collect();
-            let list = ElementList::new("gravity", elements, &vertices)?;
-            self.terms.push(Box::new(PotentialTerm::linear(list)));
+            self.add_potential("gravity", &vertices, elements)?;
         }
         if !self.leave_out("drag", surroundings.drag == 0.0, vertices.len()) {
             let elements = self.masses.iter().map(|&mass| ViscousDrag::new(surroundings.drag * mass)).collect();
-            let list = ElementList::new("drag", elements, &vertices)?;
-            self.terms.push(Box::new(ForceTerm::new(list).with_symmetric_jacobians()));
+            self.add_force("drag", &vertices, elements)?;
         }
         Ok(())
     }

@@ -16,7 +16,8 @@ use crate::body::Body;
 ///
 /// Compressed elements can make the matrix indefinite, and then its solution may run uphill. When conjugate gradients meet
 /// such curvature, the step is solved again with each element's Hessian projected to positive semi-definite on both
-/// sides of the equation; the [`StepReport`] says so.
+/// sides of the equation; the [`StepReport`] says so. One linear solve may overshoot when a single step undoes a strong
+/// compression: energy is not guaranteed to fall.
 #[derive(Clone, Debug, Default)]
 pub struct ImplicitEuler {
     options: Options,

@@ -44,3 +44,17 @@ pub fn rest_angle(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
     let (n1, n2) = (cross(edge, subtract(x1, x3)), cross(subtract(x2, x3), edge));
     (dot(cross(n1, n2), edge) / norm(edge)).atan2(dot(n1, n2))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_corner_carries_a_third() {
+        let vertices = vec![[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 3.0, 1.0], [0.0, 3.0, 1.0]];
+        let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let masses = lumped_masses(&mesh, 0.5);
+        assert_eq!(masses, [1.0, 0.5, 1.0, 0.5]);
+        assert_eq!(masses.iter().sum::<f64>(), 0.5 * 6.0);
+    }
+}

@@ -10,17 +10,31 @@ use gltf_json::{Accessor, Animation, Buffer, Index, Material, Mesh, Node, Root, 
 
 use super::vertex_normals;
 
+/// An animation that cannot be encoded.
+#[derive(Debug, thiserror::Error)]
+pub enum AnimationError {
+    /// A binary glTF file holds less than 4 GiB.
+    #[error("the animation would take {bytes} bytes, but a .glb file holds less than 4 GiB; write fewer frames")]
+    TooLarge {
+        /// What it would take.
+        bytes: usize,
+    },
+    /// The JSON part.
+    #[error("the animation's JSON part")]
+    Json(#[from] gltf_json::Error),
+}
+
 /// The frames as one binary glTF 2.0 file (`.glb`), which common viewers play: the first frame is the mesh, each later one a
 /// morph target, and the animation moves the weight from one to the next. `frame_time` is in s. glTF's y points up: (x, y, z)
 /// becomes (x, z, −y).
 ///
 /// # Errors
-/// When the JSON part cannot be written.
+/// When the file would be too large or its JSON part cannot be written.
 pub fn animation_glb(
     frames: &[Vec<Vector3<f64>>],
     triangles: &[[usize; 3]],
     frame_time: f64,
-) -> Result<Vec<u8>, gltf_json::Error> {
+) -> Result<Vec<u8>, AnimationError> {
     let mut file = File::default();
     let indices: Vec<u8> = triangles.iter().flatten().flat_map(|&corner| (corner as u32).to_le_bytes()).collect();
     let indices = file.accessor(&indices, 3 * triangles.len(), ComponentType::U32, Type::Scalar, None);
@@ -185,7 +199,7 @@ impl File {
     }
 
     /// The two chunks of a `.glb` file behind its header.
-    fn finish(mut self) -> Result<Vec<u8>, gltf_json::Error> {
+    fn finish(mut self) -> Result<Vec<u8>, AnimationError> {
         self.root.push(Buffer {
             byte_length: USize64::from(self.data.len()),
             name: None,
@@ -196,6 +210,9 @@ impl File {
         let mut json = gltf_json::serialize::to_vec(&self.root)?;
         json.resize(json.len().next_multiple_of(4), b' ');
         let total = 12 + 8 + json.len() + 8 + self.data.len();
+        if u32::try_from(total).is_err() {
+            return Err(AnimationError::TooLarge { bytes: total });
+        }
         let mut file = Vec::with_capacity(total);
         let word = |file: &mut Vec<u8>, number: usize| file.extend_from_slice(&(number as u32).to_le_bytes());
         file.extend_from_slice(b"glTF");

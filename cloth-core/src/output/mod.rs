@@ -6,7 +6,7 @@ mod frame;
 mod picture;
 mod projection;
 
-pub use animation::animation_glb;
+pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
 pub use frame::obj_text;
 pub use picture::{PictureError, picture_png};

@@ -23,6 +23,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let (points, rest, parameters) = (fields(&program.moving), fields(&program.rest), fields(declared));
     let rows = program.rows();
     let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
+    let Character { curved, velocity_dependent, symmetric } = character(program, routines);
     let primitives = &routines.primitives;
     let list = routines.list.iter().map(|r| routine(&routines.graph, r));
     quote! {
@@ -37,10 +38,39 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             parameters: &[#parameters],
             rows: #rows,
             translation_invariant: #invariant,
+            curved: #curved,
+            velocity_dependent: #velocity_dependent,
+            symmetric: #symmetric,
             reduced_coordinates: #coordinates,
             primitives: &[#(#primitives),*],
             routines: &[#(#list),*],
         }
+    }
+}
+
+/// What a solver may rely on.
+struct Character {
+    curved: bool,
+    velocity_dependent: bool,
+    symmetric: bool,
+}
+
+fn character(program: &Program, routines: &Routines) -> Character {
+    let group = |routine: &str, number: usize| {
+        let routine = routines.list.iter().find(|r| r.name == routine)?;
+        routine.groups.get(number)
+    };
+    let varies = |nodes: Option<&Vec<NodeId>>| nodes.is_some_and(|n| n.iter().any(|&e| !routines.graph.is(e, 0.0)));
+    let (by_position, by_velocity) = (group("jacobians", 1), group("jacobians", 2));
+    let n = program.points();
+    let mirrored = |square: &Vec<NodeId>| {
+        let entry = |row: usize, column: usize| square[9 * (row / 3 * n + column / 3) + 3 * (row % 3) + column % 3];
+        (0..3 * n).all(|row| (0..row).all(|column| entry(row, column) == entry(column, row)))
+    };
+    Character {
+        curved: varies(group("hessian", 2).or(by_position)),
+        velocity_dependent: varies(by_velocity),
+        symmetric: [by_position, by_velocity].into_iter().flatten().all(mirrored),
     }
 }
 

@@ -62,6 +62,14 @@ pub(super) const FUNCTIONS: &[Function] = &[
         accuracy: "",
     },
     Function {
+        name: "adjugate",
+        usage: "adjugate(A)",
+        docs: "det(A) A⁻¹ of a 2×2 or 3×3 matrix, without division: of integers it is exact.",
+        shape: square_to_square,
+        lower: adjugate,
+        accuracy: "",
+    },
+    Function {
         name: "identity",
         usage: "identity(2) or identity(3)",
         docs: "Unit matrix.",
@@ -240,6 +248,12 @@ fn inverse(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let determinant = g.dot(&a[0].parts[..n], &cofactors[..n]);
     let parts = (0..n * n).map(|e| g.div(cofactors[(e % n) * n + e / n], determinant)).collect();
     Lowered::matrix(n, n, parts)
+}
+
+fn adjugate(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let n = a[0].dimensions().0;
+    let cofactors = cofactors(g, &a[0]);
+    Lowered::matrix(n, n, (0..n * n).map(|e| cofactors[(e % n) * n + e / n]).collect())
 }
 
 fn identity(g: &mut Graph, a: &[Lowered]) -> Lowered {

@@ -89,8 +89,14 @@ pub struct Declaration {
     pub parameters: &'static [Field],
     /// Rows: 1 for an energy, the length of C or r, three per point for a force.
     pub rows: usize,
-    /// Whether the points enter only through their differences (proved on the expression graph).
+    /// Whether the points enter only through their differences (like the next three, proved on the expression graph).
     pub translation_invariant: bool,
+    /// Whether the second derivatives of the energy, or those of the force by position, are not all identically zero: gravity's are.
+    pub curved: bool,
+    /// Whether the force depends on velocities.
+    pub velocity_dependent: bool,
+    /// Whether all Jacobians of the force are symmetric, entry by entry the same expression.
+    pub symmetric: bool,
     /// Coordinates the derivatives are taken in, after input reduction.
     pub reduced_coordinates: usize,
     /// The robust primitives the formula was compiled to.

@@ -2,13 +2,10 @@
 
 use proc_macro2::TokenStream;
 
-use super::ast::{
-    Body, Declaration, Expression, ExpressionKind, InputGroup, InputType, Item, Let, Section, UserFunction,
-};
+use super::ast::{Body, Declaration, ExpressionKind, InputGroup, InputType, Item, Let, Section, UserFunction};
 use super::name::Name;
 use super::tokens::{self, Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
-use crate::functions;
 use crate::runtime::Kind;
 
 /// Parses all items. After an error in one item it goes on with the next.
@@ -35,18 +32,18 @@ pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
     items
 }
 
-type Parsed<T> = Result<T, Box<Diagnostic>>;
+pub(super) type Parsed<T> = Result<T, Box<Diagnostic>>;
 
-struct Parser<'a> {
-    tokens: &'a [Token],
-    at: usize,
+pub(super) struct Parser<'a> {
+    pub(super) tokens: &'a [Token],
+    pub(super) at: usize,
     /// Where the text ends.
-    end: Span,
+    pub(super) end: Span,
     /// Open bars `‖` and `|`; a bracket between hides those outside it.
-    bars: Vec<String>,
-    user_functions: Vec<String>,
+    pub(super) bars: Vec<String>,
+    pub(super) user_functions: Vec<String>,
     /// Errors after which the declaration could still be made out.
-    errors: Vec<Diagnostic>,
+    pub(super) errors: Vec<Diagnostic>,
 }
 
 const KINDS: [Kind; 4] = [Kind::Energy, Kind::Constraint, Kind::Force, Kind::Residual];
@@ -60,50 +57,50 @@ const TYPES: &[(&str, InputType)] = &[
 ];
 
 impl<'a> Parser<'a> {
-    fn peek(&self) -> Option<&'a Token> {
+    pub(super) fn peek(&self) -> Option<&'a Token> {
         self.tokens.get(self.at)
     }
 
-    fn span(&self) -> Span {
+    pub(super) fn span(&self) -> Span {
         self.peek().map_or_else(|| self.end.clone(), |t| t.span.clone())
     }
 
-    fn is(&self, symbol: &str) -> bool {
+    pub(super) fn is(&self, symbol: &str) -> bool {
         matches!(self.peek(), Some(Token { kind: TokenKind::Symbol(s), .. }) if s == symbol)
     }
 
-    fn is_word(&self, word: &str) -> bool {
+    pub(super) fn is_word(&self, word: &str) -> bool {
         matches!(self.peek(), Some(Token { kind: TokenKind::Name(n), .. }) if n == word)
     }
 
-    fn take(&mut self, symbol: &str) -> bool {
+    pub(super) fn take(&mut self, symbol: &str) -> bool {
         let found = self.is(symbol);
         self.at += usize::from(found);
         found
     }
 
-    fn take_word(&mut self, word: &str) -> bool {
+    pub(super) fn take_word(&mut self, word: &str) -> bool {
         let found = self.is_word(word);
         self.at += usize::from(found);
         found
     }
 
-    fn found(&self) -> String {
+    pub(super) fn found(&self) -> String {
         match self.peek() {
             None => "the end".into(),
             Some(token) => format!("`{}`", token.text),
         }
     }
 
-    fn fail<T>(&self, expected: &str) -> Parsed<T> {
+    pub(super) fn fail<T>(&self, expected: &str) -> Parsed<T> {
         Err(Box::new(Diagnostic::new(&self.span(), format!("expected {expected}, found {}", self.found()))))
     }
 
-    fn expect(&mut self, symbol: &str, context: &str) -> Parsed<()> {
+    pub(super) fn expect(&mut self, symbol: &str, context: &str) -> Parsed<()> {
         if self.take(symbol) { Ok(()) } else { self.fail(&format!("`{symbol}` {context}")) }
     }
 
-    fn name(&mut self, what: &str) -> Parsed<Name> {
+    pub(super) fn name(&mut self, what: &str) -> Parsed<Name> {
         match self.peek() {
             Some(Token { kind: TokenKind::Name(text), span, .. }) if !is_keyword(text) => {
                 self.at += 1;
@@ -320,7 +317,7 @@ impl<'a> Parser<'a> {
         self.braced_body()
     }
 
-    fn braced_body(&mut self) -> Parsed<Body> {
+    pub(super) fn braced_body(&mut self) -> Parsed<Body> {
         self.expect("{", "to open the body")?;
         let body = self.body(true)?;
         self.expect("}", "after the result")?;
@@ -328,7 +325,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Statements and a result, up to the closing brace or the end of a string.
-    fn body(&mut self, braced: bool) -> Parsed<Body> {
+    pub(super) fn body(&mut self, braced: bool) -> Parsed<Body> {
         let mut body = (Vec::new(), Vec::new());
         loop {
             if self.take_word("fn") {
@@ -375,224 +372,6 @@ impl<'a> Parser<'a> {
         self.expect(";", "after the value")?;
         Ok(Let { name, value, rest })
     }
-
-    fn expression(&mut self) -> Parsed<Expression> {
-        self.binary(0)
-    }
-
-    /// Left-associative operators, by rising precedence.
-    fn binary(&mut self, level: usize) -> Parsed<Expression> {
-        const LEVELS: &[&[&str]] =
-            &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×"]];
-        let Some(operators) = LEVELS.get(level) else { return self.unary() };
-        let mut left = self.binary(level + 1)?;
-        loop {
-            let span = self.span();
-            let operator = operators.iter().find(|o| self.is(o)).copied();
-            let operator = match operator {
-                Some(operator) => {
-                    self.at += 1;
-                    operator
-                }
-                None if level + 1 == LEVELS.len() && self.starts_factor() => "*",
-                None => return Ok(left),
-            };
-            let right = self.binary(level + 1)?;
-            let function = match operator {
-                "·" => "dot",
-                "×" => "cross",
-                other => other,
-            };
-            left = call(function, span, vec![left, right]);
-        }
-    }
-
-    /// Whether a factor follows without an operator, which in notation is a product.
-    fn starts_factor(&self) -> bool {
-        let Some(token) = self.peek().filter(|t| t.notation) else { return false };
-        match &token.kind {
-            TokenKind::Name(name) => !is_keyword(name),
-            TokenKind::Symbol(symbol) => match symbol.as_str() {
-                "(" | "√" | "hat" => true,
-                "‖" | "|" => self.bars.last() != Some(symbol),
-                _ => false,
-            },
-            _ => false,
-        }
-    }
-
-    fn unary(&mut self) -> Parsed<Expression> {
-        let span = self.span();
-        if self.take("-") {
-            let operand = self.unary()?;
-            return Ok(call("neg", span, vec![operand]));
-        }
-        if self.take("+") {
-            return self.unary();
-        }
-        self.power()
-    }
-
-    fn power(&mut self) -> Parsed<Expression> {
-        let mut base = self.primary()?;
-        loop {
-            let span = self.span();
-            if self.take("ᵀ") {
-                base = call("transpose", span, vec![base]);
-            } else if self.take("^") {
-                let exponent = if self.is("-") { self.unary()? } else { self.power()? };
-                base = call("^", span, vec![base, exponent]);
-            } else {
-                return Ok(base);
-            }
-        }
-    }
-
-    fn primary(&mut self) -> Parsed<Expression> {
-        let span = self.span();
-        let Some(token) = self.peek() else { return self.fail("a value") };
-        let kind = match &token.kind {
-            TokenKind::Number(value) => {
-                self.at += 1;
-                ExpressionKind::Number(*value)
-            }
-            TokenKind::Notation(inner) => {
-                self.at += 1;
-                return self.notation(inner, &span);
-            }
-            TokenKind::Name(word) if word == "if" => return self.conditional(),
-            TokenKind::Name(word) if is_keyword(word) => return self.fail("a value"),
-            TokenKind::Name(_) => return self.name_or_call(),
-            TokenKind::Text(_) => return self.fail("a value"),
-            TokenKind::Symbol(symbol) => match symbol.as_str() {
-                "(" => {
-                    self.at += 1;
-                    let inner = self.bracketed("(", ")")?;
-                    return Ok(inner);
-                }
-                "[" => ExpressionKind::List(self.list("[", "]")?),
-                "{" => ExpressionKind::Body(Box::new(self.braced_body()?)),
-                "‖" | "|" => return self.barred(symbol),
-                "√" => {
-                    self.at += 1;
-                    let operand = self.primary()?;
-                    return Ok(call("sqrt", span, vec![operand]));
-                }
-                "hat" => {
-                    self.at += 1;
-                    let name = self.name("the vector under the hat")?;
-                    let vector = Expression { span: name.span.clone(), kind: ExpressionKind::Name(name) };
-                    return Ok(call("unit", span, vec![vector]));
-                }
-                _ => return self.fail("a value"),
-            },
-        };
-        Ok(Expression { kind, span })
-    }
-
-    /// A bracketed expression after its opening bracket.
-    fn bracketed(&mut self, open: &str, close: &str) -> Parsed<Expression> {
-        self.bars.push(open.into());
-        let inner = self.expression()?;
-        self.bars.pop();
-        self.expect(close, &format!("to close `{open}`"))?;
-        Ok(inner)
-    }
-
-    fn list(&mut self, open: &str, close: &str) -> Parsed<Vec<Expression>> {
-        self.expect(open, "to open the list")?;
-        self.bars.push(open.into());
-        let mut items = Vec::new();
-        while !self.is(close) {
-            items.push(self.expression()?);
-            if !self.take(",") && !self.is(close) {
-                return self.fail(&format!("`,` or `{close}`"));
-            }
-        }
-        self.at += 1;
-        self.bars.pop();
-        Ok(items)
-    }
-
-    /// `‖d‖`, a norm, or `|x|`, an absolute value.
-    fn barred(&mut self, bar: &str) -> Parsed<Expression> {
-        let span = self.span();
-        self.at += 1;
-        self.bars.push(bar.into());
-        let inner = self.expression()?;
-        self.bars.pop();
-        if !self.take(bar) {
-            let message = format!("unbalanced `{bar}`: expected a second `{bar}`, found {}", self.found());
-            return Err(Box::new(Diagnostic::new(&span, message).help(format!("close it, as in {bar}d{bar}"))));
-        }
-        let function = if bar == "‖" { "norm" } else { "abs" };
-        Ok(call(function, span, vec![inner]))
-    }
-
-    fn is_function(&self, name: &str) -> bool {
-        functions::find(name).is_some() || name == "gradient" || self.user_functions.iter().any(|f| f == name)
-    }
-
-    fn name_or_call(&mut self) -> Parsed<Expression> {
-        let notation = self.peek().is_some_and(|t| t.notation);
-        let name = self.name("a name")?;
-        let span = name.span.clone();
-        let function = self.is_function(&name.text);
-        if self.is("(") && (function || !notation) {
-            let arguments = self.list("(", ")")?;
-            return Ok(Expression { kind: ExpressionKind::Call(name, arguments), span });
-        }
-        if function && notation && self.starts_factor() {
-            // `sin θ`, as printed.
-            let argument = self.power()?;
-            return Ok(Expression { kind: ExpressionKind::Call(name, vec![argument]), span });
-        }
-        Ok(Expression { kind: ExpressionKind::Name(name), span })
-    }
-
-    fn conditional(&mut self) -> Parsed<Expression> {
-        let span = self.span();
-        self.at += 1;
-        let condition = self.expression()?;
-        let yes = self.braced_body()?;
-        if !self.take_word("else") {
-            return self.fail("`else { … }`: a formula has a value either way");
-        }
-        let no = if self.is_word("if") {
-            let nested = self.conditional()?;
-            Body { functions: Vec::new(), lets: Vec::new(), result: Box::new(nested) }
-        } else {
-            self.braced_body()?
-        };
-        Ok(Expression { kind: ExpressionKind::If(Box::new(condition), Box::new(yes), Box::new(no)), span })
-    }
-
-    /// The content of a string literal: a body of its own.
-    fn notation(&mut self, inner: &'a [Token], span: &Span) -> Parsed<Expression> {
-        let end = inner.last().map_or_else(|| span.clone(), |t| t.span.clone());
-        let mut parser = Parser {
-            tokens: inner,
-            at: 0,
-            end,
-            bars: Vec::new(),
-            user_functions: self.user_functions.clone(),
-            errors: Vec::new(),
-        };
-        let body = parser.body(false)?;
-        if parser.peek().is_some() {
-            return parser.fail("an operator or the end of the formula");
-        }
-        Ok(Expression { kind: ExpressionKind::Body(Box::new(body)), span: span.clone() })
-    }
-}
-
-fn call(function: &str, span: Span, arguments: Vec<Expression>) -> Expression {
-    let name = Name { text: function.into(), span: span.clone() };
-    Expression { kind: ExpressionKind::Call(name, arguments), span }
-}
-
-fn is_keyword(word: &str) -> bool {
-    matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub")
 }
 
 fn section_of(section: Section, input_type: InputType) -> Section {
@@ -600,6 +379,11 @@ fn section_of(section: Section, input_type: InputType) -> Section {
         InputType::Point | InputType::Velocity => Section::Moving,
         _ => section,
     }
+}
+
+/// Words that cannot name anything.
+pub(super) fn is_keyword(word: &str) -> bool {
+    matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub")
 }
 
 /// The body as a reader would write it: a string's content, or the statements without the braces.

@@ -1,0 +1,225 @@
+//! Expressions, by precedence.
+
+use super::ast::{Body, Expression, ExpressionKind};
+use super::name::Name;
+use super::parse::{Parsed, Parser, is_keyword};
+use super::tokens::{Kind as TokenKind, Token};
+use crate::diagnostic::{Diagnostic, Span};
+use crate::functions;
+
+impl<'a> Parser<'a> {
+    /// An expression of any precedence.
+    pub(super) fn expression(&mut self) -> Parsed<Expression> {
+        self.binary(0)
+    }
+
+    /// Left-associative operators, by rising precedence.
+    fn binary(&mut self, level: usize) -> Parsed<Expression> {
+        const LEVELS: &[&[&str]] =
+            &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×"]];
+        let Some(operators) = LEVELS.get(level) else { return self.unary() };
+        let mut left = self.binary(level + 1)?;
+        loop {
+            let span = self.span();
+            let operator = operators.iter().find(|o| self.is(o)).copied();
+            let operator = match operator {
+                Some(operator) => {
+                    self.at += 1;
+                    operator
+                }
+                None if level + 1 == LEVELS.len() && self.starts_factor() => "*",
+                None => return Ok(left),
+            };
+            let right = self.binary(level + 1)?;
+            let function = match operator {
+                "·" => "dot",
+                "×" => "cross",
+                other => other,
+            };
+            left = call(function, span, vec![left, right]);
+        }
+    }
+
+    /// Whether a factor follows without an operator, which in notation is a product.
+    fn starts_factor(&self) -> bool {
+        let Some(token) = self.peek().filter(|t| t.notation) else { return false };
+        match &token.kind {
+            TokenKind::Name(name) => !is_keyword(name),
+            TokenKind::Symbol(symbol) => match symbol.as_str() {
+                "(" | "√" | "hat" => true,
+                "‖" | "|" => self.bars.last() != Some(symbol),
+                _ => false,
+            },
+            _ => false,
+        }
+    }
+
+    fn unary(&mut self) -> Parsed<Expression> {
+        let span = self.span();
+        if self.take("-") {
+            let operand = self.unary()?;
+            return Ok(call("neg", span, vec![operand]));
+        }
+        if self.take("+") {
+            return self.unary();
+        }
+        self.power()
+    }
+
+    fn power(&mut self) -> Parsed<Expression> {
+        let mut base = self.primary()?;
+        loop {
+            let span = self.span();
+            if self.take("ᵀ") {
+                base = call("transpose", span, vec![base]);
+            } else if self.take("^") {
+                let exponent = if self.is("-") { self.unary()? } else { self.power()? };
+                base = call("^", span, vec![base, exponent]);
+            } else {
+                return Ok(base);
+            }
+        }
+    }
+
+    fn primary(&mut self) -> Parsed<Expression> {
+        let span = self.span();
+        let Some(token) = self.peek() else { return self.fail("a value") };
+        let kind = match &token.kind {
+            TokenKind::Number(value) => {
+                self.at += 1;
+                ExpressionKind::Number(*value)
+            }
+            TokenKind::Notation(inner) => {
+                self.at += 1;
+                return self.notation(inner, &span);
+            }
+            TokenKind::Name(word) if word == "if" => return self.conditional(),
+            TokenKind::Name(word) if is_keyword(word) => return self.fail("a value"),
+            TokenKind::Name(_) => return self.name_or_call(),
+            TokenKind::Text(_) => return self.fail("a value"),
+            TokenKind::Symbol(symbol) => match symbol.as_str() {
+                "(" => {
+                    self.at += 1;
+                    let inner = self.bracketed("(", ")")?;
+                    return Ok(inner);
+                }
+                "[" => ExpressionKind::List(self.list("[", "]")?),
+                "{" => ExpressionKind::Body(Box::new(self.braced_body()?)),
+                "‖" | "|" => return self.barred(symbol),
+                "√" => {
+                    self.at += 1;
+                    let operand = self.primary()?;
+                    return Ok(call("sqrt", span, vec![operand]));
+                }
+                "hat" => {
+                    self.at += 1;
+                    let name = self.name("the vector under the hat")?;
+                    let vector = Expression { span: name.span.clone(), kind: ExpressionKind::Name(name) };
+                    return Ok(call("unit", span, vec![vector]));
+                }
+                _ => return self.fail("a value"),
+            },
+        };
+        Ok(Expression { kind, span })
+    }
+
+    /// A bracketed expression after its opening bracket.
+    fn bracketed(&mut self, open: &str, close: &str) -> Parsed<Expression> {
+        self.bars.push(open.into());
+        let inner = self.expression()?;
+        self.bars.pop();
+        self.expect(close, &format!("to close `{open}`"))?;
+        Ok(inner)
+    }
+
+    fn list(&mut self, open: &str, close: &str) -> Parsed<Vec<Expression>> {
+        self.expect(open, "to open the list")?;
+        self.bars.push(open.into());
+        let mut items = Vec::new();
+        while !self.is(close) {
+            items.push(self.expression()?);
+            if !self.take(",") && !self.is(close) {
+                return self.fail(&format!("`,` or `{close}`"));
+            }
+        }
+        self.at += 1;
+        self.bars.pop();
+        Ok(items)
+    }
+
+    /// `‖d‖`, a norm, or `|x|`, an absolute value.
+    fn barred(&mut self, bar: &str) -> Parsed<Expression> {
+        let span = self.span();
+        self.at += 1;
+        self.bars.push(bar.into());
+        let inner = self.expression()?;
+        self.bars.pop();
+        if !self.take(bar) {
+            let message = format!("unbalanced `{bar}`: expected a second `{bar}`, found {}", self.found());
+            return Err(Box::new(Diagnostic::new(&span, message).help(format!("close it, as in {bar}d{bar}"))));
+        }
+        let function = if bar == "‖" { "norm" } else { "abs" };
+        Ok(call(function, span, vec![inner]))
+    }
+
+    fn is_function(&self, name: &str) -> bool {
+        functions::find(name).is_some() || name == "gradient" || self.user_functions.iter().any(|f| f == name)
+    }
+
+    fn name_or_call(&mut self) -> Parsed<Expression> {
+        let notation = self.peek().is_some_and(|t| t.notation);
+        let name = self.name("a name")?;
+        let span = name.span.clone();
+        let function = self.is_function(&name.text);
+        if self.is("(") && (function || !notation) {
+            let arguments = self.list("(", ")")?;
+            return Ok(Expression { kind: ExpressionKind::Call(name, arguments), span });
+        }
+        if function && notation && self.starts_factor() {
+            // `sin θ`, as printed.
+            let argument = self.power()?;
+            return Ok(Expression { kind: ExpressionKind::Call(name, vec![argument]), span });
+        }
+        Ok(Expression { kind: ExpressionKind::Name(name), span })
+    }
+
+    fn conditional(&mut self) -> Parsed<Expression> {
+        let span = self.span();
+        self.at += 1;
+        let condition = self.expression()?;
+        let yes = self.braced_body()?;
+        if !self.take_word("else") {
+            return self.fail("`else { … }`: a formula has a value either way");
+        }
+        let no = if self.is_word("if") {
+            let nested = self.conditional()?;
+            Body { functions: Vec::new(), lets: Vec::new(), result: Box::new(nested) }
+        } else {
+            self.braced_body()?
+        };
+        Ok(Expression { kind: ExpressionKind::If(Box::new(condition), Box::new(yes), Box::new(no)), span })
+    }
+
+    /// The content of a string literal: a body of its own.
+    fn notation(&mut self, inner: &'a [Token], span: &Span) -> Parsed<Expression> {
+        let end = inner.last().map_or_else(|| span.clone(), |t| t.span.clone());
+        let mut parser = Parser {
+            tokens: inner,
+            at: 0,
+            end,
+            bars: Vec::new(),
+            user_functions: self.user_functions.clone(),
+            errors: Vec::new(),
+        };
+        let body = parser.body(false)?;
+        if parser.peek().is_some() {
+            return parser.fail("an operator or the end of the formula");
+        }
+        Ok(Expression { kind: ExpressionKind::Body(Box::new(body)), span: span.clone() })
+    }
+}
+
+fn call(function: &str, span: Span, arguments: Vec<Expression>) -> Expression {
+    let name = Name { text: function.into(), span: span.clone() };
+    Expression { kind: ExpressionKind::Call(name, arguments), span }
+}
