@@ -43,7 +43,7 @@ impl Check {
             Self::FiniteDifferences => 2e-7,
             Self::Symmetry | Self::Finite => 0.0,
             Self::LinearMomentum => 16.0 * f64::EPSILON / 2.0,
-            Self::AngularMomentum => 1e-13,
+            Self::AngularMomentum => 1e-11,
         }
     }
 }
