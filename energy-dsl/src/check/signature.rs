@@ -26,7 +26,6 @@ impl Signature {
         let mut signature = Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), names: Vec::new() };
         let mut velocities = 0;
         for group in &declaration.inputs {
-            let is_point = group.input_type == InputType::Point;
             let points_move = declaration.kind != Kind::Residual;
             if group.section == Section::Moving
                 && points_move
@@ -49,13 +48,6 @@ impl Signature {
             for name in &group.names {
                 signature.add(name, group.section, group.input_type, &group.unit, &mut velocities, diagnostics);
             }
-            debug_assert!(
-                is_point
-                    || group.section != Section::Moving
-                    || !points_move
-                    || !diagnostics.0.is_empty()
-                    || group.input_type == InputType::Velocity
-            );
         }
         if signature.moving.is_empty() {
             diagnostics.push(
@@ -103,9 +95,10 @@ impl Signature {
             };
             diagnostics.push(Diagnostic::new(&name.span, message).help("rename one of them"));
         }
-        if let (Some(_), Section::Parameter) = (RESERVED.iter().find(|r| **r == name.text), section) {
+        let stored = section != Section::Moving && input_type != InputType::Velocity;
+        if stored && is_reserved(&name.text) {
             diagnostics.push(
-                Diagnostic::new(&name.span, format!("`{}` cannot name a parameter: generated code uses it", name.text))
+                Diagnostic::new(&name.span, format!("`{}` cannot name an input: generated code uses it", name.text))
                     .help("rename it"),
             );
         }
@@ -131,4 +124,8 @@ impl Signature {
     }
 }
 
-const RESERVED: &[&str] = &["precomputed", "self", "x", "v"];
+/// Names that would clash in the generated constructor, where inputs stand beside temporaries, and Rust's own words.
+fn is_reserved(name: &str) -> bool {
+    let temporary = name.strip_prefix('t').is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    temporary || matches!(name, "precomputed" | "sound" | "number") || syn::parse_str::<syn::Ident>(name).is_err()
+}
