@@ -13,6 +13,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod atomic_file;
 pub mod audit;
 mod blocks;
 pub mod dual;
@@ -22,7 +23,7 @@ mod geometry;
 pub mod reference;
 mod sample;
 
+pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
-pub use reference::write_whole;
 pub use sample::Sample;

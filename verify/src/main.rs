@@ -101,7 +101,7 @@ fn run(command: Command) -> anyhow::Result<bool> {
 fn write_json(path: Option<&Path>, report: &impl serde::Serialize) -> anyhow::Result<()> {
     let Some(path) = path else { return Ok(()) };
     let text = serde_json::to_string_pretty(report)?;
-    verify::write_whole(path, &text).with_context(|| format!("cannot write {}", path.display()))
+    verify::write_whole(path, text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn table(headings: &[&str], numeric: &[usize]) -> Table {

@@ -78,13 +78,7 @@ impl OutputFolder {
     /// When it cannot be written.
     pub fn write(&self, name: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
         let path = self.path.join(name);
-        let temporary = path.with_extension("partial");
-        let written = std::fs::write(&temporary, contents).and_then(|()| std::fs::rename(&temporary, &path));
-        written.map_err(|source| {
-            // Nothing half-written stays behind; if even that fails, the first error says more.
-            let _ = std::fs::remove_file(&temporary);
-            OutputError::File { path: path.clone(), source }
-        })?;
+        verify::write_whole(&path, contents).map_err(|source| OutputError::File { path: path.clone(), source })?;
         Ok(path)
     }
 

@@ -1,4 +1,3 @@
-use std::io::Write;
 use std::path::Path;
 
 use energy_dsl::Flags;
@@ -6,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
 use super::mapping::{is_undeclared, mapping};
+use crate::atomic_file::write_whole;
 use crate::blocks::{NoAnswer, evaluate};
 
 /// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the same records with `out` filled by the
@@ -29,7 +29,7 @@ pub fn evaluate_file(input: &Path, output: &Path) -> Result<usize, RecordError> 
     }
     let count = records.len();
     let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
-    write_whole(output, &text).map_err(|e| RecordError::file(output, e))?;
+    write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
     Ok(count)
 }
 
@@ -74,21 +74,4 @@ fn evaluate_record(value: &mut Value, potential: &str) -> Result<(), String> {
     fields.insert("out".into(), Value::Object(out));
     fields.insert("flags".into(), Value::Object(flags));
     Ok(())
-}
-
-/// Writes beside the file and renames: the name never stands for half a file.
-///
-/// # Errors
-/// When the folder or the file cannot be written.
-pub fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = std::path::PathBuf::from(beside);
-    let written = std::fs::File::create(&beside)
-        .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&beside, path));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&beside);
-    }
-    written
 }
