@@ -13,7 +13,7 @@ mod plan;
 
 pub use coordinates::{Coordinates, Moving};
 pub use forward::first_derivatives;
-pub use plan::second_order;
+pub use plan::{SecondOrder, second_order};
 
 use std::collections::BTreeSet;
 

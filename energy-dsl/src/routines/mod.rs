@@ -1,10 +1,12 @@
 //! What a declaration of each kind computes: the routines, as nodes of one graph.
 
+mod constraint;
+
 use std::collections::BTreeSet;
 
 use crate::check::Program;
-use crate::diff::{Coordinates, Moving, first_derivatives, second_order};
-use crate::graph::{Graph, Input, NodeId, Op, Primitive, symmetric_index};
+use crate::diff::{Coordinates, Moving, SecondOrder, first_derivatives, second_order};
+use crate::graph::{Graph, NodeId, Op, Primitive};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
 
@@ -65,8 +67,11 @@ pub fn differentiate(program: &Program) -> Routines {
         _ => Coordinates::of_points(g, &outputs, Moving::Positions),
     };
     let list = match program.kind {
-        Kind::Energy => potential(g, outputs[0], &[(outputs[0], 0)], &coordinates, program.points()),
-        Kind::Constraint => constraint(g, program, &outputs, &coordinates),
+        Kind::Energy => {
+            let plan = second_order(g, outputs[0], &coordinates);
+            potential(g, &plan, &coordinates, program.points())
+        }
+        Kind::Constraint => constraint::routines(g, program, &outputs, &coordinates),
         Kind::Force => force(g, &outputs, &coordinates, program.points()),
         Kind::Residual => residual(g, &outputs, &coordinates),
     };
@@ -82,37 +87,26 @@ pub fn differentiate(program: &Program) -> Routines {
     }
 }
 
-/// Value, gradient, Hessian of U. `roots` are the outputs whose conditions count, with the order of derivative that U adds.
-fn potential(
-    g: &mut Graph,
-    value: NodeId,
-    roots: &[(NodeId, u8)],
-    coordinates: &Coordinates,
-    points: usize,
-) -> Vec<Routine> {
-    let plan = second_order(g, value, coordinates);
+/// Value, gradient, Hessian of U.
+fn potential(g: &mut Graph, plan: &SecondOrder, coordinates: &Coordinates, points: usize) -> Vec<Routine> {
+    let value = plan.value;
     let forward = first_derivatives(g, &[value], coordinates).remove(0);
     let gradient = cheaper(g, &[value], [forward, plan.gradient.clone()]);
-    let at_order = |g: &mut Graph, order: u8| {
-        let roots: Vec<_> = roots.iter().map(|&(node, added)| (node, order + added)).collect();
-        flags(g, &roots)
-    };
-    let flags = [0, 1, 2].map(|order| at_order(g, order));
+    let flags = [0, 1, 2].map(|order| flags(g, &[(value, order)]));
     let full_gradient = coordinates.expand_all(g, &gradient, points);
     let hessian_gradient = coordinates.expand_all(g, &plan.gradient, points);
     let triangle = coordinates.expand_triangle(g, &plan.hessian, points);
-    let with = |lists: &[&[NodeId]]| lists.iter().flat_map(|l| l.iter().copied()).collect::<Vec<_>>();
     vec![
         Routine { name: "value", reduced: vec![value], groups: vec![vec![value]], flags: flags[0] },
         Routine {
             name: "gradient",
-            reduced: with(&[&[value], &gradient]),
+            reduced: [&[value], &gradient[..]].concat(),
             groups: vec![vec![value], full_gradient],
             flags: flags[1],
         },
         Routine {
             name: "hessian",
-            reduced: with(&[&[value], &plan.gradient, &plan.hessian]),
+            reduced: [&[value], &plan.gradient[..], &plan.hessian[..]].concat(),
             groups: vec![vec![value], hessian_gradient, triangle],
             flags: flags[2],
         },
@@ -124,136 +118,6 @@ fn cheaper(g: &Graph, common: &[NodeId], alternatives: [Vec<NodeId>; 2]) -> Vec<
     let cost =
         |nodes: &Vec<NodeId>| crate::graph::count(g, &common.iter().chain(nodes).copied().collect::<Vec<_>>()).total();
     alternatives.into_iter().min_by_key(cost).expect("two alternatives")
-}
-
-fn constraint(g: &mut Graph, program: &Program, c: &[NodeId], coordinates: &Coordinates) -> Vec<Routine> {
-    let points = program.points();
-    let n = coordinates.len();
-    let parameters = program.parameters_size();
-    let input = |i: usize| u16::try_from(i).expect("few parameters");
-    let stiffness = g.input(Input::Parameter(input(parameters - 2)));
-    let damping = g.input(Input::Parameter(input(parameters - 1)));
-    let square = g.sum_of_squares(c);
-    let half = g.constant(0.5);
-    let scaled = g.mul(half, square);
-    let energy = g.mul(stiffness, scaled);
-    let roots: Vec<_> = vec![(energy, 0)];
-    let mut list = potential(g, energy, &roots, coordinates, points);
-
-    let jacobian = first_derivatives(g, c, coordinates);
-    let hessians: Vec<Vec<NodeId>> = c.iter().map(|&row| second_order(g, row, coordinates).hessian).collect();
-    let order = |order: u8| c.iter().map(|&row| (row, order)).collect::<Vec<_>>();
-    let full_jacobian: Vec<NodeId> = jacobian.iter().flat_map(|row| coordinates.expand_all(g, row, points)).collect();
-    let full_hessians: Vec<NodeId> =
-        hessians.iter().flat_map(|row| coordinates.expand_triangle(g, row, points)).collect();
-    let first_flags = flags(g, &order(1));
-    let second_flags = flags(g, &order(2));
-    let flat = |rows: &[Vec<NodeId>]| rows.iter().flatten().copied().collect::<Vec<_>>();
-    let with = |lists: &[&[NodeId]]| lists.iter().flat_map(|l| l.iter().copied()).collect::<Vec<_>>();
-    list.push(Routine {
-        name: "constraint_jacobian",
-        reduced: with(&[c, &flat(&jacobian)]),
-        groups: vec![c.to_vec(), full_jacobian.clone()],
-        flags: first_flags,
-    });
-    list.push(Routine {
-        name: "constraint_hessian",
-        reduced: with(&[c, &flat(&jacobian), &flat(&hessians)]),
-        groups: vec![c.to_vec(), full_jacobian, full_hessians],
-        flags: second_flags,
-    });
-
-    let gradient = first_derivatives(g, &[energy], coordinates).remove(0);
-    let outer = |g: &mut Graph, factor: NodeId, i: usize, j: usize| {
-        let terms: Vec<_> = jacobian.iter().map(|row| g.mul(row[i], row[j])).collect();
-        let sum = g.sum(terms);
-        g.mul(factor, sum)
-    };
-    let upper: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
-    let gauss_newton: Vec<NodeId> = upper.iter().map(|&(i, j)| outer(g, stiffness, i, j)).collect();
-    let energy_flags = flags(g, &[&[(energy, 1)], &order(1)[..]].concat());
-    let triangle = coordinates.expand_triangle(g, &gauss_newton, points);
-    let full_gradient = coordinates.expand_all(g, &gradient, points);
-    list.push(Routine {
-        name: "gauss_newton",
-        reduced: with(&[&[energy], &gradient, &gauss_newton]),
-        groups: vec![vec![energy], full_gradient, triangle],
-        flags: energy_flags,
-    });
-
-    // f = −∇U − k_d Jᵀ Ċ, Ċ = J q̇ with q̇ the differences of velocity.
-    let speeds = speeds(g, coordinates);
-    let rates: Vec<NodeId> = jacobian.iter().map(|row| g.dot(row, &speeds)).collect();
-    let damped_rates = g.scaled(damping, &rates);
-    let force: Vec<NodeId> = (0..n)
-        .map(|i| {
-            let terms: Vec<_> = jacobian.iter().zip(&damped_rates).map(|(row, &rate)| g.mul(rate, row[i])).collect();
-            let resisting = g.sum(terms);
-            let sum = g.add(gradient[i], resisting);
-            g.neg(sum)
-        })
-        .collect();
-    let full_force = coordinates.expand_all(g, &force, points);
-    list.push(Routine {
-        name: "force",
-        reduced: force.clone(),
-        groups: vec![full_force.clone()],
-        flags: flags(g, &[&[(energy, 1)], &order(1)[..]].concat()),
-    });
-
-    // ∂f/∂x = −∇²U − k_d Σ (Ċ ∇²C + ∇C (∇²C q̇)ᵀ); ∂f/∂v = −k_d JᵀJ.
-    let energy_hessian = second_order(g, energy, coordinates).hessian;
-    let turning: Vec<Vec<NodeId>> = hessians
-        .iter()
-        .map(|h| {
-            let rows: Vec<Vec<NodeId>> =
-                (0..n).map(|i| (0..n).map(|j| h[symmetric_index(n, i, j)]).collect()).collect();
-            let rates: Vec<_> = rows.iter().map(|row| g.dot(row, &speeds)).collect();
-            g.scaled(damping, &rates)
-        })
-        .collect();
-    let mut by_position = Vec::with_capacity(n * n);
-    let mut by_velocity = Vec::with_capacity(n * n);
-    for i in 0..n {
-        for j in 0..n {
-            let mut sum = energy_hessian[symmetric_index(n, i, j)];
-            for (row, h) in hessians.iter().enumerate() {
-                let bending = g.mul(damped_rates[row], h[symmetric_index(n, i, j)]);
-                let swinging = g.mul(jacobian[row][i], turning[row][j]);
-                sum = g.add(sum, bending);
-                sum = g.add(sum, swinging);
-            }
-            by_position.push(g.neg(sum));
-            let resisting = outer(g, damping, i.min(j), i.max(j));
-            by_velocity.push(g.neg(resisting));
-        }
-    }
-    let full_position = coordinates.expand_square(g, &by_position, points);
-    let full_velocity = coordinates.expand_square(g, &by_velocity, points);
-    list.push(Routine {
-        name: "jacobians",
-        reduced: with(&[&force, &by_position, &by_velocity]),
-        groups: vec![full_force, full_position, full_velocity],
-        flags: flags(g, &[&[(energy, 2)], &order(2)[..]].concat()),
-    });
-    list
-}
-
-/// The velocity of each coordinate.
-fn speeds(g: &mut Graph, coordinates: &Coordinates) -> Vec<NodeId> {
-    let mut speeds = Vec::with_capacity(coordinates.len());
-    for vector in &coordinates.vectors {
-        for axis in 0..coordinates.components {
-            let mut sum = g.constant(0.0);
-            for &(point, positive) in vector {
-                let number = u16::try_from(coordinates.components * point + axis).expect("few points");
-                let velocity = g.input(Input::Velocity(number));
-                sum = if positive { g.add(sum, velocity) } else { g.sub(sum, velocity) };
-            }
-            speeds.push(sum);
-        }
-    }
-    speeds
 }
 
 fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize) -> Vec<Routine> {

@@ -1,0 +1,188 @@
+//! A constraint's routines: those of its energy U = ½ k_s CᵀC, C with J and ∂²C, and its force f = −∇U − k_d Jᵀ Ċ.
+
+use super::{Routine, flags, potential};
+use crate::check::Program;
+use crate::diff::{Coordinates, SecondOrder, first_derivatives, second_order};
+use crate::graph::{Graph, Input, NodeId, symmetric_index};
+
+/// What all routines are made of, in reduced coordinates.
+struct Compliant<'a> {
+    c: &'a [NodeId],
+    /// Row by coordinate.
+    jacobian: Vec<Vec<NodeId>>,
+    /// Of each row the upper triangle.
+    hessians: Vec<Vec<NodeId>>,
+    energy: SecondOrder,
+    /// ∇U by forward derivatives, for the routines without ∇²U.
+    gradient: Vec<NodeId>,
+    stiffness: NodeId,
+    damping: NodeId,
+    coordinates: &'a Coordinates,
+    points: usize,
+}
+
+pub(super) fn routines(g: &mut Graph, program: &Program, c: &[NodeId], coordinates: &Coordinates) -> Vec<Routine> {
+    let parameter = |g: &mut Graph, from_end: usize| {
+        let number = program.parameters_size() - from_end;
+        g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
+    };
+    let (stiffness, damping) = (parameter(g, 2), parameter(g, 1));
+    let square = g.sum_of_squares(c);
+    let half = g.constant(0.5);
+    let scaled = g.mul(half, square);
+    let value = g.mul(stiffness, scaled);
+    let energy = second_order(g, value, coordinates);
+    let compliant = Compliant {
+        c,
+        jacobian: first_derivatives(g, c, coordinates),
+        hessians: c.iter().map(|&row| second_order(g, row, coordinates).hessian).collect(),
+        gradient: first_derivatives(g, &[value], coordinates).remove(0),
+        energy,
+        stiffness,
+        damping,
+        coordinates,
+        points: program.points(),
+    };
+    let mut list = potential(g, &compliant.energy, coordinates, compliant.points);
+    list.extend(compliant.geometry(g));
+    list.push(compliant.gauss_newton(g));
+    list.extend(compliant.force(g));
+    list
+}
+
+impl Compliant<'_> {
+    /// Conditions of U's derivatives of an order and of C's.
+    fn flags(&self, g: &mut Graph, energy_order: u8, row_order: u8) -> [Option<NodeId>; 2] {
+        let mut roots = vec![(self.energy.value, energy_order)];
+        roots.extend(self.c.iter().map(|&row| (row, row_order)));
+        flags(g, &roots)
+    }
+
+    /// C with J, and with ∂²C too.
+    fn geometry(&self, g: &mut Graph) -> [Routine; 2] {
+        let rows = |order: u8| self.c.iter().map(|&row| (row, order)).collect::<Vec<_>>();
+        let (first_flags, second_flags) = (flags(g, &rows(1)), flags(g, &rows(2)));
+        let (c, jacobian, hessians) = (self.c.to_vec(), self.jacobian.concat(), self.hessians.concat());
+        let full_jacobian: Vec<NodeId> =
+            self.jacobian.iter().flat_map(|row| self.coordinates.expand_all(g, row, self.points)).collect();
+        let full_hessians: Vec<NodeId> =
+            self.hessians.iter().flat_map(|row| self.coordinates.expand_triangle(g, row, self.points)).collect();
+        [
+            Routine {
+                name: "constraint_jacobian",
+                reduced: [&c[..], &jacobian].concat(),
+                groups: vec![c.clone(), full_jacobian.clone()],
+                flags: first_flags,
+            },
+            Routine {
+                name: "constraint_hessian",
+                reduced: [&c[..], &jacobian, &hessians].concat(),
+                groups: vec![c, full_jacobian, full_hessians],
+                flags: second_flags,
+            },
+        ]
+    }
+
+    /// Entry of factor · JᵀJ.
+    fn outer(&self, g: &mut Graph, factor: NodeId, i: usize, j: usize) -> NodeId {
+        let terms: Vec<_> = self.jacobian.iter().map(|row| g.mul(row[i], row[j])).collect();
+        let sum = g.sum(terms);
+        g.mul(factor, sum)
+    }
+
+    /// U, ∇U and k_s JᵀJ.
+    fn gauss_newton(&self, g: &mut Graph) -> Routine {
+        let n = self.coordinates.len();
+        let upper = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
+        let curvature: Vec<NodeId> = upper.map(|(i, j)| self.outer(g, self.stiffness, i, j)).collect();
+        let value = self.energy.value;
+        Routine {
+            name: "gauss_newton",
+            reduced: [&[value], &self.gradient[..], &curvature].concat(),
+            groups: vec![
+                vec![value],
+                self.coordinates.expand_all(g, &self.gradient, self.points),
+                self.coordinates.expand_triangle(g, &curvature, self.points),
+            ],
+            flags: self.flags(g, 1, 1),
+        }
+    }
+
+    /// f = −∇U − k_d Jᵀ Ċ, Ċ = J q̇ with q̇ the differences of velocity; ∂f/∂x = −∇²U − k_d Σ (Ċ ∂²C + ∇C (∂²C q̇)ᵀ) and
+    /// ∂f/∂v = −k_d JᵀJ.
+    fn force(&self, g: &mut Graph) -> [Routine; 2] {
+        let n = self.coordinates.len();
+        let speeds = speeds(g, self.coordinates);
+        let rates: Vec<NodeId> = self.jacobian.iter().map(|row| g.dot(row, &speeds)).collect();
+        let damped_rates = g.scaled(self.damping, &rates);
+        let force: Vec<NodeId> = (0..n)
+            .map(|i| {
+                let column: Vec<NodeId> = self.jacobian.iter().map(|row| row[i]).collect();
+                let resisting = g.dot(&damped_rates, &column);
+                let sum = g.add(self.gradient[i], resisting);
+                g.neg(sum)
+            })
+            .collect();
+
+        let entry = |list: &[NodeId], i: usize, j: usize| list[symmetric_index(n, i, j)];
+        // k_d ∂²C q̇ of each row.
+        let turning: Vec<Vec<NodeId>> = self
+            .hessians
+            .iter()
+            .map(|h| {
+                let row = |i: usize| (0..n).map(|j| entry(h, i, j)).collect::<Vec<_>>();
+                let rates: Vec<NodeId> = (0..n).map(|i| g.dot(&row(i), &speeds)).collect();
+                g.scaled(self.damping, &rates)
+            })
+            .collect();
+        let mut by_position = Vec::with_capacity(n * n);
+        let mut by_velocity = Vec::with_capacity(n * n);
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let mut sum = entry(&self.energy.hessian, i, j);
+            for (row, h) in self.hessians.iter().enumerate() {
+                let bending = g.mul(damped_rates[row], entry(h, i, j));
+                let swinging = g.mul(self.jacobian[row][i], turning[row][j]);
+                sum = g.add(sum, bending);
+                sum = g.add(sum, swinging);
+            }
+            by_position.push(g.neg(sum));
+            let resisting = self.outer(g, self.damping, i.min(j), i.max(j));
+            by_velocity.push(g.neg(resisting));
+        }
+
+        let full_force = self.coordinates.expand_all(g, &force, self.points);
+        let full_position = self.coordinates.expand_square(g, &by_position, self.points);
+        let full_velocity = self.coordinates.expand_square(g, &by_velocity, self.points);
+        [
+            Routine {
+                name: "force",
+                reduced: force.clone(),
+                groups: vec![full_force.clone()],
+                flags: self.flags(g, 1, 1),
+            },
+            Routine {
+                name: "jacobians",
+                reduced: [force, by_position, by_velocity].concat(),
+                groups: vec![full_force, full_position, full_velocity],
+                flags: self.flags(g, 2, 2),
+            },
+        ]
+    }
+}
+
+/// The velocity of each coordinate.
+fn speeds(g: &mut Graph, coordinates: &Coordinates) -> Vec<NodeId> {
+    let mut speeds = Vec::with_capacity(coordinates.len());
+    for vector in &coordinates.vectors {
+        for axis in 0..coordinates.components {
+            let mut sum = g.constant(0.0);
+            for &(point, positive) in vector {
+                let number = u16::try_from(coordinates.components * point + axis).expect("few points");
+                let velocity = g.input(Input::Velocity(number));
+                sum = if positive { g.add(sum, velocity) } else { g.sub(sum, velocity) };
+            }
+            speeds.push(sum);
+        }
+    }
+    speeds
+}
