@@ -126,18 +126,32 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         let precomputed = schedule.array(&routines.rest.outputs);
         let degenerate = schedule.mask(routines.rest_flags[0]);
         let statements = schedule.statements();
+        let inputs = || program.rest.iter().chain(&program.parameters);
+        let names: Vec<_> = inputs().map(|input| format_ident!("{}", input.name)).collect();
+        let types = inputs().map(input_type);
+        // At the level of the routines: what the rest shape and the moving points both determine must come out equal.
         let body = quote! {
-            #statements
-            let precomputed = #precomputed;
-            let mut sound = !(#degenerate);
-            for value in precomputed {
-                // Neither infinite nor NaN.
-                sound = sound & (value - value).equal(T::from_f64(0.0));
+            struct New<T>(#(#types),*);
+            impl<T: ::energy_dsl::Real> ::energy_dsl::Kernel for New<T> {
+                type Output = ::core::result::Result<#name<T>, ::energy_dsl::RestError>;
+
+                #[inline(always)]
+                fn run<L: ::energy_dsl::Level>(self) -> Self::Output {
+                    let New(#(#names),*) = self;
+                    #statements
+                    let precomputed = #precomputed;
+                    let mut sound = !(#degenerate);
+                    for value in precomputed {
+                        // Neither infinite nor NaN.
+                        sound = sound & (value - value).equal(T::from_f64(0.0));
+                    }
+                    if ::energy_dsl::Mask::any(!sound) {
+                        return Err(::energy_dsl::RestError { element: #element });
+                    }
+                    Ok(#name { #(#fields,)* precomputed })
+                }
             }
-            if ::energy_dsl::Mask::any(!sound) {
-                return Err(::energy_dsl::RestError { element: #element });
-            }
-            Ok(Self { #(#fields,)* precomputed })
+            T::dispatch(New(#(#names),*))
         };
         let result = quote!(::core::result::Result<Self, ::energy_dsl::RestError>);
         (result, body, quote!(Self::new(#(#values),*)))
@@ -286,16 +300,31 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
 
             #[inline]
             fn value(&self, x: &Self::Points) -> ::energy_dsl::Value<T> {
+                T::dispatch(::energy_dsl::ValueCall(self, x))
+            }
+
+            #[inline(always)]
+            fn value_at<L: ::energy_dsl::Level>(&self, x: &Self::Points) -> ::energy_dsl::Value<T> {
                 #value
             }
 
             #[inline]
             fn gradient(&self, x: &Self::Points) -> ::energy_dsl::Gradient<T, Self::Points> {
+                T::dispatch(::energy_dsl::GradientCall(self, x))
+            }
+
+            #[inline(always)]
+            fn gradient_at<L: ::energy_dsl::Level>(&self, x: &Self::Points) -> ::energy_dsl::Gradient<T, Self::Points> {
                 #gradient
             }
 
             #[inline]
             fn hessian(&self, x: &Self::Points) -> ::energy_dsl::Hessian<T, Self::Points, Self::Triangle> {
+                T::dispatch(::energy_dsl::HessianCall(self, x))
+            }
+
+            #[inline(always)]
+            fn hessian_at<L: ::energy_dsl::Level>(&self, x: &Self::Points) -> ::energy_dsl::Hessian<T, Self::Points, Self::Triangle> {
                 #hessian
             }
         }
@@ -326,11 +355,29 @@ fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
                 x: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
                 v: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
             ) -> ::energy_dsl::ForceValue<T, <Self as ::energy_dsl::ForceLaw<T>>::Points> {
+                T::dispatch(::energy_dsl::ForceCall(self, x, v))
+            }
+
+            #[inline(always)]
+            fn force_at<L: ::energy_dsl::Level>(
+                &self,
+                x: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
+                v: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
+            ) -> ::energy_dsl::ForceValue<T, <Self as ::energy_dsl::ForceLaw<T>>::Points> {
                 #force
             }
 
             #[inline]
             fn jacobians(
+                &self,
+                x: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
+                v: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
+            ) -> ::energy_dsl::ForceJacobians<T, <Self as ::energy_dsl::ForceLaw<T>>::Points, Self::Square> {
+                T::dispatch(::energy_dsl::JacobiansCall(self, x, v))
+            }
+
+            #[inline(always)]
+            fn jacobians_at<L: ::energy_dsl::Level>(
                 &self,
                 x: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
                 v: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
@@ -379,6 +426,14 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
                 &self,
                 x: &#points_type,
             ) -> ::energy_dsl::ConstraintJacobian<T, Self::Rows, Self::Jacobian> {
+                T::dispatch(::energy_dsl::ConstraintJacobianCall(self, x))
+            }
+
+            #[inline(always)]
+            fn constraint_jacobian_at<L: ::energy_dsl::Level>(
+                &self,
+                x: &#points_type,
+            ) -> ::energy_dsl::ConstraintJacobian<T, Self::Rows, Self::Jacobian> {
                 #jacobian
             }
 
@@ -387,11 +442,27 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
                 &self,
                 x: &#points_type,
             ) -> ::energy_dsl::ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles> {
+                T::dispatch(::energy_dsl::ConstraintHessianCall(self, x))
+            }
+
+            #[inline(always)]
+            fn constraint_hessian_at<L: ::energy_dsl::Level>(
+                &self,
+                x: &#points_type,
+            ) -> ::energy_dsl::ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles> {
                 #hessian
             }
 
             #[inline]
             fn gauss_newton(
+                &self,
+                x: &#points_type,
+            ) -> ::energy_dsl::Hessian<T, #points_type, <Self as ::energy_dsl::Potential<T>>::Triangle> {
+                T::dispatch(::energy_dsl::GaussNewtonCall(self, x))
+            }
+
+            #[inline(always)]
+            fn gauss_newton_at<L: ::energy_dsl::Level>(
                 &self,
                 x: &#points_type,
             ) -> ::energy_dsl::Hessian<T, #points_type, <Self as ::energy_dsl::Potential<T>>::Triangle> {
@@ -417,11 +488,21 @@ fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream
 
             #[inline]
             fn residual(&self, u: &Self::Unknowns) -> ::energy_dsl::ResidualValue<T, Self::Rows> {
+                T::dispatch(::energy_dsl::ResidualCall(self, u))
+            }
+
+            #[inline(always)]
+            fn residual_at<L: ::energy_dsl::Level>(&self, u: &Self::Unknowns) -> ::energy_dsl::ResidualValue<T, Self::Rows> {
                 #value
             }
 
             #[inline]
             fn jacobian(&self, u: &Self::Unknowns) -> ::energy_dsl::ResidualJacobian<T, Self::Rows, Self::Jacobian> {
+                T::dispatch(::energy_dsl::ResidualJacobianCall(self, u))
+            }
+
+            #[inline(always)]
+            fn jacobian_at<L: ::energy_dsl::Level>(&self, u: &Self::Unknowns) -> ::energy_dsl::ResidualJacobian<T, Self::Rows, Self::Jacobian> {
                 #jacobian
             }
         }

@@ -136,6 +136,11 @@ impl<'a> Schedule<'a> {
             let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
             quote!(#a.#name(#(#rest),*))
         };
+        // What depends on the level takes it as `L`.
+        let levelled = |name: &str, a: NodeId, rest: &[NodeId]| {
+            let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
+            quote!(#a.#name::<L>(#(#rest),*))
+        };
         match self.graph.op(node) {
             Op::Constant(bits) => {
                 let literal = Literal::f64_suffixed(f64::from_bits(bits).abs());
@@ -161,18 +166,18 @@ impl<'a> Schedule<'a> {
             Op::Abs(a) => method("abs", a, &[]),
             Op::Min(a, b) => method("min", a, &[b]),
             Op::Max(a, b) => method("max", a, &[b]),
-            Op::Sin(a) => method("sin", a, &[]),
-            Op::Cos(a) => method("cos", a, &[]),
-            Op::Exp(a) => method("exp", a, &[]),
-            Op::Ln(a) => method("ln", a, &[]),
-            Op::Atan2(a, b) => method("atan2", a, &[b]),
-            Op::Pow(a, b) => method("powf", a, &[b]),
+            Op::Sin(a) => levelled("sin", a, &[]),
+            Op::Cos(a) => levelled("cos", a, &[]),
+            Op::Exp(a) => levelled("exp", a, &[]),
+            Op::Ln(a) => levelled("ln", a, &[]),
+            Op::Atan2(a, b) => levelled("atan2", a, &[b]),
+            Op::Pow(a, b) => levelled("powf", a, &[b]),
             Op::SumError(a, b) => method("sum_error", a, &[b]),
             Op::DifferenceError(a, b) => {
                 let (a, b) = (p(a), p(b));
                 quote!(#a.sum_error(-#b))
             }
-            Op::ProductError(a, b) => method("product_error", a, &[b]),
+            Op::ProductError(a, b) => levelled("product_error", a, &[b]),
             Op::PowerOfTwoScale(a) => method("power_of_two_scale", a, &[]),
             Op::Less(a, b) => method("less", a, &[b]),
             Op::LessOrEqual(a, b) => method("less_or_equal", a, &[b]),

@@ -2,6 +2,8 @@
 //! self-description that every generated element carries.
 
 mod array;
+mod call;
+mod cpu;
 mod declaration;
 mod element;
 mod evaluate;
@@ -9,6 +11,12 @@ mod flags;
 mod real;
 
 pub use array::Array;
+#[doc(hidden)]
+pub use call::{
+    ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
+    JacobiansCall, ResidualCall, ResidualJacobianCall, ValueCall,
+};
+pub use cpu::{Baseline, Kernel, Level};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Routine};
 pub use element::{
     Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,

@@ -1,12 +1,19 @@
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
+use super::cpu::{Baseline, Kernel, Level};
+
 /// The outcome of a comparison: `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
     /// False everywhere.
     fn none() -> Self;
     /// Whether it is true anywhere.
     fn any(self) -> bool;
+
+    /// Whether it is true everywhere.
+    fn all(self) -> bool {
+        !(!self).any()
+    }
 }
 
 impl Mask for bool {
@@ -21,6 +28,9 @@ impl Mask for bool {
 
 /// The arithmetic that a formula needs. Generated code runs over any [`Real`]; the interpreter over any `Number`, which
 /// need not be `Copy` (multi-precision numbers are not).
+///
+/// What depends on the processor takes the [`Level`] it runs at: whether products and sums fuse, and so how elementary
+/// functions are evaluated.
 pub trait Number:
     Clone + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -38,24 +48,34 @@ pub trait Number:
     /// The larger of the two.
     fn max(self, other: Self) -> Self;
     /// Sine of an angle in radians.
-    fn sin(self) -> Self;
+    fn sin<L: Level>(self) -> Self;
     /// Cosine of an angle in radians.
-    fn cos(self) -> Self;
+    fn cos<L: Level>(self) -> Self;
     /// eˣ.
-    fn exp(self) -> Self;
+    fn exp<L: Level>(self) -> Self;
     /// Natural logarithm.
-    fn ln(self) -> Self;
+    fn ln<L: Level>(self) -> Self;
     /// The angle of the point (`x`, `self`), in (−π, π].
-    fn atan2(self, x: Self) -> Self;
+    fn atan2<L: Level>(self, x: Self) -> Self;
     /// self to a real power.
-    fn powf(self, exponent: Self) -> Self;
+    fn powf<L: Level>(self, exponent: Self) -> Self;
+    /// self · factor + addend, rounded once where the level has fused operations and twice elsewhere.
+    fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
     /// What rounding `self + other` lost: (self + other) − fl(self + other), exactly. Zero in exact arithmetic.
     fn sum_error(self, other: Self) -> Self;
     /// What rounding `self · other` lost: self·other − fl(self·other), exactly unless it underflows. Zero in exact arithmetic.
-    fn product_error(self, other: Self) -> Self;
+    fn product_error<L: Level>(self, other: Self) -> Self;
     /// A power of two s with 1 ≤ s·|self| < 2, for |self| a normal number; 1 for zero, infinity and NaN. Multiplying by it
     /// is exact. Its derivative is taken as zero: formulas that use it are invariant to it.
     fn power_of_two_scale(self) -> Self;
+    /// Whether 2^(−80·`degree`) ≤ self < 2^(80·`degree`) (12 for 80 in single precision): a power `degree` of a length for
+    /// which products of up to eight such lengths neither overflow nor vanish. Generated code then leaves scaling out; a type
+    /// that cannot tell says no.
+    fn is_moderate(self, _degree: u8) -> Self::Mask {
+        Self::Mask::none()
+    }
     /// self < other.
     fn less(self, other: Self) -> Self::Mask;
     /// self ≤ other.
@@ -64,6 +84,10 @@ pub trait Number:
     fn equal(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Runs a kernel over this type at the level that suits it: the best this machine has for `f64` and `f32`.
+    fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Baseline>()
+    }
 }
 
 /// A [`Number`] that generated code can run over.
@@ -72,7 +96,7 @@ pub trait Real: Number + Copy {}
 impl<T: Number + Copy> Real for T {}
 
 macro_rules! number_for_float {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $split:literal) => {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $split:literal, $moderate:literal) => {
         impl Number for $float {
             type Mask = bool;
 
@@ -97,28 +121,32 @@ macro_rules! number_for_float {
                 if other > self { other } else { self }
             }
             #[inline(always)]
-            fn sin(self) -> Self {
+            fn sin<L: Level>(self) -> Self {
                 $float::sin(self)
             }
             #[inline(always)]
-            fn cos(self) -> Self {
+            fn cos<L: Level>(self) -> Self {
                 $float::cos(self)
             }
             #[inline(always)]
-            fn exp(self) -> Self {
+            fn exp<L: Level>(self) -> Self {
                 $float::exp(self)
             }
             #[inline(always)]
-            fn ln(self) -> Self {
+            fn ln<L: Level>(self) -> Self {
                 $float::ln(self)
             }
             #[inline(always)]
-            fn atan2(self, x: Self) -> Self {
+            fn atan2<L: Level>(self, x: Self) -> Self {
                 $float::atan2(self, x)
             }
             #[inline(always)]
-            fn powf(self, exponent: Self) -> Self {
+            fn powf<L: Level>(self, exponent: Self) -> Self {
                 $float::powf(self, exponent)
+            }
+            #[inline(always)]
+            fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
+                if L::FUSED { $float::mul_add(self, factor, addend) } else { self * factor + addend }
             }
             #[inline(always)]
             fn sum_error(self, other: Self) -> Self {
@@ -128,10 +156,10 @@ macro_rules! number_for_float {
                 (self - (sum - virtual_other)) + (other - virtual_other)
             }
             #[inline(always)]
-            fn product_error(self, other: Self) -> Self {
+            fn product_error<L: Level>(self, other: Self) -> Self {
                 let product = self * other;
-                if cfg!(target_feature = "fma") {
-                    return self.mul_add(other, -product);
+                if L::FUSED {
+                    return $float::mul_add(self, other, -product);
                 }
                 // Dekker's product: `mul_add` is a slow library call where the target has no fused instruction.
                 let halves = |value: $float| {
@@ -153,6 +181,12 @@ macro_rules! number_for_float {
                 $float::from_bits(inverse << $mantissa_bits)
             }
             #[inline(always)]
+            fn is_moderate(self, degree: u8) -> bool {
+                let limit = $moderate * u32::from(degree);
+                let power = |exponent: u32| $float::from_bits($bits::from(exponent) << $mantissa_bits);
+                power($bias - limit) <= self && self < power($bias + limit)
+            }
+            #[inline(always)]
             fn less(self, other: Self) -> bool {
                 self < other
             }
@@ -172,18 +206,18 @@ macro_rules! number_for_float {
     };
 }
 
-number_for_float!(f64, u64, 52, 0x7ff, 1023, 134_217_729.0);
-number_for_float!(f32, u32, 23, 0xff, 127, 4097.0);
+number_for_float!(f64, u64, 52, 0x7ff, 1023, 134_217_729.0, 80);
+number_for_float!(f32, u32, 23, 0xff, 127, 4097.0, 12);
 
 #[cfg(test)]
 mod tests {
-    use super::Number;
+    use super::{Baseline, Number};
 
     #[test]
     fn error_terms_are_exact() {
         let u = f64::EPSILON / 2.0;
         // (1 + 2u)(1 − u) = 1 + u − 2u² rounds to 1.
-        assert_eq!((1.0 + 2.0 * u).product_error(1.0 - u), u - 2.0 * u * u);
+        assert_eq!(Number::product_error::<Baseline>(1.0 + 2.0 * u, 1.0 - u), u - 2.0 * u * u);
         // Doubles are 2 apart at 1e16: 1e16 + 1 + 2u rounds up.
         assert_eq!(1e16_f64.sum_error(1.0 + 2.0 * u), -1.0 + 2.0 * u);
         assert_eq!(1.0_f32.sum_error(1e-10), 1e-10);
