@@ -94,6 +94,9 @@ impl Number for Hyper {
     fn product_error<L: Level>(self, _other: Self) -> Self {
         Self::constant(0.0)
     }
+    fn root_error<L: Level>(self, _root: Self) -> Self {
+        Self::constant(0.0)
+    }
     fn power_of_two_scale(self) -> Self {
         Self::constant(self.0.re.power_of_two_scale())
     }

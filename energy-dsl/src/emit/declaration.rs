@@ -91,10 +91,11 @@ fn routine(graph: &Graph, routine: &Routine) -> TokenStream {
 }
 
 fn counted(graph: &Graph, outputs: &[NodeId]) -> TokenStream {
-    let OperationCount { basic, divisions_and_roots, transcendental, error_terms } = count(graph, outputs);
+    let OperationCount { basic, fused, divisions_and_roots, transcendental, error_terms } = count(graph, outputs);
     quote! {
         ::energy_dsl::OperationCount {
             basic: #basic,
+            fused: #fused,
             divisions_and_roots: #divisions_and_roots,
             transcendental: #transcendental,
             error_terms: #error_terms,

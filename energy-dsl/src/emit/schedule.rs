@@ -18,11 +18,11 @@ pub(super) struct Schedule<'a> {
     last_use: BTreeMap<NodeId, usize>,
 }
 
-/// `let name = expression;`
-struct Statement {
-    name: Ident,
-    node: NodeId,
-    expression: TokenStream,
+enum Statement {
+    /// `let name = expression;`
+    Let { name: Ident, node: NodeId, expression: TokenStream },
+    /// Anything else.
+    Other(TokenStream),
 }
 
 const RETURNED: usize = usize::MAX;
@@ -47,8 +47,12 @@ impl<'a> Schedule<'a> {
                 let end = number * BLOCK + block.len();
                 let handed_on: Vec<&Ident> = block
                     .iter()
-                    .filter(|s| self.last_use.get(&s.node).is_some_and(|&u| u >= end))
-                    .map(|s| &s.name)
+                    .filter_map(|statement| match statement {
+                        Statement::Let { name, node, .. } => Some((name, node)),
+                        Statement::Other(_) => None,
+                    })
+                    .filter(|(_, node)| self.last_use.get(node).is_some_and(|&u| u >= end))
+                    .map(|(name, _)| name)
                     .collect();
                 let lets = lets(block);
                 quote!(let (#(#handed_on,)*) = { #lets (#(#handed_on,)*) };)
@@ -68,7 +72,7 @@ impl<'a> Schedule<'a> {
             }
             let missing: Vec<NodeId> = self
                 .graph
-                .op(next)
+                .fused(next)
                 .operands()
                 .map(|o| self.graph.resolve(o))
                 .filter(|o| !self.places.contains_key(o))
@@ -82,6 +86,11 @@ impl<'a> Schedule<'a> {
         }
         self.last_use.insert(node, RETURNED);
         self.places[&node].clone()
+    }
+
+    /// Adds a statement after those so far.
+    pub(super) fn statement(&mut self, tokens: TokenStream) {
+        self.statements.push(Statement::Other(tokens));
     }
 
     /// An array of nodes.
@@ -117,13 +126,13 @@ impl<'a> Schedule<'a> {
         }
         let expression = self.expression(node);
         let number = self.statements.len();
-        for operand in self.graph.op(node).operands() {
+        for operand in self.graph.fused(node).operands() {
             let last = self.last_use.entry(self.graph.resolve(operand)).or_default();
             *last = number.max(*last);
         }
         let name = format_ident!("t{number}");
         self.places.insert(node, quote!(#name));
-        self.statements.push(Statement { name, node, expression });
+        self.statements.push(Statement::Let { name, node, expression });
     }
 
     fn expression(&self, node: NodeId) -> TokenStream {
@@ -141,7 +150,7 @@ impl<'a> Schedule<'a> {
             let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
             quote!(#a.#name::<L>(#(#rest),*))
         };
-        match self.graph.op(node) {
+        match self.graph.fused(node) {
             Op::Constant(bits) => {
                 let literal = Literal::f64_suffixed(f64::from_bits(bits).abs());
                 let sign = if f64::from_bits(bits) < 0.0 { quote!(-) } else { quote!() };
@@ -178,6 +187,25 @@ impl<'a> Schedule<'a> {
                 quote!(#a.sum_error(-#b))
             }
             Op::ProductError(a, b) => levelled("product_error", a, &[b]),
+            Op::FusedMulSub(a, b, c) => levelled("fused_mul_sub", a, &[b, c]),
+            Op::RootError(a, b) => levelled("root_error", a, &[b]),
+            Op::MulAdd(a, b, c) => levelled("mul_add", a, &[b, c]),
+            Op::MulSub(a, b, c) => {
+                let (a, b, c) = (p(a), p(b), p(c));
+                quote!(#a.mul_add::<L>(#b, -#c))
+            }
+            Op::NegMulAdd(a, b, c) => {
+                let (a, b, c) = (p(a), p(b), p(c));
+                quote!((-#a).mul_add::<L>(#b, #c))
+            }
+            Op::Truth(value) => {
+                let not = if value { quote!(!) } else { quote!() };
+                quote!(#not <T::Mask as ::energy_dsl::Mask>::none())
+            }
+            Op::IsModerate(a, degree) => {
+                let a = p(a);
+                quote!(#a.is_moderate(#degree))
+            }
             Op::PowerOfTwoScale(a) => method("power_of_two_scale", a, &[]),
             Op::Less(a, b) => method("less", a, &[b]),
             Op::LessOrEqual(a, b) => method("less_or_equal", a, &[b]),
@@ -192,5 +220,9 @@ impl<'a> Schedule<'a> {
 }
 
 fn lets(statements: &[Statement]) -> TokenStream {
-    statements.iter().map(|Statement { name, expression, .. }| quote!(let #name = #expression;)).collect()
+    let text = |statement: &Statement| match statement {
+        Statement::Let { name, expression, .. } => quote!(let #name = #expression;),
+        Statement::Other(tokens) => tokens.clone(),
+    };
+    statements.iter().map(text).collect()
 }

@@ -96,7 +96,9 @@ impl Graph {
             }
             ((x, true), (y, false)) => self.sub(y, x),
             ((x, false), (y, true)) => self.sub(x, y),
-            _ => self.node(Op::Add(a.min(b), a.max(b))),
+            // One order for both, that written first: it decides which product a sum takes along.
+            _ if self.index.contains_key(&Op::Add(b, a)) => self.node(Op::Add(b, a)),
+            _ => self.node(Op::Add(a, b)),
         }
     }
 
@@ -354,6 +356,20 @@ impl Graph {
         }
     }
 
+    /// a · b − c, as if rounded once.
+    pub fn fused_mul_sub(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
+        if self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
+            let product = self.mul(a, b);
+            return self.sub(product, c);
+        }
+        self.node(Op::FusedMulSub(a.min(b), a.max(b), c))
+    }
+
+    /// a − b², b being √a rounded.
+    pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::RootError(a, b))
+    }
+
     /// A power of two that brings |a| into [1, 2).
     pub fn power_of_two_scale(&mut self, a: NodeId) -> NodeId {
         self.node(Op::PowerOfTwoScale(a))
@@ -374,27 +390,53 @@ impl Graph {
         self.node(Op::Equal(a.min(b), a.max(b)))
     }
 
+    /// Whether a ≥ 0 is the given power of a length that needs no scaling.
+    pub fn is_moderate(&mut self, a: NodeId, degree: u8) -> NodeId {
+        self.node(Op::IsModerate(a, degree))
+    }
+
+    /// A mask that is the same everywhere.
+    pub fn truth(&mut self, value: bool) -> NodeId {
+        self.node(Op::Truth(value))
+    }
+
     /// Both.
     pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if a == b { a } else { self.node(Op::And(a.min(b), a.max(b))) }
+        match (self.op(a), self.op(b)) {
+            (Op::Truth(true), _) | (_, Op::Truth(false)) => b,
+            (_, Op::Truth(true)) | (Op::Truth(false), _) => a,
+            _ if a == b => a,
+            _ => self.node(Op::And(a.min(b), a.max(b))),
+        }
     }
 
     /// Either.
     pub fn or(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if a == b { a } else { self.node(Op::Or(a.min(b), a.max(b))) }
+        match (self.op(a), self.op(b)) {
+            (Op::Truth(false), _) | (_, Op::Truth(true)) => b,
+            (_, Op::Truth(false)) | (Op::Truth(true), _) => a,
+            _ if a == b => a,
+            _ => self.node(Op::Or(a.min(b), a.max(b))),
+        }
     }
 
     /// Not.
     pub fn not(&mut self, a: NodeId) -> NodeId {
         match self.op(a) {
             Op::Not(b) => b,
+            Op::Truth(value) => self.truth(!value),
             _ => self.node(Op::Not(a)),
         }
     }
 
     /// A selection.
     pub fn select(&mut self, mask: NodeId, yes: NodeId, no: NodeId) -> NodeId {
-        if yes == no { yes } else { self.node(Op::Select(mask, yes, no)) }
+        match self.op(mask) {
+            Op::Truth(true) => yes,
+            Op::Truth(false) => no,
+            _ if yes == no => yes,
+            _ => self.node(Op::Select(mask, yes, no)),
+        }
     }
 
     /// Σ terms, left to right.

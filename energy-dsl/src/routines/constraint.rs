@@ -68,18 +68,18 @@ impl Compliant<'_> {
         let full_hessians: Vec<NodeId> =
             self.hessians.iter().flat_map(|row| self.coordinates.expand_triangle(g, row, self.points)).collect();
         [
-            Routine {
-                name: "constraint_jacobian",
-                reduced: [&c[..], &jacobian].concat(),
-                groups: vec![c.clone(), full_jacobian.clone()],
-                flags: first_flags,
-            },
-            Routine {
-                name: "constraint_hessian",
-                reduced: [&c[..], &jacobian, &hessians].concat(),
-                groups: vec![c, full_jacobian, full_hessians],
-                flags: second_flags,
-            },
+            Routine::new(
+                "constraint_jacobian",
+                [&c[..], &jacobian].concat(),
+                vec![c.clone(), full_jacobian.clone()],
+                first_flags,
+            ),
+            Routine::new(
+                "constraint_hessian",
+                [&c[..], &jacobian, &hessians].concat(),
+                vec![c, full_jacobian, full_hessians],
+                second_flags,
+            ),
         ]
     }
 
@@ -96,16 +96,16 @@ impl Compliant<'_> {
         let upper = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
         let curvature: Vec<NodeId> = upper.map(|(i, j)| self.outer(g, self.stiffness, i, j)).collect();
         let value = self.energy.value;
-        Routine {
-            name: "gauss_newton",
-            reduced: [&[value], &self.gradient[..], &curvature].concat(),
-            groups: vec![
+        Routine::new(
+            "gauss_newton",
+            [&[value], &self.gradient[..], &curvature].concat(),
+            vec![
                 vec![value],
                 self.coordinates.expand_all(g, &self.gradient, self.points),
                 self.coordinates.expand_triangle(g, &curvature, self.points),
             ],
-            flags: self.flags(g, 1, 1),
-        }
+            self.flags(g, 1, 1),
+        )
     }
 
     /// f = −∇U − k_d Jᵀ Ċ, Ċ = J q̇ with q̇ the differences of velocity; ∂f/∂x = −∇²U − k_d Σ (Ċ ∂²C + ∇C (∂²C q̇)ᵀ) and
@@ -154,18 +154,13 @@ impl Compliant<'_> {
         let full_position = self.coordinates.expand_square(g, &by_position, self.points);
         let full_velocity = self.coordinates.expand_square(g, &by_velocity, self.points);
         [
-            Routine {
-                name: "force",
-                reduced: force.clone(),
-                groups: vec![full_force.clone()],
-                flags: self.flags(g, 1, 1),
-            },
-            Routine {
-                name: "jacobians",
-                reduced: [force, by_position, by_velocity].concat(),
-                groups: vec![full_force, full_position, full_velocity],
-                flags: self.flags(g, 2, 2),
-            },
+            Routine::new("force", force.clone(), vec![full_force.clone()], self.flags(g, 1, 1)),
+            Routine::new(
+                "jacobians",
+                [force, by_position, by_velocity].concat(),
+                vec![full_force, full_position, full_velocity],
+                self.flags(g, 2, 2),
+            ),
         ]
     }
 }

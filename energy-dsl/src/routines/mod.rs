@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, SecondOrder, first_derivatives, second_order};
-use crate::graph::{Graph, NodeId, Op, Primitive};
+use crate::graph::{Graph, NodeId, Op, Primitive, ordinary};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
 
@@ -21,19 +21,51 @@ pub struct Routine {
     pub groups: Vec<Vec<NodeId>>,
     /// Masks: degenerate, kink.
     pub flags: [Option<NodeId>; 2],
+    /// What ordinary configurations leave out.
+    pub general: Option<General>,
+}
+
+/// A routine with all its precautions, for where the mask does not hold.
+#[derive(Clone, Debug)]
+pub struct General {
+    /// Where the routine itself suffices.
+    pub ordinary: NodeId,
+    /// What is returned elsewhere.
+    pub groups: Vec<Vec<NodeId>>,
+    /// The masks returned elsewhere.
+    pub flags: [Option<NodeId>; 2],
 }
 
 impl Routine {
+    fn new(name: &'static str, reduced: Vec<NodeId>, groups: Vec<Vec<NodeId>>, flags: [Option<NodeId>; 2]) -> Self {
+        Self { name, reduced, groups, flags, general: None }
+    }
+
+    /// Splits off what only extraordinary configurations need.
+    fn split(self, g: &mut Graph) -> Self {
+        let all: Vec<NodeId> = self.reduced.iter().copied().chain(self.outputs()).collect();
+        let Some((nodes, ordinary)) = ordinary(g, &all) else { return self };
+        let mut nodes = nodes.into_iter();
+        let mut take = |n: usize| nodes.by_ref().take(n).collect::<Vec<_>>();
+        let reduced = take(self.reduced.len());
+        let groups = self.groups.iter().map(|group| take(group.len())).collect();
+        let flags = self.flags.map(|flag| flag.map(|_| take(1)[0]).filter(|&mask| g.op(mask) != Op::Truth(false)));
+        let general = General { ordinary, groups: self.groups, flags: self.flags };
+        Self { name: self.name, reduced, groups, flags, general: Some(general) }
+    }
+
     /// All that it returns.
     #[must_use]
     pub fn outputs(&self) -> Vec<NodeId> {
-        self.groups.iter().flatten().copied().chain(self.flags.into_iter().flatten()).collect()
+        let guard = self.general.as_ref().map(|general| general.ordinary);
+        self.groups.iter().flatten().copied().chain(self.flags.into_iter().flatten()).chain(guard).collect()
     }
 
     /// All that it computes before the expansion to points.
     #[must_use]
     pub fn reduced_outputs(&self) -> Vec<NodeId> {
-        self.reduced.iter().copied().chain(self.flags.into_iter().flatten()).collect()
+        let guard = self.general.as_ref().map(|general| general.ordinary);
+        self.reduced.iter().copied().chain(self.flags.into_iter().flatten()).chain(guard).collect()
     }
 }
 
@@ -66,7 +98,7 @@ pub fn differentiate(program: &Program) -> Routines {
         Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
         _ => Coordinates::of_points(g, &outputs, Moving::Positions),
     };
-    let list = match program.kind {
+    let list: Vec<Routine> = match program.kind {
         Kind::Energy => {
             let plan = second_order(g, outputs[0], &coordinates);
             potential(g, &plan, &coordinates, program.points())
@@ -76,6 +108,7 @@ pub fn differentiate(program: &Program) -> Routines {
         Kind::Residual => residual(g, &outputs, &coordinates),
     };
     let primitives = primitives(g, &outputs, &list);
+    let list: Vec<Routine> = list.into_iter().map(|routine| routine.split(g)).collect();
     Routines {
         rest,
         rest_flags,
@@ -97,19 +130,14 @@ fn potential(g: &mut Graph, plan: &SecondOrder, coordinates: &Coordinates, point
     let hessian_gradient = coordinates.expand_all(g, &plan.gradient, points);
     let triangle = coordinates.expand_triangle(g, &plan.hessian, points);
     vec![
-        Routine { name: "value", reduced: vec![value], groups: vec![vec![value]], flags: flags[0] },
-        Routine {
-            name: "gradient",
-            reduced: [&[value], &gradient[..]].concat(),
-            groups: vec![vec![value], full_gradient],
-            flags: flags[1],
-        },
-        Routine {
-            name: "hessian",
-            reduced: [&[value], &plan.gradient[..], &plan.hessian[..]].concat(),
-            groups: vec![vec![value], hessian_gradient, triangle],
-            flags: flags[2],
-        },
+        Routine::new("value", vec![value], vec![vec![value]], flags[0]),
+        Routine::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], flags[1]),
+        Routine::new(
+            "hessian",
+            [&[value], &plan.gradient[..], &plan.hessian[..]].concat(),
+            vec![vec![value], hessian_gradient, triangle],
+            flags[2],
+        ),
     ]
 }
 
@@ -141,13 +169,8 @@ fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize) 
     let full_velocity = square(g, &by_velocity, &velocities);
     let order = |order: u8| f.iter().map(|&node| (node, order)).collect::<Vec<_>>();
     vec![
-        Routine { name: "force", reduced: f.to_vec(), groups: vec![f.to_vec()], flags: flags(g, &order(0)) },
-        Routine {
-            name: "jacobians",
-            reduced,
-            groups: vec![f.to_vec(), full_position, full_velocity],
-            flags: flags(g, &order(1)),
-        },
+        Routine::new("force", f.to_vec(), vec![f.to_vec()], flags(g, &order(0))),
+        Routine::new("jacobians", reduced, vec![f.to_vec(), full_position, full_velocity], flags(g, &order(1))),
     ]
 }
 
@@ -155,13 +178,13 @@ fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates) -> Vec<Routi
     let jacobian: Vec<NodeId> = first_derivatives(g, r, coordinates).into_iter().flatten().collect();
     let order = |order: u8| r.iter().map(|&node| (node, order)).collect::<Vec<_>>();
     vec![
-        Routine { name: "residual", reduced: r.to_vec(), groups: vec![r.to_vec()], flags: flags(g, &order(0)) },
-        Routine {
-            name: "jacobian",
-            reduced: r.iter().chain(&jacobian).copied().collect(),
-            groups: vec![r.to_vec(), jacobian],
-            flags: flags(g, &order(1)),
-        },
+        Routine::new("residual", r.to_vec(), vec![r.to_vec()], flags(g, &order(0))),
+        Routine::new(
+            "jacobian",
+            r.iter().chain(&jacobian).copied().collect(),
+            vec![r.to_vec(), jacobian],
+            flags(g, &order(1)),
+        ),
     ]
 }
 

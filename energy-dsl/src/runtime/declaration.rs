@@ -40,6 +40,8 @@ pub struct Field {
 pub struct OperationCount {
     /// Additions, subtractions, multiplications, negations, minima, maxima, absolute values, comparisons and selections.
     pub basic: usize,
+    /// Products that fuse with a sum: one instruction where the processor has it, else two.
+    pub fused: usize,
     /// Divisions and square roots.
     pub divisions_and_roots: usize,
     /// sin, cos, exp, log, atan2, pow.
@@ -50,10 +52,16 @@ pub struct OperationCount {
 }
 
 impl OperationCount {
-    /// All of them, an error term counting as one.
+    /// All of them: a fused multiply-add counts as its two operations, an error term as one.
     #[must_use]
     pub const fn total(&self) -> usize {
-        self.basic + self.divisions_and_roots + self.transcendental + self.error_terms
+        self.instructions() + self.fused
+    }
+
+    /// All of them, a fused multiply-add counting as one.
+    #[must_use]
+    pub const fn instructions(&self) -> usize {
+        self.basic + self.fused + self.divisions_and_roots + self.transcendental + self.error_terms
     }
 }
 

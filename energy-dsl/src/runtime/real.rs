@@ -67,6 +67,17 @@ pub trait Number:
     fn sum_error(self, other: Self) -> Self;
     /// What rounding `self · other` lost: self·other − fl(self·other), exactly unless it underflows. Zero in exact arithmetic.
     fn product_error<L: Level>(self, other: Self) -> Self;
+    /// self · factor − subtrahend as if rounded once.
+    fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
+        let error = self.clone().product_error::<L>(factor.clone());
+        (self * factor - subtrahend) + error
+    }
+    /// What rounding the square root of `self` to `root` lost: self − root², exactly but for one last rounding. Zero in exact
+    /// arithmetic.
+    fn root_error<L: Level>(self, root: Self) -> Self {
+        let square = root.clone() * root.clone();
+        (self - square) - root.clone().product_error::<L>(root)
+    }
     /// A power of two s with 1 ≤ s·|self| < 2, for |self| a normal number; 1 for zero, infinity and NaN. Multiplying by it
     /// is exact. Its derivative is taken as zero: formulas that use it are invariant to it.
     fn power_of_two_scale(self) -> Self;
@@ -169,6 +180,20 @@ macro_rules! number_for_float {
                 };
                 let ((a, b), (c, d)) = (halves(self), halves(other));
                 ((a * c - product) + a * d + b * c) + b * d
+            }
+            #[inline(always)]
+            fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
+                if L::FUSED {
+                    return $float::mul_add(self, factor, -subtrahend);
+                }
+                (self * factor - subtrahend) + Number::product_error::<L>(self, factor)
+            }
+            #[inline(always)]
+            fn root_error<L: Level>(self, root: Self) -> Self {
+                if L::FUSED {
+                    return $float::mul_add(-root, root, self);
+                }
+                (self - root * root) - Number::product_error::<L>(root, root)
             }
             #[inline(always)]
             fn power_of_two_scale(self) -> Self {

@@ -1,0 +1,322 @@
+//! The routines as methods of the traits that the declaration's kind implements.
+//!
+//! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L; `f`, which runs it at the machine's best level;
+//! and, where precautions were split off, `f_in_general::<L>` for the configurations that need them.
+
+use proc_macro2::{Ident, TokenStream};
+use quote::{format_ident, quote};
+
+use super::schedule::Schedule;
+use crate::check::{Input as DeclaredInput, Program};
+use crate::graph::{Input, NodeId};
+use crate::routines::{Routine, Routines};
+use crate::runtime::Kind;
+use crate::syntax::InputType;
+
+/// What turns a group of outputs into an expression.
+type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
+
+const NUMBER: Layout = |schedule, nodes| schedule.value(nodes[0]);
+const NUMBERS: Layout = |schedule, nodes| schedule.array(nodes);
+const VECTORS: Layout = |schedule, nodes| schedule.vectors(nodes);
+const BLOCKS: Layout = |schedule, nodes| schedule.blocks(nodes);
+
+/// How a routine appears in its trait.
+struct Method {
+    routine: &'static str,
+    /// The kernel that calls it.
+    call: &'static str,
+    /// The struct it returns, and that struct's fields with the types it is generic over.
+    result: &'static str,
+    fields: &'static [(&'static str, Layout)],
+    generics: TokenStream,
+    /// Arguments after `self`.
+    arguments: Vec<(&'static str, TokenStream)>,
+}
+
+/// The implementations of all traits of the declaration's kind.
+pub(super) fn traits(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    match program.kind {
+        Kind::Energy => potential(name, program, routines),
+        Kind::Force => force_law(name, program, routines),
+        Kind::Constraint => {
+            let (potential, force) = (potential(name, program, routines), force_law(name, program, routines));
+            let constraint = constraint(name, program, routines);
+            quote!(#potential #force #constraint)
+        }
+        Kind::Residual => residual(name, program, routines),
+    }
+}
+
+fn points(program: &Program) -> TokenStream {
+    let points = program.points();
+    quote!([::energy_dsl::Vector3<T>; #points])
+}
+
+fn blocks(number: usize) -> TokenStream {
+    quote!([::energy_dsl::Block<T>; #number])
+}
+
+fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let n = program.points();
+    let (points, triangle) = (points(program), blocks(n * (n + 1) / 2));
+    let x = || vec![("x", points.clone())];
+    let methods = [
+        Method {
+            routine: "value",
+            call: "ValueCall",
+            result: "Value",
+            fields: &[("value", NUMBER)],
+            generics: quote!(T),
+            arguments: x(),
+        },
+        Method {
+            routine: "gradient",
+            call: "GradientCall",
+            result: "Gradient",
+            fields: &[("value", NUMBER), ("gradient", VECTORS)],
+            generics: quote!(T, #points),
+            arguments: x(),
+        },
+        Method {
+            routine: "hessian",
+            call: "HessianCall",
+            result: "Hessian",
+            fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
+            generics: quote!(T, #points, #triangle),
+            arguments: x(),
+        },
+    ];
+    let types = quote!(type Points = #points; type Triangle = #triangle;);
+    implementation(name, "Potential", &types, &methods, program, routines)
+}
+
+fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let n = program.points();
+    let (points, square) = (points(program), blocks(n * n));
+    let state = || vec![("x", points.clone()), ("v", points.clone())];
+    let methods = [
+        Method {
+            routine: "force",
+            call: "ForceCall",
+            result: "ForceValue",
+            fields: &[("force", VECTORS)],
+            generics: quote!(T, #points),
+            arguments: state(),
+        },
+        Method {
+            routine: "jacobians",
+            call: "JacobiansCall",
+            result: "ForceJacobians",
+            fields: &[("force", VECTORS), ("by_position", BLOCKS), ("by_velocity", BLOCKS)],
+            generics: quote!(T, #points, #square),
+            arguments: state(),
+        },
+    ];
+    let types = quote!(type Points = #points; type Square = #square;);
+    implementation(name, "ForceLaw", &types, &methods, program, routines)
+}
+
+fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let (n, rows) = (program.points(), program.rows());
+    let vectors = rows * n;
+    let rows_type = quote!([T; #rows]);
+    let jacobian = quote!([::energy_dsl::Vector3<T>; #vectors]);
+    let (points, triangle, triangles) = (points(program), blocks(n * (n + 1) / 2), blocks(rows * n * (n + 1) / 2));
+    let x = || vec![("x", points.clone())];
+    let methods = [
+        Method {
+            routine: "constraint_jacobian",
+            call: "ConstraintJacobianCall",
+            result: "ConstraintJacobian",
+            fields: &[("value", NUMBERS), ("jacobian", VECTORS)],
+            generics: quote!(T, #rows_type, #jacobian),
+            arguments: x(),
+        },
+        Method {
+            routine: "constraint_hessian",
+            call: "ConstraintHessianCall",
+            result: "ConstraintHessian",
+            fields: &[("value", NUMBERS), ("jacobian", VECTORS), ("hessians", BLOCKS)],
+            generics: quote!(T, #rows_type, #jacobian, #triangles),
+            arguments: x(),
+        },
+        Method {
+            routine: "gauss_newton",
+            call: "GaussNewtonCall",
+            result: "Hessian",
+            fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
+            generics: quote!(T, #points, #triangle),
+            arguments: x(),
+        },
+    ];
+    let types = quote!(type Rows = #rows_type; type Jacobian = #jacobian; type Triangles = #triangles;);
+    implementation(name, "Constraint", &types, &methods, program, routines)
+}
+
+fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let (unknowns, rows) = (program.moving_size(), program.rows());
+    let entries = unknowns * rows;
+    let (unknowns, rows, jacobian) = (quote!([T; #unknowns]), quote!([T; #rows]), quote!([T; #entries]));
+    let u = || vec![("u", unknowns.clone())];
+    let methods = [
+        Method {
+            routine: "residual",
+            call: "ResidualCall",
+            result: "ResidualValue",
+            fields: &[("value", NUMBERS)],
+            generics: quote!(T, #rows),
+            arguments: u(),
+        },
+        Method {
+            routine: "jacobian",
+            call: "ResidualJacobianCall",
+            result: "ResidualJacobian",
+            fields: &[("value", NUMBERS), ("jacobian", NUMBERS)],
+            generics: quote!(T, #rows, #jacobian),
+            arguments: u(),
+        },
+    ];
+    let types = quote!(type Unknowns = #unknowns; type Rows = #rows; type Jacobian = #jacobian;);
+    implementation(name, "Residual", &types, &methods, program, routines)
+}
+
+/// A trait's implementation, and beside it the routines with all precautions.
+fn implementation(
+    name: &Ident,
+    of: &str,
+    types: &TokenStream,
+    methods: &[Method],
+    program: &Program,
+    routines: &Routines,
+) -> TokenStream {
+    let of = format_ident!("{of}");
+    let (levelled, general): (Vec<_>, Vec<_>) = methods.iter().map(|m| method(m, program, routines)).unzip();
+    let general = general.iter().any(|g| !g.is_empty()).then(|| {
+        quote! {
+            #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+            impl<T: ::energy_dsl::Real> #name<T> {
+                #(#general)*
+            }
+        }
+    });
+    // Generated arithmetic is not written to be read by lints.
+    quote! {
+        #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> ::energy_dsl::#of<T> for #name<T> {
+            #types
+            #(#levelled)*
+        }
+        #general
+    }
+}
+
+/// The method and its levelled form; the form with all precautions, if they were split off.
+fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
+    let routine = routines
+        .list
+        .iter()
+        .find(|r| r.name == method.routine)
+        .expect("compiler bug: a routine of another kind of declaration");
+    let (plain, call, result) =
+        (format_ident!("{}", method.routine), format_ident!("{}", method.call), format_ident!("{}", method.result));
+    let (levelled, in_general) = (format_ident!("{plain}_at"), format_ident!("{plain}_in_general"));
+    let generics = &method.generics;
+    let result_type = quote!(::energy_dsl::#result<#generics>);
+    let names: Vec<_> = method.arguments.iter().map(|(name, _)| format_ident!("{name}")).collect();
+    let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
+    let arguments = quote!(&self, #(#names: &#types),*);
+
+    let leave = quote!(return self.#in_general::<L>(#(#names),*));
+    let body = body(method, program, routines, routine, &routine.groups, routine.flags, Some(leave));
+    let levelled = quote! {
+        #[inline]
+        fn #plain(#arguments) -> #result_type {
+            T::dispatch(::energy_dsl::#call(self, #(#names),*))
+        }
+
+        #[inline(always)]
+        fn #levelled<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+            #body
+        }
+    };
+    let general = routine.general.as_ref().map(|general| {
+        let body = self::body(method, program, routines, routine, &general.groups, general.flags, None);
+        quote! {
+            #[cold]
+            #[inline(never)]
+            fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+                #body
+            }
+        }
+    });
+    (levelled, general.unwrap_or_default())
+}
+
+/// Statements, then the struct returned; before most of them, `leave` where the configuration is not ordinary.
+fn body(
+    method: &Method,
+    program: &Program,
+    routines: &Routines,
+    routine: &Routine,
+    groups: &[Vec<NodeId>],
+    flags: [Option<NodeId>; 2],
+    leave: Option<TokenStream>,
+) -> TokenStream {
+    let read = |input: Input| read_input(program, input);
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    if let (Some(general), Some(leave)) = (&routine.general, leave) {
+        let ordinary = schedule.value(general.ordinary);
+        schedule.statement(quote!(if !::energy_dsl::Mask::all(#ordinary) { #leave; }));
+    }
+    let mut values = Vec::new();
+    for ((field, layout), nodes) in method.fields.iter().zip(groups) {
+        let (field, value) = (format_ident!("{field}"), layout(&mut schedule, nodes));
+        values.push(quote!(#field: #value));
+    }
+    let (degenerate, kink) = (schedule.mask(flags[0]), schedule.mask(flags[1]));
+    let statements = schedule.statements();
+    let result = format_ident!("{}", method.result);
+    quote! {
+        #statements
+        ::energy_dsl::#result { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }
+    }
+}
+
+/// How a routine reads an input.
+fn read_input(program: &Program, input: Input) -> TokenStream {
+    let coordinate = |list: &str, i: u16| {
+        let (list, point, axis) = (format_ident!("{list}"), usize::from(i) / 3, usize::from(i) % 3);
+        quote!(#list[#point][#axis])
+    };
+    match input {
+        Input::Position(i) if program.kind == Kind::Residual => {
+            let i = usize::from(i);
+            quote!(u[#i])
+        }
+        Input::Position(i) => coordinate("x", i),
+        Input::Velocity(i) => coordinate("v", i),
+        Input::Parameter(i) => component(&program.parameters, usize::from(i), &quote!(self.)),
+        Input::Precomputed(i) => {
+            let i = usize::from(i);
+            quote!(self.precomputed[#i])
+        }
+        Input::Rest(_) => unreachable!("compiler bug: the rest shape is read when an element is made"),
+    }
+}
+
+/// The component with a number among the inputs, each read as `prefix name`.
+pub(super) fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenStream) -> TokenStream {
+    let input = inputs
+        .iter()
+        .find(|i| (i.first..i.first + i.input_type.size()).contains(&number))
+        .expect("compiler bug: inputs are numbered without gaps");
+    let name = format_ident!("{}", input.name);
+    match input.input_type {
+        InputType::Scalar => quote!(#prefix #name),
+        _ => {
+            let place = number - input.first;
+            quote!(#prefix #name[#place])
+        }
+    }
+}
