@@ -101,8 +101,9 @@ fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Between {
     let (x, y) = (g.scaled(scales[0], a), g.scaled(scales[1], b));
     let squares = [&x, &y].map(|v| g.sum_of_squares(v));
     let zeros = squares.map(|square| g.equal(square, null));
-    assume_moderate(g, a, scales[0], zeros[0]);
-    assume_moderate(g, b, scales[1], zeros[1]);
+    for own in 0..2 {
+        assume_moderate(g, squares[own], scales[own], zeros[own]);
+    }
     let degenerate = g.or(zeros[0], zeros[1]);
 
     let cross = accurate_cross(g, &x, &y);

@@ -52,6 +52,8 @@ pub(super) struct Direction {
     pub(super) scale: NodeId,
     /// scale · d.
     pub(super) scaled: Vec<NodeId>,
+    /// ‖scale · d‖².
+    pub(super) square: NodeId,
     /// ‖scale · d‖.
     pub(super) length: NodeId,
     /// Whether d = 0.
@@ -73,9 +75,8 @@ fn largest_magnitude(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
     magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components")
 }
 
-/// Notes that where d·d is moderate d needs no scaling and is not 0.
-pub(super) fn assume_moderate(g: &mut Graph, d: &[NodeId], scale: NodeId, zero: NodeId) {
-    let square = g.sum_of_squares(d);
+/// Notes that where d·d (which scaling brings near 1) is moderate, d needs no scaling and is not 0.
+pub(super) fn assume_moderate(g: &mut Graph, square: NodeId, scale: NodeId, zero: NodeId) {
     let moderate = g.is_moderate(square, 2);
     let (one, never) = (g.constant(1.0), g.truth(false));
     g.assume(scale, one, moderate);
@@ -92,14 +93,14 @@ pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Di
     let reciprocal = g.div(one, length);
     let reciprocal = g.select(zero, null, reciprocal);
     let unit = g.scaled(reciprocal, &scaled);
-    Direction { scale, scaled, length, zero, reciprocal, unit }
+    Direction { scale, scaled, square, length, zero, reciprocal, unit }
 }
 
 /// Finds the direction of `d`.
 pub(super) fn direction(g: &mut Graph, d: &[NodeId]) -> Direction {
     let scale = common_scale(g, d);
     let at = direction_scaled(g, d, scale);
-    assume_moderate(g, d, scale, at.zero);
+    assume_moderate(g, at.square, scale, at.zero);
     at
 }
 
@@ -226,7 +227,7 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let largest = g.max(largest, rest_length);
     let scale = g.power_of_two_scale(largest);
     let at = direction_scaled(g, &d, scale);
-    assume_moderate(g, &d, scale, at.zero);
+    assume_moderate(g, at.square, scale, at.zero);
     let length = g.mul(scale, rest_length);
     let (null, one, half) = (g.constant(0.0), g.constant(1.0), g.constant(0.5));
     let slack = g.equal(length, null);

@@ -14,6 +14,7 @@ pub use shape::{Lowered, Shape};
 
 pub(crate) use angle::recognise_one_minus_cosine;
 pub(crate) use dihedral::recognise_dihedral;
+use dihedral::recognise_sine_difference;
 pub(crate) use length::recognise_norm_power;
 
 use crate::graph::{Graph, NodeId};
@@ -64,5 +65,7 @@ pub fn find(name: &str) -> Option<&'static Function> {
 
 /// The robust form of a − b, if it has one.
 pub(crate) fn recognise_difference(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
-    recognise_one_minus_cosine(g, a, b).or_else(|| length::recognise_elongation(g, a, b))
+    recognise_one_minus_cosine(g, a, b)
+        .or_else(|| length::recognise_elongation(g, a, b))
+        .or_else(|| recognise_sine_difference(g, a, b))
 }

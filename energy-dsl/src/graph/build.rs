@@ -138,6 +138,17 @@ impl Graph {
         }
     }
 
+    /// a − b without recognition.
+    pub(crate) fn plain_difference(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Sub(a, b))
+    }
+
+    /// 0 − a: −a, but for +0 where a is a zero of either sign.
+    pub fn minus_or_plus_zero(&mut self, a: NodeId) -> NodeId {
+        let zero = self.constant(0.0);
+        self.node(Op::Sub(zero, a))
+    }
+
     /// a · b. A squared elongation becomes its own primitive.
     pub fn mul(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
@@ -474,9 +485,22 @@ impl Graph {
         factors.iter().fold(weight.unwrap_or(one), |product, &factor| self.mul(product, factor))
     }
 
-    /// weight · Σ products, the weight going into each.
+    /// weight · Σ products, the weight going into each. Products that follow each other and end in the same factor are added
+    /// before it multiplies them.
     pub fn sum_of_products(&mut self, weight: Option<NodeId>, products: &[Vec<NodeId>]) -> NodeId {
-        let terms: Vec<_> = products.iter().map(|factors| self.product(weight, factors)).collect();
+        let mut terms = Vec::with_capacity(products.len());
+        for group in products.chunk_by(|a, b| a.len() > 1 && b.len() > 1 && a.last() == b.last()) {
+            let term = match group {
+                [factors] => self.product(weight, factors),
+                _ => {
+                    let common = *group[0].last().expect("more than one factor");
+                    let kept: Vec<_> = group.iter().map(|factors| factors[..factors.len() - 1].to_vec()).collect();
+                    let sum = self.sum_of_products(weight, &kept);
+                    self.mul(sum, common)
+                }
+            };
+            terms.push(term);
+        }
         self.sum(terms)
     }
 

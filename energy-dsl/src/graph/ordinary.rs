@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Graph, NodeId, Op};
 
-/// Where `guard` holds, `node` equals `instead`.
+/// Where `guard`, computed under the assumptions themselves, holds, `node` equals `instead`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assumption {
     /// The precaution.
@@ -34,11 +34,13 @@ pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeI
         guards: BTreeSet::new(),
     };
     let outputs = outputs.iter().map(|&output| path.rebuild(g, output)).collect();
-    if path.guards.is_empty() {
-        return None;
+    // A guard may rest on further assumptions.
+    let mut masks = BTreeMap::new();
+    while let Some(&guard) = path.guards.iter().find(|guard| !masks.contains_key(*guard)) {
+        let mask = path.rebuild(g, guard);
+        masks.insert(guard, mask);
     }
-    let masks: Vec<_> = path.guards.into_iter().map(|guard| g.resolve(guard)).collect();
-    let guard = masks.into_iter().reduce(|a, b| g.and(a, b)).expect("some");
+    let guard = masks.into_values().collect::<BTreeSet<_>>().into_iter().reduce(|a, b| g.and(a, b))?;
     Some((outputs, guard))
 }
 
@@ -105,6 +107,7 @@ impl Path {
         }
         let d = |o: NodeId| self.done[&g.resolve(o)];
         match op {
+            Op::Sub(a, b) if g.is(a, 0.0) => g.minus_or_plus_zero(d(b)),
             Op::Constant(_) | Op::Truth(_) | Op::Pi | Op::Input(_) => node,
             Op::Neg(a) => g.neg(d(a)),
             Op::Add(a, b) => g.add(d(a), d(b)),

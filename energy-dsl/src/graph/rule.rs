@@ -31,6 +31,8 @@ pub enum Primitive {
     DihedralSineHalf,
     /// cos θ/2 of a dihedral angle.
     DihedralCosineHalf,
+    /// sin θ/2 − sin θ₀/2 of a dihedral angle and its rest angle.
+    DihedralSineDifference,
     /// 1 − cos x.
     Versine,
     /// x − sin x.
@@ -62,6 +64,7 @@ impl Primitive {
             Self::DihedralCosine => "cos θ of a dihedral angle",
             Self::DihedralSineHalf => "sin θ/2 of a dihedral angle",
             Self::DihedralCosineHalf => "cos θ/2 of a dihedral angle",
+            Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
             Self::Partial { .. } => return None,
