@@ -17,10 +17,10 @@ pub use plan::{SecondOrder, second_order};
 
 use std::collections::BTreeSet;
 
-use crate::graph::{Graph, NodeId};
+use crate::graph::{Graph, NodeId, Op};
 
 /// The nodes through which `outputs` depend on what moves, in topological order. A rule leads on to its arguments, or to its
-/// value where only that can be differentiated.
+/// value where only that can be differentiated; masks and rounding errors have no derivatives.
 fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack: Vec<NodeId> = outputs.to_vec();
@@ -31,7 +31,11 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTre
         match graph.rule(node) {
             Some(rule) if second_order && rule.second.is_none() => stack.push(rule.value),
             Some(rule) => stack.extend(&rule.arguments),
-            None => stack.extend(graph.op(node).operands()),
+            None => match graph.op(node) {
+                Op::Select(_, yes, no) => stack.extend([yes, no]),
+                op if op.is_mask() || op.is_constant_in_exact_arithmetic() => {}
+                op => stack.extend(op.operands()),
+            },
         }
     }
     seen

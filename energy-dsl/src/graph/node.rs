@@ -137,6 +137,19 @@ impl Op {
         list.into_iter().take(count)
     }
 
+    /// Whether the node is a rounding error or a scale: its derivative is zero whatever its operands.
+    #[must_use]
+    pub fn is_constant_in_exact_arithmetic(self) -> bool {
+        matches!(
+            self,
+            Self::SumError(..)
+                | Self::DifferenceError(..)
+                | Self::ProductError(..)
+                | Self::RootError(..)
+                | Self::PowerOfTwoScale(_)
+        )
+    }
+
     /// Whether the node is a mask and not a number.
     #[must_use]
     pub fn is_mask(self) -> bool {
