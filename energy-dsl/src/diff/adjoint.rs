@@ -1,3 +1,5 @@
+//! Derivatives that flow back from the outputs.
+
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
@@ -6,16 +8,24 @@ use super::forward::{Sparse, products, tangents};
 use super::local::local;
 use crate::graph::{Graph, NodeId, Op};
 
-/// Derivatives of the output by every node it is made of.
-fn adjoints(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<NodeId, NodeId> {
-    let mut adjoints = BTreeMap::new();
-    adjoints.insert(output, g.constant(1.0));
-    for node in differentiable(g, &[output], true).into_iter().rev() {
+/// Nodes and what each is weighed by.
+pub(super) type Weighted = BTreeMap<NodeId, NodeId>;
+
+/// Σ weight · output as one weighted node.
+pub(super) fn alone(g: &mut Graph, output: NodeId) -> Weighted {
+    BTreeMap::from([(output, g.constant(1.0))])
+}
+
+/// Derivatives of Σ weight · output by every node the outputs are made of.
+fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second_order: bool) -> Weighted {
+    let mut adjoints = outputs.clone();
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    for node in differentiable(g, &roots, second_order).into_iter().rev() {
         let Some(&weight) = adjoints.get(&node) else { continue };
         if coordinates.seeds.contains_key(&node) {
             continue;
         }
-        let local = local(g, node, true);
+        let local = local(g, node, second_order);
         for (operand, first) in local.operands.into_iter().zip(local.first) {
             if !g.varies(operand) {
                 continue;
@@ -31,9 +41,25 @@ fn adjoints(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMa
     adjoints
 }
 
-/// ∇U by reverse accumulation.
-pub(super) fn gradient(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> Vec<NodeId> {
-    let adjoints = adjoints(g, output, coordinates);
+/// Whether reverse accumulation is unsafe: through a selection it would multiply the derivative of the other branch, which may be
+/// infinite, by zero.
+fn selects(g: &Graph, outputs: &Weighted, second_order: bool) -> bool {
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    let nodes = differentiable(g, &roots, second_order);
+    nodes.iter().any(|&node| matches!(g.op(node), Op::Select(..) | Op::Min(..) | Op::Max(..)))
+}
+
+/// Σ weight · ∇output by reverse accumulation. `None` where there are selections.
+pub(super) fn gradient(
+    g: &mut Graph,
+    outputs: &Weighted,
+    coordinates: &Coordinates,
+    second_order: bool,
+) -> Option<Vec<NodeId>> {
+    if selects(g, outputs, second_order) {
+        return None;
+    }
+    let adjoints = adjoints(g, outputs, coordinates, second_order);
     let mut gradient = vec![g.constant(0.0); coordinates.len()];
     for (node, seeds) in &coordinates.seeds {
         let Some(&weight) = adjoints.get(node) else { continue };
@@ -42,23 +68,24 @@ pub(super) fn gradient(g: &mut Graph, output: NodeId, coordinates: &Coordinates)
             gradient[c] = g.add(gradient[c], term);
         }
     }
-    gradient
+    Some(gradient)
 }
 
-/// ∇²U = Σ over nodes v of ∂U/∂v Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where a selection could
-/// multiply an infinite branch by zero.
+/// Σ weight · ∇²output = Σ over nodes v of the adjoint of v times Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where
+/// there are selections.
 pub(super) fn second_derivatives(
     g: &mut Graph,
-    output: NodeId,
+    outputs: &Weighted,
     coordinates: &Coordinates,
 ) -> Option<BTreeMap<usize, NodeId>> {
-    let nodes = differentiable(g, &[output], true);
-    if nodes.iter().any(|&node| matches!(g.op(node), Op::Select(..) | Op::Min(..) | Op::Max(..))) {
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    if selects(g, outputs, true) {
         return None;
     }
+    let nodes = differentiable(g, &roots, true);
     let n = coordinates.len();
-    let tangents = tangents(g, &[output], coordinates, true);
-    let adjoints = adjoints(g, output, coordinates);
+    let tangents = tangents(g, &roots, coordinates, true);
+    let adjoints = adjoints(g, outputs, coordinates, true);
     let mut hessian: BTreeMap<usize, NodeId> = BTreeMap::new();
     let none = Sparse::new();
     for node in nodes {

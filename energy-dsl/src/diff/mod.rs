@@ -1,11 +1,13 @@
 //! Derivatives of graph nodes, as nodes of the same graph.
 //!
 //! Inputs are first *reduced*: where points enter only through differences, derivatives are taken by those differences
-//! (`coordinates.rs`). First derivatives go forward as sparse dual parts (`forward.rs`); second derivatives either forward
-//! too, or weighted by adjoints (`adjoint.rs`): `plan.rs` takes whichever needs less arithmetic.
+//! (`coordinates.rs`). First derivatives go forward as sparse dual parts (`forward.rs`) or back from the outputs
+//! (`adjoint.rs`); second derivatives forward too, weighted by adjoints, or gathered at a few primitives (`cut.rs`):
+//! `plan.rs` takes whichever costs least.
 
 mod adjoint;
 mod coordinates;
+mod cut;
 mod expand;
 mod forward;
 mod local;
@@ -13,7 +15,7 @@ mod plan;
 
 pub use coordinates::{Coordinates, Moving};
 pub use forward::first_derivatives;
-pub use plan::{SecondOrder, second_order};
+pub use plan::{Plan, Route, SecondOrder, first_order, second_order};
 
 use std::collections::BTreeSet;
 

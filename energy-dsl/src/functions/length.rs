@@ -3,6 +3,7 @@
 //! Vectors are scaled by a power of two first, so that no square overflows or vanishes. With n = d/‖d‖, r = ‖d‖ and
 //! P = I − n nᵀ: ∇r = n and ∇²r = P/r, the diagonal of P being the sum of the *other* squares, never 1 − nᵢ².
 
+use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 use crate::runtime::Flag;
@@ -135,7 +136,7 @@ fn norm(g: &mut Graph, args: &[Lowered]) -> Lowered {
 }
 
 fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
-    Lowered::scalar(g.sum_of_squares(&args[0].parts))
+    Lowered::scalar(inner_product(g, &args[0].parts, &args[0].parts))
 }
 
 fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {

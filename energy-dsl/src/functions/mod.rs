@@ -5,6 +5,7 @@ mod angle;
 mod arithmetic;
 mod dihedral;
 mod elementary;
+mod inner_product;
 mod length;
 mod linear_algebra;
 mod logic;

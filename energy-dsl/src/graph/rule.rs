@@ -5,6 +5,8 @@ use crate::runtime::Flag;
 /// A robust primitive of the language; each output of a vector-valued one is a primitive of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Primitive {
+    /// x·y.
+    InnerProduct,
     /// ‖d‖.
     Norm,
     /// A component of d/‖d‖.
@@ -67,7 +69,7 @@ impl Primitive {
             Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
-            Self::Partial { .. } => return None,
+            Self::InnerProduct | Self::Partial { .. } => return None,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Routine, flags, potential};
 use crate::check::Program;
-use crate::diff::{Coordinates, SecondOrder, first_derivatives, second_order};
+use crate::diff::{Coordinates, Plan, SecondOrder, first_order, second_order};
 use crate::graph::{Graph, Input, NodeId, symmetric_index};
 
 /// What all routines are made of, in reduced coordinates.
@@ -21,7 +21,13 @@ struct Compliant<'a> {
     points: usize,
 }
 
-pub(super) fn routines(g: &mut Graph, program: &Program, c: &[NodeId], coordinates: &Coordinates) -> Vec<Routine> {
+pub(super) fn routines(
+    g: &mut Graph,
+    program: &Program,
+    c: &[NodeId],
+    coordinates: &Coordinates,
+    plans: &mut Vec<Plan>,
+) -> Vec<Routine> {
     let parameter = |g: &mut Graph, from_end: usize| {
         let number = program.parameters_size() - from_end;
         g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
@@ -31,19 +37,30 @@ pub(super) fn routines(g: &mut Graph, program: &Program, c: &[NodeId], coordinat
     let half = g.constant(0.5);
     let scaled = g.mul(half, square);
     let value = g.mul(stiffness, scaled);
-    let energy = second_order(g, value, coordinates);
+    let (energy, plan) = second_order(g, "hessian", value, coordinates);
+    plans.push(plan);
+    let (jacobian, plan) = first_order(g, "constraint_jacobian", c, coordinates, None);
+    plans.push(plan);
+    let mut hessians = Vec::with_capacity(c.len());
+    for &row in c {
+        let (second, plan) = second_order(g, "constraint_hessian", row, coordinates);
+        hessians.push(second.hessian);
+        plans.push(plan);
+    }
+    let (mut gradient, plan) = first_order(g, "gauss_newton", &[value], coordinates, None);
+    plans.push(plan);
     let compliant = Compliant {
         c,
-        jacobian: first_derivatives(g, c, coordinates),
-        hessians: c.iter().map(|&row| second_order(g, row, coordinates).hessian).collect(),
-        gradient: first_derivatives(g, &[value], coordinates).remove(0),
+        jacobian,
+        hessians,
+        gradient: gradient.remove(0),
         energy,
         stiffness,
         damping,
         coordinates,
         points: program.points(),
     };
-    let mut list = potential(g, &compliant.energy, coordinates, compliant.points);
+    let mut list = potential(g, &compliant.energy, coordinates, compliant.points, plans);
     list.extend(compliant.geometry(g));
     list.push(compliant.gauss_newton(g));
     list.extend(compliant.force(g));

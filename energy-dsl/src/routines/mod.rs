@@ -5,7 +5,7 @@ mod constraint;
 use std::collections::BTreeSet;
 
 use crate::check::Program;
-use crate::diff::{Coordinates, Moving, SecondOrder, first_derivatives, second_order};
+use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, second_order};
 use crate::graph::{Graph, NodeId, Op, Primitive, ordinary};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
@@ -86,6 +86,8 @@ pub struct Routines {
     pub translation_invariant: bool,
     /// The robust primitives used.
     pub primitives: Vec<&'static str>,
+    /// How each routine's derivatives were reached.
+    pub plans: Vec<Plan>,
 }
 
 /// Differentiates a program as its kind demands.
@@ -98,14 +100,16 @@ pub fn differentiate(program: &Program) -> Routines {
         Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
         _ => Coordinates::of_points(g, &outputs, Moving::Positions),
     };
+    let mut plans = Vec::new();
     let list: Vec<Routine> = match program.kind {
         Kind::Energy => {
-            let plan = second_order(g, outputs[0], &coordinates);
-            potential(g, &plan, &coordinates, program.points())
+            let (energy, plan) = second_order(g, "hessian", outputs[0], &coordinates);
+            plans.push(plan);
+            potential(g, &energy, &coordinates, program.points(), &mut plans)
         }
-        Kind::Constraint => constraint::routines(g, program, &outputs, &coordinates),
-        Kind::Force => force(g, &outputs, &coordinates, program.points()),
-        Kind::Residual => residual(g, &outputs, &coordinates),
+        Kind::Constraint => constraint::routines(g, program, &outputs, &coordinates, &mut plans),
+        Kind::Force => force(g, &outputs, &coordinates, program.points(), &mut plans),
+        Kind::Residual => residual(g, &outputs, &coordinates, &mut plans),
     };
     let primitives = primitives(g, &outputs, &list);
     let list: Vec<Routine> = list.into_iter().map(|routine| routine.split(g)).collect();
@@ -116,42 +120,46 @@ pub fn differentiate(program: &Program) -> Routines {
         coordinates: coordinates.len(),
         translation_invariant: coordinates.translation_invariant,
         primitives,
+        plans,
         graph,
     }
 }
 
 /// Value, gradient, Hessian of U.
-fn potential(g: &mut Graph, plan: &SecondOrder, coordinates: &Coordinates, points: usize) -> Vec<Routine> {
-    let value = plan.value;
-    let forward = first_derivatives(g, &[value], coordinates).remove(0);
-    let gradient = cheaper(g, &[value], [forward, plan.gradient.clone()]);
+fn potential(
+    g: &mut Graph,
+    energy: &SecondOrder,
+    coordinates: &Coordinates,
+    points: usize,
+    plans: &mut Vec<Plan>,
+) -> Vec<Routine> {
+    let value = energy.value;
+    let known = Some(vec![energy.gradient.clone()]);
+    let (mut gradient, plan) = first_order(g, "gradient", &[value], coordinates, known);
+    plans.push(plan);
+    let gradient = gradient.remove(0);
     let flags = [0, 1, 2].map(|order| flags(g, &[(value, order)]));
     let full_gradient = coordinates.expand_all(g, &gradient, points);
-    let hessian_gradient = coordinates.expand_all(g, &plan.gradient, points);
-    let triangle = coordinates.expand_triangle(g, &plan.hessian, points);
+    let hessian_gradient = coordinates.expand_all(g, &energy.gradient, points);
+    let triangle = coordinates.expand_triangle(g, &energy.hessian, points);
     vec![
         Routine::new("value", vec![value], vec![vec![value]], flags[0]),
         Routine::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], flags[1]),
         Routine::new(
             "hessian",
-            [&[value], &plan.gradient[..], &plan.hessian[..]].concat(),
+            [&[value], &energy.gradient[..], &energy.hessian[..]].concat(),
             vec![vec![value], hessian_gradient, triangle],
             flags[2],
         ),
     ]
 }
 
-/// The alternative that, computed together with `common`, needs fewer operations.
-fn cheaper(g: &Graph, common: &[NodeId], alternatives: [Vec<NodeId>; 2]) -> Vec<NodeId> {
-    let cost =
-        |nodes: &Vec<NodeId>| crate::graph::count(g, &common.iter().chain(nodes).copied().collect::<Vec<_>>()).total();
-    alternatives.into_iter().min_by_key(cost).expect("two alternatives")
-}
-
-fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize) -> Vec<Routine> {
-    let by_position = first_derivatives(g, f, coordinates);
+fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize, plans: &mut Vec<Plan>) -> Vec<Routine> {
+    let (by_position, plan) = first_order(g, "jacobians", f, coordinates, None);
+    plans.push(plan);
     let velocities = Coordinates::of_points(g, f, Moving::Velocities);
-    let by_velocity = first_derivatives(g, f, &velocities);
+    let (by_velocity, plan) = first_order(g, "jacobians, by velocity", f, &velocities, None);
+    plans.push(plan);
     let reduced = f.iter().copied().chain(by_position.iter().chain(&by_velocity).flatten().copied()).collect();
     let square = |g: &mut Graph, rows: &[Vec<NodeId>], coordinates: &Coordinates| {
         let expanded: Vec<Vec<NodeId>> = rows.iter().map(|row| coordinates.expand_all(g, row, points)).collect();
@@ -174,8 +182,10 @@ fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize) 
     ]
 }
 
-fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates) -> Vec<Routine> {
-    let jacobian: Vec<NodeId> = first_derivatives(g, r, coordinates).into_iter().flatten().collect();
+fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut Vec<Plan>) -> Vec<Routine> {
+    let (jacobian, plan) = first_order(g, "jacobian", r, coordinates, None);
+    plans.push(plan);
+    let jacobian = jacobian.concat();
     let order = |order: u8| r.iter().map(|&node| (node, order)).collect::<Vec<_>>();
     vec![
         Routine::new("residual", r.to_vec(), vec![r.to_vec()], flags(g, &order(0))),

@@ -58,6 +58,13 @@ impl OperationCount {
         self.instructions() + self.fused
     }
 
+    /// What they cost, in units of one instruction: a division or root about five, a transcendental about twenty; an exact error
+    /// term one where products fuse and up to six elsewhere, taken as three.
+    #[must_use]
+    pub const fn cost(&self) -> usize {
+        self.instructions() + 4 * self.divisions_and_roots + 19 * self.transcendental + 2 * self.error_terms
+    }
+
     /// All of them, a fused multiply-add counting as one.
     #[must_use]
     pub const fn instructions(&self) -> usize {
