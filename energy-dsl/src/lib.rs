@@ -11,7 +11,7 @@
 //! elements ([`Potential`], [`ForceLaw`], [`Constraint`], [`Residual`]) and their self-description ([`Declaration`]).
 //!
 #![doc = include_str!("../LANGUAGE.md")]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 extern crate self as energy_dsl;
 

@@ -16,7 +16,7 @@ pub use call::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
     JacobiansCall, ResidualCall, ResidualJacobianCall, ValueCall,
 };
-pub use cpu::{Baseline, Kernel, Level};
+pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Routine};
 pub use element::{
     Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,

@@ -1,28 +1,43 @@
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-use super::cpu::{Baseline, Kernel, Level};
+use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
 
 /// The outcome of a comparison: `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
     /// False everywhere.
     fn none() -> Self;
+    /// Bit `i` is set where lane `i` is true.
+    fn bits(self) -> u32;
+
     /// Whether it is true anywhere.
-    fn any(self) -> bool;
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
 
     /// Whether it is true everywhere.
+    #[inline(always)]
     fn all(self) -> bool {
         !(!self).any()
+    }
+
+    /// Whether it is true in a lane.
+    #[inline(always)]
+    fn lane(self, lane: usize) -> bool {
+        self.bits() >> lane & 1 != 0
     }
 }
 
 impl Mask for bool {
+    #[inline(always)]
     fn none() -> Self {
         false
     }
 
-    fn any(self) -> bool {
-        self
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self)
     }
 }
 
@@ -84,6 +99,7 @@ pub trait Number:
     /// Whether 2^(−80·`degree`) ≤ self < 2^(80·`degree`) (12 for 80 in single precision): a power `degree` of a length for
     /// which products of up to eight such lengths neither overflow nor vanish. Generated code then leaves scaling out; a type
     /// that cannot tell says no.
+    #[allow(clippy::wrong_self_convention)] // numbers are taken by value throughout
     fn is_moderate(self, _degree: u8) -> Self::Mask {
         Self::Mask::none()
     }
@@ -107,7 +123,7 @@ pub trait Real: Number + Copy {}
 impl<T: Number + Copy> Real for T {}
 
 macro_rules! number_for_float {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $split:literal, $moderate:literal) => {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal) => {
         impl Number for $float {
             type Mask = bool;
 
@@ -174,7 +190,7 @@ macro_rules! number_for_float {
                 }
                 // Dekker's product: `mul_add` is a slow library call where the target has no fused instruction.
                 let halves = |value: $float| {
-                    let shifted = $split * value;
+                    let shifted = <$float as Scalar>::SPLITTER * value;
                     let high = shifted - (shifted - value);
                     (high, value - high)
                 };
@@ -207,9 +223,8 @@ macro_rules! number_for_float {
             }
             #[inline(always)]
             fn is_moderate(self, degree: u8) -> bool {
-                let limit = $moderate * u32::from(degree);
-                let power = |exponent: u32| $float::from_bits($bits::from(exponent) << $mantissa_bits);
-                power($bias - limit) <= self && self < power($bias + limit)
+                let (from, to) = <$float as Scalar>::moderate_bounds(degree);
+                from <= self && self < to
             }
             #[inline(always)]
             fn less(self, other: Self) -> bool {
@@ -227,12 +242,16 @@ macro_rules! number_for_float {
             fn select(mask: bool, yes: Self, no: Self) -> Self {
                 if mask { yes } else { no }
             }
+            #[inline(always)]
+            fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+                dispatch_scalar(kernel)
+            }
         }
     };
 }
 
-number_for_float!(f64, u64, 52, 0x7ff, 1023, 134_217_729.0, 80);
-number_for_float!(f32, u32, 23, 0xff, 127, 4097.0, 12);
+number_for_float!(f64, u64, 52, 0x7ff, 1023);
+number_for_float!(f32, u32, 23, 0xff, 127);
 
 #[cfg(test)]
 mod tests {

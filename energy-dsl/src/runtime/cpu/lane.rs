@@ -1,0 +1,88 @@
+use crate::runtime::real::{Number, Real};
+
+/// Several numbers of type `S` that are computed with at once. A scalar is a lane of one.
+///
+/// Every operation gives each lane the same bits as the scalar's operation at the same [`super::Level::FUSED`].
+pub trait Lane<S: Number>: Real {
+    /// How many numbers there are.
+    const LANES: usize;
+
+    /// The same number in every lane.
+    fn splat(value: S) -> Self;
+
+    /// The first [`Self::LANES`] numbers of a slice.
+    ///
+    /// # Panics
+    /// When there are fewer; see [`Self::load_ragged`].
+    fn load(values: &[S]) -> Self;
+
+    /// Writes to the first [`Self::LANES`] places of a slice.
+    ///
+    /// # Panics
+    /// When there are fewer; see [`Self::store_ragged`].
+    fn store(self, values: &mut [S]);
+
+    /// The number `value(i)` in lane `i`.
+    fn from_fn(value: impl FnMut(usize) -> S) -> Self;
+
+    /// The number in lane `lane`.
+    fn extract(self, lane: usize) -> S;
+
+    /// The first numbers of a slice; lanes beyond its end repeat its last number, so that they compute, and flag, nothing
+    /// that it does not.
+    ///
+    /// # Panics
+    /// When the slice is empty.
+    #[inline(always)]
+    fn load_ragged(values: &[S]) -> Self {
+        if values.len() >= Self::LANES {
+            return Self::load(values);
+        }
+        let last = values.len().checked_sub(1).expect("a ragged load needs one number at least");
+        Self::from_fn(|lane| values[lane.min(last)].clone())
+    }
+
+    /// Writes the first lanes, as many as the slice takes.
+    #[inline(always)]
+    fn store_ragged(self, values: &mut [S]) {
+        if values.len() >= Self::LANES {
+            return self.store(values);
+        }
+        for (lane, value) in values.iter_mut().enumerate() {
+            *value = self.extract(lane);
+        }
+    }
+}
+
+macro_rules! one_lane {
+    ($float:ident) => {
+        impl Lane<$float> for $float {
+            const LANES: usize = 1;
+
+            #[inline(always)]
+            fn splat(value: $float) -> Self {
+                value
+            }
+            #[inline(always)]
+            fn load(values: &[$float]) -> Self {
+                values[0]
+            }
+            #[inline(always)]
+            fn store(self, values: &mut [$float]) {
+                values[0] = self;
+            }
+            #[inline(always)]
+            fn from_fn(mut value: impl FnMut(usize) -> $float) -> Self {
+                value(0)
+            }
+            #[inline(always)]
+            fn extract(self, lane: usize) -> $float {
+                assert!(lane < 1, "lane {lane} of 1");
+                self
+            }
+        }
+    };
+}
+
+one_lane!(f64);
+one_lane!(f32);
