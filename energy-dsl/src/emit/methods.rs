@@ -227,7 +227,13 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
     let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
     let arguments = quote!(&self, #(#names: &#types),*);
 
-    let leave = quote!(return self.#in_general::<L>(#(#names),*));
+    // Field by field: returned as it is, the struct would live in memory whichever way it was made.
+    let fields: Vec<_> =
+        method.fields.iter().map(|(field, _)| *field).chain(["flags"]).map(|field| format_ident!("{field}")).collect();
+    let leave = quote! {
+        let general = self.#in_general::<L>(#(#names),*);
+        return ::energy_dsl::#result { #(#fields: general.#fields,)* };
+    };
     let body = body(method, program, routines, routine, &routine.groups, routine.flags, Some(leave));
     let levelled = quote! {
         #[inline]
@@ -267,7 +273,7 @@ fn body(
     let mut schedule = Schedule::new(&routines.graph, &read);
     if let (Some(general), Some(leave)) = (&routine.general, leave) {
         let ordinary = schedule.value(general.ordinary);
-        schedule.statement(quote!(if !::energy_dsl::Mask::all(#ordinary) { #leave; }));
+        schedule.statement(quote!(if !::energy_dsl::Mask::all(#ordinary) { #leave }));
     }
     let mut values = Vec::new();
     for ((field, layout), nodes) in method.fields.iter().zip(groups) {

@@ -152,6 +152,20 @@ impl<R: Register> Number for Lanes<R> {
         ((a * c - product) + a * d + b * c) + b * d
     }
     #[inline(always)]
+    fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
+        if L::FUSED {
+            return Self(R::fused(self.0, factor.0, (-subtrahend).0));
+        }
+        (self * factor - subtrahend) + self.product_error::<L>(factor)
+    }
+    #[inline(always)]
+    fn root_error<L: Level>(self, root: Self) -> Self {
+        if L::FUSED {
+            return Self(R::fused((-root).0, root.0, self.0));
+        }
+        (self - root * root) - root.product_error::<L>(root)
+    }
+    #[inline(always)]
     fn power_of_two_scale(self) -> Self {
         let exponent = R::and(self.0, R::splat(R::Scalar::INFINITY));
         // The exponent field of the inverse is twice the bias less the number's; at least 1. A subnormal has 0: it gets the

@@ -63,14 +63,20 @@ pub(super) fn run_at<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
 }
 
 /// Runs scalar code at AVX2 where the level, which must not be better than [`detected`] said, has it.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     if name >= LevelName::Avx2 {
         // SAFETY: as for `run_at`.
         unsafe { run_avx2(kernel) }
     } else {
-        kernel.run::<Baseline>()
+        run_plain(kernel)
     }
+}
+
+/// Out of line: a scalar routine at a lesser level should not swell its callers.
+#[inline(never)]
+fn run_plain<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Baseline>()
 }
 
 #[target_feature(enable = "avx2,fma")]
