@@ -32,6 +32,8 @@ mod graph;
 #[cfg(feature = "compiler")]
 mod interpret;
 #[cfg(feature = "compiler")]
+mod listing;
+#[cfg(feature = "compiler")]
 mod lower;
 #[cfg(feature = "compiler")]
 mod routines;
@@ -47,10 +49,13 @@ pub use diagnostic::{Diagnostic, Diagnostics};
 #[cfg(feature = "compiler")]
 pub use functions::{Function, all as functions};
 #[cfg(feature = "compiler")]
+pub use listing::Listing;
+#[cfg(feature = "compiler")]
 pub use textbook::Textbook;
 
 /// Compiles declarations to Rust: the whole of what `energy!` does. Errors become `compile_error!` at their places, beside
-/// stubs of what was declared.
+/// stubs of what was declared. Where the environment variable `ENERGY_DUMP_DIR` names a folder, the code of each declaration is
+/// also written to a file there, laid out for reading.
 ///
 /// ```
 /// let code = energy_dsl::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());
@@ -62,8 +67,18 @@ pub fn compile(declarations: proc_macro2::TokenStream) -> proc_macro2::TokenStre
     let mut diagnostics = Diagnostics::default();
     let items = syntax::parse(declarations, &mut diagnostics);
     let programs = check::check(&items, &mut diagnostics);
-    let code: proc_macro2::TokenStream =
-        programs.iter().map(|program| emit::emit(program, &routines::differentiate(program))).collect();
+    let folder = std::env::var_os("ENERGY_DUMP_DIR").map(std::path::PathBuf::from);
+    let mut code = proc_macro2::TokenStream::new();
+    for program in &programs {
+        let items = emit::emit(program, &routines::differentiate(program));
+        if let Some(folder) = &folder
+            && let Err(error) = listing::dump(folder, &program.name, &items)
+        {
+            let message = format!("ENERGY_DUMP_DIR: cannot write {} to {}: {error}", program.name, folder.display());
+            diagnostics.push(Diagnostic::new(&program.span, message));
+        }
+        code.extend(items);
+    }
     let errors: proc_macro2::TokenStream =
         diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error()).collect();
     quote::quote!(#code #errors)
