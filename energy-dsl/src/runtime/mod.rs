@@ -6,6 +6,7 @@ mod call;
 mod cpu;
 mod declaration;
 mod element;
+mod elementary;
 mod evaluate;
 mod flags;
 mod real;

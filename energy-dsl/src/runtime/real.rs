@@ -2,6 +2,7 @@ use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
+use super::elementary::{Atan2, Binary, Cos, Exp, Ln, Pow, Sin, Unary, sin_cos};
 
 /// The outcome of a comparison: `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
@@ -66,6 +67,10 @@ pub trait Number:
     fn sin<L: Level>(self) -> Self;
     /// Cosine of an angle in radians.
     fn cos<L: Level>(self) -> Self;
+    /// Sine and cosine of an angle in radians.
+    fn sin_cos<L: Level>(self) -> (Self, Self) {
+        (self.clone().sin::<L>(), self.cos::<L>())
+    }
     /// eˣ.
     fn exp<L: Level>(self) -> Self;
     /// Natural logarithm.
@@ -123,7 +128,7 @@ pub trait Real: Number + Copy {}
 impl<T: Number + Copy> Real for T {}
 
 macro_rules! number_for_float {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal) => {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $binary:ident) => {
         impl Number for $float {
             type Mask = bool;
 
@@ -149,27 +154,32 @@ macro_rules! number_for_float {
             }
             #[inline(always)]
             fn sin<L: Level>(self) -> Self {
-                $float::sin(self)
+                <Sin as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
             fn cos<L: Level>(self) -> Self {
-                $float::cos(self)
+                <Cos as Unary>::of::<f64, L>(f64::from(self)) as $float
+            }
+            #[inline(always)]
+            fn sin_cos<L: Level>(self) -> (Self, Self) {
+                let (sine, cosine) = sin_cos::<f64, L>(f64::from(self));
+                (sine as $float, cosine as $float)
             }
             #[inline(always)]
             fn exp<L: Level>(self) -> Self {
-                $float::exp(self)
+                <Exp as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
             fn ln<L: Level>(self) -> Self {
-                $float::ln(self)
+                <Ln as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
             fn atan2<L: Level>(self, x: Self) -> Self {
-                $float::atan2(self, x)
+                Atan2::$binary::<f64, L>(f64::from(self), f64::from(x)) as $float
             }
             #[inline(always)]
             fn powf<L: Level>(self, exponent: Self) -> Self {
-                $float::powf(self, exponent)
+                Pow::$binary::<f64, L>(f64::from(self), f64::from(exponent)) as $float
             }
             #[inline(always)]
             fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
@@ -250,8 +260,8 @@ macro_rules! number_for_float {
     };
 }
 
-number_for_float!(f64, u64, 52, 0x7ff, 1023);
-number_for_float!(f32, u32, 23, 0xff, 127);
+number_for_float!(f64, u64, 52, 0x7ff, 1023, of);
+number_for_float!(f32, u32, 23, 0xff, 127, of_single);
 
 #[cfg(test)]
 mod tests {

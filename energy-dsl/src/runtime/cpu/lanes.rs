@@ -4,8 +4,9 @@ use std::fmt::{self, Debug};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::lane::Lane;
-use super::register::{Register, Scalar};
+use super::register::{DoubleRegister, Register, Scalar};
 use super::{Kernel, Level};
+use crate::runtime::elementary::{Atan2, Cos, Double, Exp, Ln, Pow, Sin};
 use crate::runtime::real::Number;
 
 /// A register as a number.
@@ -103,27 +104,32 @@ impl<R: Register> Number for Lanes<R> {
     }
     #[inline(always)]
     fn sin<L: Level>(self) -> Self {
-        Self::from_fn(|lane| self.extract(lane).sin::<L>())
+        Self(R::unary::<Sin, L>(self.0))
     }
     #[inline(always)]
     fn cos<L: Level>(self) -> Self {
-        Self::from_fn(|lane| self.extract(lane).cos::<L>())
+        Self(R::unary::<Cos, L>(self.0))
+    }
+    #[inline(always)]
+    fn sin_cos<L: Level>(self) -> (Self, Self) {
+        let (sine, cosine) = R::sin_cos::<L>(self.0);
+        (Self(sine), Self(cosine))
     }
     #[inline(always)]
     fn exp<L: Level>(self) -> Self {
-        Self::from_fn(|lane| self.extract(lane).exp::<L>())
+        Self(R::unary::<Exp, L>(self.0))
     }
     #[inline(always)]
     fn ln<L: Level>(self) -> Self {
-        Self::from_fn(|lane| self.extract(lane).ln::<L>())
+        Self(R::unary::<Ln, L>(self.0))
     }
     #[inline(always)]
     fn atan2<L: Level>(self, x: Self) -> Self {
-        Self::from_fn(|lane| self.extract(lane).atan2::<L>(x.extract(lane)))
+        Self(R::binary::<Atan2, L>(self.0, x.0))
     }
     #[inline(always)]
     fn powf<L: Level>(self, exponent: Self) -> Self {
-        Self::from_fn(|lane| self.extract(lane).powf::<L>(exponent.extract(lane)))
+        Self(R::binary::<Pow, L>(self.0, exponent.0))
     }
     #[inline(always)]
     fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
@@ -200,5 +206,36 @@ impl<R: Register> Number for Lanes<R> {
     #[inline(always)]
     fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         R::dispatch(kernel)
+    }
+}
+
+impl<R: DoubleRegister> Double for Lanes<R> {
+    #[inline(always)]
+    fn and(self, other: Self) -> Self {
+        Self(R::and(self.0, other.0))
+    }
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        Self(R::or(self.0, other.0))
+    }
+    #[inline(always)]
+    fn xor(self, other: Self) -> Self {
+        Self(R::xor(self.0, other.0))
+    }
+    #[inline(always)]
+    fn add_bits(self, other: Self) -> Self {
+        Self(R::add_bits(self.0, other.0))
+    }
+    #[inline(always)]
+    fn low_bits_to_exponent(self) -> Self {
+        Self(R::low_bits_to_exponent(self.0))
+    }
+    #[inline(always)]
+    fn exponent_to_low_bits(self) -> Self {
+        Self(R::exponent_to_low_bits(self.0))
+    }
+    #[inline(always)]
+    fn bit_1_to_sign(self) -> Self {
+        Self(R::bit_1_to_sign(self.0))
     }
 }

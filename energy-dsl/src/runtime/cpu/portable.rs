@@ -4,8 +4,10 @@
 use std::array;
 use std::ops::{BitAnd, BitOr, Not};
 
-use super::register::Register;
-use super::{Baseline, Kernel};
+use super::lanes::Lanes;
+use super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
+use super::{Baseline, Kernel, Level};
+use crate::runtime::elementary::{Binary, Double, Unary, sin_cos};
 use crate::runtime::real::Mask;
 
 /// Two doubles.
@@ -19,7 +21,7 @@ pub struct F64x2([f64; 2]);
 pub struct F32x4([f32; 4]);
 
 macro_rules! array_register {
-    ($register:ident, $mask:ident, $float:ident, $bits:ident, $lanes:literal) => {
+    ($register:ident, $mask:ident, $float:ident, $bits:ident, $lanes:literal, $elementary:ident) => {
         /// All bits of a lane where it holds, none elsewhere.
         #[derive(Clone, Copy, Debug)]
         pub struct $mask([$bits; $lanes]);
@@ -178,9 +180,39 @@ macro_rules! array_register {
             fn sub_bits(a: Self, b: Self) -> Self {
                 Self::zip_bits(a, b, $bits::wrapping_sub)
             }
+            $elementary!();
         }
     };
 }
 
-array_register!(F64x2, Mask64x2, f64, u64, 2);
-array_register!(F32x4, Mask32x4, f32, u32, 4);
+array_register!(F64x2, Mask64x2, f64, u64, 2, elementary_of_doubles);
+array_register!(F32x4, Mask32x4, f32, u32, 4, elementary_of_singles);
+
+impl DoubleRegister for F64x2 {
+    #[inline(always)]
+    fn low_bits_to_exponent(a: Self) -> Self {
+        Self::map(a, Double::low_bits_to_exponent)
+    }
+    #[inline(always)]
+    fn exponent_to_low_bits(a: Self) -> Self {
+        Self::map(a, Double::exponent_to_low_bits)
+    }
+    #[inline(always)]
+    fn bit_1_to_sign(a: Self) -> Self {
+        Self::map(a, Double::bit_1_to_sign)
+    }
+}
+
+impl SingleRegister for F32x4 {
+    type Double = F64x2;
+
+    #[inline(always)]
+    fn widen(a: Self) -> [F64x2; 2] {
+        let [a, b, c, d] = a.0.map(f64::from);
+        [F64x2([a, b]), F64x2([c, d])]
+    }
+    #[inline(always)]
+    fn narrow([F64x2([a, b]), F64x2([c, d])]: [F64x2; 2]) -> Self {
+        Self([a, b, c, d].map(|value| value as f32))
+    }
+}

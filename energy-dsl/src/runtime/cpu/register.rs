@@ -1,7 +1,8 @@
 //! What a processor's register can do. [`super::lanes`] makes numbers of registers.
 
-use super::Kernel;
 use super::lane::Lane;
+use super::{Kernel, Level};
+use crate::runtime::elementary::{Binary, Unary};
 use crate::runtime::real::{Mask, Number};
 
 /// A floating-point number that lanes are made of, with the bit patterns that work on it needs.
@@ -112,4 +113,78 @@ pub trait Register: Copy {
     fn add_bits(a: Self, b: Self) -> Self;
     /// The difference of the bit patterns as integers.
     fn sub_bits(a: Self, b: Self) -> Self;
+
+    /// An elementary function of each number.
+    fn unary<F: Unary, L: Level>(a: Self) -> Self;
+    /// Sine and cosine of each number.
+    fn sin_cos<L: Level>(a: Self) -> (Self, Self);
+    /// An elementary function of each pair of numbers.
+    fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self;
 }
+
+/// A register of doubles, with the shifts that elementary functions need.
+pub trait DoubleRegister: Register<Scalar = f64> {
+    /// Each shifted to the left by 52 bits.
+    fn low_bits_to_exponent(a: Self) -> Self;
+    /// Each shifted to the right by 52 bits.
+    fn exponent_to_low_bits(a: Self) -> Self;
+    /// Each shifted to the left by 62 bits, the sign bit kept.
+    fn bit_1_to_sign(a: Self) -> Self;
+}
+
+/// A register of single-precision numbers, half of which fill one of doubles.
+pub trait SingleRegister: Register<Scalar = f32> {
+    /// As many bits of doubles.
+    type Double: DoubleRegister;
+
+    /// Both halves in double precision.
+    fn widen(a: Self) -> [Self::Double; 2];
+    /// Both halves, rounded.
+    fn narrow(halves: [Self::Double; 2]) -> Self;
+}
+
+/// Elementary functions of a register of doubles.
+macro_rules! elementary_of_doubles {
+    () => {
+        #[inline(always)]
+        fn unary<F: Unary, L: Level>(a: Self) -> Self {
+            F::of::<_, L>(Lanes(a)).0
+        }
+        #[inline(always)]
+        fn sin_cos<L: Level>(a: Self) -> (Self, Self) {
+            let (sine, cosine) = sin_cos::<_, L>(Lanes(a));
+            (sine.0, cosine.0)
+        }
+        #[inline(always)]
+        fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self {
+            F::of::<_, L>(Lanes(a), Lanes(b)).0
+        }
+    };
+}
+
+/// Elementary functions of a register of single-precision numbers: by way of doubles. (Not with closures, which would not be
+/// compiled for the level.)
+macro_rules! elementary_of_singles {
+    () => {
+        #[inline(always)]
+        fn unary<F: Unary, L: Level>(a: Self) -> Self {
+            let [low, high] = Self::widen(a);
+            Self::narrow([F::of::<_, L>(Lanes(low)).0, F::of::<_, L>(Lanes(high)).0])
+        }
+        #[inline(always)]
+        fn sin_cos<L: Level>(a: Self) -> (Self, Self) {
+            let [low, high] = Self::widen(a);
+            let (low, high) = (sin_cos::<_, L>(Lanes(low)), sin_cos::<_, L>(Lanes(high)));
+            (Self::narrow([low.0.0, high.0.0]), Self::narrow([low.1.0, high.1.0]))
+        }
+        #[inline(always)]
+        fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self {
+            let ([a_low, a_high], [b_low, b_high]) = (Self::widen(a), Self::widen(b));
+            let low = F::of_single::<_, L>(Lanes(a_low), Lanes(b_low)).0;
+            let high = F::of_single::<_, L>(Lanes(a_high), Lanes(b_high)).0;
+            Self::narrow([low, high])
+        }
+    };
+}
+
+pub(super) use {elementary_of_doubles, elementary_of_singles};

@@ -2,9 +2,11 @@
 
 use std::arch::x86_64::*;
 
-use super::super::Kernel;
-use super::super::register::Register;
+use super::super::lanes::Lanes;
+use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
+use super::super::{Kernel, Level};
 use super::{intrinsics, mask, run_avx2};
+use crate::runtime::elementary::{Binary, Unary, sin_cos};
 
 mask!(
     Mask4(__m256d),
@@ -50,6 +52,8 @@ impl Register for __m256d {
     fn from_fn(value: impl FnMut(usize) -> f64) -> Self {
         <Self as Register>::load(&std::array::from_fn::<_, 4, _>(value))
     }
+
+    elementary_of_doubles!();
 
     intrinsics! {
         fn splat(value: f64) -> Self = _mm256_set1_pd(value);
@@ -100,6 +104,8 @@ impl Register for __m256 {
         <Self as Register>::load(&std::array::from_fn::<_, 8, _>(value))
     }
 
+    elementary_of_singles!();
+
     intrinsics! {
         fn splat(value: f32) -> Self = _mm256_set1_ps(value);
         fn add(a: Self, b: Self) -> Self = _mm256_add_ps(a, b);
@@ -119,5 +125,22 @@ impl Register for __m256 {
         fn xor(a: Self, b: Self) -> Self = _mm256_xor_ps(a, b);
         fn add_bits(a: Self, b: Self) -> Self = _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
         fn sub_bits(a: Self, b: Self) -> Self = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
+    }
+}
+
+impl DoubleRegister for __m256d {
+    intrinsics! {
+        fn low_bits_to_exponent(a: Self) -> Self = _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(a)));
+        fn exponent_to_low_bits(a: Self) -> Self = _mm256_castsi256_pd(_mm256_srli_epi64::<52>(_mm256_castpd_si256(a)));
+        fn bit_1_to_sign(a: Self) -> Self = _mm256_castsi256_pd(_mm256_slli_epi64::<63>(_mm256_srli_epi64::<1>(_mm256_castpd_si256(a))));
+    }
+}
+
+impl SingleRegister for __m256 {
+    type Double = __m256d;
+
+    intrinsics! {
+        fn widen(a: Self) -> [__m256d; 2] = [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))];
+        fn narrow(halves: [__m256d; 2]) -> Self = _mm256_set_m128(_mm256_cvtpd_ps(halves[1]), _mm256_cvtpd_ps(halves[0]));
     }
 }

@@ -2,9 +2,11 @@
 
 use std::arch::x86_64::*;
 
-use super::super::Kernel;
-use super::super::register::Register;
+use super::super::lanes::Lanes;
+use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
+use super::super::{Kernel, Level};
 use super::{intrinsics, mask, run_avx512};
+use crate::runtime::elementary::{Binary, Unary, sin_cos};
 
 mask!(Mask8(__mmask8), none: 0, bits: |m| u32::from(m), and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m);
 
@@ -36,6 +38,8 @@ impl Register for __m512d {
     fn from_fn(value: impl FnMut(usize) -> f64) -> Self {
         <Self as Register>::load(&std::array::from_fn::<_, 8, _>(value))
     }
+
+    elementary_of_doubles!();
 
     intrinsics! {
         fn splat(value: f64) -> Self = _mm512_set1_pd(value);
@@ -86,6 +90,8 @@ impl Register for __m512 {
         <Self as Register>::load(&std::array::from_fn::<_, 16, _>(value))
     }
 
+    elementary_of_singles!();
+
     intrinsics! {
         fn splat(value: f32) -> Self = _mm512_set1_ps(value);
         fn add(a: Self, b: Self) -> Self = _mm512_add_ps(a, b);
@@ -105,5 +111,22 @@ impl Register for __m512 {
         fn xor(a: Self, b: Self) -> Self = _mm512_xor_ps(a, b);
         fn add_bits(a: Self, b: Self) -> Self = _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
         fn sub_bits(a: Self, b: Self) -> Self = _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
+    }
+}
+
+impl DoubleRegister for __m512d {
+    intrinsics! {
+        fn low_bits_to_exponent(a: Self) -> Self = _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(a)));
+        fn exponent_to_low_bits(a: Self) -> Self = _mm512_castsi512_pd(_mm512_srli_epi64::<52>(_mm512_castpd_si512(a)));
+        fn bit_1_to_sign(a: Self) -> Self = _mm512_castsi512_pd(_mm512_slli_epi64::<63>(_mm512_srli_epi64::<1>(_mm512_castpd_si512(a))));
+    }
+}
+
+impl SingleRegister for __m512 {
+    type Double = __m512d;
+
+    intrinsics! {
+        fn widen(a: Self) -> [__m512d; 2] = [_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a))];
+        fn narrow(halves: [__m512d; 2]) -> Self = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm512_cvtpd_ps(halves[0])), _mm512_cvtpd_ps(halves[1]));
     }
 }
