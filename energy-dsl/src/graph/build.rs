@@ -331,12 +331,20 @@ impl Graph {
         }
     }
 
-    /// What rounding a + b lost.
+    /// What rounding a + b lost. Signs move out as they do of the sum itself, so that a sum and its error name the same operands.
     pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
         }
-        self.node(Op::SumError(a.min(b), a.max(b)))
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => {
+                let error = self.sum_error(x, y);
+                self.neg(error)
+            }
+            ((x, true), (y, false)) => self.difference_error(y, x),
+            ((x, false), (y, true)) => self.difference_error(x, y),
+            _ => self.node(Op::SumError(a.min(b), a.max(b))),
+        }
     }
 
     /// What rounding a − b lost.
@@ -344,7 +352,19 @@ impl Graph {
         if self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
         }
-        self.node(Op::DifferenceError(a, b))
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => self.difference_error(y, x),
+            ((x, true), (y, false)) => {
+                let error = self.sum_error(x, y);
+                self.neg(error)
+            }
+            ((x, false), (y, true)) => self.sum_error(x, y),
+            _ if !self.index.contains_key(&Op::Sub(a, b)) && self.index.contains_key(&Op::Sub(b, a)) => {
+                let opposite = self.node(Op::DifferenceError(b, a));
+                self.neg(opposite)
+            }
+            _ => self.node(Op::DifferenceError(a, b)),
+        }
     }
 
     /// What rounding a · b lost.
@@ -352,7 +372,9 @@ impl Graph {
         if self.as_constant(a).is_some_and(is_power_of_two) || self.as_constant(b).is_some_and(is_power_of_two) {
             return self.constant(0.0);
         }
-        self.node(Op::ProductError(a.min(b), a.max(b)))
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let error = self.node(Op::ProductError(a.min(b), a.max(b)));
+        self.signed(error, minus_a != minus_b)
     }
 
     /// What rounding lost when this node was computed as a difference of two others; zero for other nodes.
@@ -373,7 +395,12 @@ impl Graph {
             let product = self.mul(a, b);
             return self.sub(product, c);
         }
-        self.node(Op::FusedMulSub(a.min(b), a.max(b), c))
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let negative = minus_a != minus_b;
+        // −a·b − c = −(a·b − (−c)).
+        let c = self.signed(c, negative);
+        let difference = self.node(Op::FusedMulSub(a.min(b), a.max(b), c));
+        self.signed(difference, negative)
     }
 
     /// a − b², b being √a rounded.
