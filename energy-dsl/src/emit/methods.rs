@@ -1,7 +1,7 @@
 //! The routines as methods of the traits that the declaration's kind implements.
 //!
-//! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L; `f`, which runs it at the machine's best level;
-//! and, where precautions were split off, `f_in_general::<L>` for the configurations that need them.
+//! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L, and `f`, which runs it at the machine's best
+//! level. Where precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general` by `f_is_ordinary`.
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
@@ -9,7 +9,7 @@ use quote::{format_ident, quote};
 use super::schedule::Schedule;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Input, NodeId};
-use crate::routines::{Routine, Routines};
+use crate::routines::Routines;
 use crate::runtime::Kind;
 use crate::syntax::InputType;
 
@@ -220,22 +220,65 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
         .expect("compiler bug: a routine of another kind of declaration");
     let (plain, call, result) =
         (format_ident!("{}", method.routine), format_ident!("{}", method.call), format_ident!("{}", method.result));
-    let (levelled, in_general) = (format_ident!("{plain}_at"), format_ident!("{plain}_in_general"));
+    let levelled = format_ident!("{plain}_at");
     let generics = &method.generics;
     let result_type = quote!(::energy_dsl::#result<#generics>);
     let names: Vec<_> = method.arguments.iter().map(|(name, _)| format_ident!("{name}")).collect();
     let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
     let arguments = quote!(&self, #(#names: &#types),*);
+    let ordinary = body(method, program, routines, &routine.groups, routine.flags);
+    let (body, general) = match &routine.general {
+        None => (ordinary, TokenStream::new()),
+        Some(general) => {
+            let [is_ordinary, if_ordinary, in_general] =
+                ["is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
+            // Field by field: returned as it is, the struct would live in memory whichever way it was made.
+            let fields: Vec<_> = method
+                .fields
+                .iter()
+                .map(|(field, _)| *field)
+                .chain(["flags"])
+                .map(|field| format_ident!("{field}"))
+                .collect();
+            let select = quote! {
+                if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
+                    self.#if_ordinary::<L>(#(#names),*)
+                } else {
+                    let general = self.#in_general::<L>(#(#names),*);
+                    ::energy_dsl::#result { #(#fields: general.#fields,)* }
+                }
+            };
+            let guard = mask(program, routines, general.ordinary);
+            let everything = self::body(method, program, routines, &general.groups, general.flags);
+            let general = quote! {
+                /// Where `_if_ordinary` suffices.
+                #[inline(always)]
+                fn #is_ordinary<L: ::energy_dsl::Level>(#arguments) -> T::Mask {
+                    #guard
+                }
 
-    // Field by field: returned as it is, the struct would live in memory whichever way it was made.
-    let fields: Vec<_> =
-        method.fields.iter().map(|(field, _)| *field).chain(["flags"]).map(|field| format_ident!("{field}")).collect();
-    let leave = quote! {
-        let general = self.#in_general::<L>(#(#names),*);
-        return ::energy_dsl::#result { #(#fields: general.#fields,)* };
+                #[inline(always)]
+                fn #if_ordinary<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+                    #ordinary
+                }
+
+                /// With all precautions; lanes that need none keep the bits they would have alone.
+                #[cold]
+                #[inline(never)]
+                fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+                    let general = { #everything };
+                    if T::WIDE {
+                        let ordinary = self.#is_ordinary::<L>(#(#names),*);
+                        let here = self.#if_ordinary::<L>(#(#names),*);
+                        return ::energy_dsl::Choose::choose(ordinary, &here, &general);
+                    }
+                    general
+                }
+            };
+            (select, general)
+        }
     };
-    let body = body(method, program, routines, routine, &routine.groups, routine.flags, Some(leave));
-    let levelled = quote! {
+    let methods = quote! {
         #[inline]
         fn #plain(#arguments) -> #result_type {
             T::dispatch(::energy_dsl::#call(self, #(#names),*))
@@ -246,35 +289,28 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
             #body
         }
     };
-    let general = routine.general.as_ref().map(|general| {
-        let body = self::body(method, program, routines, routine, &general.groups, general.flags, None);
-        quote! {
-            #[cold]
-            #[inline(never)]
-            fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #result_type {
-                #body
-            }
-        }
-    });
-    (levelled, general.unwrap_or_default())
+    (methods, general)
 }
 
-/// Statements, then the struct returned; before most of them, `leave` where the configuration is not ordinary.
+/// Statements, then a mask.
+fn mask(program: &Program, routines: &Routines, node: NodeId) -> TokenStream {
+    let read = |input: Input| read_input(program, input);
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let mask = schedule.value(node);
+    let statements = schedule.statements();
+    quote!(#statements #mask)
+}
+
+/// Statements, then the struct returned.
 fn body(
     method: &Method,
     program: &Program,
     routines: &Routines,
-    routine: &Routine,
     groups: &[Vec<NodeId>],
     flags: [Option<NodeId>; 2],
-    leave: Option<TokenStream>,
 ) -> TokenStream {
     let read = |input: Input| read_input(program, input);
     let mut schedule = Schedule::new(&routines.graph, &read);
-    if let (Some(general), Some(leave)) = (&routine.general, leave) {
-        let ordinary = schedule.value(general.ordinary);
-        schedule.statement(quote!(if !::energy_dsl::Mask::all(#ordinary) { #leave }));
-    }
     let mut values = Vec::new();
     for ((field, layout), nodes) in method.fields.iter().zip(groups) {
         let (field, value) = (format_ident!("{field}"), layout(&mut schedule, nodes));

@@ -18,11 +18,11 @@ pub(super) struct Schedule<'a> {
     last_use: BTreeMap<NodeId, usize>,
 }
 
-enum Statement {
-    /// `let name = expression;`
-    Let { name: Ident, node: NodeId, expression: TokenStream },
-    /// Anything else.
-    Other(TokenStream),
+/// `let name = expression;`
+struct Statement {
+    name: Ident,
+    node: NodeId,
+    expression: TokenStream,
 }
 
 const RETURNED: usize = usize::MAX;
@@ -47,12 +47,8 @@ impl<'a> Schedule<'a> {
                 let end = number * BLOCK + block.len();
                 let handed_on: Vec<&Ident> = block
                     .iter()
-                    .filter_map(|statement| match statement {
-                        Statement::Let { name, node, .. } => Some((name, node)),
-                        Statement::Other(_) => None,
-                    })
-                    .filter(|(_, node)| self.last_use.get(node).is_some_and(|&u| u >= end))
-                    .map(|(name, _)| name)
+                    .filter(|s| self.last_use.get(&s.node).is_some_and(|&u| u >= end))
+                    .map(|s| &s.name)
                     .collect();
                 let lets = lets(block);
                 quote!(let (#(#handed_on,)*) = { #lets (#(#handed_on,)*) };)
@@ -86,11 +82,6 @@ impl<'a> Schedule<'a> {
         }
         self.last_use.insert(node, RETURNED);
         self.places[&node].clone()
-    }
-
-    /// Adds a statement after those so far.
-    pub(super) fn statement(&mut self, tokens: TokenStream) {
-        self.statements.push(Statement::Other(tokens));
     }
 
     /// An array of nodes.
@@ -132,7 +123,7 @@ impl<'a> Schedule<'a> {
         }
         let name = format_ident!("t{number}");
         self.places.insert(node, quote!(#name));
-        self.statements.push(Statement::Let { name, node, expression });
+        self.statements.push(Statement { name, node, expression });
     }
 
     fn expression(&self, node: NodeId) -> TokenStream {
@@ -220,9 +211,5 @@ impl<'a> Schedule<'a> {
 }
 
 fn lets(statements: &[Statement]) -> TokenStream {
-    let text = |statement: &Statement| match statement {
-        Statement::Let { name, expression, .. } => quote!(let #name = #expression;),
-        Statement::Other(tokens) => tokens.clone(),
-    };
-    statements.iter().map(text).collect()
+    statements.iter().map(|Statement { name, expression, .. }| quote!(let #name = #expression;)).collect()
 }

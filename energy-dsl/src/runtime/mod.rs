@@ -3,6 +3,7 @@
 
 mod array;
 mod call;
+mod choose;
 mod cpu;
 mod declaration;
 mod element;
@@ -17,6 +18,8 @@ pub use call::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
     JacobiansCall, ResidualCall, ResidualJacobianCall, ValueCall,
 };
+#[doc(hidden)]
+pub use choose::Choose;
 pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Routine};
 pub use element::{

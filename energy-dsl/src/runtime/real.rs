@@ -52,6 +52,8 @@ pub trait Number:
 {
     /// What a comparison yields.
     type Mask: Mask;
+    /// Whether there are several lanes, so that a mask may hold for some and not for others.
+    const WIDE: bool = false;
 
     /// The number nearest to a double.
     fn from_f64(value: f64) -> Self;

@@ -80,6 +80,7 @@ impl<R: Register> Lane<R::Scalar> for Lanes<R> {
 
 impl<R: Register> Number for Lanes<R> {
     type Mask = R::Mask;
+    const WIDE: bool = R::LANES > 1;
 
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
