@@ -2,6 +2,7 @@
 //! self-description that every generated element carries.
 
 mod array;
+mod batch;
 mod call;
 mod cpu;
 mod declaration;
@@ -12,6 +13,7 @@ mod flags;
 mod real;
 
 pub use array::Array;
+pub use batch::{Batch, BatchWork, Batches, Hessians, Pack, WidePoints, for_each_batch, pack_field};
 #[doc(hidden)]
 pub use call::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
