@@ -139,9 +139,9 @@ fn fastest(mut pass: impl FnMut()) -> f64 {
     (0..300).map(time).fold(f64::INFINITY, f64::min)
 }
 
-fn measure<E: Pack + From<usize>, const N: usize>(name: &str)
+fn measure<E, const N: usize>(name: &str)
 where
-    E: Potential<f64, Points = [[f64; 3]; N]>,
+    E: Pack + From<usize> + Potential<f64, Points = [[f64; 3]; N]>,
 {
     let number = |i: usize| (1.3 * i as f64).sin();
     let positions: Vec<[f64; 3]> = (0..POINTS).map(|i| [number(3 * i), number(3 * i + 1), number(3 * i + 2)]).collect();

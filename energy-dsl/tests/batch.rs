@@ -42,9 +42,9 @@ fn stencils<const N: usize>(count: usize) -> Vec<[u32; N]> {
     (0..count).map(|element| std::array::from_fn(|p| point(element, p))).collect()
 }
 
-fn check<E: Pack, const N: usize, const TRIANGLE: usize>(element: impl Fn(usize) -> E)
+fn check<E, const N: usize, const TRIANGLE: usize>(element: impl Fn(usize) -> E)
 where
-    E: Potential<f64, Points = [[f64; 3]; N], Triangle = [[[f64; 3]; 3]; TRIANGLE]>,
+    E: Pack + Potential<f64, Points = [[f64; 3]; N], Triangle = [[[f64; 3]; 3]; TRIANGLE]>,
 {
     let positions = positions();
     for level in available() {

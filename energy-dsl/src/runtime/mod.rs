@@ -1,4 +1,4 @@
-//! What generated code calls, and what calls generated code: number types, element traits and the
+//! What generated code calls, and what calls generated code: number types, lanes and levels, element traits and the
 //! self-description that every generated element carries.
 
 mod array;
