@@ -1,7 +1,8 @@
-//! What generated code calls, and what calls generated code: number types, element traits and the
+//! What generated code calls, and what calls generated code: number types, lanes and levels, element traits and the
 //! self-description that every generated element carries.
 
 mod array;
+mod batch;
 mod call;
 mod choose;
 mod cpu;
@@ -13,6 +14,7 @@ mod flags;
 mod real;
 
 pub use array::Array;
+pub use batch::{Batch, BatchWork, Batches, Hessians, Pack, WidePoints, for_each_batch, pack_field};
 #[doc(hidden)]
 pub use call::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,

@@ -28,6 +28,26 @@ pub trait Lane<S: Number>: Real {
     /// The number in lane `lane`.
     fn extract(self, lane: usize) -> S;
 
+    /// The points `indices(lane)`: x, y and z.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline(always)]
+    fn gather(points: &[[S; 3]], indices: impl Fn(usize) -> usize) -> [Self; 3] {
+        gather_by_element(points, indices)
+    }
+
+    /// Writes lanes as rows: number `r` of lane `c` goes to `out[c · stride + r]`, for the first `count` lanes. It turns results
+    /// of many elements, one a lane, to one result after the other.
+    ///
+    /// # Panics
+    /// When there are fewer lanes or places, or rows would overlap.
+    #[inline(always)]
+    fn store_transposed(numbers: &[Self], count: usize, out: &mut [S], stride: usize) {
+        check_transposed::<S, Self>(numbers.len(), count, out.len(), stride);
+        transpose_by_element(numbers, count, out, stride);
+    }
+
     /// The first numbers of a slice; lanes beyond its end repeat its last number, so that they compute, and flag, nothing
     /// that it does not.
     ///
@@ -51,6 +71,35 @@ pub trait Lane<S: Number>: Real {
         for (lane, value) in values.iter_mut().enumerate() {
             *value = self.extract(lane);
         }
+    }
+}
+
+/// [`Lane::gather`] number by number: the gathering instructions of AVX-512 were not faster.
+#[inline(always)]
+pub fn gather_by_element<S: Number, V: Lane<S>>(points: &[[S; 3]], indices: impl Fn(usize) -> usize) -> [V; 3] {
+    let x = V::from_fn(|lane| points[indices(lane)][0].clone());
+    let y = V::from_fn(|lane| points[indices(lane)][1].clone());
+    let z = V::from_fn(|lane| points[indices(lane)][2].clone());
+    [x, y, z]
+}
+
+/// [`Lane::store_transposed`] number by number.
+#[inline(always)]
+pub fn transpose_by_element<S: Number, V: Lane<S>>(numbers: &[V], count: usize, out: &mut [S], stride: usize) {
+    for (row, number) in numbers.iter().enumerate() {
+        for lane in 0..count {
+            out[lane * stride + row] = number.extract(lane);
+        }
+    }
+}
+
+/// The conditions of [`Lane::store_transposed`].
+#[inline(always)]
+pub fn check_transposed<S: Number, V: Lane<S>>(numbers: usize, count: usize, places: usize, stride: usize) {
+    assert!(count <= V::LANES, "{count} lanes of {}", V::LANES);
+    assert!(numbers <= stride, "{numbers} numbers a lane do not fit a stride of {stride}");
+    if count > 0 {
+        assert!((count - 1) * stride + numbers <= places, "{count} rows of {numbers} numbers in {places} places");
     }
 }
 

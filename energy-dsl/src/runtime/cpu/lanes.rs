@@ -3,7 +3,7 @@
 use std::fmt::{self, Debug};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lane::Lane;
+use super::lane::{Lane, check_transposed};
 use super::register::{DoubleRegister, Register, Scalar};
 use super::{Kernel, Level};
 use crate::runtime::elementary::{Atan2, Cos, Double, Exp, Ln, Pow, Sin};
@@ -75,6 +75,11 @@ impl<R: Register> Lane<R::Scalar> for Lanes<R> {
         let mut values = [R::Scalar::default(); 16];
         self.0.store(&mut values);
         values[lane]
+    }
+    #[inline(always)]
+    fn store_transposed(numbers: &[Self], count: usize, out: &mut [R::Scalar], stride: usize) {
+        check_transposed::<R::Scalar, Self>(numbers.len(), count, out.len(), stride);
+        R::store_transposed(numbers, count, out, stride);
     }
 }
 

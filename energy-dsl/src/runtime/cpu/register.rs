@@ -1,6 +1,7 @@
 //! What a processor's register can do. [`super::lanes`] makes numbers of registers.
 
-use super::lane::Lane;
+use super::lane::{Lane, transpose_by_element};
+use super::lanes::Lanes;
 use super::{Kernel, Level};
 use crate::runtime::elementary::{Binary, Unary};
 use crate::runtime::real::{Mask, Number};
@@ -113,6 +114,12 @@ pub trait Register: Copy {
     fn add_bits(a: Self, b: Self) -> Self;
     /// The difference of the bit patterns as integers.
     fn sub_bits(a: Self, b: Self) -> Self;
+
+    /// [`Lane::store_transposed`], its conditions checked.
+    #[inline(always)]
+    fn store_transposed(numbers: &[Lanes<Self>], count: usize, out: &mut [Self::Scalar], stride: usize) {
+        transpose_by_element(numbers, count, out, stride);
+    }
 
     /// An elementary function of each number.
     fn unary<F: Unary, L: Level>(a: Self) -> Self;

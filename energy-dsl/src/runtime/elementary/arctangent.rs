@@ -43,8 +43,12 @@ impl Binary for Atan2 {
         let less = D::select(infinite, D::select(less.equal(infinity), one, zero), less);
         let more = D::select(infinite | more.equal(zero), one, more);
         // Scaled so that nothing below overflows, and only a quotient that is subnormal itself underflows.
-        let scale = more.power_of_two_scale();
-        let scale = scale * D::select(D::splat(power_of_two(-400)).less(more), D::splat(power_of_two(512)), one);
+        let scale = D::select(
+            more.less(D::splat(power_of_two(-400))),
+            D::splat(power_of_two(600)),
+            D::splat(power_of_two(400)),
+        );
+        let scale = D::select(D::splat(power_of_two(500)).less(more), D::splat(power_of_two(-300)), scale);
         let (less, more) = (less * scale, more * scale);
         // Beyond π/8 the angle is π/4 + atan((less − more)/(less + more)).
         let far = (D::splat(0.414_213_562_373_095) * more).less(less);

@@ -1,8 +1,8 @@
 //! Sine, cosine, exponential, logarithm, arc tangent and power, each one branch-free algorithm that is generic over the
 //! width, so that a lane has the bits of the scalar. The only branch is the reduction of angles beyond 2²⁰.
 //!
-//! Sine, cosine, exponential, logarithm and arc tangent are within 1 ulp, the power within 2, over the whole range,
-//! subnormal numbers and special cases of IEEE 754 included; `verify` holds them to it. Single precision is computed in
+//! They are within 1 ulp over the whole range, subnormal numbers and special cases of IEEE 754 included; `verify` holds them
+//! to it. Single precision is computed in
 //! double precision and rounded once.
 //!
 //! The polynomials are minimax for the relative error of the function, computed in multi-precision by the exchange

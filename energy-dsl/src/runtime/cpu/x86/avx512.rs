@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::super::lanes::Lanes;
 use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
 use super::super::{Kernel, Level};
-use super::{intrinsics, mask, run_avx512};
+use super::{intrinsics, mask, run_avx512, transpose};
 use crate::runtime::elementary::{Binary, Unary, sin_cos};
 
 mask!(Mask8(__mmask8), none: 0, bits: |m| u32::from(m), and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m);
@@ -37,6 +37,11 @@ impl Register for __m512d {
     #[inline(always)]
     fn from_fn(value: impl FnMut(usize) -> f64) -> Self {
         <Self as Register>::load(&std::array::from_fn::<_, 8, _>(value))
+    }
+
+    #[inline(always)]
+    fn store_transposed(numbers: &[Lanes<Self>], count: usize, out: &mut [f64], stride: usize) {
+        transpose::avx512(numbers, count, out, stride);
     }
 
     elementary_of_doubles!();

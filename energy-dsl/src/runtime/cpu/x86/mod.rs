@@ -8,6 +8,7 @@
 
 mod avx2;
 mod avx512;
+mod transpose;
 
 use super::lanes::Lanes;
 use super::{Baseline, Kernel, Level, LevelName};
