@@ -2,7 +2,7 @@
 
 #![allow(mixed_script_confusables)]
 
-use energy_dsl::{Batches, Hessians, Lane, Pack, Potential, available, dispatch_at, for_each_batch, pack_field};
+use energy_dsl::{Batches, Hessians, Packed, PackedPotential, Potential, available, dispatch_at};
 use energy_macros::energy;
 
 energy! {
@@ -10,24 +10,6 @@ energy! {
     energy Hinge(x1, x2, x3, x4: Point; k: Scalar[J], θ0: Scalar[rad]) {
         let θ = dihedral(x1, x2, x3, x4);
         k * (θ - θ0)^2
-    }
-}
-
-impl Pack for Spring {
-    type Wide<V: Lane<f64>> = Spring<V>;
-
-    #[inline(always)]
-    fn pack<V: Lane<f64>>(elements: &[Self]) -> Spring<V> {
-        Spring { k: pack_field(elements, |e| e.k), L: pack_field(elements, |e| e.L) }
-    }
-}
-
-impl Pack for Hinge {
-    type Wide<V: Lane<f64>> = Hinge<V>;
-
-    #[inline(always)]
-    fn pack<V: Lane<f64>>(elements: &[Self]) -> Hinge<V> {
-        Hinge { k: pack_field(elements, |e| e.k), θ0: pack_field(elements, |e| e.θ0) }
     }
 }
 
@@ -44,7 +26,7 @@ fn stencils<const N: usize>(count: usize) -> Vec<[u32; N]> {
 
 fn check<E, const N: usize, const TRIANGLE: usize>(element: impl Fn(usize) -> E)
 where
-    E: Pack + Potential<f64, Points = [[f64; 3]; N], Triangle = [[[f64; 3]; 3]; TRIANGLE]>,
+    E: PackedPotential<f64> + Potential<f64, Points = [[f64; 3]; N], Triangle = [[[f64; 3]; 3]; TRIANGLE]>,
 {
     let positions = positions();
     for level in available() {
@@ -59,7 +41,8 @@ where
                 triangles: triangles.as_flattened_mut().as_flattened_mut().as_flattened_mut(),
                 flagged: Vec::new(),
             };
-            let batches = Batches { elements: &elements, stencils: &stencils, positions: &positions, work: &mut work };
+            let packed = Packed::new(&elements, &stencils);
+            let batches = Batches { elements: &packed, positions: &positions, work: &mut work };
             dispatch_at(level, batches).expect("the level is available");
             let flagged: Vec<usize> = work.flagged.iter().map(|(element, _)| *element).collect();
             let mut expected_flags = Vec::new();
@@ -110,12 +93,38 @@ fn batches_of_hinges_are_hinges() {
 #[test]
 #[should_panic(expected = "every element needs a stencil")]
 fn a_missing_stencil_is_noticed() {
-    let (mut energies, mut gradients, mut triangles) = ([0.0; 1], [0.0; 6], [0.0; 27]);
-    let work = &mut Hessians {
-        energies: &mut energies,
-        gradients: &mut gradients,
-        triangles: &mut triangles,
-        flagged: Vec::new(),
+    let _ = Packed::new::<2>(&[Spring { k: 1.0, L: 1.0 }], &[]);
+}
+
+#[test]
+#[should_panic(expected = "point 8 of 5")]
+fn a_missing_point_is_noticed() {
+    let packed = Packed::new(&[Spring { k: 1.0, L: 1.0 }], &[[2, 7]]);
+    let mut work =
+        Hessians { energies: &mut [0.0; 1], gradients: &mut [0.0; 6], triangles: &mut [0.0; 27], flagged: Vec::new() };
+    energy_dsl::for_each_batch(&packed, &[[0.0; 3]; 5], &mut work);
+}
+
+#[test]
+fn replaced_elements_are_those_computed_with() {
+    let spring = |i: usize| Spring { k: 1.0 + i as f64, L: 0.1 };
+    let elements: Vec<Spring> = (0..19).map(spring).collect();
+    let mut packed = Packed::new(&elements, &stencils::<2>(19));
+    packed.set(18, &Spring { k: 7.0, L: 0.3 });
+    packed.set(4, &Spring { k: 9.0, L: 0.2 });
+    let mut changed = elements.clone();
+    changed[18] = Spring { k: 7.0, L: 0.3 };
+    changed[4] = Spring { k: 9.0, L: 0.2 };
+    let energies = |packed: &Packed<Spring>| {
+        let (mut energies, mut gradients, mut triangles) = (vec![0.0; 19], vec![0.0; 19 * 6], vec![0.0; 19 * 27]);
+        let mut work = Hessians {
+            energies: &mut energies,
+            gradients: &mut gradients,
+            triangles: &mut triangles,
+            flagged: Vec::new(),
+        };
+        energy_dsl::for_each_batch(packed, &positions(), &mut work);
+        energies
     };
-    for_each_batch::<Spring, 2>(&[Spring { k: 1.0, L: 1.0 }], &[], &[], work);
+    assert_eq!(energies(&packed), energies(&Packed::new(&changed, &stencils::<2>(19))));
 }

@@ -18,8 +18,9 @@ pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
     let constructor = constructor(&name, program, routines);
     let element = element(&name, program, routines);
     let traits = traits(&name, program, routines);
+    let packed = packed(&name, program, routines);
     let test = audit_test(&name, program);
-    quote!(#structure #constructor #element #traits #test)
+    quote!(#structure #constructor #element #traits #packed #test)
 }
 
 fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
@@ -203,6 +204,66 @@ fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream 
                 Ok(::energy_dsl::#evaluate(&element, inputs))
             }
         }
+    }
+}
+
+/// Elements as plain numbers, and side by side in lanes.
+fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    // The fields with their places, number by number.
+    let mut stores = Vec::new();
+    let mut loads = Vec::new();
+    let mut number = 0usize;
+    let mut field = |field: &Ident, size: Option<usize>| {
+        let mut reads = Vec::new();
+        for i in 0..size.unwrap_or(1) {
+            let place = size.map(|_| quote!([#i]));
+            stores.push(quote!(numbers[#number * stride] = self.#field #place;));
+            reads.push(quote!(V::load(&numbers[#number * stride..])));
+            number += 1;
+        }
+        loads.push(match size {
+            Some(_) => quote!(#field: [#(#reads),*],),
+            None => quote!(#field: #(#reads)*,),
+        });
+    };
+    for parameter in &program.parameters {
+        let size = (parameter.input_type != InputType::Scalar).then(|| parameter.input_type.size());
+        field(&format_ident!("{}", parameter.name), size);
+    }
+    if !routines.rest.outputs.is_empty() {
+        field(&format_ident!("precomputed"), Some(routines.rest.outputs.len()));
+    }
+    let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData,));
+    let traits = match program.kind {
+        Kind::Energy => vec!["PackedPotential"],
+        Kind::Constraint => vec!["PackedPotential", "PackedForce"],
+        Kind::Force => vec!["PackedForce"],
+        Kind::Residual => vec!["PackedResidual"],
+    };
+    let over_lanes = traits.into_iter().map(|packed| {
+        let packed = format_ident!("{packed}");
+        quote! {
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<S: ::energy_dsl::Real> ::energy_dsl::#packed<S> for #name<S> {
+                type Wide<V: ::energy_dsl::Lane<S>> = #name<V>;
+
+                #[inline(always)]
+                fn load<V: ::energy_dsl::Lane<S>>(numbers: &[S], stride: usize) -> #name<V> {
+                    #name { #(#loads)* #marker }
+                }
+            }
+        }
+    });
+    quote! {
+        #[allow(unused_variables, clippy::all, clippy::pedantic)]
+        impl<S: ::energy_dsl::Real> ::energy_dsl::Stored<S> for #name<S> {
+            const NUMBERS: usize = #number;
+
+            fn store(&self, numbers: &mut [S], stride: usize) {
+                #(#stores)*
+            }
+        }
+        #(#over_lanes)*
     }
 }
 

@@ -26,10 +26,10 @@ struct Method {
     routine: &'static str,
     /// The kernel that calls it.
     call: &'static str,
-    /// The struct it returns, and that struct's fields with the types it is generic over.
+    /// The struct it returns, and that struct's fields with the types it is generic over (the number type first).
     result: &'static str,
     fields: &'static [(&'static str, Layout)],
-    generics: TokenStream,
+    generics: Vec<TokenStream>,
     /// Arguments after `self`.
     arguments: Vec<(&'static str, TokenStream)>,
 }
@@ -67,7 +67,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             call: "ValueCall",
             result: "Value",
             fields: &[("value", NUMBER)],
-            generics: quote!(T),
+            generics: vec![quote!(T)],
             arguments: x(),
         },
         Method {
@@ -75,7 +75,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             call: "GradientCall",
             result: "Gradient",
             fields: &[("value", NUMBER), ("gradient", VECTORS)],
-            generics: quote!(T, #points),
+            generics: vec![quote!(T), quote!(#points)],
             arguments: x(),
         },
         Method {
@@ -83,7 +83,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             call: "HessianCall",
             result: "Hessian",
             fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
-            generics: quote!(T, #points, #triangle),
+            generics: vec![quote!(T), quote!(#points), quote!(#triangle)],
             arguments: x(),
         },
     ];
@@ -101,7 +101,7 @@ fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             call: "ForceCall",
             result: "ForceValue",
             fields: &[("force", VECTORS)],
-            generics: quote!(T, #points),
+            generics: vec![quote!(T), quote!(#points)],
             arguments: state(),
         },
         Method {
@@ -109,7 +109,7 @@ fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             call: "JacobiansCall",
             result: "ForceJacobians",
             fields: &[("force", VECTORS), ("by_position", BLOCKS), ("by_velocity", BLOCKS)],
-            generics: quote!(T, #points, #square),
+            generics: vec![quote!(T), quote!(#points), quote!(#square)],
             arguments: state(),
         },
     ];
@@ -130,7 +130,7 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
             call: "ConstraintJacobianCall",
             result: "ConstraintJacobian",
             fields: &[("value", NUMBERS), ("jacobian", VECTORS)],
-            generics: quote!(T, #rows_type, #jacobian),
+            generics: vec![quote!(T), quote!(#rows_type), quote!(#jacobian)],
             arguments: x(),
         },
         Method {
@@ -138,7 +138,7 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
             call: "ConstraintHessianCall",
             result: "ConstraintHessian",
             fields: &[("value", NUMBERS), ("jacobian", VECTORS), ("hessians", BLOCKS)],
-            generics: quote!(T, #rows_type, #jacobian, #triangles),
+            generics: vec![quote!(T), quote!(#rows_type), quote!(#jacobian), quote!(#triangles)],
             arguments: x(),
         },
         Method {
@@ -146,7 +146,7 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
             call: "GaussNewtonCall",
             result: "Hessian",
             fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
-            generics: quote!(T, #points, #triangle),
+            generics: vec![quote!(T), quote!(#points), quote!(#triangle)],
             arguments: x(),
         },
     ];
@@ -165,7 +165,7 @@ fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream
             call: "ResidualCall",
             result: "ResidualValue",
             fields: &[("value", NUMBERS)],
-            generics: quote!(T, #rows),
+            generics: vec![quote!(T), quote!(#rows)],
             arguments: u(),
         },
         Method {
@@ -173,7 +173,7 @@ fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream
             call: "ResidualJacobianCall",
             result: "ResidualJacobian",
             fields: &[("value", NUMBERS), ("jacobian", NUMBERS)],
-            generics: quote!(T, #rows, #jacobian),
+            generics: vec![quote!(T), quote!(#rows), quote!(#jacobian)],
             arguments: u(),
         },
     ];
@@ -222,7 +222,7 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
         (format_ident!("{}", method.routine), format_ident!("{}", method.call), format_ident!("{}", method.result));
     let levelled = format_ident!("{plain}_at");
     let generics = &method.generics;
-    let result_type = quote!(::energy_dsl::#result<#generics>);
+    let result_type = quote!(::energy_dsl::#result<#(#generics),*>);
     let names: Vec<_> = method.arguments.iter().map(|(name, _)| format_ident!("{name}")).collect();
     let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
     let arguments = quote!(&self, #(#names: &#types),*);
@@ -232,20 +232,20 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
         Some(general) => {
             let [is_ordinary, if_ordinary, in_general] =
                 ["is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
-            // Field by field: returned as it is, the struct would live in memory whichever way it was made.
-            let fields: Vec<_> = method
-                .fields
-                .iter()
-                .map(|(field, _)| *field)
-                .chain(["flags"])
+            // Apart, and in another order: handed on as it is, the struct would live in memory whichever way it was made.
+            let fields: Vec<_> = ["flags"]
+                .into_iter()
+                .chain(method.fields.iter().rev().map(|(field, _)| *field))
                 .map(|field| format_ident!("{field}"))
                 .collect();
+            let field_types = method.fields.iter().rev().zip(method.generics.iter().rev()).map(|(_, generic)| generic);
+            let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
             let select = quote! {
                 if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
                     self.#if_ordinary::<L>(#(#names),*)
                 } else {
-                    let general = self.#in_general::<L>(#(#names),*);
-                    ::energy_dsl::#result { #(#fields: general.#fields,)* }
+                    let (#(#fields),*) = self.#in_general::<L>(#(#names),*);
+                    ::energy_dsl::#result { #(#fields),* }
                 }
             };
             let guard = mask(program, routines, general.ordinary);
@@ -265,14 +265,14 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
                 /// With all precautions; lanes that need none keep the bits they would have alone.
                 #[cold]
                 #[inline(never)]
-                fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #result_type {
-                    let general = { #everything };
+                fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #parts {
+                    let mut general = { #everything };
                     if T::WIDE {
                         let ordinary = self.#is_ordinary::<L>(#(#names),*);
                         let here = self.#if_ordinary::<L>(#(#names),*);
-                        return ::energy_dsl::Choose::choose(ordinary, &here, &general);
+                        general = ::energy_dsl::Choose::choose(ordinary, &here, &general);
                     }
-                    general
+                    (#(general.#fields),*)
                 }
             };
             (select, general)

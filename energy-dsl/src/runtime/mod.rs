@@ -14,7 +14,10 @@ mod flags;
 mod real;
 
 pub use array::Array;
-pub use batch::{Batch, BatchWork, Batches, Hessians, Pack, WidePoints, for_each_batch, pack_field};
+pub use batch::{
+    BLOCK, Batch, BatchWork, Batches, Hessians, Packed, PackedForce, PackedPotential, PackedResidual, Stored,
+    WidePoints, for_each_batch,
+};
 #[doc(hidden)]
 pub use call::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,

@@ -28,12 +28,12 @@ pub trait Lane<S: Number>: Real {
     /// The number in lane `lane`.
     fn extract(self, lane: usize) -> S;
 
-    /// The points `indices(lane)`: x, y and z.
+    /// The points of the first [`Self::LANES`] indices: x, y and z.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// When there is no such point, or there are fewer indices.
     #[inline(always)]
-    fn gather(points: &[[S; 3]], indices: impl Fn(usize) -> usize) -> [Self; 3] {
+    fn gather(points: &[[S; 3]], indices: &[u32]) -> [Self; 3] {
         gather_by_element(points, indices)
     }
 
@@ -76,11 +76,17 @@ pub trait Lane<S: Number>: Real {
 
 /// [`Lane::gather`] number by number: the gathering instructions of AVX-512 were not faster.
 #[inline(always)]
-pub fn gather_by_element<S: Number, V: Lane<S>>(points: &[[S; 3]], indices: impl Fn(usize) -> usize) -> [V; 3] {
-    let x = V::from_fn(|lane| points[indices(lane)][0].clone());
-    let y = V::from_fn(|lane| points[indices(lane)][1].clone());
-    let z = V::from_fn(|lane| points[indices(lane)][2].clone());
-    [x, y, z]
+pub fn gather_by_element<S: Number, V: Lane<S>>(points: &[[S; 3]], indices: &[u32]) -> [V; 3] {
+    assert!(indices.len() >= V::LANES, "{} lanes from {} indices", V::LANES, indices.len());
+    // The widest register has 16 lanes.
+    let mut numbers: [[S; 16]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| S::from_f64(0.0)));
+    for lane in 0..V::LANES {
+        let point = &points[indices[lane] as usize];
+        for axis in 0..3 {
+            numbers[axis][lane] = point[axis].clone();
+        }
+    }
+    [V::load(&numbers[0]), V::load(&numbers[1]), V::load(&numbers[2])]
 }
 
 /// [`Lane::store_transposed`] number by number.
