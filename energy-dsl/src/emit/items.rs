@@ -7,7 +7,6 @@ use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Input, NodeId, count};
 use crate::routines::{Routine, Routines};
 use crate::runtime::Kind;
-use crate::syntax::InputType;
 
 /// The type, its constructor, its traits, and its test if one was asked for.
 #[must_use]
@@ -85,13 +84,7 @@ fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
 }
 
 fn input_type(input: &DeclaredInput) -> TokenStream {
-    match input.input_type {
-        InputType::Scalar => quote!(T),
-        other => {
-            let size = other.size();
-            quote!([T; #size])
-        }
-    }
+    input.input_type.dimensions().into_iter().rev().fold(quote!(T), |entry, length| quote!([#entry; #length]))
 }
 
 /// `new` with the rest shape and then the parameters, and the same from flat slices.
@@ -106,11 +99,12 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         inputs
             .iter()
             .map(|input| {
-                let numbers = (input.first..input.first + input.input_type.size()).map(|i| quote!(#list[#i]));
-                match input.input_type {
-                    InputType::Scalar => quote!(#(#numbers)*),
-                    _ => quote!([#(#numbers),*]),
+                let mut numbers: Vec<TokenStream> =
+                    (input.first..input.first + input.input_type.size()).map(|i| quote!(#list[#i])).collect();
+                for length in input.input_type.dimensions().into_iter().rev() {
+                    numbers = numbers.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
                 }
+                numbers.into_iter().collect()
             })
             .collect()
     };
@@ -181,13 +175,16 @@ fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenStream) -> T
         .find(|i| (i.first..i.first + i.input_type.size()).contains(&number))
         .expect("compiler bug: inputs are numbered without gaps");
     let name = format_ident!("{}", input.name);
-    match input.input_type {
-        InputType::Scalar => quote!(#prefix #name),
-        _ => {
-            let place = number - input.first;
-            quote!(#prefix #name[#place])
-        }
+    let mut place = number - input.first;
+    let mut size = input.input_type.size();
+    let mut read = quote!(#prefix #name);
+    for length in input.input_type.dimensions() {
+        size /= length;
+        let index = place / size;
+        read.extend(quote!([#index]));
+        place %= size;
     }
+    read
 }
 
 fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {

@@ -86,6 +86,14 @@ pub(super) const FUNCTIONS: &[Function] = &[
         accuracy: "0",
     },
     Function {
+        name: "[]",
+        usage: "v[i], v.x, q.w",
+        docs: "A component, counted from 0; of an array, an entry.",
+        shape: component_shape,
+        lower: component,
+        accuracy: "0",
+    },
+    Function {
         name: "vector",
         usage: "vector(x, y, …)",
         docs: "The vector of those numbers.",
@@ -175,6 +183,14 @@ fn vector_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.len() {
         n @ 2..=4 if shapes.iter().all(|s| *s == Shape::Scalar) => Ok(Shape::Vector(n as u8)),
         _ => Err("takes two to four scalars".into()),
+    }
+}
+
+/// The checker has seen to it that the second is a constant in range.
+fn component_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Vector(_) | Shape::Quat | Shape::DualQuat | Shape::Twist, Shape::Scalar] => Ok(Shape::Scalar),
+        _ => Err("is written v[0] or v.x".into()),
     }
 }
 
@@ -270,4 +286,9 @@ fn columns(_: &mut Graph, a: &[Lowered]) -> Lowered {
 
 fn vector(_: &mut Graph, a: &[Lowered]) -> Lowered {
     Lowered::vector(a.iter().map(Lowered::node).collect::<Vec<_>>())
+}
+
+fn component(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let number = g.as_constant(a[1].node()).expect("compiler bug: indices are constants");
+    Lowered::scalar(a[0].parts[number as usize])
 }
