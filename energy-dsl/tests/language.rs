@@ -54,6 +54,27 @@ fn functions_compute_what_they_say() {
         ("cos_half(θ0) - cos(0.125)", 0.0),
         ("one_minus_cos(L) - 1 + cos(L)", 0.0),
         ("x_minus_sin(L) - L + sin(L)", 0.0),
+        // i j = k, and q q* = ‖q‖².
+        ("(quat(0, 1, 0, 0) * quat(0, 0, 1, 0)).z", 1.0),
+        ("{ let q = quat(L, p_k); real(q * conjugate(q)) - norm(q)^2 + dot(q, q) }", 9.25),
+        ("norm(unit(quat(L, p_k)) - quat(L, p_k) / norm(quat(L, p_k)))", 0.0),
+        // A quarter turn about z: half the angle is π/4.
+        ("rotate(rotation(vector(0, 0, π / 4)), vector(1, 0, 0)).y", 1.0),
+        ("(rotation_matrix(rotation(vector(0, 0, π / 4))) * vector(1, 0, 0)).y", 1.0),
+        ("transform(exp(twist(vector(0, 0, π / 4), p_l)), p_k).y", 0.0),
+        ("linear(twist(p_k, p_l)).x + angular(twist(p_k, p_l)).y", 5.0),
+        // Motions compose: first the one on the right.
+        (
+            "{ let A = exp(twist(L * p_k, p_l)); let B = exp(twist(p_l, p_k)); norm(transform(A * B, p_l) - transform(A, transform(B, p_l))) }",
+            0.0,
+        ),
+        (
+            "{ let A = exp(twist(L * p_k, p_l)); let q = unit(k * A); norm(real(q) - real(A)) + norm(dual(q) - dual(A)) }",
+            0.0,
+        ),
+        ("norm(dual(dual_quat(quat(1, p_k), 2 * quat(0, p_l)))) - 2 * norm(p_l)", 0.0),
+        ("sinc(L) - sin(L) / L + cosc(L) - (1 - cos(L)) / L^2", 0.0),
+        ("cos_sqrt(k) - cos(sqrt(k)) + sinc_sqrt(k) - sinc(sqrt(k))", 0.0),
         ("{ fn twice(x) { x + x } twice(twice(k)) }", 12.0),
         ("{ let a = unit(p_k); dot(â, a) }", 1.0),
         ("dot(gradient(norm_squared(p_k - p_l), p_k), vector(1, 0, 0))", -4.0),

@@ -71,5 +71,26 @@ energy! {
     constraint Angles(p, q, r: Point; φ: Scalar) { vector(angle(q - p, r - q) - φ, norm(p - r)^3) }
 
     #[audit(samples = 50)]
+    energy Motions(p, q: Point; ξ: Twist, a: Quat, B: DualQuat, s: Scalar) {
+        let A = exp(twist(p / 4, s * q));
+        let U = unit(quat(s, p) * conjugate(a));
+        dot(transform(A * exp(ξ), q), rotate(U, p)) + norm(real(A) - a) + dual(unit(A * B)).x
+            + trace(rotation_matrix(rotation(q / 2))) * norm(quat(dot(p, q), p - q))
+    }
+
+    #[audit(samples = 50)]
+    energy Sincs(p, q: Point; s: Scalar) {
+        let y = norm_squared(p - q) / s;
+        // Away from 0, where the textbook form has no digits.
+        cos_sqrt(y) * s + sinc_sqrt(y) + sinc(1 + y * s) + cosc(1 + y)
+    }
+
+    #[audit(samples = 50)]
+    force SincGradients(p, q: Point; s: Scalar) {
+        let U = sinc_sqrt(s * norm_squared(p - q)) + cos_sqrt(norm_squared(p)) + sinc(1 + s * norm_squared(p + q));
+        [-gradient(U, p), -gradient(U, q)]
+    }
+
+    #[audit(samples = 50)]
     residual Fit(a: Vec3, s, t: Scalar; m: Vec3) { vector(norm(a - m), sin(s) * t, dot(a, m)^2, atan2(s, 2 + t^2)) }
 }

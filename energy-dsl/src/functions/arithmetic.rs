@@ -10,7 +10,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "*",
         usage: "a * b",
-        docs: "Product: of numbers, of a number with anything, of matrices, of a matrix with a vector.",
+        docs: "Product: of numbers, of a number with anything, of matrices, of a matrix with a vector, of quaternions, of dual quaternions.",
         shape: product,
         lower: mul,
         accuracy: "",
@@ -47,12 +47,17 @@ fn product(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Truth, _] | [_, Truth] => Err("a comparison is not a number; use if … { } else { }".into()),
         [Scalar, other] | [other, Scalar] => Ok(other),
+        [Shape::Quat, Shape::Quat] => Ok(Shape::Quat),
+        [Shape::DualQuat, Shape::DualQuat] => Ok(Shape::DualQuat),
         [Matrix(r, c), Matrix(r2, c2)] if c == r2 => Ok(Matrix(r, c2)),
         [Matrix(r, c), Vector(n)] if c == n => Ok(if r == 1 { Scalar } else { Vector(r) }),
         [Vector(_), Vector(_)] => {
             Err("two vectors have no product `*`; did you mean dot(a, b), cross(a, b) or outer(a, b)?".into())
         }
-        [a, b] => Err(format!("inner sizes must agree, but this is {a} times {b}")),
+        [a @ (Matrix(..) | Vector(_)), b @ (Matrix(..) | Vector(_))] => {
+            Err(format!("inner sizes must agree, but this is {a} times {b}"))
+        }
+        [a, b] => Err(format!("{a} and {b} have no product")),
         _ => Err("takes two operands".into()),
     }
 }
@@ -103,6 +108,7 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
     match (a.shape, b.shape) {
         (Shape::Scalar, _) => Lowered { shape: b.shape, parts: g.scaled(a.node(), &b.parts) },
         (_, Shape::Scalar) => Lowered { shape: a.shape, parts: g.scaled(b.node(), &a.parts) },
+        (Shape::Quat | Shape::DualQuat, _) => super::quaternion::product(g, a, b),
         _ => {
             let ((rows, inner), (_, columns)) = (a.dimensions(), b.dimensions());
             let mut parts = Vec::with_capacity(rows * columns);

@@ -18,7 +18,17 @@ macro_rules! scalar_function {
 
 pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!("sqrt", "sqrt(x)", "√x, x ≥ 0.", one_scalar, "1", |g, a| g.sqrt(a[0].node())),
-    scalar_function!("exp", "exp(x)", "eˣ.", one_scalar, "1", |g, a| g.exp(a[0].node())),
+    Function {
+        name: "exp",
+        usage: "exp(x) or exp(ξ)",
+        docs: "eˣ; of a twist ξ = (θ, t), the dual quaternion of the motion that turns by the angle 2‖θ‖ about θ and shifts by t: (q, ½ t q), q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖). Regular at θ = 0.",
+        shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
+        lower: |g, a| match a[0].shape {
+            Shape::Twist => super::quaternion::exp(g, &a[0]),
+            _ => Lowered::scalar(g.exp(a[0].node())),
+        },
+        accuracy: "1",
+    },
     scalar_function!("log", "log(x)", "Natural logarithm, x > 0.", one_scalar, "1", |g, a| g.ln(a[0].node())),
     scalar_function!(
         "sin",

@@ -7,7 +7,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "dot",
         usage: "dot(a, b) or a·b",
-        docs: "Inner product; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive.",
+        docs: "Inner product of two vectors or quaternions; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive.",
         shape: dot_shape,
         lower: dot,
         accuracy: "",
@@ -106,7 +106,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
 fn dot_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(a), Shape::Vector(b)] if a == b => Ok(Shape::Scalar),
-        [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Quat, Shape::Quat] | [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
         [Shape::Scalar, other] | [other, Shape::Scalar] => Ok(other),
         [a, b] => Err(format!("takes two vectors of the same length, but these are {a} and {b}")),
         _ => Err(format!("takes two vectors, but there are {} arguments", shapes.len())),

@@ -8,7 +8,9 @@ mod elementary;
 mod length;
 mod linear_algebra;
 mod logic;
+mod quaternion;
 mod shape;
+mod sinc;
 
 pub use shape::{Lowered, Shape};
 
@@ -46,10 +48,12 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
     [
         arithmetic::FUNCTIONS,
         elementary::FUNCTIONS,
+        sinc::FUNCTIONS,
         linear_algebra::FUNCTIONS,
         length::FUNCTIONS,
         angle::FUNCTIONS,
         dihedral::FUNCTIONS,
+        quaternion::FUNCTIONS,
         logic::FUNCTIONS,
     ]
     .into_iter()

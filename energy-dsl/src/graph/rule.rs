@@ -35,6 +35,14 @@ pub enum Primitive {
     Versine,
     /// x − sin x.
     SineRemainder,
+    /// cos √y.
+    CosSqrt,
+    /// sin √y / √y.
+    SincSqrt,
+    /// The derivative of sin √y / √y.
+    SincSqrtSlope,
+    /// sin x / x.
+    Sinc,
     /// A first partial derivative of another rule's output.
     Partial {
         /// The node differentiated.
@@ -64,7 +72,10 @@ impl Primitive {
             Self::DihedralCosineHalf => "cos θ/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
-            Self::Partial { .. } => return None,
+            Self::CosSqrt => "cos √y",
+            Self::SincSqrt => "sin √y / √y",
+            Self::Sinc => "sin x / x",
+            Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }
 }
