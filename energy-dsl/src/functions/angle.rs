@@ -4,7 +4,7 @@
 
 use super::length::{Direction, direction, projector, upper};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
@@ -180,6 +180,11 @@ fn angle(g: &mut Graph, args: &[Lowered]) -> Lowered {
         let (sine, cosine) = (g.sqrt(square), g.dot(a, b));
         return Lowered::scalar(g.atan2(sine, cosine));
     }
+    Lowered::scalar(between(g, a, b))
+}
+
+/// The robust form of the angle between two vectors.
+pub(super) fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
     let pair = pair(g, a, b);
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     let w = direction(g, &pair.cross);
@@ -217,5 +222,28 @@ fn angle(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let rule = Rule::smooth(Primitive::Angle, pair.arguments.clone(), value, first, second)
         .flagged(0, Flag::Degenerate, pair.degenerate)
         .flagged(1, Flag::Degenerate, w.zero);
-    Lowered::scalar(g.add_rule(rule, &[]))
+    g.add_rule(rule, &[])
+}
+
+/// √(c (1 − â·b̂)) with a constant c: v = 0 is the tip of a cone, where derivatives are taken as 0. Of ω = 1 − â·b̂, first
+/// derivative c/(2v), second −c²/(4v³).
+pub(crate) fn recognise_root(g: &mut Graph, x: NodeId) -> Option<NodeId> {
+    let (factor, omega) = match g.op(x) {
+        Op::Mul(c, y) if g.as_constant(c).is_some() => (c, y),
+        Op::Mul(y, c) => (c, y),
+        _ => (g.constant(1.0), x),
+    };
+    let factor = g.as_constant(factor).filter(|c| *c > 0.0)?;
+    g.rule(omega).filter(|r| r.primitive == Primitive::OneMinusCosine)?;
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let value = g.plain_sqrt(x);
+    let tip = g.equal(value, null);
+    let reciprocal = g.div(one, value);
+    let reciprocal = g.select(tip, null, reciprocal);
+    let (half, minus_quarter) = (g.constant(factor / 2.0), g.constant(-factor * factor / 4.0));
+    let first = g.mul(half, reciprocal);
+    let second = g.product(None, &[minus_quarter, reciprocal, reciprocal, reciprocal]);
+    let rule = Rule::smooth(Primitive::RootOneMinusCosine, vec![omega], value, vec![first], vec![second]);
+    let factor = g.constant(factor);
+    Some(g.add_rule(rule.flagged(1, Flag::Kink, tip), &[factor]))
 }

@@ -1,11 +1,18 @@
 //! `+ − · / ^` and their likes, on numbers, vectors and matrices.
 
 use super::{Function, Lowered, Shape};
-use crate::graph::Graph;
+use crate::graph::{Form, Graph, NodeId, Op};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function { name: "+", usage: "a + b", docs: "Sum of equal shapes.", shape: same, lower: add, accuracy: "" },
-    Function { name: "-", usage: "a - b", docs: "Difference of equal shapes.", shape: same, lower: sub, accuracy: "" },
+    Function {
+        name: "-",
+        usage: "a - b",
+        docs: "Difference of equal shapes. `x^2 - y^2` of numbers is (x − y)(x + y).",
+        shape: same,
+        lower: sub,
+        accuracy: "",
+    },
     Function { name: "neg", usage: "-a", docs: "Negative.", shape: one, lower: neg, accuracy: "" },
     Function {
         name: "*",
@@ -82,11 +89,7 @@ fn power(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
-fn by_parts(
-    g: &mut Graph,
-    args: &[Lowered],
-    op: fn(&mut Graph, crate::graph::NodeId, crate::graph::NodeId) -> crate::graph::NodeId,
-) -> Lowered {
+fn by_parts(g: &mut Graph, args: &[Lowered], op: fn(&mut Graph, NodeId, NodeId) -> NodeId) -> Lowered {
     let parts = args[0].parts.iter().zip(&args[1].parts).map(|(&a, &b)| op(g, a, b)).collect();
     Lowered { shape: args[0].shape, parts }
 }
@@ -96,7 +99,34 @@ fn add(g: &mut Graph, args: &[Lowered]) -> Lowered {
 }
 
 fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    if g.form() == Form::Robust
+        && args[0].shape == Shape::Scalar
+        && let Some(product) = recognise_squares(g, args[0].node(), args[1].node())
+    {
+        return Lowered::scalar(product);
+    }
     by_parts(g, args, Graph::sub)
+}
+
+/// x² − y² as (x − y)(x + y), where one of them may be a constant with an exact root.
+fn recognise_squares(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
+    let (x, y) = (root_of_square(g, a)?, root_of_square(g, b)?);
+    if g.as_constant(a).is_some() && g.as_constant(b).is_some() {
+        return None;
+    }
+    let (difference, sum) = (g.sub(x, y), g.add(x, y));
+    Some(g.mul(difference, sum))
+}
+
+fn root_of_square(g: &mut Graph, square: NodeId) -> Option<NodeId> {
+    if let Some(value) = g.as_constant(square) {
+        let root = value.sqrt();
+        return (root > 0.0 && root * root == value && root.fract() == 0.0).then(|| g.constant(root));
+    }
+    match g.op(square) {
+        Op::Mul(x, y) if x == y => Some(x),
+        _ => None,
+    }
 }
 
 fn neg(g: &mut Graph, args: &[Lowered]) -> Lowered {

@@ -5,16 +5,19 @@ mod angle;
 mod arithmetic;
 mod dihedral;
 mod elementary;
+mod exponential;
 mod length;
 mod linear_algebra;
 mod logic;
+mod loss;
 mod quaternion;
 mod shape;
 mod sinc;
+mod trigonometric;
 
 pub use shape::{Lowered, Shape};
 
-pub(crate) use angle::recognise_one_minus_cosine;
+pub(crate) use angle::{recognise_one_minus_cosine, recognise_root};
 pub(crate) use dihedral::recognise_dihedral;
 pub(crate) use length::recognise_norm_power;
 
@@ -48,7 +51,10 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
     [
         arithmetic::FUNCTIONS,
         elementary::FUNCTIONS,
+        exponential::FUNCTIONS,
+        trigonometric::FUNCTIONS,
         sinc::FUNCTIONS,
+        loss::FUNCTIONS,
         linear_algebra::FUNCTIONS,
         length::FUNCTIONS,
         angle::FUNCTIONS,
@@ -68,5 +74,8 @@ pub fn find(name: &str) -> Option<&'static Function> {
 
 /// The robust form of a − b, if it has one.
 pub(crate) fn recognise_difference(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
-    recognise_one_minus_cosine(g, a, b).or_else(|| length::recognise_elongation(g, a, b))
+    recognise_one_minus_cosine(g, a, b)
+        .or_else(|| length::recognise_elongation(g, a, b))
+        .or_else(|| elementary::recognise_versine(g, a, b))
+        .or_else(|| exponential::recognise_expm1(g, a, b))
 }

@@ -43,6 +43,24 @@ pub enum Primitive {
     SincSqrtSlope,
     /// sin x / x.
     Sinc,
+    /// √(c (1 − cos)) of the angle between two vectors.
+    RootOneMinusCosine,
+    /// ln(1 + x).
+    Log1p,
+    /// eˣ − 1.
+    Expm1,
+    /// ln(1 + eˣ).
+    Softplus,
+    /// Quadratic up to a threshold, then linear.
+    Huber,
+    /// A smooth one.
+    PseudoHuber,
+    /// tan x.
+    Tangent,
+    /// asin x.
+    ArcSine,
+    /// acos x.
+    ArcCosine,
     /// A first partial derivative of another rule's output.
     Partial {
         /// The node differentiated.
@@ -75,6 +93,15 @@ impl Primitive {
             Self::CosSqrt => "cos √y",
             Self::SincSqrt => "sin √y / √y",
             Self::Sinc => "sin x / x",
+            Self::RootOneMinusCosine => "√(1 − cosine between vectors)",
+            Self::Log1p => "log1p",
+            Self::Expm1 => "expm1",
+            Self::Softplus => "softplus",
+            Self::Huber => "Huber loss",
+            Self::PseudoHuber => "pseudo-Huber loss",
+            Self::Tangent => "tan x",
+            Self::ArcSine => "asin x",
+            Self::ArcCosine => "acos x",
             Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }
