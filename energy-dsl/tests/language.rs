@@ -93,6 +93,28 @@ fn functions_compute_what_they_say() {
     }
 }
 
+/// What has right units is accepted, also where some are left to be inferred.
+#[test]
+fn right_units_are_accepted() {
+    for source in [
+        // L must be a length, ρ a stiffness; 0 has any unit.
+        "energy A(p, q: Point; k: Scalar[N/m], L, ρ: Scalar) { k * (norm(p - q) - L)^2 + max(ρ, 0) * (L - 0)^2 }",
+        "energy A(p: Point; g: Scalar[m/s^2], m: Scalar[kg]) { const H: Scalar[m] = 2; m * g * (p.z - H) }",
+        // Half-integer powers, and units that cancel: √(J/N · m) is a length.
+        "energy A(p: Point; E: Scalar[J], F: Scalar[N]) { F * sqrt(E / F * norm(p)) + E * (norm(p) / (E / F))^1.5 }",
+        "energy A(p, q: Point; c: Scalar[J/m^(1/2)]) { c * sqrt(norm(p - q)) }",
+        "energy A(p, q: Point; E: Scalar[\"kg·m²/s²\"], a: Scalar[1/m]) { E * exp(-a * norm(p - q)) }",
+        "energy A(x1, x2, x3, x4: Point; k: Scalar[J], w: Scalar) { k * dihedral(x1, x2, x3, x4) * atan2(w, w + 1) }",
+        "force A(_p: Point, v: Velocity; c: Scalar[N s/m]) { -c * v }",
+        "residual A(ξ: Twist; p: Vec3[m]) { vector(norm(p), angular(ξ).x, dot(linear(ξ), p)) }",
+        "constraint A(p, q: Point; L: Scalar[m]) { [norm(p - q) - L, dot(p, q) / L^2] }",
+        // Nothing has a unit: nothing to check.
+        "energy A(p, q: Point; α: Scalar[1]) { norm(p - q)^α + sin(norm(p)) }",
+    ] {
+        Textbook::from_source(source).unwrap_or_else(|e| panic!("{source}\n{e}"));
+    }
+}
+
 #[test]
 fn hostile_texts_are_refused_without_panic() {
     for source in [

@@ -6,6 +6,7 @@ mod expression;
 mod result;
 mod signature;
 mod typed;
+mod units;
 
 pub use typed::{Input, Program, Source, Typed, TypedKind};
 
@@ -83,12 +84,12 @@ fn check_declaration(
     diagnostics.0.extend(own.0);
     let (bindings, has_velocities, result) = checked
         .unwrap_or_else(|| (Vec::new(), false, result::stub(declaration.kind, &signature, &declaration.name.span)));
-    Program {
+    let program = Program {
         name: declaration.name.text.clone(),
         span: declaration.name.span.clone(),
         docs: declaration.docs.clone(),
         visibility: declaration.visibility.clone(),
-        audit_samples: declaration.audit_samples.filter(|_| !failed),
+        audit_samples: declaration.audit_samples,
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),
@@ -98,5 +99,12 @@ fn check_declaration(
         has_velocities,
         bindings,
         result,
+    };
+    let mut own = Diagnostics::default();
+    if !failed {
+        units::check(&program, &mut own);
     }
+    let failed = failed || !own.0.is_empty();
+    diagnostics.0.extend(own.0);
+    if failed { program.without_audit() } else { program }
 }

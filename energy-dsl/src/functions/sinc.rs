@@ -13,7 +13,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "cos √y, y ≥ 0: regular at 0, with derivative −½ sinc_sqrt(y).",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(cos_sqrt(g, a[0].node())),
-        accuracy: "5 / 3 / 6 for y ≤ 2",
+        accuracy: "4 / 3 / 6 for y ≤ 1.5",
     },
     Function {
         name: "sinc_sqrt",
