@@ -59,7 +59,7 @@ fn stored_bindings(program: &Program) -> Vec<usize> {
                     visit(program, &program.bindings[*number].value, seen);
                 }
             }
-            TypedKind::Call(_, list) | TypedKind::Forces(list) => list.iter().for_each(|e| visit(program, e, seen)),
+            TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().for_each(|e| visit(program, e, seen)),
             TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|e| visit(program, e, seen)),
             TypedKind::Gradient(of, _) => visit(program, of, seen),
             TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
@@ -126,7 +126,7 @@ impl<'a> Lowering<'a> {
                 let parts = yes.parts.iter().zip(&no.parts).map(|(&y, &n)| self.graph.select(mask, y, n)).collect();
                 Lowered { shape: expression.shape, parts }
             }
-            TypedKind::Forces(list) => {
+            TypedKind::Array(list) => {
                 let parts = list.iter().flat_map(|f| self.expression(f).parts).collect();
                 Lowered { shape: expression.shape, parts }
             }

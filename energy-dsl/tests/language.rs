@@ -54,12 +54,64 @@ fn functions_compute_what_they_say() {
         ("cos_half(θ0) - cos(0.125)", 0.0),
         ("one_minus_cos(L) - 1 + cos(L)", 0.0),
         ("x_minus_sin(L) - L + sin(L)", 0.0),
+        // i j = k, and q q* = ‖q‖².
+        ("(quat(0, 1, 0, 0) * quat(0, 0, 1, 0)).z", 1.0),
+        ("{ let q = quat(L, p_k); real(q * conjugate(q)) - norm(q)^2 + dot(q, q) }", 9.25),
+        ("norm(unit(quat(L, p_k)) - quat(L, p_k) / norm(quat(L, p_k)))", 0.0),
+        // A quarter turn about z: half the angle is π/4.
+        ("rotate(rotation(vector(0, 0, π / 4)), vector(1, 0, 0)).y", 1.0),
+        ("(rotation_matrix(rotation(vector(0, 0, π / 4))) * vector(1, 0, 0)).y", 1.0),
+        ("transform(exp(twist(vector(0, 0, π / 4), p_l)), p_k).y", 0.0),
+        ("linear(twist(p_k, p_l)).x + angular(twist(p_k, p_l)).y", 5.0),
+        // Motions compose: first the one on the right.
+        (
+            "{ let A = exp(twist(L * p_k, p_l)); let B = exp(twist(p_l, p_k)); norm(transform(A * B, p_l) - transform(A, transform(B, p_l))) }",
+            0.0,
+        ),
+        (
+            "{ let A = exp(twist(L * p_k, p_l)); let q = unit(k * A); norm(real(q) - real(A)) + norm(dual(q) - dual(A)) }",
+            0.0,
+        ),
+        ("norm(dual(dual_quat(quat(1, p_k), 2 * quat(0, p_l)))) - 2 * norm(p_l)", 0.0),
+        ("sinc(L) - sin(L) / L + cosc(L) - (1 - cos(L)) / L^2", 0.0),
+        ("cos_sqrt(k) - cos(sqrt(k)) + sinc_sqrt(k) - sinc(sqrt(k))", 0.0),
+        ("log1p(k) - log(4) + expm1(k) - exp(k) + 1", 0.0),
+        ("log1p(-1 + L) - log(L) + softplus(-L) - softplus(L) + L", 0.0),
+        ("huber(L, k) + huber(-k, L)", 0.125 + 0.5 * 2.75),
+        ("pseudo_huber(k, L) - L^2 * (sqrt(1 + (k / L)^2) - 1)", 0.0),
+        ("asin(L) + acos(L) - π / 2 + asin(2 * k) + acos(-k)", 1.5 * std::f64::consts::PI),
+        ("tan(L) - sin(L) / cos(L)", 0.0),
+        ("clamp(k, 0, L) + clamp(-k, 0, L) + clamp(θ0, 0, L)", 0.75),
+        ("sign(k) + 10 * sign(-L) + 100 * sign(k - k)", -9.0),
+        ("max(θ0, k, L) + min(k, θ0, L)", 3.25),
         ("{ fn twice(x) { x + x } twice(twice(k)) }", 12.0),
         ("{ let a = unit(p_k); dot(â, a) }", 1.0),
         ("dot(gradient(norm_squared(p_k - p_l), p_k), vector(1, 0, 0))", -4.0),
     ] {
         let found = value(formula);
         assert!((found - expected).abs() <= 1e-13 * expected.abs().max(1.0), "{formula}: {found}, expected {expected}");
+    }
+}
+
+/// What has right units is accepted, also where some are left to be inferred.
+#[test]
+fn right_units_are_accepted() {
+    for source in [
+        // L must be a length, ρ a stiffness; 0 has any unit.
+        "energy A(p, q: Point; k: Scalar[N/m], L, ρ: Scalar) { k * (norm(p - q) - L)^2 + max(ρ, 0) * (L - 0)^2 }",
+        "energy A(p: Point; g: Scalar[m/s^2], m: Scalar[kg]) { const H: Scalar[m] = 2; m * g * (p.z - H) }",
+        // Half-integer powers, and units that cancel: √(J/N · m) is a length.
+        "energy A(p: Point; E: Scalar[J], F: Scalar[N]) { F * sqrt(E / F * norm(p)) + E * (norm(p) / (E / F))^1.5 }",
+        "energy A(p, q: Point; c: Scalar[J/m^(1/2)]) { c * sqrt(norm(p - q)) }",
+        "energy A(p, q: Point; E: Scalar[\"kg·m²/s²\"], a: Scalar[1/m]) { E * exp(-a * norm(p - q)) }",
+        "energy A(x1, x2, x3, x4: Point; k: Scalar[J], w: Scalar) { k * dihedral(x1, x2, x3, x4) * atan2(w, w + 1) }",
+        "force A(_p: Point, v: Velocity; c: Scalar[N s/m]) { -c * v }",
+        "residual A(ξ: Twist; p: Vec3[m]) { vector(norm(p), angular(ξ).x, dot(linear(ξ), p)) }",
+        "constraint A(p, q: Point; L: Scalar[m]) { [norm(p - q) - L, dot(p, q) / L^2] }",
+        // Nothing has a unit: nothing to check.
+        "energy A(p, q: Point; α: Scalar[1]) { norm(p - q)^α + sin(norm(p)) }",
+    ] {
+        Textbook::from_source(source).unwrap_or_else(|e| panic!("{source}\n{e}"));
     }
 }
 

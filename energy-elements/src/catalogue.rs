@@ -37,6 +37,7 @@ pub fn catalogue() -> &'static [CatalogueEntry] {
         HingeCosHalf,
         HingeSinHalf,
         HookeSpring,
+        PointToPlane,
         PowerLaw,
         QuadraticHinge,
         Spring,

@@ -36,6 +36,7 @@ elements! {
     hinge_cos_half: HingeCosHalf;
     hinge_sin_half: HingeSinHalf;
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
+    point_to_plane: PointToPlane;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
     spring: Spring;

@@ -71,5 +71,57 @@ energy! {
     constraint Angles(p, q, r: Point; φ: Scalar) { vector(angle(q - p, r - q) - φ, norm(p - r)^3) }
 
     #[audit(samples = 50)]
+    energy Motions(p, q: Point; ξ: Twist, a: Quat, B: DualQuat, s: Scalar) {
+        let A = exp(twist(p / 4, s * q));
+        let U = unit(quat(s, p) * conjugate(a));
+        dot(transform(A * exp(ξ), q), rotate(U, p)) + norm(real(A) - a) + dual(unit(A * B)).x
+            + trace(rotation_matrix(rotation(q / 2))) * norm(quat(dot(p, q), p - q))
+    }
+
+    #[audit(samples = 50)]
+    energy Sincs(p, q: Point; s: Scalar) {
+        let y = norm_squared(p - q) / s;
+        // Away from 0, where the textbook form has no digits.
+        cos_sqrt(y) * s + sinc_sqrt(y) + sinc(1 + y * s) + cosc(1 + y)
+    }
+
+    #[audit(samples = 50)]
+    force SincGradients(p, q: Point; s: Scalar) {
+        let U = sinc_sqrt(s * norm_squared(p - q)) + cos_sqrt(norm_squared(p)) + sinc(1 + s * norm_squared(p + q));
+        [-gradient(U, p), -gradient(U, q)]
+    }
+
+    #[audit(samples = 50)]
+    energy Logarithms(p, q: Point; s: Scalar) {
+        let x = dot(p, q);
+        log1p(x^2) * expm1(x / 8) + log(2 + norm(p)) + softplus(s * x) + exp(x / 16) - 1 + log(1 + norm_squared(q))
+    }
+
+    #[audit(samples = 50)]
+    energy Losses(p, q: Point; δ: Scalar) {
+        let x = norm(p) - norm(q);
+        huber(x, δ) + pseudo_huber(x, δ) + huber(dot(p, q), 1 + norm(p)) + pseudo_huber(x, 1 + norm(q))
+    }
+
+    #[audit(samples = 50)]
+    energy Arcs(p, q: Point; s: Scalar) {
+        let x = dot(p, q) / (s + norm(p) * norm(q));
+        asin(x) * acos(x / 2) + tan(x / s) + acos(dot(unit(p), unit(q)))
+    }
+
+    #[audit(samples = 50)]
+    energy Bounds(p, q: Point; a, b: Scalar) {
+        let x = dot(p, q);
+        clamp(x, -a, b)^2 + min(x, p.y, q.z, a) * max(x, p.z, b) + sign(x) * norm(p - q)
+    }
+
+    #[audit(samples = 50)]
+    energy Naive(p, q, r: Point; k: Scalar) {
+        let a = unit(q - p);
+        let b = unit(r - q);
+        sqrt((1 - dot(a, b)) / 2) + k * sqrt(1 - dot(a, b)) + norm(p)^2 - norm(q)^2 + (1 - cos(dot(p, r)))
+    }
+
+    #[audit(samples = 50)]
     residual Fit(a: Vec3, s, t: Scalar; m: Vec3) { vector(norm(a - m), sin(s) * t, dot(a, m)^2, atan2(s, 2 + t^2)) }
 }

@@ -1,5 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::constant::Globals;
 use super::signature::Signature;
 use super::typed::{Binding, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
@@ -7,10 +8,14 @@ use crate::functions::{self, Shape};
 use crate::syntax::{Body, Expression, ExpressionKind, Name, UserFunction, canonical};
 
 /// What a name stands for.
-#[derive(Clone, Copy)]
-enum Meaning {
-    Input(Source, usize, Shape),
+#[derive(Clone)]
+pub(super) enum Meaning {
+    Input(Source, usize, Shape, Option<usize>),
     Binding(usize, Shape),
+    /// The entries of an array.
+    Entries(Vec<Meaning>),
+    /// What counts in a sum.
+    Index(usize),
 }
 
 /// Checks the expressions of one declaration. An erroneous expression is reported once and yields `None`; its neighbours are
@@ -18,11 +23,14 @@ enum Meaning {
 pub(super) struct Checker<'a> {
     signature: &'a Signature,
     functions: Vec<&'a UserFunction>,
-    diagnostics: &'a mut Diagnostics,
-    scopes: Vec<BTreeMap<String, Option<Meaning>>>,
+    pub(super) diagnostics: &'a mut Diagnostics,
+    /// Constants beside the declaration, inputs, then bodies.
+    pub(super) scopes: Vec<BTreeMap<String, Option<Meaning>>>,
     calls: Vec<String>,
     used: BTreeSet<String>,
     in_rest: bool,
+    /// Terms that sums were unrolled to.
+    pub(super) terms: usize,
     pub(super) bindings: Vec<Binding>,
     pub(super) reads_velocities: bool,
 }
@@ -30,28 +38,30 @@ pub(super) struct Checker<'a> {
 impl<'a> Checker<'a> {
     pub(super) fn new(
         signature: &'a Signature,
+        globals: &Globals,
         functions: &[&'a UserFunction],
         diagnostics: &'a mut Diagnostics,
     ) -> Self {
         let inputs = signature
             .names
             .iter()
-            .map(|n| (n.name.canonical(), Some(Meaning::Input(n.source, n.first, n.shape))))
+            .map(|n| (n.name.canonical(), Some(Meaning::Input(n.source, n.first, n.shape, n.length))))
             .collect();
         Self {
             signature,
             functions: functions.to_vec(),
             diagnostics,
-            scopes: vec![inputs],
+            scopes: vec![globals.scope.clone(), inputs],
             calls: Vec::new(),
             used: BTreeSet::new(),
             in_rest: false,
-            bindings: Vec::new(),
+            terms: 0,
+            bindings: globals.bindings.clone(),
             reads_velocities: false,
         }
     }
 
-    fn error(&mut self, span: &Span, message: impl Into<String>) -> Option<Typed> {
+    pub(super) fn error(&mut self, span: &Span, message: impl Into<String>) -> Option<Typed> {
         self.diagnostics.push(Diagnostic::new(span, message));
         None
     }
@@ -71,6 +81,10 @@ impl<'a> Checker<'a> {
         let outer_functions = self.functions.len();
         self.functions.extend(&body.functions);
         self.scopes.push(BTreeMap::new());
+        for constant in &body.constants {
+            let meaning = self.constant(constant);
+            self.scopes.last_mut().expect("compiler bug: no scope").insert(constant.name.canonical(), meaning);
+        }
         for statement in &body.lets {
             if statement.rest && !outermost {
                 self.error(&statement.name.span, "a `rest` block stands in the outermost body only");
@@ -88,26 +102,33 @@ impl<'a> Checker<'a> {
     }
 
     fn define(&mut self, name: &Name, value: Option<Typed>, rest: bool) {
-        let meaning = value.map(|value| {
-            let shape = value.shape;
-            self.bindings.push(Binding { value, rest });
-            Meaning::Binding(self.bindings.len() - 1, shape)
-        });
+        let meaning = value.map(|value| self.bind(value, rest));
         self.scopes.last_mut().expect("compiler bug: no scope").insert(name.canonical(), meaning);
+    }
+
+    fn bind(&mut self, value: Typed, rest: bool) -> Meaning {
+        let shape = value.shape;
+        match value.kind {
+            TypedKind::Array(entries) => Meaning::Entries(entries.into_iter().map(|e| self.bind(e, rest)).collect()),
+            _ => {
+                self.bindings.push(Binding { value, rest, unit: None });
+                Meaning::Binding(self.bindings.len() - 1, shape)
+            }
+        }
     }
 
     fn find(&self, name: &str) -> Option<Option<Meaning>> {
         let canonical = canonical(name);
-        self.scopes.iter().rev().find_map(|scope| scope.get(&canonical).copied())
+        self.scopes.iter().rev().find_map(|scope| scope.get(&canonical).cloned())
     }
 
-    fn expression(&mut self, expression: &'a Expression) -> Option<Typed> {
+    pub(super) fn expression(&mut self, expression: &'a Expression) -> Option<Typed> {
         let span = &expression.span;
         match &expression.kind {
-            ExpressionKind::Number(value) => Some(constant(*value)),
+            ExpressionKind::Number(value) => Some(constant(*value, span)),
             ExpressionKind::Name(name) => self.name(name),
             ExpressionKind::Call(name, arguments) => self.call(name, arguments),
-            ExpressionKind::Body(body) => self.body(body, self.scopes.len() == 2),
+            ExpressionKind::Body(body) => self.body(body, self.scopes.len() == 3 && self.calls.is_empty()),
             ExpressionKind::If(condition, yes, no) => {
                 let checked = self.expression(condition);
                 let (yes, no) = (self.body(yes, false), self.body(no, false));
@@ -124,31 +145,27 @@ impl<'a> Checker<'a> {
                         format!("both branches must have the same shape, but they are {} and {}", yes.shape, no.shape),
                     );
                 }
-                let shape = yes.shape;
-                Some(Typed { kind: TypedKind::Select(Box::new(condition_shape), Box::new(yes), Box::new(no)), shape })
-            }
-            ExpressionKind::List(items) => {
-                let checked: Vec<_> = items.iter().map(|item| self.expression(item)).collect();
-                let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
-                if let Some((item, _)) = items.iter().zip(&checked).find(|(_, c)| c.shape != Shape::Vector(3)) {
-                    return self.error(&item.span, "each force in the list must be a 3-vector");
+                if matches!(yes.shape, Shape::Array(_) | Shape::Truth) {
+                    return self.error(span, format!("a branch must be a value, but it is {}", yes.shape));
                 }
-                let shape = Shape::Forces(u8::try_from(checked.len()).unwrap_or(u8::MAX));
-                Some(Typed { kind: TypedKind::Forces(checked), shape })
+                let shape = yes.shape;
+                let kind = TypedKind::Select(Box::new(condition_shape), Box::new(yes), Box::new(no));
+                Some(Typed { kind, shape, span: span.clone() })
             }
+            ExpressionKind::List(items) => self.list(items, span),
+            ExpressionKind::Index(of, index) => self.index(of, index),
+            ExpressionKind::Component(of, name) => self.component(of, name),
+            ExpressionKind::Sum(sum) => self.sum(sum, span),
         }
     }
-
     fn name(&mut self, name: &Name) -> Option<Typed> {
         if let Some(found) = self.find(&name.text) {
             self.used.insert(name.canonical());
-            return match found? {
-                Meaning::Binding(number, shape) => Some(Typed { kind: TypedKind::Binding(number), shape }),
-                Meaning::Input(source, first, shape) => self.input(name, source, first, shape),
-            };
+            let meaning = found?;
+            return self.meant(name, meaning);
         }
         if matches!(name.text.as_str(), "π" | "pi" | "PI") {
-            return Some(Typed { kind: TypedKind::Pi, shape: Shape::Scalar });
+            return Some(Typed { kind: TypedKind::Pi, shape: Shape::Scalar, span: name.span.clone() });
         }
         // â is the unit vector of a, also among Rust tokens, where it is one identifier.
         if let Some(plain) = without_hat(&name.text).filter(|plain| self.find(plain).is_some()) {
@@ -167,6 +184,25 @@ impl<'a> Checker<'a> {
         };
         self.diagnostics.push(diagnostic);
         None
+    }
+
+    fn meant(&mut self, name: &Name, meaning: Meaning) -> Option<Typed> {
+        let span = name.span.clone();
+        let entries = match meaning {
+            Meaning::Binding(number, shape) => return Some(Typed { kind: TypedKind::Binding(number), shape, span }),
+            Meaning::Index(number) => return Some(constant(number as f64, &span)),
+            Meaning::Input(source, first, shape, None) => return self.input(name, source, first, shape),
+            Meaning::Input(source, first, shape, Some(length)) => {
+                // One error for all entries.
+                self.input(name, source, first, shape)?;
+                let entry = |i: usize| Meaning::Input(source, first + i * shape.size(), shape, None);
+                (0..length).map(entry).collect()
+            }
+            Meaning::Entries(entries) => entries,
+        };
+        let entries: Vec<_> = entries.into_iter().map(|entry| self.meant(name, entry)).collect::<Option<_>>()?;
+        let length = u16::try_from(entries.len()).expect("arrays are short");
+        Some(Typed { kind: TypedKind::Array(entries), shape: Shape::Array(length), span })
     }
 
     fn as_declared(&self, canonical: &str) -> String {
@@ -195,7 +231,7 @@ impl<'a> Checker<'a> {
             _ => {}
         }
         self.reads_velocities |= source == Source::Velocity;
-        Some(Typed { kind: TypedKind::Input(source, first), shape })
+        Some(Typed { kind: TypedKind::Input(source, first), shape, span: name.span.clone() })
     }
 
     fn call(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
@@ -222,7 +258,7 @@ impl<'a> Checker<'a> {
         self.apply(&name.text, &name.span, checked)
     }
 
-    fn apply(&mut self, name: &str, span: &Span, arguments: Vec<Typed>) -> Option<Typed> {
+    pub(super) fn apply(&mut self, name: &str, span: &Span, arguments: Vec<Typed>) -> Option<Typed> {
         let Some(function) = functions::find(name) else {
             let mut diagnostic = Diagnostic::new(span, format!("unknown function `{name}`"));
             diagnostic = if self.find(name).is_some() {
@@ -238,10 +274,18 @@ impl<'a> Checker<'a> {
             return None;
         };
         let shapes: Vec<Shape> = arguments.iter().map(|a| a.shape).collect();
+        let array = shapes.iter().find(|s| matches!(s, Shape::Array(_) | Shape::Rows(_)));
+        let name = if name == "neg" { "-" } else { name };
+        if let Some(array) = array {
+            let message = format!("`{name}` does not take {array}");
+            self.diagnostics.push(
+                Diagnostic::new(span, message).help("take its entries: a[0], a[1], …, or sum(j in 0..4, … a[j] …)"),
+            );
+            return None;
+        }
         match (function.shape)(&shapes) {
-            Ok(shape) => Some(Typed { kind: TypedKind::Call(function, arguments), shape }),
+            Ok(shape) => Some(Typed { kind: TypedKind::Call(function, arguments), shape, span: span.clone() }),
             Err(message) => {
-                let name = if name == "neg" { "-" } else { name };
                 self.diagnostics.push(
                     Diagnostic::new(span, format!("`{name}`: {message}")).help(format!("usage: {}", function.usage)),
                 );
@@ -261,7 +305,8 @@ impl<'a> Checker<'a> {
             return self.error(&name.span, format!("`{}` calls itself: a formula cannot be recursive", name.text));
         }
         self.calls.push(function.name.text.clone());
-        let outer = std::mem::replace(&mut self.scopes, vec![BTreeMap::new()]);
+        let scopes = vec![self.scopes[0].clone(), BTreeMap::new()];
+        let outer = std::mem::replace(&mut self.scopes, scopes);
         for (parameter, argument) in function.parameters.iter().zip(arguments) {
             self.define(parameter, Some(argument), false);
         }
@@ -274,7 +319,7 @@ impl<'a> Checker<'a> {
     fn identity(&mut self, name: &Name, arguments: &[Expression]) -> Option<Typed> {
         match arguments {
             [Expression { kind: ExpressionKind::Number(n), .. }] if *n == 2.0 || *n == 3.0 => {
-                self.apply("identity", &name.span, vec![constant(0.0); *n as usize])
+                self.apply("identity", &name.span, vec![constant(0.0, &name.span); *n as usize])
             }
             _ => self.error(&name.span, "`identity` takes the number 2 or 3, as in identity(3)"),
         }
@@ -292,15 +337,16 @@ impl<'a> Checker<'a> {
         }
         match by_typed.kind {
             TypedKind::Input(Source::Position, first) => {
-                Some(Typed { kind: TypedKind::Gradient(Box::new(of_typed), first / 3), shape: Shape::Vector(3) })
+                let kind = TypedKind::Gradient(Box::new(of_typed), first / 3);
+                Some(Typed { kind, shape: Shape::Vector(3), span: name.span.clone() })
             }
             _ => self.error(&by.span, "`gradient` is by a declared point"),
         }
     }
 }
 
-fn constant(value: f64) -> Typed {
-    Typed { kind: TypedKind::Constant(value), shape: Shape::Scalar }
+pub(super) fn constant(value: f64, span: &Span) -> Typed {
+    Typed { kind: TypedKind::Constant(value), shape: Shape::Scalar, span: span.clone() }
 }
 
 fn without_hat(name: &str) -> Option<String> {

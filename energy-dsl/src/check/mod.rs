@@ -1,15 +1,18 @@
 //! Syntax tree to typed program: names, shapes, and what each kind of declaration must yield.
 
+mod array;
+mod constant;
 mod expression;
+mod result;
 mod signature;
 mod typed;
+mod units;
 
 pub use typed::{Input, Program, Source, Typed, TypedKind};
 
-use crate::diagnostic::{Diagnostic, Diagnostics, Span};
-use crate::functions::Shape;
-use crate::runtime::Kind;
-use crate::syntax::{Declaration, Item, UserFunction};
+use crate::diagnostic::Diagnostics;
+use crate::syntax::{Declaration, Item, UserFunction, canonical};
+use constant::Globals;
 use expression::Checker;
 use signature::Signature;
 
@@ -18,18 +21,54 @@ use signature::Signature;
 pub fn check(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Program> {
     let functions: Vec<&UserFunction> =
         items.iter().filter_map(|i| if let Item::Function(f) = i { Some(f) } else { None }).collect();
+    let constants = items.iter().filter_map(|i| if let Item::Constant(c) = i { Some(c) } else { None });
+    let globals = Globals::of(constants, diagnostics);
     items
         .iter()
         .filter_map(|item| if let Item::Declaration(d) = item { Some(d) } else { None })
-        .map(|declaration| check_declaration(declaration, &functions, diagnostics))
+        .map(|declaration| {
+            let mut program = check_declaration(declaration, &functions, &globals, diagnostics);
+            program.source = with_what_it_uses(&program.source, items);
+            program
+        })
         .collect()
 }
 
-fn check_declaration(declaration: &Declaration, functions: &[&UserFunction], diagnostics: &mut Diagnostics) -> Program {
-    let signature = Signature::of(declaration, diagnostics);
+/// A declaration's text after those of the functions and constants beside it that it names, so that it stands alone.
+fn with_what_it_uses(source: &str, items: &[Item]) -> String {
+    let others: Vec<(String, &str)> = items
+        .iter()
+        .filter_map(|item| match item {
+            Item::Function(function) => Some((function.name.canonical(), function.source.as_str())),
+            Item::Constant(constant) => Some((constant.name.canonical(), constant.source.as_str())),
+            Item::Declaration(_) => None,
+        })
+        .collect();
+    let mut named = vec![false; others.len()];
+    let mut texts = vec![source];
+    while let Some(text) = texts.pop() {
+        let text = canonical(text);
+        for (number, (name, other)) in others.iter().enumerate() {
+            if !named[number] && text.contains(name) {
+                named[number] = true;
+                texts.push(other);
+            }
+        }
+    }
+    let used = others.iter().zip(named).filter(|(_, named)| *named).map(|((_, source), _)| *source);
+    used.chain([source]).collect::<Vec<_>>().join(" ")
+}
+
+fn check_declaration(
+    declaration: &Declaration,
+    functions: &[&UserFunction],
+    globals: &Globals,
+    diagnostics: &mut Diagnostics,
+) -> Program {
+    let signature = Signature::of(declaration, globals, diagnostics);
     let mut own = Diagnostics::default();
     let checked = declaration.body.as_ref().and_then(|body| {
-        let mut checker = Checker::new(&signature, functions, &mut own);
+        let mut checker = Checker::new(&signature, globals, functions, &mut own);
         let result = checker.body(body, true)?;
         checker.report_unused(&declaration.name);
         let bindings = checker.bindings;
@@ -38,19 +77,19 @@ fn check_declaration(declaration: &Declaration, functions: &[&UserFunction], dia
     });
     let checked = checked.and_then(|(bindings, has_velocities, result)| {
         let body = declaration.body.as_ref()?;
-        let result = expected_result(declaration, &signature, result, &body.result.span, &mut own)?;
+        let result = result::expected(declaration, &signature, result, &body.result.span, &mut own)?;
         own.0.is_empty().then_some((bindings, has_velocities, result))
     });
     let failed = checked.is_none();
     diagnostics.0.extend(own.0);
-    let (bindings, has_velocities, result) =
-        checked.unwrap_or_else(|| (Vec::new(), false, stub(declaration.kind, &signature)));
-    Program {
+    let (bindings, has_velocities, result) = checked
+        .unwrap_or_else(|| (Vec::new(), false, result::stub(declaration.kind, &signature, &declaration.name.span)));
+    let program = Program {
         name: declaration.name.text.clone(),
         span: declaration.name.span.clone(),
         docs: declaration.docs.clone(),
         visibility: declaration.visibility.clone(),
-        audit_samples: declaration.audit_samples.filter(|_| !failed),
+        audit_samples: declaration.audit_samples,
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),
@@ -60,53 +99,12 @@ fn check_declaration(declaration: &Declaration, functions: &[&UserFunction], dia
         has_velocities,
         bindings,
         result,
-    }
-}
-
-/// The zero of what the kind must yield.
-fn stub(kind: Kind, signature: &Signature) -> Typed {
-    let zero = Typed { kind: TypedKind::Constant(0.0), shape: Shape::Scalar };
-    if kind != Kind::Force {
-        return zero;
-    }
-    let vector = crate::functions::find("vector").expect("compiler bug: no function `vector`");
-    let null = Typed { kind: TypedKind::Call(vector, vec![zero; 3]), shape: Shape::Vector(3) };
-    let points = signature.moving.len();
-    Typed { kind: TypedKind::Forces(vec![null; points]), shape: Shape::Forces(points as u8) }
-}
-
-/// The result as the kind of declaration wants it.
-fn expected_result(
-    declaration: &Declaration,
-    signature: &Signature,
-    result: Typed,
-    span: &Span,
-    diagnostics: &mut Diagnostics,
-) -> Option<Typed> {
-    let points = signature.moving.len();
-    let problem = match (declaration.kind, result.shape) {
-        (Kind::Energy, Shape::Scalar) | (Kind::Constraint | Kind::Residual, Shape::Scalar | Shape::Vector(_)) => None,
-        (Kind::Force, Shape::Forces(n)) if usize::from(n) == points => None,
-        (Kind::Force, Shape::Vector(3)) if points == 1 => {
-            return Some(Typed { shape: Shape::Forces(1), kind: TypedKind::Forces(vec![result]) });
-        }
-        (Kind::Energy, found) => {
-            Some((format!("an energy must be a scalar, but this is {found}"), "take its norm or a component's square"))
-        }
-        (Kind::Force, found) => Some((
-            format!("a force must be one 3-vector for each of the {points} points, but this is {found}"),
-            "write [f1, f2, …], one vector for each point in declared order",
-        )),
-        (kind, found) => Some((
-            format!("a {} must be a scalar or a vector, but this is {found}", kind.keyword()),
-            "split it into vectors",
-        )),
     };
-    match problem {
-        None => Some(result),
-        Some((message, help)) => {
-            diagnostics.push(Diagnostic::new(span, message).help(help));
-            None
-        }
+    let mut own = Diagnostics::default();
+    if !failed {
+        units::check(&program, &mut own);
     }
+    let failed = failed || !own.0.is_empty();
+    diagnostics.0.extend(own.0);
+    if failed { program.without_audit() } else { program }
 }

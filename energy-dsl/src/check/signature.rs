@@ -1,8 +1,10 @@
+use super::constant::Globals;
+use super::expression::Checker;
 use super::typed::{Input, Source};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions::Shape;
 use crate::runtime::Kind;
-use crate::syntax::{Declaration, InputType, Name, Section};
+use crate::syntax::{Declaration, ElementType, InputGroup, InputType, Name, Section, Unit};
 
 /// The inputs of a declaration, numbered, and the names they go by.
 pub(super) struct Signature {
@@ -18,18 +20,26 @@ pub(super) struct InputName {
     pub(super) name: Name,
     pub(super) source: Source,
     pub(super) first: usize,
+    /// Of one, or of each entry.
     pub(super) shape: Shape,
+    /// How many, if it is an array.
+    pub(super) length: Option<usize>,
 }
 
 impl Signature {
-    pub(super) fn of(declaration: &Declaration, diagnostics: &mut Diagnostics) -> Self {
-        let mut signature = Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), names: Vec::new() };
+    /// No inputs.
+    pub(super) fn empty() -> Self {
+        Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), names: Vec::new() }
+    }
+
+    pub(super) fn of(declaration: &Declaration, globals: &Globals, diagnostics: &mut Diagnostics) -> Self {
+        let mut signature = Self::empty();
         let mut velocities = 0;
         for group in &declaration.inputs {
             let points_move = declaration.kind != Kind::Residual;
             if group.section == Section::Moving
                 && points_move
-                && !matches!(group.input_type, InputType::Point | InputType::Velocity)
+                && !matches!(group.element, ElementType::Point | ElementType::Velocity)
             {
                 diagnostics.push(
                     Diagnostic::new(
@@ -39,15 +49,24 @@ impl Signature {
                     .help("parameters stand after the first `;`, as in (p0, p1: Point; k: Scalar)"),
                 );
             }
-            if group.input_type == InputType::Velocity && declaration.kind != Kind::Force {
+            if group.element == ElementType::Velocity && declaration.kind != Kind::Force {
                 diagnostics.push(Diagnostic::new(
                     &group.type_span,
                     format!("a {} does not depend on velocities; declare a force", declaration.kind.keyword()),
                 ));
             }
+            let input_type = input_type(group, globals, diagnostics);
             for name in &group.names {
-                signature.add(name, group.section, group.input_type, &group.unit, &mut velocities, diagnostics);
+                signature.add(name, group.section, input_type, &group.unit, &mut velocities, diagnostics);
             }
+        }
+        let numbers = |list: &[Input]| list.iter().map(|i| i.input_type.size()).sum::<usize>();
+        if [&signature.moving, &signature.rest, &signature.parameters]
+            .into_iter()
+            .any(|list| numbers(list) > MOST_NUMBERS)
+        {
+            let message = format!("the inputs of {} are more than {MOST_NUMBERS} numbers", declaration.name.text);
+            diagnostics.push(Diagnostic::new(&declaration.name.span, message).help("shorten the arrays"));
         }
         if signature.moving.is_empty() {
             diagnostics.push(
@@ -68,7 +87,8 @@ impl Signature {
             let span = declaration.name.span.clone();
             for implied in ["stiffness", "damping"] {
                 let name = Name { text: implied.into(), span: span.clone() };
-                signature.add(&name, Section::Parameter, InputType::Scalar, "", &mut velocities, diagnostics);
+                let scalar = InputType { element: ElementType::Scalar, length: None };
+                signature.add(&name, Section::Parameter, scalar, &Unit::default(), &mut velocities, diagnostics);
                 // The formula has no use for it: it cannot be named there.
                 signature.names.pop();
             }
@@ -81,7 +101,7 @@ impl Signature {
         name: &Name,
         section: Section,
         input_type: InputType,
-        unit: &str,
+        unit: &Unit,
         velocities: &mut usize,
         diagnostics: &mut Diagnostics,
     ) {
@@ -95,21 +115,18 @@ impl Signature {
             };
             diagnostics.push(Diagnostic::new(&name.span, message).help("rename one of them"));
         }
-        let stored = section != Section::Moving && input_type != InputType::Velocity;
+        let is_velocity = input_type.element == ElementType::Velocity;
+        let stored = section != Section::Moving && !is_velocity;
         if stored && is_reserved(&name.text) {
             diagnostics.push(
                 Diagnostic::new(&name.span, format!("`{}` cannot name an input: generated code uses it", name.text))
                     .help("rename it"),
             );
         }
-        let shape = match input_type {
-            InputType::Point | InputType::Velocity => Shape::Vector(3),
-            InputType::Scalar => Shape::Scalar,
-            InputType::Vector(n) => Shape::Vector(n),
-        };
-        let (source, first) = if input_type == InputType::Velocity {
-            *velocities += 1;
-            (Source::Velocity, 3 * (*velocities - 1))
+        let (shape, length) = (shape(input_type.element), input_type.length);
+        let (source, first) = if is_velocity {
+            *velocities += length.unwrap_or(1);
+            (Source::Velocity, 3 * (*velocities - length.unwrap_or(1)))
         } else {
             let (source, list) = match section {
                 Section::Moving => (Source::Position, &mut self.moving),
@@ -117,10 +134,48 @@ impl Signature {
                 Section::Parameter => (Source::Parameter, &mut self.parameters),
             };
             let first = list.last().map_or(0, |i: &Input| i.first + i.input_type.size());
-            list.push(Input { name: name.text.clone(), input_type, unit: unit.into(), first });
+            let span = unit.span.as_ref().unwrap_or(&name.span).clone();
+            let input = Input { name: name.text.clone(), input_type, unit: unit.text.clone(), span, first };
+            match length.filter(|_| section == Section::Moving) {
+                // What moves is told apart entry by entry.
+                Some(length) => list.extend((0..length).map(|i| entry(&input, i))),
+                None => list.push(input),
+            }
             (source, first)
         };
-        self.names.push(InputName { name: name.clone(), source, first, shape });
+        self.names.push(InputName { name: name.clone(), source, first, shape, length });
+    }
+}
+
+/// More would be data, not a formula.
+const MOST_NUMBERS: usize = 4096;
+
+/// The type of a group of inputs; of a broken length, an array of one.
+fn input_type(group: &InputGroup, globals: &Globals, diagnostics: &mut Diagnostics) -> InputType {
+    let length = group.length.as_ref().map(|length| {
+        let signature = Signature::empty();
+        let mut checker = Checker::new(&signature, globals, &[], diagnostics);
+        checker.array_length(&group.names[0], length).unwrap_or(1)
+    });
+    InputType { element: group.element, length }
+}
+
+/// Entry `number` of an array as an input of its own.
+fn entry(array: &Input, number: usize) -> Input {
+    let input_type = InputType { element: array.input_type.element, length: None };
+    let first = array.first + number * input_type.size();
+    Input { name: format!("{}[{number}]", array.name), input_type, first, ..array.clone() }
+}
+
+fn shape(element: ElementType) -> Shape {
+    match element {
+        ElementType::Point | ElementType::Velocity => Shape::Vector(3),
+        ElementType::Scalar => Shape::Scalar,
+        ElementType::Vector(n) => Shape::Vector(n),
+        ElementType::Matrix(rows, columns) => Shape::Matrix(rows, columns),
+        ElementType::Quat => Shape::Quat,
+        ElementType::DualQuat => Shape::DualQuat,
+        ElementType::Twist => Shape::Twist,
     }
 }
 

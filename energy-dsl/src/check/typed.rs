@@ -1,7 +1,7 @@
 use crate::diagnostic::Span;
 use crate::functions::{Function, Shape};
 use crate::runtime::Kind;
-use crate::syntax::InputType;
+use crate::syntax::{InputType, Unit};
 
 /// A checked declaration.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ pub struct Program {
     pub parameters: Vec<Input>,
     /// Whether the body reads velocities.
     pub has_velocities: bool,
-    /// Intermediate values in order.
+    /// Intermediate values and constants in order.
     pub bindings: Vec<Binding>,
     /// The value.
     pub result: Typed,
@@ -41,6 +41,12 @@ impl Program {
     #[must_use]
     pub fn points(&self) -> usize {
         self.moving.len()
+    }
+
+    /// The same without its test, which a broken declaration would fail once more.
+    #[must_use]
+    pub fn without_audit(self) -> Self {
+        Self { audit_samples: None, ..self }
     }
 
     /// How many numbers move.
@@ -71,6 +77,8 @@ pub struct Input {
     pub input_type: InputType,
     /// Its unit as written.
     pub unit: String,
+    /// Where its unit or else its name is written.
+    pub span: Span,
     /// The number of its first component in its section.
     pub first: usize,
 }
@@ -82,6 +90,8 @@ pub struct Binding {
     pub value: Typed,
     /// Computed once for the element: it stands in the `rest` block.
     pub rest: bool,
+    /// Of a constant: the unit its number is in.
+    pub unit: Option<Unit>,
 }
 
 /// Which inputs a name stands for.
@@ -104,6 +114,8 @@ pub struct Typed {
     pub kind: TypedKind,
     /// Its shape.
     pub shape: Shape,
+    /// Where it is written; of a call, the function's name or the operator.
+    pub span: Span,
 }
 
 /// The kinds of checked expression.
@@ -121,8 +133,8 @@ pub enum TypedKind {
     Call(&'static Function, Vec<Typed>),
     /// One value where a comparison holds, another elsewhere.
     Select(Box<Typed>, Box<Typed>, Box<Typed>),
-    /// One vector per point.
-    Forces(Vec<Typed>),
+    /// An array, or rows, one after the other.
+    Array(Vec<Typed>),
     /// The derivative of a scalar by a point.
     Gradient(Box<Typed>, usize),
 }

@@ -8,7 +8,6 @@ use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Input, count};
 use crate::routines::Routines;
 use crate::runtime::Kind;
-use crate::syntax::InputType;
 
 /// The type, its constructor, its traits, and its test if one was asked for.
 #[must_use]
@@ -78,13 +77,7 @@ fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
 }
 
 fn input_type(input: &DeclaredInput) -> TokenStream {
-    match input.input_type {
-        InputType::Scalar => quote!(T),
-        other => {
-            let size = other.size();
-            quote!([T; #size])
-        }
-    }
+    input.input_type.dimensions().into_iter().rev().fold(quote!(T), |entry, length| quote!([#entry; #length]))
 }
 
 /// `new` with the rest shape and then the parameters, and the same from flat slices.
@@ -99,11 +92,12 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         inputs
             .iter()
             .map(|input| {
-                let numbers = (input.first..input.first + input.input_type.size()).map(|i| quote!(#list[#i]));
-                match input.input_type {
-                    InputType::Scalar => quote!(#(#numbers)*),
-                    _ => quote!([#(#numbers),*]),
+                let mut numbers: Vec<TokenStream> =
+                    (input.first..input.first + input.input_type.size()).map(|i| quote!(#list[#i])).collect();
+                for length in input.input_type.dimensions().into_iter().rev() {
+                    numbers = numbers.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
                 }
+                numbers.into_iter().collect()
             })
             .collect()
     };
@@ -213,25 +207,32 @@ fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     let mut stores = Vec::new();
     let mut loads = Vec::new();
     let mut number = 0usize;
-    let mut field = |field: &Ident, size: Option<usize>| {
-        let mut reads = Vec::new();
-        for i in 0..size.unwrap_or(1) {
-            let place = size.map(|_| quote!([#i]));
-            stores.push(quote!(numbers[#number * stride] = self.#field #place;));
+    let mut field = |field: &Ident, dimensions: &[usize]| {
+        let size: usize = dimensions.iter().product();
+        let mut reads = Vec::with_capacity(size);
+        for place in 0..size {
+            let (mut rest, mut left) = (place, size);
+            let mut indices = TokenStream::new();
+            for length in dimensions {
+                left /= length;
+                let index = rest / left;
+                indices.extend(quote!([#index]));
+                rest %= left;
+            }
+            stores.push(quote!(numbers[#number * stride] = self.#field #indices;));
             reads.push(quote!(V::load(&numbers[#number * stride..])));
             number += 1;
         }
-        loads.push(match size {
-            Some(_) => quote!(#field: [#(#reads),*],),
-            None => quote!(#field: #(#reads)*,),
-        });
+        for &length in dimensions.iter().rev() {
+            reads = reads.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
+        }
+        loads.push(quote!(#field: #(#reads)*,));
     };
     for parameter in &program.parameters {
-        let size = (parameter.input_type != InputType::Scalar).then(|| parameter.input_type.size());
-        field(&format_ident!("{}", parameter.name), size);
+        field(&format_ident!("{}", parameter.name), &parameter.input_type.dimensions());
     }
     if !routines.rest.outputs.is_empty() {
-        field(&format_ident!("precomputed"), Some(routines.rest.outputs.len()));
+        field(&format_ident!("precomputed"), &[routines.rest.outputs.len()]);
     }
     let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData,));
     let traits = match program.kind {

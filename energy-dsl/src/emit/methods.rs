@@ -11,7 +11,6 @@ use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Input, NodeId};
 use crate::routines::Routines;
 use crate::runtime::Kind;
-use crate::syntax::InputType;
 
 /// What turns a group of outputs into an expression.
 type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
@@ -26,10 +25,11 @@ struct Method {
     routine: &'static str,
     /// The kernel that calls it.
     call: &'static str,
-    /// The struct it returns, and that struct's fields with the types it is generic over (the number type first).
+    /// The struct it returns, that struct's fields, the types it is generic over, and those of its fields.
     result: &'static str,
     fields: &'static [(&'static str, Layout)],
     generics: Vec<TokenStream>,
+    field_types: Vec<TokenStream>,
     /// Arguments after `self`.
     arguments: Vec<(&'static str, TokenStream)>,
 }
@@ -68,6 +68,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             result: "Value",
             fields: &[("value", NUMBER)],
             generics: vec![quote!(T)],
+            field_types: vec![quote!(T)],
             arguments: x(),
         },
         Method {
@@ -76,6 +77,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             result: "Gradient",
             fields: &[("value", NUMBER), ("gradient", VECTORS)],
             generics: vec![quote!(T), quote!(#points)],
+            field_types: vec![quote!(T), quote!(#points)],
             arguments: x(),
         },
         Method {
@@ -84,6 +86,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             result: "Hessian",
             fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
             generics: vec![quote!(T), quote!(#points), quote!(#triangle)],
+            field_types: vec![quote!(T), quote!(#points), quote!(#triangle)],
             arguments: x(),
         },
     ];
@@ -102,6 +105,7 @@ fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             result: "ForceValue",
             fields: &[("force", VECTORS)],
             generics: vec![quote!(T), quote!(#points)],
+            field_types: vec![quote!(#points)],
             arguments: state(),
         },
         Method {
@@ -110,6 +114,7 @@ fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             result: "ForceJacobians",
             fields: &[("force", VECTORS), ("by_position", BLOCKS), ("by_velocity", BLOCKS)],
             generics: vec![quote!(T), quote!(#points), quote!(#square)],
+            field_types: vec![quote!(#points), quote!(#square), quote!(#square)],
             arguments: state(),
         },
     ];
@@ -131,6 +136,7 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
             result: "ConstraintJacobian",
             fields: &[("value", NUMBERS), ("jacobian", VECTORS)],
             generics: vec![quote!(T), quote!(#rows_type), quote!(#jacobian)],
+            field_types: vec![quote!(#rows_type), quote!(#jacobian)],
             arguments: x(),
         },
         Method {
@@ -139,6 +145,7 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
             result: "ConstraintHessian",
             fields: &[("value", NUMBERS), ("jacobian", VECTORS), ("hessians", BLOCKS)],
             generics: vec![quote!(T), quote!(#rows_type), quote!(#jacobian), quote!(#triangles)],
+            field_types: vec![quote!(#rows_type), quote!(#jacobian), quote!(#triangles)],
             arguments: x(),
         },
         Method {
@@ -147,6 +154,7 @@ fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStre
             result: "Hessian",
             fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
             generics: vec![quote!(T), quote!(#points), quote!(#triangle)],
+            field_types: vec![quote!(T), quote!(#points), quote!(#triangle)],
             arguments: x(),
         },
     ];
@@ -166,6 +174,7 @@ fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream
             result: "ResidualValue",
             fields: &[("value", NUMBERS)],
             generics: vec![quote!(T), quote!(#rows)],
+            field_types: vec![quote!(#rows)],
             arguments: u(),
         },
         Method {
@@ -174,6 +183,7 @@ fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream
             result: "ResidualJacobian",
             fields: &[("value", NUMBERS), ("jacobian", NUMBERS)],
             generics: vec![quote!(T), quote!(#rows), quote!(#jacobian)],
+            field_types: vec![quote!(#rows), quote!(#jacobian)],
             arguments: u(),
         },
     ];
@@ -238,7 +248,7 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
                 .chain(method.fields.iter().rev().map(|(field, _)| *field))
                 .map(|field| format_ident!("{field}"))
                 .collect();
-            let field_types = method.fields.iter().rev().zip(method.generics.iter().rev()).map(|(_, generic)| generic);
+            let field_types = method.field_types.iter().rev();
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
             let select = quote! {
                 if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
@@ -354,11 +364,14 @@ pub(super) fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenS
         .find(|i| (i.first..i.first + i.input_type.size()).contains(&number))
         .expect("compiler bug: inputs are numbered without gaps");
     let name = format_ident!("{}", input.name);
-    match input.input_type {
-        InputType::Scalar => quote!(#prefix #name),
-        _ => {
-            let place = number - input.first;
-            quote!(#prefix #name[#place])
-        }
+    let mut place = number - input.first;
+    let mut size = input.input_type.size();
+    let mut read = quote!(#prefix #name);
+    for length in input.input_type.dimensions() {
+        size /= length;
+        let index = place / size;
+        read.extend(quote!([#index]));
+        place %= size;
     }
+    read
 }

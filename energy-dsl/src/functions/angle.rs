@@ -4,7 +4,7 @@
 
 use super::length::{Direction, assume_moderate, common_scale, direction, upper};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Primitive, Product, Rule};
+use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule};
 use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
@@ -81,7 +81,7 @@ fn vector_of_unit(g: &Graph, components: &[NodeId]) -> Option<Vec<NodeId>> {
 
 /// The cosine c of the angle between a and b, and what it and 1 − c need of them. With w = a × b, and lengths only in
 /// γ = 1/(‖a‖‖b‖), 1/‖a‖² = ‖b‖²γ² and 1/‖b‖² = ‖a‖²γ²: one root and one division serve all.
-struct Between {
+struct Aligned {
     a: Vec<NodeId>,
     b: Vec<NodeId>,
     scales: [NodeId; 2],
@@ -95,7 +95,7 @@ struct Between {
     degenerate: NodeId,
 }
 
-fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Between {
+fn aligned(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Aligned {
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     let scales = [a, b].map(|v| common_scale(g, v));
     let (x, y) = (g.scaled(scales[0], a), g.scaled(scales[1], b));
@@ -126,16 +126,16 @@ fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Between {
     let one_minus = g.select(degenerate, null, one_minus);
     let square = g.mul(per_both, per_both);
     let per_square = [g.mul(squares[1], square), g.mul(squares[0], square)];
-    Between { a: x, b: y, scales, cross, cosine, one_minus, per_both, per_square, degenerate }
+    Aligned { a: x, b: y, scales, cross, cosine, one_minus, per_both, per_square, degenerate }
 }
 
 /// â·b̂ as one primitive.
 pub(super) fn recognise_cosine(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
     let (a, b) = (vector_of_unit(g, x)?, vector_of_unit(g, y)?);
-    let between = between(g, &a, &b);
-    let (first, second) = cosine_derivatives(g, &between, false);
-    let rule = Rule::factored(Primitive::Cosine, [a, b].concat(), between.cosine, first, second);
-    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, between.degenerate), &[]))
+    let at = aligned(g, &a, &b);
+    let (first, second) = cosine_derivatives(g, &at, false);
+    let rule = Rule::factored(Primitive::Cosine, [a, b].concat(), at.cosine, first, second);
+    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
 /// 1 − â·b̂ as one primitive.
@@ -144,15 +144,15 @@ pub(crate) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
         return None;
     }
     let arguments = g.rule(cosine).filter(|r| r.primitive == Primitive::Cosine)?.arguments.clone();
-    let between = between(g, &arguments[..3], &arguments[3..]);
-    let (first, second) = cosine_derivatives(g, &between, true);
-    let rule = Rule::factored(Primitive::OneMinusCosine, arguments, between.one_minus, first, second);
-    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, between.degenerate), &[]))
+    let at = aligned(g, &arguments[..3], &arguments[3..]);
+    let (first, second) = cosine_derivatives(g, &at, true);
+    let rule = Rule::factored(Primitive::OneMinusCosine, arguments, at.one_minus, first, second);
+    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
 /// Derivatives of c by a and b, or of −c. With p = γ (w × a)/‖a‖², q = γ (b × w)/‖b‖²: ∇c = (p, q); ∇²c has the blocks
 /// −c/‖a‖² I − a sᵀ − s aᵀ, s = p/‖a‖² − ½ c a/‖a‖⁴ (likewise for b), and γ (I − a aᵀ/‖a‖²) − p bᵀ/‖b‖².
-fn cosine_derivatives(g: &mut Graph, at: &Between, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
+fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
     let half = g.constant(0.5);
     let turned = [g.cross(&at.cross, &at.a), g.cross(&at.b, &at.cross)];
     let vectors = [&at.a, &at.b];
@@ -233,6 +233,11 @@ fn angle(g: &mut Graph, args: &[Lowered]) -> Lowered {
         let (sine, cosine) = (g.sqrt(square), g.dot(a, b));
         return Lowered::scalar(g.atan2(sine, cosine));
     }
+    Lowered::scalar(between(g, a, b))
+}
+
+/// The robust form of the angle between two vectors.
+pub(super) fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
     let pair = pair(g, a, b);
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     let w = direction(g, &pair.cross);
@@ -270,5 +275,28 @@ fn angle(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let rule = Rule::smooth(Primitive::Angle, pair.arguments.clone(), value, first, second)
         .flagged(0, Flag::Degenerate, pair.degenerate)
         .flagged(1, Flag::Degenerate, w.zero);
-    Lowered::scalar(g.add_rule(rule, &[]))
+    g.add_rule(rule, &[])
+}
+
+/// √(c (1 − â·b̂)) with a constant c: v = 0 is the tip of a cone, where derivatives are taken as 0. Of ω = 1 − â·b̂, first
+/// derivative c/(2v), second −c²/(4v³).
+pub(crate) fn recognise_root(g: &mut Graph, x: NodeId) -> Option<NodeId> {
+    let (factor, omega) = match g.op(x) {
+        Op::Mul(c, y) if g.as_constant(c).is_some() => (c, y),
+        Op::Mul(y, c) => (c, y),
+        _ => (g.constant(1.0), x),
+    };
+    let factor = g.as_constant(factor).filter(|c| *c > 0.0)?;
+    g.rule(omega).filter(|r| r.primitive == Primitive::OneMinusCosine)?;
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let value = g.plain_sqrt(x);
+    let tip = g.equal(value, null);
+    let reciprocal = g.div(one, value);
+    let reciprocal = g.select(tip, null, reciprocal);
+    let (half, minus_quarter) = (g.constant(factor / 2.0), g.constant(-factor * factor / 4.0));
+    let first = g.mul(half, reciprocal);
+    let second = g.product(None, &[minus_quarter, reciprocal, reciprocal, reciprocal]);
+    let rule = Rule::smooth(Primitive::RootOneMinusCosine, vec![omega], value, vec![first], vec![second]);
+    let factor = g.constant(factor);
+    Some(g.add_rule(rule.flagged(1, Flag::Kink, tip), &[factor]))
 }

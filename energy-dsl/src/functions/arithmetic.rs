@@ -2,16 +2,23 @@
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
-use crate::graph::Graph;
+use crate::graph::{Form, Graph, NodeId, Op};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function { name: "+", usage: "a + b", docs: "Sum of equal shapes.", shape: same, lower: add, accuracy: "" },
-    Function { name: "-", usage: "a - b", docs: "Difference of equal shapes.", shape: same, lower: sub, accuracy: "" },
+    Function {
+        name: "-",
+        usage: "a - b",
+        docs: "Difference of equal shapes. `x^2 - y^2` of numbers is (x − y)(x + y).",
+        shape: same,
+        lower: sub,
+        accuracy: "",
+    },
     Function { name: "neg", usage: "-a", docs: "Negative.", shape: one, lower: neg, accuracy: "" },
     Function {
         name: "*",
         usage: "a * b",
-        docs: "Product: of numbers, of a number with anything, of matrices, of a matrix with a vector.",
+        docs: "Product: of numbers, of a number with anything, of matrices, of a matrix with a vector, of quaternions, of dual quaternions.",
         shape: product,
         lower: mul,
         accuracy: "",
@@ -48,12 +55,17 @@ fn product(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Truth, _] | [_, Truth] => Err("a comparison is not a number; use if … { } else { }".into()),
         [Scalar, other] | [other, Scalar] => Ok(other),
+        [Shape::Quat, Shape::Quat] => Ok(Shape::Quat),
+        [Shape::DualQuat, Shape::DualQuat] => Ok(Shape::DualQuat),
         [Matrix(r, c), Matrix(r2, c2)] if c == r2 => Ok(Matrix(r, c2)),
         [Matrix(r, c), Vector(n)] if c == n => Ok(if r == 1 { Scalar } else { Vector(r) }),
         [Vector(_), Vector(_)] => {
             Err("two vectors have no product `*`; did you mean dot(a, b), cross(a, b) or outer(a, b)?".into())
         }
-        [a, b] => Err(format!("inner sizes must agree, but this is {a} times {b}")),
+        [a @ (Matrix(..) | Vector(_)), b @ (Matrix(..) | Vector(_))] => {
+            Err(format!("inner sizes must agree, but this is {a} times {b}"))
+        }
+        [a, b] => Err(format!("{a} and {b} have no product")),
         _ => Err("takes two operands".into()),
     }
 }
@@ -78,11 +90,7 @@ fn power(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
-fn by_parts(
-    g: &mut Graph,
-    args: &[Lowered],
-    op: fn(&mut Graph, crate::graph::NodeId, crate::graph::NodeId) -> crate::graph::NodeId,
-) -> Lowered {
+fn by_parts(g: &mut Graph, args: &[Lowered], op: fn(&mut Graph, NodeId, NodeId) -> NodeId) -> Lowered {
     let parts = args[0].parts.iter().zip(&args[1].parts).map(|(&a, &b)| op(g, a, b)).collect();
     Lowered { shape: args[0].shape, parts }
 }
@@ -92,7 +100,34 @@ fn add(g: &mut Graph, args: &[Lowered]) -> Lowered {
 }
 
 fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    if g.form() == Form::Robust
+        && args[0].shape == Shape::Scalar
+        && let Some(product) = recognise_squares(g, args[0].node(), args[1].node())
+    {
+        return Lowered::scalar(product);
+    }
     by_parts(g, args, Graph::sub)
+}
+
+/// x² − y² as (x − y)(x + y), where one of them may be a constant with an exact root.
+fn recognise_squares(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
+    let (x, y) = (root_of_square(g, a)?, root_of_square(g, b)?);
+    if g.as_constant(a).is_some() && g.as_constant(b).is_some() {
+        return None;
+    }
+    let (difference, sum) = (g.sub(x, y), g.add(x, y));
+    Some(g.mul(difference, sum))
+}
+
+fn root_of_square(g: &mut Graph, square: NodeId) -> Option<NodeId> {
+    if let Some(value) = g.as_constant(square) {
+        let root = value.sqrt();
+        return (root > 0.0 && root * root == value && root.fract() == 0.0).then(|| g.constant(root));
+    }
+    match g.op(square) {
+        Op::Mul(x, y) if x == y => Some(x),
+        _ => None,
+    }
 }
 
 fn neg(g: &mut Graph, args: &[Lowered]) -> Lowered {
@@ -104,6 +139,7 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
     match (a.shape, b.shape) {
         (Shape::Scalar, _) => Lowered { shape: b.shape, parts: g.scaled(a.node(), &b.parts) },
         (_, Shape::Scalar) => Lowered { shape: a.shape, parts: g.scaled(b.node(), &a.parts) },
+        (Shape::Quat | Shape::DualQuat, _) => super::quaternion::product(g, a, b),
         _ => {
             let ((rows, inner), (_, columns)) = (a.dimensions(), b.dimensions());
             let mut parts = Vec::with_capacity(rows * columns);

@@ -1,7 +1,7 @@
 //! Functions of one number, and of two.
 
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 macro_rules! scalar_function {
     ($name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal, |$g:ident, $args:ident| $body:expr) => {
@@ -17,9 +17,25 @@ macro_rules! scalar_function {
 }
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    scalar_function!("sqrt", "sqrt(x)", "√x, x ≥ 0.", one_scalar, "1", |g, a| g.sqrt(a[0].node())),
-    scalar_function!("exp", "exp(x)", "eˣ.", one_scalar, "1", |g, a| g.exp(a[0].node())),
-    scalar_function!("log", "log(x)", "Natural logarithm, x > 0.", one_scalar, "1", |g, a| g.ln(a[0].node())),
+    scalar_function!(
+        "sqrt",
+        "sqrt(x)",
+        "√x, x ≥ 0; of `1 - dot(unit(a), unit(b))` or a multiple, one robust primitive: its derivative at 0 is taken as 0 and flagged.",
+        one_scalar,
+        "1",
+        |g, a| g.sqrt(a[0].node())
+    ),
+    Function {
+        name: "exp",
+        usage: "exp(x) or exp(ξ)",
+        docs: "eˣ; of a twist ξ = (θ, t), the dual quaternion of the motion that turns by the angle 2‖θ‖ about θ and shifts by t: (q, ½ t q), q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖). Regular at θ = 0.",
+        shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
+        lower: |g, a| match a[0].shape {
+            Shape::Twist => super::quaternion::exp(g, &a[0]),
+            _ => Lowered::scalar(g.exp(a[0].node())),
+        },
+        accuracy: "1",
+    },
     scalar_function!(
         "sin",
         "sin(x)",
@@ -56,26 +72,41 @@ pub(super) const FUNCTIONS: &[Function] = &[
         .abs(a[0].node())),
     scalar_function!(
         "min",
-        "min(a, b)",
-        "The smaller; where equal, the derivative of the first.",
-        two_scalars,
+        "min(a, b, …)",
+        "The smallest; where two are equal, the derivative of the first.",
+        some_scalars,
         "0",
-        |g, a| g.min(a[0].node(), a[1].node())
+        |g, a| fold(g, a, Graph::min)
     ),
     scalar_function!(
         "max",
-        "max(a, b)",
-        "The larger; where equal, the derivative of the first.",
-        two_scalars,
+        "max(a, b, …)",
+        "The largest; where two are equal, the derivative of the first.",
+        some_scalars,
         "0",
-        |g, a| g.max(a[0].node(), a[1].node())
+        |g, a| fold(g, a, Graph::max)
     ),
+    scalar_function!(
+        "clamp",
+        "clamp(x, least, most)",
+        "x, but at least `least` and at most `most`: min(max(x, least), most).",
+        three_scalars,
+        "0",
+        |g, a| {
+            let raised = g.max(a[0].node(), a[1].node());
+            g.min(raised, a[2].node())
+        }
+    ),
+    scalar_function!("sign", "sign(x)", "−1, 0 or 1; its derivative is taken as 0.", one_scalar, "0", |g, a| sign(
+        g,
+        a[0].node()
+    )),
     scalar_function!(
         "one_minus_cos",
         "one_minus_cos(x)",
-        "1 − cos x = 2 sin²(x/2), without cancellation at 0.",
+        "1 − cos x = 2 sin²(x/2), without cancellation at 0; so is `1 - cos(x)`.",
         one_scalar,
-        "2 / 1 / 1",
+        "3 / 1 / 1",
         |g, a| versine(g, a[0].node())
     ),
     scalar_function!(
@@ -104,9 +135,45 @@ pub(super) fn two_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
+fn some_scalars(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes.iter().find(|s| **s != Shape::Scalar) {
+        None if shapes.len() >= 2 => Ok(Shape::Scalar),
+        None => Err(format!("takes two or more scalars, but there are {} arguments", shapes.len())),
+        Some(other) => Err(format!("takes scalars, but one is {other}")),
+    }
+}
+
+fn three_scalars(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes {
+        [_, _, _] => some_scalars(shapes),
+        _ => Err(format!("takes three scalars, but there are {} arguments", shapes.len())),
+    }
+}
+
+fn fold(g: &mut Graph, numbers: &[Lowered], by: fn(&mut Graph, NodeId, NodeId) -> NodeId) -> NodeId {
+    let first = numbers[0].node();
+    numbers[1..].iter().fold(first, |found, next| by(g, found, next.node()))
+}
+
+fn sign(g: &mut Graph, x: NodeId) -> NodeId {
+    let (minus_one, null, one) = (g.constant(-1.0), g.constant(0.0), g.constant(1.0));
+    let (negative, positive) = (g.less(x, null), g.less(null, x));
+    let right = g.select(positive, one, null);
+    g.select(negative, minus_one, right)
+}
+
 fn half(g: &mut Graph, x: NodeId) -> NodeId {
     let half = g.constant(0.5);
     g.mul(half, x)
+}
+
+/// 1 − cos x, written so.
+pub(super) fn recognise_versine(g: &mut Graph, one: NodeId, cosine: NodeId) -> Option<NodeId> {
+    let angle = match g.op(cosine) {
+        Op::Cos(angle) => angle,
+        _ => *g.rule(cosine).filter(|r| r.primitive == Primitive::DihedralCosine)?.arguments.first()?,
+    };
+    g.is(one, 1.0).then(|| versine(g, angle))
 }
 
 /// 1 − cos x: first derivative sin x, second cos x.

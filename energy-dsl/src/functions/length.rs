@@ -12,7 +12,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "norm",
         usage: "norm(d) or ‖d‖",
-        docs: "Length of a vector. At 0 its derivatives are taken as 0 and flagged. `norm(d) - L` is the elongation, one robust primitive, and so is its square.",
+        docs: "Length of a vector or quaternion. At 0 its derivatives are taken as 0 and flagged. `norm(d) - L` is the elongation, one robust primitive, and so is its square.",
         shape: vector_to_scalar,
         lower: norm,
         accuracy: "2 / 2 / 6",
@@ -28,20 +28,23 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "unit",
         usage: "unit(d) or â",
-        docs: "d/‖d‖. At 0 it is taken as 0 and flagged.",
-        shape: vector_to_vector,
+        docs: "d/‖d‖ of a vector or quaternion; of a dual quaternion, both parts over the norm of the real one. At 0 it is taken as 0 and flagged.",
+        shape: unit_shape,
         lower: unit,
         accuracy: "2 / 5 / 8",
     },
 ];
 
 fn vector_to_scalar(shapes: &[Shape]) -> Result<Shape, String> {
-    vector_to_vector(shapes).map(|_| Shape::Scalar)
+    match shapes {
+        [Shape::DualQuat] => Err("takes a vector, but this is a dual quaternion; did you mean norm(real(q))?".into()),
+        _ => unit_shape(shapes).map(|_| Shape::Scalar),
+    }
 }
 
-fn vector_to_vector(shapes: &[Shape]) -> Result<Shape, String> {
+fn unit_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
-        [v @ Shape::Vector(_)] => Ok(v),
+        [v @ (Shape::Vector(_) | Shape::Quat | Shape::DualQuat)] => Ok(v),
         [other] => Err(format!("takes a vector, but this is {other}")),
         _ => Err(format!("takes one vector, but there are {} arguments", shapes.len())),
     }
@@ -121,18 +124,21 @@ pub(super) fn upper(n: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 fn norm(g: &mut Graph, args: &[Lowered]) -> Lowered {
-    let d = &args[0].parts;
+    Lowered::scalar(length(g, &args[0].parts))
+}
+
+fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
     if g.form() == Form::Textbook {
         let square = g.sum_of_squares(d);
-        return Lowered::scalar(g.sqrt(square));
+        return g.sqrt(square);
     }
     let at = direction(g, d);
     let value = g.div(at.length, at.scale);
     let curvature = g.mul(at.reciprocal, at.scale);
     let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
     let first = at.unit.iter().map(|&n| vec![n]).collect();
-    let rule = Rule::factored(Primitive::Norm, d.clone(), value, first, second);
-    Lowered::scalar(g.add_rule(rule.flagged(1, Flag::Degenerate, at.zero), &[]))
+    let rule = Rule::factored(Primitive::Norm, d.to_vec(), value, first, second);
+    g.add_rule(rule.flagged(1, Flag::Degenerate, at.zero), &[])
 }
 
 fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
@@ -140,11 +146,20 @@ fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
 }
 
 fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
-    let d = &args[0].parts;
+    let (q, shape) = (&args[0], args[0].shape);
+    if shape == Shape::DualQuat {
+        let unit = unit_parts(g, &q.parts[..4]);
+        let norm = length(g, &q.parts[..4]);
+        return super::quaternion::unit_dual(g, q, unit, norm);
+    }
+    Lowered { shape, parts: unit_parts(g, &q.parts) }
+}
+
+fn unit_parts(g: &mut Graph, d: &[NodeId]) -> Vec<NodeId> {
     if g.form() == Form::Textbook {
         let square = g.sum_of_squares(d);
         let length = g.sqrt(square);
-        return Lowered::vector(d.iter().map(|&x| g.div(x, length)).collect::<Vec<_>>());
+        return d.iter().map(|&x| g.div(x, length)).collect();
     }
     let at = direction(g, d);
     let (n, m) = (&at.unit, d.len());
@@ -166,10 +181,10 @@ fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
                 g.neg(entry)
             })
             .collect();
-        let rule = Rule::smooth(Primitive::Unit(i as u8), d.clone(), n[i], first, second);
+        let rule = Rule::smooth(Primitive::Unit(i as u8), d.to_vec(), n[i], first, second);
         g.add_rule(rule.flagged(0, Flag::Degenerate, at.zero), &[])
     };
-    Lowered::vector((0..m).map(|i| component(g, i)).collect::<Vec<_>>())
+    (0..m).map(|i| component(g, i)).collect()
 }
 
 /// ‖d‖^α with α a parameter or a constant: gradient g n, Hessian (g/r) (I + (α − 2) n nᵀ), g = α ‖d‖^(α−1). An even constant

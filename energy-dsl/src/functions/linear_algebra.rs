@@ -8,7 +8,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "dot",
         usage: "dot(a, b) or a·b",
-        docs: "Inner product; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive.",
+        docs: "Inner product of two vectors or quaternions; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive.",
         shape: dot_shape,
         lower: dot,
         accuracy: "",
@@ -87,6 +87,14 @@ pub(super) const FUNCTIONS: &[Function] = &[
         accuracy: "0",
     },
     Function {
+        name: "[]",
+        usage: "v[i], v.x, q.w",
+        docs: "A component, counted from 0; of an array, an entry.",
+        shape: component_shape,
+        lower: component,
+        accuracy: "0",
+    },
+    Function {
         name: "vector",
         usage: "vector(x, y, …)",
         docs: "The vector of those numbers.",
@@ -99,7 +107,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
 fn dot_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(a), Shape::Vector(b)] if a == b => Ok(Shape::Scalar),
-        [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Quat, Shape::Quat] | [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
         [Shape::Scalar, other] | [other, Shape::Scalar] => Ok(other),
         [a, b] => Err(format!("takes two vectors of the same length, but these are {a} and {b}")),
         _ => Err(format!("takes two vectors, but there are {} arguments", shapes.len())),
@@ -176,6 +184,14 @@ fn vector_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.len() {
         n @ 2..=4 if shapes.iter().all(|s| *s == Shape::Scalar) => Ok(Shape::Vector(n as u8)),
         _ => Err("takes two to four scalars".into()),
+    }
+}
+
+/// The checker has seen to it that the second is a constant in range.
+fn component_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Vector(_) | Shape::Quat | Shape::DualQuat | Shape::Twist, Shape::Scalar] => Ok(Shape::Scalar),
+        _ => Err("is written v[0] or v.x".into()),
     }
 }
 
@@ -271,4 +287,9 @@ fn columns(_: &mut Graph, a: &[Lowered]) -> Lowered {
 
 fn vector(_: &mut Graph, a: &[Lowered]) -> Lowered {
     Lowered::vector(a.iter().map(Lowered::node).collect::<Vec<_>>())
+}
+
+fn component(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let number = g.as_constant(a[1].node()).expect("compiler bug: indices are constants");
+    Lowered::scalar(a[0].parts[number as usize])
 }

@@ -5,15 +5,20 @@ mod angle;
 mod arithmetic;
 mod dihedral;
 mod elementary;
+mod exponential;
 mod inner_product;
 mod length;
 mod linear_algebra;
 mod logic;
+mod loss;
+mod quaternion;
 mod shape;
+mod sinc;
+mod trigonometric;
 
 pub use shape::{Lowered, Shape};
 
-pub(crate) use angle::recognise_one_minus_cosine;
+pub(crate) use angle::{recognise_one_minus_cosine, recognise_root};
 pub(crate) use dihedral::recognise_dihedral;
 use dihedral::recognise_sine_difference;
 pub(crate) use length::recognise_norm_power;
@@ -48,10 +53,15 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
     [
         arithmetic::FUNCTIONS,
         elementary::FUNCTIONS,
+        exponential::FUNCTIONS,
+        trigonometric::FUNCTIONS,
+        sinc::FUNCTIONS,
+        loss::FUNCTIONS,
         linear_algebra::FUNCTIONS,
         length::FUNCTIONS,
         angle::FUNCTIONS,
         dihedral::FUNCTIONS,
+        quaternion::FUNCTIONS,
         logic::FUNCTIONS,
     ]
     .into_iter()
@@ -69,4 +79,6 @@ pub(crate) fn recognise_difference(g: &mut Graph, a: NodeId, b: NodeId) -> Optio
     recognise_one_minus_cosine(g, a, b)
         .or_else(|| length::recognise_elongation(g, a, b))
         .or_else(|| recognise_sine_difference(g, a, b))
+        .or_else(|| elementary::recognise_versine(g, a, b))
+        .or_else(|| exponential::recognise_expm1(g, a, b))
 }

@@ -11,10 +11,18 @@ pub enum Shape {
     Vector(u8),
     /// A matrix, rows × columns.
     Matrix(u8, u8),
+    /// A quaternion: w, x, y, z.
+    Quat,
+    /// A dual quaternion: the real part, then the dual one.
+    DualQuat,
+    /// A rotation vector, then a translation.
+    Twist,
     /// The outcome of a comparison.
     Truth,
-    /// One vector per point, the body of a force.
-    Forces(u8),
+    /// So many values one after the other. No function takes one: its entries are its own values.
+    Array(u16),
+    /// One vector per point, the body of a force; or the rows of a constraint or residual, given one by one.
+    Rows(u16),
 }
 
 impl Shape {
@@ -25,7 +33,10 @@ impl Shape {
             Self::Scalar | Self::Truth => 1,
             Self::Vector(n) => n.into(),
             Self::Matrix(r, c) => usize::from(r) * usize::from(c),
-            Self::Forces(n) => 3 * usize::from(n),
+            Self::Quat => 4,
+            Self::DualQuat => 8,
+            Self::Twist => 6,
+            Self::Array(n) | Self::Rows(n) => usize::from(n),
         }
     }
 }
@@ -37,7 +48,11 @@ impl fmt::Display for Shape {
             Self::Vector(n) => write!(f, "a {n}-vector"),
             Self::Matrix(r, c) => write!(f, "a {r}×{c} matrix"),
             Self::Truth => f.write_str("a comparison"),
-            Self::Forces(n) => write!(f, "a list of {n} vectors"),
+            Self::Quat => f.write_str("a quaternion"),
+            Self::DualQuat => f.write_str("a dual quaternion"),
+            Self::Twist => f.write_str("a twist"),
+            Self::Array(n) => write!(f, "an array of {n}"),
+            Self::Rows(n) => write!(f, "{n} rows"),
         }
     }
 }

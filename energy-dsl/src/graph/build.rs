@@ -230,8 +230,18 @@ impl Graph {
         }
     }
 
-    /// √a.
+    /// √a; of 1 − cos between vectors, its own primitive.
     pub fn sqrt(&mut self, a: NodeId) -> NodeId {
+        if self.form() == Form::Robust
+            && let Some(recognised) = crate::functions::recognise_root(self, a)
+        {
+            return recognised;
+        }
+        self.plain_sqrt(a)
+    }
+
+    /// √a without recognition.
+    pub(crate) fn plain_sqrt(&mut self, a: NodeId) -> NodeId {
         self.unary(a, f64::sqrt, Op::Sqrt)
     }
 

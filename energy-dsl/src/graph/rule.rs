@@ -39,6 +39,32 @@ pub enum Primitive {
     Versine,
     /// x − sin x.
     SineRemainder,
+    /// cos √y.
+    CosSqrt,
+    /// sin √y / √y.
+    SincSqrt,
+    /// The derivative of sin √y / √y.
+    SincSqrtSlope,
+    /// sin x / x.
+    Sinc,
+    /// √(c (1 − cos)) of the angle between two vectors.
+    RootOneMinusCosine,
+    /// ln(1 + x).
+    Log1p,
+    /// eˣ − 1.
+    Expm1,
+    /// ln(1 + eˣ).
+    Softplus,
+    /// Quadratic up to a threshold, then linear.
+    Huber,
+    /// A smooth one.
+    PseudoHuber,
+    /// tan x.
+    Tangent,
+    /// asin x.
+    ArcSine,
+    /// acos x.
+    ArcCosine,
     /// A first partial derivative of another rule's output.
     Partial {
         /// The node differentiated.
@@ -69,7 +95,19 @@ impl Primitive {
             Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
-            Self::InnerProduct | Self::Partial { .. } => return None,
+            Self::CosSqrt => "cos √y",
+            Self::SincSqrt => "sin √y / √y",
+            Self::Sinc => "sin x / x",
+            Self::RootOneMinusCosine => "√(1 − cosine between vectors)",
+            Self::Log1p => "log1p",
+            Self::Expm1 => "expm1",
+            Self::Softplus => "softplus",
+            Self::Huber => "Huber loss",
+            Self::PseudoHuber => "pseudo-Huber loss",
+            Self::Tangent => "tan x",
+            Self::ArcSine => "asin x",
+            Self::ArcCosine => "acos x",
+            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }
 }

@@ -2,13 +2,15 @@ use super::name::Name;
 use crate::diagnostic::Span;
 use crate::runtime::Kind;
 
-/// A declaration or a function.
+/// A declaration, a function or a constant.
 #[derive(Clone, Debug)]
 pub enum Item {
     /// `energy Name(…) { … }` and its kin.
     Declaration(Declaration),
     /// `fn name(a, b) { … }`.
     Function(UserFunction),
+    /// `const name: Scalar = value;`.
+    Constant(Constant),
 }
 
 /// A declared energy, constraint, force or residual.
@@ -45,9 +47,9 @@ pub enum Section {
     Parameter,
 }
 
-/// The declared type of an input.
+/// The declared type of an input, or of the entries of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InputType {
+pub enum ElementType {
     /// A point of space.
     Point,
     /// The velocity of the point with the same number.
@@ -56,17 +58,58 @@ pub enum InputType {
     Scalar,
     /// A vector of 2, 3 or 4.
     Vector(u8),
+    /// A matrix, rows × columns.
+    Matrix(u8, u8),
+    /// A quaternion: w, x, y, z.
+    Quat,
+    /// A dual quaternion: the real part, then the dual one, each w, x, y, z.
+    DualQuat,
+    /// A rotation vector θ, then a translation t.
+    Twist,
 }
 
-impl InputType {
+impl ElementType {
+    /// How the numbers are nested in an array of the generated code, outermost first; nothing for a scalar.
+    #[must_use]
+    pub fn dimensions(self) -> Vec<usize> {
+        match self {
+            Self::Point | Self::Velocity => vec![3],
+            Self::Scalar => vec![],
+            Self::Vector(n) => vec![n.into()],
+            Self::Matrix(rows, columns) => vec![rows.into(), columns.into()],
+            Self::Quat => vec![4],
+            Self::DualQuat => vec![8],
+            Self::Twist => vec![6],
+        }
+    }
+
     /// How many numbers.
     #[must_use]
     pub fn size(self) -> usize {
-        match self {
-            Self::Point | Self::Velocity => 3,
-            Self::Scalar => 1,
-            Self::Vector(n) => n.into(),
-        }
+        self.dimensions().into_iter().product()
+    }
+}
+
+/// The type of an input: `Type` or `[Type; length]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InputType {
+    /// Of one, or of each entry.
+    pub element: ElementType,
+    /// How many, if it is an array.
+    pub length: Option<usize>,
+}
+
+impl InputType {
+    /// How the numbers are nested, outermost first; nothing for a scalar.
+    #[must_use]
+    pub fn dimensions(self) -> Vec<usize> {
+        self.length.into_iter().chain(self.element.dimensions()).collect()
+    }
+
+    /// How many numbers.
+    #[must_use]
+    pub fn size(self) -> usize {
+        self.dimensions().into_iter().product()
     }
 }
 
@@ -77,12 +120,36 @@ pub struct InputGroup {
     pub section: Section,
     /// The names.
     pub names: Vec<Name>,
-    /// The type.
-    pub input_type: InputType,
+    /// The type, or that of the entries.
+    pub element: ElementType,
+    /// The length of an array as written.
+    pub length: Option<Expression>,
     /// Where the type is written.
     pub type_span: Span,
     /// The unit as written, or empty.
-    pub unit: String,
+    pub unit: Unit,
+}
+
+/// A unit as written.
+#[derive(Clone, Debug, Default)]
+pub struct Unit {
+    /// The text; empty if there is none.
+    pub text: String,
+    /// Where.
+    pub span: Option<Span>,
+}
+
+/// `const name: Scalar[unit] = value;`.
+#[derive(Clone, Debug)]
+pub struct Constant {
+    /// Its name.
+    pub name: Name,
+    /// Its unit.
+    pub unit: Unit,
+    /// Its value.
+    pub value: Expression,
+    /// The declaration as text.
+    pub source: String,
 }
 
 /// A function of the user's.
@@ -94,11 +161,15 @@ pub struct UserFunction {
     pub parameters: Vec<Name>,
     /// What it returns.
     pub body: Body,
+    /// The declaration as text.
+    pub source: String,
 }
 
 /// `let`s and functions, then the result.
 #[derive(Clone, Debug)]
 pub struct Body {
+    /// Constants, visible in the whole body.
+    pub constants: Vec<Constant>,
     /// Functions, visible in the whole body.
     pub functions: Vec<UserFunction>,
     /// In order.
@@ -116,6 +187,14 @@ pub struct Let {
     pub value: Expression,
     /// Whether it stands in the `rest` block.
     pub rest: bool,
+}
+
+impl Body {
+    /// A body that is its result alone.
+    #[must_use]
+    pub fn of(result: Expression) -> Self {
+        Self { constants: Vec::new(), functions: Vec::new(), lets: Vec::new(), result: Box::new(result) }
+    }
 }
 
 /// An expression.
@@ -138,8 +217,27 @@ pub enum ExpressionKind {
     Call(Name, Vec<Expression>),
     /// `if condition { } else { }`.
     If(Box<Expression>, Box<Body>, Box<Body>),
-    /// `[f1, f2, …]`, the forces on the points.
+    /// `[a, b, …]`, an array.
     List(Vec<Expression>),
+    /// `a[i]`.
+    Index(Box<Expression>, Box<Expression>),
+    /// `v.x`.
+    Component(Box<Expression>, Name),
+    /// `sum(j in first..end, term)`.
+    Sum(Box<Sum>),
     /// A body in braces, or in a string.
     Body(Box<Body>),
+}
+
+/// `sum(index in first..end, term)`.
+#[derive(Clone, Debug)]
+pub struct Sum {
+    /// What counts.
+    pub index: Name,
+    /// From.
+    pub first: Expression,
+    /// Up to, exclusive.
+    pub end: Expression,
+    /// What is summed.
+    pub term: Expression,
 }

@@ -1,6 +1,6 @@
 //! Expressions, by precedence.
 
-use super::ast::{Body, Expression, ExpressionKind};
+use super::ast::{Body, Expression, ExpressionKind, Sum};
 use super::name::Name;
 use super::parse::{Parsed, Parser, is_keyword};
 use super::tokens::{Kind as TokenKind, Token};
@@ -72,6 +72,12 @@ impl<'a> Parser<'a> {
             let span = self.span();
             if self.take("ᵀ") {
                 base = call("transpose", span, vec![base]);
+            } else if self.take("[") {
+                let index = self.bracketed("[", "]")?;
+                base = Expression { kind: ExpressionKind::Index(Box::new(base), Box::new(index)), span };
+            } else if self.take(".") {
+                let name = self.name("the name of a component, as in v.x")?;
+                base = Expression { kind: ExpressionKind::Component(Box::new(base), name), span };
             } else if self.take("^") {
                 let exponent = if self.is("-") { self.unary()? } else { self.power()? };
                 base = call("^", span, vec![base, exponent]);
@@ -170,6 +176,9 @@ impl<'a> Parser<'a> {
         let notation = self.peek().is_some_and(|t| t.notation);
         let name = self.name("a name")?;
         let span = name.span.clone();
+        if name.text == "sum" && self.is("(") {
+            return self.sum(span);
+        }
         let function = self.is_function(&name.text);
         if self.is("(") && (function || !notation) {
             let arguments = self.list("(", ")")?;
@@ -183,6 +192,26 @@ impl<'a> Parser<'a> {
         Ok(Expression { kind: ExpressionKind::Name(name), span })
     }
 
+    /// `sum(j in first..end, term)`, after the name.
+    fn sum(&mut self, span: Span) -> Parsed<Expression> {
+        const FORM: &str = "as in sum(j in 0..4, w[j] * x[j])";
+        self.expect("(", FORM)?;
+        self.bars.push("(".into());
+        let index = self.name(&format!("an index, {FORM}"))?;
+        if !self.take_word("in") {
+            return self.fail(&format!("`in` and a range, {FORM}"));
+        }
+        let first = self.expression()?;
+        self.expect("..", &format!("between the ends of the range, {FORM}"))?;
+        let end = self.expression()?;
+        self.expect(",", &format!("and what is summed, {FORM}"))?;
+        let term = self.expression()?;
+        self.take(",");
+        self.bars.pop();
+        self.expect(")", "to close `sum(`")?;
+        Ok(Expression { kind: ExpressionKind::Sum(Box::new(Sum { index, first, end, term })), span })
+    }
+
     fn conditional(&mut self) -> Parsed<Expression> {
         let span = self.span();
         self.at += 1;
@@ -193,7 +222,7 @@ impl<'a> Parser<'a> {
         }
         let no = if self.is_word("if") {
             let nested = self.conditional()?;
-            Body { functions: Vec::new(), lets: Vec::new(), result: Box::new(nested) }
+            Body::of(nested)
         } else {
             self.braced_body()?
         };

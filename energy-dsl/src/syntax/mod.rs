@@ -7,7 +7,10 @@ mod notation;
 mod parse;
 mod tokens;
 
-pub use ast::{Body, Declaration, Expression, ExpressionKind, InputType, Item, Section, UserFunction};
+pub use ast::{
+    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, InputType, Item, Section, Sum,
+    Unit, UserFunction,
+};
 pub use name::{Name, canonical};
 pub(crate) use notation::unhatted;
 pub use parse::parse;

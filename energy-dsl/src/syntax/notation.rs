@@ -82,11 +82,11 @@ impl Lexer<'_> {
             '¾' => self.push(Kind::Number(0.75), start),
             'ᵀ' => self.symbol("ᵀ", start),
             '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';' | ':'
-            | '=' | '<' | '>' | '!' | '&' => {
+            | '=' | '<' | '>' | '!' | '&' | '.' => {
                 let mut symbol = c.to_string();
                 if let Some(next) = self.peek() {
                     let pair = format!("{c}{next}");
-                    if ["==", "!=", "<=", ">=", "&&"].contains(&pair.as_str()) {
+                    if ["==", "!=", "<=", ">=", "&&", ".."].contains(&pair.as_str()) {
                         symbol = pair;
                         self.advance();
                     }
@@ -114,6 +114,8 @@ impl Lexer<'_> {
         let start = self.at;
         let rest = &self.text[start..];
         let mut end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        // `0..4` is a range.
+        end = rest.find("..").map_or(end, |range| range.min(end));
         // An exponent is digits after `e`, else `e` is a name.
         let bytes = rest.as_bytes();
         if bytes.get(end).is_some_and(|b| b.eq_ignore_ascii_case(&b'e')) {

@@ -2,7 +2,10 @@
 
 use proc_macro2::TokenStream;
 
-use super::ast::{Body, Declaration, ExpressionKind, InputGroup, InputType, Item, Let, Section, UserFunction};
+use super::ast::{
+    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Section, Unit,
+    UserFunction,
+};
 use super::name::Name;
 use super::tokens::{self, Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
@@ -47,13 +50,20 @@ pub(super) struct Parser<'a> {
 }
 
 const KINDS: [Kind; 4] = [Kind::Energy, Kind::Constraint, Kind::Force, Kind::Residual];
-const TYPES: &[(&str, InputType)] = &[
-    ("Point", InputType::Point),
-    ("Velocity", InputType::Velocity),
-    ("Scalar", InputType::Scalar),
-    ("Vec2", InputType::Vector(2)),
-    ("Vec3", InputType::Vector(3)),
-    ("Vec4", InputType::Vector(4)),
+const TYPES: &[(&str, ElementType)] = &[
+    ("Point", ElementType::Point),
+    ("Velocity", ElementType::Velocity),
+    ("Scalar", ElementType::Scalar),
+    ("Vec2", ElementType::Vector(2)),
+    ("Vec3", ElementType::Vector(3)),
+    ("Vec4", ElementType::Vector(4)),
+    ("Mat2x2", ElementType::Matrix(2, 2)),
+    ("Mat3x2", ElementType::Matrix(3, 2)),
+    ("Mat3x3", ElementType::Matrix(3, 3)),
+    ("Mat4x4", ElementType::Matrix(4, 4)),
+    ("Quat", ElementType::Quat),
+    ("DualQuat", ElementType::DualQuat),
+    ("Twist", ElementType::Twist),
 ];
 
 impl<'a> Parser<'a> {
@@ -150,6 +160,9 @@ impl<'a> Parser<'a> {
         if self.take_word("fn") {
             return self.user_function().map(Item::Function);
         }
+        if self.take_word("const") {
+            return self.constant().map(Item::Constant);
+        }
         let start = self.at;
         let kind = self.kind()?;
         let name = self.name("a name for the declaration")?;
@@ -225,8 +238,10 @@ impl<'a> Parser<'a> {
             return Ok(kind);
         }
         let found = self.found();
-        let mut diagnostic =
-            Diagnostic::new(&self.span(), format!("expected energy, constraint, force, residual or fn, found {found}"));
+        let mut diagnostic = Diagnostic::new(
+            &self.span(),
+            format!("expected energy, constraint, force, residual, fn or const, found {found}"),
+        );
         if let Some(Token { kind: TokenKind::Name(name), .. }) = self.peek()
             && let Some(near) = nearest(name, KINDS.map(Kind::keyword))
         {
@@ -247,10 +262,9 @@ impl<'a> Parser<'a> {
             }
             self.expect(":", "and the type of the input")?;
             let type_span = self.span();
-            let input_type = self.input_type()?;
-            let unit = if self.is("[") { self.unit()? } else { String::new() };
-            let place = if rest { Section::Rest } else { section_of(section, input_type) };
-            groups.push(InputGroup { section: place, names, input_type, type_span, unit });
+            let (element, unit, length) = self.input_type()?;
+            let place = if rest { Section::Rest } else { section_of(section, element) };
+            groups.push(InputGroup { section: place, names, element, length, type_span, unit });
             if self.take(";") {
                 section = Section::Parameter;
                 rest = self.take_word("rest");
@@ -261,7 +275,21 @@ impl<'a> Parser<'a> {
         Ok(groups)
     }
 
-    fn input_type(&mut self) -> Parsed<InputType> {
+    /// `Type[unit]` or `[Type[unit]; length]`.
+    fn input_type(&mut self) -> Parsed<(ElementType, Unit, Option<Expression>)> {
+        if !self.take("[") {
+            let element = self.element_type()?;
+            return Ok((element, self.unit()?, None));
+        }
+        let element = self.element_type()?;
+        let unit = self.unit()?;
+        self.expect(";", "and the length of the array, as in [Point; 4]")?;
+        let length = self.expression()?;
+        self.expect("]", "after the length of the array")?;
+        Ok((element, unit, Some(length)))
+    }
+
+    fn element_type(&mut self) -> Parsed<ElementType> {
         let known = TYPES.iter().map(|(name, _)| *name).collect::<Vec<_>>();
         let name = self.name(&format!("one of the types {}", known.join(", ")))?;
         TYPES.iter().find(|(known, _)| *known == name.text).map(|&(_, t)| t).ok_or_else(|| {
@@ -274,21 +302,46 @@ impl<'a> Parser<'a> {
         })
     }
 
-    fn unit(&mut self) -> Parsed<String> {
-        self.expect("[", "to open the unit")?;
-        let start = self.at;
+    /// `[unit]`, or nothing.
+    fn unit(&mut self) -> Parsed<Unit> {
+        if !self.take("[") {
+            return Ok(Unit::default());
+        }
+        let (start, span) = (self.at, self.span());
         while !self.is("]") {
             if self.peek().is_none() {
                 return self.fail("`]` to close the unit");
             }
             self.at += 1;
         }
-        let unit = tokens::unit_text(&self.tokens[start..self.at]);
+        let text = tokens::unit_text(&self.tokens[start..self.at]);
         self.at += 1;
-        Ok(unit)
+        Ok(Unit { text, span: Some(span) })
+    }
+
+    /// `name: Scalar[unit] = value;`, after the `const`.
+    fn constant(&mut self) -> Parsed<Constant> {
+        let start = self.at - 1;
+        let name = self.name("the name of the constant")?;
+        let unit = if self.take(":") {
+            let span = self.span();
+            if self.element_type()? != ElementType::Scalar {
+                return Err(Box::new(
+                    Diagnostic::new(&span, "a constant is a Scalar").help("as in const K: Scalar = 4;"),
+                ));
+            }
+            self.unit()?
+        } else {
+            Unit::default()
+        };
+        self.expect("=", "and the value of the constant, as in const K: Scalar = 4;")?;
+        let value = self.expression()?;
+        self.expect(";", "after the value")?;
+        Ok(Constant { name, unit, value, source: tokens::text(&self.tokens[start..self.at]) })
     }
 
     fn user_function(&mut self) -> Parsed<UserFunction> {
+        let start = self.at - 1;
         let name = self.name("the name of the function")?;
         self.expect("(", "and the parameters of the function")?;
         let mut parameters = Vec::new();
@@ -299,7 +352,7 @@ impl<'a> Parser<'a> {
             }
         }
         let body = self.braced_body()?;
-        Ok(UserFunction { name, parameters, body })
+        Ok(UserFunction { name, parameters, body, source: tokens::text(&self.tokens[start..self.at]) })
     }
 
     fn declaration_body(&mut self) -> Parsed<Body> {
@@ -308,7 +361,7 @@ impl<'a> Parser<'a> {
             self.expect(";", "after the formula")?;
             return Ok(match result.kind {
                 ExpressionKind::Body(body) => *body,
-                _ => Body { functions: Vec::new(), lets: Vec::new(), result: Box::new(result) },
+                _ => Body::of(result),
             });
         }
         if !self.is("{") {
@@ -326,10 +379,13 @@ impl<'a> Parser<'a> {
 
     /// Statements and a result, up to the closing brace or the end of a string.
     pub(super) fn body(&mut self, braced: bool) -> Parsed<Body> {
+        let mut constants = Vec::new();
         let mut body = (Vec::new(), Vec::new());
         loop {
             if self.take_word("fn") {
                 body.0.push(self.user_function()?);
+            } else if self.take_word("const") {
+                constants.push(self.constant()?);
             } else if self.is_word("rest") && self.tokens.get(self.at + 1).is_some_and(|t| t.text == "{") {
                 self.at += 2;
                 while !self.take("}") {
@@ -353,7 +409,7 @@ impl<'a> Parser<'a> {
                     .help("the result stands last and without `;`; name intermediate values with `let name = …;`"),
             ));
         }
-        Ok(Body { functions: body.0, lets: body.1, result: Box::new(result) })
+        Ok(Body { constants, functions: body.0, lets: body.1, result: Box::new(result) })
     }
 
     fn next_is_definition(&self) -> bool {
@@ -374,16 +430,16 @@ impl<'a> Parser<'a> {
     }
 }
 
-fn section_of(section: Section, input_type: InputType) -> Section {
-    match input_type {
-        InputType::Point | InputType::Velocity => Section::Moving,
+fn section_of(section: Section, element: ElementType) -> Section {
+    match element {
+        ElementType::Point | ElementType::Velocity => Section::Moving,
         _ => section,
     }
 }
 
 /// Words that cannot name anything.
 pub(super) fn is_keyword(word: &str) -> bool {
-    matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub")
+    matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub" | "const")
 }
 
 /// The body as a reader would write it: a string's content, or the statements without the braces.

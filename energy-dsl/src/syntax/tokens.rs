@@ -31,6 +31,11 @@ pub(super) struct Token {
 pub(super) fn unit_text(tokens: &[Token]) -> String {
     let mut unit = String::new();
     for token in tokens {
+        // A unit with characters that are no Rust tokens stands in a string.
+        if let Ok(text) = syn::parse_str::<syn::LitStr>(&token.text) {
+            unit.push_str(&text.value());
+            continue;
+        }
         let is_name = matches!(token.kind, Kind::Name(_));
         if is_name && unit.ends_with(char::is_alphanumeric) {
             unit.push(' ');
@@ -46,8 +51,8 @@ pub(super) fn text(tokens: &[Token]) -> String {
     let mut glue = true;
     let mut previous: Option<&Token> = None;
     for token in tokens {
-        let closing = matches!(token.text.as_str(), ")" | "]" | "," | ";" | ":");
-        let opening = matches!(token.text.as_str(), "(" | "[");
+        let closing = matches!(token.text.as_str(), ")" | "]" | "," | ";" | ":" | ".");
+        let opening = matches!(token.text.as_str(), "(" | "[" | ".");
         let after_name = text.ends_with(|c: char| c.is_alphanumeric() || c == '_');
         if !(glue || closing || opening && after_name) {
             text.push(' ');
@@ -67,7 +72,7 @@ impl PartialEq for Token {
     }
 }
 
-const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->"];
+const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
 
 /// Rust tokens as ours. Attributes' strings stay text; every other string literal is notation.
 pub(super) fn from_rust(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Token> {

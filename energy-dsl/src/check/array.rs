@@ -1,0 +1,103 @@
+//! Arrays, their entries, components of vectors, and sums over indices. All of it is unrolled: an array is its entries.
+
+use super::expression::{Checker, Meaning, constant};
+use super::typed::{Typed, TypedKind};
+use crate::diagnostic::{Diagnostic, Span};
+use crate::functions::{self, Shape};
+use crate::syntax::{Expression, Name, Sum};
+
+/// How many terms the sums of a declaration may unroll to.
+const MOST_TERMS: usize = 1024;
+
+impl<'a> Checker<'a> {
+    /// `[a, b, …]`.
+    pub(super) fn list(&mut self, items: &'a [Expression], span: &Span) -> Option<Typed> {
+        let checked: Vec<_> = items.iter().map(|item| self.expression(item)).collect();
+        let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
+        if let Some((item, _)) = items.iter().zip(&checked).find(|(_, c)| c.shape == Shape::Truth) {
+            return self.error(&item.span, "a comparison is no entry of an array");
+        }
+        let Ok(length) = u16::try_from(checked.len()) else {
+            return self.error(span, "this array is too long");
+        };
+        Some(Typed { kind: TypedKind::Array(checked), shape: Shape::Array(length), span: span.clone() })
+    }
+
+    /// `a[i]`: an entry of an array, or a component.
+    pub(super) fn index(&mut self, of: &'a Expression, index: &'a Expression) -> Option<Typed> {
+        let value = self.expression(of)?;
+        let number = self.whole_number(index, "an index")?;
+        let length = match value.shape {
+            Shape::Vector(_) | Shape::Quat | Shape::DualQuat | Shape::Twist => value.shape.size(),
+            Shape::Array(n) => n.into(),
+            other => return self.error(&of.span, format!("only arrays and vectors have entries, but this is {other}")),
+        };
+        if number >= length {
+            let message =
+                format!("the index {number} is out of range: there are {length} entries, 0 to {}", length - 1);
+            return self.error(&index.span, message);
+        }
+        match value.kind {
+            TypedKind::Array(mut entries) => Some(entries.swap_remove(number)),
+            _ => self.component_of(value, number, &index.span),
+        }
+    }
+
+    /// `v.x`, `q.w`.
+    pub(super) fn component(&mut self, of: &'a Expression, name: &Name) -> Option<Typed> {
+        let value = self.expression(of)?;
+        let letters = match value.shape {
+            Shape::Vector(n) => &"xyzw"[..n.into()],
+            Shape::Quat => "wxyz",
+            other => {
+                let message = format!(
+                    "`.{}`: only vectors and quaternions have named components, but this is {other}",
+                    name.text
+                );
+                self.diagnostics.push(Diagnostic::new(&name.span, message).help("entries of arrays are a[0], a[1], …"));
+                return None;
+            }
+        };
+        match letters.find(&name.text).filter(|_| name.text.len() == 1) {
+            Some(number) => self.component_of(value, number, &name.span),
+            None => {
+                let known = letters.chars().map(|c| format!(".{c}")).collect::<Vec<_>>().join(", ");
+                let message = format!("{} has the components {known}, not .{}", value.shape, name.text);
+                self.error(&name.span, message)
+            }
+        }
+    }
+
+    fn component_of(&mut self, value: Typed, number: usize, span: &Span) -> Option<Typed> {
+        let function = functions::find("[]").expect("compiler bug: no function `[]`");
+        let arguments = vec![value, constant(number as f64, span)];
+        Some(Typed { kind: TypedKind::Call(function, arguments), shape: Shape::Scalar, span: span.clone() })
+    }
+
+    /// `sum(j in first..end, term)`.
+    pub(super) fn sum(&mut self, sum: &'a Sum, span: &Span) -> Option<Typed> {
+        let (first, end) = (self.whole_number(&sum.first, "a range"), self.whole_number(&sum.end, "a range"));
+        let (first, end) = (first?, end?);
+        if first >= end {
+            let message = format!("the range {first}..{end} is empty");
+            return self.error(&sum.end.span, message);
+        }
+        self.terms += end - first;
+        if self.terms > MOST_TERMS {
+            return self.error(span, format!("the sums unroll to more than {MOST_TERMS} terms"));
+        }
+        let mut total: Option<Typed> = None;
+        for number in first..end {
+            let scope = [(sum.index.canonical(), Some(Meaning::Index(number)))];
+            self.scopes.push(scope.into_iter().collect());
+            let term = self.expression(&sum.term);
+            self.scopes.pop();
+            let term = term?;
+            total = Some(match total {
+                None => term,
+                Some(total) => self.apply("+", span, vec![total, term])?,
+            });
+        }
+        total
+    }
+}

@@ -1,0 +1,106 @@
+//! Constants: named numbers, and what of a formula is one.
+
+use std::collections::BTreeMap;
+
+use super::expression::{Checker, Meaning};
+use super::signature::Signature;
+use super::typed::{Binding, Typed, TypedKind};
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::functions::Shape;
+use crate::syntax::{Constant, Expression, Name};
+
+/// The constants beside the declarations, which every declaration sees.
+#[derive(Default)]
+pub(super) struct Globals {
+    pub(super) bindings: Vec<Binding>,
+    pub(super) scope: BTreeMap<String, Option<Meaning>>,
+}
+
+impl Globals {
+    /// Checks each in the sight of those before it.
+    pub(super) fn of<'a>(constants: impl Iterator<Item = &'a Constant>, diagnostics: &mut Diagnostics) -> Self {
+        let signature = Signature::empty();
+        let mut globals = Self::default();
+        for constant in constants {
+            let canonical = constant.name.canonical();
+            if globals.scope.contains_key(&canonical) {
+                let message = format!("the constant `{}` is declared twice", constant.name.text);
+                diagnostics.push(Diagnostic::new(&constant.name.span, message).help("rename one of them"));
+            }
+            let mut checker = Checker::new(&signature, &globals, &[], diagnostics);
+            let meaning = checker.constant(constant);
+            globals.bindings = checker.bindings;
+            globals.scope.insert(canonical, meaning);
+        }
+        globals
+    }
+}
+
+impl<'a> Checker<'a> {
+    /// A constant is a binding whose value needs no input.
+    pub(super) fn constant(&mut self, constant: &'a Constant) -> Option<Meaning> {
+        let value = self.expression(&constant.value)?;
+        if value.shape != Shape::Scalar || evaluate(&self.bindings, &value).is_none() {
+            let message = format!("the value of the constant `{}` is not a number", constant.name.text);
+            let help = "a constant is made of numbers and other constants; name other values with `let`";
+            self.diagnostics.push(Diagnostic::new(&constant.value.span, message).help(help));
+            return None;
+        }
+        self.bindings.push(Binding { value, rest: false, unit: Some(constant.unit.clone()) });
+        Some(Meaning::Binding(self.bindings.len() - 1, Shape::Scalar))
+    }
+
+    /// The whole number that an expression always is.
+    pub(super) fn whole_number(&mut self, expression: &'a Expression, what: &str) -> Option<usize> {
+        let typed = self.expression(expression)?;
+        match evaluate(&self.bindings, &typed) {
+            Some(value) if value >= 0.0 && value.fract() == 0.0 && value <= f64::from(u16::MAX) => Some(value as usize),
+            found => {
+                let found = found.map_or_else(|| "this depends on inputs".into(), |value| format!("this is {value}"));
+                let message = format!("{what} must be a constant whole number, but {found}");
+                let help = "an integer, an index of `sum`, or a `const`";
+                self.diagnostics.push(Diagnostic::new(&expression.span, message).help(help));
+                None
+            }
+        }
+    }
+
+    /// The length of an array.
+    pub(super) fn array_length(&mut self, name: &Name, expression: &'a Expression) -> Option<usize> {
+        let length = self.whole_number(expression, &format!("the length of `{}`", name.text))?;
+        if (1..=MOST_ENTRIES).contains(&length) {
+            return Some(length);
+        }
+        let message = format!("an array has 1 to {MOST_ENTRIES} entries, but this has {length}");
+        self.diagnostics.push(Diagnostic::new(&expression.span, message));
+        None
+    }
+}
+
+/// A formula is unrolled: longer arrays are data, not a formula.
+const MOST_ENTRIES: usize = 256;
+
+/// The number that a value always is.
+pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
+    match &typed.kind {
+        TypedKind::Constant(value) => Some(*value),
+        TypedKind::Pi => Some(std::f64::consts::PI),
+        TypedKind::Binding(number) => evaluate(bindings, &bindings[*number].value),
+        TypedKind::Call(function, arguments) => {
+            let numbers: Vec<f64> = arguments.iter().map(|a| evaluate(bindings, a)).collect::<Option<_>>()?;
+            Some(match (function.name, numbers.as_slice()) {
+                ("+", [a, b]) => a + b,
+                ("-", [a, b]) => a - b,
+                ("*", [a, b]) => a * b,
+                ("/", [a, b]) => a / b,
+                ("^", [a, b]) => a.powf(*b),
+                ("neg", [a]) => -a,
+                ("sqrt", [a]) => a.sqrt(),
+                ("min", [a, b]) => a.min(*b),
+                ("max", [a, b]) => a.max(*b),
+                _ => return None,
+            })
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,180 @@
+//! A walk over the typed program that collects the equations.
+
+use super::dimension::{Dimension, LENGTH, VELOCITY};
+use super::solver::Solver;
+use super::{declared, rules};
+use crate::check::constant::evaluate;
+use crate::check::typed::{Input, Program, Source, Typed, TypedKind};
+use crate::diagnostic::{Diagnostic, Diagnostics, Span};
+use crate::functions::Shape;
+
+/// The dimensions of a value: one; of a dual quaternion, of its two parts; of a twist, of θ and t.
+#[derive(Clone, Debug)]
+pub(super) struct Units(pub(super) Vec<Dimension>);
+
+impl Units {
+    pub(super) fn one(dimension: Dimension) -> Self {
+        Self(vec![dimension])
+    }
+
+    pub(super) fn two(first: Dimension, second: Dimension) -> Self {
+        Self(vec![first, second])
+    }
+
+    /// The only one, or the first.
+    pub(super) fn main(&self) -> Dimension {
+        self.0[0].clone()
+    }
+
+    /// The only one, or the second.
+    pub(super) fn other(&self) -> Dimension {
+        self.0[self.0.len() - 1].clone()
+    }
+
+    /// Each changed in the same way.
+    pub(super) fn map(&self, change: impl Fn(&Dimension) -> Dimension) -> Self {
+        Self(self.0.iter().map(change).collect())
+    }
+}
+
+/// How many dimensions a value of a shape has.
+fn parts(shape: Shape) -> usize {
+    if matches!(shape, Shape::DualQuat | Shape::Twist) { 2 } else { 1 }
+}
+
+/// The state of the walk.
+pub(super) struct Inference<'a> {
+    program: &'a Program,
+    diagnostics: &'a mut Diagnostics,
+    pub(super) solver: Solver,
+    bindings: Vec<Option<Units>>,
+    /// Of each input by section and first number: what it was given when first met.
+    inputs: Vec<((u8, usize), Units)>,
+}
+
+impl<'a> Inference<'a> {
+    pub(super) fn new(program: &'a Program, diagnostics: &'a mut Diagnostics) -> Self {
+        let bindings = vec![None; program.bindings.len()];
+        Self { program, diagnostics, solver: Solver::default(), bindings, inputs: Vec::new() }
+    }
+
+    /// Reports an error, once at each place: functions and sums are walked again for each use.
+    pub(super) fn error(&mut self, span: &Span, message: String, help: &str) {
+        let place = |span: &Span| (span.token.start(), span.excerpt.as_ref().map(|e| (e.start, e.end)));
+        if self.diagnostics.0.iter().all(|d| place(&d.span) != place(span)) {
+            self.diagnostics.push(Diagnostic::new(span, message).help(help));
+        }
+    }
+
+    /// Demands that a result has the dimension that its kind has.
+    pub(super) fn result(&mut self, found: &Dimension, wanted: &Dimension, span: &Span, what: &str) {
+        if let Err((found, _)) = self.solver.equal(found, wanted) {
+            self.error(span, format!("{what}, but this is {found}"), "check the formula, or the units of the inputs");
+        }
+    }
+
+    /// Nothing known of each part.
+    pub(super) fn fresh(&mut self, shape: Shape) -> Units {
+        Units((0..parts(shape)).map(|_| self.solver.fresh()).collect())
+    }
+
+    pub(super) fn expression(&mut self, typed: &Typed) -> Units {
+        match &typed.kind {
+            // Nothing is nothing in any unit.
+            TypedKind::Constant(0.0) => self.fresh(typed.shape),
+            TypedKind::Constant(_) | TypedKind::Pi => Units::one(Dimension::default()),
+            TypedKind::Input(source, first) => self.input(*source, *first, typed.shape),
+            TypedKind::Binding(number) => self.binding(*number),
+            TypedKind::Call(function, arguments) => {
+                let units: Vec<Units> = arguments.iter().map(|a| self.expression(a)).collect();
+                let call = rules::Call {
+                    name: function.name,
+                    arguments,
+                    units: &units,
+                    span: &typed.span,
+                    constant: arguments.last().and_then(|last| evaluate(&self.program.bindings, last)),
+                };
+                rules::apply(self, &call)
+            }
+            TypedKind::Select(condition, yes, no) => {
+                self.expression(condition);
+                let (yes, no) = (self.expression(yes), self.expression(no));
+                self.same("if", &[&yes, &no], &typed.span)
+            }
+            TypedKind::Array(entries) => {
+                entries.iter().for_each(|entry| drop(self.expression(entry)));
+                Units::one(Dimension::default())
+            }
+            TypedKind::Gradient(of, point) => {
+                let of = self.expression(of).main();
+                let by = self.input(Source::Position, 3 * point, Shape::Vector(3)).main();
+                Units::one(of.over(&by))
+            }
+        }
+    }
+
+    fn binding(&mut self, number: usize) -> Units {
+        if let Some(units) = &self.bindings[number] {
+            return units.clone();
+        }
+        let binding = &self.program.bindings[number];
+        let value = self.expression(&binding.value);
+        let unit = binding.unit.as_ref().and_then(|unit| super::dimension::parse(&unit.text).ok());
+        let units = unit.map_or(value, Units::one);
+        self.bindings[number] = Some(units.clone());
+        units
+    }
+
+    fn input(&mut self, source: Source, first: usize, shape: Shape) -> Units {
+        let (section, list): (u8, &[Input]) = match source {
+            Source::Position => (0, &self.program.moving),
+            Source::Velocity => return Units::one(Dimension::of(VELOCITY)),
+            Source::Rest => (1, &self.program.rest),
+            Source::Parameter => (2, &self.program.parameters),
+        };
+        let contains = |input: &&Input| (input.first..input.first + input.input_type.size()).contains(&first);
+        let input = list.iter().find(contains).expect("compiler bug: inputs are numbered without gaps");
+        let key = (section, input.first);
+        if let Some((_, units)) = self.inputs.iter().find(|(other, _)| *other == key) {
+            return units.clone();
+        }
+        let units = match (shape, declared(input)) {
+            // A rotation is a number, a translation is not.
+            (Shape::Twist, known) => Units::two(Dimension::default(), known.unwrap_or(Dimension::of(LENGTH))),
+            (Shape::DualQuat, Some(known)) => Units::two(Dimension::default(), known),
+            (_, Some(known)) => Units::one(known),
+            (_, None) => self.fresh(shape),
+        };
+        self.inputs.push((key, units.clone()));
+        units
+    }
+
+    /// Demands that all are of the same units, and yields those.
+    pub(super) fn same(&mut self, name: &str, values: &[&Units], span: &Span) -> Units {
+        let first = values[0];
+        for (number, other) in values.iter().enumerate().skip(1) {
+            for (a, b) in first.0.iter().zip(&other.0) {
+                if let Err((a, b)) = self.solver.equal(a, b) {
+                    let message = match (name, values.len()) {
+                        ("if", _) => format!("`if`: one branch is {a}, the other is {b}"),
+                        (_, 2) => format!("`{name}`: left is {a}, right is {b}"),
+                        _ => format!("`{name}`: the first is {a}, number {} is {b}", number + 1),
+                    };
+                    self.error(span, message, "both need the same unit: check the formula, or the units of the inputs");
+                    return Units(first.0.iter().map(|_| self.solver.fresh()).collect());
+                }
+            }
+        }
+        first.clone()
+    }
+
+    /// Demands a number without a unit; whether it is one.
+    pub(super) fn number(&mut self, name: &str, value: &Dimension, span: &Span) -> bool {
+        if let Err((found, _)) = self.solver.equal(value, &Dimension::default()) {
+            let message = format!("`{name}` takes a number without a unit, but this is {found}");
+            self.error(span, message, "divide it by a reference value of the same unit");
+            return false;
+        }
+        true
+    }
+}

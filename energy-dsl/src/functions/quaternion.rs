@@ -1,0 +1,275 @@
+//! Quaternions (w, x, y, z), dual quaternions (real part, dual part) and twists (rotation vector θ, translation t).
+//!
+//! A rotation is a unit quaternion q, which turns v into q v q*. A rigid motion is a dual quaternion with a unit real part q and
+//! the dual part ½ t q, which takes p to q p q* + t. The exponential of a twist has the angle 2‖θ‖: q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
+
+use super::sinc::{cos_sqrt, sinc_sqrt};
+use super::{Function, Lowered, Shape};
+use crate::graph::{Form, Graph, NodeId};
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
+        name: "quat",
+        usage: "quat(w, x, y, z) or quat(w, v)",
+        docs: "The quaternion w + x i + y j + z k.",
+        shape: quat_shape,
+        lower: |_, a| Lowered { shape: Shape::Quat, parts: joined(a) },
+        accuracy: "0",
+    },
+    Function {
+        name: "dual_quat",
+        usage: "dual_quat(q, e)",
+        docs: "The dual quaternion q + ε e.",
+        shape: |s| exactly(s, &[Shape::Quat, Shape::Quat], Shape::DualQuat, "takes two quaternions"),
+        lower: |_, a| Lowered { shape: Shape::DualQuat, parts: joined(a) },
+        accuracy: "0",
+    },
+    Function {
+        name: "twist",
+        usage: "twist(θ, t)",
+        docs: "The twist of a rotation vector θ and a translation t.",
+        shape: |s| exactly(s, &[Shape::Vector(3), Shape::Vector(3)], Shape::Twist, "takes two 3-vectors"),
+        lower: |_, a| Lowered { shape: Shape::Twist, parts: joined(a) },
+        accuracy: "0",
+    },
+    Function {
+        name: "angular",
+        usage: "angular(ξ)",
+        docs: "θ of the twist (θ, t).",
+        shape: |s| exactly(s, &[Shape::Twist], Shape::Vector(3), "takes a twist"),
+        lower: |_, a| Lowered::vector(&a[0].parts[..3]),
+        accuracy: "0",
+    },
+    Function {
+        name: "linear",
+        usage: "linear(ξ)",
+        docs: "t of the twist (θ, t).",
+        shape: |s| exactly(s, &[Shape::Twist], Shape::Vector(3), "takes a twist"),
+        lower: |_, a| Lowered::vector(&a[0].parts[3..]),
+        accuracy: "0",
+    },
+    Function {
+        name: "real",
+        usage: "real(q)",
+        docs: "The real part of a dual quaternion, a quaternion; of a quaternion, w.",
+        shape: real_shape,
+        lower: real,
+        accuracy: "0",
+    },
+    Function {
+        name: "dual",
+        usage: "dual(q)",
+        docs: "The dual part of a dual quaternion, a quaternion.",
+        shape: |s| exactly(s, &[Shape::DualQuat], Shape::Quat, "takes a dual quaternion"),
+        lower: |_, a| quaternion(&a[0].parts[4..]),
+        accuracy: "0",
+    },
+    Function {
+        name: "imaginary",
+        usage: "imaginary(q)",
+        docs: "The vector (x, y, z) of a quaternion.",
+        shape: |s| exactly(s, &[Shape::Quat], Shape::Vector(3), "takes a quaternion"),
+        lower: |_, a| Lowered::vector(&a[0].parts[1..]),
+        accuracy: "0",
+    },
+    Function {
+        name: "conjugate",
+        usage: "conjugate(q)",
+        docs: "q*: the vector part negated; of a dual quaternion, in both parts.",
+        shape: conjugate_shape,
+        lower: conjugate,
+        accuracy: "0",
+    },
+    Function {
+        name: "rotate",
+        usage: "rotate(q, v)",
+        docs: "q v q*, the vector v turned by a unit quaternion, or by the unit real part of a dual quaternion.",
+        shape: rotate_shape,
+        lower: |g, a| Lowered::vector(rotate(g, &a[0].parts[..4], &a[1].parts)),
+        accuracy: "",
+    },
+    Function {
+        name: "transform",
+        usage: "transform(q, p)",
+        docs: "The point p moved by a dual quaternion with unit real part: turned by it, and shifted by the vector part of 2 dual(q) real(q)*.",
+        shape: |s| {
+            exactly(s, &[Shape::DualQuat, Shape::Vector(3)], Shape::Vector(3), "takes a dual quaternion and a 3-vector")
+        },
+        lower: transform,
+        accuracy: "",
+    },
+    Function {
+        name: "rotation",
+        usage: "rotation(θ)",
+        docs: "The unit quaternion (cos ‖θ‖, θ sin ‖θ‖/‖θ‖) of half a rotation vector: it turns by the angle 2‖θ‖. Regular at θ = 0.",
+        shape: |s| exactly(s, &[Shape::Vector(3)], Shape::Quat, "takes a 3-vector"),
+        lower: |g, a| quaternion(&rotation(g, &a[0].parts)),
+        accuracy: "",
+    },
+    Function {
+        name: "rotation_matrix",
+        usage: "rotation_matrix(q)",
+        docs: "The 3×3 matrix of v ↦ rotate(q, v), of a unit quaternion.",
+        shape: |s| exactly(s, &[Shape::Quat], Shape::Matrix(3, 3), "takes a quaternion"),
+        lower: rotation_matrix,
+        accuracy: "",
+    },
+];
+
+fn exactly(shapes: &[Shape], wanted: &[Shape], result: Shape, expectation: &str) -> Result<Shape, String> {
+    if shapes == wanted {
+        return Ok(result);
+    }
+    let found = shapes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and ");
+    Err(format!("{expectation}, but found {}", if found.is_empty() { "nothing" } else { &found }))
+}
+
+fn quat_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Scalar, Shape::Scalar, Shape::Scalar, Shape::Scalar] | [Shape::Scalar, Shape::Vector(3)] => {
+            Ok(Shape::Quat)
+        }
+        _ => Err("takes four scalars, or a scalar and a 3-vector".into()),
+    }
+}
+
+fn real_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::DualQuat] => Ok(Shape::Quat),
+        [Shape::Quat] => Ok(Shape::Scalar),
+        _ => Err("takes a quaternion or a dual quaternion".into()),
+    }
+}
+
+fn conjugate_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [q @ (Shape::Quat | Shape::DualQuat)] => Ok(q),
+        _ => Err("takes a quaternion or a dual quaternion".into()),
+    }
+}
+
+fn rotate_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [Shape::Quat | Shape::DualQuat, Shape::Vector(3)] => Ok(Shape::Vector(3)),
+        _ => Err("takes a quaternion or a dual quaternion, and a 3-vector".into()),
+    }
+}
+
+fn joined(values: &[Lowered]) -> Vec<NodeId> {
+    values.iter().flat_map(|v| v.parts.iter().copied()).collect()
+}
+
+fn quaternion(parts: &[NodeId]) -> Lowered {
+    Lowered { shape: Shape::Quat, parts: parts.to_vec() }
+}
+
+fn real(_: &mut Graph, a: &[Lowered]) -> Lowered {
+    match a[0].shape {
+        Shape::DualQuat => quaternion(&a[0].parts[..4]),
+        _ => Lowered::scalar(a[0].parts[0]),
+    }
+}
+
+fn conjugate(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let parts = a[0].parts.iter().enumerate().map(|(i, &p)| if i % 4 == 0 { p } else { g.neg(p) }).collect();
+    Lowered { shape: a[0].shape, parts }
+}
+
+/// p q = (p₀ q₀ − p·q, p₀ q + q₀ p + p × q).
+fn hamilton(g: &mut Graph, p: &[NodeId], q: &[NodeId]) -> Vec<NodeId> {
+    let (real, along) = (g.mul(p[0], q[0]), g.dot(&p[1..], &q[1..]));
+    let turned = g.cross(&p[1..], &q[1..]);
+    let mut product = vec![g.sub(real, along)];
+    for i in 1..4 {
+        let (a, b) = (g.mul(p[0], q[i]), g.mul(q[0], p[i]));
+        let sum = g.add(a, b);
+        product.push(g.add(sum, turned[i - 1]));
+    }
+    product
+}
+
+/// The product of two quaternions, or of two dual quaternions: p q + ε (p q′ + p′ q).
+pub(super) fn product(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
+    let (p, q) = (&a.parts, &b.parts);
+    let mut parts = hamilton(g, &p[..4], &q[..4]);
+    if a.shape == Shape::DualQuat {
+        let (one, other) = (hamilton(g, &p[..4], &q[4..]), hamilton(g, &p[4..], &q[..4]));
+        parts.extend(one.into_iter().zip(other).map(|(x, y)| g.add(x, y)));
+    }
+    Lowered { shape: a.shape, parts }
+}
+
+/// v + w t + u × t with q = (w, u), t = 2 u × v.
+fn rotate(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
+    let two = g.constant(2.0);
+    let across = g.cross(&q[1..], v);
+    let t = g.scaled(two, &across);
+    let (along, turned) = (g.scaled(q[0], &t), g.cross(&q[1..], &t));
+    (0..3)
+        .map(|i| {
+            let sum = g.add(v[i], along[i]);
+            g.add(sum, turned[i])
+        })
+        .collect()
+}
+
+/// Turned, and shifted by 2 (w e − w′ u + u × e) with the parts (w, u) and (w′, e).
+fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let (q, dual) = a[0].parts.split_at(4);
+    let turned = rotate(g, q, &a[1].parts);
+    let two = g.constant(2.0);
+    let across = g.cross(&q[1..], &dual[1..]);
+    let moved = (0..3)
+        .map(|i| {
+            let (plus, minus) = (g.mul(q[0], dual[i + 1]), g.mul(dual[0], q[i + 1]));
+            let difference = g.sub(plus, minus);
+            let sum = g.add(difference, across[i]);
+            let shift = g.mul(two, sum);
+            g.add(turned[i], shift)
+        })
+        .collect::<Vec<_>>();
+    Lowered::vector(moved)
+}
+
+fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let columns: Vec<_> = (0..3)
+        .map(|axis| {
+            let unit: Vec<_> = (0..3).map(|i| if i == axis { one } else { null }).collect();
+            rotate(g, &a[0].parts, &unit)
+        })
+        .collect();
+    Lowered::matrix(3, 3, (0..9).map(|e| columns[e % 3][e / 3]).collect())
+}
+
+/// (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
+fn rotation(g: &mut Graph, theta: &[NodeId]) -> Vec<NodeId> {
+    let square = g.sum_of_squares(theta);
+    let (cosine, sinc) = (cos_sqrt(g, square), sinc_sqrt(g, square));
+    let mut parts = vec![cosine];
+    parts.extend(g.scaled(sinc, theta));
+    parts
+}
+
+/// exp of a twist: the rotation q of θ, and ½ (0, t) q.
+pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
+    let (theta, t) = twist.parts.split_at(3);
+    let mut parts = rotation(g, theta);
+    let half = g.constant(0.5);
+    let mut halved = vec![g.constant(0.0)];
+    halved.extend(g.scaled(half, t));
+    let dual = hamilton(g, &halved, &parts);
+    parts.extend(dual);
+    Lowered { shape: Shape::DualQuat, parts }
+}
+
+/// All of a dual quaternion over the norm of its real part.
+pub(super) fn unit_dual(g: &mut Graph, q: &Lowered, unit: Vec<NodeId>, norm: NodeId) -> Lowered {
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let reciprocal = g.div(one, norm);
+    let zero = g.equal(norm, null);
+    let reciprocal = if g.form() == Form::Textbook { reciprocal } else { g.select(zero, null, reciprocal) };
+    let mut parts = unit;
+    parts.extend(g.scaled(reciprocal, &q.parts[4..]));
+    Lowered { shape: Shape::DualQuat, parts }
+}

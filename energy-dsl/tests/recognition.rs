@@ -1,0 +1,94 @@
+//! Naive spellings compile to the robust form: they and the robust spelling give the same primitives, the same operations and the
+//! same bits.
+#![allow(missing_docs)]
+
+use energy_dsl::{Potential, compile};
+use energy_macros::energy;
+
+/// The primitives that a formula of vectors and numbers compiles to, and the operations of each routine.
+fn plan(formula: &str) -> String {
+    let source = format!(
+        "energy Test(p, q, r: Point; k, δ: Scalar) {{
+            let a = q - p;
+            let b = r - q;
+            let x = dot(p, q);
+            let y = dot(q, r);
+            k * norm(a) * norm(b) * (x + y) * δ + {formula}
+        }}"
+    );
+    let code = compile(source.parse().unwrap()).to_string();
+    assert!(!code.contains("compile_error"), "{source}");
+    let (_, plan) = code.split_once("primitives : &").unwrap();
+    plan.split_once("} ;").unwrap().0.to_owned()
+}
+
+#[test]
+fn naive_and_robust_spellings_are_the_same_code() {
+    for (naive, robust) in [
+        ("log(1 + x)", "log1p(x)"),
+        ("log(x + 1)", "log1p(x)"),
+        ("log(1 - x)", "log1p(-x)"),
+        ("(exp(x) - 1)", "expm1(x)"),
+        ("(1 - exp(x))", "(-expm1(x))"),
+        ("(x^2 - y^2)", "(x - y) * (x + y)"),
+        ("(x * x - 4)", "(x - 2) * (x + 2)"),
+        ("(1 - y^2)", "(1 - y) * (1 + y)"),
+        ("(1 - cos(x))", "one_minus_cos(x)"),
+        ("acos(dot(unit(a), unit(b)))", "angle(a, b)"),
+        ("(1 - cos(dihedral(p, r, q, a)))", "one_minus_cos(dihedral(p, r, q, a))"),
+    ] {
+        assert!(plan(naive) == plan(robust), "{naive} is not {robust}");
+    }
+}
+
+#[test]
+fn unlike_spellings_stay_as_they_are() {
+    for (one, other) in [
+        ("log(2 + x)", "log1p(1 + x)"),
+        ("(exp(x) - 2)", "(expm1(x) - 1)"),
+        ("(x^2 - 3)", "(x^2 - 4)"),
+        ("(x * y - y^2)", "(x - y) * (x + y)"),
+    ] {
+        assert!(plan(one) != plan(other), "{one} became {other}");
+    }
+}
+
+energy! {
+    energy ByArcCosine(p, q, r: Point) { acos(dot(unit(q - p), unit(r - q))) }
+    energy ByAngle(p, q, r: Point) { angle(q - p, r - q) }
+    energy HalfSine(x1, x2, x3, x4: Point) {
+        let n1 = unit(cross(x4 - x3, x1 - x3));
+        let n2 = unit(cross(x2 - x3, x4 - x3));
+        sqrt((1 - dot(n1, n2)) / 2)
+    }
+    energy Naive(p: Point) { log(1 + p.x) + (exp(p.y) - 1) + (p.x^2 - p.z^2) }
+    energy Robust(p: Point) { log1p(p.x) + expm1(p.y) + (p.x - p.z) * (p.x + p.z) }
+}
+
+#[test]
+fn naive_and_robust_spellings_give_the_same_bits() {
+    let x = [[0.25, 0.5, -1.0], [1.0, 0.125, 0.75], [1.75, -0.25, 2.5 + 1e-9]];
+    let (arc, angle) = (ByArcCosine::<f64>::new().hessian(&x), ByAngle::<f64>::new().hessian(&x));
+    assert_eq!((arc.value, arc.gradient, arc.hessian), (angle.value, angle.gradient, angle.hessian));
+    for p in [[1e-9, -1e-11, 1e-9 + 1e-24], [0.5, 2.0, -0.5]] {
+        let (naive, robust) = (Naive::<f64>::new().hessian(&[p]), Robust::<f64>::new().hessian(&[p]));
+        assert_eq!((naive.value, naive.gradient, naive.hessian), (robust.value, robust.gradient, robust.hessian));
+    }
+}
+
+/// |sin θ/2| of a hinge, printed as √((1 − n₁·n₂)/2), keeps its digits near flat; at flat it has a kink.
+#[test]
+fn half_the_sine_of_a_nearly_flat_hinge_is_accurate() {
+    let hinge = |height: f64| [[0.0, 1.0, height], [0.0, -1.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0]];
+    for height in [1e-3, 1e-8, 1e-12] {
+        let at = HalfSine::<f64>::new().hessian(&hinge(height));
+        let theta: f64 = height.atan();
+        let slope = 0.5 * (theta / 2.0).cos() / (1.0 + height * height);
+        assert!((at.value / (theta / 2.0).sin() - 1.0).abs() < 2e-15, "{height}: {}", at.value);
+        assert!((at.gradient[0][2] / slope - 1.0).abs() < 4e-15, "{height}: {}", at.gradient[0][2]);
+        assert!(!at.flags.any() && at.hessian.as_flattened().as_flattened().iter().all(|h| h.is_finite()));
+    }
+    let flat = HalfSine::<f64>::new().hessian(&hinge(0.0));
+    assert_eq!((flat.value, flat.gradient, flat.flags.kink), (0.0, [[0.0; 3]; 4], true));
+    assert!(flat.hessian.as_flattened().as_flattened().iter().all(|h| h.is_finite()));
+}

@@ -1,0 +1,75 @@
+//! Twists, their exponential and the blend of four motions against multi-precision values.
+#![allow(missing_docs, confusable_idents, mixed_script_confusables, uncommon_codepoints)]
+
+use energy_dsl::{Element, Residual};
+use energy_elements::PointToPlane;
+use energy_macros::energy;
+
+energy! {
+    residual Exponential(ξ: Twist) {
+        let q = exp(ξ);
+        [real(q).w, imaginary(real(q)), dual(q).w, imaginary(dual(q))]
+    }
+}
+
+/// The records whose name starts so: name and numbers.
+fn records(prefix: &str) -> Vec<(&'static str, Vec<f64>)> {
+    let text = include_str!("data/rigid_motions.txt");
+    let records = text.lines().filter(|line| line.starts_with(prefix)).map(|line| {
+        let (name, numbers) = line.split_once(' ').unwrap();
+        (name, numbers.split(' ').map(|n| n.parse().unwrap()).collect())
+    });
+    records.collect()
+}
+
+/// The largest error relative to the largest entry, in units of roundoff.
+fn error(found: &[f64], truth: &[f64]) -> f64 {
+    assert_eq!(found.len(), truth.len());
+    let size = truth.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let worst = found
+        .iter()
+        .zip(truth)
+        .map(|(f, t)| (f - t).abs())
+        .fold(0.0_f64, |m, e| if e > m || e.is_nan() { e } else { m });
+    worst / size / (f64::EPSILON / 2.0)
+}
+
+#[test]
+fn the_exponential_is_accurate_down_to_no_rotation_at_all() {
+    let records = records("exp");
+    assert!(records.len() >= 10, "{} records", records.len());
+    for (name, numbers) in records {
+        let (twist, truth) = numbers.split_at(6);
+        let at = Exponential::<f64>::new().jacobian(twist.try_into().unwrap());
+        assert!(!at.flags.any(), "{name}");
+        // Rounding ‖θ‖ turns by as much: the argument of sine and cosine is only so good.
+        let angle = twist[..3].iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        assert!(error(&at.value, &truth[..8]) <= 6.0 * angle, "{name}: value {:.1} u", error(&at.value, &truth[..8]));
+        let jacobian = error(&at.jacobian, &truth[8..]);
+        assert!(jacobian <= 6.0 * angle, "{name}: Jacobian {jacobian:.1} u");
+    }
+}
+
+#[test]
+fn a_blend_of_four_motions_is_accurate() {
+    let records = records("nonrigid");
+    assert!(records.len() >= 2, "{} records", records.len());
+    for (name, numbers) in records {
+        let vector = |at: usize| std::array::from_fn(|i| numbers[at + i]);
+        let element = PointToPlane::new(std::array::from_fn(|i| numbers[24 + i]), vector(28), vector(31), vector(34));
+        let at = element.jacobian(numbers[..24].try_into().unwrap());
+        // The residual is a difference of lengths of order one.
+        assert!((at.value[0] - numbers[37]).abs() <= 8.0 * f64::EPSILON, "{name}: {} for {}", at.value[0], numbers[37]);
+        let jacobian = error(&at.jacobian, &numbers[38..]);
+        assert!(jacobian <= 24.0, "{name}: Jacobian {jacobian:.1} u");
+    }
+}
+
+/// Sharing shows in the counts: one sine, one cosine and one division for a twist, one root for its angle.
+#[test]
+fn an_exponential_needs_one_sine_one_cosine_and_one_division() {
+    let routines = Exponential::<f64>::DECLARATION.routines;
+    for routine in routines {
+        assert_eq!((routine.full.transcendental, routine.full.divisions_and_roots), (2, 2), "{}", routine.name);
+    }
+}
