@@ -73,6 +73,7 @@ fn compute<T: Number>(
         Op::LessOrEqual(a, b) => return Computed::Mask(n(a).less_or_equal(n(b))),
         Op::Equal(a, b) => return Computed::Mask(n(a).equal(n(b))),
         Op::IsModerate(a, degree) => return Computed::Mask(n(a).is_moderate(degree)),
+        Op::Cautious => return Computed::Mask(!T::Mask::none()),
         Op::Truth(value) => return Computed::Mask(if value { !T::Mask::none() } else { T::Mask::none() }),
         Op::And(a, b) => return Computed::Mask(m(a) & m(b)),
         Op::Or(a, b) => return Computed::Mask(m(a) | m(b)),

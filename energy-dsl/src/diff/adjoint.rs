@@ -41,22 +41,26 @@ fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second
     adjoints
 }
 
-/// Whether reverse accumulation is unsafe: through a selection it would multiply the derivative of the other branch, which may be
-/// infinite, by zero.
-fn selects(g: &Graph, outputs: &Weighted, second_order: bool) -> bool {
-    let roots: Vec<NodeId> = outputs.keys().copied().collect();
-    let nodes = differentiable(g, &roots, second_order);
-    nodes.iter().any(|&node| matches!(g.op(node), Op::Select(..) | Op::Min(..) | Op::Max(..)))
+/// Whether reverse accumulation is right, on the ordinary path or everywhere. Through a selection it multiplies the derivative of
+/// the other branch, which may be infinite, by zero; unless it is known which branch is taken.
+pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], second_order: bool, everywhere: bool) -> bool {
+    let nodes = differentiable(g, roots, second_order);
+    nodes.into_iter().all(|node| match g.op(node) {
+        Op::Select(mask, ..) => !everywhere && g.is_decided(mask),
+        Op::Min(..) | Op::Max(..) => false,
+        _ => true,
+    })
 }
 
-/// Σ weight · ∇output by reverse accumulation. `None` where there are selections.
+/// Σ weight · ∇output by reverse accumulation. `None` where it is not safe on the ordinary path.
 pub(super) fn gradient(
     g: &mut Graph,
     outputs: &Weighted,
     coordinates: &Coordinates,
     second_order: bool,
 ) -> Option<Vec<NodeId>> {
-    if selects(g, outputs, second_order) {
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    if !is_safe(g, &roots, second_order, false) {
         return None;
     }
     let adjoints = adjoints(g, outputs, coordinates, second_order);
@@ -72,14 +76,14 @@ pub(super) fn gradient(
 }
 
 /// Σ weight · ∇²output = Σ over nodes v of the adjoint of v times Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where
-/// there are selections.
+/// it is not safe on the ordinary path.
 pub(super) fn second_derivatives(
     g: &mut Graph,
     outputs: &Weighted,
     coordinates: &Coordinates,
 ) -> Option<BTreeMap<usize, NodeId>> {
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
-    if selects(g, outputs, true) {
+    if !is_safe(g, &roots, true, false) {
         return None;
     }
     let nodes = differentiable(g, &roots, true);

@@ -107,6 +107,7 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
         }
         Op::Constant(_)
         | Op::Truth(_)
+        | Op::Cautious
         | Op::Pi
         | Op::Input(_)
         | Op::SumError(..)

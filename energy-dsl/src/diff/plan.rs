@@ -38,25 +38,38 @@ pub struct Plan {
     pub routes: Vec<Route>,
 }
 
-/// A route's name and all nodes it computes.
-type Alternative = (&'static str, Vec<NodeId>);
+/// A route to derivatives.
+struct Alternative {
+    name: &'static str,
+    /// The derivatives.
+    nodes: Vec<NodeId>,
+    /// Whether it is right everywhere, and not on the ordinary path only.
+    safe: bool,
+}
 
-/// The number of the cheapest alternative (the first of equals) in ordinary configurations, and the comparison.
-fn choose(g: &mut Graph, routine: &'static str, alternatives: &[Alternative]) -> (usize, Plan) {
-    let mut order: Vec<(usize, Route)> = alternatives
-        .iter()
-        .enumerate()
-        .map(|(number, (name, nodes))| {
-            let count = match ordinary(g, nodes) {
-                Some((nodes, guard)) => count(g, &[&nodes[..], &[guard]].concat()),
-                None => count(g, nodes),
-            };
-            (number, Route { name, count, cost: count.cost() })
-        })
-        .collect();
+/// The derivatives by the cheapest route (the first of equals) on the ordinary path; where that route is not safe everywhere,
+/// with caution those by the cheapest that is.
+fn choose(
+    g: &mut Graph,
+    routine: &'static str,
+    values: &[NodeId],
+    alternatives: &[Alternative],
+) -> (Vec<NodeId>, Plan) {
+    let mut order: Vec<(usize, Route)> = Vec::with_capacity(alternatives.len());
+    for (number, alternative) in alternatives.iter().enumerate() {
+        let nodes = [values, &alternative.nodes].concat();
+        let count = match ordinary(g, &nodes) {
+            Some((nodes, guard)) => count(g, &[&nodes[..], &[guard]].concat()),
+            None => count(g, &nodes),
+        };
+        order.push((number, Route { name: alternative.name, count, cost: count.cost() }));
+    }
     order.sort_by_key(|(number, route)| (route.cost, *number));
-    let chosen = order.first().expect("a route exists").0;
-    (chosen, Plan { routine, routes: order.into_iter().map(|(_, route)| route).collect() })
+    let best = &alternatives[order.first().expect("a route exists").0];
+    let safe = order.iter().map(|(number, _)| &alternatives[*number]).find(|a| a.safe).expect("one route is safe");
+    let cautious = g.cautious();
+    let nodes = best.nodes.iter().zip(&safe.nodes).map(|(&best, &safe)| g.select(cautious, safe, best)).collect();
+    (nodes, Plan { routine, routes: order.into_iter().map(|(_, route)| route).collect() })
 }
 
 /// First and second derivatives of a scalar by the cheapest route.
@@ -76,32 +89,30 @@ pub fn second_order(
         hessian
     };
     let whole = adjoint::alone(g, value);
+    let safe = adjoint::is_safe(g, &[value], true, true);
     let forward_gradient = forward::first_derivatives(g, &[value], coordinates).remove(0);
     let reverse_gradient = adjoint::gradient(g, &whole, coordinates, true);
     let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
-    let mut hessians = vec![("forward over forward", forward_hessian)];
-    if let Some(entries) = adjoint::second_derivatives(g, &whole, coordinates) {
-        hessians.push(("adjoint-weighted", dense(entries)));
+    let mut alternatives = Vec::new();
+    let mut offer = |name, gradient: &[NodeId], hessian: &[NodeId], safe| {
+        alternatives.push(Alternative { name, nodes: [gradient, hessian].concat(), safe });
+    };
+    offer("forward over forward", &forward_gradient, &forward_hessian, true);
+    if let Some(gradient) = &reverse_gradient {
+        offer("forward over forward, reverse gradient", gradient, &forward_hessian, safe);
     }
-    let mut routes = Vec::new();
-    for (name, hessian) in hessians {
-        routes.push((name, forward_gradient.clone(), hessian.clone()));
+    if let Some(entries) = adjoint::second_derivatives(g, &whole, coordinates) {
+        let hessian = dense(entries);
+        offer("adjoint-weighted, forward gradient", &forward_gradient, &hessian, safe);
         if let Some(gradient) = &reverse_gradient {
-            let name = if name == "adjoint-weighted" {
-                "adjoint-weighted, reverse gradient"
-            } else {
-                "forward over forward, reverse gradient"
-            };
-            routes.push((name, gradient.clone(), hessian));
+            offer("adjoint-weighted, reverse gradient", gradient, &hessian, safe);
         }
     }
     if let Some((gradient, entries)) = cut::derivatives(g, value, coordinates) {
-        routes.push(("gathered at primitives", gradient, dense(entries)));
+        offer("gathered at primitives", &gradient, &dense(entries), safe);
     }
-    let alternatives: Vec<Alternative> =
-        routes.iter().map(|(name, gradient, hessian)| (*name, [&[value], &gradient[..], hessian].concat())).collect();
-    let (chosen, plan) = choose(g, routine, &alternatives);
-    let (_, gradient, hessian) = routes.swap_remove(chosen);
+    let (mut gradient, plan) = choose(g, routine, &[value], &alternatives);
+    let hessian = gradient.split_off(n);
     (SecondOrder { value, gradient, hessian }, plan)
 }
 
@@ -111,9 +122,11 @@ pub fn first_order(
     routine: &'static str,
     outputs: &[NodeId],
     coordinates: &Coordinates,
-    known: Option<Vec<Vec<NodeId>>>,
+    known: Option<Vec<NodeId>>,
 ) -> (Vec<Vec<NodeId>>, Plan) {
-    let forward = forward::first_derivatives(g, outputs, coordinates);
+    let forward = forward::first_derivatives(g, outputs, coordinates).concat();
+    let mut alternatives = vec![Alternative { name: "forward", nodes: forward, safe: true }];
+    let safe = adjoint::is_safe(g, outputs, false, true);
     let reverse: Option<Vec<_>> = outputs
         .iter()
         .map(|&output| {
@@ -121,11 +134,14 @@ pub fn first_order(
             adjoint::gradient(g, &whole, coordinates, false)
         })
         .collect();
-    let mut routes = vec![("forward", forward)];
-    routes.extend(reverse.map(|rows| ("reverse", rows)));
-    routes.extend(known.map(|rows| ("as with second derivatives", rows)));
-    let alternatives: Vec<Alternative> =
-        routes.iter().map(|(name, rows)| (*name, [outputs, &rows.concat()].concat())).collect();
-    let (chosen, plan) = choose(g, routine, &alternatives);
-    (routes.swap_remove(chosen).1, plan)
+    if let Some(rows) = reverse {
+        alternatives.push(Alternative { name: "reverse", nodes: rows.concat(), safe });
+    }
+    if let Some(nodes) = known {
+        // It decides by itself what to do with caution.
+        alternatives.push(Alternative { name: "as with second derivatives", nodes, safe: true });
+    }
+    let (nodes, plan) = choose(g, routine, outputs, &alternatives);
+    let n = coordinates.len();
+    ((0..outputs.len()).map(|row| nodes[row * n..(row + 1) * n].to_vec()).collect(), plan)
 }

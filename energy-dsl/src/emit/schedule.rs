@@ -205,7 +205,9 @@ impl<'a> Schedule<'a> {
                 let (mask, a, b) = (p(mask), p(a), p(b));
                 quote!(T::select(#mask, #a, #b))
             }
-            Op::Input(_) | Op::Rule(_) => unreachable!("compiler bug: inputs are read and rules resolved elsewhere"),
+            Op::Input(_) | Op::Rule(_) | Op::Cautious => {
+                unreachable!("compiler bug: inputs are read, rules resolved and caution decided elsewhere")
+            }
         }
     }
 }

@@ -148,9 +148,7 @@ fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
 fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let (q, shape) = (&args[0], args[0].shape);
     if shape == Shape::DualQuat {
-        let unit = unit_parts(g, &q.parts[..4]);
-        let norm = length(g, &q.parts[..4]);
-        return super::quaternion::unit_dual(g, q, unit, norm);
+        return super::quaternion::unit_dual(g, q);
     }
     Lowered { shape, parts: unit_parts(g, &q.parts) }
 }

@@ -448,6 +448,11 @@ impl Graph {
         self.node(Op::Truth(value))
     }
 
+    /// Whether precautions must be taken.
+    pub fn cautious(&mut self) -> NodeId {
+        self.node(Op::Cautious)
+    }
+
     /// Both.
     pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
         match (self.op(a), self.op(b)) {

@@ -22,7 +22,7 @@ pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
     let mut count = OperationCount::default();
     for node in reachable(graph, outputs) {
         match graph.fused(node) {
-            Op::Constant(_) | Op::Truth(_) | Op::Pi | Op::Input(_) => {}
+            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => {}
             Op::Rule(_) => unreachable!("resolved"),
             Op::Div(..) | Op::Sqrt(_) => count.divisions_and_roots += 1,
             Op::Sin(_) | Op::Cos(_) | Op::Exp(_) | Op::Ln(_) | Op::Atan2(..) | Op::Pow(..) => count.transcendental += 1,

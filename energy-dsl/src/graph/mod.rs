@@ -10,7 +10,7 @@ mod rule;
 
 pub use count::{count, reachable};
 pub use node::{Input, NodeId, Op};
-pub use ordinary::{Assumption, ordinary};
+pub use ordinary::{Assumption, general, ordinary};
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 
 use std::collections::HashMap;

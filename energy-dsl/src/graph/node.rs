@@ -24,6 +24,8 @@ pub enum Op {
     Constant(u64),
     /// A mask that is the same everywhere.
     Truth(bool),
+    /// A mask: whether the configuration may not be ordinary, so that precautions must be taken.
+    Cautious,
     /// π, to the precision of the number type at hand.
     Pi,
     /// An input.
@@ -100,7 +102,9 @@ impl Op {
     /// The operands of an elementary operation (a rule's are its own affair).
     pub fn operands(self) -> impl Iterator<Item = NodeId> {
         let (count, list) = match self {
-            Self::Constant(_) | Self::Truth(_) | Self::Pi | Self::Input(_) | Self::Rule(_) => (0, [NodeId(0); 3]),
+            Self::Constant(_) | Self::Truth(_) | Self::Cautious | Self::Pi | Self::Input(_) | Self::Rule(_) => {
+                (0, [NodeId(0); 3])
+            }
             Self::Neg(a)
             | Self::Sqrt(a)
             | Self::Abs(a)
@@ -156,6 +160,7 @@ impl Op {
         matches!(
             self,
             Self::Truth(_)
+                | Self::Cautious
                 | Self::Less(..)
                 | Self::LessOrEqual(..)
                 | Self::Equal(..)

@@ -18,12 +18,25 @@ pub struct Assumption {
 }
 
 impl Graph {
+    /// Whether a mask is the same wherever the assumptions hold.
+    pub(crate) fn is_decided(&mut self, mask: NodeId) -> bool {
+        ordinary(self, &[mask]).is_some_and(|(masks, _)| matches!(self.op(masks[0]), Op::Truth(_)))
+    }
+
     /// Notes that `node` equals `instead` where `guard` holds.
     pub(crate) fn assume(&mut self, node: NodeId, instead: NodeId, guard: NodeId) {
         if node != instead && !self.assumptions.iter().any(|a| a.node == node) {
             self.assumptions.push(Assumption { node, instead, guard });
         }
     }
+}
+
+/// `outputs` with all precautions.
+pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
+    let mut path = Path { assumptions: BTreeMap::new(), done: BTreeMap::new(), guards: BTreeSet::new() };
+    let (cautious, always) = (g.cautious(), g.truth(true));
+    path.done.insert(cautious, always);
+    outputs.iter().map(|&output| path.rebuild(g, output)).collect()
 }
 
 /// `outputs` under all assumptions, and the mask where they hold; nothing if no precaution is taken.
@@ -33,6 +46,8 @@ pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeI
         done: BTreeMap::new(),
         guards: BTreeSet::new(),
     };
+    let (cautious, never) = (g.cautious(), g.truth(false));
+    path.done.insert(cautious, never);
     let outputs = outputs.iter().map(|&output| path.rebuild(g, output)).collect();
     // A guard may rest on further assumptions.
     let mut masks = BTreeMap::new();
@@ -108,7 +123,7 @@ impl Path {
         let d = |o: NodeId| self.done[&g.resolve(o)];
         match op {
             Op::Sub(a, b) if g.is(a, 0.0) => g.minus_or_plus_zero(d(b)),
-            Op::Constant(_) | Op::Truth(_) | Op::Pi | Op::Input(_) => node,
+            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => node,
             Op::Neg(a) => g.neg(d(a)),
             Op::Add(a, b) => g.add(d(a), d(b)),
             Op::Sub(a, b) => g.sub(d(a), d(b)),

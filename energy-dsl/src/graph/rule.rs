@@ -7,6 +7,8 @@ use crate::runtime::Flag;
 pub enum Primitive {
     /// x·y.
     InnerProduct,
+    /// 1/‖d‖.
+    ReciprocalNorm,
     /// ‖d‖.
     Norm,
     /// A component of d/‖d‖.
@@ -95,6 +97,7 @@ impl Primitive {
             Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
+            Self::ReciprocalNorm => "reciprocal norm 1/‖d‖",
             Self::CosSqrt => "cos √y",
             Self::SincSqrt => "sin √y / √y",
             Self::Sinc => "sin x / x",

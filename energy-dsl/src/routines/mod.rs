@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, second_order};
-use crate::graph::{Graph, NodeId, Op, Primitive, ordinary};
+use crate::graph::{Graph, NodeId, Op, Primitive, general, ordinary};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
 
@@ -44,14 +44,21 @@ impl Routine {
     /// Splits off what only extraordinary configurations need.
     fn split(self, g: &mut Graph) -> Self {
         let all: Vec<NodeId> = self.reduced.iter().copied().chain(self.outputs()).collect();
-        let Some((nodes, ordinary)) = ordinary(g, &all) else { return self };
-        let mut nodes = nodes.into_iter();
+        let cautious = general(g, &all);
+        let cautious = self.with(g, &cautious);
+        let Some((nodes, ordinary)) = ordinary(g, &all) else { return cautious };
+        let general = General { ordinary, groups: cautious.groups, flags: cautious.flags };
+        Self { general: Some(general), ..self.with(g, &nodes) }
+    }
+
+    /// The routine with other nodes: reduced, groups, flags.
+    fn with(&self, g: &Graph, nodes: &[NodeId]) -> Self {
+        let mut nodes = nodes.iter().copied();
         let mut take = |n: usize| nodes.by_ref().take(n).collect::<Vec<_>>();
         let reduced = take(self.reduced.len());
         let groups = self.groups.iter().map(|group| take(group.len())).collect();
         let flags = self.flags.map(|flag| flag.map(|_| take(1)[0]).filter(|&mask| g.op(mask) != Op::Truth(false)));
-        let general = General { ordinary, groups: self.groups, flags: self.flags };
-        Self { name: self.name, reduced, groups, flags, general: Some(general) }
+        Self { name: self.name, reduced, groups, flags, general: None }
     }
 
     /// All that it returns.
@@ -134,7 +141,7 @@ fn potential(
     plans: &mut Vec<Plan>,
 ) -> Vec<Routine> {
     let value = energy.value;
-    let known = Some(vec![energy.gradient.clone()]);
+    let known = Some(energy.gradient.clone());
     let (mut gradient, plan) = first_order(g, "gradient", &[value], coordinates, known);
     plans.push(plan);
     let gradient = gradient.remove(0);
