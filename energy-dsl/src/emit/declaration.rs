@@ -24,6 +24,10 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let rows = program.rows();
     let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
     let Character { curved, velocity_dependent, symmetric } = character(program, routines);
+    let vectors = routines.vectors.iter().map(|vector| {
+        let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
+        quote!(&[#(#ends),*])
+    });
     let primitives = &routines.primitives;
     let list = routines.list.iter().map(|r| routine(&routines.graph, r));
     quote! {
@@ -42,6 +46,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             velocity_dependent: #velocity_dependent,
             symmetric: #symmetric,
             reduced_coordinates: #coordinates,
+            reduced_vectors: &[#(#vectors),*],
             primitives: &[#(#primitives),*],
             routines: &[#(#list),*],
         }

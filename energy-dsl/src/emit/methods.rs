@@ -80,18 +80,68 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             field_types: vec![quote!(T), quote!(#points)],
             arguments: x(),
         },
-        Method {
-            routine: "hessian",
-            call: "HessianCall",
-            result: "Hessian",
-            fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
-            generics: vec![quote!(T), quote!(#points), quote!(#triangle)],
-            field_types: vec![quote!(T), quote!(#points), quote!(#triangle)],
-            arguments: x(),
-        },
     ];
-    let types = quote!(type Points = #points; type Triangle = #triangle;);
-    implementation(name, "Potential", &types, &methods, program, routines)
+    let hessian = quote! {
+        type Points = #points;
+        type Triangle = #triangle;
+
+        #[inline]
+        fn hessian(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
+            T::dispatch(::energy_dsl::HessianCall(self, x))
+        }
+
+        #[inline(always)]
+        fn hessian_at<L: ::energy_dsl::Level>(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
+            <Self as ::energy_dsl::ReducedPotential<T>>::expand(
+                &<Self as ::energy_dsl::ReducedPotential<T>>::reduced_hessian_at::<L>(self, x),
+            )
+        }
+    };
+    let potential = implementation(name, "Potential", &hessian, &methods, program, routines);
+    let reduced = reduced_potential(name, program, routines);
+    quote!(#potential #reduced)
+}
+
+/// The Hessian by coordinates, and what it is by points.
+fn reduced_potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let (n, points_number) = (routines.coordinates, program.points());
+    let entries = n * (n + 1) / 2;
+    let (coordinates, upper) = (quote!([T; #n]), quote!([T; #entries]));
+    let (points, triangle) = (points(program), blocks(points_number * (points_number + 1) / 2));
+    let method = Method {
+        routine: "reduced_hessian",
+        call: "ReducedHessianCall",
+        result: "ReducedHessian",
+        fields: &[("value", NUMBER), ("gradient", NUMBERS), ("hessian", NUMBERS)],
+        generics: vec![quote!(T), quote!(#coordinates), quote!(#upper)],
+        field_types: vec![quote!(T), quote!(#coordinates), quote!(#upper)],
+        arguments: vec![("x", points.clone())],
+    };
+    let expansion = routines.expansion.as_ref().expect("compiler bug: an energy has an expansion");
+    let read = |input: Input| {
+        let Input::Precomputed(number) = input else { unreachable!("compiler bug: sums of reduced numbers only") };
+        let number = usize::from(number);
+        match number.checked_sub(n) {
+            None => quote!(reduced.gradient[#number]),
+            Some(entry) => quote!(reduced.hessian[#entry]),
+        }
+    };
+    let mut schedule = Schedule::new(&expansion.graph, &read);
+    let (gradient, hessian) = (schedule.vectors(&expansion.gradient), schedule.blocks(&expansion.triangle));
+    let statements = schedule.statements();
+    let types = quote! {
+        type Coordinates = #coordinates;
+        type Upper = #upper;
+
+        #[inline(always)]
+        fn expand(
+            reduced: &::energy_dsl::ReducedHessian<T, #coordinates, #upper>,
+        ) -> ::energy_dsl::Hessian<T, #points, #triangle> {
+            #statements
+            ::energy_dsl::Hessian { value: reduced.value, gradient: #gradient, hessian: #hessian, flags: reduced.flags }
+        }
+    };
+    implementation(name, "ReducedPotential", &types, &[method], program, routines)
 }
 
 fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {

@@ -27,7 +27,7 @@ pub(super) fn routines(
     c: &[NodeId],
     coordinates: &Coordinates,
     plans: &mut Vec<Plan>,
-) -> Vec<Routine> {
+) -> (Vec<Routine>, SecondOrder) {
     let parameter = |g: &mut Graph, from_end: usize| {
         let number = program.parameters_size() - from_end;
         g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
@@ -64,7 +64,7 @@ pub(super) fn routines(
     list.extend(compliant.geometry(g));
     list.push(compliant.gauss_newton(g));
     list.extend(compliant.force(g));
-    list
+    (list, compliant.energy)
 }
 
 impl Compliant<'_> {

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, second_order};
-use crate::graph::{Graph, NodeId, Op, Primitive, general, ordinary};
+use crate::graph::{Form, Graph, Input, NodeId, Op, Primitive, general, ordinary};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
 
@@ -89,12 +89,50 @@ pub struct Routines {
     pub list: Vec<Routine>,
     /// The coordinates the derivatives were taken by.
     pub coordinates: usize,
+    /// Of each coordinate vector the points it is made of, with sign; of a residual nothing.
+    pub vectors: Vec<Vec<(usize, bool)>>,
+    /// What turns reduced derivatives of an energy into those by points.
+    pub expansion: Option<Expansion>,
     /// Whether points enter only through differences.
     pub translation_invariant: bool,
     /// The robust primitives used.
     pub primitives: Vec<&'static str>,
     /// How each routine's derivatives were reached.
     pub plans: Vec<Plan>,
+}
+
+/// Derivatives by points, of the numbers of a reduced routine: the gradient's are [`Input::Precomputed`] 0 to n − 1, the
+/// triangle's follow.
+#[derive(Clone, Debug)]
+pub struct Expansion {
+    /// The graph.
+    pub graph: Graph,
+    /// ∇U.
+    pub gradient: Vec<NodeId>,
+    /// The triangle of ∇²U.
+    pub triangle: Vec<NodeId>,
+}
+
+impl Expansion {
+    /// What is 0, or the same as another number, in the reduced routine is so here.
+    fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates, points: usize) -> Self {
+        let mut graph = Graph::new(Form::Textbook);
+        let all: Vec<NodeId> = energy.gradient.iter().chain(&energy.hessian).map(|&node| g.resolve(node)).collect();
+        let numbers: Vec<NodeId> = all
+            .iter()
+            .map(|&node| match g.as_constant(node) {
+                Some(value) => graph.constant(value),
+                None => {
+                    let first = all.iter().position(|&other| other == node).expect("it is one of them");
+                    graph.input(Input::Precomputed(u16::try_from(first).expect("few numbers")))
+                }
+            })
+            .collect();
+        let (gradient, triangle) = numbers.split_at(energy.gradient.len());
+        let gradient = coordinates.expand_all(&mut graph, gradient, points);
+        let triangle = coordinates.expand_triangle(&mut graph, triangle, points);
+        Self { graph, gradient, triangle }
+    }
 }
 
 /// Differentiates a program as its kind demands.
@@ -108,13 +146,19 @@ pub fn differentiate(program: &Program) -> Routines {
         _ => Coordinates::of_points(g, &outputs, Moving::Positions),
     };
     let mut plans = Vec::new();
+    let mut expansion = None;
     let list: Vec<Routine> = match program.kind {
         Kind::Energy => {
             let (energy, plan) = second_order(g, "hessian", outputs[0], &coordinates);
             plans.push(plan);
+            expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
             potential(g, &energy, &coordinates, program.points(), &mut plans)
         }
-        Kind::Constraint => constraint::routines(g, program, &outputs, &coordinates, &mut plans),
+        Kind::Constraint => {
+            let (list, energy) = constraint::routines(g, program, &outputs, &coordinates, &mut plans);
+            expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
+            list
+        }
         Kind::Force => force(g, &outputs, &coordinates, program.points(), &mut plans),
         Kind::Residual => residual(g, &outputs, &coordinates, &mut plans),
     };
@@ -125,6 +169,8 @@ pub fn differentiate(program: &Program) -> Routines {
         rest_flags,
         list,
         coordinates: coordinates.len(),
+        vectors: if program.kind == Kind::Residual { Vec::new() } else { coordinates.vectors.clone() },
+        expansion,
         translation_invariant: coordinates.translation_invariant,
         primitives,
         plans,
@@ -149,15 +195,13 @@ fn potential(
     let full_gradient = coordinates.expand_all(g, &gradient, points);
     let hessian_gradient = coordinates.expand_all(g, &energy.gradient, points);
     let triangle = coordinates.expand_triangle(g, &energy.hessian, points);
+    let reduced = [&[value], &energy.gradient[..], &energy.hessian[..]].concat();
+    let reduced_groups = vec![vec![value], energy.gradient.clone(), energy.hessian.clone()];
     vec![
         Routine::new("value", vec![value], vec![vec![value]], flags[0]),
         Routine::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], flags[1]),
-        Routine::new(
-            "hessian",
-            [&[value], &energy.gradient[..], &energy.hessian[..]].concat(),
-            vec![vec![value], hessian_gradient, triangle],
-            flags[2],
-        ),
+        Routine::new("hessian", reduced.clone(), vec![vec![value], hessian_gradient, triangle], flags[2]),
+        Routine::new("reduced_hessian", reduced, reduced_groups, flags[2]),
     ]
 }
 

@@ -3,7 +3,7 @@
 use super::cpu::{Kernel, Level};
 use super::element::{
     Constraint, ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian,
-    Potential, Residual, ResidualJacobian, ResidualValue, Value,
+    Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian, ResidualValue, Value,
 };
 use super::real::Real;
 
@@ -29,6 +29,8 @@ type Points<E, T> = <E as Potential<T>>::Points;
 call!(ValueCall: Potential, value_at(1 E::Points) -> Value<T>);
 call!(GradientCall: Potential, gradient_at(1 E::Points) -> Gradient<T, E::Points>);
 call!(HessianCall: Potential, hessian_at(1 E::Points) -> Hessian<T, E::Points, E::Triangle>);
+call!(ReducedHessianCall: ReducedPotential,
+    reduced_hessian_at(1 E::Points) -> ReducedHessian<T, E::Coordinates, E::Upper>);
 call!(ForceCall: ForceLaw, force_at(1 E::Points, 2 E::Points) -> ForceValue<T, E::Points>);
 call!(JacobiansCall: ForceLaw, jacobians_at(1 E::Points, 2 E::Points) -> ForceJacobians<T, E::Points, E::Square>);
 call!(ConstraintJacobianCall: Constraint,

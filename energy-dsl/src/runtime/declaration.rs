@@ -114,6 +114,9 @@ pub struct Declaration {
     pub symmetric: bool,
     /// Coordinates the derivatives are taken in, after input reduction.
     pub reduced_coordinates: usize,
+    /// Of each difference vector that is three of them, the points it is made of, with their signs (`true`: added). Empty for
+    /// residuals.
+    pub reduced_vectors: &'static [&'static [(usize, bool)]],
     /// The robust primitives the formula was compiled to.
     pub primitives: &'static [&'static str],
     /// Each routine and its cost.

@@ -75,6 +75,20 @@ pub struct Hessian<T: Number, Points, Triangle> {
     pub flags: Flags<T>,
 }
 
+/// U, ∇U and ∇²U by the coordinates that derivatives are taken in: the differences of points through which U sees them, three
+/// numbers to a difference, as [`Declaration::reduced_vectors`] lists them.
+#[derive(Clone, Copy, Debug)]
+pub struct ReducedHessian<T: Number, Coordinates, Upper> {
+    /// U.
+    pub value: T,
+    /// ∂U/∂q.
+    pub gradient: Coordinates,
+    /// ∂²U/∂q², the upper triangle row by row.
+    pub hessian: Upper,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
 /// f.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceValue<T: Number, Points> {
@@ -208,6 +222,25 @@ pub trait Potential<T: Real>: Element {
     fn hessian_at<L: Level>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
         self.hessian(x)
     }
+}
+
+/// A potential whose derivatives can be had before their expansion to points: there the Hessian is smaller, and cheaper to
+/// make positive semi-definite.
+pub trait ReducedPotential<T: Real>: Potential<T> {
+    /// One number per coordinate: `[T; n]`.
+    type Coordinates: Array<T>;
+    /// The upper triangle: `[T; n (n + 1) / 2]`.
+    type Upper: Array<T>;
+
+    /// U, ∂U/∂q and ∂²U/∂q².
+    fn reduced_hessian(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper>;
+    /// [`Self::reduced_hessian`] compiled into a caller that runs at level `L`.
+    #[inline(always)]
+    fn reduced_hessian_at<L: Level>(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper> {
+        self.reduced_hessian(x)
+    }
+    /// The derivatives by the points: sums of those by the coordinates with signs.
+    fn expand(reduced: &ReducedHessian<T, Self::Coordinates, Self::Upper>) -> Hessian<T, Self::Points, Self::Triangle>;
 }
 
 /// A force f(x, v), not necessarily the gradient of anything.
