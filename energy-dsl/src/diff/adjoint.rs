@@ -64,15 +64,7 @@ pub(super) fn gradient(
         return None;
     }
     let adjoints = adjoints(g, outputs, coordinates, second_order);
-    let mut gradient = vec![g.constant(0.0); coordinates.len()];
-    for (node, seeds) in &coordinates.seeds {
-        let Some(&weight) = adjoints.get(node) else { continue };
-        for &(c, sign) in seeds {
-            let term = g.mul(weight, sign);
-            gradient[c] = g.add(gradient[c], term);
-        }
-    }
-    Some(gradient)
+    Some(gathered(g, &adjoints, coordinates))
 }
 
 /// Σ weight · ∇²output = Σ over nodes v of the adjoint of v times Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where
@@ -116,4 +108,77 @@ pub(super) fn second_derivatives(
         }
     }
     Some(hessian)
+}
+
+/// ∇²output · w by second-order reverse accumulation, w given by its dual part in every coordinate: beside each adjoint flows
+/// its derivative along w. `None` where it is not safe on the ordinary path.
+pub(super) fn hessian_vector(
+    g: &mut Graph,
+    output: NodeId,
+    coordinates: &Coordinates,
+    direction: &[NodeId],
+) -> Option<Vec<NodeId>> {
+    if !is_safe(g, &[output], true, false) {
+        return None;
+    }
+    let along = coordinates.along(g, direction);
+    let rates = tangents(g, &[output], &along, true);
+    let rate = |node: &NodeId| rates.get(node).and_then(|parts| parts.first()).map(|&(_, part)| part);
+    let whole = alone(g, output);
+    let adjoints = adjoints(g, &whole, coordinates, true);
+    let mut turning: Weighted = BTreeMap::new();
+    for node in differentiable(g, &[output], true).into_iter().rev() {
+        if coordinates.seeds.contains_key(&node) {
+            continue;
+        }
+        let Some(&weight) = adjoints.get(&node) else { continue };
+        let local = local(g, node, true);
+        let mut add = |g: &mut Graph, operand: NodeId, term: NodeId| {
+            let sum = match turning.get(&operand) {
+                Some(&sum) => g.add(sum, term),
+                None => term,
+            };
+            turning.insert(operand, sum);
+        };
+        for (i, j, products_of) in &local.second {
+            let (a, b) = (local.operands[*i], local.operands[*j]);
+            let factor = g.sum_of_products(Some(weight), products_of);
+            if let Some(rate) = rate(&b) {
+                let term = g.mul(factor, rate);
+                add(g, a, term);
+            }
+            if i != j
+                && let Some(rate) = rate(&a)
+            {
+                let term = g.mul(factor, rate);
+                add(g, b, term);
+            }
+        }
+        if let Some(&own) = turning.get(&node) {
+            for (operand, first) in local.operands.into_iter().zip(local.first) {
+                if g.varies(operand) {
+                    let term = g.product(Some(own), &first);
+                    let sum = match turning.get(&operand) {
+                        Some(&sum) => g.add(sum, term),
+                        None => term,
+                    };
+                    turning.insert(operand, sum);
+                }
+            }
+        }
+    }
+    Some(gathered(g, &turning, coordinates))
+}
+
+/// What flowed back to the seeds, by coordinate.
+fn gathered(g: &mut Graph, adjoints: &Weighted, coordinates: &Coordinates) -> Vec<NodeId> {
+    let mut sums = vec![g.constant(0.0); coordinates.len()];
+    for (node, seeds) in &coordinates.seeds {
+        let Some(&weight) = adjoints.get(node) else { continue };
+        for &(c, sign) in seeds {
+            let term = g.mul(weight, sign);
+            sums[c] = g.add(sums[c], term);
+        }
+    }
+    sums
 }

@@ -55,6 +55,33 @@ impl Coordinates {
         Self { seeds, vectors, components: 1, translation_invariant: false }
     }
 
+    /// One coordinate only: the distance along a direction, given by its part in each of these coordinates.
+    pub(super) fn along(&self, g: &mut Graph, direction: &[NodeId]) -> Self {
+        let mut seeds = BTreeMap::new();
+        for (&node, entries) in &self.seeds {
+            let parts: Vec<_> = entries.iter().map(|&(c, sign)| g.mul(direction[c], sign)).collect();
+            seeds.insert(node, vec![(0, g.sum(parts))]);
+        }
+        Self { seeds, vectors: vec![vec![(0, true)]], components: 1, translation_invariant: false }
+    }
+
+    /// The derivative of each coordinate by time, of the points' velocities (or along any other direction).
+    pub fn rates(&self, g: &mut Graph) -> Vec<NodeId> {
+        let mut rates = Vec::with_capacity(self.len());
+        for vector in &self.vectors {
+            for axis in 0..self.components {
+                let mut sum = g.constant(0.0);
+                for &(point, positive) in vector {
+                    let number = u16::try_from(self.components * point + axis).expect("few points");
+                    let velocity = g.input(Input::Velocity(number));
+                    sum = if positive { g.add(sum, velocity) } else { g.sub(sum, velocity) };
+                }
+                rates.push(sum);
+            }
+        }
+        rates
+    }
+
     /// Finds the differences of points through which `outputs` see them.
     pub fn of_points(g: &mut Graph, outputs: &[NodeId], moving: Moving) -> Self {
         let coordinate = |g: &Graph, node: NodeId| match (g.op(node), moving) {

@@ -15,7 +15,7 @@ mod plan;
 
 pub use coordinates::{Coordinates, Moving};
 pub use forward::first_derivatives;
-pub use plan::{Plan, SecondOrder, first_order, second_order};
+pub use plan::{Plan, SecondOrder, first_order, hessian_vector, second_order};
 
 use std::collections::BTreeSet;
 

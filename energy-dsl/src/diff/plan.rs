@@ -116,6 +116,30 @@ pub fn second_order(
     (SecondOrder { value, gradient, hessian }, plan)
 }
 
+/// ∇²U · w, w the rates of the coordinates, by second-order reverse accumulation or from ∇²U.
+pub fn hessian_vector(
+    g: &mut Graph,
+    routine: &'static str,
+    energy: &SecondOrder,
+    coordinates: &Coordinates,
+) -> (Vec<NodeId>, Plan) {
+    let n = coordinates.len();
+    let rates = coordinates.rates(g);
+    let formed = (0..n)
+        .map(|i| {
+            let row: Vec<_> = (0..n).map(|j| energy.hessian[symmetric_index(n, i, j)]).collect();
+            g.dot(&row, &rates)
+        })
+        .collect();
+    // What ∇²U does with caution, its product does.
+    let mut alternatives = vec![Alternative { name: "from the Hessian", nodes: formed, safe: true }];
+    let safe = adjoint::is_safe(g, &[energy.value], true, true);
+    if let Some(nodes) = adjoint::hessian_vector(g, energy.value, coordinates, &rates) {
+        alternatives.push(Alternative { name: "second-order reverse", nodes, safe });
+    }
+    choose(g, routine, &[], &alternatives)
+}
+
 /// First derivatives of each output by the cheaper of the forward and the reverse route; `known` is a further alternative.
 pub fn first_order(
     g: &mut Graph,

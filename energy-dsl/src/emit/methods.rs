@@ -80,6 +80,15 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             field_types: vec![quote!(T), quote!(#points)],
             arguments: x(),
         },
+        Method {
+            routine: "hessian_vector",
+            call: "HessianVectorCall",
+            result: "HessianVector",
+            fields: &[("product", VECTORS)],
+            generics: vec![quote!(T), quote!(#points)],
+            field_types: vec![quote!(#points)],
+            arguments: vec![("x", points.clone()), ("v", points.clone())],
+        },
     ];
     let hessian = quote! {
         type Points = #points;
@@ -92,7 +101,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
 
         #[inline(always)]
         fn hessian_at<L: ::energy_dsl::Level>(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
-            <Self as ::energy_dsl::ReducedPotential<T>>::expand(
+            <Self as ::energy_dsl::ReducedPotential<T>>::expand::<{ u32::MAX }>(
                 &<Self as ::energy_dsl::ReducedPotential<T>>::reduced_hessian_at::<L>(self, x),
             )
         }
@@ -127,14 +136,24 @@ fn reduced_potential(name: &Ident, program: &Program, routines: &Routines) -> To
         }
     };
     let mut schedule = Schedule::new(&expansion.graph, &read);
-    let (gradient, hessian) = (schedule.vectors(&expansion.gradient), schedule.blocks(&expansion.triangle));
+    let gradient = schedule.vectors(&expansion.gradient);
+    let pairs = (0..points_number).flat_map(|i| (i..points_number).map(move |j| (i, j)));
+    let triangle_blocks: Vec<TokenStream> = pairs
+        .zip(expansion.triangle.chunks(9))
+        .map(|((i, j), block)| {
+            let free = (1u32 << i) | (1u32 << j);
+            let block = schedule.vectors(block);
+            quote!(if FREE & #free == #free { #block } else { [[T::from_f64(0.0); 3]; 3] })
+        })
+        .collect();
+    let hessian = quote!([#(#triangle_blocks),*]);
     let statements = schedule.statements();
     let types = quote! {
         type Coordinates = #coordinates;
         type Upper = #upper;
 
         #[inline(always)]
-        fn expand(
+        fn expand<const FREE: u32>(
             reduced: &::energy_dsl::ReducedHessian<T, #coordinates, #upper>,
         ) -> ::energy_dsl::Hessian<T, #points, #triangle> {
             #statements

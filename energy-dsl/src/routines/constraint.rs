@@ -129,7 +129,7 @@ impl Compliant<'_> {
     /// ∂f/∂v = −k_d JᵀJ.
     fn force(&self, g: &mut Graph) -> [Routine; 2] {
         let n = self.coordinates.len();
-        let speeds = speeds(g, self.coordinates);
+        let speeds = self.coordinates.rates(g);
         let rates: Vec<NodeId> = self.jacobian.iter().map(|row| g.dot(row, &speeds)).collect();
         let damped_rates = g.scaled(self.damping, &rates);
         let force: Vec<NodeId> = (0..n)
@@ -180,21 +180,4 @@ impl Compliant<'_> {
             ),
         ]
     }
-}
-
-/// The velocity of each coordinate.
-fn speeds(g: &mut Graph, coordinates: &Coordinates) -> Vec<NodeId> {
-    let mut speeds = Vec::with_capacity(coordinates.len());
-    for vector in &coordinates.vectors {
-        for axis in 0..coordinates.components {
-            let mut sum = g.constant(0.0);
-            for &(point, positive) in vector {
-                let number = u16::try_from(coordinates.components * point + axis).expect("few points");
-                let velocity = g.input(Input::Velocity(number));
-                sum = if positive { g.add(sum, velocity) } else { g.sub(sum, velocity) };
-            }
-            speeds.push(sum);
-        }
-    }
-    speeds
 }

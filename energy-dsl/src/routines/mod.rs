@@ -5,7 +5,7 @@ mod constraint;
 use std::collections::BTreeSet;
 
 use crate::check::Program;
-use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, second_order};
+use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, second_order};
 use crate::graph::{Form, Graph, Input, NodeId, Op, Primitive, general, ordinary};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
@@ -191,6 +191,9 @@ fn potential(
     let (mut gradient, plan) = first_order(g, "gradient", &[value], coordinates, known);
     plans.push(plan);
     let gradient = gradient.remove(0);
+    let (product, plan) = hessian_vector(g, "hessian_vector", energy, coordinates);
+    plans.push(plan);
+    let full_product = coordinates.expand_all(g, &product, points);
     let flags = [0, 1, 2].map(|order| flags(g, &[(value, order)]));
     let full_gradient = coordinates.expand_all(g, &gradient, points);
     let hessian_gradient = coordinates.expand_all(g, &energy.gradient, points);
@@ -202,6 +205,7 @@ fn potential(
         Routine::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], flags[1]),
         Routine::new("hessian", reduced.clone(), vec![vec![value], hessian_gradient, triangle], flags[2]),
         Routine::new("reduced_hessian", reduced, reduced_groups, flags[2]),
+        Routine::new("hessian_vector", product, vec![full_product], flags[2]),
     ]
 }
 

@@ -3,7 +3,7 @@
 use super::cpu::{Kernel, Level};
 use super::element::{
     Constraint, ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian,
-    Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian, ResidualValue, Value,
+    HessianVector, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian, ResidualValue, Value,
 };
 use super::real::Real;
 
@@ -29,6 +29,7 @@ type Points<E, T> = <E as Potential<T>>::Points;
 call!(ValueCall: Potential, value_at(1 E::Points) -> Value<T>);
 call!(GradientCall: Potential, gradient_at(1 E::Points) -> Gradient<T, E::Points>);
 call!(HessianCall: Potential, hessian_at(1 E::Points) -> Hessian<T, E::Points, E::Triangle>);
+call!(HessianVectorCall: Potential, hessian_vector_at(1 E::Points, 2 E::Points) -> HessianVector<T, E::Points>);
 call!(ReducedHessianCall: ReducedPotential,
     reduced_hessian_at(1 E::Points) -> ReducedHessian<T, E::Coordinates, E::Upper>);
 call!(ForceCall: ForceLaw, force_at(1 E::Points, 2 E::Points) -> ForceValue<T, E::Points>);

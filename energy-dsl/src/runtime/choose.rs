@@ -1,7 +1,7 @@
 use super::array::Array;
 use super::element::{
-    Block, ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, ReducedHessian,
-    ResidualJacobian, ResidualValue, Value, Vector3,
+    Block, ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vector3,
 };
 use super::flags::Flags;
 use super::real::Real;
@@ -56,6 +56,7 @@ fn number<T: Real>(mask: T::Mask, yes: &T, no: &T) -> T {
 choose!(Value<T> { value: number });
 choose!(Gradient<T, P: Vector3> { value: number, gradient: vectors });
 choose!(Hessian<T, P: Vector3, H: Block> { value: number, gradient: vectors, hessian: blocks });
+choose!(HessianVector<T, P: Vector3> { product: vectors });
 choose!(ReducedHessian<T, Q: Number, H: Number> { value: number, gradient: numbers, hessian: numbers });
 choose!(ForceValue<T, P: Vector3> { force: vectors });
 choose!(ForceJacobians<T, P: Vector3, S: Block> { force: vectors, by_position: blocks, by_velocity: blocks });

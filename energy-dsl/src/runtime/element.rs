@@ -75,6 +75,15 @@ pub struct Hessian<T: Number, Points, Triangle> {
     pub flags: Flags<T>,
 }
 
+/// ∇²U v.
+#[derive(Clone, Copy, Debug)]
+pub struct HessianVector<T: Number, Points> {
+    /// ∂²U/∂x² v, one vector per point.
+    pub product: Points,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
 /// U, ∇U and ∇²U by the coordinates that derivatives are taken in: the differences of points through which U sees them, three
 /// numbers to a difference, as [`Declaration::reduced_vectors`] lists them.
 #[derive(Clone, Copy, Debug)]
@@ -222,6 +231,35 @@ pub trait Potential<T: Real>: Element {
     fn hessian_at<L: Level>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
         self.hessian(x)
     }
+
+    /// ∇²U v, for one vector per point in `v`, without forming ∇²U where that is cheaper.
+    fn hessian_vector(&self, x: &Self::Points, v: &Self::Points) -> HessianVector<T, Self::Points> {
+        let Hessian { hessian, flags, .. } = self.hessian(x);
+        let n = Self::Points::LEN;
+        let (triangle, v) = (hessian.as_ref(), v.as_ref());
+        let product = Self::Points::from_fn(|i| {
+            std::array::from_fn(|row| {
+                let mut sum = T::from_f64(0.0);
+                for j in 0..n {
+                    for column in 0..3 {
+                        let entry = if i <= j {
+                            triangle[triangle_index(n, i, j)][row][column]
+                        } else {
+                            triangle[triangle_index(n, j, i)][column][row]
+                        };
+                        sum = sum + entry * v[j][column];
+                    }
+                }
+                sum
+            })
+        });
+        HessianVector { product, flags }
+    }
+    /// [`Self::hessian_vector`] compiled into a caller that runs at level `L`.
+    #[inline(always)]
+    fn hessian_vector_at<L: Level>(&self, x: &Self::Points, v: &Self::Points) -> HessianVector<T, Self::Points> {
+        self.hessian_vector(x, v)
+    }
 }
 
 /// A potential whose derivatives can be had before their expansion to points: there the Hessian is smaller, and cheaper to
@@ -239,8 +277,29 @@ pub trait ReducedPotential<T: Real>: Potential<T> {
     fn reduced_hessian_at<L: Level>(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper> {
         self.reduced_hessian(x)
     }
-    /// The derivatives by the points: sums of those by the coordinates with signs.
-    fn expand(reduced: &ReducedHessian<T, Self::Coordinates, Self::Upper>) -> Hessian<T, Self::Points, Self::Triangle>;
+    /// The derivatives by the points: sums of those by the coordinates with signs. Blocks of points whose bit in `FREE` is not
+    /// set are left out, that is, 0: what only they need is not computed.
+    fn expand<const FREE: u32>(
+        reduced: &ReducedHessian<T, Self::Coordinates, Self::Upper>,
+    ) -> Hessian<T, Self::Points, Self::Triangle>;
+    /// [`Potential::hessian_at`] with the blocks of free points only: point i is free where bit i of `FREE` is set.
+    ///
+    /// ```
+    /// use energy_dsl::{Baseline, Potential, ReducedPotential};
+    /// use energy_macros::energy;
+    ///
+    /// energy! { energy Pull(p, q: Point; k: Scalar) = "k/2 ‖p − q‖²"; }
+    ///
+    /// let x = [[0.0; 3], [1.0, 2.0, 3.0]];
+    /// // p is pinned: of three blocks only that of q with itself is left.
+    /// let free = Pull::new(5.0).hessian_free_at::<Baseline, 0b10>(&x);
+    /// assert_eq!(free.hessian[2], Pull::new(5.0).hessian(&x).hessian[2]);
+    /// assert_eq!(free.hessian[0], [[0.0; 3]; 3]);
+    /// ```
+    #[inline(always)]
+    fn hessian_free_at<L: Level, const FREE: u32>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
+        Self::expand::<FREE>(&self.reduced_hessian_at::<L>(x))
+    }
 }
 
 /// A force f(x, v), not necessarily the gradient of anything.

@@ -21,7 +21,7 @@ pub use batch::{
 #[doc(hidden)]
 pub use call::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
-    JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall,
+    HessianVectorCall, JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall,
 };
 #[doc(hidden)]
 pub use choose::Choose;
@@ -29,8 +29,8 @@ pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available,
 pub use declaration::{Declaration, Field, Kind, OperationCount, Routine};
 pub use element::{
     Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,
-    Hessian, Inputs, Outputs, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian, ResidualValue,
-    RestError, Value, Vector3, triangle_index,
+    Hessian, HessianVector, Inputs, Outputs, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian,
+    ResidualValue, RestError, Value, Vector3, triangle_index,
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};
