@@ -61,7 +61,22 @@ pub use textbook::Textbook;
 pub fn compile(declarations: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
     let mut diagnostics = Diagnostics::default();
     let items = syntax::parse(declarations, &mut diagnostics);
-    let programs = check::check(&items, &mut diagnostics);
+    compile_items(&items, diagnostics)
+}
+
+/// Compiles the declarations of a file, whose text this is. `file` is what messages call it, `at` the place in Rust code that
+/// errors are reported at.
+#[cfg(feature = "compiler")]
+#[must_use]
+pub fn compile_file(text: &str, file: &str, at: proc_macro2::Span) -> proc_macro2::TokenStream {
+    let mut diagnostics = Diagnostics::default();
+    let items = syntax::parse_file(text, file, &diagnostic::Span::of(at), &mut diagnostics);
+    compile_items(&items, diagnostics)
+}
+
+#[cfg(feature = "compiler")]
+fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> proc_macro2::TokenStream {
+    let programs = check::check(items, &mut diagnostics);
     let code: proc_macro2::TokenStream =
         programs.iter().map(|program| emit::emit(program, &routines::differentiate(program))).collect();
     let errors: proc_macro2::TokenStream =

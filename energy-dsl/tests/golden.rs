@@ -64,3 +64,19 @@ fn the_table_of_functions_is_the_compilers() {
     }
     assert!(text == expected || std::env::var_os("UPDATE_GOLDEN").is_some(), "LANGUAGE.md is behind the compiler");
 }
+
+/// The messages of a file name file, line and column, and show the line.
+#[test]
+fn mistakes_in_a_file_are_shown_in_it() {
+    let text = include_str!("golden/broken.energy");
+    let code = energy_dsl::compile_file(text, "src/broken.energy", proc_macro2::Span::call_site());
+    let file: syn::File = syn::parse2(code).unwrap();
+    let mut messages = String::new();
+    for item in file.items {
+        if let syn::Item::Macro(call) = item {
+            let message: syn::LitStr = syn::parse2(call.mac.tokens).unwrap();
+            messages += &format!("{}\n\n", message.value());
+        }
+    }
+    assert_golden("broken.energy.messages.txt", &messages);
+}

@@ -5,6 +5,7 @@ mod expression;
 mod name;
 mod notation;
 mod parse;
+mod text;
 mod tokens;
 
 pub use ast::{
@@ -13,4 +14,4 @@ pub use ast::{
 };
 pub use name::{Name, canonical};
 pub(crate) use notation::unhatted;
-pub use parse::parse;
+pub use parse::{parse, parse_file};

@@ -8,8 +8,19 @@ use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
 
 /// Splits a formula into tokens. `literal` is where the string stands.
 pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
-    let text: Rc<str> = text.into();
-    let mut lexer = Lexer { text: text.clone(), at: 0, literal, tokens: Vec::new() };
+    let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: None };
+    let whole = Span { token: literal.token, excerpt: Some(excerpt.clone()) };
+    tokens_within(&excerpt.text, (0, text.len()), &whole, diagnostics)
+}
+
+/// Splits the formula between two places of a text into tokens. `whole` is the text.
+pub(super) fn tokens_within(
+    text: &Rc<str>,
+    (start, end): (usize, usize),
+    whole: &Span,
+    diagnostics: &mut Diagnostics,
+) -> Vec<Token> {
+    let mut lexer = Lexer { text: text.clone(), at: start, end, whole, tokens: Vec::new() };
     while let Some(c) = lexer.peek() {
         let start = lexer.at;
         if let Err(message) = lexer.token(c) {
@@ -25,15 +36,16 @@ pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) 
 struct Lexer<'a> {
     text: Rc<str>,
     at: usize,
-    literal: &'a Span,
+    end: usize,
+    whole: &'a Span,
     tokens: Vec<Token>,
 }
 
-const HAT: char = '\u{302}';
+pub(super) const HAT: char = '\u{302}';
 
 impl Lexer<'_> {
     fn peek(&self) -> Option<char> {
-        self.text[self.at..].chars().next()
+        self.text[self.at..self.end].chars().next()
     }
 
     fn advance(&mut self) {
@@ -41,8 +53,7 @@ impl Lexer<'_> {
     }
 
     fn span(&self, start: usize) -> Span {
-        let excerpt = Excerpt { text: self.text.clone(), start, end: self.at.max(start) };
-        Span { token: self.literal.token, excerpt: Some(excerpt) }
+        self.whole.within(start, self.at.max(start))
     }
 
     fn push(&mut self, kind: Kind, start: usize) {
@@ -112,7 +123,7 @@ impl Lexer<'_> {
 
     fn number(&mut self) -> Result<(), String> {
         let start = self.at;
-        let rest = &self.text[start..];
+        let rest = &self.text[start..self.end];
         let mut end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
         // `0..4` is a range.
         end = rest.find("..").map_or(end, |range| range.min(end));

@@ -7,6 +7,7 @@ use super::ast::{
     UserFunction,
 };
 use super::name::Name;
+use super::text;
 use super::tokens::{self, Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
 use crate::runtime::Kind;
@@ -14,13 +15,23 @@ use crate::runtime::Kind;
 /// Parses all items. After an error in one item it goes on with the next.
 pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
     let tokens = tokens::from_rust(stream, diagnostics);
+    items(&tokens, diagnostics)
+}
+
+/// The same of a file's text. `at` is where Rust code names the file.
+pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Item> {
+    let tokens = text::tokens(text, file, at, diagnostics);
+    items(&tokens, diagnostics)
+}
+
+fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
     let user_functions = tokens
         .windows(2)
         .filter(|pair| pair[0].kind == TokenKind::Name("fn".into()))
         .filter_map(|pair| if let TokenKind::Name(name) = &pair[1].kind { Some(name.clone()) } else { None })
         .collect();
     let end = tokens.last().map_or_else(|| Span::of(proc_macro2::Span::call_site()), |t| t.span.clone());
-    let mut parser = Parser { tokens: &tokens, at: 0, end, bars: Vec::new(), user_functions, errors: Vec::new() };
+    let mut parser = Parser { tokens, at: 0, end, bars: Vec::new(), user_functions, errors: Vec::new() };
     let mut items = Vec::new();
     while parser.at < tokens.len() {
         match parser.item() {

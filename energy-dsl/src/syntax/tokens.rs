@@ -72,7 +72,7 @@ impl PartialEq for Token {
     }
 }
 
-const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
+pub(super) const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
 
 /// Rust tokens as ours. Attributes' strings stay text; every other string literal is notation.
 pub(super) fn from_rust(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Token> {
@@ -130,7 +130,8 @@ fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, attribute: bool, diagno
     }
 }
 
-fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
+/// A number, or a string as notation.
+pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
     if let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
         let content = string.value();
         return if attribute {
