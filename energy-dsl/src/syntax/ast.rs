@@ -1,4 +1,5 @@
 use super::name::Name;
+use super::specialise::Specialisation;
 use crate::diagnostic::Span;
 use crate::runtime::Kind;
 
@@ -11,6 +12,8 @@ pub enum Item {
     Function(UserFunction),
     /// `const name: Scalar = value;`.
     Constant(Constant),
+    /// `energy Name = Other(k = 100);`, while parsing: it becomes a declaration.
+    Specialisation(Box<Specialisation>),
 }
 
 /// A declared energy, constraint, force or residual.

@@ -5,6 +5,7 @@ mod expression;
 mod name;
 mod notation;
 mod parse;
+mod specialise;
 mod text;
 mod tokens;
 

@@ -7,6 +7,7 @@ use super::ast::{
     UserFunction,
 };
 use super::name::Name;
+use super::specialise::{Specialisation, specialise};
 use super::text;
 use super::tokens::{self, Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
@@ -43,7 +44,7 @@ fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
         }
     }
     parser.errors.into_iter().for_each(|error| diagnostics.push(error));
-    items
+    specialise(items, diagnostics)
 }
 
 pub(super) type Parsed<T> = Result<T, Box<Diagnostic>>;
@@ -177,6 +178,20 @@ impl<'a> Parser<'a> {
         let start = self.at;
         let kind = self.kind()?;
         let name = self.name("a name for the declaration")?;
+        if self.is("=") {
+            let declaration = Declaration {
+                docs,
+                visibility,
+                audit_samples,
+                kind,
+                name,
+                inputs: Vec::new(),
+                body: None,
+                source: String::new(),
+                formula: String::new(),
+            };
+            return self.specialisation(start, declaration).map(|s| Item::Specialisation(Box::new(s)));
+        }
         let inputs = self.inputs()?;
         let body_start = self.at;
         let body = match self.declaration_body() {
@@ -201,6 +216,28 @@ impl<'a> Parser<'a> {
             source,
             formula,
         }))
+    }
+
+    /// `= Other(k = 100, L = 0.1);`.
+    fn specialisation(&mut self, start: usize, mut declaration: Declaration) -> Parsed<Specialisation> {
+        const FORM: &str = "as in energy Stiff = Spring(k = 100);";
+        self.expect("=", FORM)?;
+        let of = self.name(&format!("the name of another declaration, {FORM}"))?;
+        self.expect("(", FORM)?;
+        let values_start = self.at;
+        let mut values = Vec::new();
+        while !self.take(")") {
+            let name = self.name(&format!("the name of a parameter, {FORM}"))?;
+            self.expect("=", FORM)?;
+            values.push((name, self.expression()?));
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after a value");
+            }
+        }
+        declaration.formula = tokens::text(&self.tokens[values_start..self.at - 1]);
+        self.expect(";", "after the parameters")?;
+        declaration.source = tokens::text(&self.tokens[start..self.at]);
+        Ok(Specialisation { declaration, of, values })
     }
 
     /// `[doc = "…"]`, `[audit]` or `[audit(samples = n)]`, after the `#`.
