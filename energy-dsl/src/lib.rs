@@ -34,6 +34,8 @@ mod interpret;
 #[cfg(feature = "compiler")]
 mod lower;
 #[cfg(feature = "compiler")]
+mod properties;
+#[cfg(feature = "compiler")]
 mod routines;
 #[cfg(feature = "compiler")]
 mod syntax;
@@ -77,8 +79,12 @@ pub fn compile_file(text: &str, file: &str, at: proc_macro2::Span) -> proc_macro
 #[cfg(feature = "compiler")]
 fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> proc_macro2::TokenStream {
     let programs = check::check(items, &mut diagnostics);
-    let code: proc_macro2::TokenStream =
-        programs.iter().map(|program| emit::emit(program, &routines::differentiate(program))).collect();
+    let mut code = proc_macro2::TokenStream::new();
+    for program in &programs {
+        let routines = routines::differentiate(program);
+        properties::prove(program, &routines, &mut diagnostics);
+        code.extend(emit::emit(program, &routines));
+    }
     let errors: proc_macro2::TokenStream =
         diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error()).collect();
     quote::quote!(#code #errors)

@@ -80,3 +80,24 @@ fn mistakes_in_a_file_are_shown_in_it() {
     }
     assert_golden("broken.energy.messages.txt", &messages);
 }
+
+/// Claims that cannot be proved, or that nothing checks, are errors of the code and not of the text.
+#[test]
+fn claims_are_proved_or_refused() {
+    for (source, expected) in [
+        ("#[invariant(translation)] energy A(p, q: Point) { norm(p - q) + dot(q, p - q) }", "`q` is used by itself"),
+        ("#[invariant(translation)] residual A(p: Vec3) { p }", "has no invariance of points"),
+        ("#[even] energy A(p: Point) { norm(p) }", "nothing checks the claim `even`"),
+        (
+            "#[audit] #[rest_state(zero_force)] energy A(p, q: Point; L: Scalar) { norm(p - q) * L }",
+            "where each point rests",
+        ),
+        ("#[audit] #[invariant(scale)] energy A(p: Point) { norm(p) }", "unknown property `scale`"),
+        ("#[odd] energy A(p: Point) { norm(p) }", "unknown attribute `odd`"),
+    ] {
+        let code = compile(source.parse().unwrap()).to_string();
+        assert!(code.contains("compile_error") && code.contains(expected), "{source}: {code}");
+    }
+    let right = "#[invariant(translation)] force A(p, q: Point; k: Scalar) { [k * (p - q), -k * (p - q)] }";
+    assert!(!compile(right.parse().unwrap()).to_string().contains("compile_error"));
+}

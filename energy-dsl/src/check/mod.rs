@@ -90,6 +90,7 @@ fn check_declaration(
         docs: declaration.docs.clone(),
         visibility: declaration.visibility.clone(),
         audit_samples: declaration.audit_samples,
+        properties: declaration.properties.clone(),
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),

@@ -1,5 +1,5 @@
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{format_ident, quote};
 
 use crate::check::{Input, Program};
 use crate::graph::{Graph, NodeId, count};
@@ -25,6 +25,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
     let Character { curved, velocity_dependent, symmetric } = character(program, routines);
     let primitives = &routines.primitives;
+    let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
     let list = routines.list.iter().map(|r| routine(&routines.graph, r));
     quote! {
         ::energy_dsl::Declaration {
@@ -37,6 +38,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             rest: &[#rest],
             parameters: &[#parameters],
             rows: #rows,
+            properties: &[#(::energy_dsl::Property::#properties),*],
             translation_invariant: #invariant,
             curved: #curved,
             velocity_dependent: #velocity_dependent,

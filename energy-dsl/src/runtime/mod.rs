@@ -9,7 +9,7 @@ mod flags;
 mod real;
 
 pub use array::Array;
-pub use declaration::{Declaration, Field, Kind, OperationCount, Routine};
+pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
     Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,
     Hessian, Inputs, Outputs, Potential, Residual, ResidualJacobian, ResidualValue, RestError, Value, Vector3,

@@ -1,7 +1,7 @@
 use super::name::Name;
 use super::specialise::Specialisation;
 use crate::diagnostic::Span;
-use crate::runtime::Kind;
+use crate::runtime::{Kind, Property};
 
 /// A declaration, a function or a constant.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub struct Declaration {
     pub visibility: String,
     /// Samples of the generated audit test, if one was asked for by `#[audit]`.
     pub audit_samples: Option<usize>,
+    /// What it claims of itself, and where.
+    pub properties: Vec<(Property, Span)>,
     /// What it describes.
     pub kind: Kind,
     /// Its name.

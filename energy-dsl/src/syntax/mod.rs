@@ -1,6 +1,7 @@
 //! Text to syntax tree. Rust tokens and mathematical notation become the same tokens, and one parser reads both.
 
 mod ast;
+mod attribute;
 mod expression;
 mod name;
 mod notation;

@@ -6,6 +6,7 @@ use super::ast::{
     Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Section, Unit,
     UserFunction,
 };
+use super::attribute::Attributes;
 use super::name::Name;
 use super::specialise::{Specialisation, specialise};
 use super::text;
@@ -154,11 +155,11 @@ impl<'a> Parser<'a> {
     }
 
     fn item(&mut self) -> Parsed<Item> {
-        let mut docs = Vec::new();
-        let mut audit_samples = None;
+        let mut attributes = Attributes::default();
         while self.take("#") {
-            self.attribute(&mut docs, &mut audit_samples)?;
+            self.attribute(&mut attributes)?;
         }
+        let Attributes { docs, audit_samples, properties } = attributes;
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -183,6 +184,7 @@ impl<'a> Parser<'a> {
                 docs,
                 visibility,
                 audit_samples,
+                properties,
                 kind,
                 name,
                 inputs: Vec::new(),
@@ -209,6 +211,7 @@ impl<'a> Parser<'a> {
             docs,
             visibility,
             audit_samples,
+            properties,
             kind,
             name,
             inputs,
@@ -238,46 +241,6 @@ impl<'a> Parser<'a> {
         self.expect(";", "after the parameters")?;
         declaration.source = tokens::text(&self.tokens[start..self.at]);
         Ok(Specialisation { declaration, of, values })
-    }
-
-    /// `[doc = "…"]`, `[audit]` or `[audit(samples = n)]`, after the `#`.
-    fn attribute(&mut self, docs: &mut Vec<String>, audit_samples: &mut Option<usize>) -> Parsed<()> {
-        self.expect("[", "to open the attribute")?;
-        let name = self.name("`doc` or `audit`")?;
-        match name.text.as_str() {
-            "doc" => {
-                self.expect("=", "after doc")?;
-                match self.peek().map(|t| &t.kind) {
-                    Some(TokenKind::Text(text)) => docs.push(text.clone()),
-                    _ => return self.fail("the documentation as a string"),
-                }
-                self.at += 1;
-            }
-            "audit" => {
-                *audit_samples = Some(200);
-                if self.take("(") {
-                    if !self.take_word("samples") {
-                        return self.fail("`samples = …`");
-                    }
-                    self.expect("=", "after samples")?;
-                    match self.peek().map(|t| &t.kind) {
-                        Some(TokenKind::Number(n)) if *n >= 1.0 && n.fract() == 0.0 => {
-                            *audit_samples = Some(*n as usize)
-                        }
-                        _ => return self.fail("the number of samples"),
-                    }
-                    self.at += 1;
-                    self.expect(")", "after the number of samples")?;
-                }
-            }
-            other => {
-                return Err(Box::new(
-                    Diagnostic::new(&name.span, format!("unknown attribute `{other}`"))
-                        .help("a declaration takes doc comments and #[audit] or #[audit(samples = 200)]"),
-                ));
-            }
-        }
-        self.expect("]", "to close the attribute")
     }
 
     fn kind(&mut self) -> Parsed<Kind> {
