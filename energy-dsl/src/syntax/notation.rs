@@ -75,7 +75,7 @@ impl Lexer<'_> {
             return self.command();
         }
         if is_name_start(c) {
-            self.name();
+            self.name(false);
             return Ok(());
         }
         self.advance();
@@ -84,13 +84,18 @@ impl Lexer<'_> {
             '−' | '–' => self.symbol("-", start),
             '·' | 'ᐧ' | '⋅' | '∙' => self.symbol("·", start),
             '×' => self.symbol("×", start),
-            '÷' => self.symbol("/", start),
+            '⊗' => self.symbol("⊗", start),
+            '∗' => self.symbol("*", start),
+            '÷' | '∕' | '⁄' => self.symbol("/", start),
             '≤' => self.symbol("<=", start),
             '≥' => self.symbol(">=", start),
             '≠' => self.symbol("!=", start),
             '½' => self.push(Kind::Number(0.5), start),
             '¼' => self.push(Kind::Number(0.25), start),
             '¾' => self.push(Kind::Number(0.75), start),
+            '⅓' => self.push(Kind::Number(1.0 / 3.0), start),
+            '⅔' => self.push(Kind::Number(2.0 / 3.0), start),
+            '⅛' => self.push(Kind::Number(0.125), start),
             'ᵀ' => self.symbol("ᵀ", start),
             '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';' | ':'
             | '=' | '<' | '>' | '!' | '&' | '.' => {
@@ -154,20 +159,29 @@ impl Lexer<'_> {
         let command = self.text[name_start..self.at].to_owned();
         match command.as_str() {
             "hat" => {
-                while self.peek().is_some_and(|c| c == ' ' || c == '{') {
+                let mut braced = false;
+                while let Some(c) = self.peek().filter(|&c| c == ' ' || c == '{') {
+                    braced |= c == '{';
                     self.advance();
                 }
                 if !self.peek().is_some_and(is_name_start) {
                     return Err("expected the name of a vector after \\hat".into());
                 }
                 self.symbol("hat", start);
-                self.name();
-                if self.peek() == Some('}') {
-                    self.advance();
-                }
+                self.name(braced);
             }
             "cdot" => self.symbol("·", start),
             "times" => self.symbol("×", start),
+            "otimes" => self.symbol("⊗", start),
+            "frac" => self.symbol("frac", start),
+            "sqrt" => self.symbol("√", start),
+            "lVert" | "rVert" => self.symbol("‖", start),
+            "lvert" | "rvert" => self.symbol("|", start),
+            "le" => self.symbol("<=", start),
+            "ge" => self.symbol(">=", start),
+            // They only size the bracket that follows.
+            "left" | "right" => {}
+            function if crate::functions::find(function).is_some() => self.push(Kind::Name(command), start),
             "pi" => self.push(Kind::Name("π".into()), start),
             other => match GREEK.iter().find(|(_, spelled)| *spelled == other) {
                 Some((letter, _)) => {
@@ -184,18 +198,29 @@ impl Lexer<'_> {
         Ok(())
     }
 
-    fn name(&mut self) {
+    /// A name; a part of it may stand in braces, as in `p_{kl}` and `\hat{n}_1`.
+    fn name(&mut self, mut braced: bool) {
         let start = self.at;
         let mut name = String::new();
         let mut hat = false;
-        while let Some(c) = self.peek().filter(|&c| is_name_part(c) || c == HAT) {
+        while let Some(c) = self.peek() {
             match unhatted(c) {
                 _ if c == HAT => hat = true,
+                _ if c == '{' && name.ends_with('_') && !braced => braced = true,
+                _ if c == '}' && braced => {
+                    braced = false;
+                    self.advance();
+                    if self.peek().is_some_and(|c| c == '_' || ('₀'..='₉').contains(&c)) {
+                        continue;
+                    }
+                    break;
+                }
                 Some(plain) => {
                     hat = true;
                     name.push(plain);
                 }
-                None => name.push(c),
+                None if is_name_part(c) => name.push(c),
+                None => break,
             }
             self.advance();
         }
@@ -223,7 +248,18 @@ pub(crate) fn unhatted(c: char) -> Option<char> {
         'ĵ' => 'j',
         'ŝ' => 's',
         'Â' => 'A',
+        'Ĉ' => 'C',
         'Ê' => 'E',
+        'Ĝ' => 'G',
+        'Ĥ' => 'H',
+        'Î' => 'I',
+        'Ĵ' => 'J',
+        'Ô' => 'O',
+        'Ŝ' => 'S',
+        'Û' => 'U',
+        'Ŵ' => 'W',
+        'Ŷ' => 'Y',
+        'Ẑ' => 'Z',
         _ => return None,
     })
 }

@@ -33,7 +33,7 @@ fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
         .filter_map(|pair| if let TokenKind::Name(name) = &pair[1].kind { Some(name.clone()) } else { None })
         .collect();
     let end = tokens.last().map_or_else(|| Span::of(proc_macro2::Span::call_site()), |t| t.span.clone());
-    let mut parser = Parser { tokens, at: 0, end, bars: Vec::new(), user_functions, errors: Vec::new() };
+    let mut parser = Parser { tokens, at: 0, end, bars: Vec::new(), depth: 0, user_functions, errors: Vec::new() };
     let mut items = Vec::new();
     while parser.at < tokens.len() {
         match parser.item() {
@@ -57,6 +57,8 @@ pub(super) struct Parser<'a> {
     pub(super) end: Span,
     /// Open bars `‖` and `|`; a bracket between hides those outside it.
     pub(super) bars: Vec<String>,
+    /// How deep the expression at hand is nested.
+    pub(super) depth: usize,
     pub(super) user_functions: Vec<String>,
     /// Errors after which the declaration could still be made out.
     pub(super) errors: Vec<Diagnostic>,
