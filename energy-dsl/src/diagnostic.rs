@@ -23,6 +23,18 @@ pub struct Excerpt {
     pub start: usize,
     /// Past the last byte.
     pub end: usize,
+    /// The file that the text is, if it is one.
+    pub file: Option<Rc<str>>,
+}
+
+impl Excerpt {
+    /// The line of the place, and its line and column from 0.
+    fn line(&self) -> (&str, usize, usize) {
+        let before = &self.text[..self.start];
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        let line = self.text[line_start..].lines().next().unwrap_or("");
+        (line, before.matches('\n').count(), before[line_start..].chars().count())
+    }
 }
 
 impl Span {
@@ -30,6 +42,20 @@ impl Span {
     #[must_use]
     pub fn of(token: TokenSpan) -> Self {
         Self { token, excerpt: None }
+    }
+
+    /// A part of the text that this is the place of.
+    #[must_use]
+    pub fn within(&self, start: usize, end: usize) -> Self {
+        let excerpt = self.excerpt.as_ref().map(|e| Excerpt { start, end, ..e.clone() });
+        Self { token: self.token, excerpt }
+    }
+
+    /// The file that it is in, with line and column, if it is in one.
+    fn place_in_file(&self) -> Option<String> {
+        let excerpt = self.excerpt.as_ref()?;
+        let (file, (_, line, column)) = (excerpt.file.as_ref()?, excerpt.line());
+        Some(format!("{file}:{}:{}", line + 1, column + 1))
     }
 }
 
@@ -60,16 +86,14 @@ impl Diagnostic {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(place) = self.span.place_in_file() {
+            write!(f, "{place}: ")?;
+        }
         f.write_str(&self.message)?;
         if let Some(excerpt) = &self.span.excerpt {
-            let before = &excerpt.text[..excerpt.start];
-            let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-            let line = excerpt.text[line_start..].lines().next().unwrap_or("");
-            let column = excerpt.text[line_start..excerpt.start].chars().count();
-            let line_end = line_start + line.len();
-            let width = excerpt.text[excerpt.start..excerpt.end.clamp(excerpt.start, line_end.max(excerpt.start))]
-                .chars()
-                .count();
+            let (line, _, column) = excerpt.line();
+            let marked = excerpt.text[excerpt.start..excerpt.end.max(excerpt.start)].lines().next().unwrap_or("");
+            let width = marked.chars().count();
             write!(f, "\n  | {line}\n  | {}{}", " ".repeat(column), "^".repeat(width.max(1)))?;
         }
         if let Some(help) = &self.help {
@@ -109,6 +133,10 @@ impl fmt::Display for Diagnostics {
         for (number, diagnostic) in self.0.iter().enumerate() {
             if number > 0 {
                 f.write_str("\n\n")?;
+            }
+            if diagnostic.span.place_in_file().is_some() {
+                write!(f, "error at {diagnostic}")?;
+                continue;
             }
             let start = diagnostic.span.token.start();
             write!(f, "error at {}:{}: {diagnostic}", start.line, start.column + 1)?;

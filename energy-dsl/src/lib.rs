@@ -36,6 +36,8 @@ mod listing;
 #[cfg(feature = "compiler")]
 mod lower;
 #[cfg(feature = "compiler")]
+mod properties;
+#[cfg(feature = "compiler")]
 mod routines;
 #[cfg(feature = "compiler")]
 mod syntax;
@@ -66,11 +68,28 @@ pub use textbook::Textbook;
 pub fn compile(declarations: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
     let mut diagnostics = Diagnostics::default();
     let items = syntax::parse(declarations, &mut diagnostics);
-    let programs = check::check(&items, &mut diagnostics);
+    compile_items(&items, diagnostics)
+}
+
+/// Compiles the declarations of a file, whose text this is. `file` is what messages call it, `at` the place in Rust code that
+/// errors are reported at.
+#[cfg(feature = "compiler")]
+#[must_use]
+pub fn compile_file(text: &str, file: &str, at: proc_macro2::Span) -> proc_macro2::TokenStream {
+    let mut diagnostics = Diagnostics::default();
+    let items = syntax::parse_file(text, file, &diagnostic::Span::of(at), &mut diagnostics);
+    compile_items(&items, diagnostics)
+}
+
+#[cfg(feature = "compiler")]
+fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> proc_macro2::TokenStream {
+    let programs = check::check(items, &mut diagnostics);
     let folder = std::env::var_os("ENERGY_DUMP_DIR").map(std::path::PathBuf::from);
     let mut code = proc_macro2::TokenStream::new();
     for program in &programs {
-        let items = emit::emit(program, &routines::differentiate(program));
+        let routines = routines::differentiate(program);
+        properties::prove(program, &routines, &mut diagnostics);
+        let items = emit::emit(program, &routines);
         if let Some(folder) = &folder
             && let Err(error) = listing::dump(folder, &program.name, &items)
         {

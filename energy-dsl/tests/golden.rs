@@ -54,13 +54,52 @@ fn the_table_of_functions_is_the_compilers() {
     let (before, _) = text.split_once("| usage |").unwrap_or((&text, ""));
     let mut table = String::from("| usage | what it is | accuracy, u |\n|---|---|---|\n");
     for function in energy_dsl::functions() {
-        let usage = function.usage.replace('|', "\\|");
-        table += &format!("| `{usage}` | {} | {} |\n", function.docs, function.accuracy);
+        let cell = |text: &str| text.replace('|', "\\|");
+        let (usage, docs, accuracy) = (cell(function.usage), cell(function.docs), cell(function.accuracy));
+        table += &format!("| `{usage}` | {docs} | {accuracy} |\n");
     }
+    table += "| `sum(j in a..b, term)` | The sum of the terms with j = a, …, b − 1, unrolled. |  |\n";
     table += "| `gradient(U, p)` | The derivative of a scalar by a point. |  |\n";
     let expected = format!("{before}{table}");
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         std::fs::write(&path, &expected).unwrap();
     }
     assert!(text == expected || std::env::var_os("UPDATE_GOLDEN").is_some(), "LANGUAGE.md is behind the compiler");
+}
+
+/// The messages of a file name file, line and column, and show the line.
+#[test]
+fn mistakes_in_a_file_are_shown_in_it() {
+    let text = include_str!("golden/broken.energy");
+    let code = energy_dsl::compile_file(text, "src/broken.energy", proc_macro2::Span::call_site());
+    let file: syn::File = syn::parse2(code).unwrap();
+    let mut messages = String::new();
+    for item in file.items {
+        if let syn::Item::Macro(call) = item {
+            let message: syn::LitStr = syn::parse2(call.mac.tokens).unwrap();
+            messages += &format!("{}\n\n", message.value());
+        }
+    }
+    assert_golden("broken.energy.messages.txt", &messages);
+}
+
+/// Claims that cannot be proved, or that nothing checks, are errors of the code and not of the text.
+#[test]
+fn claims_are_proved_or_refused() {
+    for (source, expected) in [
+        ("#[invariant(translation)] energy A(p, q: Point) { norm(p - q) + dot(q, p - q) }", "`q` is used by itself"),
+        ("#[invariant(translation)] residual A(p: Vec3) { p }", "has no invariance of points"),
+        ("#[even] energy A(p: Point) { norm(p) }", "nothing checks the claim `even`"),
+        (
+            "#[audit] #[rest_state(zero_force)] energy A(p, q: Point; L: Scalar) { norm(p - q) * L }",
+            "where each point rests",
+        ),
+        ("#[audit] #[invariant(scale)] energy A(p: Point) { norm(p) }", "unknown property `scale`"),
+        ("#[odd] energy A(p: Point) { norm(p) }", "unknown attribute `odd`"),
+    ] {
+        let code = compile(source.parse().unwrap()).to_string();
+        assert!(code.contains("compile_error") && code.contains(expected), "{source}: {code}");
+    }
+    let right = "#[invariant(translation)] force A(p, q: Point; k: Scalar) { [k * (p - q), -k * (p - q)] }";
+    assert!(!compile(right.parse().unwrap()).to_string().contains("compile_error"));
 }

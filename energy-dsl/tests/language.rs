@@ -29,6 +29,17 @@ fn both_spellings_mean_the_same() {
         ("k^2^L", "k^(2^L)"),
         ("-L^2", "-(L * L)"),
         ("k L⁻²", "k / L / L"),
+        ("k L⁻¹ + ¼ k + ¾ L³ + ⅛ L⁰", "k / L + k / 4 + 3 * L^3 / 4 + 1 / 8"),
+        ("½√(k L) + √k", "sqrt(k * L) / 2 + sqrt(k)"),
+        ("pₖ·pₗ + p_{k}·p_{l}", "2 * dot(p_k, p_l)"),
+        ("n_1 = p_k × p_l; \\hat{n}_1·n̂_1 + n̂₁·\\hat n_1 + ‖n₁‖", "2 + norm(cross(p_k, p_l))"),
+        ("trace(p_k ⊗ p_l)", "dot(p_k, p_l)"),
+        ("Δ = p_k − p_ℓ; ‖Δ‖² ∕ 2", "norm_squared(p_k - p_l) / 2"),
+        ("\\frac{k + 1}{2 L} \\sqrt{k}", "(k + 1) / (2 * L) * sqrt(k)"),
+        ("\\left(k + L\\right) \\lVert p_k \\rVert \\cos \\theta_0", "(k + L) * norm(p_k) * cos(θ0)"),
+        ("M = columns(p_k, p_l, p_k × p_l); (M⁻¹ p_l)·vector(1, 10, 100)", "10"),
+        ("sin² θ₀ + cos² θ₀ + |−L|", "1.5"),
+        ("w = [k, L]; sum(j in 0..2, w[j] j) + p_k.y", "L + 2"),
     ] {
         let printed_value = value(&format!("\"{}\"", printed.replace('\\', "\\\\")));
         assert_relative_eq!(printed_value, value(rust), max_relative = 1e-14);
@@ -50,6 +61,9 @@ fn functions_compute_what_they_say() {
         ("min(k, L) + 10 * max(k, L)", 30.5),
         ("exp(log(k)) + atan2(1, 1) * 4 - π", 3.0),
         ("if k < L { 1 } else if L < k && k == 3 { 2 } else { 3 }", 2.0),
+        ("if 1 < 2 && 2 <= 2 && 3 > 2 && 3 >= 3 && 1 == 1 && 1 != 2 { k } else { 0 }", 3.0),
+        ("if 2 < 2 || 3 <= 2 || 2 > 2 || 2 >= 3 || 1 == 2 || 1 != 1 { k } else { 0 }", 0.0),
+        ("if k < L || 2 < 1 { 1 } else { if L <= k && 1 < 2 { 2 } else { 3 } }", 2.0),
         ("sin_half(θ0) - sin(0.125)", 0.0),
         ("cos_half(θ0) - cos(0.125)", 0.0),
         ("one_minus_cos(L) - 1 + cos(L)", 0.0),
@@ -112,6 +126,23 @@ fn right_units_are_accepted() {
         "energy A(p, q: Point; α: Scalar[1]) { norm(p - q)^α + sin(norm(p)) }",
     ] {
         Textbook::from_source(source).unwrap_or_else(|e| panic!("{source}\n{e}"));
+    }
+}
+
+#[test]
+fn deep_nesting_is_refused_and_not_a_stack_overflow() {
+    for (open, close) in [
+        ("(", ")"),
+        ("-", ""),
+        ("sin(", ")"),
+        ("[", "]"),
+        ("if 1 < 2 { ", " } else { 1 }"),
+        ("2^", ""),
+        ("if 1 < 2 { 1 } else ", ""),
+    ] {
+        let source = format!("energy A(p: Point) {{ {}{{ norm(p) }}{} }}", open.repeat(5000), close.repeat(5000));
+        let errors = Textbook::from_source(&source).unwrap_err().to_string();
+        assert!(errors.contains("nested more than"), "{open}: {}", &errors[..errors.len().min(300)]);
     }
 }
 

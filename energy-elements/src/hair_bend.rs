@@ -4,6 +4,7 @@ energy! {
     /// Bending of a hair at the middle one of three points: 0 when its two segments are in line, k when it is folded back
     /// (Khungurn 2019, §6).
     #[audit]
+    #[invariant(translation, rotation)]
     pub energy HairBend(p0, p1, p2: Point; k: Scalar[J]) {
         let a = p1 - p0;
         let b = p2 - p1;

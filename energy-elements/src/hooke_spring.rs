@@ -4,6 +4,8 @@ energy! {
     /// Hooke's spring of the mass–spring cloth model: F_P = K (PQ − L P̂Q), PQ = Q − P (the source prints the opposite sign). It is the
     /// gradient of −K/2 (‖PQ‖ − L)².
     #[audit]
+    #[invariant(translation, rotation)]
+    #[even]
     pub energy HookeSpring(P, Q: Point; K: Scalar[N/m], L: Scalar[m]) {
         let PQ = Q - P;
         K / 2 * (norm(PQ) - L)^2

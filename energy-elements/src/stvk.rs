@@ -5,6 +5,8 @@ energy! {
     /// Young's modulus Y, Poisson's ratio ν and thickness h in plane stress, λ = Y h ν/(1 − ν²), μ = Y h/(2 (1 + ν)). The rest shape
     /// is given by material coordinates in its plane, of positive area; a polynomial, regular everywhere.
     #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
     pub energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);

@@ -125,3 +125,84 @@ energy! {
     #[audit(samples = 50)]
     residual Fit(a: Vec3, s, t: Scalar; m: Vec3) { vector(norm(a - m), sin(s) * t, dot(a, m)^2, atan2(s, 2 + t^2)) }
 }
+
+energy! {
+    #[audit(samples = 20)]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    energy Sheet(x0, x1, x2: Point; rest u0, u1, u2: Vec2; μ: Scalar) {
+        rest { let B = inverse(columns(u1 - u0, u2 - u0)); }
+        let F = columns(x1 - x0, x2 - x0) * B;
+        let E = transpose(F) * F - identity(2);
+        μ * ddot(E, E)
+    }
+
+    #[audit(samples = 20)]
+    #[invariant(rotation)]
+    #[rest_state(zero_force)]
+    #[even]
+    constraint Lengths(x: [Point; 2]; rest X: [Point; 2]) {
+        rest { let L = norm(X[1] - X[0]); }
+        [norm(x[1] - x[0]) - L, dot(x[0], x[0] - x[1]) * (norm(x[0] - x[1]) - L)]
+    }
+
+    #[audit(samples = 20)]
+    #[invariant(translation, rotation)]
+    force Drag(p, q: Point, v, w: Velocity; c: Scalar) { let f = c * norm(p - q) * (v - w); [-f, f] }
+
+    #[audit(samples = 20)]
+    #[even]
+    residual Squares(a: Vec3, s: Scalar; k: Scalar) { [norm_squared(a) - k, s * a] }
+}
+
+/// What is not kept is found: the same claims on declarations that break them.
+mod broken_claims {
+    use std::panic::catch_unwind;
+
+    use energy_dsl::{Declaration, Element, Inputs, Kind, Outputs, Property, Real, RestError};
+    use energy_elements::{BridsonForce, Gravity, HingeAngle, StVK};
+
+    /// An element with a claim that its declaration does not make.
+    macro_rules! claims {
+        ($name:ident, $of:ty, $property:ident) => {
+            #[derive(Clone, Copy)]
+            struct $name;
+
+            impl Element for $name {
+                const DECLARATION: &'static Declaration =
+                    &Declaration { properties: &[Property::$property], ..*<$of as Element>::DECLARATION };
+                type Over<T: Real> = Self;
+
+                fn evaluate<T: Real>(inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
+                    <$of as Element>::evaluate(inputs)
+                }
+            }
+        };
+    }
+    claims!(TurnedGravity, Gravity<f64>, RotationInvariant);
+    claims!(EvenGravity, Gravity<f64>, Even);
+    claims!(TurnedHinge, HingeAngle<f64>, RotationInvariant);
+    claims!(EvenHinge, HingeAngle<f64>, Even);
+    claims!(TurnedForce, BridsonForce<f64>, RotationInvariant);
+    claims!(RestingSheet, StVK<f64>, ZeroForceAtRest);
+
+    fn message<E: Element>() -> String {
+        let panic = catch_unwind(|| verify::assert_derivatives::<E>(20)).err();
+        panic.and_then(|p| p.downcast_ref::<String>().cloned()).unwrap_or_default()
+    }
+
+    #[test]
+    fn false_claims_are_found() {
+        assert_eq!(Gravity::<f64>::DECLARATION.kind, Kind::Energy);
+        for (message, attribute) in [
+            (message::<TurnedGravity>(), "invariant(rotation)"),
+            (message::<EvenGravity>(), "even"),
+            (message::<EvenHinge>(), "even"),
+        ] {
+            assert!(message.contains("claims") && message.contains(attribute), "{message}");
+        }
+        for message in [message::<TurnedHinge>(), message::<TurnedForce>(), message::<RestingSheet>()] {
+            assert_eq!(message, "", "a right claim");
+        }
+    }
+}

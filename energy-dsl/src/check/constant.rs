@@ -104,3 +104,23 @@ pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
         _ => None,
     }
 }
+
+/// What a comparison always is.
+pub(super) fn truth(bindings: &[Binding], typed: &Typed) -> Option<bool> {
+    let TypedKind::Call(function, arguments) = &typed.kind else { return None };
+    let [a, b] = arguments.as_slice() else { return None };
+    if let "&&" | "||" = function.name {
+        let (a, b) = (truth(bindings, a)?, truth(bindings, b)?);
+        return Some(if function.name == "&&" { a && b } else { a || b });
+    }
+    let (a, b) = (evaluate(bindings, a)?, evaluate(bindings, b)?);
+    Some(match function.name {
+        "<" => a < b,
+        "<=" => a <= b,
+        ">" => a > b,
+        ">=" => a >= b,
+        "==" => a == b,
+        "!=" => a != b,
+        _ => return None,
+    })
+}

@@ -148,6 +148,10 @@ impl<'a> Checker<'a> {
                 if matches!(yes.shape, Shape::Array(_) | Shape::Truth) {
                     return self.error(span, format!("a branch must be a value, but it is {}", yes.shape));
                 }
+                // A condition of constants is decided here: the other branch leaves nothing.
+                if let Some(truth) = super::constant::truth(&self.bindings, &condition_shape) {
+                    return Some(if truth { yes } else { no });
+                }
                 let shape = yes.shape;
                 let kind = TypedKind::Select(Box::new(condition_shape), Box::new(yes), Box::new(no));
                 Some(Typed { kind, shape, span: span.clone() })

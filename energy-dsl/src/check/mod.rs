@@ -41,7 +41,7 @@ fn with_what_it_uses(source: &str, items: &[Item]) -> String {
         .filter_map(|item| match item {
             Item::Function(function) => Some((function.name.canonical(), function.source.as_str())),
             Item::Constant(constant) => Some((constant.name.canonical(), constant.source.as_str())),
-            Item::Declaration(_) => None,
+            Item::Declaration(_) | Item::Specialisation(_) => None,
         })
         .collect();
     let mut named = vec![false; others.len()];
@@ -90,6 +90,7 @@ fn check_declaration(
         docs: declaration.docs.clone(),
         visibility: declaration.visibility.clone(),
         audit_samples: declaration.audit_samples,
+        properties: declaration.properties.clone(),
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),

@@ -1,6 +1,6 @@
 use crate::diagnostic::Span;
 use crate::functions::{Function, Shape};
-use crate::runtime::Kind;
+use crate::runtime::{Kind, Property};
 use crate::syntax::{InputType, Unit};
 
 /// A checked declaration.
@@ -16,6 +16,8 @@ pub struct Program {
     pub visibility: String,
     /// Samples of the generated test, if wanted.
     pub audit_samples: Option<usize>,
+    /// What it claims of itself, and where.
+    pub properties: Vec<(Property, Span)>,
     /// What it describes.
     pub kind: Kind,
     /// The declaration as text.
@@ -46,7 +48,7 @@ impl Program {
     /// The same without its test, which a broken declaration would fail once more.
     #[must_use]
     pub fn without_audit(self) -> Self {
-        Self { audit_samples: None, ..self }
+        Self { audit_samples: None, properties: Vec::new(), ..self }
     }
 
     /// How many numbers move.

@@ -1,5 +1,5 @@
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{format_ident, quote};
 
 use crate::check::{Input, Program};
 use crate::graph::{Graph, NodeId, count};
@@ -29,6 +29,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
         quote!(&[#(#ends),*])
     });
     let primitives = &routines.primitives;
+    let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
     let list = routines.list.iter().map(|r| routine(&routines.graph, r));
     quote! {
         ::energy_dsl::Declaration {
@@ -41,6 +42,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             rest: &[#rest],
             parameters: &[#parameters],
             rows: #rows,
+            properties: &[#(::energy_dsl::Property::#properties),*],
             translation_invariant: #invariant,
             curved: #curved,
             velocity_dependent: #velocity_dependent,

@@ -37,7 +37,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "(1 − cos x)/x² = ½ sinc²(x/2): ½ at 0, and regular there.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(cosc(g, a[0].node())),
-        accuracy: "5 / 9 / 12 for |x| ≤ 1.5",
+        accuracy: "5 / 9 / 16 for |x| ≤ 1.5",
     },
 ];
 

@@ -24,6 +24,32 @@ impl Kind {
     }
 }
 
+/// A property that a declaration claims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Property {
+    /// A common translation of all points changes nothing: proved on the expression graph.
+    TranslationInvariant,
+    /// Turning all points turns the forces with them, and changes no energy: checked by the audit.
+    RotationInvariant,
+    /// The rest shape feels no force: checked by the audit.
+    ZeroForceAtRest,
+    /// Mirroring all points, or unknowns, at the origin changes no value: checked by the audit.
+    Even,
+}
+
+impl Property {
+    /// The attribute that declares it.
+    #[must_use]
+    pub const fn attribute(self) -> &'static str {
+        match self {
+            Self::TranslationInvariant => "invariant(translation)",
+            Self::RotationInvariant => "invariant(rotation)",
+            Self::ZeroForceAtRest => "rest_state(zero_force)",
+            Self::Even => "even",
+        }
+    }
+}
+
 /// One named input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
@@ -104,6 +130,8 @@ pub struct Declaration {
     pub parameters: &'static [Field],
     /// Rows: 1 for an energy, the length of C or r, three per point for a force.
     pub rows: usize,
+    /// What it claims of itself.
+    pub properties: &'static [Property],
     /// Whether the points enter only through their differences (like the next three, proved on the expression graph).
     pub translation_invariant: bool,
     /// Whether the second derivatives of the energy, or those of the force by position, are not all identically zero: gravity's are.

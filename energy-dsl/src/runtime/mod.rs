@@ -26,7 +26,7 @@ pub use call::{
 #[doc(hidden)]
 pub use choose::Choose;
 pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
-pub use declaration::{Declaration, Field, Kind, OperationCount, Routine};
+pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
     Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,
     Hessian, HessianVector, Inputs, Outputs, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian,

@@ -1,6 +1,7 @@
 use super::name::Name;
+use super::specialise::Specialisation;
 use crate::diagnostic::Span;
-use crate::runtime::Kind;
+use crate::runtime::{Kind, Property};
 
 /// A declaration, a function or a constant.
 #[derive(Clone, Debug)]
@@ -11,6 +12,8 @@ pub enum Item {
     Function(UserFunction),
     /// `const name: Scalar = value;`.
     Constant(Constant),
+    /// `energy Name = Other(k = 100);`, while parsing: it becomes a declaration.
+    Specialisation(Box<Specialisation>),
 }
 
 /// A declared energy, constraint, force or residual.
@@ -22,6 +25,8 @@ pub struct Declaration {
     pub visibility: String,
     /// Samples of the generated audit test, if one was asked for by `#[audit]`.
     pub audit_samples: Option<usize>,
+    /// What it claims of itself, and where.
+    pub properties: Vec<(Property, Span)>,
     /// What it describes.
     pub kind: Kind,
     /// Its name.

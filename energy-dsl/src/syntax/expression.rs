@@ -16,7 +16,7 @@ impl<'a> Parser<'a> {
     /// Left-associative operators, by rising precedence.
     fn binary(&mut self, level: usize) -> Parsed<Expression> {
         const LEVELS: &[&[&str]] =
-            &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×"]];
+            &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×", "⊗"]];
         let Some(operators) = LEVELS.get(level) else { return self.unary() };
         let mut left = self.binary(level + 1)?;
         loop {
@@ -34,6 +34,7 @@ impl<'a> Parser<'a> {
             let function = match operator {
                 "·" => "dot",
                 "×" => "cross",
+                "⊗" => "outer",
                 other => other,
             };
             left = call(function, span, vec![left, right]);
@@ -46,7 +47,7 @@ impl<'a> Parser<'a> {
         match &token.kind {
             TokenKind::Name(name) => !is_keyword(name),
             TokenKind::Symbol(symbol) => match symbol.as_str() {
-                "(" | "√" | "hat" => true,
+                "(" | "√" | "hat" | "frac" => true,
                 "‖" | "|" => self.bars.last() != Some(symbol),
                 _ => false,
             },
@@ -55,6 +56,23 @@ impl<'a> Parser<'a> {
     }
 
     fn unary(&mut self) -> Parsed<Expression> {
+        self.nested(Self::signed)
+    }
+
+    /// Every nesting passes here: it is bounded, because the compiler recurses over expressions.
+    fn nested(&mut self, parse: fn(&mut Self) -> Parsed<Expression>) -> Parsed<Expression> {
+        const DEEPEST: usize = 100;
+        if self.depth >= DEEPEST {
+            let message = format!("the formula is nested more than {DEEPEST} levels deep");
+            return Err(Box::new(Diagnostic::new(&self.span(), message).help("name parts of it with `let`")));
+        }
+        self.depth += 1;
+        let operand = parse(self);
+        self.depth -= 1;
+        operand
+    }
+
+    fn signed(&mut self) -> Parsed<Expression> {
         let span = self.span();
         if self.take("-") {
             let operand = self.unary()?;
@@ -79,7 +97,7 @@ impl<'a> Parser<'a> {
                 let name = self.name("the name of a component, as in v.x")?;
                 base = Expression { kind: ExpressionKind::Component(Box::new(base), name), span };
             } else if self.take("^") {
-                let exponent = if self.is("-") { self.unary()? } else { self.power()? };
+                let exponent = self.unary()?;
                 base = call("^", span, vec![base, exponent]);
             } else {
                 return Ok(base);
@@ -114,8 +132,15 @@ impl<'a> Parser<'a> {
                 "‖" | "|" => return self.barred(symbol),
                 "√" => {
                     self.at += 1;
-                    let operand = self.primary()?;
+                    let operand = self.nested(Self::primary)?;
                     return Ok(call("sqrt", span, vec![operand]));
+                }
+                "frac" => {
+                    self.at += 1;
+                    let (above, below) = (self.braced_body()?, self.braced_body()?);
+                    let value = |body| Expression { kind: ExpressionKind::Body(Box::new(body)), span: span.clone() };
+                    let parts = vec![value(above), value(below)];
+                    return Ok(call("/", span, parts));
                 }
                 "hat" => {
                     self.at += 1;
@@ -184,9 +209,25 @@ impl<'a> Parser<'a> {
             let arguments = self.list("(", ")")?;
             return Ok(Expression { kind: ExpressionKind::Call(name, arguments), span });
         }
+        if function && notation && self.is("^") {
+            // `sin² θ`, as printed; not sin⁻¹, which has two meanings.
+            if let Some(Token { kind: TokenKind::Number(power), span: at, .. }) = self.tokens.get(self.at + 1)
+                && *power > 0.0
+            {
+                self.at += 2;
+                let argument = self.nested(Self::power)?;
+                let exponent = Expression { kind: ExpressionKind::Number(*power), span: at.clone() };
+                let value = Expression { kind: ExpressionKind::Call(name, vec![argument]), span: span.clone() };
+                return Ok(call("^", span, vec![value, exponent]));
+            }
+            return Err(Box::new(
+                Diagnostic::new(&span, format!("`{}` needs its argument before this power", name.text))
+                    .help(format!("write ({}(x))^p, or asin(x), acos(x), 1/{}(x)", name.text, name.text)),
+            ));
+        }
         if function && notation && self.starts_factor() {
             // `sin θ`, as printed.
-            let argument = self.power()?;
+            let argument = self.nested(Self::power)?;
             return Ok(Expression { kind: ExpressionKind::Call(name, vec![argument]), span });
         }
         Ok(Expression { kind: ExpressionKind::Name(name), span })
@@ -221,7 +262,7 @@ impl<'a> Parser<'a> {
             return self.fail("`else { … }`: a formula has a value either way");
         }
         let no = if self.is_word("if") {
-            let nested = self.conditional()?;
+            let nested = self.nested(Self::conditional)?;
             Body::of(nested)
         } else {
             self.braced_body()?
@@ -237,6 +278,7 @@ impl<'a> Parser<'a> {
             at: 0,
             end,
             bars: Vec::new(),
+            depth: self.depth,
             user_functions: self.user_functions.clone(),
             errors: Vec::new(),
         };

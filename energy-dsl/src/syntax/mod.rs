@@ -1,10 +1,13 @@
 //! Text to syntax tree. Rust tokens and mathematical notation become the same tokens, and one parser reads both.
 
 mod ast;
+mod attribute;
 mod expression;
 mod name;
 mod notation;
 mod parse;
+mod specialise;
+mod text;
 mod tokens;
 
 pub use ast::{
@@ -13,4 +16,4 @@ pub use ast::{
 };
 pub use name::{Name, canonical};
 pub(crate) use notation::unhatted;
-pub use parse::parse;
+pub use parse::{parse, parse_file};

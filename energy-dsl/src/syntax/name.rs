@@ -17,7 +17,7 @@ impl Name {
     }
 }
 
-/// Spellings of one symbol agree: `θ₀`, `θ_0` and `θ0`; `p_ℓ`, `p_l` and `pl`; `θ` and `theta`.
+/// Spellings of one symbol agree: `θ₀`, `θ_0` and `θ0`; `p_ℓ`, `p_l`, `pₗ` and `pl`; `θ` and `theta`.
 #[must_use]
 pub fn canonical(name: &str) -> String {
     let mut plain = String::with_capacity(name.len());
@@ -26,6 +26,7 @@ pub fn canonical(name: &str) -> String {
             '_' => {}
             'ℓ' => plain.push('l'),
             '₀'..='₉' => plain.push(char::from(b'0' + (c as u32 - '₀' as u32) as u8)),
+            _ if subscript_letter(c).is_some() => plain.extend(subscript_letter(c)),
             '′' | '\'' => plain.push_str("prime"),
             other => match GREEK.iter().find(|(letter, _)| *letter == other) {
                 Some((_, spelled)) => plain.push_str(spelled),
@@ -34,6 +35,18 @@ pub fn canonical(name: &str) -> String {
         }
     }
     plain
+}
+
+/// The letter that a subscript letter stands for.
+pub(super) fn subscript_letter(c: char) -> Option<char> {
+    const SUBSCRIPTS: &str = "ₐaₑeₕhᵢiⱼjₖkₗlₘmₙnₒoₚpᵣrₛsₜtᵤuᵥvₓx";
+    let mut pairs = SUBSCRIPTS.chars();
+    while let (Some(subscript), Some(letter)) = (pairs.next(), pairs.next()) {
+        if subscript == c {
+            return Some(letter);
+        }
+    }
+    None
 }
 
 pub(super) const GREEK: &[(char, &str)] = &[
@@ -57,4 +70,17 @@ pub(super) const GREEK: &[(char, &str)] = &[
     ('χ', "chi"),
     ('ψ', "psi"),
     ('ω', "omega"),
+    ('ϑ', "theta"),
+    ('ϵ', "epsilon"),
+    ('ϕ', "phi"),
+    ('Γ', "Gamma"),
+    ('Δ', "Delta"),
+    ('Θ', "Theta"),
+    ('Λ', "Lambda"),
+    ('Ξ', "Xi"),
+    ('Π', "Pi"),
+    ('Σ', "Sigma"),
+    ('Φ', "Phi"),
+    ('Ψ', "Psi"),
+    ('Ω', "Omega"),
 ];

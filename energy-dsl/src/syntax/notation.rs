@@ -8,8 +8,19 @@ use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
 
 /// Splits a formula into tokens. `literal` is where the string stands.
 pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
-    let text: Rc<str> = text.into();
-    let mut lexer = Lexer { text: text.clone(), at: 0, literal, tokens: Vec::new() };
+    let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: None };
+    let whole = Span { token: literal.token, excerpt: Some(excerpt.clone()) };
+    tokens_within(&excerpt.text, (0, text.len()), &whole, diagnostics)
+}
+
+/// Splits the formula between two places of a text into tokens. `whole` is the text.
+pub(super) fn tokens_within(
+    text: &Rc<str>,
+    (start, end): (usize, usize),
+    whole: &Span,
+    diagnostics: &mut Diagnostics,
+) -> Vec<Token> {
+    let mut lexer = Lexer { text: text.clone(), at: start, end, whole, tokens: Vec::new() };
     while let Some(c) = lexer.peek() {
         let start = lexer.at;
         if let Err(message) = lexer.token(c) {
@@ -25,15 +36,16 @@ pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) 
 struct Lexer<'a> {
     text: Rc<str>,
     at: usize,
-    literal: &'a Span,
+    end: usize,
+    whole: &'a Span,
     tokens: Vec<Token>,
 }
 
-const HAT: char = '\u{302}';
+pub(super) const HAT: char = '\u{302}';
 
 impl Lexer<'_> {
     fn peek(&self) -> Option<char> {
-        self.text[self.at..].chars().next()
+        self.text[self.at..self.end].chars().next()
     }
 
     fn advance(&mut self) {
@@ -41,8 +53,7 @@ impl Lexer<'_> {
     }
 
     fn span(&self, start: usize) -> Span {
-        let excerpt = Excerpt { text: self.text.clone(), start, end: self.at.max(start) };
-        Span { token: self.literal.token, excerpt: Some(excerpt) }
+        self.whole.within(start, self.at.max(start))
     }
 
     fn push(&mut self, kind: Kind, start: usize) {
@@ -64,7 +75,7 @@ impl Lexer<'_> {
             return self.command();
         }
         if is_name_start(c) {
-            self.name();
+            self.name(false);
             return Ok(());
         }
         self.advance();
@@ -73,13 +84,18 @@ impl Lexer<'_> {
             '−' | '–' => self.symbol("-", start),
             '·' | 'ᐧ' | '⋅' | '∙' => self.symbol("·", start),
             '×' => self.symbol("×", start),
-            '÷' => self.symbol("/", start),
+            '⊗' => self.symbol("⊗", start),
+            '∗' => self.symbol("*", start),
+            '÷' | '∕' | '⁄' => self.symbol("/", start),
             '≤' => self.symbol("<=", start),
             '≥' => self.symbol(">=", start),
             '≠' => self.symbol("!=", start),
             '½' => self.push(Kind::Number(0.5), start),
             '¼' => self.push(Kind::Number(0.25), start),
             '¾' => self.push(Kind::Number(0.75), start),
+            '⅓' => self.push(Kind::Number(1.0 / 3.0), start),
+            '⅔' => self.push(Kind::Number(2.0 / 3.0), start),
+            '⅛' => self.push(Kind::Number(0.125), start),
             'ᵀ' => self.symbol("ᵀ", start),
             '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';' | ':'
             | '=' | '<' | '>' | '!' | '&' | '.' => {
@@ -112,7 +128,7 @@ impl Lexer<'_> {
 
     fn number(&mut self) -> Result<(), String> {
         let start = self.at;
-        let rest = &self.text[start..];
+        let rest = &self.text[start..self.end];
         let mut end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
         // `0..4` is a range.
         end = rest.find("..").map_or(end, |range| range.min(end));
@@ -143,20 +159,29 @@ impl Lexer<'_> {
         let command = self.text[name_start..self.at].to_owned();
         match command.as_str() {
             "hat" => {
-                while self.peek().is_some_and(|c| c == ' ' || c == '{') {
+                let mut braced = false;
+                while let Some(c) = self.peek().filter(|&c| c == ' ' || c == '{') {
+                    braced |= c == '{';
                     self.advance();
                 }
                 if !self.peek().is_some_and(is_name_start) {
                     return Err("expected the name of a vector after \\hat".into());
                 }
                 self.symbol("hat", start);
-                self.name();
-                if self.peek() == Some('}') {
-                    self.advance();
-                }
+                self.name(braced);
             }
             "cdot" => self.symbol("·", start),
             "times" => self.symbol("×", start),
+            "otimes" => self.symbol("⊗", start),
+            "frac" => self.symbol("frac", start),
+            "sqrt" => self.symbol("√", start),
+            "lVert" | "rVert" => self.symbol("‖", start),
+            "lvert" | "rvert" => self.symbol("|", start),
+            "le" => self.symbol("<=", start),
+            "ge" => self.symbol(">=", start),
+            // They only size the bracket that follows.
+            "left" | "right" => {}
+            function if crate::functions::find(function).is_some() => self.push(Kind::Name(command), start),
             "pi" => self.push(Kind::Name("π".into()), start),
             other => match GREEK.iter().find(|(_, spelled)| *spelled == other) {
                 Some((letter, _)) => {
@@ -173,18 +198,29 @@ impl Lexer<'_> {
         Ok(())
     }
 
-    fn name(&mut self) {
+    /// A name; a part of it may stand in braces, as in `p_{kl}` and `\hat{n}_1`.
+    fn name(&mut self, mut braced: bool) {
         let start = self.at;
         let mut name = String::new();
         let mut hat = false;
-        while let Some(c) = self.peek().filter(|&c| is_name_part(c) || c == HAT) {
+        while let Some(c) = self.peek() {
             match unhatted(c) {
                 _ if c == HAT => hat = true,
+                _ if c == '{' && name.ends_with('_') && !braced => braced = true,
+                _ if c == '}' && braced => {
+                    braced = false;
+                    self.advance();
+                    if self.peek().is_some_and(|c| c == '_' || ('₀'..='₉').contains(&c)) {
+                        continue;
+                    }
+                    break;
+                }
                 Some(plain) => {
                     hat = true;
                     name.push(plain);
                 }
-                None => name.push(c),
+                None if is_name_part(c) => name.push(c),
+                None => break,
             }
             self.advance();
         }
@@ -212,7 +248,18 @@ pub(crate) fn unhatted(c: char) -> Option<char> {
         'ĵ' => 'j',
         'ŝ' => 's',
         'Â' => 'A',
+        'Ĉ' => 'C',
         'Ê' => 'E',
+        'Ĝ' => 'G',
+        'Ĥ' => 'H',
+        'Î' => 'I',
+        'Ĵ' => 'J',
+        'Ô' => 'O',
+        'Ŝ' => 'S',
+        'Û' => 'U',
+        'Ŵ' => 'W',
+        'Ŷ' => 'Y',
+        'Ẑ' => 'Z',
         _ => return None,
     })
 }

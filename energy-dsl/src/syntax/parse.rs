@@ -6,7 +6,10 @@ use super::ast::{
     Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Section, Unit,
     UserFunction,
 };
+use super::attribute::Attributes;
 use super::name::Name;
+use super::specialise::{Specialisation, specialise};
+use super::text;
 use super::tokens::{self, Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
 use crate::runtime::Kind;
@@ -14,13 +17,23 @@ use crate::runtime::Kind;
 /// Parses all items. After an error in one item it goes on with the next.
 pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
     let tokens = tokens::from_rust(stream, diagnostics);
+    items(&tokens, diagnostics)
+}
+
+/// The same of a file's text. `at` is where Rust code names the file.
+pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Item> {
+    let tokens = text::tokens(text, file, at, diagnostics);
+    items(&tokens, diagnostics)
+}
+
+fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
     let user_functions = tokens
         .windows(2)
         .filter(|pair| pair[0].kind == TokenKind::Name("fn".into()))
         .filter_map(|pair| if let TokenKind::Name(name) = &pair[1].kind { Some(name.clone()) } else { None })
         .collect();
     let end = tokens.last().map_or_else(|| Span::of(proc_macro2::Span::call_site()), |t| t.span.clone());
-    let mut parser = Parser { tokens: &tokens, at: 0, end, bars: Vec::new(), user_functions, errors: Vec::new() };
+    let mut parser = Parser { tokens, at: 0, end, bars: Vec::new(), depth: 0, user_functions, errors: Vec::new() };
     let mut items = Vec::new();
     while parser.at < tokens.len() {
         match parser.item() {
@@ -32,7 +45,7 @@ pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
         }
     }
     parser.errors.into_iter().for_each(|error| diagnostics.push(error));
-    items
+    specialise(items, diagnostics)
 }
 
 pub(super) type Parsed<T> = Result<T, Box<Diagnostic>>;
@@ -44,6 +57,8 @@ pub(super) struct Parser<'a> {
     pub(super) end: Span,
     /// Open bars `‖` and `|`; a bracket between hides those outside it.
     pub(super) bars: Vec<String>,
+    /// How deep the expression at hand is nested.
+    pub(super) depth: usize,
     pub(super) user_functions: Vec<String>,
     /// Errors after which the declaration could still be made out.
     pub(super) errors: Vec<Diagnostic>,
@@ -142,11 +157,11 @@ impl<'a> Parser<'a> {
     }
 
     fn item(&mut self) -> Parsed<Item> {
-        let mut docs = Vec::new();
-        let mut audit_samples = None;
+        let mut attributes = Attributes::default();
         while self.take("#") {
-            self.attribute(&mut docs, &mut audit_samples)?;
+            self.attribute(&mut attributes)?;
         }
+        let Attributes { docs, audit_samples, properties } = attributes;
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -166,6 +181,21 @@ impl<'a> Parser<'a> {
         let start = self.at;
         let kind = self.kind()?;
         let name = self.name("a name for the declaration")?;
+        if self.is("=") {
+            let declaration = Declaration {
+                docs,
+                visibility,
+                audit_samples,
+                properties,
+                kind,
+                name,
+                inputs: Vec::new(),
+                body: None,
+                source: String::new(),
+                formula: String::new(),
+            };
+            return self.specialisation(start, declaration).map(|s| Item::Specialisation(Box::new(s)));
+        }
         let inputs = self.inputs()?;
         let body_start = self.at;
         let body = match self.declaration_body() {
@@ -183,6 +213,7 @@ impl<'a> Parser<'a> {
             docs,
             visibility,
             audit_samples,
+            properties,
             kind,
             name,
             inputs,
@@ -192,44 +223,26 @@ impl<'a> Parser<'a> {
         }))
     }
 
-    /// `[doc = "…"]`, `[audit]` or `[audit(samples = n)]`, after the `#`.
-    fn attribute(&mut self, docs: &mut Vec<String>, audit_samples: &mut Option<usize>) -> Parsed<()> {
-        self.expect("[", "to open the attribute")?;
-        let name = self.name("`doc` or `audit`")?;
-        match name.text.as_str() {
-            "doc" => {
-                self.expect("=", "after doc")?;
-                match self.peek().map(|t| &t.kind) {
-                    Some(TokenKind::Text(text)) => docs.push(text.clone()),
-                    _ => return self.fail("the documentation as a string"),
-                }
-                self.at += 1;
-            }
-            "audit" => {
-                *audit_samples = Some(200);
-                if self.take("(") {
-                    if !self.take_word("samples") {
-                        return self.fail("`samples = …`");
-                    }
-                    self.expect("=", "after samples")?;
-                    match self.peek().map(|t| &t.kind) {
-                        Some(TokenKind::Number(n)) if *n >= 1.0 && n.fract() == 0.0 => {
-                            *audit_samples = Some(*n as usize)
-                        }
-                        _ => return self.fail("the number of samples"),
-                    }
-                    self.at += 1;
-                    self.expect(")", "after the number of samples")?;
-                }
-            }
-            other => {
-                return Err(Box::new(
-                    Diagnostic::new(&name.span, format!("unknown attribute `{other}`"))
-                        .help("a declaration takes doc comments and #[audit] or #[audit(samples = 200)]"),
-                ));
+    /// `= Other(k = 100, L = 0.1);`.
+    fn specialisation(&mut self, start: usize, mut declaration: Declaration) -> Parsed<Specialisation> {
+        const FORM: &str = "as in energy Stiff = Spring(k = 100);";
+        self.expect("=", FORM)?;
+        let of = self.name(&format!("the name of another declaration, {FORM}"))?;
+        self.expect("(", FORM)?;
+        let values_start = self.at;
+        let mut values = Vec::new();
+        while !self.take(")") {
+            let name = self.name(&format!("the name of a parameter, {FORM}"))?;
+            self.expect("=", FORM)?;
+            values.push((name, self.expression()?));
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after a value");
             }
         }
-        self.expect("]", "to close the attribute")
+        declaration.formula = tokens::text(&self.tokens[values_start..self.at - 1]);
+        self.expect(";", "after the parameters")?;
+        declaration.source = tokens::text(&self.tokens[start..self.at]);
+        Ok(Specialisation { declaration, of, values })
     }
 
     fn kind(&mut self) -> Parsed<Kind> {

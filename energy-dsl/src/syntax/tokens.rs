@@ -72,16 +72,24 @@ impl PartialEq for Token {
     }
 }
 
-const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
+pub(super) const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
 
 /// Rust tokens as ours. Attributes' strings stay text; every other string literal is notation.
 pub(super) fn from_rust(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Token> {
     let mut tokens = Vec::new();
-    flatten(stream, &mut tokens, false, diagnostics);
+    flatten(stream, &mut tokens, (false, 0), diagnostics);
     tokens
 }
 
-fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, attribute: bool, diagnostics: &mut Diagnostics) {
+/// Brackets within brackets are walked by recursion, so they are bounded; the parser refuses far shallower ones.
+const DEEPEST: usize = 1000;
+
+fn flatten(
+    stream: TokenStream,
+    tokens: &mut Vec<Token>,
+    (attribute, depth): (bool, usize),
+    diagnostics: &mut Diagnostics,
+) {
     let mut trees = stream.into_iter().peekable();
     let mut after_hash = false;
     while let Some(tree) = trees.next() {
@@ -115,7 +123,9 @@ fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, attribute: bool, diagno
                 if !open.is_empty() {
                     push(Kind::Symbol(open.into()), Span::of(group.span_open()), open.into());
                 }
-                flatten(group.stream(), tokens, attribute || after_hash, diagnostics);
+                if depth < DEEPEST {
+                    flatten(group.stream(), tokens, (attribute || after_hash, depth + 1), diagnostics);
+                }
                 if !close.is_empty() {
                     tokens.push(Token {
                         kind: Kind::Symbol(close.into()),
@@ -130,7 +140,8 @@ fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, attribute: bool, diagno
     }
 }
 
-fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
+/// A number, or a string as notation.
+pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
     if let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
         let content = string.value();
         return if attribute {

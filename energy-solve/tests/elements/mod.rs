@@ -17,6 +17,7 @@ const fn declaration(name: &'static str, kind: Kind, formula: &'static str, rows
         rest: &[],
         parameters: &[],
         rows,
+        properties: &[],
         translation_invariant: true,
         curved: true,
         velocity_dependent: matches!(kind, Kind::Force),

@@ -2,6 +2,7 @@
 
 mod entry;
 mod momentum;
+mod properties;
 mod report;
 
 use energy_dsl::{Declaration, Element, Kind, Textbook};
@@ -110,6 +111,7 @@ impl Auditor {
             }
             self.differences(&sample, &answer)?;
             self.symmetry(&sample, &answer);
+            self.claims(&sample, &answer, |vectors| rotate_all(&turn, vectors))?;
             if has_points(self.declaration) && self.declaration.translation_invariant {
                 self.momenta(&sample, &answer, |vectors| rotate_all(&turn, vectors));
             }

@@ -16,6 +16,8 @@ pub enum Check {
     LinearMomentum,
     /// Σ x × f = 0.
     AngularMomentum,
+    /// The declaration keeps what it claims: invariance, no force at rest, evenness.
+    Claims,
     /// No number is NaN or infinite, and no condition is flagged, at an ordinary input.
     Finite,
 }
@@ -30,6 +32,7 @@ impl Check {
             Self::Symmetry => "symmetry",
             Self::LinearMomentum => "Σ f = 0",
             Self::AngularMomentum => "Σ x × f = 0",
+            Self::Claims => "claims",
             Self::Finite => "finite",
         }
     }
@@ -41,6 +44,7 @@ impl Check {
             // The textbook form loses digits: what it leaves of them.
             Self::DualNumbers => 1e-9,
             Self::FiniteDifferences => 2e-7,
+            Self::Claims => 1e-10,
             Self::Symmetry | Self::Finite => 0.0,
             Self::LinearMomentum => 16.0 * f64::EPSILON / 2.0,
             Self::AngularMomentum => 1e-11,

@@ -1,0 +1,174 @@
+//! The text of a file as tokens, each with its place in the file: what the Rust compiler does for a macro's input.
+
+use std::rc::Rc;
+
+use super::notation;
+use super::tokens::{Kind, OPERATORS, Token, literal_kind};
+use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
+
+/// Splits a file into tokens. `at` is where Rust code names it.
+pub(super) fn tokens(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
+    let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: Some(file.into()) };
+    let whole = Span { token: at.token, excerpt: Some(excerpt.clone()) };
+    let mut lexer =
+        Lexer { text: excerpt.text, whole: &whole, at: 0, tokens: Vec::new(), attribute: Attribute::No, diagnostics };
+    while let Some(c) = lexer.peek() {
+        lexer.token(c);
+    }
+    lexer.tokens
+}
+
+/// Whether the lexer is inside `#[…]`, where strings are no formulas.
+#[derive(Clone, Copy, PartialEq)]
+enum Attribute {
+    No,
+    Hash,
+    Inside(usize),
+}
+
+struct Lexer<'a> {
+    text: Rc<str>,
+    whole: &'a Span,
+    at: usize,
+    tokens: Vec<Token>,
+    attribute: Attribute,
+    diagnostics: &'a mut Diagnostics,
+}
+
+impl Lexer<'_> {
+    fn rest(&self) -> &str {
+        &self.text[self.at..]
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.rest().chars().next()
+    }
+
+    fn span(&self, start: usize) -> Span {
+        self.whole.within(start, self.at)
+    }
+
+    fn push(&mut self, kind: Kind, start: usize, text: String) {
+        let span = self.span(start);
+        self.tokens.push(Token { kind, span, notation: false, text });
+    }
+
+    fn error(&mut self, start: usize, message: String, help: &str) {
+        let span = self.span(start);
+        self.diagnostics.push(Diagnostic::new(&span, message).help(help));
+    }
+
+    /// Goes on while `part` holds; what it went over.
+    fn take_while(&mut self, part: impl Fn(char) -> bool) -> String {
+        let rest = self.rest();
+        let taken = rest[..rest.find(|c| !part(c)).unwrap_or(rest.len())].to_owned();
+        self.at += taken.len();
+        taken
+    }
+
+    fn token(&mut self, c: char) {
+        let start = self.at;
+        if c.is_whitespace() {
+            self.at += c.len_utf8();
+        } else if self.rest().starts_with("//") {
+            self.comment();
+        } else if self.rest().starts_with("/*") {
+            self.at += self.rest().find("*/").map_or(self.rest().len(), |end| end + 2);
+        } else if c == '"' {
+            self.string();
+        } else if c.is_alphabetic() || c == '_' {
+            let name = self.take_while(|c| c.is_alphabetic() || c.is_ascii_digit() || c == '_' || c == notation::HAT);
+            self.push(Kind::Name(name.clone()), start, name);
+        } else if c.is_ascii_digit() {
+            self.number();
+        } else {
+            self.symbol(c);
+        }
+    }
+
+    /// A comment; `///` is documentation.
+    fn comment(&mut self) {
+        let start = self.at;
+        let line = self.take_while(|c| c != '\n');
+        let Some(docs) = line.strip_prefix("///").filter(|docs| !docs.starts_with('/')) else { return };
+        let docs = docs.trim_end_matches('\r').to_owned();
+        let symbol = |s: &str| (Kind::Symbol(s.into()), s.to_owned());
+        let quoted = format!("{docs:?}");
+        for (kind, text) in [
+            symbol("#"),
+            symbol("["),
+            (Kind::Name("doc".into()), "doc".into()),
+            symbol("="),
+            (Kind::Text(docs), quoted),
+            symbol("]"),
+        ] {
+            self.push(kind, start, text);
+        }
+    }
+
+    /// A formula in quotes, as it stands: a backslash is a backslash.
+    fn string(&mut self) {
+        let start = self.at;
+        self.at += 1;
+        let content = self.take_while(|c| c != '"');
+        let inside = (start + 1, self.at);
+        if self.peek().is_none() {
+            self.at = start + 1;
+            self.error(start, "this string has no end".into(), "close it with `\"`");
+            self.at = self.text.len();
+            return;
+        }
+        self.at += 1;
+        let quoted = format!("{content:?}");
+        let kind = match self.attribute {
+            Attribute::Inside(_) => Kind::Text(content),
+            _ => Kind::Notation(notation::tokens_within(&self.text, inside, self.whole, self.diagnostics)),
+        };
+        self.push(kind, start, quoted);
+    }
+
+    fn number(&mut self) {
+        let start = self.at;
+        let digit = |c: char| c.is_ascii_digit() || c == '_';
+        self.take_while(digit);
+        // Not the first dot of a range.
+        if self.rest().starts_with('.') && !self.rest().starts_with("..") {
+            self.at += 1;
+            self.take_while(digit);
+        }
+        let exponent = self.rest().strip_prefix(['e', 'E']);
+        if exponent.is_some_and(|e| e.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit())) {
+            self.at += 1;
+            self.take_while(|c| c == '+' || c == '-');
+            self.take_while(digit);
+        }
+        self.take_while(|c| c.is_alphanumeric() || c == '_');
+        let text = self.text[start..self.at].to_owned();
+        let span = self.span(start);
+        let kind = literal_kind(&text, &span, false, self.diagnostics);
+        self.push(kind, start, text);
+    }
+
+    fn symbol(&mut self, c: char) {
+        let start = self.at;
+        let pair = OPERATORS.iter().find(|pair| self.rest().starts_with(**pair));
+        let symbol = pair.map_or_else(|| c.to_string(), |pair| (*pair).to_owned());
+        self.at += symbol.len();
+        if !"#[](){}<>=!&|+-*/^,;:.".contains(c) {
+            let help = "mathematical notation stands in a string: \"‖p − q‖ − L\"";
+            self.error(start, format!("the character `{c}` has no meaning here"), help);
+            return;
+        }
+        self.attribute = match (self.attribute, c) {
+            (Attribute::No, '#') => Attribute::Hash,
+            (Attribute::Hash, '[') => Attribute::Inside(1),
+            (Attribute::Inside(depth), '[') => Attribute::Inside(depth + 1),
+            (Attribute::Inside(1) | Attribute::Hash, _) if c == ']' || self.attribute == Attribute::Hash => {
+                Attribute::No
+            }
+            (Attribute::Inside(depth), ']') => Attribute::Inside(depth - 1),
+            (same, _) => same,
+        };
+        self.push(Kind::Symbol(symbol.clone()), start, symbol);
+    }
+}

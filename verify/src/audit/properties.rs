@@ -1,0 +1,87 @@
+//! Properties that a declaration claims and no proof covers.
+
+use energy_dsl::{Kind, Property};
+
+use super::{Auditor, Check};
+use crate::blocks::{Answer, BlockName, NoAnswer, largest};
+use crate::sample::Sample;
+
+impl Auditor {
+    /// Checks each claim at one input; `turn` is a rotation of vectors.
+    pub(super) fn claims(
+        &mut self,
+        sample: &Sample,
+        answer: &Answer,
+        turn: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> Result<(), NoAnswer> {
+        for property in self.declaration.properties {
+            let (moved, expected) = match property {
+                // Proved when it was compiled.
+                Property::TranslationInvariant => continue,
+                Property::RotationInvariant => (turned(sample, &turn), Expected::Turned),
+                Property::Even => (mirrored(sample), Expected::Same),
+                Property::ZeroForceAtRest => (at_rest(sample), Expected::Zero),
+            };
+            let there = self.answer(&moved)?;
+            let block = compared(self.declaration.kind, expected);
+            let (here, there) = (&answer.block(block).numbers, &there.block(block).numbers);
+            let wanted = match expected {
+                Expected::Turned if block == BlockName::Force => turn(here),
+                Expected::Turned | Expected::Same => here.clone(),
+                Expected::Zero => vec![0.0; here.len()],
+            };
+            let scale = largest(here).max(self.natural_size(sample, answer, block));
+            let worst = there
+                .iter()
+                .zip(&wanted)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0_f64, |m, e| if e > m || e.is_nan() { e } else { m });
+            let error = if worst == 0.0 { 0.0 } else { worst / scale };
+            let declaration = self.declaration;
+            self.record(Check::Claims, block, error, None, || {
+                format!(
+                    "  it claims #[{}], but `{block}` is {there:?} where {wanted:?} was expected, after moving{}",
+                    property.attribute(),
+                    sample.describe(declaration)
+                )
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What a block must be after the points have moved.
+#[derive(Clone, Copy, PartialEq)]
+enum Expected {
+    Same,
+    Turned,
+    Zero,
+}
+
+/// The block that a claim is about.
+fn compared(kind: Kind, expected: Expected) -> BlockName {
+    match (kind, expected) {
+        (Kind::Energy | Kind::Constraint, Expected::Zero) => BlockName::Gradient,
+        // A constraint's rows may turn: its energy ½ k CᵀC does not.
+        (Kind::Energy | Kind::Constraint, _) => BlockName::Energy,
+        (Kind::Force, _) => BlockName::Force,
+        (Kind::Residual, _) => BlockName::Residual,
+    }
+}
+
+fn turned(sample: &Sample, turn: impl Fn(&[f64]) -> Vec<f64>) -> Sample {
+    Sample { positions: turn(&sample.positions), velocities: turn(&sample.velocities), ..sample.clone() }
+}
+
+fn mirrored(sample: &Sample) -> Sample {
+    Sample { positions: sample.positions.iter().map(|x| -x).collect(), ..sample.clone() }
+}
+
+/// The points where the rest shape has them; a plane one lies in the plane z = 0.
+fn at_rest(sample: &Sample) -> Sample {
+    let points = sample.positions.len() / 3;
+    let dimension = sample.rest.len() / points.max(1);
+    let places = sample.rest.chunks(dimension.max(1));
+    let positions = places.flat_map(|place| (0..3).map(|axis| place.get(axis).copied().unwrap_or(0.0))).collect();
+    Sample { positions, velocities: vec![0.0; sample.velocities.len()], ..sample.clone() }
+}
