@@ -94,17 +94,13 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
         }
         Op::Atan2(y, x) => of_atan2(g, y, x),
         Op::Pow(a, b) => of_power(g, node, a, b),
-        Op::FusedMulSub(a, b, c) => {
+        Op::FusedMulSub(a, b, c) => of_product_and_sum(g, (a, b), one, c, -1.0),
+        Op::MulAdd(a, b, c) => of_product_and_sum(g, (a, b), one, c, 1.0),
+        Op::NegMulAdd(a, b, c) => {
             let minus = g.neg(one);
-            if a == b {
-                let slope = g.mul(two, a);
-                return Local::new(vec![a, c], vec![slope, minus], vec![(0, 0, two)]);
-            }
-            Local::new(vec![a, b, c], vec![b, a, minus], vec![(0, 1, one)])
+            of_product_and_sum(g, (a, b), minus, c, 1.0)
         }
-        Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) => {
-            unreachable!("compiler bug: sums fuse when code is written, not before")
-        }
+        Op::MulSub(..) => unreachable!("compiler bug: other sums fuse when code is written, not before"),
         Op::Constant(_)
         | Op::Truth(_)
         | Op::Cautious
@@ -142,6 +138,19 @@ fn of_rule(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
         .filter(|(_, _, entry)| !g.vanishes(entry))
         .collect();
     Local { operands: rule.arguments, first: rule.first, second }
+}
+
+/// sign · a · b + factor · c.
+fn of_product_and_sum(g: &mut Graph, (a, b): (NodeId, NodeId), sign: NodeId, c: NodeId, factor: f64) -> Local {
+    let factor = g.constant(factor);
+    if a == b {
+        let two = g.constant(2.0);
+        let curvature = g.mul(two, sign);
+        let slope = g.mul(curvature, a);
+        return Local::new(vec![a, c], vec![slope, factor], vec![(0, 0, curvature)]);
+    }
+    let (by_a, by_b) = (g.mul(sign, b), g.mul(sign, a));
+    Local::new(vec![a, b, c], vec![by_a, by_b, factor], vec![(0, 1, sign)])
 }
 
 /// `mask ? a : b`, whose derivative chooses likewise.

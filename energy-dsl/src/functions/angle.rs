@@ -154,34 +154,30 @@ pub(crate) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
 /// −c/‖a‖² I − a sᵀ − s aᵀ, s = p/‖a‖² − ½ c a/‖a‖⁴ (likewise for b), and γ (I − a aᵀ/‖a‖²) − p bᵀ/‖b‖².
 fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
     let half = g.constant(0.5);
-    let turned = [g.cross(&at.cross, &at.a), g.cross(&at.b, &at.cross)];
+    let turned = [g.fused_cross(&at.cross, &at.a), g.fused_cross(&at.b, &at.cross)];
     let vectors = [&at.a, &at.b];
     let signed = |g: &mut Graph, node: NodeId, minus: bool| if minus { g.neg(node) } else { node };
+    // Scalars lead the products and vectors follow, so that what weighs a product weighs a scalar.
     let mut first = Vec::new();
-    // Of each vector: its gradient p, its s, and c/‖a‖².
+    // Of each vector: γ/‖a‖² with its sign, s, and c/‖a‖².
     let mut parts = Vec::new();
     for own in 0..2 {
         let factor = g.mul(at.per_both, at.per_square[own]);
-        let gradient = g.scaled(factor, &turned[own]);
-        for &entry in &gradient {
-            let entry = g.mul(at.scales[own], entry);
-            first.push(vec![signed(g, entry, negative)]);
-        }
+        let slope = g.mul(at.scales[own], factor);
+        let slope = signed(g, slope, negative);
+        first.extend(turned[own].iter().map(|&turned| vec![slope, turned]));
         let curvature = g.mul(at.cosine, at.per_square[own]);
         let fourth = g.mul(curvature, at.per_square[own]);
         let fourth = g.mul(half, fourth);
-        let slant: Vec<_> = (0..3)
-            .map(|i| {
-                let (turning, drawing) = (g.mul(at.per_square[own], gradient[i]), g.mul(fourth, vectors[own][i]));
-                let entry = g.sub(turning, drawing);
-                signed(g, entry, !negative)
-            })
-            .collect();
-        parts.push((gradient, slant, signed(g, curvature, !negative)));
+        let turning = g.mul(factor, at.per_square[own]);
+        let (turning, fourth) = if negative { (turning, fourth) } else { (g.neg(turning), g.neg(fourth)) };
+        let slant: Vec<_> =
+            (0..3).map(|i| g.difference_of_products([turning, turned[own][i]], [fourth, vectors[own][i]])).collect();
+        parts.push((factor, slant, signed(g, curvature, !negative)));
     }
-    let inverse = g.mul(at.per_both, at.per_square[0]);
-    let along: Vec<_> = g.scaled(inverse, &at.a).into_iter().map(|x| signed(g, x, !negative)).collect();
-    let across: Vec<_> = g.scaled(at.per_square[1], &parts[0].0).into_iter().map(|x| signed(g, x, !negative)).collect();
+    let along = signed(g, parts[0].0, !negative);
+    let across = g.mul(parts[0].0, at.per_square[1]);
+    let across = signed(g, across, !negative);
     let mixed = signed(g, at.per_both, negative);
 
     let second = upper(6)
@@ -196,7 +192,8 @@ fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Produ
                 }
                 products
             } else {
-                let mut products = vec![vec![along[row], at.a[column]], vec![across[row], at.b[column]]];
+                let mut products =
+                    vec![vec![along, at.a[row], at.a[column]], vec![across, turned[0][row], at.b[column]]];
                 if row == column {
                     products.push(vec![mixed]);
                 }

@@ -111,7 +111,7 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
         let along = g.dot(apex, &e.scaled);
         let along = g.mul(along, per_edge_squared);
         let factor = g.mul(e.length, reciprocal);
-        let across = g.cross(normal, &e.scaled);
+        let across = g.fused_cross(normal, &e.scaled);
         let tangent = g.scaled(factor, &across);
         let reciprocal = if negative { g.neg(reciprocal) } else { reciprocal };
         Wing { normal: g.scaled(reciprocal, normal), tangent, along, aspect: g.mul(aspect_unit, square) }
@@ -192,7 +192,6 @@ fn derivatives(g: &mut Graph, edge: &Direction, wings: &[Wing; 2]) -> (Vec<Produ
         let tau_squared = g.mul(tau, tau);
         let bent = g.add(tau_squared, wing.aspect);
         let slope = g.scaled(minus_length, &wing.normal);
-        let turned = g.scaled(minus_tau, &wing.normal);
         for i in 0..3 {
             first[apex + i] = vec![slope[i]];
             let term = g.mul(minus_tau, slope[i]);
@@ -206,7 +205,7 @@ fn derivatives(g: &mut Graph, edge: &Direction, wings: &[Wing; 2]) -> (Vec<Produ
             second[place(apex + i, apex + j)].extend(symmetric(i, j, &[]));
             let at = place(i, j);
             second[at].extend(symmetric(i, j, &[bent]));
-            second[at].extend([vec![turned[i], edge.unit[j]], vec![turned[j], edge.unit[i]]]);
+            second[at].extend([(i, j), (j, i)].map(|(i, j)| vec![minus_tau, wing.normal[i], edge.unit[j]]));
         }
         for i in 0..3 {
             for j in 0..3 {

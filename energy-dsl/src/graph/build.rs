@@ -413,6 +413,23 @@ impl Graph {
         self.signed(difference, negative)
     }
 
+    /// a · b − c · d with one of the products fused, for where it need not be 0 when both are equal.
+    pub fn difference_of_products(&mut self, [a, b]: [NodeId; 2], [c, d]: [NodeId; 2]) -> NodeId {
+        let product = self.mul(a, b);
+        self.neg_mul_add(c, d, product)
+    }
+
+    /// c − a · b, fused.
+    pub(crate) fn neg_mul_add(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
+        if self.is(c, 0.0) || self.as_constant(a).or(self.as_constant(b)).is_some() {
+            let product = self.mul(a, b);
+            return self.sub(c, product);
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let (a, b) = (a.min(b), a.max(b));
+        if minus_a == minus_b { self.node(Op::NegMulAdd(a, b, c)) } else { self.node(Op::MulAdd(a, b, c)) }
+    }
+
     /// a − b², b being √a rounded.
     pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::RootError(a, b))
@@ -518,6 +535,14 @@ impl Graph {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             let (plus, minus) = (self.mul(a[j], b[k]), self.mul(a[k], b[j]));
             self.sub(plus, minus)
+        })
+    }
+
+    /// a × b with fused products: more exact where it does not vanish, but not exactly 0 where it should.
+    pub fn fused_cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            self.difference_of_products([a[j], b[k]], [a[k], b[j]])
         })
     }
 

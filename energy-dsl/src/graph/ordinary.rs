@@ -153,9 +153,13 @@ impl Path {
             Op::Or(a, b) => g.or(d(a), d(b)),
             Op::Not(a) => g.not(d(a)),
             Op::Select(..) => unreachable!("above"),
-            Op::Rule(_) | Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) => {
-                unreachable!("compiler bug: resolved, and not yet fused")
+            Op::MulAdd(a, b, c) => {
+                let [a, b, c] = [a, b, c].map(d);
+                let minus = g.neg(a);
+                g.neg_mul_add(minus, b, c)
             }
+            Op::NegMulAdd(a, b, c) => g.neg_mul_add(d(a), d(b), d(c)),
+            Op::Rule(_) | Op::MulSub(..) => unreachable!("compiler bug: resolved, and not yet fused"),
         }
     }
 }
