@@ -1,7 +1,7 @@
 //! Evaluates a graph over any number type: doubles, dual numbers, multi-precision. The audit's way in.
 
 use crate::graph::{Graph, Input, NodeId, Op, reachable};
-use crate::runtime::{Inputs, Number};
+use crate::runtime::{Baseline, Inputs, Mask, Number};
 
 #[derive(Clone)]
 enum Computed<T: Number> {
@@ -40,9 +40,9 @@ fn compute<T: Number>(
 ) -> Computed<T> {
     let n = |node| number(graph, values, node);
     let m = |node| mask::<T>(graph, values, node);
-    Computed::Number(match graph.op(node) {
+    Computed::Number(match graph.fused(node) {
         Op::Constant(bits) => T::from_f64(f64::from_bits(bits)),
-        Op::Pi => T::from_f64(0.0).atan2(T::from_f64(-1.0)),
+        Op::Pi => T::from_f64(0.0).atan2::<Baseline>(T::from_f64(-1.0)),
         Op::Input(input) => read(input, inputs),
         Op::Neg(a) => -n(a),
         Op::Add(a, b) => n(a) + n(b),
@@ -53,20 +53,28 @@ fn compute<T: Number>(
         Op::Abs(a) => n(a).abs(),
         Op::Min(a, b) => n(a).min(n(b)),
         Op::Max(a, b) => n(a).max(n(b)),
-        Op::Sin(a) => n(a).sin(),
-        Op::Cos(a) => n(a).cos(),
-        Op::Exp(a) => n(a).exp(),
-        Op::Ln(a) => n(a).ln(),
-        Op::Atan2(a, b) => n(a).atan2(n(b)),
-        Op::Pow(a, b) => n(a).powf(n(b)),
+        Op::Sin(a) => n(a).sin::<Baseline>(),
+        Op::Cos(a) => n(a).cos::<Baseline>(),
+        Op::Exp(a) => n(a).exp::<Baseline>(),
+        Op::Ln(a) => n(a).ln::<Baseline>(),
+        Op::Atan2(a, b) => n(a).atan2::<Baseline>(n(b)),
+        Op::Pow(a, b) => n(a).powf::<Baseline>(n(b)),
         Op::SumError(a, b) => n(a).sum_error(n(b)),
         Op::DifferenceError(a, b) => n(a).sum_error(-n(b)),
-        Op::ProductError(a, b) => n(a).product_error(n(b)),
+        Op::ProductError(a, b) => n(a).product_error::<Baseline>(n(b)),
+        Op::FusedMulSub(a, b, c) => n(a).fused_mul_sub::<Baseline>(n(b), n(c)),
+        Op::RootError(a, b) => n(a).root_error::<Baseline>(n(b)),
+        Op::MulAdd(a, b, c) => n(a) * n(b) + n(c),
+        Op::MulSub(a, b, c) => n(a) * n(b) - n(c),
+        Op::NegMulAdd(a, b, c) => n(c) - n(a) * n(b),
         Op::PowerOfTwoScale(a) => n(a).power_of_two_scale(),
         Op::Select(mask, a, b) => T::select(m(mask), n(a), n(b)),
         Op::Less(a, b) => return Computed::Mask(n(a).less(n(b))),
         Op::LessOrEqual(a, b) => return Computed::Mask(n(a).less_or_equal(n(b))),
         Op::Equal(a, b) => return Computed::Mask(n(a).equal(n(b))),
+        Op::IsModerate(a, degree) => return Computed::Mask(n(a).is_moderate(degree)),
+        Op::Cautious => return Computed::Mask(!T::Mask::none()),
+        Op::Truth(value) => return Computed::Mask(if value { !T::Mask::none() } else { T::Mask::none() }),
         Op::And(a, b) => return Computed::Mask(m(a) & m(b)),
         Op::Or(a, b) => return Computed::Mask(m(a) | m(b)),
         Op::Not(a) => return Computed::Mask(!m(a)),

@@ -11,7 +11,7 @@
 //! elements ([`Potential`], [`ForceLaw`], [`Constraint`], [`Residual`]) and their self-description ([`Declaration`]).
 //!
 #![doc = include_str!("../LANGUAGE.md")]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 extern crate self as energy_dsl;
 
@@ -32,6 +32,8 @@ mod graph;
 #[cfg(feature = "compiler")]
 mod interpret;
 #[cfg(feature = "compiler")]
+mod listing;
+#[cfg(feature = "compiler")]
 mod lower;
 #[cfg(feature = "compiler")]
 mod properties;
@@ -49,10 +51,13 @@ pub use diagnostic::{Diagnostic, Diagnostics};
 #[cfg(feature = "compiler")]
 pub use functions::{Function, all as functions};
 #[cfg(feature = "compiler")]
+pub use listing::Listing;
+#[cfg(feature = "compiler")]
 pub use textbook::Textbook;
 
 /// Compiles declarations to Rust: the whole of what `energy!` does. Errors become `compile_error!` at their places, beside
-/// stubs of what was declared.
+/// stubs of what was declared. Where the environment variable `ENERGY_DUMP_DIR` names a folder, the code of each declaration is
+/// also written to a file there, laid out for reading.
 ///
 /// ```
 /// let code = energy_dsl::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());
@@ -79,11 +84,19 @@ pub fn compile_file(text: &str, file: &str, at: proc_macro2::Span) -> proc_macro
 #[cfg(feature = "compiler")]
 fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> proc_macro2::TokenStream {
     let programs = check::check(items, &mut diagnostics);
+    let folder = std::env::var_os("ENERGY_DUMP_DIR").map(std::path::PathBuf::from);
     let mut code = proc_macro2::TokenStream::new();
     for program in &programs {
         let routines = routines::differentiate(program);
         properties::prove(program, &routines, &mut diagnostics);
-        code.extend(emit::emit(program, &routines));
+        let items = emit::emit(program, &routines);
+        if let Some(folder) = &folder
+            && let Err(error) = listing::dump(folder, &program.name, &items)
+        {
+            let message = format!("ENERGY_DUMP_DIR: cannot write {} to {}: {error}", program.name, folder.display());
+            diagnostics.push(Diagnostic::new(&program.span, message));
+        }
+        code.extend(items);
     }
     let errors: proc_macro2::TokenStream =
         diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error()).collect();

@@ -3,7 +3,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use energy_dsl::Number;
+use energy_dsl::{Level, Number};
 use num_dual::{DualNum, HyperDual64};
 
 /// a + b ε₁ + c ε₂ + d ε₁ε₂ with ε₁² = ε₂² = 0: carries a value, two first derivatives and their mixed second one.
@@ -69,29 +69,32 @@ impl Number for Hyper {
     fn max(self, other: Self) -> Self {
         if other.0.re > self.0.re { other } else { self }
     }
-    fn sin(self) -> Self {
+    fn sin<L: Level>(self) -> Self {
         Self(self.0.sin())
     }
-    fn cos(self) -> Self {
+    fn cos<L: Level>(self) -> Self {
         Self(self.0.cos())
     }
-    fn exp(self) -> Self {
+    fn exp<L: Level>(self) -> Self {
         Self(self.0.exp())
     }
-    fn ln(self) -> Self {
+    fn ln<L: Level>(self) -> Self {
         Self(self.0.ln())
     }
-    fn atan2(self, x: Self) -> Self {
+    fn atan2<L: Level>(self, x: Self) -> Self {
         Self(self.0.atan2(x.0))
     }
-    fn powf(self, exponent: Self) -> Self {
+    fn powf<L: Level>(self, exponent: Self) -> Self {
         // A constant exponent allows a base that is negative or zero, which exp(e ln x) does not.
         if exponent.is_constant() { Self(self.0.powf(exponent.0.re)) } else { Self(self.0.powd(exponent.0)) }
     }
     fn sum_error(self, _other: Self) -> Self {
         Self::constant(0.0)
     }
-    fn product_error(self, _other: Self) -> Self {
+    fn product_error<L: Level>(self, _other: Self) -> Self {
+        Self::constant(0.0)
+    }
+    fn root_error<L: Level>(self, _root: Self) -> Self {
         Self::constant(0.0)
     }
     fn power_of_two_scale(self) -> Self {
@@ -113,6 +116,8 @@ impl Number for Hyper {
 
 #[cfg(test)]
 mod tests {
+    use energy_dsl::Baseline;
+
     use super::*;
 
     /// At (3, 4), by hand: f = atan2(y, x) has f_x = −y/r², f_xy = (y² − x²)/r⁴.
@@ -120,7 +125,7 @@ mod tests {
     fn second_derivatives_of_the_angle_of_a_point() {
         let x = Hyper::variable(3.0, true, false);
         let y = Hyper::variable(4.0, false, true);
-        let angle = y.atan2(x).0;
+        let angle = y.atan2::<Baseline>(x).0;
         assert!((angle.re - 4.0_f64.atan2(3.0)).abs() < 1e-15);
         assert!((angle.eps1 + 4.0 / 25.0).abs() < 1e-15, "{angle:?}");
         assert!((angle.eps2 - 3.0 / 25.0).abs() < 1e-15, "{angle:?}");
@@ -130,7 +135,7 @@ mod tests {
     #[test]
     fn powers_and_selections() {
         let x = Hyper::variable(-2.0, true, true);
-        let cube = x.powf(Hyper::constant(3.0)).0;
+        let cube = x.powf::<Baseline>(Hyper::constant(3.0)).0;
         assert_eq!((cube.re, cube.eps1, cube.eps1eps2), (-8.0, 12.0, -12.0));
         let magnitude = x.abs().0;
         assert_eq!((magnitude.re, magnitude.eps1), (2.0, -1.0));

@@ -20,10 +20,12 @@ pub mod dual;
 mod finite_difference;
 mod formula;
 mod geometry;
+mod listings;
 pub mod reference;
 mod sample;
 
 pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
+pub use listings::listings;
 pub use sample::Sample;

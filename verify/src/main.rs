@@ -49,6 +49,17 @@ enum Command {
         #[arg(long)]
         strict: bool,
     },
+    /// Print the code generated for an element.
+    Show {
+        /// An element's name, or a file of declarations (`.energy`).
+        name: String,
+        /// One routine only: `value`, `gradient`, `hessian`, ….
+        #[arg(long)]
+        routine: Option<String>,
+        /// Instead of code, the routes to each routine's derivatives: their operations, and which was taken.
+        #[arg(long, conflicts_with = "routine")]
+        plan: bool,
+    },
     /// Evaluate the records of a file and write them with the results, 17 digits, and flags.
     Eval {
         /// A `potref-1` or `potref-policy-1` file.
@@ -89,6 +100,22 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let beyond = report.lines.iter().any(|l| !l.beyond_tier_a.is_empty() || !l.beyond_tier_b.is_empty());
             let policy = report.policy.iter().all(|line| line.passed != Some(false));
             Ok(!nan && policy && !(strict && beyond))
+        }
+        Command::Show { name, routine, plan } => {
+            for listing in verify::listings(&name)? {
+                match &routine {
+                    _ if plan => print!("{}", listing.plans()),
+                    None => print!("{}", listing.code()),
+                    Some(routine) => {
+                        let code = listing.routine(routine).with_context(|| {
+                            let known = listing.routines().join(", ");
+                            format!("{} has no routine `{routine}`; it has {known}", listing.name())
+                        })?;
+                        print!("{code}");
+                    }
+                }
+            }
+            Ok(true)
         }
         Command::Eval { records, output } => {
             let count = evaluate_file(&records, &output)?;

@@ -1,3 +1,5 @@
+//! Derivatives that flow back from the outputs.
+
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
@@ -6,16 +8,24 @@ use super::forward::{Sparse, products, tangents};
 use super::local::local;
 use crate::graph::{Graph, NodeId, Op};
 
-/// Derivatives of the output by every node it is made of.
-fn adjoints(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<NodeId, NodeId> {
-    let mut adjoints = BTreeMap::new();
-    adjoints.insert(output, g.constant(1.0));
-    for node in differentiable(g, &[output], true).into_iter().rev() {
+/// Nodes and what each is weighed by.
+pub(super) type Weighted = BTreeMap<NodeId, NodeId>;
+
+/// Σ weight · output as one weighted node.
+pub(super) fn alone(g: &mut Graph, output: NodeId) -> Weighted {
+    BTreeMap::from([(output, g.constant(1.0))])
+}
+
+/// Derivatives of Σ weight · output by every node the outputs are made of.
+fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second_order: bool) -> Weighted {
+    let mut adjoints = outputs.clone();
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    for node in differentiable(g, &roots, second_order).into_iter().rev() {
         let Some(&weight) = adjoints.get(&node) else { continue };
         if coordinates.seeds.contains_key(&node) {
             continue;
         }
-        let local = local(g, node, true);
+        let local = local(g, node, second_order);
         for (operand, first) in local.operands.into_iter().zip(local.first) {
             if !g.varies(operand) {
                 continue;
@@ -31,9 +41,29 @@ fn adjoints(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMa
     adjoints
 }
 
-/// ∇U by reverse accumulation.
-pub(super) fn gradient(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> Vec<NodeId> {
-    let adjoints = adjoints(g, output, coordinates);
+/// Whether reverse accumulation is right, on the ordinary path or everywhere. Through a selection it multiplies the derivative of
+/// the other branch, which may be infinite, by zero; unless it is known which branch is taken.
+pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], second_order: bool, everywhere: bool) -> bool {
+    let nodes = differentiable(g, roots, second_order);
+    nodes.into_iter().all(|node| match g.op(node) {
+        Op::Select(mask, ..) => !everywhere && g.is_decided(mask),
+        Op::Min(..) | Op::Max(..) => false,
+        _ => true,
+    })
+}
+
+/// Σ weight · ∇output by reverse accumulation. `None` where it is not safe on the ordinary path.
+pub(super) fn gradient(
+    g: &mut Graph,
+    outputs: &Weighted,
+    coordinates: &Coordinates,
+    second_order: bool,
+) -> Option<Vec<NodeId>> {
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    if !is_safe(g, &roots, second_order, false) {
+        return None;
+    }
+    let adjoints = adjoints(g, outputs, coordinates, second_order);
     let mut gradient = vec![g.constant(0.0); coordinates.len()];
     for (node, seeds) in &coordinates.seeds {
         let Some(&weight) = adjoints.get(node) else { continue };
@@ -42,23 +72,24 @@ pub(super) fn gradient(g: &mut Graph, output: NodeId, coordinates: &Coordinates)
             gradient[c] = g.add(gradient[c], term);
         }
     }
-    gradient
+    Some(gradient)
 }
 
-/// ∇²U = Σ over nodes v of ∂U/∂v Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where a selection could
-/// multiply an infinite branch by zero.
+/// Σ weight · ∇²output = Σ over nodes v of the adjoint of v times Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where
+/// it is not safe on the ordinary path.
 pub(super) fn second_derivatives(
     g: &mut Graph,
-    output: NodeId,
+    outputs: &Weighted,
     coordinates: &Coordinates,
 ) -> Option<BTreeMap<usize, NodeId>> {
-    let nodes = differentiable(g, &[output], true);
-    if nodes.iter().any(|&node| matches!(g.op(node), Op::Select(..) | Op::Min(..) | Op::Max(..))) {
+    let roots: Vec<NodeId> = outputs.keys().copied().collect();
+    if !is_safe(g, &roots, true, false) {
         return None;
     }
+    let nodes = differentiable(g, &roots, true);
     let n = coordinates.len();
-    let tangents = tangents(g, &[output], coordinates, true);
-    let adjoints = adjoints(g, output, coordinates);
+    let tangents = tangents(g, &roots, coordinates, true);
+    let adjoints = adjoints(g, outputs, coordinates, true);
     let mut hessian: BTreeMap<usize, NodeId> = BTreeMap::new();
     let none = Sparse::new();
     for node in nodes {

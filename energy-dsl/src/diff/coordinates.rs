@@ -47,6 +47,14 @@ impl Coordinates {
         Self { seeds, vectors, components: 1, translation_invariant: false }
     }
 
+    /// Each of `nodes` is its own coordinate.
+    pub(super) fn of_nodes(g: &mut Graph, nodes: &[NodeId]) -> Self {
+        let one = g.constant(1.0);
+        let seeds = nodes.iter().enumerate().map(|(number, &node)| (node, vec![(number, one)])).collect();
+        let vectors = (0..nodes.len()).map(|number| vec![(number, true)]).collect();
+        Self { seeds, vectors, components: 1, translation_invariant: false }
+    }
+
     /// Finds the differences of points through which `outputs` see them.
     pub fn of_points(g: &mut Graph, outputs: &[NodeId], moving: Moving) -> Self {
         let coordinate = |g: &Graph, node: NodeId| match (g.op(node), moving) {

@@ -94,12 +94,27 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
         }
         Op::Atan2(y, x) => of_atan2(g, y, x),
         Op::Pow(a, b) => of_power(g, node, a, b),
+        Op::FusedMulSub(a, b, c) => {
+            let minus = g.neg(one);
+            if a == b {
+                let slope = g.mul(two, a);
+                return Local::new(vec![a, c], vec![slope, minus], vec![(0, 0, two)]);
+            }
+            Local::new(vec![a, b, c], vec![b, a, minus], vec![(0, 1, one)])
+        }
+        Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) => {
+            unreachable!("compiler bug: sums fuse when code is written, not before")
+        }
         Op::Constant(_)
+        | Op::Truth(_)
+        | Op::Cautious
         | Op::Pi
         | Op::Input(_)
         | Op::SumError(..)
         | Op::DifferenceError(..)
         | Op::ProductError(..)
+        | Op::RootError(..)
+        | Op::IsModerate(..)
         | Op::PowerOfTwoScale(_)
         | Op::Less(..)
         | Op::LessOrEqual(..)

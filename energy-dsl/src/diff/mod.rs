@@ -1,11 +1,13 @@
 //! Derivatives of graph nodes, as nodes of the same graph.
 //!
 //! Inputs are first *reduced*: where points enter only through differences, derivatives are taken by those differences
-//! (`coordinates.rs`). First derivatives go forward as sparse dual parts (`forward.rs`); second derivatives either forward
-//! too, or weighted by adjoints (`adjoint.rs`): `plan.rs` takes whichever needs less arithmetic.
+//! (`coordinates.rs`). First derivatives go forward as sparse dual parts (`forward.rs`) or back from the outputs
+//! (`adjoint.rs`); second derivatives forward too, weighted by adjoints, or gathered at a few primitives (`cut.rs`):
+//! `plan.rs` takes whichever costs least.
 
 mod adjoint;
 mod coordinates;
+mod cut;
 mod expand;
 mod forward;
 mod local;
@@ -13,14 +15,14 @@ mod plan;
 
 pub use coordinates::{Coordinates, Moving};
 pub use forward::first_derivatives;
-pub use plan::{SecondOrder, second_order};
+pub use plan::{Plan, SecondOrder, first_order, second_order};
 
 use std::collections::BTreeSet;
 
-use crate::graph::{Graph, NodeId};
+use crate::graph::{Graph, NodeId, Op};
 
 /// The nodes through which `outputs` depend on what moves, in topological order. A rule leads on to its arguments, or to its
-/// value where only that can be differentiated.
+/// value where only that can be differentiated; masks and rounding errors have no derivatives.
 fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack: Vec<NodeId> = outputs.to_vec();
@@ -31,7 +33,11 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTre
         match graph.rule(node) {
             Some(rule) if second_order && rule.second.is_none() => stack.push(rule.value),
             Some(rule) => stack.extend(&rule.arguments),
-            None => stack.extend(graph.op(node).operands()),
+            None => match graph.op(node) {
+                Op::Select(_, yes, no) => stack.extend([yes, no]),
+                op if op.is_mask() || op.is_constant_in_exact_arithmetic() => {}
+                op => stack.extend(op.operands()),
+            },
         }
     }
     seen

@@ -24,6 +24,10 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let rows = program.rows();
     let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
     let Character { curved, velocity_dependent, symmetric } = character(program, routines);
+    let vectors = routines.vectors.iter().map(|vector| {
+        let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
+        quote!(&[#(#ends),*])
+    });
     let primitives = &routines.primitives;
     let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
     let list = routines.list.iter().map(|r| routine(&routines.graph, r));
@@ -44,6 +48,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             velocity_dependent: #velocity_dependent,
             symmetric: #symmetric,
             reduced_coordinates: #coordinates,
+            reduced_vectors: &[#(#vectors),*],
             primitives: &[#(#primitives),*],
             routines: &[#(#list),*],
         }
@@ -93,10 +98,11 @@ fn routine(graph: &Graph, routine: &Routine) -> TokenStream {
 }
 
 fn counted(graph: &Graph, outputs: &[NodeId]) -> TokenStream {
-    let OperationCount { basic, divisions_and_roots, transcendental, error_terms } = count(graph, outputs);
+    let OperationCount { basic, fused, divisions_and_roots, transcendental, error_terms } = count(graph, outputs);
     quote! {
         ::energy_dsl::OperationCount {
             basic: #basic,
+            fused: #fused,
             divisions_and_roots: #divisions_and_roots,
             transcendental: #transcendental,
             error_terms: #error_terms,

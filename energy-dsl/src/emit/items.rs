@@ -2,10 +2,11 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::declaration::declaration;
-use super::schedule::{Reader, Schedule};
+use super::methods::{component, traits};
+use super::schedule::Schedule;
 use crate::check::{Input as DeclaredInput, Program};
-use crate::graph::{Input, NodeId, count};
-use crate::routines::{Routine, Routines};
+use crate::graph::{Input, count};
+use crate::routines::Routines;
 use crate::runtime::Kind;
 
 /// The type, its constructor, its traits, and its test if one was asked for.
@@ -15,18 +16,10 @@ pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
     let structure = structure(&name, program, routines);
     let constructor = constructor(&name, program, routines);
     let element = element(&name, program, routines);
-    let traits = match program.kind {
-        Kind::Energy => potential(&name, program, routines),
-        Kind::Force => force_law(&name, program, routines),
-        Kind::Constraint => {
-            let (potential, force) = (potential(&name, program, routines), force_law(&name, program, routines));
-            let constraint = constraint(&name, program, routines);
-            quote!(#potential #force #constraint)
-        }
-        Kind::Residual => residual(&name, program, routines),
-    };
+    let traits = traits(&name, program, routines);
+    let packed = packed(&name, program, routines);
     let test = audit_test(&name, program);
-    quote!(#structure #constructor #element #traits #test)
+    quote!(#structure #constructor #element #traits #packed #test)
 }
 
 fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
@@ -120,18 +113,32 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         let precomputed = schedule.array(&routines.rest.outputs);
         let degenerate = schedule.mask(routines.rest_flags[0]);
         let statements = schedule.statements();
+        let inputs = || program.rest.iter().chain(&program.parameters);
+        let names: Vec<_> = inputs().map(|input| format_ident!("{}", input.name)).collect();
+        let types = inputs().map(input_type);
+        // At the level of the routines: what the rest shape and the moving points both determine must come out equal.
         let body = quote! {
-            #statements
-            let precomputed = #precomputed;
-            let mut sound = !(#degenerate);
-            for value in precomputed {
-                // Neither infinite nor NaN.
-                sound = sound & (value - value).equal(T::from_f64(0.0));
+            struct New<T>(#(#types),*);
+            impl<T: ::energy_dsl::Real> ::energy_dsl::Kernel for New<T> {
+                type Output = ::core::result::Result<#name<T>, ::energy_dsl::RestError>;
+
+                #[inline(always)]
+                fn run<L: ::energy_dsl::Level>(self) -> Self::Output {
+                    let New(#(#names),*) = self;
+                    #statements
+                    let precomputed = #precomputed;
+                    let mut sound = !(#degenerate);
+                    for value in precomputed {
+                        // Neither infinite nor NaN.
+                        sound = sound & (value - value).equal(T::from_f64(0.0));
+                    }
+                    if ::energy_dsl::Mask::any(!sound) {
+                        return Err(::energy_dsl::RestError { element: #element });
+                    }
+                    Ok(#name { #(#fields,)* precomputed })
+                }
             }
-            if ::energy_dsl::Mask::any(!sound) {
-                return Err(::energy_dsl::RestError { element: #element });
-            }
-            Ok(Self { #(#fields,)* precomputed })
+            T::dispatch(New(#(#names),*))
         };
         let result = quote!(::core::result::Result<Self, ::energy_dsl::RestError>);
         (result, body, quote!(Self::new(#(#values),*)))
@@ -168,25 +175,6 @@ fn read_input(rest: &[DeclaredInput], parameters: &[DeclaredInput], input: Input
     component(list, number, &quote!())
 }
 
-/// The component with a number among the inputs, each read as `prefix name`.
-fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenStream) -> TokenStream {
-    let input = inputs
-        .iter()
-        .find(|i| (i.first..i.first + i.input_type.size()).contains(&number))
-        .expect("compiler bug: inputs are numbered without gaps");
-    let name = format_ident!("{}", input.name);
-    let mut place = number - input.first;
-    let mut size = input.input_type.size();
-    let mut read = quote!(#prefix #name);
-    for length in input.input_type.dimensions() {
-        size /= length;
-        let index = place / size;
-        read.extend(quote!([#index]));
-        place %= size;
-    }
-    read
-}
-
 fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     let declaration = declaration(program, routines);
     let evaluate = format_ident!(
@@ -213,215 +201,70 @@ fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream 
     }
 }
 
-/// What turns a group of outputs into an expression.
-type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
-
-const NUMBER: Layout = |schedule, nodes| schedule.value(nodes[0]);
-const NUMBERS: Layout = |schedule, nodes| schedule.array(nodes);
-const VECTORS: Layout = |schedule, nodes| schedule.vectors(nodes);
-const BLOCKS: Layout = |schedule, nodes| schedule.blocks(nodes);
-
-/// The body of a method: statements, then the struct it returns.
-fn body(program: &Program, routines: &Routines, name: &str, result: &str, fields: &[(&str, Layout)]) -> TokenStream {
-    let routine: &Routine =
-        routines.list.iter().find(|r| r.name == name).expect("compiler bug: a routine of another kind of declaration");
-    let unknowns = program.kind == Kind::Residual;
-    let read = |input: Input| match input {
-        Input::Position(i) if unknowns => {
-            let i = usize::from(i);
-            quote!(u[#i])
+/// Elements as plain numbers, and side by side in lanes.
+fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    // The fields with their places, number by number.
+    let mut stores = Vec::new();
+    let mut loads = Vec::new();
+    let mut number = 0usize;
+    let mut field = |field: &Ident, dimensions: &[usize]| {
+        let size: usize = dimensions.iter().product();
+        let mut reads = Vec::with_capacity(size);
+        for place in 0..size {
+            let (mut rest, mut left) = (place, size);
+            let mut indices = TokenStream::new();
+            for length in dimensions {
+                left /= length;
+                let index = rest / left;
+                indices.extend(quote!([#index]));
+                rest %= left;
+            }
+            stores.push(quote!(numbers[#number * stride] = self.#field #indices;));
+            reads.push(quote!(V::load(&numbers[#number * stride..])));
+            number += 1;
         }
-        Input::Position(i) => {
-            let (point, axis) = (usize::from(i) / 3, usize::from(i) % 3);
-            quote!(x[#point][#axis])
+        for &length in dimensions.iter().rev() {
+            reads = reads.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
         }
-        Input::Velocity(i) => {
-            let (point, axis) = (usize::from(i) / 3, usize::from(i) % 3);
-            quote!(v[#point][#axis])
-        }
-        Input::Parameter(i) => component(&program.parameters, usize::from(i), &quote!(self.)),
-        Input::Precomputed(i) => {
-            let i = usize::from(i);
-            quote!(self.precomputed[#i])
-        }
-        Input::Rest(_) => unreachable!("compiler bug: the rest shape is read when an element is made"),
+        loads.push(quote!(#field: #(#reads)*,));
     };
-    let reader: Reader<'_> = &read;
-    let mut schedule = Schedule::new(&routines.graph, reader);
-    let mut values = Vec::new();
-    for ((field, layout), nodes) in fields.iter().zip(&routine.groups) {
-        let (field, value) = (format_ident!("{field}"), layout(&mut schedule, nodes));
-        values.push(quote!(#field: #value));
+    for parameter in &program.parameters {
+        field(&format_ident!("{}", parameter.name), &parameter.input_type.dimensions());
     }
-    let (degenerate, kink) = (schedule.mask(routine.flags[0]), schedule.mask(routine.flags[1]));
-    let statements = schedule.statements();
-    let result = format_ident!("{result}");
-    quote! {
-        #statements
-        ::energy_dsl::#result { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }
+    if !routines.rest.outputs.is_empty() {
+        field(&format_ident!("precomputed"), &[routines.rest.outputs.len()]);
     }
-}
+    let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData,));
+    let traits = match program.kind {
+        Kind::Energy => vec!["PackedPotential"],
+        Kind::Constraint => vec!["PackedPotential", "PackedForce"],
+        Kind::Force => vec!["PackedForce"],
+        Kind::Residual => vec!["PackedResidual"],
+    };
+    let over_lanes = traits.into_iter().map(|packed| {
+        let packed = format_ident!("{packed}");
+        quote! {
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<S: ::energy_dsl::Real> ::energy_dsl::#packed<S> for #name<S> {
+                type Wide<V: ::energy_dsl::Lane<S>> = #name<V>;
 
-/// Generated arithmetic is not written to be read by lints.
-fn allowances() -> TokenStream {
-    quote!(#[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)])
-}
-
-fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let points = program.points();
-    let blocks = points * (points + 1) / 2;
-    let value = body(program, routines, "value", "Value", &[("value", NUMBER)]);
-    let gradient = body(program, routines, "gradient", "Gradient", &[("value", NUMBER), ("gradient", VECTORS)]);
-    let hessian =
-        body(program, routines, "hessian", "Hessian", &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)]);
-    let allowances = allowances();
-    quote! {
-        #allowances
-        impl<T: ::energy_dsl::Real> ::energy_dsl::Potential<T> for #name<T> {
-            type Points = [::energy_dsl::Vector3<T>; #points];
-            type Triangle = [::energy_dsl::Block<T>; #blocks];
-
-            #[inline]
-            fn value(&self, x: &Self::Points) -> ::energy_dsl::Value<T> {
-                #value
-            }
-
-            #[inline]
-            fn gradient(&self, x: &Self::Points) -> ::energy_dsl::Gradient<T, Self::Points> {
-                #gradient
-            }
-
-            #[inline]
-            fn hessian(&self, x: &Self::Points) -> ::energy_dsl::Hessian<T, Self::Points, Self::Triangle> {
-                #hessian
+                #[inline(always)]
+                fn load<V: ::energy_dsl::Lane<S>>(numbers: &[S], stride: usize) -> #name<V> {
+                    #name { #(#loads)* #marker }
+                }
             }
         }
-    }
-}
-
-fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let points = program.points();
-    let blocks = points * points;
-    let force = body(program, routines, "force", "ForceValue", &[("force", VECTORS)]);
-    let jacobians = body(
-        program,
-        routines,
-        "jacobians",
-        "ForceJacobians",
-        &[("force", VECTORS), ("by_position", BLOCKS), ("by_velocity", BLOCKS)],
-    );
-    let allowances = allowances();
+    });
     quote! {
-        #allowances
-        impl<T: ::energy_dsl::Real> ::energy_dsl::ForceLaw<T> for #name<T> {
-            type Points = [::energy_dsl::Vector3<T>; #points];
-            type Square = [::energy_dsl::Block<T>; #blocks];
+        #[allow(unused_variables, clippy::all, clippy::pedantic)]
+        impl<S: ::energy_dsl::Real> ::energy_dsl::Stored<S> for #name<S> {
+            const NUMBERS: usize = #number;
 
-            #[inline]
-            fn force(
-                &self,
-                x: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
-                v: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
-            ) -> ::energy_dsl::ForceValue<T, <Self as ::energy_dsl::ForceLaw<T>>::Points> {
-                #force
-            }
-
-            #[inline]
-            fn jacobians(
-                &self,
-                x: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
-                v: &<Self as ::energy_dsl::ForceLaw<T>>::Points,
-            ) -> ::energy_dsl::ForceJacobians<T, <Self as ::energy_dsl::ForceLaw<T>>::Points, Self::Square> {
-                #jacobians
+            fn store(&self, numbers: &mut [S], stride: usize) {
+                #(#stores)*
             }
         }
-    }
-}
-
-fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let (points, rows) = (program.points(), program.rows());
-    let (vectors, blocks) = (rows * points, rows * points * (points + 1) / 2);
-    let jacobian = body(
-        program,
-        routines,
-        "constraint_jacobian",
-        "ConstraintJacobian",
-        &[("value", NUMBERS), ("jacobian", VECTORS)],
-    );
-    let hessian = body(
-        program,
-        routines,
-        "constraint_hessian",
-        "ConstraintHessian",
-        &[("value", NUMBERS), ("jacobian", VECTORS), ("hessians", BLOCKS)],
-    );
-    let gauss_newton = body(
-        program,
-        routines,
-        "gauss_newton",
-        "Hessian",
-        &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
-    );
-    let points_type = quote!(<Self as ::energy_dsl::Potential<T>>::Points);
-    let allowances = allowances();
-    quote! {
-        #allowances
-        impl<T: ::energy_dsl::Real> ::energy_dsl::Constraint<T> for #name<T> {
-            type Rows = [T; #rows];
-            type Jacobian = [::energy_dsl::Vector3<T>; #vectors];
-            type Triangles = [::energy_dsl::Block<T>; #blocks];
-
-            #[inline]
-            fn constraint_jacobian(
-                &self,
-                x: &#points_type,
-            ) -> ::energy_dsl::ConstraintJacobian<T, Self::Rows, Self::Jacobian> {
-                #jacobian
-            }
-
-            #[inline]
-            fn constraint_hessian(
-                &self,
-                x: &#points_type,
-            ) -> ::energy_dsl::ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles> {
-                #hessian
-            }
-
-            #[inline]
-            fn gauss_newton(
-                &self,
-                x: &#points_type,
-            ) -> ::energy_dsl::Hessian<T, #points_type, <Self as ::energy_dsl::Potential<T>>::Triangle> {
-                #gauss_newton
-            }
-        }
-    }
-}
-
-fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let (unknowns, rows) = (program.moving_size(), program.rows());
-    let entries = unknowns * rows;
-    let value = body(program, routines, "residual", "ResidualValue", &[("value", NUMBERS)]);
-    let jacobian =
-        body(program, routines, "jacobian", "ResidualJacobian", &[("value", NUMBERS), ("jacobian", NUMBERS)]);
-    let allowances = allowances();
-    quote! {
-        #allowances
-        impl<T: ::energy_dsl::Real> ::energy_dsl::Residual<T> for #name<T> {
-            type Unknowns = [T; #unknowns];
-            type Rows = [T; #rows];
-            type Jacobian = [T; #entries];
-
-            #[inline]
-            fn residual(&self, u: &Self::Unknowns) -> ::energy_dsl::ResidualValue<T, Self::Rows> {
-                #value
-            }
-
-            #[inline]
-            fn jacobian(&self, u: &Self::Unknowns) -> ::energy_dsl::ResidualJacobian<T, Self::Rows, Self::Jacobian> {
-                #jacobian
-            }
-        }
+        #(#over_lanes)*
     }
 }
 

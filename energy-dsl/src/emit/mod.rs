@@ -2,6 +2,7 @@
 
 mod declaration;
 mod items;
+mod methods;
 mod schedule;
 
 pub use items::emit;

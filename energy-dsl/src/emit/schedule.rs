@@ -68,7 +68,7 @@ impl<'a> Schedule<'a> {
             }
             let missing: Vec<NodeId> = self
                 .graph
-                .op(next)
+                .fused(next)
                 .operands()
                 .map(|o| self.graph.resolve(o))
                 .filter(|o| !self.places.contains_key(o))
@@ -117,7 +117,7 @@ impl<'a> Schedule<'a> {
         }
         let expression = self.expression(node);
         let number = self.statements.len();
-        for operand in self.graph.op(node).operands() {
+        for operand in self.graph.fused(node).operands() {
             let last = self.last_use.entry(self.graph.resolve(operand)).or_default();
             *last = number.max(*last);
         }
@@ -136,7 +136,12 @@ impl<'a> Schedule<'a> {
             let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
             quote!(#a.#name(#(#rest),*))
         };
-        match self.graph.op(node) {
+        // What depends on the level takes it as `L`.
+        let levelled = |name: &str, a: NodeId, rest: &[NodeId]| {
+            let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
+            quote!(#a.#name::<L>(#(#rest),*))
+        };
+        match self.graph.fused(node) {
             Op::Constant(bits) => {
                 let literal = Literal::f64_suffixed(f64::from_bits(bits).abs());
                 let sign = if f64::from_bits(bits) < 0.0 { quote!(-) } else { quote!() };
@@ -161,18 +166,37 @@ impl<'a> Schedule<'a> {
             Op::Abs(a) => method("abs", a, &[]),
             Op::Min(a, b) => method("min", a, &[b]),
             Op::Max(a, b) => method("max", a, &[b]),
-            Op::Sin(a) => method("sin", a, &[]),
-            Op::Cos(a) => method("cos", a, &[]),
-            Op::Exp(a) => method("exp", a, &[]),
-            Op::Ln(a) => method("ln", a, &[]),
-            Op::Atan2(a, b) => method("atan2", a, &[b]),
-            Op::Pow(a, b) => method("powf", a, &[b]),
+            Op::Sin(a) => levelled("sin", a, &[]),
+            Op::Cos(a) => levelled("cos", a, &[]),
+            Op::Exp(a) => levelled("exp", a, &[]),
+            Op::Ln(a) => levelled("ln", a, &[]),
+            Op::Atan2(a, b) => levelled("atan2", a, &[b]),
+            Op::Pow(a, b) => levelled("powf", a, &[b]),
             Op::SumError(a, b) => method("sum_error", a, &[b]),
             Op::DifferenceError(a, b) => {
                 let (a, b) = (p(a), p(b));
                 quote!(#a.sum_error(-#b))
             }
-            Op::ProductError(a, b) => method("product_error", a, &[b]),
+            Op::ProductError(a, b) => levelled("product_error", a, &[b]),
+            Op::FusedMulSub(a, b, c) => levelled("fused_mul_sub", a, &[b, c]),
+            Op::RootError(a, b) => levelled("root_error", a, &[b]),
+            Op::MulAdd(a, b, c) => levelled("mul_add", a, &[b, c]),
+            Op::MulSub(a, b, c) => {
+                let (a, b, c) = (p(a), p(b), p(c));
+                quote!(#a.mul_add::<L>(#b, -#c))
+            }
+            Op::NegMulAdd(a, b, c) => {
+                let (a, b, c) = (p(a), p(b), p(c));
+                quote!((-#a).mul_add::<L>(#b, #c))
+            }
+            Op::Truth(value) => {
+                let not = if value { quote!(!) } else { quote!() };
+                quote!(#not <T::Mask as ::energy_dsl::Mask>::none())
+            }
+            Op::IsModerate(a, degree) => {
+                let a = p(a);
+                quote!(#a.is_moderate(#degree))
+            }
             Op::PowerOfTwoScale(a) => method("power_of_two_scale", a, &[]),
             Op::Less(a, b) => method("less", a, &[b]),
             Op::LessOrEqual(a, b) => method("less_or_equal", a, &[b]),
@@ -181,7 +205,9 @@ impl<'a> Schedule<'a> {
                 let (mask, a, b) = (p(mask), p(a), p(b));
                 quote!(T::select(#mask, #a, #b))
             }
-            Op::Input(_) | Op::Rule(_) => unreachable!("compiler bug: inputs are read and rules resolved elsewhere"),
+            Op::Input(_) | Op::Rule(_) | Op::Cautious => {
+                unreachable!("compiler bug: inputs are read, rules resolved and caution decided elsewhere")
+            }
         }
     }
 }

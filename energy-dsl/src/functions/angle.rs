@@ -2,9 +2,9 @@
 //! p = b̂ − c â = (w × a)/(‖a‖²‖b‖), and that of â across b̂ is q = â − c b̂ = (b × w)/(‖b‖²‖a‖): neither subtracts
 //! what nearly cancels when the vectors align.
 
-use super::length::{Direction, direction, projector, upper};
+use super::length::{Direction, assume_moderate, common_scale, direction, upper};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule};
 use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
@@ -37,26 +37,24 @@ pub(super) fn exact_cross(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> [(NodeId
     })
 }
 
-/// a × b, each component to about one rounding.
+/// a × b, each component to about one rounding: of the two products one is kept with its error (Kahan).
 pub(super) fn accurate_cross(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        let (plus, minus) = (g.mul(a[j], b[k]), g.mul(a[k], b[j]));
-        let (plus_error, minus_error) = (g.product_error(a[j], b[k]), g.product_error(a[k], b[j]));
-        let high = g.sub(plus, minus);
-        let low = g.sub(plus_error, minus_error);
-        g.add(high, low)
+        let minus = g.mul(a[k], b[j]);
+        let minus_error = g.product_error(a[k], b[j]);
+        let high = g.fused_mul_sub(a[j], b[k], minus);
+        g.sub(high, minus_error)
     })
 }
 
-/// Two directions and what both angle functions need of them.
+/// Two directions and what their angle needs of them.
 struct Pair {
     a: Direction,
     b: Direction,
     cross: [NodeId; 3],
     dot: NodeId,
     lengths: NodeId,
-    cosine: NodeId,
     degenerate: NodeId,
     arguments: Vec<NodeId>,
 }
@@ -66,11 +64,9 @@ fn pair(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Pair {
     let cross = accurate_cross(g, &a_at.scaled, &b_at.scaled);
     let dot = g.dot(&a_at.scaled, &b_at.scaled);
     let lengths = g.mul(a_at.length, b_at.length);
-    let reciprocal = g.mul(a_at.reciprocal, b_at.reciprocal);
-    let cosine = g.mul(dot, reciprocal);
     let degenerate = g.or(a_at.zero, b_at.zero);
     let arguments = a.iter().chain(b).copied().collect();
-    Pair { a: a_at, b: b_at, cross, dot, lengths, cosine, degenerate, arguments }
+    Pair { a: a_at, b: b_at, cross, dot, lengths, degenerate, arguments }
 }
 
 /// The vector behind three components of its unit vector.
@@ -83,80 +79,137 @@ fn vector_of_unit(g: &Graph, components: &[NodeId]) -> Option<Vec<NodeId>> {
     all.then_some(arguments)
 }
 
+/// The cosine c of the angle between a and b, and what it and 1 − c need of them. With w = a × b, and lengths only in
+/// γ = 1/(‖a‖‖b‖), 1/‖a‖² = ‖b‖²γ² and 1/‖b‖² = ‖a‖²γ²: one root and one division serve all.
+struct Aligned {
+    a: Vec<NodeId>,
+    b: Vec<NodeId>,
+    scales: [NodeId; 2],
+    cross: [NodeId; 3],
+    cosine: NodeId,
+    one_minus: NodeId,
+    /// γ.
+    per_both: NodeId,
+    /// 1/‖a‖², 1/‖b‖².
+    per_square: [NodeId; 2],
+    degenerate: NodeId,
+}
+
+fn aligned(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Aligned {
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let scales = [a, b].map(|v| common_scale(g, v));
+    let (x, y) = (g.scaled(scales[0], a), g.scaled(scales[1], b));
+    let squares = [&x, &y].map(|v| g.sum_of_squares(v));
+    let zeros = squares.map(|square| g.equal(square, null));
+    for own in 0..2 {
+        assume_moderate(g, squares[own], scales[own], zeros[own]);
+    }
+    let degenerate = g.or(zeros[0], zeros[1]);
+
+    let cross = accurate_cross(g, &x, &y);
+    let dot = g.dot(&x, &y);
+    let product = g.mul(squares[0], squares[1]);
+    let lengths = g.sqrt(product);
+    // 1 − c = ‖w‖²/(m (m + a·b)), m = ‖a‖‖b‖, where a·b > 0; elsewhere the difference itself is exact enough.
+    let acute = g.less(null, dot);
+    let sum = g.add(lengths, dot);
+    let sum = g.select(acute, sum, one);
+    let denominator = g.mul(lengths, sum);
+    let reciprocal = g.div(one, denominator);
+    let reciprocal = g.select(degenerate, null, reciprocal);
+    let per_both = g.mul(sum, reciprocal);
+    let cosine = g.mul(dot, per_both);
+    let cross_squared = g.sum_of_squares(&cross);
+    let small = g.mul(cross_squared, reciprocal);
+    let large = g.sub(one, cosine);
+    let one_minus = g.select(acute, small, large);
+    let one_minus = g.select(degenerate, null, one_minus);
+    let square = g.mul(per_both, per_both);
+    let per_square = [g.mul(squares[1], square), g.mul(squares[0], square)];
+    Aligned { a: x, b: y, scales, cross, cosine, one_minus, per_both, per_square, degenerate }
+}
+
 /// â·b̂ as one primitive.
 pub(super) fn recognise_cosine(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
     let (a, b) = (vector_of_unit(g, x)?, vector_of_unit(g, y)?);
-    let pair = pair(g, &a, &b);
-    let (first, second) = cosine_derivatives(g, &pair);
-    let rule = Rule::smooth(Primitive::Cosine, pair.arguments.clone(), pair.cosine, first, second);
-    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, pair.degenerate), &[]))
+    let at = aligned(g, &a, &b);
+    let (first, second) = cosine_derivatives(g, &at, false);
+    let rule = Rule::factored(Primitive::Cosine, [a, b].concat(), at.cosine, first, second);
+    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
-/// 1 − â·b̂ as one primitive: ‖a×b‖²/(m (m + a·b)), m = ‖a‖‖b‖, where a·b > 0.
+/// 1 − â·b̂ as one primitive.
 pub(crate) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: NodeId) -> Option<NodeId> {
     if !g.is(one, 1.0) {
         return None;
     }
     let arguments = g.rule(cosine).filter(|r| r.primitive == Primitive::Cosine)?.arguments.clone();
-    let pair = pair(g, &arguments[..3], &arguments[3..]);
-    let zero = g.constant(0.0);
-    let numerator = g.sum_of_squares(&pair.cross);
-    let sum = g.add(pair.lengths, pair.dot);
-    let denominator = g.mul(pair.lengths, sum);
-    let small = g.div(numerator, denominator);
-    let plain_cosine = g.resolve(pair.cosine);
-    let large = g.sub(one, plain_cosine);
-    let acute = g.less(zero, pair.dot);
-    let value = g.select(acute, small, large);
-    let value = g.select(pair.degenerate, zero, value);
-    let (first, second) = cosine_derivatives(g, &pair);
-    let negated = |g: &mut Graph, list: Vec<NodeId>| list.into_iter().map(|x| g.neg(x)).collect::<Vec<_>>();
-    let (first, second) = (negated(g, first), negated(g, second));
-    let rule = Rule::smooth(Primitive::OneMinusCosine, arguments, value, first, second);
-    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, pair.degenerate), &[]))
+    let at = aligned(g, &arguments[..3], &arguments[3..]);
+    let (first, second) = cosine_derivatives(g, &at, true);
+    let rule = Rule::factored(Primitive::OneMinusCosine, arguments, at.one_minus, first, second);
+    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
-/// ∇c = (p/‖a‖, q/‖b‖); ∇²c has the blocks −(c P_a + â pᵀ + p âᵀ)/‖a‖², (P_a − p b̂ᵀ)/(‖a‖‖b‖) and the first with a, b swapped.
-fn cosine_derivatives(g: &mut Graph, pair: &Pair) -> (Vec<NodeId>, Vec<NodeId>) {
-    let (a, b) = (&pair.a, &pair.b);
-    let across = |g: &mut Graph, cross: [NodeId; 3], own: &Direction, other: &Direction| {
-        let square = g.mul(own.reciprocal, own.reciprocal);
-        let factor = g.mul(square, other.reciprocal);
-        g.scaled(factor, &cross)
-    };
-    let w_a = g.cross(&pair.cross, &a.scaled);
-    let b_w = g.cross(&b.scaled, &pair.cross);
-    let p = across(g, w_a, a, b);
-    let q = across(g, b_w, b, a);
-    let per_a = g.mul(a.reciprocal, a.scale);
-    let per_b = g.mul(b.reciprocal, b.scale);
-    let mut first = g.scaled(per_a, &p);
-    first.extend(g.scaled(per_b, &q));
+/// Derivatives of c by a and b, or of −c. With p = γ (w × a)/‖a‖², q = γ (b × w)/‖b‖²: ∇c = (p, q); ∇²c has the blocks
+/// −c/‖a‖² I − a sᵀ − s aᵀ, s = p/‖a‖² − ½ c a/‖a‖⁴ (likewise for b), and γ (I − a aᵀ/‖a‖²) − p bᵀ/‖b‖².
+fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
+    let half = g.constant(0.5);
+    let turned = [g.cross(&at.cross, &at.a), g.cross(&at.b, &at.cross)];
+    let vectors = [&at.a, &at.b];
+    let signed = |g: &mut Graph, node: NodeId, minus: bool| if minus { g.neg(node) } else { node };
+    let mut first = Vec::new();
+    // Of each vector: its gradient p, its s, and c/‖a‖².
+    let mut parts = Vec::new();
+    for own in 0..2 {
+        let factor = g.mul(at.per_both, at.per_square[own]);
+        let gradient = g.scaled(factor, &turned[own]);
+        for &entry in &gradient {
+            let entry = g.mul(at.scales[own], entry);
+            first.push(vec![signed(g, entry, negative)]);
+        }
+        let curvature = g.mul(at.cosine, at.per_square[own]);
+        let fourth = g.mul(curvature, at.per_square[own]);
+        let fourth = g.mul(half, fourth);
+        let slant: Vec<_> = (0..3)
+            .map(|i| {
+                let (turning, drawing) = (g.mul(at.per_square[own], gradient[i]), g.mul(fourth, vectors[own][i]));
+                let entry = g.sub(turning, drawing);
+                signed(g, entry, !negative)
+            })
+            .collect();
+        parts.push((gradient, slant, signed(g, curvature, !negative)));
+    }
+    let inverse = g.mul(at.per_both, at.per_square[0]);
+    let along: Vec<_> = g.scaled(inverse, &at.a).into_iter().map(|x| signed(g, x, !negative)).collect();
+    let across: Vec<_> = g.scaled(at.per_square[1], &parts[0].0).into_iter().map(|x| signed(g, x, !negative)).collect();
+    let mixed = signed(g, at.per_both, negative);
 
-    let (squared_a, squared_b, mixed) = (g.mul(per_a, per_a), g.mul(per_b, per_b), g.mul(per_a, per_b));
     let second = upper(6)
-        .map(|(i, j)| match (i < 3, j < 3) {
-            (true, true) => own_block(g, pair.cosine, &a.unit, &p, squared_a, i, j),
-            (false, false) => own_block(g, pair.cosine, &b.unit, &q, squared_b, i - 3, j - 3),
-            _ => {
-                let projection = projector(g, &a.unit, i, j - 3);
-                let product = g.mul(p[i], b.unit[j - 3]);
-                let entry = g.sub(projection, product);
-                g.mul(mixed, entry)
+        .map(|(i, j)| {
+            let (own, other) = (i / 3, j / 3);
+            let (row, column) = (i % 3, j % 3);
+            let mut products = if own == other {
+                let (_, slant, curvature) = &parts[own];
+                let mut products = vec![vec![slant[row], vectors[own][column]], vec![slant[column], vectors[own][row]]];
+                if row == column {
+                    products.push(vec![*curvature]);
+                }
+                products
+            } else {
+                let mut products = vec![vec![along[row], at.a[column]], vec![across[row], at.b[column]]];
+                if row == column {
+                    products.push(vec![mixed]);
+                }
+                products
+            };
+            let scale = g.mul(at.scales[own], at.scales[other]);
+            if !g.is(scale, 1.0) {
+                products.iter_mut().for_each(|product| product.push(scale));
             }
+            products
         })
         .collect();
     (first, second)
-}
-
-/// Entry of −(c P + n pᵀ + p nᵀ) · factor.
-fn own_block(g: &mut Graph, c: NodeId, n: &[NodeId], p: &[NodeId], factor: NodeId, i: usize, j: usize) -> NodeId {
-    let projection = projector(g, n, i, j);
-    let symmetric = symmetric_product(g, n, p, i, j);
-    let scaled = g.mul(c, projection);
-    let entry = g.add(scaled, symmetric);
-    let entry = g.mul(factor, entry);
-    g.neg(entry)
 }
 
 /// Entry of x yᵀ + y xᵀ.

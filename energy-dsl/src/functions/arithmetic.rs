@@ -1,5 +1,6 @@
 //! `+ − · / ^` and their likes, on numbers, vectors and matrices.
 
+use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op};
 
@@ -144,8 +145,9 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
             let mut parts = Vec::with_capacity(rows * columns);
             for i in 0..rows {
                 for j in 0..columns {
-                    let terms: Vec<_> = (0..inner).map(|k| g.mul(a.at(i, k), b.at(k, j))).collect();
-                    parts.push(g.sum(terms));
+                    let row: Vec<_> = (0..inner).map(|k| a.at(i, k)).collect();
+                    let column: Vec<_> = (0..inner).map(|k| b.at(k, j)).collect();
+                    parts.push(inner_product(g, &row, &column));
                 }
             }
             match b.shape {

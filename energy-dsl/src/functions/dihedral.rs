@@ -4,10 +4,10 @@
 //! Flat is 0, sin θ = (n₁ × n₂)·Ê. θ = atan2(−‖E‖ b·(E×a), −(E×a)·(E×b)): the triple product is computed as if in twice
 //! the precision, including what rounding the edges lost, so a nearly flat hinge has a relatively exact angle.
 
-use super::angle::{accurate_cross, exact_cross, symmetric_product};
+use super::angle::{accurate_cross, exact_cross};
 use super::length::{Direction, common_scale, direction_scaled, upper};
 use super::{Function, Lowered, Shape};
-use crate::graph::{DihedralParts, Form, Graph, NodeId, Primitive, Rule};
+use crate::graph::{DihedralParts, Form, Graph, NodeId, Primitive, Product, Rule};
 use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
@@ -53,22 +53,16 @@ fn textbook(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeI
     g.atan2(sine, cosine)
 }
 
-/// One triangle of the hinge, in scaled lengths.
+/// One triangle of the hinge, in scaled lengths: apex a, normal N = E × a.
 struct Wing {
-    /// Unit normal.
+    /// ±N/‖N‖², the gradient of the angle by the apex but for −‖E‖.
     normal: Vec<NodeId>,
-    /// n × Ê, negated for the second triangle.
+    /// ‖E‖ t/‖N‖², with t = N × E; not as ‖E‖² (a − τ E), which cancels in a needle.
     tangent: Vec<NodeId>,
-    /// 1/height of the apex over the edge, in true lengths; 0 where there is none.
-    inverse_height: NodeId,
-    /// Where along the edge the apex stands.
+    /// τ = a·E/‖E‖², where along the edge the apex stands.
     along: NodeId,
-}
-
-struct Hinge {
-    edge: Direction,
-    inverse_edge: NodeId,
-    wings: [Wing; 2],
+    /// ½ ‖N‖²/‖E‖⁴.
+    aspect: NodeId,
 }
 
 fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId {
@@ -78,49 +72,54 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
     let (a_scaled, b_scaled) = (g.scaled(scale, a), g.scaled(scale, b));
     let first = exact_cross(g, &e.scaled, &a_scaled);
     let n1: Vec<_> = first.iter().map(|&(high, low)| g.add(high, low)).collect();
-    let second = accurate_cross(g, &e.scaled, &b_scaled);
+    let n2 = accurate_cross(g, &e.scaled, &b_scaled);
 
-    let volume = triple_product(g, (edge, a, b), (&a_scaled, &b_scaled), scale, &first, (&n1, &second));
+    let volume = triple_product(g, (edge, a, b), (&a_scaled, &b_scaled), scale, &first, (&n1, &n2));
     let (null, one) = (g.constant(0.0), g.constant(1.0));
-    let squares = [g.sum_of_squares(&n1), g.sum_of_squares(&second)];
-    let product = g.mul(squares[0], squares[1]);
-    let degenerate = g.equal(product, null);
-    let folded = g.dot(&n1, &second);
+    let folded = g.dot(&n1, &n2);
     let y = g.mul(e.length, volume);
-    let y = g.neg(y);
     // −0 and +0 are the same fold: +π.
-    let flat = g.equal(y, null);
-    let y = g.select(flat, null, y);
+    let y = g.minus_or_plus_zero(y);
     let x = g.neg(folded);
+    // ‖N₁‖²‖N₂‖² = x² + y².
+    let areas_squared = g.sum_of_squares(&[x, y]);
+    let degenerate = g.equal(areas_squared, null);
+    let (edge_moderate, areas_moderate) = (g.is_moderate(e.square, 2), g.is_moderate(areas_squared, 8));
+    let moderate = g.and(edge_moderate, areas_moderate);
+    let never = g.truth(false);
+    for (precaution, instead) in [(scale, one), (e.zero, never), (degenerate, never)] {
+        g.assume(precaution, instead, moderate);
+    }
     let raw = g.atan2(y, x);
     let value = g.select(degenerate, null, raw);
 
-    let areas = squares.map(|s| g.sqrt(s));
-    let reciprocals = areas.map(|area| {
-        let reciprocal = g.div(one, area);
-        g.select(degenerate, null, reciprocal)
+    let areas = g.sqrt(areas_squared);
+    let [sine, cosine] = [y, x].map(|part| {
+        let quotient = g.div(part, areas);
+        g.select(degenerate, null, quotient)
     });
-    let both = g.mul(reciprocals[0], reciprocals[1]);
-    let (sine, cosine) = (g.mul(y, both), g.mul(x, both));
     let parts = half_angles(g, sine, cosine, degenerate);
 
-    let inverse_edge = g.mul(e.reciprocal, scale);
-    let minus_one = g.constant(-1.0);
-    let edge_height = g.mul(e.length, scale);
-    let wing = |g: &mut Graph, normal: &[NodeId], sign: NodeId, apex: &[NodeId], reciprocal: NodeId| {
-        let factor = g.mul(sign, reciprocal);
-        let normal = g.scaled(factor, normal);
-        let tangent = g.cross(&normal, &e.unit);
-        let tangent = g.scaled(sign, &tangent);
-        let along = g.dot(apex, &e.unit);
-        let along = g.mul(along, e.reciprocal);
-        Wing { normal, tangent, inverse_height: g.mul(edge_height, reciprocal), along }
+    let per_edge_squared = g.mul(e.reciprocal, e.reciprocal);
+    let half = g.constant(0.5);
+    let aspect_unit = g.mul(per_edge_squared, per_edge_squared);
+    let aspect_unit = g.mul(half, aspect_unit);
+    let wing = |g: &mut Graph, normal: &[NodeId], negative: bool, apex: &[NodeId]| {
+        let square = g.sum_of_squares(normal);
+        let reciprocal = g.div(one, square);
+        let reciprocal = g.select(degenerate, null, reciprocal);
+        let along = g.dot(apex, &e.scaled);
+        let along = g.mul(along, per_edge_squared);
+        let factor = g.mul(e.length, reciprocal);
+        let across = g.cross(normal, &e.scaled);
+        let tangent = g.scaled(factor, &across);
+        let reciprocal = if negative { g.neg(reciprocal) } else { reciprocal };
+        Wing { normal: g.scaled(reciprocal, normal), tangent, along, aspect: g.mul(aspect_unit, square) }
     };
-    let wings = [wing(g, &n1, one, &a_scaled, reciprocals[0]), wing(g, &second, minus_one, &b_scaled, reciprocals[1])];
-    let hinge = Hinge { edge: e, inverse_edge, wings };
-    let (first, second) = derivatives(g, &hinge);
+    let wings = [wing(g, &n1, false, &a_scaled), wing(g, &n2, true, &b_scaled)];
+    let (first, second) = derivatives(g, &e, &wings);
     let mut rule =
-        Rule::smooth(Primitive::Dihedral, arguments, value, first, second).flagged(0, Flag::Degenerate, degenerate);
+        Rule::factored(Primitive::Dihedral, arguments, value, first, second).flagged(0, Flag::Degenerate, degenerate);
     rule.dihedral = Some(parts);
     g.add_rule(rule, &[])
 }
@@ -177,55 +176,52 @@ fn half_angles(g: &mut Graph, sine: NodeId, cosine: NodeId, degenerate: NodeId) 
     DihedralParts { sine, cosine, sine_half, cosine_half, degenerate }
 }
 
-/// Of each triangle, over (apex, E), with c = (1, −τ), δ = (0, 1): gradient −c n/h and Hessian
-/// c cᵀ (t nᵀ + n tᵀ)/h² + (c δᵀ Ê nᵀ + δ cᵀ n Êᵀ)/(e h) + ½ δ δᵀ (t nᵀ + n tᵀ)/e². Their sum is θ's.
-fn derivatives(g: &mut Graph, hinge: &Hinge) -> (Vec<NodeId>, Vec<NodeId>) {
-    let unit = &hinge.edge.unit;
-    let half = g.constant(0.5);
-    let per_edge_squared = g.mul(hinge.inverse_edge, hinge.inverse_edge);
-    let half_per_edge_squared = g.mul(half, per_edge_squared);
-
-    let mut first = vec![g.constant(0.0); 9];
-    let mut second = vec![g.constant(0.0); 45];
+/// Of each triangle, over (apex, E), with u = ±N/‖N‖², s = ±‖E‖ t/‖N‖², S = s uᵀ + u sᵀ: gradient −‖E‖ (u, −τ u); Hessian S for
+/// the apex, u Êᵀ − τ S between edge and apex, (τ² + ½‖N‖²/‖E‖⁴) S − τ (Ê uᵀ + u Êᵀ) for the edge. Their sum is θ's.
+fn derivatives(g: &mut Graph, edge: &Direction, wings: &[Wing; 2]) -> (Vec<Product>, Vec<Vec<Product>>) {
+    let minus_length = g.mul(edge.length, edge.scale);
+    let minus_length = g.neg(minus_length);
+    let mut by_edge: [Vec<NodeId>; 3] = Default::default();
+    let mut first = vec![Product::new(); 9];
+    let mut second = vec![Vec::<Product>::new(); 45];
     let place = |i: usize, j: usize| crate::graph::symmetric_index(9, i, j);
-    for (w, wing) in hinge.wings.iter().enumerate() {
+    for (w, wing) in wings.iter().enumerate() {
         let apex = 3 + 3 * w;
-        let per_height_squared = g.mul(wing.inverse_height, wing.inverse_height);
-        let mixed = g.mul(hinge.inverse_edge, wing.inverse_height);
-        let slope = g.scaled(wing.inverse_height, &wing.normal);
         let tau = wing.along;
+        let minus_tau = g.neg(tau);
         let tau_squared = g.mul(tau, tau);
+        let bent = g.add(tau_squared, wing.aspect);
+        let slope = g.scaled(minus_length, &wing.normal);
+        let turned = g.scaled(minus_tau, &wing.normal);
         for i in 0..3 {
-            first[apex + i] = g.neg(slope[i]);
-            let by_edge = g.mul(tau, slope[i]);
-            first[i] = g.add(first[i], by_edge);
+            first[apex + i] = vec![slope[i]];
+            let term = g.mul(minus_tau, slope[i]);
+            by_edge[i].push(term);
         }
-        // c cᵀ/h² + ½ δ δᵀ/e² share the symmetric product; −τ (Ê nᵀ + n Êᵀ)/(e h) is left for the edge block.
-        let scaled_tau = g.mul(tau_squared, per_height_squared);
-        let edge_factor = g.add(scaled_tau, half_per_edge_squared);
-        let tau_per_height = g.mul(tau, per_height_squared);
-        let tau_mixed = g.mul(tau, mixed);
+        // Entry (i, j) of S, times what follows.
+        let symmetric = |i: usize, j: usize, more: &[NodeId]| -> [Product; 2] {
+            [(i, j), (j, i)].map(|(i, j)| [&[wing.tangent[i], wing.normal[j]], more].concat())
+        };
         for (i, j) in upper(3) {
-            let symmetric = symmetric_product(g, &wing.tangent, &wing.normal, i, j);
-            second[place(apex + i, apex + j)] = g.mul(per_height_squared, symmetric);
-            let bent = g.mul(edge_factor, symmetric);
-            let turned = symmetric_product(g, unit, &wing.normal, i, j);
-            let turned = g.mul(tau_mixed, turned);
-            let entry = g.sub(bent, turned);
+            second[place(apex + i, apex + j)].extend(symmetric(i, j, &[]));
             let at = place(i, j);
-            second[at] = g.add(second[at], entry);
+            second[at].extend(symmetric(i, j, &[bent]));
+            second[at].extend([vec![turned[i], edge.unit[j]], vec![turned[j], edge.unit[i]]]);
         }
         for i in 0..3 {
             for j in 0..3 {
                 // Row: component i of the edge; column: component j of the apex.
-                let symmetric = symmetric_product(g, &wing.tangent, &wing.normal, i.min(j), i.max(j));
-                let bent = g.mul(tau_per_height, symmetric);
-                let turned = g.mul(unit[j], wing.normal[i]);
-                let turned = g.mul(mixed, turned);
-                second[place(i, apex + j)] = g.sub(turned, bent);
+                let at = place(i, apex + j);
+                second[at].extend(symmetric(i.min(j), i.max(j), &[minus_tau]));
+                second[at].push(vec![wing.normal[i], edge.unit[j]]);
             }
         }
     }
+    for (i, terms) in by_edge.into_iter().enumerate() {
+        first[i] = vec![g.sum(terms)];
+    }
+    let scale_squared = g.mul(edge.scale, edge.scale);
+    second.iter_mut().flatten().for_each(|product| product.push(scale_squared));
     (first, second)
 }
 
@@ -255,4 +251,28 @@ pub(crate) fn recognise_dihedral(g: &mut Graph, x: NodeId, primitive: Primitive)
         rule = rule.flagged(1, Flag::Kink, fold);
     }
     Some(g.add_rule(rule, &[]))
+}
+
+/// sin(θ/2) − sin(y/2) for a dihedral angle θ and a y that does not move. Where |sin| > |cos|, which is near folded, the difference
+/// is that of the cosines' squares over the sum of the sines: the cosines are small there, and so is what rounding them costs.
+pub(crate) fn recognise_sine_difference(g: &mut Graph, sine: NodeId, rest: NodeId) -> Option<NodeId> {
+    let rule = g.rule(sine).filter(|r| r.primitive == Primitive::DihedralSineHalf)?.clone();
+    let crate::graph::Op::Sin(half_rest) = g.op(rest) else { return None };
+    if g.varies(half_rest) {
+        return None;
+    }
+    let parts = g.rule(rule.arguments[0])?.dihedral?;
+    let rest_cosine = g.cos(half_rest);
+    let direct = g.plain_difference(parts.sine_half, rest);
+    let (less, more) = (g.sub(rest_cosine, parts.cosine_half), g.add(rest_cosine, parts.cosine_half));
+    let numerator = g.mul(less, more);
+    let denominator = g.add(parts.sine_half, rest);
+    let quotient = g.div(numerator, denominator);
+    let null = g.constant(0.0);
+    let (same_side, magnitude) = (g.mul(parts.sine_half, rest), g.abs(parts.sine_half));
+    let (same_side, folded) = (g.less(null, same_side), g.less(parts.cosine_half, magnitude));
+    let near = g.and(same_side, folded);
+    let value = g.select(near, quotient, direct);
+    let difference = Rule { primitive: Primitive::DihedralSineDifference, value, ..rule };
+    Some(g.add_rule(difference, &[rest]))
 }

@@ -3,6 +3,7 @@
 //! Vectors are scaled by a power of two first, so that no square overflows or vanishes. With n = d/‖d‖, r = ‖d‖ and
 //! P = I − n nᵀ: ∇r = n and ∇²r = P/r, the diagonal of P being the sum of the *other* squares, never 1 − nᵢ².
 
+use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 use crate::runtime::Flag;
@@ -55,6 +56,8 @@ pub(super) struct Direction {
     pub(super) scale: NodeId,
     /// scale · d.
     pub(super) scaled: Vec<NodeId>,
+    /// ‖scale · d‖².
+    pub(super) square: NodeId,
     /// ‖scale · d‖.
     pub(super) length: NodeId,
     /// Whether d = 0.
@@ -76,6 +79,14 @@ fn largest_magnitude(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
     magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components")
 }
 
+/// Notes that where d·d (which scaling brings near 1) is moderate, d needs no scaling and is not 0.
+pub(super) fn assume_moderate(g: &mut Graph, square: NodeId, scale: NodeId, zero: NodeId) {
+    let moderate = g.is_moderate(square, 2);
+    let (one, never) = (g.constant(1.0), g.truth(false));
+    g.assume(scale, one, moderate);
+    g.assume(zero, never, moderate);
+}
+
 /// Scales `d` by `scale` and finds its direction.
 pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Direction {
     let scaled = g.scaled(scale, d);
@@ -86,13 +97,15 @@ pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Di
     let reciprocal = g.div(one, length);
     let reciprocal = g.select(zero, null, reciprocal);
     let unit = g.scaled(reciprocal, &scaled);
-    Direction { scale, scaled, length, zero, reciprocal, unit }
+    Direction { scale, scaled, square, length, zero, reciprocal, unit }
 }
 
 /// Finds the direction of `d`.
 pub(super) fn direction(g: &mut Graph, d: &[NodeId]) -> Direction {
     let scale = common_scale(g, d);
-    direction_scaled(g, d, scale)
+    let at = direction_scaled(g, d, scale);
+    assume_moderate(g, at.square, scale, at.zero);
+    at
 }
 
 /// The entries of P = I − n nᵀ, each by `entry(i, j)`: off the diagonal −nᵢ nⱼ, on it the other squares.
@@ -129,15 +142,13 @@ fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
 }
 
 fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
-    Lowered::scalar(g.sum_of_squares(&args[0].parts))
+    Lowered::scalar(inner_product(g, &args[0].parts, &args[0].parts))
 }
 
 fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let (q, shape) = (&args[0], args[0].shape);
     if shape == Shape::DualQuat {
-        let unit = unit_parts(g, &q.parts[..4]);
-        let norm = length(g, &q.parts[..4]);
-        return super::quaternion::unit_dual(g, q, unit, norm);
+        return super::quaternion::unit_dual(g, q);
     }
     Lowered { shape, parts: unit_parts(g, &q.parts) }
 }
@@ -216,8 +227,8 @@ pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
     Some(g.add_rule(rule, &[exponent]))
 }
 
-/// ‖d‖ − L with L a length that does not move: C = (d·d − L²)/(‖d‖ + L), the numerator in double-double arithmetic with the
-/// rounding errors of the edge itself. Its half square ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ,
+/// ‖d‖ − L with L a length that does not move: C = (r − L) + ρ, r the rounded length, ρ = (d·d − r²)/2r what rounding it lost,
+/// with the rounding errors of the edge itself: near rest r − L is exact, and ρ most of the strain. Its half square ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ,
 /// which are right at d = 0 too where L = 0.
 pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: NodeId) -> Option<NodeId> {
     let rule = g.rule(norm).filter(|r| r.primitive == Primitive::Norm)?;
@@ -230,14 +241,14 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let largest = g.max(largest, rest_length);
     let scale = g.power_of_two_scale(largest);
     let at = direction_scaled(g, &d, scale);
+    assume_moderate(g, at.square, scale, at.zero);
     let length = g.mul(scale, rest_length);
-    let numerator = excess_of_squares(g, &d, &at, length);
-    let (null, one) = (g.constant(0.0), g.constant(1.0));
-    let sum = g.add(at.length, length);
+    let (null, one, half) = (g.constant(0.0), g.constant(1.0), g.constant(0.5));
     let slack = g.equal(length, null);
-    let regular_at_zero = g.and(at.zero, slack);
-    let denominator = g.select(regular_at_zero, one, sum);
-    let scaled_value = g.div(numerator, denominator);
+    let rounding = rounding_of_length(g, &d, &at);
+    let correction = g.mul(rounding, at.reciprocal);
+    let rounded = g.sub(at.length, length);
+    let scaled_value = g.add(rounded, correction);
     let value = g.div(scaled_value, scale);
 
     let curvature = g.mul(at.reciprocal, scale);
@@ -252,7 +263,6 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let reciprocal_squared = g.mul(at.reciprocal, at.reciprocal);
     let inverse_stretch = g.mul(length, at.reciprocal);
     let along = g.mul(inverse_stretch, reciprocal_squared);
-    let half = g.constant(0.5);
     let square = g.mul(value, value);
     let half_value = g.mul(half, square);
     let half_first = d.iter().map(|&x| vec![ratio, x]).collect();
@@ -273,25 +283,22 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     Some(g.add_rule(rule, &[rest_length]))
 }
 
-/// d·d − L² of the scaled vector and length, as if in twice the precision, including what rounding d lost.
-fn excess_of_squares(g: &mut Graph, d: &[NodeId], at: &Direction, length: NodeId) -> NodeId {
+/// ‖d‖ (‖d‖ − r) for r, the length of the scaled vector as it was rounded: half of d·d − r² as if in twice the precision,
+/// including what rounding d lost.
+fn rounding_of_length(g: &mut Graph, d: &[NodeId], at: &Direction) -> NodeId {
     let squares: Vec<_> = at.scaled.iter().map(|&e| g.mul(e, e)).collect();
-    let length_squared = g.mul(length, length);
     let mut errors: Vec<_> = at.scaled.iter().map(|&e| g.product_error(e, e)).collect();
     let mut sum = squares[0];
     for &square in &squares[1..] {
         errors.push(g.sum_error(sum, square));
         sum = g.add(sum, square);
     }
-    errors.push(g.difference_error(sum, length_squared));
-    let excess = g.sub(sum, length_squared);
-    let length_error = g.product_error(length, length);
+    errors.push(g.root_error(sum, at.length));
+    let errors = g.sum(errors);
+    let half = g.constant(0.5);
+    let errors = g.mul(half, errors);
     let tails: Vec<_> = d.iter().map(|&x| g.rounding_tail(x)).collect();
     let along = g.dot(&at.scaled, &tails);
-    let two = g.constant(2.0);
-    let twice = g.mul(two, at.scale);
-    errors.push(g.mul(twice, along));
-    let errors = g.sum(errors);
-    let errors = g.sub(errors, length_error);
-    g.add(excess, errors)
+    let along = g.mul(at.scale, along);
+    g.add(errors, along)
 }

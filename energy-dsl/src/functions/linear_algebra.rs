@@ -1,5 +1,6 @@
 //! Products, transposes and inverses of vectors and matrices, and how they are put together.
 
+use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId};
 
@@ -201,7 +202,7 @@ fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
         (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
         _ => match super::angle::recognise_cosine(g, &x.parts, &y.parts) {
             Some(cosine) => Lowered::scalar(cosine),
-            None => Lowered::scalar(g.dot(&x.parts, &y.parts)),
+            None => Lowered::scalar(inner_product(g, &x.parts, &y.parts)),
         },
     }
 }

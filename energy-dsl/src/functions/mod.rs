@@ -6,6 +6,7 @@ mod arithmetic;
 mod dihedral;
 mod elementary;
 mod exponential;
+mod inner_product;
 mod length;
 mod linear_algebra;
 mod logic;
@@ -19,6 +20,7 @@ pub use shape::{Lowered, Shape};
 
 pub(crate) use angle::{recognise_one_minus_cosine, recognise_root};
 pub(crate) use dihedral::recognise_dihedral;
+use dihedral::recognise_sine_difference;
 pub(crate) use length::recognise_norm_power;
 
 use crate::graph::{Graph, NodeId};
@@ -76,6 +78,7 @@ pub fn find(name: &str) -> Option<&'static Function> {
 pub(crate) fn recognise_difference(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
     recognise_one_minus_cosine(g, a, b)
         .or_else(|| length::recognise_elongation(g, a, b))
+        .or_else(|| recognise_sine_difference(g, a, b))
         .or_else(|| elementary::recognise_versine(g, a, b))
         .or_else(|| exponential::recognise_expm1(g, a, b))
 }

@@ -3,9 +3,11 @@
 //! A rotation is a unit quaternion q, which turns v into q v q*. A rigid motion is a dual quaternion with a unit real part q and
 //! the dual part ½ t q, which takes p to q p q* + t. The exponential of a twist has the angle 2‖θ‖: q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
 
-use super::sinc::{cos_sqrt, sinc_sqrt};
+use super::length::{direction, upper};
+use super::sinc::{assume_at_most_a_quarter_turn, cos_sqrt, sinc_sqrt};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId};
+use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
@@ -246,6 +248,7 @@ fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {
 fn rotation(g: &mut Graph, theta: &[NodeId]) -> Vec<NodeId> {
     let square = g.sum_of_squares(theta);
     let (cosine, sinc) = (cos_sqrt(g, square), sinc_sqrt(g, square));
+    assume_at_most_a_quarter_turn(g, square);
     let mut parts = vec![cosine];
     parts.extend(g.scaled(sinc, theta));
     parts
@@ -263,13 +266,30 @@ pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
     Lowered { shape: Shape::DualQuat, parts }
 }
 
-/// All of a dual quaternion over the norm of its real part.
-pub(super) fn unit_dual(g: &mut Graph, q: &Lowered, unit: Vec<NodeId>, norm: NodeId) -> Lowered {
-    let (null, one) = (g.constant(0.0), g.constant(1.0));
-    let reciprocal = g.div(one, norm);
-    let zero = g.equal(norm, null);
-    let reciprocal = if g.form() == Form::Textbook { reciprocal } else { g.select(zero, null, reciprocal) };
-    let mut parts = unit;
-    parts.extend(g.scaled(reciprocal, &q.parts[4..]));
-    Lowered { shape: Shape::DualQuat, parts }
+/// All of a dual quaternion times ρ = 1/‖q‖, q its real part: with n = q/‖q‖, ∇ρ = −ρ² n and ∇²ρ = ρ³ (3 n nᵀ − I).
+pub(super) fn unit_dual(g: &mut Graph, dual: &Lowered) -> Lowered {
+    let q = &dual.parts[..4];
+    let reciprocal = if g.form() == Form::Textbook {
+        let (one, square) = (g.constant(1.0), g.sum_of_squares(q));
+        let norm = g.sqrt(square);
+        g.div(one, norm)
+    } else {
+        let at = direction(g, q);
+        let value = g.mul(at.reciprocal, at.scale);
+        let square = g.mul(value, value);
+        let slope = g.neg(square);
+        let cube = g.mul(slope, value);
+        let minus_three = g.constant(-3.0);
+        let triple = g.mul(minus_three, cube);
+        let first = at.unit.iter().map(|&n| vec![slope, n]).collect();
+        let second = upper(4)
+            .map(|(i, j)| {
+                let along = vec![triple, at.unit[i], at.unit[j]];
+                if i == j { vec![along, vec![cube]] } else { vec![along] }
+            })
+            .collect();
+        let rule = Rule::factored(Primitive::ReciprocalNorm, q.to_vec(), value, first, second);
+        g.add_rule(rule.flagged(0, Flag::Degenerate, at.zero), &[])
+    };
+    Lowered { shape: Shape::DualQuat, parts: g.scaled(reciprocal, &dual.parts) }
 }

@@ -29,7 +29,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "sin x / x: 1 at 0, and regular there.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(sinc(g, a[0].node())),
-        accuracy: "2 / 6 / 10 for |x| ≤ 1.5",
+        accuracy: "2 / 6 / 12 for |x| ≤ 1.5",
     },
     Function {
         name: "cosc",
@@ -85,6 +85,46 @@ impl Shared {
     }
 }
 
+/// Notes that x = √y is nearly always at most a quarter turn, π/2: of half a rotation vector that is all there is to tell apart.
+/// There series in y take the place of root, sine, cosine and division.
+pub(super) fn assume_at_most_a_quarter_turn(g: &mut Graph, y: NodeId) {
+    const BELOW: f64 = 2.5;
+    if g.form() == Form::Textbook {
+        return;
+    }
+    let x = g.sqrt(y);
+    let shared = shared(g, x, y);
+    let limit = g.constant(BELOW);
+    let small = g.less(y, limit);
+    let cosine = cosine_series(g, y, BELOW);
+    g.assume(shared.cosine, cosine, small);
+    let curvature = shared.curvature(g);
+    for (node, order) in [(shared.sinc, 0), (shared.slope, 1), (curvature, 2)] {
+        let series = series(g, y, BELOW, order);
+        g.assume(node, series, small);
+    }
+}
+
+/// cos √y = Σ (−y)ᵏ/(2k)!, until the next term is below 2⁻⁵⁶ at y = `below`.
+fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
+    let coefficient = |k: i32| {
+        let factorial: f64 = (1..=2 * k).map(f64::from).product();
+        (if k % 2 == 0 { 1.0 } else { -1.0 }) / factorial
+    };
+    let last = (0..).find(|&k| coefficient(k).abs() * below.powi(k) < 2.0_f64.powi(-56)).unwrap_or(0);
+    polynomial(g, y, (0..=last).map(coefficient).collect())
+}
+
+/// Σ cₖ yᵏ by Horner's rule.
+fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -> NodeId {
+    let mut sum = g.constant(coefficients.pop().expect("a polynomial has coefficients"));
+    for coefficient in coefficients.into_iter().rev() {
+        let (coefficient, product) = (g.constant(coefficient), g.mul(y, sum));
+        sum = g.add(coefficient, product);
+    }
+    sum
+}
+
 /// The series of Sₘ where y < `below`, else `direct`.
 fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -> NodeId {
     let series = series(g, y, below, order);
@@ -103,12 +143,7 @@ fn series(g: &mut Graph, y: NodeId, below: f64, order: i32) -> NodeId {
     };
     let least = coefficient(order).abs() * 2.0_f64.powi(-56);
     let last = (order..).find(|&k| coefficient(k).abs() * below.powi(k - order) < least).unwrap_or(order);
-    let mut sum = g.constant(coefficient(last));
-    for k in (order..last).rev() {
-        let (coefficient, product) = (g.constant(coefficient(k)), g.mul(y, sum));
-        sum = g.add(coefficient, product);
-    }
-    sum
+    polynomial(g, y, (order..=last).map(coefficient).collect())
 }
 
 /// S₁ as a rule of y, so that it can be differentiated.

@@ -96,7 +96,9 @@ impl Graph {
             }
             ((x, true), (y, false)) => self.sub(y, x),
             ((x, false), (y, true)) => self.sub(x, y),
-            _ => self.node(Op::Add(a.min(b), a.max(b))),
+            // One order for both, that written first: it decides which product a sum takes along.
+            _ if self.index.contains_key(&Op::Add(b, a)) => self.node(Op::Add(b, a)),
+            _ => self.node(Op::Add(a, b)),
         }
     }
 
@@ -134,6 +136,17 @@ impl Graph {
                 self.node(Op::Sub(a, b))
             }
         }
+    }
+
+    /// a − b without recognition.
+    pub(crate) fn plain_difference(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Sub(a, b))
+    }
+
+    /// 0 − a: −a, but for +0 where a is a zero of either sign.
+    pub fn minus_or_plus_zero(&mut self, a: NodeId) -> NodeId {
+        let zero = self.constant(0.0);
+        self.node(Op::Sub(zero, a))
     }
 
     /// a · b. A squared elongation becomes its own primitive.
@@ -328,12 +341,20 @@ impl Graph {
         }
     }
 
-    /// What rounding a + b lost.
+    /// What rounding a + b lost. Signs move out as they do of the sum itself, so that a sum and its error name the same operands.
     pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
         }
-        self.node(Op::SumError(a.min(b), a.max(b)))
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => {
+                let error = self.sum_error(x, y);
+                self.neg(error)
+            }
+            ((x, true), (y, false)) => self.difference_error(y, x),
+            ((x, false), (y, true)) => self.difference_error(x, y),
+            _ => self.node(Op::SumError(a.min(b), a.max(b))),
+        }
     }
 
     /// What rounding a − b lost.
@@ -341,7 +362,19 @@ impl Graph {
         if self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
         }
-        self.node(Op::DifferenceError(a, b))
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => self.difference_error(y, x),
+            ((x, true), (y, false)) => {
+                let error = self.sum_error(x, y);
+                self.neg(error)
+            }
+            ((x, false), (y, true)) => self.sum_error(x, y),
+            _ if !self.index.contains_key(&Op::Sub(a, b)) && self.index.contains_key(&Op::Sub(b, a)) => {
+                let opposite = self.node(Op::DifferenceError(b, a));
+                self.neg(opposite)
+            }
+            _ => self.node(Op::DifferenceError(a, b)),
+        }
     }
 
     /// What rounding a · b lost.
@@ -349,7 +382,9 @@ impl Graph {
         if self.as_constant(a).is_some_and(is_power_of_two) || self.as_constant(b).is_some_and(is_power_of_two) {
             return self.constant(0.0);
         }
-        self.node(Op::ProductError(a.min(b), a.max(b)))
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let error = self.node(Op::ProductError(a.min(b), a.max(b)));
+        self.signed(error, minus_a != minus_b)
     }
 
     /// What rounding lost when this node was computed as a difference of two others; zero for other nodes.
@@ -362,6 +397,25 @@ impl Graph {
             }
             _ => self.constant(0.0),
         }
+    }
+
+    /// a · b − c, as if rounded once.
+    pub fn fused_mul_sub(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
+        if self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
+            let product = self.mul(a, b);
+            return self.sub(product, c);
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let negative = minus_a != minus_b;
+        // −a·b − c = −(a·b − (−c)).
+        let c = self.signed(c, negative);
+        let difference = self.node(Op::FusedMulSub(a.min(b), a.max(b), c));
+        self.signed(difference, negative)
+    }
+
+    /// a − b², b being √a rounded.
+    pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::RootError(a, b))
     }
 
     /// A power of two that brings |a| into [1, 2).
@@ -384,27 +438,58 @@ impl Graph {
         self.node(Op::Equal(a.min(b), a.max(b)))
     }
 
+    /// Whether a ≥ 0 is the given power of a length that needs no scaling.
+    pub fn is_moderate(&mut self, a: NodeId, degree: u8) -> NodeId {
+        self.node(Op::IsModerate(a, degree))
+    }
+
+    /// A mask that is the same everywhere.
+    pub fn truth(&mut self, value: bool) -> NodeId {
+        self.node(Op::Truth(value))
+    }
+
+    /// Whether precautions must be taken.
+    pub fn cautious(&mut self) -> NodeId {
+        self.node(Op::Cautious)
+    }
+
     /// Both.
     pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if a == b { a } else { self.node(Op::And(a.min(b), a.max(b))) }
+        match (self.op(a), self.op(b)) {
+            (Op::Truth(true), _) | (_, Op::Truth(false)) => b,
+            (_, Op::Truth(true)) | (Op::Truth(false), _) => a,
+            _ if a == b => a,
+            _ => self.node(Op::And(a.min(b), a.max(b))),
+        }
     }
 
     /// Either.
     pub fn or(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if a == b { a } else { self.node(Op::Or(a.min(b), a.max(b))) }
+        match (self.op(a), self.op(b)) {
+            (Op::Truth(false), _) | (_, Op::Truth(true)) => b,
+            (_, Op::Truth(false)) | (Op::Truth(true), _) => a,
+            _ if a == b => a,
+            _ => self.node(Op::Or(a.min(b), a.max(b))),
+        }
     }
 
     /// Not.
     pub fn not(&mut self, a: NodeId) -> NodeId {
         match self.op(a) {
             Op::Not(b) => b,
+            Op::Truth(value) => self.truth(!value),
             _ => self.node(Op::Not(a)),
         }
     }
 
     /// A selection.
     pub fn select(&mut self, mask: NodeId, yes: NodeId, no: NodeId) -> NodeId {
-        if yes == no { yes } else { self.node(Op::Select(mask, yes, no)) }
+        match self.op(mask) {
+            Op::Truth(true) => yes,
+            Op::Truth(false) => no,
+            _ if yes == no => yes,
+            _ => self.node(Op::Select(mask, yes, no)),
+        }
     }
 
     /// Σ terms, left to right.
@@ -442,9 +527,22 @@ impl Graph {
         factors.iter().fold(weight.unwrap_or(one), |product, &factor| self.mul(product, factor))
     }
 
-    /// weight · Σ products, the weight going into each.
+    /// weight · Σ products, the weight going into each. Products that follow each other and end in the same factor are added
+    /// before it multiplies them.
     pub fn sum_of_products(&mut self, weight: Option<NodeId>, products: &[Vec<NodeId>]) -> NodeId {
-        let terms: Vec<_> = products.iter().map(|factors| self.product(weight, factors)).collect();
+        let mut terms = Vec::with_capacity(products.len());
+        for group in products.chunk_by(|a, b| a.len() > 1 && b.len() > 1 && a.last() == b.last()) {
+            let term = match group {
+                [factors] => self.product(weight, factors),
+                _ => {
+                    let common = *group[0].last().expect("more than one factor");
+                    let kept: Vec<_> = group.iter().map(|factors| factors[..factors.len() - 1].to_vec()).collect();
+                    let sum = self.sum_of_products(weight, &kept);
+                    self.mul(sum, common)
+                }
+            };
+            terms.push(term);
+        }
         self.sum(terms)
     }
 

@@ -10,7 +10,7 @@ pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
     let mut stack: Vec<NodeId> = outputs.iter().map(|&o| graph.resolve(o)).collect();
     while let Some(node) = stack.pop() {
         if seen.insert(node) {
-            stack.extend(graph.op(node).operands().map(|o| graph.resolve(o)));
+            stack.extend(graph.fused(node).operands().map(|o| graph.resolve(o)));
         }
     }
     seen
@@ -21,12 +21,20 @@ pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
 pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
     let mut count = OperationCount::default();
     for node in reachable(graph, outputs) {
-        match graph.op(node) {
-            Op::Constant(_) | Op::Pi | Op::Input(_) => {}
+        match graph.fused(node) {
+            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => {}
             Op::Rule(_) => unreachable!("resolved"),
             Op::Div(..) | Op::Sqrt(_) => count.divisions_and_roots += 1,
             Op::Sin(_) | Op::Cos(_) | Op::Exp(_) | Op::Ln(_) | Op::Atan2(..) | Op::Pow(..) => count.transcendental += 1,
-            Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) => count.error_terms += 1,
+            Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) | Op::RootError(..) => {
+                count.error_terms += 1
+            }
+            // Its product alone, beside an error term.
+            Op::FusedMulSub(..) => {
+                count.basic += 1;
+                count.error_terms += 1;
+            }
+            Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) => count.fused += 1,
             _ => count.basic += 1,
         }
     }

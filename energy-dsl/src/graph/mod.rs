@@ -3,11 +3,14 @@
 
 mod build;
 mod count;
+mod fuse;
 mod node;
+mod ordinary;
 mod rule;
 
 pub use count::{count, reachable};
 pub use node::{Input, NodeId, Op};
+pub use ordinary::{Assumption, general, ordinary};
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 
 use std::collections::HashMap;
@@ -30,6 +33,7 @@ pub struct Graph {
     index: HashMap<Op, NodeId>,
     rules: Vec<Rule>,
     rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
+    assumptions: Vec<Assumption>,
 }
 
 impl Graph {
@@ -43,6 +47,7 @@ impl Graph {
             index: HashMap::new(),
             rules: Vec::new(),
             rule_index: HashMap::new(),
+            assumptions: Vec::new(),
         }
     }
 

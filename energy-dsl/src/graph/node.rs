@@ -22,6 +22,10 @@ pub enum Input {
 pub enum Op {
     /// A constant, as the bits of a double.
     Constant(u64),
+    /// A mask that is the same everywhere.
+    Truth(bool),
+    /// A mask: whether the configuration may not be ordinary, so that precautions must be taken.
+    Cautious,
     /// π, to the precision of the number type at hand.
     Pi,
     /// An input.
@@ -62,6 +66,16 @@ pub enum Op {
     DifferenceError(NodeId, NodeId),
     /// What rounding a · b lost; zero derivative.
     ProductError(NodeId, NodeId),
+    /// What √a, rounded to b, lost: a − b²; zero derivative.
+    RootError(NodeId, NodeId),
+    /// a · b − c, as if rounded once.
+    FusedMulSub(NodeId, NodeId, NodeId),
+    /// a · b + c, rounded once where the processor can. Made of sums by [`super::Graph::fused`] when code is written.
+    MulAdd(NodeId, NodeId, NodeId),
+    /// a · b − c.
+    MulSub(NodeId, NodeId, NodeId),
+    /// c − a · b.
+    NegMulAdd(NodeId, NodeId, NodeId),
     /// A power of two that brings |a| into [1, 2); zero derivative.
     PowerOfTwoScale(NodeId),
     /// a < b.
@@ -70,6 +84,8 @@ pub enum Op {
     LessOrEqual(NodeId, NodeId),
     /// a = b.
     Equal(NodeId, NodeId),
+    /// Whether a is the given power of a length that needs no scaling.
+    IsModerate(NodeId, u8),
     /// Both masks.
     And(NodeId, NodeId),
     /// Either mask.
@@ -86,7 +102,9 @@ impl Op {
     /// The operands of an elementary operation (a rule's are its own affair).
     pub fn operands(self) -> impl Iterator<Item = NodeId> {
         let (count, list) = match self {
-            Self::Constant(_) | Self::Pi | Self::Input(_) | Self::Rule(_) => (0, [NodeId(0); 3]),
+            Self::Constant(_) | Self::Truth(_) | Self::Cautious | Self::Pi | Self::Input(_) | Self::Rule(_) => {
+                (0, [NodeId(0); 3])
+            }
             Self::Neg(a)
             | Self::Sqrt(a)
             | Self::Abs(a)
@@ -95,6 +113,7 @@ impl Op {
             | Self::Exp(a)
             | Self::Ln(a)
             | Self::PowerOfTwoScale(a)
+            | Self::IsModerate(a, _)
             | Self::Not(a) => (1, [a; 3]),
             Self::Add(a, b)
             | Self::Sub(a, b)
@@ -107,14 +126,32 @@ impl Op {
             | Self::SumError(a, b)
             | Self::DifferenceError(a, b)
             | Self::ProductError(a, b)
+            | Self::RootError(a, b)
             | Self::Less(a, b)
             | Self::LessOrEqual(a, b)
             | Self::Equal(a, b)
             | Self::And(a, b)
             | Self::Or(a, b) => (2, [a, b, b]),
-            Self::Select(m, a, b) => (3, [m, a, b]),
+            Self::Select(a, b, c)
+            | Self::FusedMulSub(a, b, c)
+            | Self::MulAdd(a, b, c)
+            | Self::MulSub(a, b, c)
+            | Self::NegMulAdd(a, b, c) => (3, [a, b, c]),
         };
         list.into_iter().take(count)
+    }
+
+    /// Whether the node is a rounding error or a scale: its derivative is zero whatever its operands.
+    #[must_use]
+    pub fn is_constant_in_exact_arithmetic(self) -> bool {
+        matches!(
+            self,
+            Self::SumError(..)
+                | Self::DifferenceError(..)
+                | Self::ProductError(..)
+                | Self::RootError(..)
+                | Self::PowerOfTwoScale(_)
+        )
     }
 
     /// Whether the node is a mask and not a number.
@@ -122,7 +159,15 @@ impl Op {
     pub fn is_mask(self) -> bool {
         matches!(
             self,
-            Self::Less(..) | Self::LessOrEqual(..) | Self::Equal(..) | Self::And(..) | Self::Or(..) | Self::Not(_)
+            Self::Truth(_)
+                | Self::Cautious
+                | Self::Less(..)
+                | Self::LessOrEqual(..)
+                | Self::Equal(..)
+                | Self::IsModerate(..)
+                | Self::And(..)
+                | Self::Or(..)
+                | Self::Not(_)
         )
     }
 }

@@ -5,6 +5,10 @@ use crate::runtime::Flag;
 /// A robust primitive of the language; each output of a vector-valued one is a primitive of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Primitive {
+    /// x·y.
+    InnerProduct,
+    /// 1/‖d‖.
+    ReciprocalNorm,
     /// ‖d‖.
     Norm,
     /// A component of d/‖d‖.
@@ -31,6 +35,8 @@ pub enum Primitive {
     DihedralSineHalf,
     /// cos θ/2 of a dihedral angle.
     DihedralCosineHalf,
+    /// sin θ/2 − sin θ₀/2 of a dihedral angle and its rest angle.
+    DihedralSineDifference,
     /// 1 − cos x.
     Versine,
     /// x − sin x.
@@ -88,8 +94,10 @@ impl Primitive {
             Self::DihedralCosine => "cos θ of a dihedral angle",
             Self::DihedralSineHalf => "sin θ/2 of a dihedral angle",
             Self::DihedralCosineHalf => "cos θ/2 of a dihedral angle",
+            Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
+            Self::ReciprocalNorm => "reciprocal norm 1/‖d‖",
             Self::CosSqrt => "cos √y",
             Self::SincSqrt => "sin √y / √y",
             Self::Sinc => "sin x / x",
@@ -102,7 +110,7 @@ impl Primitive {
             Self::Tangent => "tan x",
             Self::ArcSine => "asin x",
             Self::ArcCosine => "acos x",
-            Self::Partial { .. } | Self::SincSqrtSlope => return None,
+            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Routine, flags, potential};
 use crate::check::Program;
-use crate::diff::{Coordinates, SecondOrder, first_derivatives, second_order};
+use crate::diff::{Coordinates, Plan, SecondOrder, first_order, second_order};
 use crate::graph::{Graph, Input, NodeId, symmetric_index};
 
 /// What all routines are made of, in reduced coordinates.
@@ -21,7 +21,13 @@ struct Compliant<'a> {
     points: usize,
 }
 
-pub(super) fn routines(g: &mut Graph, program: &Program, c: &[NodeId], coordinates: &Coordinates) -> Vec<Routine> {
+pub(super) fn routines(
+    g: &mut Graph,
+    program: &Program,
+    c: &[NodeId],
+    coordinates: &Coordinates,
+    plans: &mut Vec<Plan>,
+) -> (Vec<Routine>, SecondOrder) {
     let parameter = |g: &mut Graph, from_end: usize| {
         let number = program.parameters_size() - from_end;
         g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
@@ -31,23 +37,34 @@ pub(super) fn routines(g: &mut Graph, program: &Program, c: &[NodeId], coordinat
     let half = g.constant(0.5);
     let scaled = g.mul(half, square);
     let value = g.mul(stiffness, scaled);
-    let energy = second_order(g, value, coordinates);
+    let (energy, plan) = second_order(g, "hessian", value, coordinates);
+    plans.push(plan);
+    let (jacobian, plan) = first_order(g, "constraint_jacobian", c, coordinates, None);
+    plans.push(plan);
+    let mut hessians = Vec::with_capacity(c.len());
+    for &row in c {
+        let (second, plan) = second_order(g, "constraint_hessian", row, coordinates);
+        hessians.push(second.hessian);
+        plans.push(plan);
+    }
+    let (mut gradient, plan) = first_order(g, "gauss_newton", &[value], coordinates, None);
+    plans.push(plan);
     let compliant = Compliant {
         c,
-        jacobian: first_derivatives(g, c, coordinates),
-        hessians: c.iter().map(|&row| second_order(g, row, coordinates).hessian).collect(),
-        gradient: first_derivatives(g, &[value], coordinates).remove(0),
+        jacobian,
+        hessians,
+        gradient: gradient.remove(0),
         energy,
         stiffness,
         damping,
         coordinates,
         points: program.points(),
     };
-    let mut list = potential(g, &compliant.energy, coordinates, compliant.points);
+    let mut list = potential(g, &compliant.energy, coordinates, compliant.points, plans);
     list.extend(compliant.geometry(g));
     list.push(compliant.gauss_newton(g));
     list.extend(compliant.force(g));
-    list
+    (list, compliant.energy)
 }
 
 impl Compliant<'_> {
@@ -68,18 +85,18 @@ impl Compliant<'_> {
         let full_hessians: Vec<NodeId> =
             self.hessians.iter().flat_map(|row| self.coordinates.expand_triangle(g, row, self.points)).collect();
         [
-            Routine {
-                name: "constraint_jacobian",
-                reduced: [&c[..], &jacobian].concat(),
-                groups: vec![c.clone(), full_jacobian.clone()],
-                flags: first_flags,
-            },
-            Routine {
-                name: "constraint_hessian",
-                reduced: [&c[..], &jacobian, &hessians].concat(),
-                groups: vec![c, full_jacobian, full_hessians],
-                flags: second_flags,
-            },
+            Routine::new(
+                "constraint_jacobian",
+                [&c[..], &jacobian].concat(),
+                vec![c.clone(), full_jacobian.clone()],
+                first_flags,
+            ),
+            Routine::new(
+                "constraint_hessian",
+                [&c[..], &jacobian, &hessians].concat(),
+                vec![c, full_jacobian, full_hessians],
+                second_flags,
+            ),
         ]
     }
 
@@ -96,16 +113,16 @@ impl Compliant<'_> {
         let upper = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
         let curvature: Vec<NodeId> = upper.map(|(i, j)| self.outer(g, self.stiffness, i, j)).collect();
         let value = self.energy.value;
-        Routine {
-            name: "gauss_newton",
-            reduced: [&[value], &self.gradient[..], &curvature].concat(),
-            groups: vec![
+        Routine::new(
+            "gauss_newton",
+            [&[value], &self.gradient[..], &curvature].concat(),
+            vec![
                 vec![value],
                 self.coordinates.expand_all(g, &self.gradient, self.points),
                 self.coordinates.expand_triangle(g, &curvature, self.points),
             ],
-            flags: self.flags(g, 1, 1),
-        }
+            self.flags(g, 1, 1),
+        )
     }
 
     /// f = −∇U − k_d Jᵀ Ċ, Ċ = J q̇ with q̇ the differences of velocity; ∂f/∂x = −∇²U − k_d Σ (Ċ ∂²C + ∇C (∂²C q̇)ᵀ) and
@@ -154,18 +171,13 @@ impl Compliant<'_> {
         let full_position = self.coordinates.expand_square(g, &by_position, self.points);
         let full_velocity = self.coordinates.expand_square(g, &by_velocity, self.points);
         [
-            Routine {
-                name: "force",
-                reduced: force.clone(),
-                groups: vec![full_force.clone()],
-                flags: self.flags(g, 1, 1),
-            },
-            Routine {
-                name: "jacobians",
-                reduced: [force, by_position, by_velocity].concat(),
-                groups: vec![full_force, full_position, full_velocity],
-                flags: self.flags(g, 2, 2),
-            },
+            Routine::new("force", force.clone(), vec![full_force.clone()], self.flags(g, 1, 1)),
+            Routine::new(
+                "jacobians",
+                [force, by_position, by_velocity].concat(),
+                vec![full_force, full_position, full_velocity],
+                self.flags(g, 2, 2),
+            ),
         ]
     }
 }

@@ -5,6 +5,9 @@ pub trait Array<Item>: Copy + AsRef<[Item]> + AsMut<[Item]> {
 
     /// The array whose `i`-th item is `item(i)`.
     fn from_fn(item: impl FnMut(usize) -> Item) -> Self;
+
+    /// The array of equal items.
+    fn repeat(item: Item) -> Self;
 }
 
 impl<Item: Copy, const N: usize> Array<Item> for [Item; N] {
@@ -12,5 +15,10 @@ impl<Item: Copy, const N: usize> Array<Item> for [Item; N] {
 
     fn from_fn(item: impl FnMut(usize) -> Item) -> Self {
         std::array::from_fn(item)
+    }
+
+    #[inline(always)]
+    fn repeat(item: Item) -> Self {
+        [item; N]
     }
 }

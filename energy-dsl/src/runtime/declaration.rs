@@ -66,6 +66,8 @@ pub struct Field {
 pub struct OperationCount {
     /// Additions, subtractions, multiplications, negations, minima, maxima, absolute values, comparisons and selections.
     pub basic: usize,
+    /// Products that fuse with a sum: one instruction where the processor has it, else two.
+    pub fused: usize,
     /// Divisions and square roots.
     pub divisions_and_roots: usize,
     /// sin, cos, exp, log, atan2, pow.
@@ -76,10 +78,23 @@ pub struct OperationCount {
 }
 
 impl OperationCount {
-    /// All of them, an error term counting as one.
+    /// All of them: a fused multiply-add counts as its two operations, an error term as one.
     #[must_use]
     pub const fn total(&self) -> usize {
-        self.basic + self.divisions_and_roots + self.transcendental + self.error_terms
+        self.instructions() + self.fused
+    }
+
+    /// What they cost, in units of one instruction: a division or root about five, a transcendental about twenty; an exact error
+    /// term one where products fuse and up to six elsewhere, taken as three.
+    #[must_use]
+    pub const fn cost(&self) -> usize {
+        self.instructions() + 4 * self.divisions_and_roots + 19 * self.transcendental + 2 * self.error_terms
+    }
+
+    /// All of them, a fused multiply-add counting as one.
+    #[must_use]
+    pub const fn instructions(&self) -> usize {
+        self.basic + self.fused + self.divisions_and_roots + self.transcendental + self.error_terms
     }
 }
 
@@ -127,6 +142,9 @@ pub struct Declaration {
     pub symmetric: bool,
     /// Coordinates the derivatives are taken in, after input reduction.
     pub reduced_coordinates: usize,
+    /// Of each difference vector that is three of them, the points it is made of, with their signs (`true`: added). Empty for
+    /// residuals.
+    pub reduced_vectors: &'static [&'static [(usize, bool)]],
     /// The robust primitives the formula was compiled to.
     pub primitives: &'static [&'static str],
     /// Each routine and its cost.

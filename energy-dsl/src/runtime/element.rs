@@ -6,6 +6,7 @@
 //! N×N blocks row by row.
 
 use super::array::Array;
+use super::cpu::Level;
 use super::declaration::Declaration;
 use super::flags::Flags;
 use super::real::{Number, Real};
@@ -70,6 +71,20 @@ pub struct Hessian<T: Number, Points, Triangle> {
     pub gradient: Points,
     /// ∂²U/∂x², one triangle of blocks; the diagonal blocks are exactly symmetric.
     pub hessian: Triangle,
+    /// Conditions met.
+    pub flags: Flags<T>,
+}
+
+/// U, ∇U and ∇²U by the coordinates that derivatives are taken in: the differences of points through which U sees them, three
+/// numbers to a difference, as [`Declaration::reduced_vectors`] lists them.
+#[derive(Clone, Copy, Debug)]
+pub struct ReducedHessian<T: Number, Coordinates, Upper> {
+    /// U.
+    pub value: T,
+    /// ∂U/∂q.
+    pub gradient: Coordinates,
+    /// ∂²U/∂q², the upper triangle row by row.
+    pub hessian: Upper,
     /// Conditions met.
     pub flags: Flags<T>,
 }
@@ -188,10 +203,44 @@ pub trait Potential<T: Real>: Element {
 
     /// U.
     fn value(&self, x: &Self::Points) -> Value<T>;
+    /// [`Self::value`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn value_at<L: Level>(&self, x: &Self::Points) -> Value<T> {
+        self.value(x)
+    }
     /// U and ∇U.
     fn gradient(&self, x: &Self::Points) -> Gradient<T, Self::Points>;
+    /// [`Self::gradient`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn gradient_at<L: Level>(&self, x: &Self::Points) -> Gradient<T, Self::Points> {
+        self.gradient(x)
+    }
     /// U, ∇U and ∇²U.
     fn hessian(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle>;
+    /// [`Self::hessian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn hessian_at<L: Level>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
+        self.hessian(x)
+    }
+}
+
+/// A potential whose derivatives can be had before their expansion to points: there the Hessian is smaller, and cheaper to
+/// make positive semi-definite.
+pub trait ReducedPotential<T: Real>: Potential<T> {
+    /// One number per coordinate: `[T; n]`.
+    type Coordinates: Array<T>;
+    /// The upper triangle: `[T; n (n + 1) / 2]`.
+    type Upper: Array<T>;
+
+    /// U, ∂U/∂q and ∂²U/∂q².
+    fn reduced_hessian(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper>;
+    /// [`Self::reduced_hessian`] compiled into a caller that runs at level `L`.
+    #[inline(always)]
+    fn reduced_hessian_at<L: Level>(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper> {
+        self.reduced_hessian(x)
+    }
+    /// The derivatives by the points: sums of those by the coordinates with signs.
+    fn expand(reduced: &ReducedHessian<T, Self::Coordinates, Self::Upper>) -> Hessian<T, Self::Points, Self::Triangle>;
 }
 
 /// A force f(x, v), not necessarily the gradient of anything.
@@ -203,8 +252,22 @@ pub trait ForceLaw<T: Real>: Element {
 
     /// f.
     fn force(&self, x: &Self::Points, v: &Self::Points) -> ForceValue<T, Self::Points>;
+    /// [`Self::force`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn force_at<L: Level>(&self, x: &Self::Points, v: &Self::Points) -> ForceValue<T, Self::Points> {
+        self.force(x, v)
+    }
     /// f, ∂f/∂x and ∂f/∂v.
     fn jacobians(&self, x: &Self::Points, v: &Self::Points) -> ForceJacobians<T, Self::Points, Self::Square>;
+    /// [`Self::jacobians`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn jacobians_at<L: Level>(
+        &self,
+        x: &Self::Points,
+        v: &Self::Points,
+    ) -> ForceJacobians<T, Self::Points, Self::Square> {
+        self.jacobians(x, v)
+    }
 }
 
 /// A constraint C(x) with its compliant forms: as a [`Potential`] it is ½ k_s CᵀC, as a [`ForceLaw`] the force
@@ -222,16 +285,40 @@ pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
         &self,
         x: &<Self as Potential<T>>::Points,
     ) -> ConstraintJacobian<T, Self::Rows, Self::Jacobian>;
+    /// [`Self::constraint_jacobian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn constraint_jacobian_at<L: Level>(
+        &self,
+        x: &<Self as Potential<T>>::Points,
+    ) -> ConstraintJacobian<T, Self::Rows, Self::Jacobian> {
+        self.constraint_jacobian(x)
+    }
     /// C, J and ∂²C.
     fn constraint_hessian(
         &self,
         x: &<Self as Potential<T>>::Points,
     ) -> ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles>;
+    /// [`Self::constraint_hessian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn constraint_hessian_at<L: Level>(
+        &self,
+        x: &<Self as Potential<T>>::Points,
+    ) -> ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles> {
+        self.constraint_hessian(x)
+    }
     /// The always positive semi-definite part k_s JᵀJ of the Hessian of ½ k_s CᵀC, with value and gradient.
     fn gauss_newton(
         &self,
         x: &<Self as Potential<T>>::Points,
     ) -> Hessian<T, <Self as Potential<T>>::Points, <Self as Potential<T>>::Triangle>;
+    /// [`Self::gauss_newton`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn gauss_newton_at<L: Level>(
+        &self,
+        x: &<Self as Potential<T>>::Points,
+    ) -> Hessian<T, <Self as Potential<T>>::Points, <Self as Potential<T>>::Triangle> {
+        self.gauss_newton(x)
+    }
 }
 
 /// A residual r(u) of unknowns that need not be points.
@@ -245,6 +332,16 @@ pub trait Residual<T: Real>: Element {
 
     /// r.
     fn residual(&self, u: &Self::Unknowns) -> ResidualValue<T, Self::Rows>;
+    /// [`Self::residual`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn residual_at<L: Level>(&self, u: &Self::Unknowns) -> ResidualValue<T, Self::Rows> {
+        self.residual(u)
+    }
     /// r and J.
     fn jacobian(&self, u: &Self::Unknowns) -> ResidualJacobian<T, Self::Rows, Self::Jacobian>;
+    /// [`Self::jacobian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    #[inline(always)]
+    fn jacobian_at<L: Level>(&self, u: &Self::Unknowns) -> ResidualJacobian<T, Self::Rows, Self::Jacobian> {
+        self.jacobian(u)
+    }
 }

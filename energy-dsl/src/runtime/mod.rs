@@ -1,19 +1,36 @@
-//! What generated code calls, and what calls generated code: number types, element traits and the
+//! What generated code calls, and what calls generated code: number types, lanes and levels, element traits and the
 //! self-description that every generated element carries.
 
 mod array;
+mod batch;
+mod call;
+mod choose;
+mod cpu;
 mod declaration;
 mod element;
+mod elementary;
 mod evaluate;
 mod flags;
 mod real;
 
 pub use array::Array;
+pub use batch::{
+    BLOCK, Batch, BatchWork, Batches, Hessians, Packed, PackedForce, PackedPotential, PackedResidual, Stored,
+    WidePoints, for_each_batch,
+};
+#[doc(hidden)]
+pub use call::{
+    ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
+    JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall,
+};
+#[doc(hidden)]
+pub use choose::Choose;
+pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
     Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,
-    Hessian, Inputs, Outputs, Potential, Residual, ResidualJacobian, ResidualValue, RestError, Value, Vector3,
-    triangle_index,
+    Hessian, Inputs, Outputs, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian, ResidualValue,
+    RestError, Value, Vector3, triangle_index,
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};

@@ -1,31 +1,59 @@
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
+use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
+use super::elementary::{Atan2, Binary, Cos, Exp, Ln, Pow, Sin, Unary, sin_cos};
+
 /// The outcome of a comparison: `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
     /// False everywhere.
     fn none() -> Self;
+    /// Bit `i` is set where lane `i` is true.
+    fn bits(self) -> u32;
+
     /// Whether it is true anywhere.
-    fn any(self) -> bool;
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
+
+    /// Whether it is true everywhere.
+    #[inline(always)]
+    fn all(self) -> bool {
+        !(!self).any()
+    }
+
+    /// Whether it is true in a lane.
+    #[inline(always)]
+    fn lane(self, lane: usize) -> bool {
+        self.bits() >> lane & 1 != 0
+    }
 }
 
 impl Mask for bool {
+    #[inline(always)]
     fn none() -> Self {
         false
     }
 
-    fn any(self) -> bool {
-        self
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self)
     }
 }
 
 /// The arithmetic that a formula needs. Generated code runs over any [`Real`]; the interpreter over any `Number`, which
 /// need not be `Copy` (multi-precision numbers are not).
+///
+/// What depends on the processor takes the [`Level`] it runs at: whether products and sums fuse, and so how elementary
+/// functions are evaluated.
 pub trait Number:
     Clone + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// What a comparison yields.
     type Mask: Mask;
+    /// Whether there are several lanes, so that a mask may hold for some and not for others.
+    const WIDE: bool = false;
 
     /// The number nearest to a double.
     fn from_f64(value: f64) -> Self;
@@ -38,24 +66,50 @@ pub trait Number:
     /// The larger of the two.
     fn max(self, other: Self) -> Self;
     /// Sine of an angle in radians.
-    fn sin(self) -> Self;
+    fn sin<L: Level>(self) -> Self;
     /// Cosine of an angle in radians.
-    fn cos(self) -> Self;
+    fn cos<L: Level>(self) -> Self;
+    /// Sine and cosine of an angle in radians.
+    fn sin_cos<L: Level>(self) -> (Self, Self) {
+        (self.clone().sin::<L>(), self.cos::<L>())
+    }
     /// eˣ.
-    fn exp(self) -> Self;
+    fn exp<L: Level>(self) -> Self;
     /// Natural logarithm.
-    fn ln(self) -> Self;
+    fn ln<L: Level>(self) -> Self;
     /// The angle of the point (`x`, `self`), in (−π, π].
-    fn atan2(self, x: Self) -> Self;
+    fn atan2<L: Level>(self, x: Self) -> Self;
     /// self to a real power.
-    fn powf(self, exponent: Self) -> Self;
+    fn powf<L: Level>(self, exponent: Self) -> Self;
+    /// self · factor + addend, rounded once where the level has fused operations and twice elsewhere.
+    fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
     /// What rounding `self + other` lost: (self + other) − fl(self + other), exactly. Zero in exact arithmetic.
     fn sum_error(self, other: Self) -> Self;
     /// What rounding `self · other` lost: self·other − fl(self·other), exactly unless it underflows. Zero in exact arithmetic.
-    fn product_error(self, other: Self) -> Self;
+    fn product_error<L: Level>(self, other: Self) -> Self;
+    /// self · factor − subtrahend as if rounded once.
+    fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
+        let error = self.clone().product_error::<L>(factor.clone());
+        (self * factor - subtrahend) + error
+    }
+    /// What rounding the square root of `self` to `root` lost: self − root², exactly but for one last rounding. Zero in exact
+    /// arithmetic.
+    fn root_error<L: Level>(self, root: Self) -> Self {
+        let square = root.clone() * root.clone();
+        (self - square) - root.clone().product_error::<L>(root)
+    }
     /// A power of two s with 1 ≤ s·|self| < 2, for |self| a normal number; 1 for zero, infinity and NaN. Multiplying by it
     /// is exact. Its derivative is taken as zero: formulas that use it are invariant to it.
     fn power_of_two_scale(self) -> Self;
+    /// Whether 2^(−80·`degree`) ≤ self < 2^(80·`degree`) (12 for 80 in single precision): a power `degree` of a length for
+    /// which products of up to eight such lengths neither overflow nor vanish. Generated code then leaves scaling out; a type
+    /// that cannot tell says no.
+    #[allow(clippy::wrong_self_convention)] // numbers are taken by value throughout
+    fn is_moderate(self, _degree: u8) -> Self::Mask {
+        Self::Mask::none()
+    }
     /// self < other.
     fn less(self, other: Self) -> Self::Mask;
     /// self ≤ other.
@@ -64,6 +118,10 @@ pub trait Number:
     fn equal(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Runs a kernel over this type at the level that suits it: the best this machine has for `f64` and `f32`.
+    fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Baseline>()
+    }
 }
 
 /// A [`Number`] that generated code can run over.
@@ -72,7 +130,7 @@ pub trait Real: Number + Copy {}
 impl<T: Number + Copy> Real for T {}
 
 macro_rules! number_for_float {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $split:literal) => {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $binary:ident) => {
         impl Number for $float {
             type Mask = bool;
 
@@ -97,28 +155,37 @@ macro_rules! number_for_float {
                 if other > self { other } else { self }
             }
             #[inline(always)]
-            fn sin(self) -> Self {
-                $float::sin(self)
+            fn sin<L: Level>(self) -> Self {
+                <Sin as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
-            fn cos(self) -> Self {
-                $float::cos(self)
+            fn cos<L: Level>(self) -> Self {
+                <Cos as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
-            fn exp(self) -> Self {
-                $float::exp(self)
+            fn sin_cos<L: Level>(self) -> (Self, Self) {
+                let (sine, cosine) = sin_cos::<f64, L>(f64::from(self));
+                (sine as $float, cosine as $float)
             }
             #[inline(always)]
-            fn ln(self) -> Self {
-                $float::ln(self)
+            fn exp<L: Level>(self) -> Self {
+                <Exp as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
-            fn atan2(self, x: Self) -> Self {
-                $float::atan2(self, x)
+            fn ln<L: Level>(self) -> Self {
+                <Ln as Unary>::of::<f64, L>(f64::from(self)) as $float
             }
             #[inline(always)]
-            fn powf(self, exponent: Self) -> Self {
-                $float::powf(self, exponent)
+            fn atan2<L: Level>(self, x: Self) -> Self {
+                Atan2::$binary::<f64, L>(f64::from(self), f64::from(x)) as $float
+            }
+            #[inline(always)]
+            fn powf<L: Level>(self, exponent: Self) -> Self {
+                Pow::$binary::<f64, L>(f64::from(self), f64::from(exponent)) as $float
+            }
+            #[inline(always)]
+            fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
+                if L::FUSED { $float::mul_add(self, factor, addend) } else { self * factor + addend }
             }
             #[inline(always)]
             fn sum_error(self, other: Self) -> Self {
@@ -128,19 +195,33 @@ macro_rules! number_for_float {
                 (self - (sum - virtual_other)) + (other - virtual_other)
             }
             #[inline(always)]
-            fn product_error(self, other: Self) -> Self {
+            fn product_error<L: Level>(self, other: Self) -> Self {
                 let product = self * other;
-                if cfg!(target_feature = "fma") {
-                    return self.mul_add(other, -product);
+                if L::FUSED {
+                    return $float::mul_add(self, other, -product);
                 }
                 // Dekker's product: `mul_add` is a slow library call where the target has no fused instruction.
                 let halves = |value: $float| {
-                    let shifted = $split * value;
+                    let shifted = <$float as Scalar>::SPLITTER * value;
                     let high = shifted - (shifted - value);
                     (high, value - high)
                 };
                 let ((a, b), (c, d)) = (halves(self), halves(other));
                 ((a * c - product) + a * d + b * c) + b * d
+            }
+            #[inline(always)]
+            fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
+                if L::FUSED {
+                    return $float::mul_add(self, factor, -subtrahend);
+                }
+                (self * factor - subtrahend) + Number::product_error::<L>(self, factor)
+            }
+            #[inline(always)]
+            fn root_error<L: Level>(self, root: Self) -> Self {
+                if L::FUSED {
+                    return $float::mul_add(-root, root, self);
+                }
+                (self - root * root) - Number::product_error::<L>(root, root)
             }
             #[inline(always)]
             fn power_of_two_scale(self) -> Self {
@@ -151,6 +232,11 @@ macro_rules! number_for_float {
                     _ => (2 * $bias - exponent).max(1),
                 };
                 $float::from_bits(inverse << $mantissa_bits)
+            }
+            #[inline(always)]
+            fn is_moderate(self, degree: u8) -> bool {
+                let (from, to) = <$float as Scalar>::moderate_bounds(degree);
+                from <= self && self < to
             }
             #[inline(always)]
             fn less(self, other: Self) -> bool {
@@ -168,22 +254,26 @@ macro_rules! number_for_float {
             fn select(mask: bool, yes: Self, no: Self) -> Self {
                 if mask { yes } else { no }
             }
+            #[inline(always)]
+            fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+                dispatch_scalar(kernel)
+            }
         }
     };
 }
 
-number_for_float!(f64, u64, 52, 0x7ff, 1023, 134_217_729.0);
-number_for_float!(f32, u32, 23, 0xff, 127, 4097.0);
+number_for_float!(f64, u64, 52, 0x7ff, 1023, of);
+number_for_float!(f32, u32, 23, 0xff, 127, of_single);
 
 #[cfg(test)]
 mod tests {
-    use super::Number;
+    use super::{Baseline, Number};
 
     #[test]
     fn error_terms_are_exact() {
         let u = f64::EPSILON / 2.0;
         // (1 + 2u)(1 − u) = 1 + u − 2u² rounds to 1.
-        assert_eq!((1.0 + 2.0 * u).product_error(1.0 - u), u - 2.0 * u * u);
+        assert_eq!(Number::product_error::<Baseline>(1.0 + 2.0 * u, 1.0 - u), u - 2.0 * u * u);
         // Doubles are 2 apart at 1e16: 1e16 + 1 + 2u rounds up.
         assert_eq!(1e16_f64.sum_error(1.0 + 2.0 * u), -1.0 + 2.0 * u);
         assert_eq!(1.0_f32.sum_error(1e-10), 1e-10);

@@ -23,6 +23,7 @@ const fn declaration(name: &'static str, kind: Kind, formula: &'static str, rows
         velocity_dependent: matches!(kind, Kind::Force),
         symmetric: matches!(kind, Kind::Energy),
         reduced_coordinates: 3,
+        reduced_vectors: &[&[(0, true), (1, false)]],
         primitives: &[],
         routines: &[],
     }

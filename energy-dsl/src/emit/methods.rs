@@ -1,0 +1,427 @@
+//! The routines as methods of the traits that the declaration's kind implements.
+//!
+//! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L, and `f`, which runs it at the machine's best
+//! level. Where precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general` by `f_is_ordinary`.
+
+use proc_macro2::{Ident, TokenStream};
+use quote::{format_ident, quote};
+
+use super::schedule::Schedule;
+use crate::check::{Input as DeclaredInput, Program};
+use crate::graph::{Input, NodeId};
+use crate::routines::Routines;
+use crate::runtime::Kind;
+
+/// What turns a group of outputs into an expression.
+type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
+
+const NUMBER: Layout = |schedule, nodes| schedule.value(nodes[0]);
+const NUMBERS: Layout = |schedule, nodes| schedule.array(nodes);
+const VECTORS: Layout = |schedule, nodes| schedule.vectors(nodes);
+const BLOCKS: Layout = |schedule, nodes| schedule.blocks(nodes);
+
+/// How a routine appears in its trait.
+struct Method {
+    routine: &'static str,
+    /// The kernel that calls it.
+    call: &'static str,
+    /// The struct it returns, that struct's fields, the types it is generic over, and those of its fields.
+    result: &'static str,
+    fields: &'static [(&'static str, Layout)],
+    generics: Vec<TokenStream>,
+    field_types: Vec<TokenStream>,
+    /// Arguments after `self`.
+    arguments: Vec<(&'static str, TokenStream)>,
+}
+
+/// The implementations of all traits of the declaration's kind.
+pub(super) fn traits(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    match program.kind {
+        Kind::Energy => potential(name, program, routines),
+        Kind::Force => force_law(name, program, routines),
+        Kind::Constraint => {
+            let (potential, force) = (potential(name, program, routines), force_law(name, program, routines));
+            let constraint = constraint(name, program, routines);
+            quote!(#potential #force #constraint)
+        }
+        Kind::Residual => residual(name, program, routines),
+    }
+}
+
+fn points(program: &Program) -> TokenStream {
+    let points = program.points();
+    quote!([::energy_dsl::Vector3<T>; #points])
+}
+
+fn blocks(number: usize) -> TokenStream {
+    quote!([::energy_dsl::Block<T>; #number])
+}
+
+fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let n = program.points();
+    let (points, triangle) = (points(program), blocks(n * (n + 1) / 2));
+    let x = || vec![("x", points.clone())];
+    let methods = [
+        Method {
+            routine: "value",
+            call: "ValueCall",
+            result: "Value",
+            fields: &[("value", NUMBER)],
+            generics: vec![quote!(T)],
+            field_types: vec![quote!(T)],
+            arguments: x(),
+        },
+        Method {
+            routine: "gradient",
+            call: "GradientCall",
+            result: "Gradient",
+            fields: &[("value", NUMBER), ("gradient", VECTORS)],
+            generics: vec![quote!(T), quote!(#points)],
+            field_types: vec![quote!(T), quote!(#points)],
+            arguments: x(),
+        },
+    ];
+    let hessian = quote! {
+        type Points = #points;
+        type Triangle = #triangle;
+
+        #[inline]
+        fn hessian(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
+            T::dispatch(::energy_dsl::HessianCall(self, x))
+        }
+
+        #[inline(always)]
+        fn hessian_at<L: ::energy_dsl::Level>(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
+            <Self as ::energy_dsl::ReducedPotential<T>>::expand(
+                &<Self as ::energy_dsl::ReducedPotential<T>>::reduced_hessian_at::<L>(self, x),
+            )
+        }
+    };
+    let potential = implementation(name, "Potential", &hessian, &methods, program, routines);
+    let reduced = reduced_potential(name, program, routines);
+    quote!(#potential #reduced)
+}
+
+/// The Hessian by coordinates, and what it is by points.
+fn reduced_potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let (n, points_number) = (routines.coordinates, program.points());
+    let entries = n * (n + 1) / 2;
+    let (coordinates, upper) = (quote!([T; #n]), quote!([T; #entries]));
+    let (points, triangle) = (points(program), blocks(points_number * (points_number + 1) / 2));
+    let method = Method {
+        routine: "reduced_hessian",
+        call: "ReducedHessianCall",
+        result: "ReducedHessian",
+        fields: &[("value", NUMBER), ("gradient", NUMBERS), ("hessian", NUMBERS)],
+        generics: vec![quote!(T), quote!(#coordinates), quote!(#upper)],
+        field_types: vec![quote!(T), quote!(#coordinates), quote!(#upper)],
+        arguments: vec![("x", points.clone())],
+    };
+    let expansion = routines.expansion.as_ref().expect("compiler bug: an energy has an expansion");
+    let read = |input: Input| {
+        let Input::Precomputed(number) = input else { unreachable!("compiler bug: sums of reduced numbers only") };
+        let number = usize::from(number);
+        match number.checked_sub(n) {
+            None => quote!(reduced.gradient[#number]),
+            Some(entry) => quote!(reduced.hessian[#entry]),
+        }
+    };
+    let mut schedule = Schedule::new(&expansion.graph, &read);
+    let (gradient, hessian) = (schedule.vectors(&expansion.gradient), schedule.blocks(&expansion.triangle));
+    let statements = schedule.statements();
+    let types = quote! {
+        type Coordinates = #coordinates;
+        type Upper = #upper;
+
+        #[inline(always)]
+        fn expand(
+            reduced: &::energy_dsl::ReducedHessian<T, #coordinates, #upper>,
+        ) -> ::energy_dsl::Hessian<T, #points, #triangle> {
+            #statements
+            ::energy_dsl::Hessian { value: reduced.value, gradient: #gradient, hessian: #hessian, flags: reduced.flags }
+        }
+    };
+    implementation(name, "ReducedPotential", &types, &[method], program, routines)
+}
+
+fn force_law(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let n = program.points();
+    let (points, square) = (points(program), blocks(n * n));
+    let state = || vec![("x", points.clone()), ("v", points.clone())];
+    let methods = [
+        Method {
+            routine: "force",
+            call: "ForceCall",
+            result: "ForceValue",
+            fields: &[("force", VECTORS)],
+            generics: vec![quote!(T), quote!(#points)],
+            field_types: vec![quote!(#points)],
+            arguments: state(),
+        },
+        Method {
+            routine: "jacobians",
+            call: "JacobiansCall",
+            result: "ForceJacobians",
+            fields: &[("force", VECTORS), ("by_position", BLOCKS), ("by_velocity", BLOCKS)],
+            generics: vec![quote!(T), quote!(#points), quote!(#square)],
+            field_types: vec![quote!(#points), quote!(#square), quote!(#square)],
+            arguments: state(),
+        },
+    ];
+    let types = quote!(type Points = #points; type Square = #square;);
+    implementation(name, "ForceLaw", &types, &methods, program, routines)
+}
+
+fn constraint(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let (n, rows) = (program.points(), program.rows());
+    let vectors = rows * n;
+    let rows_type = quote!([T; #rows]);
+    let jacobian = quote!([::energy_dsl::Vector3<T>; #vectors]);
+    let (points, triangle, triangles) = (points(program), blocks(n * (n + 1) / 2), blocks(rows * n * (n + 1) / 2));
+    let x = || vec![("x", points.clone())];
+    let methods = [
+        Method {
+            routine: "constraint_jacobian",
+            call: "ConstraintJacobianCall",
+            result: "ConstraintJacobian",
+            fields: &[("value", NUMBERS), ("jacobian", VECTORS)],
+            generics: vec![quote!(T), quote!(#rows_type), quote!(#jacobian)],
+            field_types: vec![quote!(#rows_type), quote!(#jacobian)],
+            arguments: x(),
+        },
+        Method {
+            routine: "constraint_hessian",
+            call: "ConstraintHessianCall",
+            result: "ConstraintHessian",
+            fields: &[("value", NUMBERS), ("jacobian", VECTORS), ("hessians", BLOCKS)],
+            generics: vec![quote!(T), quote!(#rows_type), quote!(#jacobian), quote!(#triangles)],
+            field_types: vec![quote!(#rows_type), quote!(#jacobian), quote!(#triangles)],
+            arguments: x(),
+        },
+        Method {
+            routine: "gauss_newton",
+            call: "GaussNewtonCall",
+            result: "Hessian",
+            fields: &[("value", NUMBER), ("gradient", VECTORS), ("hessian", BLOCKS)],
+            generics: vec![quote!(T), quote!(#points), quote!(#triangle)],
+            field_types: vec![quote!(T), quote!(#points), quote!(#triangle)],
+            arguments: x(),
+        },
+    ];
+    let types = quote!(type Rows = #rows_type; type Jacobian = #jacobian; type Triangles = #triangles;);
+    implementation(name, "Constraint", &types, &methods, program, routines)
+}
+
+fn residual(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let (unknowns, rows) = (program.moving_size(), program.rows());
+    let entries = unknowns * rows;
+    let (unknowns, rows, jacobian) = (quote!([T; #unknowns]), quote!([T; #rows]), quote!([T; #entries]));
+    let u = || vec![("u", unknowns.clone())];
+    let methods = [
+        Method {
+            routine: "residual",
+            call: "ResidualCall",
+            result: "ResidualValue",
+            fields: &[("value", NUMBERS)],
+            generics: vec![quote!(T), quote!(#rows)],
+            field_types: vec![quote!(#rows)],
+            arguments: u(),
+        },
+        Method {
+            routine: "jacobian",
+            call: "ResidualJacobianCall",
+            result: "ResidualJacobian",
+            fields: &[("value", NUMBERS), ("jacobian", NUMBERS)],
+            generics: vec![quote!(T), quote!(#rows), quote!(#jacobian)],
+            field_types: vec![quote!(#rows), quote!(#jacobian)],
+            arguments: u(),
+        },
+    ];
+    let types = quote!(type Unknowns = #unknowns; type Rows = #rows; type Jacobian = #jacobian;);
+    implementation(name, "Residual", &types, &methods, program, routines)
+}
+
+/// A trait's implementation, and beside it the routines with all precautions.
+fn implementation(
+    name: &Ident,
+    of: &str,
+    types: &TokenStream,
+    methods: &[Method],
+    program: &Program,
+    routines: &Routines,
+) -> TokenStream {
+    let of = format_ident!("{of}");
+    let (levelled, general): (Vec<_>, Vec<_>) = methods.iter().map(|m| method(m, program, routines)).unzip();
+    let general = general.iter().any(|g| !g.is_empty()).then(|| {
+        quote! {
+            #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+            impl<T: ::energy_dsl::Real> #name<T> {
+                #(#general)*
+            }
+        }
+    });
+    // Generated arithmetic is not written to be read by lints.
+    quote! {
+        #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> ::energy_dsl::#of<T> for #name<T> {
+            #types
+            #(#levelled)*
+        }
+        #general
+    }
+}
+
+/// The method and its levelled form; the form with all precautions, if they were split off.
+fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
+    let routine = routines
+        .list
+        .iter()
+        .find(|r| r.name == method.routine)
+        .expect("compiler bug: a routine of another kind of declaration");
+    let (plain, call, result) =
+        (format_ident!("{}", method.routine), format_ident!("{}", method.call), format_ident!("{}", method.result));
+    let levelled = format_ident!("{plain}_at");
+    let generics = &method.generics;
+    let result_type = quote!(::energy_dsl::#result<#(#generics),*>);
+    let names: Vec<_> = method.arguments.iter().map(|(name, _)| format_ident!("{name}")).collect();
+    let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
+    let arguments = quote!(&self, #(#names: &#types),*);
+    let ordinary = body(method, program, routines, &routine.groups, routine.flags);
+    let (body, general) = match &routine.general {
+        None => (ordinary, TokenStream::new()),
+        Some(general) => {
+            let [is_ordinary, if_ordinary, in_general] =
+                ["is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
+            // Apart, and in another order: handed on as it is, the struct would live in memory whichever way it was made.
+            let fields: Vec<_> = ["flags"]
+                .into_iter()
+                .chain(method.fields.iter().rev().map(|(field, _)| *field))
+                .map(|field| format_ident!("{field}"))
+                .collect();
+            let field_types = method.field_types.iter().rev();
+            let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
+            let select = quote! {
+                if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
+                    self.#if_ordinary::<L>(#(#names),*)
+                } else {
+                    let (#(#fields),*) = self.#in_general::<L>(#(#names),*);
+                    ::energy_dsl::#result { #(#fields),* }
+                }
+            };
+            let guard = mask(program, routines, general.ordinary);
+            let everything = self::body(method, program, routines, &general.groups, general.flags);
+            let general = quote! {
+                /// Where `_if_ordinary` suffices.
+                #[inline(always)]
+                fn #is_ordinary<L: ::energy_dsl::Level>(#arguments) -> T::Mask {
+                    #guard
+                }
+
+                #[inline(always)]
+                fn #if_ordinary<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+                    #ordinary
+                }
+
+                /// With all precautions; lanes that need none keep the bits they would have alone.
+                #[cold]
+                #[inline(never)]
+                fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #parts {
+                    let mut general = { #everything };
+                    if T::WIDE {
+                        let ordinary = self.#is_ordinary::<L>(#(#names),*);
+                        let here = self.#if_ordinary::<L>(#(#names),*);
+                        general = ::energy_dsl::Choose::choose(ordinary, &here, &general);
+                    }
+                    (#(general.#fields),*)
+                }
+            };
+            (select, general)
+        }
+    };
+    let methods = quote! {
+        #[inline]
+        fn #plain(#arguments) -> #result_type {
+            T::dispatch(::energy_dsl::#call(self, #(#names),*))
+        }
+
+        #[inline(always)]
+        fn #levelled<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+            #body
+        }
+    };
+    (methods, general)
+}
+
+/// Statements, then a mask.
+fn mask(program: &Program, routines: &Routines, node: NodeId) -> TokenStream {
+    let read = |input: Input| read_input(program, input);
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let mask = schedule.value(node);
+    let statements = schedule.statements();
+    quote!(#statements #mask)
+}
+
+/// Statements, then the struct returned.
+fn body(
+    method: &Method,
+    program: &Program,
+    routines: &Routines,
+    groups: &[Vec<NodeId>],
+    flags: [Option<NodeId>; 2],
+) -> TokenStream {
+    let read = |input: Input| read_input(program, input);
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let mut values = Vec::new();
+    for ((field, layout), nodes) in method.fields.iter().zip(groups) {
+        let (field, value) = (format_ident!("{field}"), layout(&mut schedule, nodes));
+        values.push(quote!(#field: #value));
+    }
+    let (degenerate, kink) = (schedule.mask(flags[0]), schedule.mask(flags[1]));
+    let statements = schedule.statements();
+    let result = format_ident!("{}", method.result);
+    quote! {
+        #statements
+        ::energy_dsl::#result { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }
+    }
+}
+
+/// How a routine reads an input.
+fn read_input(program: &Program, input: Input) -> TokenStream {
+    let coordinate = |list: &str, i: u16| {
+        let (list, point, axis) = (format_ident!("{list}"), usize::from(i) / 3, usize::from(i) % 3);
+        quote!(#list[#point][#axis])
+    };
+    match input {
+        Input::Position(i) if program.kind == Kind::Residual => {
+            let i = usize::from(i);
+            quote!(u[#i])
+        }
+        Input::Position(i) => coordinate("x", i),
+        Input::Velocity(i) => coordinate("v", i),
+        Input::Parameter(i) => component(&program.parameters, usize::from(i), &quote!(self.)),
+        Input::Precomputed(i) => {
+            let i = usize::from(i);
+            quote!(self.precomputed[#i])
+        }
+        Input::Rest(_) => unreachable!("compiler bug: the rest shape is read when an element is made"),
+    }
+}
+
+/// The component with a number among the inputs, each read as `prefix name`.
+pub(super) fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenStream) -> TokenStream {
+    let input = inputs
+        .iter()
+        .find(|i| (i.first..i.first + i.input_type.size()).contains(&number))
+        .expect("compiler bug: inputs are numbered without gaps");
+    let name = format_ident!("{}", input.name);
+    let mut place = number - input.first;
+    let mut size = input.input_type.size();
+    let mut read = quote!(#prefix #name);
+    for length in input.input_type.dimensions() {
+        size /= length;
+        let index = place / size;
+        read.extend(quote!([#index]));
+        place %= size;
+    }
+    read
+}

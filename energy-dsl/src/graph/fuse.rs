@@ -1,0 +1,42 @@
+//! Which sums take a product along, as one fused multiply-add.
+//!
+//! The choice depends on the graph alone and not on the routine, so that all routines compute a node alike. A difference of
+//! two products stays as it is: fused, a·b − a·b would not be 0, and a flat hinge not flat.
+
+use super::{Graph, NodeId, Op};
+
+impl Graph {
+    /// What computes a node where products fuse with sums.
+    #[must_use]
+    pub fn fused(&self, node: NodeId) -> Op {
+        match self.op(node) {
+            op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) => {
+                match (self.product_of(a), self.product_of(b)) {
+                    (_, Some((x, y))) => Op::MulAdd(x, y, a),
+                    (Some((x, y)), None) => Op::MulAdd(x, y, b),
+                    (None, None) => op,
+                }
+            }
+            op @ Op::Sub(a, b) if !self.has(Op::DifferenceError(a, b)) => {
+                match (self.product_of(a), self.product_of(b)) {
+                    (None, Some((x, y))) => Op::NegMulAdd(x, y, a),
+                    (Some((x, y)), None) => Op::MulSub(x, y, b),
+                    _ => op,
+                }
+            }
+            op => op,
+        }
+    }
+
+    /// The factors of a product whose rounding error nobody asks for: asked for, it is that of the rounded product.
+    fn product_of(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
+        match self.op(self.resolve(node)) {
+            Op::Mul(x, y) if !self.has(Op::ProductError(x, y)) => Some((x, y)),
+            _ => None,
+        }
+    }
+
+    fn has(&self, op: Op) -> bool {
+        self.index.contains_key(&op)
+    }
+}

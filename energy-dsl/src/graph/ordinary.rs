@@ -1,0 +1,161 @@
+//! The path that ordinary configurations take. Robust primitives scale their vectors, and choose other values where a vector
+//! vanishes; nearly always all that is idle. Each such precaution comes with an [`Assumption`] under which it can be
+//! left out without changing a bit of the result, and one mask tells whether all assumptions hold.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Graph, NodeId, Op};
+
+/// Where `guard`, computed under the assumptions themselves, holds, `node` equals `instead`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Assumption {
+    /// The precaution.
+    pub node: NodeId,
+    /// What it comes to.
+    pub instead: NodeId,
+    /// When.
+    pub guard: NodeId,
+}
+
+impl Graph {
+    /// Whether a mask is the same wherever the assumptions hold.
+    pub(crate) fn is_decided(&mut self, mask: NodeId) -> bool {
+        ordinary(self, &[mask]).is_some_and(|(masks, _)| matches!(self.op(masks[0]), Op::Truth(_)))
+    }
+
+    /// Notes that `node` equals `instead` where `guard` holds.
+    pub(crate) fn assume(&mut self, node: NodeId, instead: NodeId, guard: NodeId) {
+        if node != instead && !self.assumptions.iter().any(|a| a.node == node) {
+            self.assumptions.push(Assumption { node, instead, guard });
+        }
+    }
+}
+
+/// `outputs` with all precautions.
+pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
+    let mut path = Path { assumptions: BTreeMap::new(), done: BTreeMap::new(), guards: BTreeSet::new() };
+    let (cautious, always) = (g.cautious(), g.truth(true));
+    path.done.insert(cautious, always);
+    outputs.iter().map(|&output| path.rebuild(g, output)).collect()
+}
+
+/// `outputs` under all assumptions, and the mask where they hold; nothing if no precaution is taken.
+pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeId)> {
+    let mut path = Path {
+        assumptions: g.assumptions.iter().map(|a| (a.node, *a)).collect(),
+        done: BTreeMap::new(),
+        guards: BTreeSet::new(),
+    };
+    let (cautious, never) = (g.cautious(), g.truth(false));
+    path.done.insert(cautious, never);
+    let outputs = outputs.iter().map(|&output| path.rebuild(g, output)).collect();
+    // A guard may rest on further assumptions.
+    let mut masks = BTreeMap::new();
+    while let Some(&guard) = path.guards.iter().find(|guard| !masks.contains_key(*guard)) {
+        let mask = path.rebuild(g, guard);
+        masks.insert(guard, mask);
+    }
+    let guard = masks.into_values().collect::<BTreeSet<_>>().into_iter().reduce(|a, b| g.and(a, b))?;
+    Some((outputs, guard))
+}
+
+struct Path {
+    assumptions: BTreeMap<NodeId, Assumption>,
+    done: BTreeMap<NodeId, NodeId>,
+    guards: BTreeSet<NodeId>,
+}
+
+impl Path {
+    /// The node under the assumptions. Operands have smaller numbers, so a stack of pending nodes suffices; what a decided
+    /// selection leaves out is never visited.
+    fn rebuild(&mut self, g: &mut Graph, node: NodeId) -> NodeId {
+        let node = g.resolve(node);
+        let mut stack = vec![node];
+        while let Some(&next) = stack.last() {
+            if self.done.contains_key(&next) {
+                stack.pop();
+                continue;
+            }
+            if let Some(assumption) = self.assumptions.get(&next).copied() {
+                self.guards.insert(assumption.guard);
+                self.done.insert(next, assumption.instead);
+                continue;
+            }
+            let needed = self.needed(g, next);
+            let missing: Vec<NodeId> = needed.into_iter().filter(|o| !self.done.contains_key(o)).collect();
+            if missing.is_empty() {
+                let rebuilt = self.simplify(g, next);
+                self.done.insert(next, rebuilt);
+                stack.pop();
+            } else {
+                stack.extend(missing);
+            }
+        }
+        self.done[&node]
+    }
+
+    /// The operands that must be known: of a selection the mask first, then what it leaves open.
+    fn needed(&self, g: &Graph, node: NodeId) -> Vec<NodeId> {
+        let op = g.op(node);
+        if let Op::Select(mask, yes, no) = op {
+            let mask = g.resolve(mask);
+            let Some(&known) = self.done.get(&mask) else { return vec![mask] };
+            match g.op(known) {
+                Op::Truth(true) => return vec![g.resolve(yes)],
+                Op::Truth(false) => return vec![g.resolve(no)],
+                _ => {}
+            }
+        }
+        op.operands().map(|o| g.resolve(o)).collect()
+    }
+
+    fn simplify(&self, g: &mut Graph, node: NodeId) -> NodeId {
+        let op = g.op(node);
+        if let Op::Select(mask, yes, no) = op {
+            let [mask, yes, no] = [mask, yes, no].map(|o| self.done.get(&g.resolve(o)).copied());
+            let mask = mask.expect("a mask comes first");
+            return match g.op(mask) {
+                Op::Truth(true) => yes.expect("chosen"),
+                Op::Truth(false) => no.expect("chosen"),
+                _ => g.select(mask, yes.expect("open"), no.expect("open")),
+            };
+        }
+        let d = |o: NodeId| self.done[&g.resolve(o)];
+        match op {
+            Op::Sub(a, b) if g.is(a, 0.0) => g.minus_or_plus_zero(d(b)),
+            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => node,
+            Op::Neg(a) => g.neg(d(a)),
+            Op::Add(a, b) => g.add(d(a), d(b)),
+            Op::Sub(a, b) => g.sub(d(a), d(b)),
+            Op::Mul(a, b) => g.mul(d(a), d(b)),
+            Op::Div(a, b) => g.div(d(a), d(b)),
+            Op::Sqrt(a) => g.sqrt(d(a)),
+            Op::Abs(a) => g.abs(d(a)),
+            Op::Min(a, b) => g.min(d(a), d(b)),
+            Op::Max(a, b) => g.max(d(a), d(b)),
+            Op::Sin(a) => g.sin(d(a)),
+            Op::Cos(a) => g.cos(d(a)),
+            Op::Exp(a) => g.exp(d(a)),
+            Op::Ln(a) => g.ln(d(a)),
+            Op::Atan2(a, b) => g.atan2(d(a), d(b)),
+            Op::Pow(a, b) => g.plain_pow(d(a), d(b)),
+            Op::SumError(a, b) => g.sum_error(d(a), d(b)),
+            Op::DifferenceError(a, b) => g.difference_error(d(a), d(b)),
+            Op::ProductError(a, b) => g.product_error(d(a), d(b)),
+            Op::FusedMulSub(a, b, c) => g.fused_mul_sub(d(a), d(b), d(c)),
+            Op::RootError(a, b) => g.root_error(d(a), d(b)),
+            Op::PowerOfTwoScale(a) => g.power_of_two_scale(d(a)),
+            Op::Less(a, b) => g.less(d(a), d(b)),
+            Op::LessOrEqual(a, b) => g.less_or_equal(d(a), d(b)),
+            Op::Equal(a, b) => g.equal(d(a), d(b)),
+            Op::IsModerate(a, degree) => g.is_moderate(d(a), degree),
+            Op::And(a, b) => g.and(d(a), d(b)),
+            Op::Or(a, b) => g.or(d(a), d(b)),
+            Op::Not(a) => g.not(d(a)),
+            Op::Select(..) => unreachable!("above"),
+            Op::Rule(_) | Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) => {
+                unreachable!("compiler bug: resolved, and not yet fused")
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+use std::fmt::Write as _;
+use std::path::Path;
+
+use proc_macro2::TokenStream;
+
+use crate::diagnostic::Diagnostics;
+use crate::diff::Plan;
+use crate::emit::emit;
+use crate::routines::differentiate;
+use crate::textbook::programs;
+
+/// What the compiler makes of a declaration: its code, and how it got there.
+///
+/// ```
+/// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
+/// let listing = energy_dsl::Listing::from_source(source).unwrap().remove(0);
+/// assert!(listing.routine("hessian").unwrap().contains("fn hessian_at<L: ::energy_dsl::Level>"));
+/// assert!(listing.plans().contains("adjoint-weighted"));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Listing {
+    name: String,
+    code: TokenStream,
+    plans: Vec<Plan>,
+}
+
+impl Listing {
+    /// Compiles the declarations of a text.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text.
+    pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
+        let programs = programs(source)?;
+        let listing = |program| {
+            let routines = differentiate(program);
+            Self { name: program.name.clone(), code: emit(program, &routines), plans: routines.plans }
+        };
+        Ok(programs.iter().map(listing).collect())
+    }
+
+    /// The declaration's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// All generated code.
+    #[must_use]
+    pub fn code(&self) -> String {
+        pretty(self.code.clone())
+    }
+
+    /// The method of a routine (`value`, `hessian`, …), and the one that handles what is not ordinary, if there is one.
+    #[must_use]
+    pub fn routine(&self, name: &str) -> Option<String> {
+        let wanted = [format!("{name}_at"), format!("{name}_in_general")];
+        let methods: Vec<String> = methods(&self.code)
+            .into_iter()
+            .filter(|method| wanted.contains(&method.sig.ident.to_string()))
+            .map(|method| pretty(quote::quote!(#method)))
+            .collect();
+        (!methods.is_empty()).then(|| methods.join("\n"))
+    }
+
+    /// The names that [`Self::routine`] knows.
+    #[must_use]
+    pub fn routines(&self) -> Vec<String> {
+        methods(&self.code)
+            .iter()
+            .filter_map(|m| m.sig.ident.to_string().strip_suffix("_at").map(str::to_owned))
+            .collect()
+    }
+
+    /// The routes to each routine's derivatives with their operations in ordinary configurations and reduced coordinates; the
+    /// first of each was taken.
+    #[must_use]
+    pub fn plans(&self) -> String {
+        let mut text = String::new();
+        for plan in &self.plans {
+            writeln!(text, "{} {}", self.name, plan.routine).expect("writing to a string succeeds");
+            let best = plan.routes.first().map_or(0, |route| route.cost);
+            for (place, route) in plan.routes.iter().enumerate() {
+                let why = match place {
+                    0 => "taken: costs least".to_owned(),
+                    _ if route.cost == best => "as cheap, but listed later".to_owned(),
+                    _ => format!("costs {:.2}×", route.cost as f64 / best as f64),
+                };
+                writeln!(
+                    text,
+                    "  {:<42} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} error terms)  {why}",
+                    route.name,
+                    route.cost,
+                    route.count.total(),
+                    route.count.fused,
+                    route.count.divisions_and_roots,
+                    route.count.transcendental,
+                    route.count.error_terms,
+                )
+                .expect("writing to a string succeeds");
+            }
+        }
+        text
+    }
+}
+
+fn methods(code: &TokenStream) -> Vec<syn::ImplItemFn> {
+    let file: syn::File = syn::parse2(code.clone()).expect("compiler bug: generated code parses");
+    let implementations = file.items.into_iter().filter_map(|item| match item {
+        syn::Item::Impl(implementation) => Some(implementation),
+        _ => None,
+    });
+    let items = implementations.flat_map(|implementation| implementation.items);
+    items.filter_map(|item| if let syn::ImplItem::Fn(method) = item { Some(method) } else { None }).collect()
+}
+
+/// Code as `rustfmt` would lay it out, more or less.
+fn pretty(code: TokenStream) -> String {
+    if let Ok(file) = syn::parse2::<syn::File>(code.clone()) {
+        return prettyplease::unparse(&file);
+    }
+    // A method stands in an implementation only.
+    let wrapped: syn::File = syn::parse2(quote::quote!(impl Element { #code })).expect("compiler bug: a method parses");
+    let text = prettyplease::unparse(&wrapped);
+    let inner = text.trim_start_matches("impl Element {\n").trim_end().trim_end_matches('}');
+    inner.lines().map(|line| format!("{}\n", line.strip_prefix("    ").unwrap_or(line))).collect()
+}
+
+/// Writes the code of a declaration to `folder/name.rs`.
+///
+/// # Errors
+/// When the folder cannot be made or the file not be written; then no file stands under that name that was not there before.
+pub(crate) fn dump(folder: &Path, name: &str, code: &TokenStream) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let unfinished = folder.join(format!(".{name}.{}.rs", std::process::id()));
+    std::fs::write(&unfinished, pretty(code.clone()))?;
+    std::fs::rename(&unfinished, folder.join(format!("{name}.rs")))
+}

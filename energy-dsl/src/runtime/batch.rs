@@ -1,0 +1,233 @@
+//! Many elements of one type at once: parameters and stencils packed into lanes once, points gathered, results unpacked.
+//!
+//! A *batch* holds as many elements as the level has lanes. In the last one lanes may be left over: they repeat the last
+//! element, so that they compute, and flag, nothing that it does not, and their results are not written.
+
+use std::marker::PhantomData;
+
+use super::array::Array;
+use super::cpu::{Kernel, Lane, Level, dispatch};
+use super::element::{Element, ForceLaw, Potential, Residual, Vector3};
+use super::flags::Flags;
+use super::real::{Mask, Real};
+
+/// Lanes a packed block has room for: the widest register's, of single-precision numbers.
+pub const BLOCK: usize = 16;
+
+/// Elements as plain numbers.
+pub trait Stored<S: Real>: Element {
+    /// How many numbers an element holds: its parameters, and what its rest shape determined.
+    const NUMBERS: usize;
+
+    /// Writes the numbers to places 0, `stride`, 2 `stride`, ….
+    fn store(&self, numbers: &mut [S], stride: usize);
+}
+
+macro_rules! packed {
+    ($(#[$docs:meta])* $name:ident: $of:ident) => {
+        $(#[$docs])*
+        pub trait $name<S: Real>: Stored<S> + $of<S> {
+            /// The element over lanes.
+            type Wide<V: Lane<S>>: $of<V>;
+
+            /// Reads the numbers of as many elements as there are lanes, side by side at 0, `stride`, 2 `stride`, ….
+            fn load<V: Lane<S>>(numbers: &[S], stride: usize) -> Self::Wide<V>;
+        }
+    };
+}
+
+packed!(
+    /// Potentials that run over lanes.
+    PackedPotential: Potential
+);
+packed!(
+    /// Forces that run over lanes.
+    PackedForce: ForceLaw
+);
+packed!(
+    /// Residuals that run over lanes.
+    PackedResidual: Residual
+);
+
+/// The points of a potential over lanes.
+pub type WidePoints<E, V, S = f64> = <<E as PackedPotential<S>>::Wide<V> as Potential<V>>::Points;
+
+/// Elements of one type on their stencils, as struct of arrays: blocks of [`BLOCK`] elements, number by number.
+#[derive(Clone, Debug)]
+pub struct Packed<E, S = f64> {
+    elements: usize,
+    points: usize,
+    /// One more than the largest index of a point.
+    reach: usize,
+    /// By block, number, element.
+    numbers: Vec<S>,
+    /// By block, point, element.
+    stencils: Vec<u32>,
+    of: PhantomData<E>,
+}
+
+impl<S: Real, E: Stored<S>> Packed<E, S> {
+    /// Packs elements; element i acts on the points `stencils[i]`.
+    ///
+    /// # Panics
+    /// When there are not as many stencils as elements.
+    #[must_use]
+    pub fn new<const N: usize>(elements: &[E], stencils: &[[u32; N]]) -> Self {
+        assert_eq!(elements.len(), stencils.len(), "every element needs a stencil");
+        let blocks = elements.len().div_ceil(BLOCK);
+        let mut packed = Self {
+            elements: elements.len(),
+            points: N,
+            reach: stencils.iter().flatten().max().map_or(0, |&largest| largest as usize + 1),
+            numbers: vec![S::from_f64(0.0); blocks * E::NUMBERS * BLOCK],
+            stencils: vec![0; blocks * N * BLOCK],
+            of: PhantomData,
+        };
+        for place in 0..blocks * BLOCK {
+            let element = place.min(elements.len() - 1);
+            packed.write(place, &elements[element]);
+            for (point, &index) in stencils[element].iter().enumerate() {
+                packed.stencils[(place / BLOCK * N + point) * BLOCK + place % BLOCK] = index;
+            }
+        }
+        packed
+    }
+
+    /// The number of elements.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.elements
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.elements == 0
+    }
+
+    /// Replaces an element, on the same stencil.
+    ///
+    /// # Panics
+    /// When there is no such element.
+    pub fn set(&mut self, element: usize, to: &E) {
+        assert!(element < self.elements, "element {element} of {}", self.elements);
+        self.write(element, to);
+        if element + 1 == self.elements {
+            for place in self.elements..self.elements.next_multiple_of(BLOCK) {
+                self.write(place, to);
+            }
+        }
+    }
+
+    fn write(&mut self, place: usize, element: &E) {
+        element.store(&mut self.numbers[place / BLOCK * E::NUMBERS * BLOCK + place % BLOCK..], BLOCK);
+    }
+}
+
+/// Elements in lanes, with their points.
+pub struct Batch<'a, E: PackedPotential<f64>, V: Lane<f64>> {
+    /// The index of the first element.
+    pub first: usize,
+    /// How many elements there are: all lanes, or fewer in the last batch.
+    pub count: usize,
+    /// The elements.
+    pub element: &'a E::Wide<V>,
+    /// Their points.
+    pub points: &'a WidePoints<E, V>,
+}
+
+/// What is done with every batch.
+pub trait BatchWork<E: PackedPotential<f64>> {
+    /// Does it. Mark implementations `#[inline(always)]`, and use no closures for the main work: only what is inlined is
+    /// compiled for the level.
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>);
+}
+
+/// Does work with all elements, in batches, at the best level of the machine.
+///
+/// # Panics
+/// When a stencil has a point that is not among `positions`.
+pub fn for_each_batch<E: PackedPotential<f64>>(
+    elements: &Packed<E>,
+    positions: &[Vector3<f64>],
+    work: &mut impl BatchWork<E>,
+) {
+    dispatch(Batches { elements, positions, work });
+}
+
+/// The kernel of [`for_each_batch`], for those who run it at a level of their choice.
+#[derive(Debug)]
+pub struct Batches<'a, E, W> {
+    /// The elements on their stencils.
+    pub elements: &'a Packed<E>,
+    /// All points.
+    pub positions: &'a [Vector3<f64>],
+    /// What is done.
+    pub work: &'a mut W,
+}
+
+impl<E: PackedPotential<f64>, W: BatchWork<E>> Kernel for Batches<'_, E, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { elements: packed, positions, work } = self;
+        let n = <E::Points as Array<Vector3<f64>>>::LEN;
+        assert_eq!(packed.points, n, "a stencil has as many points as the element");
+        assert!(packed.reach <= positions.len(), "point {} of {}", packed.reach, positions.len());
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        let mut first = 0;
+        while first < packed.elements {
+            let (block, offset) = (first / BLOCK, first % BLOCK);
+            let element = E::load::<L::F64>(&packed.numbers[block * E::NUMBERS * BLOCK + offset..], BLOCK);
+            let mut points = <WidePoints<E, L::F64> as Array<Vector3<L::F64>>>::repeat([L::F64::splat(0.0); 3]);
+            for (point, wide) in points.as_mut().iter_mut().enumerate() {
+                *wide = L::F64::gather(positions, &packed.stencils[(block * n + point) * BLOCK + offset..][..lanes]);
+            }
+            let count = lanes.min(packed.elements - first);
+            work.batch::<L>(Batch { first, count, element: &element, points: &points });
+            first += lanes;
+        }
+    }
+}
+
+/// Energies, gradients and Hessians of all elements, one after the other: work for [`for_each_batch`].
+///
+/// Slices of arrays become slices of numbers by `as_flattened_mut`.
+#[derive(Debug)]
+pub struct Hessians<'a> {
+    /// U of each element.
+    pub energies: &'a mut [f64],
+    /// ∂U/∂x of each element: 3 N numbers.
+    pub gradients: &'a mut [f64],
+    /// The triangle of ∂²U/∂x² of each element: 9 · N (N + 1)/2 numbers.
+    pub triangles: &'a mut [f64],
+    /// The elements that met a condition, with which.
+    pub flagged: Vec<(usize, Flags<f64>)>,
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let (first, count) = (batch.first, batch.count);
+        let result = batch.element.hessian_at::<L>(batch.points);
+        result.value.store_ragged(&mut self.energies[first..first + count]);
+        let gradient = result.gradient.as_ref().as_flattened();
+        let stride = gradient.len();
+        L::F64::store_transposed(gradient, count, &mut self.gradients[first * stride..], stride);
+        let triangle = result.hessian.as_ref().as_flattened().as_flattened();
+        let stride = triangle.len();
+        L::F64::store_transposed(triangle, count, &mut self.triangles[first * stride..], stride);
+        if result.flags.any() {
+            note_flags(&mut self.flagged, first, count, result.flags.degenerate, result.flags.kink);
+        }
+    }
+}
+
+/// Out of line: flags are rare.
+#[cold]
+#[inline(never)]
+fn note_flags<M: Mask>(flagged: &mut Vec<(usize, Flags<f64>)>, first: usize, count: usize, degenerate: M, kink: M) {
+    let flags = (0..count).map(|lane| Flags { degenerate: degenerate.lane(lane), kink: kink.lane(lane) });
+    flagged.extend((first..).zip(flags).filter(|(_, flags)| flags.any()));
+}
