@@ -187,7 +187,7 @@ fn logarithms_and_exponentials() {
 fn sines_over_angles() {
     check(&SincSqrt::new(), &arguments(6.5, false), [5.0, 6.0, 10.0], |y| [y.even(1, 0), y.even(1, 1), y.even(1, 2)]);
     check(&CosSqrt::new(), &arguments(1.5, false), [4.0, 3.0, 6.0], |y| [y.even(0, 0), y.even(0, 1), y.even(0, 2)]);
-    check(&Sinc::new(), &arguments(1.5, true), [2.0, 6.0, 10.0], |x| {
+    check(&Sinc::new(), &arguments(1.5, true), [2.0, 6.0, 12.0], |x| {
         let y = x.clone() * x.clone();
         let (two, four) = (Fixed::of(2.0), Fixed::of(4.0));
         let second = two.clone() * y.even(1, 1) + four * y.clone() * y.even(1, 2);
@@ -215,7 +215,7 @@ fn trigonometric_functions() {
         let first = inverse.clone() * inverse;
         [tangent.clone(), first.clone(), Fixed::of(2.0) * tangent * first]
     });
-    check(&Versine::new(), &arguments(1.5, true), [3.0, 1.0, 1.0], |x| {
+    check(&Versine::new(), &arguments(1.5, true), [3.0, 2.0, 2.0], |x| {
         let (sine, cosine) = sine_and_cosine(&x);
         let half = x.clone() / Fixed::of(2.0);
         let (half_sine, _) = sine_and_cosine(&half);

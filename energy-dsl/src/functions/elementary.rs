@@ -106,7 +106,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "one_minus_cos(x)",
         "1 − cos x = 2 sin²(x/2), without cancellation at 0; so is `1 - cos(x)`.",
         one_scalar,
-        "3 / 1 / 1",
+        "3 / 2 / 2",
         |g, a| versine(g, a[0].node())
     ),
     scalar_function!(

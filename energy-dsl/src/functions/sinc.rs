@@ -29,7 +29,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "sin x / x: 1 at 0, and regular there.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(sinc(g, a[0].node())),
-        accuracy: "2 / 6 / 10 for |x| ≤ 1.5",
+        accuracy: "2 / 6 / 12 for |x| ≤ 1.5",
     },
     Function {
         name: "cosc",
