@@ -180,6 +180,11 @@ impl Graph {
             let product = self.mul(constants, product);
             return self.signed(product, minus_a != minus_b);
         }
+        for (scale, scaled) in [(a, b), (b, a)] {
+            if self.is_scale(scale) {
+                self.round(scaled);
+            }
+        }
         let product = self.node(Op::Mul(a.min(b), a.max(b)));
         self.signed(product, minus_a != minus_b)
     }
@@ -219,6 +224,9 @@ impl Graph {
             }
         }
         let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        if self.is_scale(b) {
+            self.round(a);
+        }
         let quotient = self.node(Op::Div(a, b));
         self.signed(quotient, minus_a != minus_b)
     }

@@ -1,7 +1,8 @@
 //! Which sums take a product along, as one fused multiply-add.
 //!
 //! The choice depends on the graph alone and not on the routine, so that all routines compute a node alike. A difference of
-//! two products stays as it is: fused, a·b − a·b would not be 0, and a flat hinge not flat.
+//! two products stays as it is: fused, a·b − a·b would not be 0, and a flat hinge not flat. What is scaled by a power of two is
+//! rounded first, also where the scale turns out to be 1 and is left out: results scale exactly with their configuration.
 
 use super::{Graph, NodeId, Op};
 
@@ -31,8 +32,26 @@ impl Graph {
     /// The factors of a product whose rounding error nobody asks for: asked for, it is that of the rounded product.
     fn product_of(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
         match self.op(self.resolve(node)) {
-            Op::Mul(x, y) if !self.has(Op::ProductError(x, y)) => Some((x, y)),
+            Op::Mul(x, y) if !self.has(Op::ProductError(x, y)) && !self.rounded.contains(&self.resolve(node)) => {
+                Some((x, y))
+            }
             _ => None,
+        }
+    }
+
+    /// Notes that a node is rounded before any use.
+    pub(super) fn round(&mut self, node: NodeId) {
+        if matches!(self.op(node), Op::Mul(..)) {
+            self.rounded.insert(node);
+        }
+    }
+
+    /// Whether a node is a power of two that scales.
+    pub(super) fn is_scale(&self, node: NodeId) -> bool {
+        match self.op(node) {
+            Op::PowerOfTwoScale(_) => true,
+            Op::Mul(a, b) => self.is_scale(a) && self.is_scale(b),
+            _ => false,
         }
     }
 

@@ -13,7 +13,7 @@ pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// How language functions are lowered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +34,8 @@ pub struct Graph {
     rules: Vec<Rule>,
     rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
     assumptions: Vec<Assumption>,
+    /// Nodes that no sum takes along unrounded; see `fuse.rs`.
+    rounded: BTreeSet<NodeId>,
 }
 
 impl Graph {
@@ -48,6 +50,7 @@ impl Graph {
             rules: Vec::new(),
             rule_index: HashMap::new(),
             assumptions: Vec::new(),
+            rounded: BTreeSet::new(),
         }
     }
 

@@ -127,8 +127,16 @@ impl Path {
             Op::Neg(a) => g.neg(d(a)),
             Op::Add(a, b) => g.add(d(a), d(b)),
             Op::Sub(a, b) => g.sub(d(a), d(b)),
-            Op::Mul(a, b) => g.mul(d(a), d(b)),
-            Op::Div(a, b) => g.div(d(a), d(b)),
+            Op::Mul(a, b) | Op::Div(a, b) => {
+                let [x, y] = [a, b].map(d);
+                // Where a scale is left out its operand is rounded all the same.
+                for (scale, scaled) in [(a, y), (b, x)] {
+                    if g.is_scale(g.resolve(scale)) {
+                        g.round(scaled);
+                    }
+                }
+                if matches!(op, Op::Mul(..)) { g.mul(x, y) } else { g.div(x, y) }
+            }
             Op::Sqrt(a) => g.sqrt(d(a)),
             Op::Abs(a) => g.abs(d(a)),
             Op::Min(a, b) => g.min(d(a), d(b)),
