@@ -33,7 +33,7 @@ impl Graph {
     fn product_of(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
         match self.op(self.resolve(node)) {
             Op::Mul(x, y) if !self.has(Op::ProductError(x, y)) && !self.rounded.contains(&self.resolve(node)) => {
-                Some((x, y))
+                (!self.is_scale(x) && !self.is_scale(y)).then_some((x, y))
             }
             _ => None,
         }
