@@ -42,6 +42,7 @@ pub fn describe(declaration: &Declaration) -> String {
 fn operations(full: &OperationCount, reduced: &OperationCount) -> String {
     let parts = [
         (full.basic, "basic"),
+        (2 * full.fused, "in fused multiply-adds"),
         (full.divisions_and_roots, "divisions and roots"),
         (full.transcendental, "transcendental"),
         (full.error_terms, "error terms"),

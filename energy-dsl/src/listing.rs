@@ -4,9 +4,10 @@ use std::path::Path;
 use proc_macro2::TokenStream;
 
 use crate::diagnostic::Diagnostics;
-use crate::diff::Plan;
 use crate::emit::emit;
-use crate::routines::differentiate;
+use crate::graph::{NodeId, count};
+use crate::routines::{Routines, differentiate};
+use crate::runtime::OperationCount;
 use crate::textbook::programs;
 
 /// What the compiler makes of a declaration: its code, and how it got there.
@@ -21,7 +22,7 @@ use crate::textbook::programs;
 pub struct Listing {
     name: String,
     code: TokenStream,
-    plans: Vec<Plan>,
+    routines: Routines,
 }
 
 impl Listing {
@@ -33,7 +34,7 @@ impl Listing {
         let programs = programs(source)?;
         let listing = |program| {
             let routines = differentiate(program);
-            Self { name: program.name.clone(), code: emit(program, &routines), plans: routines.plans }
+            Self { name: program.name.clone(), code: emit(program, &routines), routines }
         };
         Ok(programs.iter().map(listing).collect())
     }
@@ -71,12 +72,40 @@ impl Listing {
             .collect()
     }
 
+    /// What each routine costs in ordinary configurations, and what is left of the Hessian where a point is pinned: operations in
+    /// all, and instructions where products and sums fuse.
+    #[must_use]
+    pub fn counts(&self) -> String {
+        let mut text = format!("{:<34} operations  instructions\n", self.name);
+        let mut row = |name: &str, count: OperationCount| {
+            writeln!(text, "  {name:<32} {:>10}  {:>12}", count.total(), count.instructions())
+                .expect("writing to a string succeeds");
+        };
+        let graph = &self.routines.graph;
+        for routine in &self.routines.list {
+            row(routine.name, count(graph, &routine.outputs()));
+        }
+        let hessian = self.routines.list.iter().find(|routine| routine.name == "hessian");
+        let Some([value, gradient, triangle]) = hessian.map(|routine| &routine.groups[..]) else { return text };
+        let points = gradient.len() / 3;
+        for pinned in 0..points {
+            let mut outputs: Vec<NodeId> = value.clone();
+            outputs.extend((0..3 * points).filter(|i| i / 3 != pinned).map(|i| gradient[i]));
+            let pairs = (0..points).flat_map(|i| (i..points).map(move |j| (i, j)));
+            for (_, block) in pairs.zip(triangle.chunks(9)).filter(|((i, j), _)| *i != pinned && *j != pinned) {
+                outputs.extend(block);
+            }
+            row(&format!("hessian, point {pinned} pinned"), count(graph, &outputs));
+        }
+        text
+    }
+
     /// The routes to each routine's derivatives with their operations in ordinary configurations and reduced coordinates; the
     /// first of each was taken.
     #[must_use]
     pub fn plans(&self) -> String {
         let mut text = String::new();
-        for plan in &self.plans {
+        for plan in &self.routines.plans {
             writeln!(text, "{} {}", self.name, plan.routine).expect("writing to a string succeeds");
             let best = plan.routes.first().map_or(0, |route| route.cost);
             for (place, route) in plan.routes.iter().enumerate() {

@@ -59,6 +59,9 @@ enum Command {
         /// Instead of code, the routes to each routine's derivatives: their operations, and which was taken.
         #[arg(long, conflicts_with = "routine")]
         plan: bool,
+        /// Instead of code, what each routine costs, and the Hessian where a point is pinned.
+        #[arg(long, conflicts_with_all = ["routine", "plan"])]
+        counts: bool,
     },
     /// Evaluate the records of a file and write them with the results, 17 digits, and flags.
     Eval {
@@ -101,10 +104,11 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let policy = report.policy.iter().all(|line| line.passed != Some(false));
             Ok(!nan && policy && !(strict && beyond))
         }
-        Command::Show { name, routine, plan } => {
+        Command::Show { name, routine, plan, counts } => {
             for listing in verify::listings(&name)? {
                 match &routine {
                     _ if plan => print!("{}", listing.plans()),
+                    _ if counts => print!("{}", listing.counts()),
                     None => print!("{}", listing.code()),
                     Some(routine) => {
                         let code = listing.routine(routine).with_context(|| {

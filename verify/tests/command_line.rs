@@ -176,3 +176,63 @@ fn bad_records_are_refused_by_name_and_nothing_is_written() {
         verify(&["eval", input.to_str().unwrap(), "-o", folder.path().join("no/folder.json").to_str().unwrap()]);
     assert!(text(&output.stderr).contains("folder.json"), "{}", text(&output.stderr));
 }
+
+#[test]
+fn generated_code_is_shown() {
+    let output = verify(&["show", "HookeSpring", "--routine", "value"]);
+    let printed = text(&output.stdout);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(printed.contains("fn value_at<L: ::energy_dsl::Level>") && printed.contains("self.K *"), "{printed}");
+    assert!(!printed.contains("fn gradient"), "one routine only: {printed}");
+    // Byte for byte the same each time.
+    assert_eq!(verify(&["show", "BridsonForce"]).stdout, verify(&["show", "BridsonForce"]).stdout);
+}
+
+#[test]
+fn plans_name_each_route_and_the_one_taken() {
+    let printed = text(&verify(&["show", "StVK", "--plan"]).stdout);
+    for route in ["forward over forward", "adjoint-weighted", "gathered at primitives", "reverse"] {
+        assert!(printed.contains(route), "{route} is missing: {printed}");
+    }
+    let first = printed.lines().nth(1).unwrap();
+    assert!(first.contains("gathered at primitives") && first.contains("taken"), "{first}");
+}
+
+#[test]
+fn pinned_points_leave_operations_out() {
+    let printed = text(&verify(&["show", "QuadraticHinge", "--counts"]).stdout);
+    let operations = |row: &str| -> usize {
+        let line = printed.lines().find(|line| line.trim_start().starts_with(row)).expect(row);
+        line[row.len() + 2..].split_whitespace().next().unwrap().parse().unwrap()
+    };
+    let all = operations("hessian ");
+    assert!(operations("value ") < operations("gradient ") && operations("gradient ") < all);
+    for point in 0..4 {
+        let pinned = operations(&format!("hessian, point {point} pinned"));
+        assert!(pinned + 20 < all, "point {point}: {pinned} of {all}");
+    }
+}
+
+#[test]
+fn unknown_routines_and_files_are_refused() {
+    let output = verify(&["show", "Spring", "--routine", "hesian"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("it has hessian, value, gradient"), "{}", text(&output.stderr));
+    let output = verify(&["show", "nowhere.energy"]);
+    assert!(text(&output.stderr).contains("cannot read nowhere.energy"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn declarations_of_a_file_are_shown_and_their_errors_placed() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = folder.path().join("good.energy");
+    std::fs::write(&good, "energy Pull(p, q: Point; k: Scalar) = \"k/2 ‖p − q‖²\";\n").unwrap();
+    let printed = text(&verify(&["show", good.to_str().unwrap()]).stdout);
+    assert!(printed.contains("struct Pull"), "{printed}");
+    let bad = folder.path().join("bad.energy");
+    std::fs::write(&bad, "energy Pull(p, q: Point; k: Scalar) {\n    k * nrm(p - q)\n}\n").unwrap();
+    let output = verify(&["show", bad.to_str().unwrap()]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("bad.energy: error at 2:9") && message.contains("did you mean `norm`"), "{message}");
+}

@@ -1,0 +1,48 @@
+//! What routines cost: operations for energy, gradient and Hessian in reduced coordinates and ordinary configurations, a fused
+//! multiply-add counted as two and an exact rounding-error term as one.
+#![allow(missing_docs, mixed_script_confusables)]
+
+use energy_dsl::Element;
+use energy_elements::find;
+use energy_macros::energy;
+
+energy! {
+    /// The membrane as a function of F's columns.
+    energy OnF(f1, f2: Point; A: Scalar, λ, μ: Scalar) {
+        let F = columns(f1, f2);
+        let E = (transpose(F) * F - identity(2)) / 2;
+        A * (μ * ddot(E, E) + λ / 2 * trace(E)^2)
+    }
+}
+
+fn operations(declaration: &energy_dsl::Declaration, routine: &str) -> usize {
+    declaration.routines.iter().find(|r| r.name == routine).unwrap().reduced.total()
+}
+
+#[test]
+fn hessians_stay_small() {
+    for (name, most) in [("HookeSpring", 60), ("HairBend", 230), ("QuadraticHinge", 750)] {
+        let count = operations(find(name).unwrap().declaration, "hessian");
+        assert!(count <= most, "{name}: {count} operations, expected at most {most}");
+    }
+    let count = operations(<OnF as Element>::DECLARATION, "hessian");
+    assert!(count <= 200, "StVK on F: {count} operations");
+}
+
+#[test]
+fn routines_leave_out_what_was_not_asked_for() {
+    for entry in energy_elements::catalogue().iter().filter(|e| e.declaration.curved) {
+        let declaration = entry.declaration;
+        if !declaration.routines.iter().any(|r| r.name == "hessian") {
+            continue;
+        }
+        let [value, gradient, hessian, product] =
+            ["value", "gradient", "hessian", "hessian_vector"].map(|routine| operations(declaration, routine));
+        assert!(value < gradient && gradient <= hessian, "{}: {value}, {gradient}, {hessian}", declaration.name);
+        // At worst the Hessian and a product with it.
+        let multiplied = 2 * declaration.reduced_coordinates * (declaration.reduced_coordinates + 1);
+        assert!(product <= hessian + multiplied, "{}: {product} for the product, {hessian} for all", declaration.name);
+    }
+    let membrane = find("StVK").unwrap().declaration;
+    assert!(10 * operations(membrane, "hessian_vector") < 7 * operations(membrane, "hessian"));
+}
