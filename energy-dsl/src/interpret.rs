@@ -18,6 +18,15 @@ pub fn interpret<T: Number>(graph: &Graph, outputs: &[NodeId], inputs: &Inputs<'
     outputs.iter().map(|&o| number(graph, &values, o)).collect()
 }
 
+/// A mask.
+pub fn interpret_mask<T: Number>(graph: &Graph, output: NodeId, inputs: &Inputs<'_, T>) -> T::Mask {
+    let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
+    for node in reachable(graph, &[output]) {
+        values[node.0 as usize] = Some(compute(graph, node, inputs, &values));
+    }
+    mask(graph, &values, output)
+}
+
 fn number<T: Number>(graph: &Graph, values: &[Option<Computed<T>>], node: NodeId) -> T {
     match &values[graph.resolve(node).0 as usize] {
         Some(Computed::Number(value)) => value.clone(),

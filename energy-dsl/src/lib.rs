@@ -51,7 +51,7 @@ pub use diagnostic::{Diagnostic, Diagnostics};
 #[cfg(feature = "compiler")]
 pub use functions::{Function, all as functions};
 #[cfg(feature = "compiler")]
-pub use listing::Listing;
+pub use listing::{Listing, Path};
 #[cfg(feature = "compiler")]
 pub use textbook::Textbook;
 

@@ -1,14 +1,23 @@
 use std::fmt::Write as _;
-use std::path::Path;
 
 use proc_macro2::TokenStream;
 
 use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
 use crate::graph::{NodeId, count};
+use crate::interpret::{interpret, interpret_mask};
 use crate::routines::{Routines, differentiate};
-use crate::runtime::OperationCount;
+use crate::runtime::{Inputs, Mask, Number, OperationCount};
 use crate::textbook::programs;
+
+/// Which of a routine's two forms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// As generated code chooses: that for ordinary configurations where they are.
+    Chosen,
+    /// That with all precautions.
+    General,
+}
 
 /// What the compiler makes of a declaration: its code, and how it got there.
 ///
@@ -70,6 +79,24 @@ impl Listing {
             .iter()
             .filter_map(|m| m.sig.ident.to_string().strip_suffix("_at").map(str::to_owned))
             .collect()
+    }
+
+    /// What a routine of a declaration without rest shape returns, group by group, by interpretation. `None` for an
+    /// unknown routine.
+    ///
+    /// # Panics
+    /// When an input slice is shorter than declared.
+    #[must_use]
+    pub fn evaluate<T: Number>(&self, routine: &str, path: Path, inputs: &Inputs<'_, T>) -> Option<Vec<Vec<T>>> {
+        let routine = self.routines.list.iter().find(|r| r.name == routine)?;
+        let graph = &self.routines.graph;
+        let groups = match &routine.general {
+            Some(general) if path == Path::General || !interpret_mask(graph, general.ordinary, inputs).all() => {
+                &general.groups
+            }
+            _ => &routine.groups,
+        };
+        Some(groups.iter().map(|group| interpret(graph, group, inputs)).collect())
     }
 
     /// What each routine costs in ordinary configurations, and what is left of the Hessian where a point is pinned: operations in
@@ -158,7 +185,7 @@ fn pretty(code: TokenStream) -> String {
 ///
 /// # Errors
 /// When the folder cannot be made or the file not be written; then no file stands under that name that was not there before.
-pub(crate) fn dump(folder: &Path, name: &str, code: &TokenStream) -> std::io::Result<()> {
+pub(crate) fn dump(folder: &std::path::Path, name: &str, code: &TokenStream) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let unfinished = folder.join(format!(".{name}.{}.rs", std::process::id()));
     std::fs::write(&unfinished, pretty(code.clone()))?;

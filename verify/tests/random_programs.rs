@@ -1,0 +1,160 @@
+//! Random well-typed programs: what the compiler makes of them agrees with hyper-dual numbers run through the text, by every
+//! routine and on both paths. `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
+
+use energy_dsl::{Inputs, Listing, Path, Textbook};
+use proptest::prelude::*;
+use verify::dual::Hyper;
+
+/// Three points, two scalars and a vector.
+const SIGNATURE: &str = "p, q, r: Point; k, L: Scalar, u: Vec3";
+
+/// A scalar expression.
+fn scalar(depth: u32) -> BoxedStrategy<String> {
+    let leaf = prop_oneof![
+        Just("k".to_owned()),
+        Just("L".to_owned()),
+        (1..40_u8).prop_map(|n| format!("{}.{}", n / 10, n % 10)),
+        vector(0).prop_map(|v| format!("norm_squared({v})")),
+        vector(0).prop_map(|v| format!("norm({v})")),
+        (vector(0), vector(0)).prop_map(|(a, b)| format!("dot({a}, {b})")),
+    ];
+    if depth == 0 {
+        return leaf.boxed();
+    }
+    let less = || scalar(depth - 1);
+    let vectors = || vector(depth - 1);
+    prop_oneof![
+        1 => leaf,
+        2 => (less(), less()).prop_map(|(a, b)| format!("({a} + {b})")),
+        2 => (less(), less()).prop_map(|(a, b)| format!("({a} - {b})")),
+        3 => (less(), less()).prop_map(|(a, b)| format!("({a} * {b})")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("({a} / (1 + ({b})^2))")),
+        1 => less().prop_map(|a| format!("sqrt(1 + ({a})^2)")),
+        1 => less().prop_map(|a| format!("sin({a})")),
+        1 => less().prop_map(|a| format!("cos({a})")),
+        1 => less().prop_map(|a| format!("exp(-({a})^2)")),
+        1 => less().prop_map(|a| format!("log(1 + ({a})^2)")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("atan2({a}, 2 + ({b})^2)")),
+        1 => less().prop_map(|a| format!("pseudo_huber({a}, 0.7)")),
+        1 => less().prop_map(|a| format!("(1 - cos({a}))")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("(if {a} < {b} {{ {a} * {b} }} else {{ {b} - {a} }})")),
+        1 => (less(), 2..4_u8).prop_map(|(a, n)| format!("({a})^{n}")),
+        2 => (vectors(), vectors()).prop_map(|(a, b)| format!("dot({a}, {b})")),
+        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("dot(unit({a}), unit({b}))")),
+        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("(1 - dot(unit({a}), unit({b})))")),
+        1 => vectors().prop_map(|v| format!("(norm({v}) - L)")),
+        1 => vectors().prop_map(|v| format!("(norm({v}) - L)^2")),
+        1 => vectors().prop_map(|v| format!("norm({v})^1.5")),
+        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("angle({a}, {b})")),
+        1 => (vectors(), vectors(), vectors()).prop_map(|(a, b, c)| format!("det(columns({a}, {b}, {c}))")),
+        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("trace(transpose(columns({a}, {b})) * columns({a}, {b}))")),
+    ]
+    .boxed()
+}
+
+/// A vector expression.
+fn vector(depth: u32) -> BoxedStrategy<String> {
+    let leaf = prop_oneof![
+        3 => Just("(q - p)".to_owned()),
+        3 => Just("(r - q)".to_owned()),
+        1 => Just("(p - r)".to_owned()),
+        1 => Just("p".to_owned()),
+        1 => Just("u".to_owned()),
+    ];
+    if depth == 0 {
+        return leaf.boxed();
+    }
+    let less = || vector(depth - 1);
+    prop_oneof![
+        2 => leaf,
+        1 => (less(), less()).prop_map(|(a, b)| format!("({a} + {b})")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("cross({a}, {b})")),
+        1 => (scalar(depth - 1), less()).prop_map(|(s, a)| format!("({s} * {a})")),
+        1 => less().prop_map(|a| format!("unit({a})")),
+    ]
+    .boxed()
+}
+
+/// U, ∇U and the triangle of ∇²U as the routine returns it, by hyper-dual numbers.
+fn expected(textbook: &Textbook, parameters: &[f64], x: &[f64]) -> [Vec<f64>; 3] {
+    let constants: Vec<Hyper> = parameters.iter().map(|&p| Hyper::constant(p)).collect();
+    let at = |i: usize, j: usize| {
+        let positions: Vec<Hyper> = x.iter().enumerate().map(|(c, &x)| Hyper::variable(x, c == i, c == j)).collect();
+        textbook.evaluate(&Inputs { parameters: &constants, rest: &[], positions: &positions, velocities: &[] })[0].0
+    };
+    let gradient: Vec<f64> = (0..9).map(|i| at(i, i).eps1).collect();
+    let mut triangle = Vec::with_capacity(54);
+    for i in 0..3 {
+        for j in i..3 {
+            triangle.extend((0..9).map(|e| at(3 * i + e / 3, 3 * j + e % 3).eps1eps2));
+        }
+    }
+    [vec![at(0, 0).re], gradient, triangle]
+}
+
+fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |largest, n| largest.max(n.abs()))
+}
+
+fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseError> {
+    let source = format!("energy Random({SIGNATURE}) {{ {formula} + 0 * (k + L + dot(u, p - q) + dot(u, r)) }}");
+    let textbook = Textbook::from_source(&source).map_err(|e| TestCaseError::fail(format!("{source}: {e}")))?;
+    let listing = Listing::from_source(&source).map_err(|e| TestCaseError::fail(format!("{source}: {e}")))?.remove(0);
+    let truth = expected(&textbook, parameters, x);
+    prop_assume!(truth.iter().flatten().all(|n| n.is_finite() && n.abs() < 1e30));
+    // What the formula makes of a change in the last places of its inputs is what it may differ by.
+    let moved: Vec<f64> = x.iter().enumerate().map(|(i, x)| x * (1.0 + (i as f64 - 4.5) * 2e-15)).collect();
+    let nearby = expected(&textbook, parameters, &moved);
+    prop_assume!(nearby.iter().flatten().all(|n| n.is_finite()));
+    let inputs = Inputs { parameters, rest: &[], positions: x, velocities: &[] };
+    for path in [Path::Chosen, Path::General] {
+        for (routine, blocks) in [("value", 1), ("gradient", 2), ("hessian", 3)] {
+            let found = listing.evaluate(routine, path, &inputs).expect("an energy has it");
+            for ((found, truth), nearby) in found.iter().zip(&truth).zip(&nearby).take(blocks) {
+                let sensitivity = truth.iter().zip(nearby).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                // A kink or jump between the two inputs: no derivative to compare.
+                prop_assume!(sensitivity <= 1e-3 * largest(truth) || largest(truth) < 1e-12);
+                let bound = 1e-10 * largest(truth) + 1e4 * sensitivity + 1e-13 * largest(&[largest(&truth[..]), 1e-3]);
+                for (entry, (a, b)) in found.iter().zip(truth).enumerate() {
+                    prop_assert!(
+                        (a - b).abs() <= bound,
+                        "{source}\n{routine} on the path {path:?}, entry {entry}: {a:e}, by dual numbers {b:e}, bound {bound:e}"
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(512),
+        failure_persistence: None,
+        max_global_rejects: 100_000,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn compiled_programs_agree_with_dual_numbers(
+        formula in (1..4_u32).prop_flat_map(scalar),
+        parameters in prop::collection::vec(0.2..1.8_f64, 5),
+        x in prop::collection::vec(-1.0..1.0_f64, 9),
+    ) {
+        check(&formula, &parameters, &x)?;
+    }
+}
+
+/// The comparison sees an error of the size it is to see.
+#[test]
+fn a_wrong_derivative_is_noticed() {
+    let source = format!("energy Random({SIGNATURE}) {{ k * L * dot(u, q - p) * norm(r - q) }}");
+    let listing = Listing::from_source(&source).unwrap().remove(0);
+    let other = Textbook::from_source(&source.replace("norm(r - q)", "norm(r - q)^1.000001")).unwrap();
+    let (parameters, x) = ([1.1, 0.7, 0.3, 0.4, 0.5], [0.1, 0.2, 0.3, 0.9, 0.4, 0.1, 0.3, 0.8, 0.6]);
+    let inputs = Inputs { parameters: &parameters, rest: &[], positions: &x, velocities: &[] };
+    let found = listing.evaluate("hessian", Path::Chosen, &inputs).unwrap();
+    let wrong = expected(&other, &parameters, &x);
+    let difference = found[2].iter().zip(&wrong[2]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(difference > 1e-10 * largest(&wrong[2]) * 100.0, "{difference}");
+}
