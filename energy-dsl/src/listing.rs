@@ -99,6 +99,14 @@ impl Listing {
         Some(groups.iter().map(|group| interpret(graph, group, inputs)).collect())
     }
 
+    /// Whether a routine of a declaration without rest shape meets a condition of its flags. `None` for an unknown routine.
+    #[must_use]
+    pub fn is_flagged<T: Number>(&self, routine: &str, inputs: &Inputs<'_, T>) -> Option<bool> {
+        let routine = self.routines.list.iter().find(|r| r.name == routine)?;
+        let flags = routine.general.as_ref().map_or(routine.flags, |general| general.flags);
+        Some(flags.into_iter().flatten().any(|mask| interpret_mask(&self.routines.graph, mask, inputs).any()))
+    }
+
     /// What each routine costs in ordinary configurations, and what is left of the Hessian where a point is pinned: operations in
     /// all, and instructions where products and sums fuse.
     #[must_use]

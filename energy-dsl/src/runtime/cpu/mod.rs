@@ -190,8 +190,14 @@ const REQUIRED: Option<LevelName> = if cfg!(all(
 #[cold]
 fn choose() -> LevelName {
     match std::env::var("ENERGY_LEVEL") {
-        // A mistyped cap that went unnoticed would make a comparison of machines worthless.
-        Ok(cap) => detected().min(cap.parse().unwrap_or_else(|error| panic!("ENERGY_LEVEL: {error}"))),
+        Ok(cap) => match cap.parse::<LevelName>() {
+            Ok(cap) => detected().min(cap),
+            Err(error) => {
+                // A mistyped cap that went unnoticed would make a comparison of machines worthless.
+                eprintln!("warning: ENERGY_LEVEL is ignored: {error}");
+                detected()
+            }
+        },
         Err(_) => detected(),
     }
 }
