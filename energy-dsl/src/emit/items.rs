@@ -2,8 +2,9 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::declaration::declaration;
-use super::methods::{component, traits};
+use super::methods::component;
 use super::schedule::Schedule;
+use super::traits::traits;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Input, count};
 use crate::routines::Routines;

@@ -4,5 +4,6 @@ mod declaration;
 mod items;
 mod methods;
 mod schedule;
+mod traits;
 
 pub use items::emit;

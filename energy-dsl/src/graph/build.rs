@@ -12,7 +12,7 @@ impl Graph {
         id
     }
 
-    fn node(&mut self, op: Op) -> NodeId {
+    pub(super) fn node(&mut self, op: Op) -> NodeId {
         if let Some(&id) = self.index.get(&op) {
             return id;
         }
@@ -57,14 +57,14 @@ impl Graph {
     }
 
     /// The node without its leading minus sign, and whether it had one.
-    fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
+    pub(super) fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
         match self.op(node) {
             Op::Neg(a) => (a, true),
             _ => (node, false),
         }
     }
 
-    fn signed(&mut self, node: NodeId, negative: bool) -> NodeId {
+    pub(super) fn signed(&mut self, node: NodeId, negative: bool) -> NodeId {
         if negative { self.neg(node) } else { node }
     }
 
@@ -141,12 +141,6 @@ impl Graph {
     /// a − b without recognition.
     pub(crate) fn plain_difference(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::Sub(a, b))
-    }
-
-    /// 0 − a: −a, but for +0 where a is a zero of either sign.
-    pub fn minus_or_plus_zero(&mut self, a: NodeId) -> NodeId {
-        let zero = self.constant(0.0);
-        self.node(Op::Sub(zero, a))
     }
 
     /// a · b. A squared elongation becomes its own primitive.
@@ -348,249 +342,8 @@ impl Graph {
             }
         }
     }
-
-    /// What rounding a + b lost. Signs move out as they do of the sum itself, so that a sum and its error name the same operands.
-    pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.is(a, 0.0) || self.is(b, 0.0) {
-            return self.constant(0.0);
-        }
-        match (self.magnitude(a), self.magnitude(b)) {
-            ((x, true), (y, true)) => {
-                let error = self.sum_error(x, y);
-                self.neg(error)
-            }
-            ((x, true), (y, false)) => self.difference_error(y, x),
-            ((x, false), (y, true)) => self.difference_error(x, y),
-            _ => self.node(Op::SumError(a.min(b), a.max(b))),
-        }
-    }
-
-    /// What rounding a − b lost.
-    pub fn difference_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.is(a, 0.0) || self.is(b, 0.0) {
-            return self.constant(0.0);
-        }
-        match (self.magnitude(a), self.magnitude(b)) {
-            ((x, true), (y, true)) => self.difference_error(y, x),
-            ((x, true), (y, false)) => {
-                let error = self.sum_error(x, y);
-                self.neg(error)
-            }
-            ((x, false), (y, true)) => self.sum_error(x, y),
-            _ if !self.index.contains_key(&Op::Sub(a, b)) && self.index.contains_key(&Op::Sub(b, a)) => {
-                let opposite = self.node(Op::DifferenceError(b, a));
-                self.neg(opposite)
-            }
-            _ => self.node(Op::DifferenceError(a, b)),
-        }
-    }
-
-    /// What rounding a · b lost.
-    pub fn product_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.as_constant(a).is_some_and(is_power_of_two) || self.as_constant(b).is_some_and(is_power_of_two) {
-            return self.constant(0.0);
-        }
-        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
-        let error = self.node(Op::ProductError(a.min(b), a.max(b)));
-        self.signed(error, minus_a != minus_b)
-    }
-
-    /// What rounding lost when this node was computed as a difference of two others; zero for other nodes.
-    pub fn rounding_tail(&mut self, node: NodeId) -> NodeId {
-        match self.op(node) {
-            Op::Sub(a, b) => self.difference_error(a, b),
-            Op::Neg(a) => {
-                let tail = self.rounding_tail(a);
-                self.neg(tail)
-            }
-            _ => self.constant(0.0),
-        }
-    }
-
-    /// a · b − c, as if rounded once.
-    pub fn fused_mul_sub(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
-        if self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
-            let product = self.mul(a, b);
-            return self.sub(product, c);
-        }
-        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
-        let negative = minus_a != minus_b;
-        // −a·b − c = −(a·b − (−c)).
-        let c = self.signed(c, negative);
-        let difference = self.node(Op::FusedMulSub(a.min(b), a.max(b), c));
-        self.signed(difference, negative)
-    }
-
-    /// a · b − c · d with one of the products fused, for where it need not be 0 when both are equal.
-    pub fn difference_of_products(&mut self, [a, b]: [NodeId; 2], [c, d]: [NodeId; 2]) -> NodeId {
-        let product = self.mul(a, b);
-        self.neg_mul_add(c, d, product)
-    }
-
-    /// c − a · b, fused.
-    pub(crate) fn neg_mul_add(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
-        if self.is(c, 0.0) || self.as_constant(a).or(self.as_constant(b)).is_some() {
-            let product = self.mul(a, b);
-            return self.sub(c, product);
-        }
-        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
-        let (a, b) = (a.min(b), a.max(b));
-        if minus_a == minus_b { self.node(Op::NegMulAdd(a, b, c)) } else { self.node(Op::MulAdd(a, b, c)) }
-    }
-
-    /// a − b², b being √a rounded.
-    pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        self.node(Op::RootError(a, b))
-    }
-
-    /// A power of two that brings |a| into [1, 2).
-    pub fn power_of_two_scale(&mut self, a: NodeId) -> NodeId {
-        self.node(Op::PowerOfTwoScale(a))
-    }
-
-    /// a < b.
-    pub fn less(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        self.node(Op::Less(a, b))
-    }
-
-    /// a ≤ b.
-    pub fn less_or_equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        self.node(Op::LessOrEqual(a, b))
-    }
-
-    /// a = b.
-    pub fn equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        self.node(Op::Equal(a.min(b), a.max(b)))
-    }
-
-    /// Whether a ≥ 0 is the given power of a length that needs no scaling.
-    pub fn is_moderate(&mut self, a: NodeId, degree: u8) -> NodeId {
-        self.node(Op::IsModerate(a, degree))
-    }
-
-    /// A mask that is the same everywhere.
-    pub fn truth(&mut self, value: bool) -> NodeId {
-        self.node(Op::Truth(value))
-    }
-
-    /// Whether precautions must be taken.
-    pub fn cautious(&mut self) -> NodeId {
-        self.node(Op::Cautious)
-    }
-
-    /// Both.
-    pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        match (self.op(a), self.op(b)) {
-            (Op::Truth(true), _) | (_, Op::Truth(false)) => b,
-            (_, Op::Truth(true)) | (Op::Truth(false), _) => a,
-            _ if a == b => a,
-            _ => self.node(Op::And(a.min(b), a.max(b))),
-        }
-    }
-
-    /// Either.
-    pub fn or(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        match (self.op(a), self.op(b)) {
-            (Op::Truth(false), _) | (_, Op::Truth(true)) => b,
-            (_, Op::Truth(false)) | (Op::Truth(true), _) => a,
-            _ if a == b => a,
-            _ => self.node(Op::Or(a.min(b), a.max(b))),
-        }
-    }
-
-    /// Not.
-    pub fn not(&mut self, a: NodeId) -> NodeId {
-        match self.op(a) {
-            Op::Not(b) => b,
-            Op::Truth(value) => self.truth(!value),
-            _ => self.node(Op::Not(a)),
-        }
-    }
-
-    /// A selection.
-    pub fn select(&mut self, mask: NodeId, yes: NodeId, no: NodeId) -> NodeId {
-        match self.op(mask) {
-            Op::Truth(true) => yes,
-            Op::Truth(false) => no,
-            _ if yes == no => yes,
-            _ => self.node(Op::Select(mask, yes, no)),
-        }
-    }
-
-    /// Σ terms, left to right.
-    pub fn sum(&mut self, terms: impl IntoIterator<Item = NodeId>) -> NodeId {
-        let mut terms = terms.into_iter();
-        match terms.next() {
-            None => self.constant(0.0),
-            Some(first) => terms.fold(first, |sum, term| self.add(sum, term)),
-        }
-    }
-
-    /// Σ aᵢ bᵢ.
-    pub fn dot(&mut self, a: &[NodeId], b: &[NodeId]) -> NodeId {
-        let products: Vec<_> = a.iter().zip(b).map(|(&x, &y)| self.mul(x, y)).collect();
-        self.sum(products)
-    }
-
-    /// Σ aᵢ².
-    pub fn sum_of_squares(&mut self, a: &[NodeId]) -> NodeId {
-        self.dot(a, a)
-    }
-
-    /// a × b.
-    pub fn cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
-        std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            let (plus, minus) = (self.mul(a[j], b[k]), self.mul(a[k], b[j]));
-            self.sub(plus, minus)
-        })
-    }
-
-    /// a × b with fused products: more exact where it does not vanish, but not exactly 0 where it should.
-    pub fn fused_cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
-        std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            self.difference_of_products([a[j], b[k]], [a[k], b[j]])
-        })
-    }
-
-    /// weight · the factors, from left to right.
-    pub fn product(&mut self, weight: Option<NodeId>, factors: &[NodeId]) -> NodeId {
-        let one = self.constant(1.0);
-        factors.iter().fold(weight.unwrap_or(one), |product, &factor| self.mul(product, factor))
-    }
-
-    /// weight · Σ products, the weight going into each. Products that follow each other and end in the same factor are added
-    /// before it multiplies them.
-    pub fn sum_of_products(&mut self, weight: Option<NodeId>, products: &[Vec<NodeId>]) -> NodeId {
-        let mut terms = Vec::with_capacity(products.len());
-        for group in products.chunk_by(|a, b| a.len() > 1 && b.len() > 1 && a.last() == b.last()) {
-            let term = match group {
-                [factors] => self.product(weight, factors),
-                _ => {
-                    let common = *group[0].last().expect("more than one factor");
-                    let kept: Vec<_> = group.iter().map(|factors| factors[..factors.len() - 1].to_vec()).collect();
-                    let sum = self.sum_of_products(weight, &kept);
-                    self.mul(sum, common)
-                }
-            };
-            terms.push(term);
-        }
-        self.sum(terms)
-    }
-
-    /// Whether each product has a factor 0.
-    #[must_use]
-    pub fn vanishes(&self, products: &[Vec<NodeId>]) -> bool {
-        products.iter().all(|factors| factors.iter().any(|&f| self.is(f, 0.0)))
-    }
-
-    /// factor · a.
-    pub fn scaled(&mut self, factor: NodeId, a: &[NodeId]) -> Vec<NodeId> {
-        a.iter().map(|&x| self.mul(factor, x)).collect()
-    }
 }
 
-fn is_power_of_two(value: f64) -> bool {
+pub(super) fn is_power_of_two(value: f64) -> bool {
     value != 0.0 && value.is_normal() && value.to_bits() & ((1 << 52) - 1) == 0
 }

@@ -4,9 +4,12 @@
 mod build;
 mod count;
 mod fuse;
+mod mask;
 mod node;
 mod ordinary;
+mod rounding;
 mod rule;
+mod sums;
 
 pub use count::{count, reachable};
 pub use node::{Input, NodeId, Op};

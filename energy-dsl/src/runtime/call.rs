@@ -1,11 +1,12 @@
 //! Calls of routines as kernels: the plain methods of generated elements run the levelled ones through these.
 
 use super::cpu::{Kernel, Level};
-use super::element::{
-    Constraint, ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian,
-    HessianVector, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian, ResidualValue, Value,
-};
+use super::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual};
 use super::real::Real;
+use super::results::{
+    ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+};
 
 /// A call with its element and arguments.
 macro_rules! call {

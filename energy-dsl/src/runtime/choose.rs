@@ -1,10 +1,11 @@
 use super::array::Array;
-use super::element::{
-    Block, ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vector3,
-};
+use super::element::{Block, Vector3};
 use super::flags::Flags;
 use super::real::Real;
+use super::results::{
+    ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+};
 
 /// Of two results, lane by lane one or the other.
 #[doc(hidden)]

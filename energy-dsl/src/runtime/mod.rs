@@ -12,6 +12,7 @@ mod elementary;
 mod evaluate;
 mod flags;
 mod real;
+mod results;
 
 pub use array::Array;
 pub use batch::{
@@ -28,10 +29,13 @@ pub use choose::Choose;
 pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
-    Block, Constraint, ConstraintHessian, ConstraintJacobian, Element, ForceJacobians, ForceLaw, ForceValue, Gradient,
-    Hessian, HessianVector, Inputs, Outputs, Potential, ReducedHessian, ReducedPotential, Residual, ResidualJacobian,
-    ResidualValue, RestError, Value, Vector3, triangle_index,
+    Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual, RestError, Vector3,
+    triangle_index,
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};
 pub use real::{Mask, Number, Real};
+pub use results::{
+    ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+};

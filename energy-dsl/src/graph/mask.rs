@@ -1,0 +1,69 @@
+//! Constructors of masks and selections, folded where the outcome is known.
+
+use super::{Graph, NodeId, Op};
+
+impl Graph {
+    /// a < b.
+    pub fn less(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Less(a, b))
+    }
+
+    /// a ≤ b.
+    pub fn less_or_equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::LessOrEqual(a, b))
+    }
+
+    /// a = b.
+    pub fn equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Equal(a.min(b), a.max(b)))
+    }
+
+    /// A mask that is the same everywhere.
+    pub fn truth(&mut self, value: bool) -> NodeId {
+        self.node(Op::Truth(value))
+    }
+
+    /// Whether precautions must be taken.
+    pub fn cautious(&mut self) -> NodeId {
+        self.node(Op::Cautious)
+    }
+
+    /// Both.
+    pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        match (self.op(a), self.op(b)) {
+            (Op::Truth(true), _) | (_, Op::Truth(false)) => b,
+            (_, Op::Truth(true)) | (Op::Truth(false), _) => a,
+            _ if a == b => a,
+            _ => self.node(Op::And(a.min(b), a.max(b))),
+        }
+    }
+
+    /// Either.
+    pub fn or(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        match (self.op(a), self.op(b)) {
+            (Op::Truth(false), _) | (_, Op::Truth(true)) => b,
+            (_, Op::Truth(false)) | (Op::Truth(true), _) => a,
+            _ if a == b => a,
+            _ => self.node(Op::Or(a.min(b), a.max(b))),
+        }
+    }
+
+    /// Not.
+    pub fn not(&mut self, a: NodeId) -> NodeId {
+        match self.op(a) {
+            Op::Not(b) => b,
+            Op::Truth(value) => self.truth(!value),
+            _ => self.node(Op::Not(a)),
+        }
+    }
+
+    /// A selection.
+    pub fn select(&mut self, mask: NodeId, yes: NodeId, no: NodeId) -> NodeId {
+        match self.op(mask) {
+            Op::Truth(true) => yes,
+            Op::Truth(false) => no,
+            _ if yes == no => yes,
+            _ => self.node(Op::Select(mask, yes, no)),
+        }
+    }
+}

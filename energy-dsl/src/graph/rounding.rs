@@ -1,0 +1,124 @@
+//! Constructors of nodes about rounding: what a sum, a product or a root lost, products fused with sums, and scales by powers of two.
+
+use super::build::is_power_of_two;
+use super::{Graph, NodeId, Op};
+
+impl Graph {
+    /// 0 − a: −a, but for +0 where a is a zero of either sign.
+    pub fn minus_or_plus_zero(&mut self, a: NodeId) -> NodeId {
+        let zero = self.constant(0.0);
+        self.node(Op::Sub(zero, a))
+    }
+
+    /// What rounding a + b lost. Signs move out as they do of the sum itself, so that a sum and its error name the same operands.
+    pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.is(a, 0.0) || self.is(b, 0.0) {
+            return self.constant(0.0);
+        }
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => {
+                let error = self.sum_error(x, y);
+                self.neg(error)
+            }
+            ((x, true), (y, false)) => self.difference_error(y, x),
+            ((x, false), (y, true)) => self.difference_error(x, y),
+            _ => self.node(Op::SumError(a.min(b), a.max(b))),
+        }
+    }
+
+    /// What rounding a − b lost.
+    pub fn difference_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.is(a, 0.0) || self.is(b, 0.0) {
+            return self.constant(0.0);
+        }
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => self.difference_error(y, x),
+            ((x, true), (y, false)) => {
+                let error = self.sum_error(x, y);
+                self.neg(error)
+            }
+            ((x, false), (y, true)) => self.sum_error(x, y),
+            _ if !self.index.contains_key(&Op::Sub(a, b)) && self.index.contains_key(&Op::Sub(b, a)) => {
+                let opposite = self.node(Op::DifferenceError(b, a));
+                self.neg(opposite)
+            }
+            _ => self.node(Op::DifferenceError(a, b)),
+        }
+    }
+
+    /// What rounding a · b lost.
+    pub fn product_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.as_constant(a).is_some_and(is_power_of_two) || self.as_constant(b).is_some_and(is_power_of_two) {
+            return self.constant(0.0);
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let error = self.node(Op::ProductError(a.min(b), a.max(b)));
+        self.signed(error, minus_a != minus_b)
+    }
+
+    /// What rounding lost when this node was computed as a difference of two others; zero for other nodes.
+    pub fn rounding_tail(&mut self, node: NodeId) -> NodeId {
+        match self.op(node) {
+            Op::Sub(a, b) => self.difference_error(a, b),
+            Op::Neg(a) => {
+                let tail = self.rounding_tail(a);
+                self.neg(tail)
+            }
+            _ => self.constant(0.0),
+        }
+    }
+
+    /// a · b − c, as if rounded once.
+    pub fn fused_mul_sub(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
+        if self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
+            let product = self.mul(a, b);
+            return self.sub(product, c);
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let negative = minus_a != minus_b;
+        // −a·b − c = −(a·b − (−c)).
+        let c = self.signed(c, negative);
+        let difference = self.node(Op::FusedMulSub(a.min(b), a.max(b), c));
+        self.signed(difference, negative)
+    }
+
+    /// a · b − c · d with one of the products fused, for where it need not be 0 when both are equal.
+    pub fn difference_of_products(&mut self, [a, b]: [NodeId; 2], [c, d]: [NodeId; 2]) -> NodeId {
+        let product = self.mul(a, b);
+        self.neg_mul_add(c, d, product)
+    }
+
+    /// c − a · b, fused.
+    pub(crate) fn neg_mul_add(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
+        if self.is(c, 0.0) || self.as_constant(a).or(self.as_constant(b)).is_some() {
+            let product = self.mul(a, b);
+            return self.sub(c, product);
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        let (a, b) = (a.min(b), a.max(b));
+        if minus_a == minus_b { self.node(Op::NegMulAdd(a, b, c)) } else { self.node(Op::MulAdd(a, b, c)) }
+    }
+
+    /// a − b², b being √a rounded.
+    pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::RootError(a, b))
+    }
+
+    /// A power of two that brings |a| into [1, 2).
+    pub fn power_of_two_scale(&mut self, a: NodeId) -> NodeId {
+        self.node(Op::PowerOfTwoScale(a))
+    }
+
+    /// Whether a ≥ 0 is the given power of a length that needs no scaling.
+    pub fn is_moderate(&mut self, a: NodeId, degree: u8) -> NodeId {
+        self.node(Op::IsModerate(a, degree))
+    }
+
+    /// a × b with fused products: more exact where it does not vanish, but not exactly 0 where it should.
+    pub fn fused_cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            self.difference_of_products([a[j], b[k]], [a[k], b[j]])
+        })
+    }
+}
