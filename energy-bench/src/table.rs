@@ -8,7 +8,7 @@ use crate::measure::Measured;
 #[must_use]
 pub fn table(kernels: &[Measured]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_preset(presets::NOTHING);
     let title = |kernel: &Measured| format!("{} {}", kernel.key, kernel.title);
     table.set_header(std::iter::once("ns an element".to_owned()).chain(kernels.iter().map(title)));
     let mut rows = Rows { kernels, table: &mut table };
