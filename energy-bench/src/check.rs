@@ -30,8 +30,7 @@ pub fn agreement<K: Subject>(samples: &[Sample]) -> Result<f64, String> {
     let mut compare = |what: &str, found: &[Vec<f64>]| -> Result<(), String> {
         for (element, (found, expected)) in found.iter().zip(&expected).enumerate() {
             let difference = difference::<K>(found, expected);
-            // Not `>`: NaN must fail.
-            if !(difference <= TOLERANCE) {
+            if difference.is_nan() || difference > TOLERANCE {
                 return Err(format!("{} {what}: element {element} is off by {difference:e}", K::KEY));
             }
             worst = worst.max(difference);
