@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use energy_dsl::{Batch, BatchWork, Lane, Level, Packed, PackedPotential, Potential, Vector3, for_each_batch};
-use energy_solve::{BlockMatrix, Curvature, ElementList, PotentialTerm, State, System, Weights};
+use energy_solve::{BlockMatrix, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
 
 use crate::run::{TOGETHER, Work};
 use crate::subject::{Sample, points};
@@ -40,7 +40,8 @@ where
     let linearise = Box::new(move || {
         let state = State { x: &positions, v: &velocities };
         let weights = Weights { position: 1.0, velocity: 0.0 };
-        let forces = system.linearise(state, weights, Curvature::Exact, &mut matrix);
+        let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
+        let forces = system.linearise(state, options, &mut matrix);
         black_box((forces.expect("finite elements"), &mut matrix));
     });
     Assembled { batches, system: linearise }

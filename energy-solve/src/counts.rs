@@ -9,6 +9,9 @@ pub struct Tally {
     pub skipped: u64,
     /// Elements evaluated at a point where the formula has no single derivative; see [`energy_dsl::Flag`].
     pub flagged: u64,
+    /// Elements whose Hessian had negative eigenvalues that were changed; see [`crate::Curvature`]. For the others a test said that there
+    /// are none.
+    pub projected: u64,
 }
 
 impl AddAssign for Tally {
@@ -16,6 +19,7 @@ impl AddAssign for Tally {
         self.evaluated += other.evaluated;
         self.skipped += other.skipped;
         self.flagged += other.flagged;
+        self.projected += other.projected;
     }
 }
 

@@ -5,18 +5,19 @@
 //!
 //! * the energy U(x) of every term that has one,
 //! * the force f(x, v) on every vertex, in N,
-//! * α ∂f/∂x + β ∂f/∂v over the free vertices as a [`BlockMatrix`] whose pattern is built once, and (∂f/∂x) v.
+//! * α ∂f/∂x + β ∂f/∂v over the free vertices as a [`BlockMatrix`] whose pattern is built once (its upper triangle, where all
+//!   terms are symmetric), with the elements' Hessians as they are or made positive semi-definite ([`Curvature`]), and (∂f/∂x) v.
 //!
 //! Pinned vertices are removed from the matrix, not penalised; elements with pinned vertices only are never evaluated. What
 //! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix.
 //!
-//! Everything is deterministic: sums run in the order of terms and elements.
+//! Potentials are evaluated many elements at once. Everything is deterministic: sums run in the order of terms and elements.
 //!
 //! ```
-//! use energy_solve::{BlockJacobi, BlockMatrix, Pattern, SolveOptions, conjugate_gradients};
+//! use energy_solve::{BlockJacobi, BlockMatrix, Pattern, SolveOptions, Storage, conjugate_gradients};
 //!
 //! // One vertex held by three springs of stiffness 2, 4 and 8 N/m along the axes, pulled with 1 N along each.
-//! let mut matrix = BlockMatrix::zeros(Pattern::from_stencils(1, &[]).into());
+//! let mut matrix = BlockMatrix::zeros(Pattern::from_stencils(Storage::Upper, 1, []).into());
 //! for (axis, stiffness) in [2.0, 4.0, 8.0].into_iter().enumerate() {
 //!     matrix.diagonal_mut(0)[axis][axis] = stiffness;
 //! }
@@ -30,14 +31,19 @@
 
 #![forbid(unsafe_code)]
 
+mod active;
 mod bicgstab;
 mod conjugate_gradients;
 mod counts;
+mod curvature;
 mod dofs;
+mod force_term;
 mod list;
 mod matrix;
+mod pattern;
+mod places;
+mod potential_term;
 mod preconditioner;
-mod projection;
 mod solve;
 mod system;
 mod term;
@@ -46,12 +52,15 @@ mod vector;
 pub use bicgstab::bicgstab;
 pub use conjugate_gradients::conjugate_gradients;
 pub use counts::{Counts, Tally};
+pub use curvature::Curvature;
 pub use dofs::DofMap;
+pub use force_term::ForceTerm;
 pub use list::{ElementList, ListError};
-pub use matrix::{BlockMatrix, Pattern};
+pub use matrix::BlockMatrix;
+pub use pattern::{Pattern, Storage};
+pub use potential_term::PotentialTerm;
 pub use preconditioner::{BlockJacobi, SingularBlock};
-pub use projection::project_to_positive;
 pub use solve::{SolveOptions, SolveReport, StopReason};
-pub use system::{EvaluationError, LinearisedForces, System, SystemError, TermEnergy};
-pub use term::{Character, Curvature, ForceTerm, Linearisation, PotentialTerm, Slots, State, Stencils, Term, Weights};
+pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
+pub use term::{Character, Linearisation, Quantity, State, Stencils, Term, Weights};
 pub use vector::dot;

@@ -1,5 +1,7 @@
 use energy_dsl::Element;
 
+use crate::term::Stencils;
+
 /// Stencils that do not fit their elements.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ListError {
@@ -89,6 +91,12 @@ impl<E: Element> ElementList<E> {
     #[must_use]
     pub fn vertices(&self) -> &[usize] {
         &self.vertices
+    }
+
+    /// The stencils of all elements.
+    #[must_use]
+    pub fn stencils(&self) -> Stencils<'_> {
+        Stencils { arity: self.arity, vertices: &self.vertices }
     }
 
     /// How many points an element has.

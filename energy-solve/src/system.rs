@@ -2,10 +2,12 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
-use crate::counts::{Counts, Tally};
+use crate::counts::Counts;
+use crate::curvature::Curvature;
 use crate::dofs::DofMap;
-use crate::matrix::{BlockMatrix, Pattern};
-use crate::term::{Character, Curvature, Linearisation, State, Term, Weights};
+use crate::matrix::BlockMatrix;
+use crate::pattern::{Pattern, Storage, index};
+use crate::term::{Character, Linearisation, Quantity, State, Term, Weights};
 
 /// Terms that do not fit the vertices.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -58,8 +60,14 @@ pub enum EvaluationError {
         element: usize,
         /// Its vertices.
         vertices: Vec<usize>,
-        /// Energy, force or Jacobian.
-        what: &'static str,
+        /// Energy or force.
+        what: Quantity,
+    },
+    /// Every element's energy or force is finite, but their sum is not.
+    #[error("the {what} of all elements together is too large a number")]
+    NonFiniteSum {
+        /// Energy or force.
+        what: Quantity,
     },
 }
 
@@ -77,8 +85,19 @@ pub struct TermEnergy<'a> {
 pub struct LinearisedForces {
     /// f, in N.
     pub force: Vec<Vector3<f64>>,
-    /// (∂f/∂x) v, in N/s.
+    /// (∂f/∂x) v, in N/s; empty unless it was asked for.
     pub stiffness_times_velocity: Vec<Vector3<f64>>,
+}
+
+/// What [`System::linearise`] computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearisationOptions {
+    /// α and β.
+    pub weights: Weights,
+    /// How to treat negative curvature.
+    pub curvature: Curvature,
+    /// Whether (∂f/∂x) v is wanted.
+    pub stiffness_times_velocity: bool,
 }
 
 /// A sum of terms over the vertices of one body.
@@ -86,16 +105,13 @@ pub struct LinearisedForces {
 pub struct System {
     dofs: DofMap,
     pattern: Arc<Pattern>,
-    terms: Vec<Assembled>,
+    terms: Vec<Counted>,
 }
 
-/// A term, its elements with a free vertex, and where their blocks go.
+/// A term, and what it did.
 #[derive(Debug)]
-struct Assembled {
+struct Counted {
     term: Box<dyn Term>,
-    active: Vec<usize>,
-    slots: Vec<Option<usize>>,
-    skipped: u64,
     counts: Counts,
 }
 
@@ -109,13 +125,19 @@ impl System {
             check_range(&**term, pinned.len())?;
         }
         let dofs = DofMap::new(pinned);
-        let coupled: Vec<Vec<usize>> = terms
-            .iter()
-            .filter(|term| term.character().curved)
+        let symmetric = terms.iter().all(|term| term.character().symmetric);
+        let storage = if symmetric { Storage::Upper } else { Storage::Whole };
+        let curved = terms.iter().filter(|term| term.character().curved);
+        let coupled: Vec<Vec<u32>> = curved
             .flat_map(|term| term.stencils().iter().map(|stencil| free_places(stencil, &dofs)).collect::<Vec<_>>())
             .collect();
-        let pattern = Arc::new(Pattern::from_stencils(dofs.free().len(), &coupled));
-        let terms = terms.into_iter().map(|term| Assembled::new(term, &dofs, &pattern)).collect();
+        let stencils = coupled.iter().map(Vec::as_slice);
+        let pattern = Arc::new(Pattern::from_stencils(storage, dofs.free().len(), stencils));
+        let placed = |mut term: Box<dyn Term>| {
+            term.place(&dofs, &pattern);
+            Counted { term, counts: Counts::default() }
+        };
+        let terms = terms.into_iter().map(placed).collect();
         Ok(Self { dofs, pattern, terms })
     }
 
@@ -140,7 +162,7 @@ impl System {
     /// What all terms' forces have in common.
     #[must_use]
     pub fn character(&self) -> Character {
-        let all = || self.terms.iter().map(|assembled| assembled.term.character());
+        let all = || self.terms.iter().map(|counted| counted.term.character());
         Character {
             symmetric: all().all(|one| one.symmetric),
             velocity_dependent: all().any(|one| one.velocity_dependent),
@@ -150,7 +172,7 @@ impl System {
 
     /// The terms in order, each with what it evaluated so far.
     pub fn terms(&self) -> impl Iterator<Item = (&dyn Term, Counts)> {
-        self.terms.iter().map(|assembled| (&*assembled.term, assembled.counts))
+        self.terms.iter().map(|counted| (&*counted.term, counted.counts))
     }
 
     /// The energy of each term, of all elements with a free vertex (the energy of the others is constant).
@@ -160,16 +182,15 @@ impl System {
     pub fn energies(&mut self, x: &[Vector3<f64>]) -> Result<Vec<TermEnergy<'_>>, EvaluationError> {
         self.check_state("position", x)?;
         let mut energies = Vec::with_capacity(self.terms.len());
-        for assembled in &mut self.terms {
-            let energy = assembled.term.energy(&assembled.active, x).map(|(energy, tally)| {
-                assembled.counts.value += tally.with_skipped(assembled.skipped);
+        for Counted { term, counts } in &mut self.terms {
+            let energy = term.energy(x).map(|(energy, tally)| {
+                counts.value += tally;
                 energy
             });
             if energy.is_some_and(|energy| !energy.is_finite()) {
-                return Err(assembled
-                    .blame("energy", |term, one| term.energy(one, x).is_some_and(|(energy, _)| !energy.is_finite())));
+                return Err(blame(std::iter::once(&**term), Quantity::Energy, State { x, v: &[] }));
             }
-            energies.push(TermEnergy { term: assembled.term.name(), energy });
+            energies.push(TermEnergy { term: term.name(), energy });
         }
         Ok(energies)
     }
@@ -181,9 +202,8 @@ impl System {
     pub fn forces(&mut self, state: State<'_>) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         self.check(state)?;
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        for assembled in &mut self.terms {
-            let tally = assembled.term.add_force(&assembled.active, state, &mut force);
-            assembled.counts.gradient += tally.with_skipped(assembled.skipped);
+        for Counted { term, counts } in &mut self.terms {
+            counts.gradient += term.add_force(state, &mut force);
         }
         if force.iter().flatten().any(|component| !component.is_finite()) {
             return Err(self.find_non_finite_force(state));
@@ -202,33 +222,33 @@ impl System {
     pub fn linearise(
         &mut self,
         state: State<'_>,
-        weights: Weights,
-        curvature: Curvature,
+        options: LinearisationOptions,
         matrix: &mut BlockMatrix,
     ) -> Result<LinearisedForces, EvaluationError> {
         self.check(state)?;
         assert!(self.owns(matrix), "the matrix must come from the same system");
         matrix.clear();
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        let mut stiffness_times_velocity = force.clone();
+        let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
+        let mut product = if wanted { force.clone() } else { Vec::new() };
         let mut sum = Linearisation {
             weights,
             curvature,
-            matrix: matrix.values_mut(),
+            matrix: matrix.values_and_nowhere(),
             force: &mut force,
-            stiffness_times_velocity: &mut stiffness_times_velocity,
+            stiffness_times_velocity: wanted.then_some(&mut product),
         };
-        for Assembled { term, active, slots, skipped, counts } in &mut self.terms {
+        for Counted { term, counts } in &mut self.terms {
             if term.character().curved {
-                counts.hessian += term.add_linearisation(active, slots, state, &mut sum).with_skipped(*skipped);
+                counts.hessian += term.add_linearisation(state, &mut sum);
             } else {
-                counts.gradient += term.add_force(active, state, sum.force).with_skipped(*skipped);
+                counts.gradient += term.add_force(state, sum.force);
             }
         }
         if force.iter().flatten().any(|component| !component.is_finite()) {
             return Err(self.find_non_finite_force(state));
         }
-        Ok(LinearisedForces { force, stiffness_times_velocity })
+        Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
@@ -248,63 +268,20 @@ impl System {
         }
     }
 
-    /// Evaluates element by element until one is found to blame.
     fn find_non_finite_force(&self, state: State<'_>) -> EvaluationError {
-        let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        let mut broken = |term: &dyn Term, one: &[usize]| {
-            term.add_force(one, state, &mut force);
-            let stencil = term.stencils().stencil(one[0]);
-            let found = stencil.iter().any(|&vertex| force[vertex].iter().any(|component| !component.is_finite()));
-            stencil.iter().for_each(|&vertex| force[vertex] = [0.0; 3]);
-            found
-        };
-        let culprit = self
-            .terms
-            .iter()
-            .find(|assembled| assembled.active.iter().any(|&element| broken(&*assembled.term, &[element])))
-            .or(self.terms.last())
-            .expect("a non-finite sum has terms");
-        culprit.blame("force", broken)
+        blame(self.terms.iter().map(|counted| &*counted.term), Quantity::Force, state)
     }
 }
 
-impl Assembled {
-    fn new(term: Box<dyn Term>, dofs: &DofMap, pattern: &Pattern) -> Self {
-        let stencils = term.stencils();
-        let is_free = |stencil: &[usize]| stencil.iter().any(|&vertex| dofs.place(vertex).is_some());
-        let active: Vec<usize> =
-            stencils.iter().enumerate().filter(|(_, stencil)| is_free(stencil)).map(|(element, _)| element).collect();
-        let mut slots = Vec::new();
-        if term.character().curved {
-            for &element in &active {
-                let places: Vec<Option<usize>> =
-                    stencils.stencil(element).iter().map(|&vertex| dofs.place(vertex)).collect();
-                for &row in &places {
-                    slots.extend(places.iter().map(|&column| pattern.slot(row?, column?)));
-                }
-            }
-        }
-        let skipped = (stencils.iter().len() - active.len()) as u64;
-        Self { active, slots, skipped, counts: Counts::default(), term }
-    }
-
-    /// The error about the first element that is `broken` (the last one if none is on its own: only their sum overflows).
-    fn blame(&self, what: &'static str, mut broken: impl FnMut(&dyn Term, &[usize]) -> bool) -> EvaluationError {
-        let element = self.active.iter().copied().find(|&element| broken(&*self.term, &[element]));
-        let element = element.or(self.active.last().copied()).unwrap_or(0);
-        EvaluationError::NonFiniteElement {
-            term: self.term.name().to_owned(),
-            element,
-            vertices: self.term.stencils().stencil(element).to_vec(),
-            what,
+/// Evaluates element by element until one is found whose energy or force is not finite.
+fn blame<'a>(terms: impl Iterator<Item = &'a dyn Term>, what: Quantity, state: State<'_>) -> EvaluationError {
+    for term in terms {
+        if let Some(element) = term.find_non_finite(what, state) {
+            let vertices = term.stencils().stencil(element).to_vec();
+            return EvaluationError::NonFiniteElement { term: term.name().to_owned(), element, vertices, what };
         }
     }
-}
-
-impl Tally {
-    fn with_skipped(self, skipped: u64) -> Self {
-        Self { skipped, ..self }
-    }
+    EvaluationError::NonFiniteSum { what }
 }
 
 fn check_range(term: &dyn Term, vertex_count: usize) -> Result<(), SystemError> {
@@ -316,6 +293,6 @@ fn check_range(term: &dyn Term, vertex_count: usize) -> Result<(), SystemError> 
     Ok(())
 }
 
-fn free_places(stencil: &[usize], dofs: &DofMap) -> Vec<usize> {
-    stencil.iter().filter_map(|&vertex| dofs.place(vertex)).collect()
+fn free_places(stencil: &[usize], dofs: &DofMap) -> Vec<u32> {
+    stencil.iter().filter_map(|&vertex| dofs.place(vertex)).map(index).collect()
 }

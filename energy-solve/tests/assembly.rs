@@ -5,8 +5,8 @@ mod elements;
 use elements::{Damper, Spring};
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, ListError, PotentialTerm, State, System,
-    SystemError, Term, Weights,
+    BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, LinearisationOptions, ListError, PotentialTerm,
+    Quantity, State, System, SystemError, Term, Weights,
 };
 
 const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [4, 1]];
@@ -34,10 +34,14 @@ fn system(pinned: &[usize]) -> System {
     System::new(vec![springs(), dampers()], &pinned).unwrap()
 }
 
+fn options(weights: Weights, curvature: Curvature) -> LinearisationOptions {
+    LinearisationOptions { weights, curvature, stiffness_times_velocity: true }
+}
+
 fn assembled(system: &mut System, weights: Weights) -> BlockMatrix {
     let (x, v) = (positions(), velocities());
     let mut matrix = system.matrix();
-    system.linearise(State { x: &x, v: &v }, weights, Curvature::Exact, &mut matrix).unwrap();
+    system.linearise(State { x: &x, v: &v }, options(weights, Curvature::Exact), &mut matrix).unwrap();
     matrix
 }
 
@@ -100,7 +104,7 @@ fn stiffness_times_velocity_is_the_directional_derivative() {
     let (x, v) = (positions(), velocities());
     let mut matrix = system.matrix();
     let weights = Weights { position: 1.0, velocity: 0.0 };
-    let got = system.linearise(State { x: &x, v: &v }, weights, Curvature::Exact, &mut matrix).unwrap();
+    let got = system.linearise(State { x: &x, v: &v }, options(weights, Curvature::Exact), &mut matrix).unwrap();
     let mut force_at = |step: f64| {
         let moved: Vec<Vector3<f64>> =
             x.iter().zip(&v).map(|(x, v)| std::array::from_fn(|axis| x[axis] + step * v[axis])).collect();
@@ -150,9 +154,9 @@ fn projection_leaves_no_negative_curvature() {
     let state = State { x: &[[1.0, 0.0, 0.0], [0.0; 3]], v: &[[0.0; 3]; 2] };
     let mut matrix = system.matrix();
     let weights = Weights { position: -1.0, velocity: 0.0 };
-    system.linearise(state, weights, Curvature::Exact, &mut matrix).unwrap();
+    system.linearise(state, options(weights, Curvature::Exact), &mut matrix).unwrap();
     assert_eq!(*matrix.diagonal(0), [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]);
-    system.linearise(state, weights, Curvature::Projected, &mut matrix).unwrap();
+    system.linearise(state, options(weights, Curvature::Clamped), &mut matrix).unwrap();
     for row in 0..3 {
         for column in 0..3 {
             let expected = if (row, column) == (0, 0) { 1.0 } else { 0.0 };
@@ -189,7 +193,12 @@ fn non_finite_numbers_are_traced_to_their_source() {
     let element = system.forces(State { x: &x, v: &v }).unwrap_err();
     assert_eq!(
         element,
-        EvaluationError::NonFiniteElement { term: "springs".into(), element: 1, vertices: vec![1, 2], what: "force" }
+        EvaluationError::NonFiniteElement {
+            term: "springs".into(),
+            element: 1,
+            vertices: vec![1, 2],
+            what: Quantity::Force
+        }
     );
     let short = system.forces(State { x: &x[..4], v: &v }).unwrap_err();
     assert_eq!(short.to_string(), "the system has 5 vertices, but 4 positions were given");

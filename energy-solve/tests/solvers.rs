@@ -4,16 +4,20 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockJacobi, BlockMatrix, Pattern, SolveOptions, SolveReport, StopReason, bicgstab, conjugate_gradients,
+    BlockJacobi, BlockMatrix, Pattern, SolveOptions, SolveReport, StopReason, Storage, bicgstab, conjugate_gradients,
 };
 use nalgebra::{DMatrix, DVector};
 
 const ROWS: usize = 12;
 
+fn pattern(storage: Storage) -> Arc<Pattern> {
+    let stencils: Vec<[u32; 3]> = (2..ROWS as u32).map(|row| [row - 2, row - 1, row]).collect();
+    Arc::new(Pattern::from_stencils(storage, ROWS, stencils.iter().map(<[u32; 3]>::as_slice)))
+}
+
 /// A chain with second neighbours; numbers from a fixed recurrence, `skew` added above the diagonal only.
 fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
-    let stencils: Vec<Vec<usize>> = (2..ROWS).map(|row| vec![row - 2, row - 1, row]).collect();
-    let pattern = Arc::new(Pattern::from_stencils(ROWS, &stencils));
+    let pattern = pattern(if skew == 0.0 { Storage::Upper } else { Storage::Whole });
     let mut matrix = BlockMatrix::zeros(Arc::clone(&pattern));
     let mut seed = 1_u64;
     let mut number = || {
@@ -21,12 +25,16 @@ fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
         (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
     for row in 0..ROWS {
-        for column in (row..ROWS).filter(|&column| pattern.slot(row, column).is_some()) {
+        for column in (row..ROWS).filter(|&column| pattern.place(row, column).is_some()) {
             for i in 0..3 {
                 for j in if row == column { i } else { 0 }..3 {
                     let entry = number() + if (row, i) == (column, j) { diagonal } else { 0.0 };
-                    matrix.values_mut()[pattern.slot(row, column).unwrap()][i][j] = entry + skew;
-                    matrix.values_mut()[pattern.slot(column, row).unwrap()][j][i] = entry;
+                    let [(upper, _), (lower, turned)] =
+                        [(row, column), (column, row)].map(|(row, column)| pattern.place(row, column).unwrap());
+                    matrix.values_mut()[upper][i][j] = entry + skew;
+                    if !turned {
+                        matrix.values_mut()[lower][j][i] = entry;
+                    }
                 }
             }
         }
@@ -103,7 +111,7 @@ fn indefinite_curvature_is_reported() {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for column in [row.wrapping_sub(1), row + 1] {
             if column < ROWS {
-                let slot = linked.pattern().slot(row, column).unwrap();
+                let slot = linked.pattern().place(row, column).unwrap().0;
                 linked.values_mut()[slot][0][0] = -2.0;
             }
         }

@@ -1,4 +1,4 @@
-use energy_dsl::{ForceLaw, Potential, RestError, Vector3};
+use energy_dsl::{ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
     BridsonBending, BridsonForce, BridsonForceDamped, Gravity, HookeSpring, Spring, StVK, ViscousDrag,
 };
@@ -158,7 +158,7 @@ impl Garment {
         elements: Vec<E>,
     ) -> Result<(), FabricError>
     where
-        E: Potential<f64> + std::fmt::Debug + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + 'static,
     {
         self.terms.push(Box::new(PotentialTerm::new(ElementList::new(name, elements, stencils)?)));
         Ok(())

@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockJacobi, BlockMatrix, Curvature, EvaluationError, SolveOptions, SolveReport, State, StopReason, Weights,
-    bicgstab, conjugate_gradients,
+    BlockJacobi, BlockMatrix, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State,
+    StopReason, Weights, bicgstab, conjugate_gradients,
 };
 
 use super::{Integrator, StepError, StepReport, advance};
@@ -51,7 +51,8 @@ impl ImplicitEuler {
     ) -> Result<Solution, StepError> {
         let state = State { x: &body.x, v: &body.v };
         let weights = Weights { position: -dt * dt, velocity: -dt };
-        let linear = body.system.linearise(state, weights, curvature, matrix)?;
+        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
+        let linear = body.system.linearise(state, options, matrix)?;
         let free = body.system.dofs().free();
         let mut right = Vec::with_capacity(free.len());
         for (row, &vertex) in free.iter().enumerate() {
@@ -108,7 +109,7 @@ impl Integrator for ImplicitEuler {
         let mut solution = self.solve(body, dt, Curvature::Exact, &mut matrix)?;
         let mut step = StepReport { solves: 1, iterations: solution.report.iterations as u64, projected: false };
         if solution.report.stopped == StopReason::IndefiniteCurvature {
-            solution = self.solve(body, dt, Curvature::Projected, &mut matrix)?;
+            solution = self.solve(body, dt, Curvature::Clamped, &mut matrix)?;
             step.solves += 1;
             step.iterations += solution.report.iterations as u64;
             step.projected = true;

@@ -1,4 +1,4 @@
-use energy_solve::{Curvature, EvaluationError, Weights};
+use energy_solve::{Curvature, EvaluationError, LinearisationOptions, Weights};
 
 use super::{Integrator, StepError, StepReport, advance};
 use crate::body::Body;
@@ -39,7 +39,9 @@ impl Integrator for SymplecticEuler {
 fn largest_row_sum(body: &mut Body, weights: Weights) -> Result<f64, EvaluationError> {
     let mut matrix = body.system.matrix();
     let state = energy_solve::State { x: &body.x, v: &body.v };
-    body.system.linearise(state, weights, Curvature::Exact, &mut matrix)?;
+    let curvature = Curvature::Exact;
+    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    body.system.linearise(state, options, &mut matrix)?;
     let free = body.system.dofs().free();
     let sums = matrix.absolute_row_sums();
     let accelerations = sums.iter().zip(free).flat_map(|(sums, &vertex)| sums.map(|sum| sum / body.masses[vertex]));

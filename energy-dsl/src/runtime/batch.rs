@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 
 use super::array::Array;
 use super::cpu::{Kernel, Lane, Level, dispatch};
-use super::element::{Element, ForceLaw, Potential, Residual, Vector3};
+use super::element::{Element, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
 use super::flags::Flags;
 use super::real::{Mask, Real};
 
@@ -24,11 +24,11 @@ pub trait Stored<S: Real>: Element {
 }
 
 macro_rules! packed {
-    ($(#[$docs:meta])* $name:ident: $of:ident) => {
+    ($(#[$docs:meta])* $name:ident: $of:ident, $wide:ident) => {
         $(#[$docs])*
         pub trait $name<S: Real>: Stored<S> + $of<S> {
             /// The element over lanes.
-            type Wide<V: Lane<S>>: $of<V>;
+            type Wide<V: Lane<S>>: $wide<V>;
 
             /// Reads the numbers of as many elements as there are lanes, side by side at 0, `stride`, 2 `stride`, ….
             fn load<V: Lane<S>>(numbers: &[S], stride: usize) -> Self::Wide<V>;
@@ -38,15 +38,15 @@ macro_rules! packed {
 
 packed!(
     /// Potentials that run over lanes.
-    PackedPotential: Potential
+    PackedPotential: Potential, ReducedPotential
 );
 packed!(
     /// Forces that run over lanes.
-    PackedForce: ForceLaw
+    PackedForce: ForceLaw, ForceLaw
 );
 packed!(
     /// Residuals that run over lanes.
-    PackedResidual: Residual
+    PackedResidual: Residual, Residual
 );
 
 /// The points of a potential over lanes.
@@ -74,20 +74,35 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
     #[must_use]
     pub fn new<const N: usize>(elements: &[E], stencils: &[[u32; N]]) -> Self {
         assert_eq!(elements.len(), stencils.len(), "every element needs a stencil");
-        let blocks = elements.len().div_ceil(BLOCK);
+        Self::from_fn(elements.len(), N, |element| &elements[element], |element, point| stencils[element][point])
+    }
+
+    /// Packs `count` elements of so many `points`: element i is `element(i)`, and its point p is `vertex(i, p)`.
+    pub fn from_fn<'a>(
+        count: usize,
+        points: usize,
+        element: impl Fn(usize) -> &'a E,
+        vertex: impl Fn(usize, usize) -> u32,
+    ) -> Self
+    where
+        E: 'a,
+    {
+        let blocks = count.div_ceil(BLOCK);
         let mut packed = Self {
-            elements: elements.len(),
-            points: N,
-            reach: stencils.iter().flatten().max().map_or(0, |&largest| largest as usize + 1),
+            elements: count,
+            points,
+            reach: 0,
             numbers: vec![S::from_f64(0.0); blocks * E::NUMBERS * BLOCK],
-            stencils: vec![0; blocks * N * BLOCK],
+            stencils: vec![0; blocks * points * BLOCK],
             of: PhantomData,
         };
         for place in 0..blocks * BLOCK {
-            let element = place.min(elements.len() - 1);
-            packed.write(place, &elements[element]);
-            for (point, &index) in stencils[element].iter().enumerate() {
-                packed.stencils[(place / BLOCK * N + point) * BLOCK + place % BLOCK] = index;
+            let repeated = place.min(count - 1);
+            packed.write(place, element(repeated));
+            for point in 0..points {
+                let vertex = vertex(repeated, point);
+                packed.reach = packed.reach.max(vertex as usize + 1);
+                packed.stencils[(place / BLOCK * points + point) * BLOCK + place % BLOCK] = vertex;
             }
         }
         packed
@@ -134,6 +149,17 @@ pub struct Batch<'a, E: PackedPotential<f64>, V: Lane<f64>> {
     pub element: &'a E::Wide<V>,
     /// Their points.
     pub points: &'a WidePoints<E, V>,
+    /// The stencils of the block they are in, from the first of them on.
+    stencils: &'a [u32],
+}
+
+impl<'a, E: PackedPotential<f64>, V: Lane<f64>> Batch<'a, E, V> {
+    /// The indices of point `point` of the elements, one a lane.
+    #[inline(always)]
+    #[must_use]
+    pub fn vertices(&self, point: usize) -> &'a [u32] {
+        &self.stencils[point * BLOCK..][..V::LANES]
+    }
 }
 
 /// What is done with every batch.
@@ -185,7 +211,8 @@ impl<E: PackedPotential<f64>, W: BatchWork<E>> Kernel for Batches<'_, E, W> {
                 *wide = L::F64::gather(positions, &packed.stencils[(block * n + point) * BLOCK + offset..][..lanes]);
             }
             let count = lanes.min(packed.elements - first);
-            work.batch::<L>(Batch { first, count, element: &element, points: &points });
+            let stencils = &packed.stencils[block * n * BLOCK + offset..];
+            work.batch::<L>(Batch { first, count, element: &element, points: &points, stencils });
             first += lanes;
         }
     }

@@ -10,6 +10,8 @@ pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + No
     fn none() -> Self;
     /// Bit `i` is set where lane `i` is true.
     fn bits(self) -> u32;
+    /// True in lane `i` where bit `i` is set; further bits are ignored.
+    fn from_bits(bits: u32) -> Self;
 
     /// Whether it is true anywhere.
     #[inline(always)]
@@ -39,6 +41,11 @@ impl Mask for bool {
     #[inline(always)]
     fn bits(self) -> u32 {
         u32::from(self)
+    }
+
+    #[inline(always)]
+    fn from_bits(bits: u32) -> Self {
+        bits & 1 != 0
     }
 }
 

@@ -2,7 +2,8 @@
 
 use energy_dsl::{
     Block, Declaration, Element, Field, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian, Inputs, Kind,
-    Outputs, Potential, Real, RestError, Value, Vector3,
+    Lane, Outputs, PackedPotential, Potential, Real, ReducedHessian, ReducedPotential, RestError, Stored, Value,
+    Vector3,
 };
 
 const fn declaration(name: &'static str, kind: Kind, formula: &'static str, rows: usize) -> Declaration {
@@ -45,46 +46,92 @@ fn delta(row: usize, column: usize) -> f64 {
     f64::from(row == column)
 }
 
-/// U = ½ k (‖p − q‖ − L)².
+/// U = ½ k (‖p − q‖ − L)², without precautions: coincident ends divide by zero.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spring {
-    pub(crate) stiffness: f64,
-    pub(crate) length: f64,
+pub(crate) struct Spring<T = f64> {
+    pub(crate) stiffness: T,
+    pub(crate) length: T,
 }
 
-impl Element for Spring {
-    const DECLARATION: &'static Declaration = &declaration("Spring", Kind::Energy, "k/2 (‖p − q‖ − L)²", 1);
-    type Over<T: Real> = Self;
+impl<T: Real> Spring<T> {
+    /// d, ‖d‖ and the stretch.
+    fn state(&self, [p, q]: &[Vector3<T>; 2]) -> (Vector3<T>, T, T) {
+        let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+        let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        (d, r, r - self.length)
+    }
+}
 
-    fn evaluate<T: Real>(_: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
+impl<T: Real> Element for Spring<T> {
+    const DECLARATION: &'static Declaration = &declaration("Spring", Kind::Energy, "k/2 (‖p − q‖ − L)²", 1);
+    type Over<R: Real> = Spring<R>;
+
+    fn evaluate<R: Real>(_: &Inputs<'_, R>) -> Result<Outputs<R>, RestError> {
         Err(RestError { element: "Spring" })
     }
 }
 
-impl Potential<f64> for Spring {
-    type Points = [Vector3<f64>; 2];
-    type Triangle = [Block<f64>; 3];
+impl<T: Real> Potential<T> for Spring<T> {
+    type Points = [Vector3<T>; 2];
+    type Triangle = [Block<T>; 3];
 
-    fn value(&self, x: &Self::Points) -> Value<f64> {
-        let stretch = length(&difference(x)) - self.length;
-        Value { value: 0.5 * self.stiffness * stretch * stretch, flags: Flags::clear() }
+    fn value(&self, x: &Self::Points) -> Value<T> {
+        let (_, _, stretch) = self.state(x);
+        Value { value: T::from_f64(0.5) * self.stiffness * stretch * stretch, flags: Flags::clear() }
     }
 
-    fn gradient(&self, x: &Self::Points) -> Gradient<f64, Self::Points> {
-        let d = difference(x);
-        let r = length(&d);
-        let g = d.map(|component| self.stiffness * (r - self.length) * component / r);
+    fn gradient(&self, x: &Self::Points) -> Gradient<T, Self::Points> {
+        let (d, r, stretch) = self.state(x);
+        let g = d.map(|component| self.stiffness * stretch * component / r);
         Gradient { value: self.value(x).value, gradient: [g, g.map(|component| -component)], flags: Flags::clear() }
     }
 
-    fn hessian(&self, x: &Self::Points) -> Hessian<f64, Self::Points, Self::Triangle> {
-        let d = difference(x);
-        let r = length(&d);
-        let (k, l) = (self.stiffness, self.length);
-        let near = block(|i, j| k * ((1.0 - l / r) * delta(i, j) + l / r * d[i] * d[j] / (r * r)));
-        let far = near.map(|row| row.map(|entry| -entry));
+    fn hessian(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
+        Self::expand::<{ u32::MAX }>(&self.reduced_hessian(x))
+    }
+}
+
+impl<T: Real> ReducedPotential<T> for Spring<T> {
+    type Coordinates = [T; 3];
+    type Upper = [T; 6];
+
+    fn reduced_hessian(&self, x: &Self::Points) -> ReducedHessian<T, [T; 3], [T; 6]> {
+        let (d, r, stretch) = self.state(x);
         let Gradient { value, gradient, flags } = self.gradient(x);
-        Hessian { value, gradient, hessian: [near, far, near], flags }
+        let (across, part) = (self.stiffness * stretch / r, self.stiffness * self.length / (r * r * r));
+        let entry = |i: usize, j: usize| {
+            let along = part * d[i] * d[j];
+            if i == j { along + across } else { along }
+        };
+        let hessian = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+        ReducedHessian { value, gradient: gradient[0], hessian, flags }
+    }
+
+    fn expand<const FREE: u32>(
+        reduced: &ReducedHessian<T, [T; 3], [T; 6]>,
+    ) -> Hessian<T, Self::Points, Self::Triangle> {
+        let [xx, xy, xz, yy, yz, zz] = reduced.hessian;
+        let near = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        let far = near.map(|row| row.map(|entry| -entry));
+        let gradient = [reduced.gradient, reduced.gradient.map(|component| -component)];
+        Hessian { value: reduced.value, gradient, hessian: [near, far, near], flags: reduced.flags }
+    }
+}
+
+impl Stored<f64> for Spring {
+    const NUMBERS: usize = 2;
+
+    fn store(&self, numbers: &mut [f64], stride: usize) {
+        numbers[0] = self.stiffness;
+        numbers[stride] = self.length;
+    }
+}
+
+impl PackedPotential<f64> for Spring {
+    type Wide<V: Lane<f64>> = Spring<V>;
+
+    fn load<V: Lane<f64>>(numbers: &[f64], stride: usize) -> Spring<V> {
+        Spring { stiffness: V::load(numbers), length: V::load(&numbers[stride..]) }
     }
 }
 

@@ -69,6 +69,10 @@ macro_rules! array_register {
             fn bits(self) -> u32 {
                 (0..$lanes).map(|i| u32::from(self.0[i] != 0) << i).sum()
             }
+            #[inline(always)]
+            fn from_bits(bits: u32) -> Self {
+                Self(array::from_fn(|i| if bits >> i & 1 != 0 { !0 } else { 0 }))
+            }
         }
 
         impl $register {

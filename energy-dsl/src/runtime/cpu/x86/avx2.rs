@@ -12,6 +12,10 @@ mask!(
     Mask4(__m256d),
     none: _mm256_setzero_pd(),
     bits: |m| _mm256_movemask_pd(m).cast_unsigned(),
+    from_bits: |b| {
+        let one = _mm256_set_epi64x(8, 4, 2, 1);
+        _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(_mm256_set1_epi64x(i64::from(b)), one), one))
+    },
     and: _mm256_and_pd,
     or: _mm256_or_pd,
     not: |m| _mm256_xor_pd(m, _mm256_castsi256_pd(_mm256_set1_epi32(-1)))
@@ -21,6 +25,10 @@ mask!(
     Mask8(__m256),
     none: _mm256_setzero_ps(),
     bits: |m| _mm256_movemask_ps(m).cast_unsigned(),
+    from_bits: |b| {
+        let one = _mm256_set_epi32(128, 64, 32, 16, 8, 4, 2, 1);
+        _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(b.cast_signed()), one), one))
+    },
     and: _mm256_and_ps,
     or: _mm256_or_ps,
     not: |m| _mm256_xor_ps(m, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))

@@ -8,9 +8,9 @@ use super::super::{Kernel, Level};
 use super::{intrinsics, mask, run_avx512, transpose};
 use crate::runtime::elementary::{Binary, Unary, sin_cos};
 
-mask!(Mask8(__mmask8), none: 0, bits: |m| u32::from(m), and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m);
+mask!(Mask8(__mmask8), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _, and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m);
 
-mask!(Mask16(__mmask16), none: 0, bits: |m| u32::from(m), and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask16| !m);
+mask!(Mask16(__mmask16), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _, and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask16| !m);
 
 impl Register for __m512d {
     type Scalar = f64;

@@ -107,7 +107,7 @@ macro_rules! intrinsics {
 
 /// A mask that registers hold as an integer or a register, with its logic.
 macro_rules! mask {
-    ($mask:ident($inner:ty), none: $none:expr, bits: |$m:ident| $bits:expr, and: $and:expr, or: $or:expr, not: $not:expr) => {
+    ($mask:ident($inner:ty), none: $none:expr, bits: |$m:ident| $bits:expr, from_bits: |$b:ident| $from_bits:expr, and: $and:expr, or: $or:expr, not: $not:expr) => {
         #[doc = "The outcome of a comparison of registers."]
         #[derive(Clone, Copy, Debug)]
         pub struct $mask($inner);
@@ -167,6 +167,14 @@ macro_rules! mask {
                 #[allow(unused_unsafe)]
                 unsafe {
                     $bits
+                }
+            }
+            #[inline(always)]
+            fn from_bits($b: u32) -> Self {
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    Self($from_bits)
                 }
             }
         }

@@ -1,13 +1,15 @@
 use energy_dsl::{Block, triangle_index};
 use nalgebra::DMatrix;
 
+use super::Curvature;
 use crate::vector::transposed;
 
-/// The nearest positive semi-definite matrix (in the Frobenius norm) to the symmetric one whose triangle of blocks is given:
-/// its negative eigenvalues become zero. Changes the triangle in place; one that is not finite is left as it is.
-pub fn project_to_positive(triangle: &mut [Block<f64>], points: usize) {
+/// Changes the eigenvalues of the symmetric matrix whose triangle of blocks is given: the way of elements with more coordinates
+/// than lanes are used for, and the measure of all others. Returns whether there was a change; a matrix that is not finite
+/// stays as it is.
+pub(crate) fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {
     if !triangle.iter().flatten().flatten().all(|entry| entry.is_finite()) {
-        return;
+        return false;
     }
     let dense = DMatrix::from_fn(3 * points, 3 * points, |row, column| {
         let (i, j) = (row / 3, column / 3);
@@ -19,11 +21,11 @@ pub fn project_to_positive(triangle: &mut [Block<f64>], points: usize) {
         block[row % 3][column % 3]
     });
     let mut eigen = dense.symmetric_eigen();
-    if eigen.eigenvalues.iter().all(|&value| value >= 0.0) {
-        return;
+    if eigen.eigenvalues.iter().all(|&value| curvature.change(value) == 0.0) {
+        return false;
     }
-    eigen.eigenvalues.iter_mut().for_each(|value| *value = value.max(0.0));
-    let projected = eigen.recompose();
+    eigen.eigenvalues.iter_mut().for_each(|value| *value += curvature.change(*value));
+    let changed = eigen.recompose();
     for i in 0..points {
         for j in i..points {
             let block = &mut triangle[triangle_index(points, i, j)];
@@ -31,9 +33,10 @@ pub fn project_to_positive(triangle: &mut [Block<f64>], points: usize) {
                 for column in 0..3 {
                     // The mean of both halves, so that diagonal blocks stay exactly symmetric.
                     let (r, c) = (3 * i + row, 3 * j + column);
-                    block[row][column] = 0.5 * (projected[(r, c)] + projected[(c, r)]);
+                    block[row][column] = 0.5 * (changed[(r, c)] + changed[(c, r)]);
                 }
             }
         }
     }
+    true
 }

@@ -1,0 +1,115 @@
+//! Eigenvalues by Jacobi's cyclic rotations (Golub and Van Loan, *Matrix Computations*, §8.5), one matrix a lane. A lane whose
+//! matrix is diagonal already is turned by zero: its bits do not depend on its neighbours.
+
+use energy_dsl::{Lane, Mask};
+
+use super::{Curvature, MOST, Orthonormal, Square, largest_of, upper_index};
+
+/// Sweeps converge quadratically: six or seven do for 12×12 matrices.
+const MOST_SWEEPS: usize = 16;
+
+/// Changes the matrices of the `open` lanes. Returns which lanes did change.
+#[inline(always)]
+pub(super) fn change<V: Lane<f64>>(
+    upper: &mut [V],
+    curvature: Curvature,
+    orthonormal: &Orthonormal,
+    open: V::Mask,
+) -> V::Mask {
+    let n = orthonormal.coordinates();
+    let zero = V::splat(0.0);
+    let largest = largest_of(upper);
+    // Entries near 1, so that their squares neither overflow nor vanish.
+    let scale = largest.power_of_two_scale();
+    let mut a = [[zero; MOST]; MOST];
+    for i in 0..n {
+        for j in i..n {
+            let entry = upper[upper_index(n, i, j)] * scale;
+            a[i][j] = entry;
+            a[j][i] = entry;
+        }
+    }
+    orthonormal.from_differences(&mut a);
+    let mut vectors = [[zero; MOST]; MOST];
+    for i in 0..n {
+        vectors[i][i] = V::splat(1.0);
+    }
+    diagonalise(&mut a, &mut vectors, n);
+    let mut changes = [zero; MOST];
+    let mut changed = V::Mask::none();
+    for i in 0..n {
+        changes[i] = curvature.change(a[i][i]);
+        changed = changed | zero.less(changes[i]);
+    }
+    changed = changed & open;
+    if !changed.any() {
+        return changed;
+    }
+    orthonormal.to_differences(&mut vectors);
+    let unscale = V::splat(1.0) / scale;
+    for i in 0..n {
+        for j in i..n {
+            let mut sum = zero;
+            for k in 0..n {
+                sum = sum + changes[k] * vectors[i][k] * vectors[j][k];
+            }
+            let entry = &mut upper[upper_index(n, i, j)];
+            *entry = V::select(changed, *entry + sum * unscale, *entry);
+        }
+    }
+    changed
+}
+
+/// Rotates a symmetric matrix until it is diagonal; the columns of `vectors` are turned along.
+#[inline(always)]
+fn diagonalise<V: Lane<f64>>(a: &mut Square<V>, vectors: &mut Square<V>, n: usize) {
+    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    let mut squares = zero;
+    for i in 0..n {
+        for j in 0..n {
+            squares = squares + a[i][j] * a[i][j];
+        }
+    }
+    let negligible = squares * V::splat(f64::EPSILON * f64::EPSILON / 16.0);
+    for _ in 0..MOST_SWEEPS {
+        let mut turned = V::Mask::none();
+        for p in 0..n {
+            for q in p + 1..n {
+                let off = a[p][q];
+                let turn = negligible.less(off * off);
+                if !turn.any() {
+                    continue;
+                }
+                turned = turned | turn;
+                // tan φ of the smaller angle, sin φ, and tan φ/2.
+                let theta = (a[q][q] - a[p][p]) / (off + off);
+                let tangent = one / (theta.abs() + (theta * theta + one).sqrt());
+                let tangent = V::select(theta.less(zero), -tangent, tangent);
+                let tangent = V::select(turn, tangent, zero);
+                let cosine = one / (tangent * tangent + one).sqrt();
+                let sine = tangent * cosine;
+                let half = sine / (cosine + one);
+                let shift = V::select(turn, tangent * off, zero);
+                a[p][p] = a[p][p] - shift;
+                a[q][q] = a[q][q] + shift;
+                a[p][q] = V::select(turn, zero, off);
+                a[q][p] = a[p][q];
+                for k in 0..n {
+                    if k != p && k != q {
+                        let (g, h) = (a[k][p], a[k][q]);
+                        a[k][p] = g - sine * (h + g * half);
+                        a[k][q] = h + sine * (g - h * half);
+                        a[p][k] = a[k][p];
+                        a[q][k] = a[k][q];
+                    }
+                    let (g, h) = (vectors[k][p], vectors[k][q]);
+                    vectors[k][p] = g - sine * (h + g * half);
+                    vectors[k][q] = h + sine * (g - h * half);
+                }
+            }
+        }
+        if !turned.any() {
+            return;
+        }
+    }
+}

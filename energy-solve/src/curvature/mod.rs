@@ -1,0 +1,108 @@
+//! Hessians made positive semi-definite, element by element.
+//!
+//! The work is done on the small Hessian by an element's difference vectors (6×6 for a triangle, 3×3 for a spring), many elements
+//! at once, and yields what the same change of the full Hessian's eigenvalues would: see [`Orthonormal`].
+
+mod definite;
+mod dense;
+mod jacobi;
+mod orthonormal;
+mod radial;
+
+use energy_dsl::{Lane, Mask};
+
+use definite::is_semi_definite;
+pub(crate) use dense::change_dense;
+pub(crate) use orthonormal::Orthonormal;
+
+/// What becomes of negative eigenvalues of the elements' Hessians. Force laws have no Hessian and are used as they are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Curvature {
+    /// They stay; the sum may be indefinite.
+    #[default]
+    Exact,
+    /// They become zero: the nearest positive semi-definite matrix in the Frobenius norm (Teran, Sifakis, Irving and Fedkiw 2005, §5).
+    Clamped,
+    /// They become positive: directions of negative curvature are as stiff as they were soft (Chen, Hsu, Liu, Panetta, Sueda and
+    /// Bickel 2024). Steps are shorter where the energy is far from convex.
+    Absolute,
+}
+
+impl Curvature {
+    /// By how much an eigenvalue changes.
+    #[inline(always)]
+    fn change<V: Lane<f64>>(self, eigenvalue: V) -> V {
+        let zero = V::splat(0.0);
+        let to_zero = V::select(eigenvalue.less(zero), -eigenvalue, zero);
+        match self {
+            Self::Exact => zero,
+            Self::Clamped => to_zero,
+            Self::Absolute => to_zero + to_zero,
+        }
+    }
+}
+
+/// The most coordinates for which lanes are used.
+pub(crate) const MOST: usize = 12;
+
+/// A square matrix over lanes; only the first rows and columns are used.
+type Square<V> = [[V; MOST]; MOST];
+
+/// The place of entry (i, j), i ≤ j, in the upper triangle of an n×n matrix, row by row.
+#[inline(always)]
+const fn upper_index(n: usize, i: usize, j: usize) -> usize {
+    i * (2 * n - i + 1) / 2 + j - i
+}
+
+/// The largest magnitude.
+#[inline(always)]
+fn largest_of<V: Lane<f64>>(numbers: &[V]) -> V {
+    let mut largest = V::splat(0.0);
+    for &number in numbers {
+        largest = largest.max(number.abs());
+    }
+    largest
+}
+
+/// Where all of the numbers are finite.
+#[inline(always)]
+fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
+    let mut zero = V::splat(0.0);
+    for &number in numbers {
+        zero = zero + (number - number);
+    }
+    zero.equal(V::splat(0.0))
+}
+
+/// Changes Hessians, one a lane, given as upper triangles by the difference vectors of `orthonormal`; `vector` is the only one of these, if
+/// there is one. Where there is nothing to change, nothing does, to the bit. Returns which lanes did change.
+///
+/// Matrices that are not finite stay as they are.
+#[inline(always)]
+pub(crate) fn change<V: Lane<f64>>(
+    upper: &mut [V],
+    curvature: Curvature,
+    orthonormal: &Orthonormal,
+    vector: Option<[V; 3]>,
+) -> V::Mask {
+    let n = orthonormal.coordinates();
+    let definite = is_semi_definite(upper, n);
+    if definite.all() {
+        return V::Mask::none();
+    }
+    let mut open = !definite & are_finite(upper);
+    let mut changed = V::Mask::none();
+    if let Some(vector) = vector {
+        let (radial, with_change) = radial::change(upper, curvature, vector);
+        let chosen = open & radial;
+        for entry in 0..6 {
+            upper[entry] = V::select(chosen, with_change[entry], upper[entry]);
+        }
+        changed = changed | chosen;
+        open = open & !radial;
+        if !open.any() {
+            return changed;
+        }
+    }
+    changed | jacobi::change::<V>(upper, curvature, orthonormal, open)
+}

@@ -1,0 +1,112 @@
+use energy_dsl::{Declaration, Lane};
+
+use super::{MOST, Square};
+
+/// The most difference vectors.
+const VECTORS: usize = MOST / 3;
+
+/// Difference vectors of an element's points, and orthonormal ones that span the same.
+///
+/// With q = D x (D ⊗ 1₃ on the points' coordinates) the Hessian by points is Dᵀ H D, where H is that by q. With D Dᵀ = L Lᵀ,
+/// Q = L⁻¹ D has orthonormal rows, and Dᵀ H D = Qᵀ (Lᵀ H L) Q: its eigenvalues are those of Lᵀ H L, and zeros. So the eigenvalues
+/// of Lᵀ H L are changed, not those of H, which differ.
+#[derive(Clone, Debug)]
+pub(crate) struct Orthonormal {
+    vectors: usize,
+    /// L.
+    lower: [[f64; VECTORS]; VECTORS],
+    /// L⁻¹.
+    inverse: [[f64; VECTORS]; VECTORS],
+}
+
+impl Orthonormal {
+    /// The vectors of a declaration. None if there are too many for lanes, or they depend on one another.
+    pub(crate) fn new(declaration: &Declaration) -> Option<Self> {
+        let vectors = declaration.reduced_vectors;
+        if vectors.is_empty() || vectors.len() > VECTORS || declaration.reduced_coordinates != 3 * vectors.len() {
+            return None;
+        }
+        let sign = |added: bool| if added { 1.0 } else { -1.0 };
+        let dot = |a: &[(usize, bool)], b: &[(usize, bool)]| -> f64 {
+            let terms = a.iter().flat_map(|p| b.iter().map(move |q| (p, q)));
+            terms.filter(|(p, q)| p.0 == q.0).map(|(p, q)| sign(p.1) * sign(q.1)).sum()
+        };
+        let n = vectors.len();
+        let (mut lower, mut inverse) = ([[0.0; VECTORS]; VECTORS], [[0.0; VECTORS]; VECTORS]);
+        for i in 0..n {
+            for j in 0..=i {
+                let known: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+                let rest = dot(vectors[i], vectors[j]) - known;
+                if i == j && rest < 1e-9 {
+                    return None;
+                }
+                lower[i][j] = if i == j { rest.sqrt() } else { rest / lower[j][j] };
+            }
+        }
+        for j in 0..n {
+            inverse[j][j] = 1.0 / lower[j][j];
+            for i in j + 1..n {
+                let sum: f64 = (j..i).map(|k| lower[i][k] * inverse[k][j]).sum();
+                inverse[i][j] = -sum / lower[i][i];
+            }
+        }
+        Some(Self { vectors: n, lower, inverse })
+    }
+
+    /// The size of H.
+    #[inline(always)]
+    pub(crate) fn coordinates(&self) -> usize {
+        3 * self.vectors
+    }
+
+    /// H ← Lᵀ H L, for a symmetric H.
+    #[inline(always)]
+    pub(super) fn from_differences<V: Lane<f64>>(&self, h: &mut Square<V>) {
+        if self.vectors == 1 {
+            return; // one vector is only longer or shorter
+        }
+        // Twice H ← (H L)ᵀ.
+        for _ in 0..2 {
+            let old = *h;
+            for row in 0..self.coordinates() {
+                let turned = self.columns_times(&self.lower, &old[row]);
+                for column in 0..self.coordinates() {
+                    h[column][row] = turned[column];
+                }
+            }
+        }
+    }
+
+    /// V ← L⁻ᵀ V, for vectors that are the columns of V.
+    #[inline(always)]
+    pub(super) fn to_differences<V: Lane<f64>>(&self, vectors: &mut Square<V>) {
+        if self.vectors == 1 {
+            return;
+        }
+        for column in 0..self.coordinates() {
+            let mut one = [V::splat(0.0); MOST];
+            for row in 0..self.coordinates() {
+                one[row] = vectors[row][column];
+            }
+            let turned = self.columns_times(&self.inverse, &one);
+            for row in 0..self.coordinates() {
+                vectors[row][column] = turned[row];
+            }
+        }
+    }
+
+    /// (T ⊗ 1₃)ᵀ z, for a lower triangle T.
+    #[inline(always)]
+    fn columns_times<V: Lane<f64>>(&self, t: &[[f64; VECTORS]; VECTORS], z: &[V; MOST]) -> [V; MOST] {
+        let mut product = [V::splat(0.0); MOST];
+        for vector in 0..self.vectors {
+            for k in vector..self.vectors {
+                for axis in 0..3 {
+                    let place = 3 * vector + axis;
+                    product[place] = product[place] + V::splat(t[k][vector]) * z[3 * k + axis];
+                }
+            }
+        }
+        product
+    }
+}

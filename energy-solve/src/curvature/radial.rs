@@ -1,0 +1,41 @@
+use energy_dsl::Lane;
+
+use super::{Curvature, largest_of, upper_index};
+
+/// How well a Hessian must fit the form, relative to its size.
+const TOLERANCE: f64 = 1e-10;
+
+/// The Hessian of a function of ‖d‖ is a I + b d dᵀ: across d the eigenvalue is a (twice), along d it is λ = a + b ‖d‖², so that the
+/// changed one is a' I + (λ' − a') d dᵀ/‖d‖². Returns in which lanes the 3×3 Hessian has this form (it is tested, not assumed),
+/// and what it changes to there.
+#[inline(always)]
+pub(super) fn change<V: Lane<f64>>(upper: &[V], curvature: Curvature, d: [V; 3]) -> (V::Mask, [V; 6]) {
+    let [xx, xy, xz, yy, yz, zz] = [upper[0], upper[1], upper[2], upper[3], upper[4], upper[5]];
+    let squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    let per_squared = V::splat(1.0) / squared;
+    let times_d =
+        [xx * d[0] + xy * d[1] + xz * d[2], xy * d[0] + yy * d[1] + yz * d[2], xz * d[0] + yz * d[1] + zz * d[2]];
+    let along = (d[0] * times_d[0] + d[1] * times_d[1] + d[2] * times_d[2]) * per_squared;
+    let across = (xx + yy + zz - along) * V::splat(0.5);
+    let largest = largest_of(upper);
+    let found = form(along, across, d, per_squared);
+    let mut radial = squared.is_moderate(2);
+    for entry in 0..6 {
+        radial = radial & (found[entry] - upper[entry]).abs().less_or_equal(largest * V::splat(TOLERANCE));
+    }
+    (radial, form(along + curvature.change(along), across + curvature.change(across), d, per_squared))
+}
+
+/// The upper triangle of a I + (λ − a) d dᵀ/‖d‖².
+#[inline(always)]
+fn form<V: Lane<f64>>(along: V, across: V, d: [V; 3], per_squared: V) -> [V; 6] {
+    let part = (along - across) * per_squared;
+    let mut form = [across; 6];
+    for i in 0..3 {
+        for j in i..3 {
+            let product = part * d[i] * d[j];
+            form[upper_index(3, i, j)] = if i == j { product + across } else { product };
+        }
+    }
+    form
+}

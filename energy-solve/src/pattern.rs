@@ -1,0 +1,97 @@
+/// Which blocks of a matrix are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// All of them.
+    Whole,
+    /// Of a symmetric matrix, those on the diagonal and above.
+    Upper,
+}
+
+/// Which 3×3 blocks of a square sparse matrix exist: by rows, columns ascending, the diagonal always there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pattern {
+    storage: Storage,
+    row_start: Vec<u32>,
+    columns: Vec<u32>,
+    diagonal: Vec<u32>,
+}
+
+impl Pattern {
+    /// The pattern of `rows` block rows in which the rows of each stencil are all coupled.
+    ///
+    /// # Panics
+    /// When a stencil names a row there is not, or there are more than 2³² blocks.
+    #[must_use]
+    pub fn from_stencils<'a>(storage: Storage, rows: usize, stencils: impl IntoIterator<Item = &'a [u32]>) -> Self {
+        let mut couplings: Vec<Vec<u32>> = (0..rows).map(|row| vec![index(row)]).collect();
+        for stencil in stencils {
+            for &row in stencil {
+                let stored = stencil.iter().filter(|&&column| storage == Storage::Whole || column > row);
+                couplings[row as usize].extend(stored);
+            }
+        }
+        let mut pattern = Self { storage, row_start: vec![0], columns: Vec::new(), diagonal: Vec::new() };
+        for (row, mut columns) in couplings.into_iter().enumerate() {
+            columns.sort_unstable();
+            columns.dedup();
+            let before = columns.partition_point(|&column| column < index(row));
+            pattern.diagonal.push(index(pattern.columns.len() + before));
+            pattern.columns.extend(columns);
+            pattern.row_start.push(index(pattern.columns.len()));
+        }
+        pattern
+    }
+
+    /// Which blocks are stored.
+    #[must_use]
+    pub fn storage(&self) -> Storage {
+        self.storage
+    }
+
+    /// The number of block rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.diagonal.len()
+    }
+
+    /// The number of stored blocks.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Where block (row, column) is stored, and whether as its mirror image; `None` when it is not in the pattern.
+    #[must_use]
+    pub fn place(&self, row: usize, column: usize) -> Option<(usize, bool)> {
+        let flipped = self.storage == Storage::Upper && column < row;
+        let (row, column) = if flipped { (column, row) } else { (row, column) };
+        let (start, end) = (self.row_start[row] as usize, self.row_start[row + 1] as usize);
+        self.columns[start..end].binary_search(&index(column)).ok().map(|offset| (start + offset, flipped))
+    }
+
+    /// The place of blocks that are not part of the matrix, those of pinned vertices: after all others.
+    #[must_use]
+    pub fn nowhere(&self) -> usize {
+        self.blocks()
+    }
+
+    /// Where the diagonal block of a row is stored.
+    #[must_use]
+    #[inline]
+    pub fn diagonal(&self, row: usize) -> usize {
+        self.diagonal[row] as usize
+    }
+
+    /// The places and columns of a row's blocks.
+    #[inline]
+    pub fn row(&self, row: usize) -> impl ExactSizeIterator<Item = (usize, usize)> {
+        let (start, end) = (self.row_start[row] as usize, self.row_start[row + 1] as usize);
+        let columns = &self.columns[start..end];
+        columns.iter().enumerate().map(move |(offset, &column)| (start + offset, column as usize))
+    }
+}
+
+/// Indices are stored with 32 bits.
+pub(crate) fn index(number: usize) -> u32 {
+    u32::try_from(number).expect("fewer than 2³² vertices and blocks")
+}

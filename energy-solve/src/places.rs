@@ -1,0 +1,53 @@
+use energy_dsl::BLOCK;
+
+use crate::dofs::DofMap;
+use crate::pattern::{Pattern, index};
+use crate::term::Stencils;
+
+/// Where the blocks of elements go: for each pair of an element's points one place in the matrix, for which block (i, j) may have to be
+/// turned to block (j, i).
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Places {
+    pairs: usize,
+    /// By element, pair.
+    slots: Vec<u32>,
+    /// By block of elements, pair: bit e is set where the pair of element e is turned.
+    turned: Vec<u16>,
+}
+
+impl Places {
+    /// The places of the `active` elements, pairs of points in the order of `pairs`.
+    pub(crate) fn new(
+        active: &[usize],
+        stencils: Stencils<'_>,
+        pairs: &[(usize, usize)],
+        dofs: &DofMap,
+        pattern: &Pattern,
+    ) -> Self {
+        let mut slots = Vec::with_capacity(active.len() * pairs.len());
+        let mut turned = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
+        for (number, &element) in active.iter().enumerate() {
+            let stencil = stencils.stencil(element);
+            for (pair, &(i, j)) in pairs.iter().enumerate() {
+                let rows = dofs.place(stencil[i]).zip(dofs.place(stencil[j]));
+                let place = rows.and_then(|(row, column)| pattern.place(row, column));
+                let (slot, flipped) = place.unwrap_or((pattern.nowhere(), false));
+                slots.push(index(slot));
+                turned[number / BLOCK * pairs.len() + pair] |= u16::from(flipped) << (number % BLOCK);
+            }
+        }
+        Self { pairs: pairs.len(), slots, turned }
+    }
+
+    /// The places of an element's pairs.
+    #[inline(always)]
+    pub(crate) fn of(&self, number: usize) -> &[u32] {
+        &self.slots[number * self.pairs..][..self.pairs]
+    }
+
+    /// Bit e is set where the pair of element `first` + e is turned.
+    #[inline(always)]
+    pub(crate) fn turned(&self, first: usize, pair: usize) -> u32 {
+        u32::from(self.turned[first / BLOCK * self.pairs + pair] >> (first % BLOCK))
+    }
+}

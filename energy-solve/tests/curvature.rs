@@ -1,0 +1,127 @@
+//! Hessians made positive semi-definite over lanes, in the coordinates of an element, against the eigenvalues of the full matrix.
+
+#![allow(mixed_script_confusables)] // θ0 is what the declaration calls it
+
+use std::fmt::Debug;
+
+use energy_dsl::{Block, PackedPotential, Vector3};
+use energy_elements::{HairBend, HookeSpring, QuadraticHinge, StVK};
+use energy_solve::{Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
+use nalgebra::DMatrix;
+use proptest::prelude::*;
+
+/// The Hessian of each element as a dense matrix, and what was counted.
+fn hessians<E, const N: usize>(
+    elements: &[E],
+    x: &[[Vector3<f64>; N]],
+    curvature: Curvature,
+) -> (Vec<DMatrix<f64>>, Counts)
+where
+    E: PackedPotential<f64> + Clone + Debug + 'static,
+{
+    let stencils: Vec<[usize; N]> = (0..x.len()).map(|i| std::array::from_fn(|p| N * i + p)).collect();
+    let list = ElementList::new("elements", elements.to_vec(), &stencils).unwrap();
+    let positions = x.concat();
+    let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &vec![false; positions.len()]).unwrap();
+    let mut matrix = system.matrix();
+    let weights = Weights { position: -1.0, velocity: 0.0 };
+    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let v = vec![[0.0; 3]; positions.len()];
+    system.linearise(State { x: &positions, v: &v }, options, &mut matrix).unwrap();
+    let dense = |stencil: &[usize; N]| {
+        DMatrix::from_fn(3 * N, 3 * N, |row, column| {
+            let block: Block<f64> = matrix.block(stencil[row / 3], stencil[column / 3]);
+            block[row % 3][column % 3]
+        })
+    };
+    let dense = stencils.iter().map(dense).collect();
+    (dense, system.terms().next().unwrap().1)
+}
+
+fn with_eigenvalues(of: &DMatrix<f64>, change: impl Fn(f64) -> f64) -> DMatrix<f64> {
+    let mut eigen = of.clone().symmetric_eigen();
+    eigen.eigenvalues.iter_mut().for_each(|value| *value = change(*value));
+    eigen.recompose()
+}
+
+/// All three ways on the same elements.
+fn check<E, const N: usize>(elements: &[E], x: &[[Vector3<f64>; N]]) -> Result<(), TestCaseError>
+where
+    E: PackedPotential<f64> + Clone + Debug + 'static,
+{
+    let (exact, none) = hessians(elements, x, Curvature::Exact);
+    prop_assert_eq!(none.hessian.projected, 0);
+    let ways: [(Curvature, fn(f64) -> f64); 2] =
+        [(Curvature::Clamped, |value| value.max(0.0)), (Curvature::Absolute, f64::abs)];
+    for (curvature, change) in ways {
+        let (found, counts) = hessians(elements, x, curvature);
+        let mut indefinite = 0;
+        for (element, (found, exact)) in found.iter().zip(&exact).enumerate() {
+            let size = exact.amax();
+            let least = exact.clone().symmetric_eigenvalues().min();
+            indefinite += u64::from(least < -1e-12 * size);
+            let expected = with_eigenvalues(exact, change);
+            let error = (found - &expected).amax();
+            prop_assert!(error <= 1e-11 * size, "{curvature:?}, element {element}: off by {error:e} of {size:e}");
+            prop_assert!(found.clone().symmetric_eigenvalues().min() >= -1e-12 * size);
+            if least >= 0.0 {
+                prop_assert_eq!(found, exact, "element {} has nothing to change", element);
+            }
+        }
+        prop_assert!(counts.hessian.projected >= indefinite, "{} of {indefinite}", counts.hessian.projected);
+    }
+    Ok(())
+}
+
+/// Enough elements for a full batch and a ragged one.
+const COUNT: usize = 19;
+
+fn points<const N: usize>() -> impl Strategy<Value = Vec<[Vector3<f64>; N]>> {
+    let one = proptest::collection::vec(-1.0..1.0_f64, 3 * N)
+        .prop_map(|numbers| std::array::from_fn(|p| std::array::from_fn(|axis| numbers[3 * p + axis])));
+    proptest::collection::vec(one, COUNT)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn springs(x in points::<2>(), length in 0.1..2.0_f64) {
+        check(&vec![HookeSpring { K: 3.0, L: length }; COUNT], &x)?;
+    }
+
+    #[test]
+    fn hair(x in points::<3>()) {
+        check(&vec![HairBend { k: 2.0 }; COUNT], &x)?;
+    }
+
+    #[test]
+    fn membranes(x in points::<3>(), size in 0.5..2.0_f64) {
+        let rest = StVK::new([0.0, 0.0], [size, 0.0], [0.3, size], 1.0, 2.0).unwrap();
+        check(&vec![rest; COUNT], &x)?;
+    }
+
+    #[test]
+    fn hinges(x in points::<4>(), angle in -2.0..2.0_f64) {
+        check(&vec![QuadraticHinge { k: 1.5, θ0: angle }; COUNT], &x)?;
+    }
+}
+
+#[test]
+fn an_element_at_rest_is_left_alone() {
+    let rest = StVK::new([0.0, 0.0], [1.0, 0.0], [0.3, 0.9], 1.0, 2.0).unwrap();
+    // Turned, so that the zeros of its Hessian are rounded.
+    let x = [[0.1, 0.2, 0.3], [0.1 + 0.6, 0.2, 0.3 + 0.8], [0.1 + 0.18, 0.2 + 0.9, 0.3 + 0.24]];
+    let (_, counts) = hessians(&[rest], &[x], Curvature::Clamped);
+    assert_eq!((counts.hessian.evaluated, counts.hessian.projected), (1, 0));
+}
+
+#[test]
+fn neighbours_do_not_matter() {
+    let spring = |length| HookeSpring { K: 1.0, L: length };
+    let x = [[[0.0; 3], [1.0, 0.2, 0.3]]; 2];
+    let (alone, _) = hessians(&[spring(2.0)], &x[..1], Curvature::Clamped);
+    let (beside, counts) = hessians(&[spring(2.0), spring(0.5)], &x, Curvature::Clamped);
+    assert_eq!(alone[0], beside[0]);
+    assert_eq!(counts.hessian.projected, 1);
+}
