@@ -8,12 +8,14 @@ use energy_solve::{BlockMatrix, Curvature, ElementList, LinearisationOptions, Po
 use crate::run::{TOGETHER, Work};
 use crate::subject::{Sample, points};
 
-/// The work of all elements by way of vertices. Every element has vertices of its own.
+/// The work of all elements by way of vertices.
 pub struct Assembled {
     /// Batches at the best level: points gathered, results turned to one element after the other.
     pub batches: Work,
     /// Elements and vertices in, matrix of blocks out, by [`System::linearise`].
-    pub system: Work,
+    pub exact: Work,
+    /// The same with [`Curvature::Clamped`].
+    pub clamped: Work,
 }
 
 /// The elements of `samples` on vertices.
@@ -22,9 +24,12 @@ where
     E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
-    let positions: Vec<Vector3<f64>> =
-        samples.iter().flat_map(|sample| points::<N>(&sample.library, E::NUMBERS)).collect();
-    let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| N * i + p)).collect();
+    // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as elements, a few more than
+    // in a mesh of triangles.
+    let ends = std::iter::repeat_n(samples.last().expect("there are elements"), N);
+    let last_point = |sample: &Sample| points::<N>(&sample.library, E::NUMBERS)[N - 1];
+    let positions: Vec<Vector3<f64>> = samples.iter().chain(ends).map(last_point).collect();
+    let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| i + p)).collect();
     let short: Vec<[u32; N]> = stencils.iter().map(|s| s.map(|v| u32::try_from(v).expect("few vertices"))).collect();
 
     let packed = Packed::new(&elements, &short);
@@ -33,18 +38,24 @@ where
     let batches = Box::new(move || for_each_batch(&packed, &gathered, &mut results));
 
     let list = ElementList::new("elements", elements, &stencils).expect("as many stencils as elements");
+    let linearise = |curvature| linearise(list.clone(), positions.clone(), curvature);
+    Assembled { batches, exact: linearise(Curvature::Exact), clamped: linearise(Curvature::Clamped) }
+}
+
+fn linearise<E>(list: ElementList<E>, positions: Vec<Vector3<f64>>, curvature: Curvature) -> Work
+where
+    E: PackedPotential<f64> + std::fmt::Debug + 'static,
+{
     let pinned = vec![false; positions.len()];
     let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &pinned).expect("the vertices exist");
     let mut matrix: BlockMatrix = system.matrix();
     let velocities = vec![[0.0; 3]; positions.len()];
-    let linearise = Box::new(move || {
-        let state = State { x: &positions, v: &velocities };
-        let weights = Weights { position: 1.0, velocity: 0.0 };
-        let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
-        let forces = system.linearise(state, options, &mut matrix);
+    let weights = Weights { position: 1.0, velocity: 0.0 };
+    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    Box::new(move || {
+        let forces = system.linearise(State { x: &positions, v: &velocities }, options, &mut matrix);
         black_box((forces.expect("finite elements"), &mut matrix));
-    });
-    Assembled { batches, system: linearise }
+    })
 }
 
 /// Results of a few elements, one after the other, soon written over.

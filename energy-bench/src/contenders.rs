@@ -35,6 +35,8 @@ pub enum Contender {
     Batches,
     /// The library in a sum of elements: vertices in, matrix of blocks out.
     System,
+    /// The same, each element's Hessian made positive semi-definite.
+    Clamped,
 }
 
 impl Display for Contender {
@@ -52,6 +54,7 @@ impl Display for Contender {
             Self::CasADi => write!(f, "CasADi, C"),
             Self::Batches => write!(f, "library, batches"),
             Self::System => write!(f, "library, assembled"),
+            Self::Clamped => write!(f, "library, clamped, assembled"),
         }
     }
 }
@@ -76,7 +79,11 @@ pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
     let numbers: Vec<f64> = packed(samples, 1, |sample| &sample.textbook);
     all.push((Contender::Dual, Box::new(move || dual::<K>(&numbers, size))));
     if let Some(assembled) = K::assembled(samples) {
-        all.extend([(Contender::Batches, assembled.batches), (Contender::System, assembled.system)]);
+        all.extend([
+            (Contender::Batches, assembled.batches),
+            (Contender::System, assembled.exact),
+            (Contender::Clamped, assembled.clamped),
+        ]);
     }
     all
 }

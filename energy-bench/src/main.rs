@@ -16,10 +16,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 #[command(version)]
 struct Arguments {
     /// Elements of each kernel; a multiple of 16.
-    #[arg(long, default_value_t = 10_000, value_parser = multiple_of_16)]
+    #[arg(long, default_value_t = 1_024, value_parser = multiple_of_16)]
     elements: usize,
     /// Turns, of which the median is taken.
-    #[arg(long, default_value_t = 31, value_parser = at_least_one)]
+    #[arg(long, default_value_t = 201, value_parser = at_least_one)]
     repetitions: usize,
     /// Only these kernels (K1 to K5); all of them if none is named.
     kernels: Vec<String>,

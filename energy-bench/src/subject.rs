@@ -43,6 +43,11 @@ pub trait Subject: Debug + 'static {
     /// The library by its plain method, which dispatches at every call.
     fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64>;
 
+    /// [`Self::library_plain`] written to where the result is wanted, if the library can.
+    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        *result = Self::library_plain(numbers);
+    }
+
     /// The textbook formula over num-dual's dual numbers: value, gradient and full Hessian (or Jacobian), flattened as the
     /// library's results are.
     fn dual(textbook: &[f64]) -> Self::HandAnswer<f64>;

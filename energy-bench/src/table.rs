@@ -21,7 +21,10 @@ pub fn table(kernels: &[Measured]) -> Table {
     levels().for_each(|level| rows.time(Contender::HandScalar(level)));
     levels().for_each(|level| rows.time(Contender::HandLanes(level)));
     levels().for_each(|level| rows.time(Contender::HandSingles(level)));
-    for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi, Contender::Batches, Contender::System] {
+    for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi] {
+        rows.time(contender);
+    }
+    for contender in [Contender::Batches, Contender::System, Contender::Clamped] {
         rows.time(contender);
     }
 
@@ -41,6 +44,7 @@ pub fn table(kernels: &[Measured]) -> Table {
     }
     let lanes = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::LibraryLanes(_)));
     rows.ratio("batches/library, lanes", |kernel| Some(kernel.time(Contender::Batches)? / lanes(kernel)?));
+    rows.ratio("assembled/library, lanes", |kernel| Some(kernel.time(Contender::System)? / lanes(kernel)?));
     rows.ratio("assembled/library, scalar", |kernel| Some(kernel.time(Contender::System)? / library(kernel)?));
 
     rows.row("operations", |kernel| Some(kernel.operations.to_string()));

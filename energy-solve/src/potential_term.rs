@@ -212,7 +212,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         if let Some(product) = &mut self.sum.stiffness_times_velocity {
             subtract_product::<E, L>(&batch, result.hessian.as_ref(), self.velocities, &mut self.rows, product);
         }
-        self.turn::<E, L>(batch.first, result.hessian.as_mut());
+        self.turn::<L>(batch.first, result.hessian.as_mut());
         self.scatter::<L>(batch.first, batch.count, result.hessian.as_ref());
         self.flagged += lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
     }
@@ -221,7 +221,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
 impl Hessians<'_, '_> {
     /// Turns the blocks (i, j) that are stored as (j, i).
     #[inline(always)]
-    fn turn<E: PackedPotential<f64>, L: Level>(&self, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
+    fn turn<L: Level>(&self, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
         for pair in 0..triangle.len() {
             let bits = self.places.turned(first, pair);
             if bits != 0 {
@@ -247,14 +247,26 @@ impl Hessians<'_, '_> {
             let blocks = self.rows[lane * stride..][..stride].as_chunks::<9>().0;
             for pair in 0..triangle.len() {
                 let block = self.sum.matrix[slots[pair] as usize].as_flattened_mut();
-                for entry in 0..9 {
-                    block[entry] += weight * blocks[pair][entry];
-                }
+                add_block::<L>(block, weight, &blocks[pair]);
             }
             if slots.len() > triangle.len() {
                 add_mirrored(&slots[triangle.len()..], blocks, weight, self.sum.matrix);
             }
         }
+    }
+}
+
+/// B ← B + s A, as many entries at once as there are lanes.
+#[inline(always)]
+fn add_block<L: Level>(sum: &mut [f64], scale: f64, block: &[f64; 9]) {
+    let lanes = <L::F64 as Lane<f64>>::LANES;
+    let wide = 9 / lanes * lanes;
+    for entry in (0..wide).step_by(lanes) {
+        let place = &mut sum[entry..entry + lanes];
+        (L::F64::load(place) + L::F64::splat(scale) * L::F64::load(&block[entry..])).store(place);
+    }
+    for entry in wide..9 {
+        sum[entry] += scale * block[entry];
     }
 }
 
@@ -297,8 +309,7 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
 ) {
     let n = batch.points.as_ref().len();
     let zero = [L::F64::splat(0.0); 3];
-    let mut v = batch.points.clone();
-    let mut sums = batch.points.clone();
+    let (mut v, mut sums) = (*batch.points, *batch.points);
     for point in 0..n {
         v.as_mut()[point] = L::F64::gather(velocities, batch.vertices(point));
         sums.as_mut()[point] = zero;

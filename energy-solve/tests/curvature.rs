@@ -51,9 +51,8 @@ where
 {
     let (exact, none) = hessians(elements, x, Curvature::Exact);
     prop_assert_eq!(none.hessian.projected, 0);
-    let ways: [(Curvature, fn(f64) -> f64); 2] =
-        [(Curvature::Clamped, |value| value.max(0.0)), (Curvature::Absolute, f64::abs)];
-    for (curvature, change) in ways {
+    for curvature in [Curvature::Clamped, Curvature::Absolute] {
+        let change = |value: f64| if curvature == Curvature::Clamped { value.max(0.0) } else { value.abs() };
         let (found, counts) = hessians(elements, x, curvature);
         let mut indefinite = 0;
         for (element, (found, exact)) in found.iter().zip(&exact).enumerate() {
@@ -87,23 +86,23 @@ proptest! {
 
     #[test]
     fn springs(x in points::<2>(), length in 0.1..2.0_f64) {
-        check(&vec![HookeSpring { K: 3.0, L: length }; COUNT], &x)?;
+        check(&[HookeSpring { K: 3.0, L: length }; COUNT], &x)?;
     }
 
     #[test]
     fn hair(x in points::<3>()) {
-        check(&vec![HairBend { k: 2.0 }; COUNT], &x)?;
+        check(&[HairBend { k: 2.0 }; COUNT], &x)?;
     }
 
     #[test]
     fn membranes(x in points::<3>(), size in 0.5..2.0_f64) {
         let rest = StVK::new([0.0, 0.0], [size, 0.0], [0.3, size], 1.0, 2.0).unwrap();
-        check(&vec![rest; COUNT], &x)?;
+        check(&[rest; COUNT], &x)?;
     }
 
     #[test]
     fn hinges(x in points::<4>(), angle in -2.0..2.0_f64) {
-        check(&vec![QuadraticHinge { k: 1.5, θ0: angle }; COUNT], &x)?;
+        check(&[QuadraticHinge { k: 1.5, θ0: angle }; COUNT], &x)?;
     }
 }
 

@@ -86,6 +86,11 @@ impl Subject for HairBendKernel {
         HairBend { k: numbers[0] }.hessian(&points(numbers, 1))
     }
 
+    #[inline]
+    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        HairBend { k: numbers[0] }.hessian_into(&points(numbers, 1), result);
+    }
+
     fn dual(x: &[f64]) -> Derivatives<f64, 3, 6> {
         dual::derivatives::<9, 3, 6>(&x[1..], |[p0, p1, p2]| {
             let (a, b) = (dual::sub(p1, p0), dual::sub(p2, p1));

@@ -112,6 +112,11 @@ impl Subject for HingeKernel {
         QuadraticHinge { k: numbers[0], θ0: numbers[1] }.hessian(&points(numbers, 2))
     }
 
+    #[inline]
+    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        QuadraticHinge { k: numbers[0], θ0: numbers[1] }.hessian_into(&points(numbers, 2), result);
+    }
+
     fn dual(x: &[f64]) -> Derivatives<f64, 4, 10> {
         dual::derivatives::<12, 4, 10>(&x[2..], |[x1, x2, x3, x4]| {
             let (e, a, b) = (dual::sub(x4, x3), dual::sub(x1, x3), dual::sub(x2, x3));

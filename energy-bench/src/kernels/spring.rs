@@ -64,6 +64,11 @@ impl Subject for SpringKernel {
         HookeSpring { K: numbers[0], L: numbers[1] }.hessian(&points(numbers, 2))
     }
 
+    #[inline]
+    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        HookeSpring { K: numbers[0], L: numbers[1] }.hessian_into(&points(numbers, 2), result);
+    }
+
     fn dual(x: &[f64]) -> Derivatives<f64, 2, 3> {
         dual::derivatives::<6, 2, 3>(&x[2..], |[p, q]| {
             let elongation = dual::norm(&dual::sub(q, p)) - x[1];

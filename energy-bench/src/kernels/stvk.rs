@@ -114,6 +114,12 @@ impl Subject for StVKKernel {
         element.hessian(&points(numbers, <StVK as energy_dsl::Stored<f64>>::NUMBERS))
     }
 
+    #[inline]
+    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        let element: StVK = <StVK as energy_dsl::PackedPotential<f64>>::load::<f64>(numbers, 1);
+        element.hessian_into(&points(numbers, <StVK as energy_dsl::Stored<f64>>::NUMBERS), result);
+    }
+
     fn dual(x: &[f64]) -> Derivatives<f64, 3, 6> {
         let (lambda, mu, area, b) = (x[0], x[1], x[2], &x[3..7]);
         dual::derivatives::<9, 3, 6>(&x[7..], |[x0, x1, x2]| {

@@ -7,8 +7,12 @@ use super::{Form, Graph, Input, NodeId, Op, Primitive};
 impl Graph {
     pub(crate) fn push(&mut self, op: Op, varies: bool) -> NodeId {
         let id = NodeId(u32::try_from(self.nodes.len()).expect("fewer than 2³² nodes"));
+        for operand in op.operands() {
+            self.users[operand.0 as usize] += 1;
+        }
         self.nodes.push(op);
         self.varies.push(varies);
+        self.users.push(0);
         id
     }
 
@@ -88,6 +92,10 @@ impl Graph {
         }
         if self.is(b, 0.0) {
             return a;
+        }
+        if a == b {
+            let two = self.constant(2.0);
+            return self.mul(two, a);
         }
         match (self.magnitude(a), self.magnitude(b)) {
             ((x, true), (y, true)) => {

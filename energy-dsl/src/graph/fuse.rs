@@ -13,6 +13,8 @@ impl Graph {
         match self.op(node) {
             op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) => {
                 match (self.product_of(a), self.product_of(b)) {
+                    // Of two products the one that is used less: the other is computed anyway.
+                    (Some((x, y)), Some(_)) if self.users(a) < self.users(b) => Op::MulAdd(x, y, b),
                     (_, Some((x, y))) => Op::MulAdd(x, y, a),
                     (Some((x, y)), None) => Op::MulAdd(x, y, b),
                     (None, None) => op,
@@ -25,8 +27,18 @@ impl Graph {
                     _ => op,
                 }
             }
+            // The same rounding with the other sign, at no cost.
+            op @ Op::Neg(a) => match self.fused(a) {
+                Op::MulSub(x, y, z) => Op::NegMulAdd(x, y, z),
+                Op::NegMulAdd(x, y, z) => Op::MulSub(x, y, z),
+                _ => op,
+            },
             op => op,
         }
+    }
+
+    fn users(&self, node: NodeId) -> u32 {
+        self.users[node.0 as usize]
     }
 
     /// The factors of a product whose rounding error nobody asks for: asked for, it is that of the rounded product.

@@ -33,6 +33,8 @@ pub struct Graph {
     form: Form,
     nodes: Vec<Op>,
     varies: Vec<bool>,
+    /// How many nodes each is an operand of.
+    users: Vec<u32>,
     index: HashMap<Op, NodeId>,
     rules: Vec<Rule>,
     rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
@@ -49,6 +51,7 @@ impl Graph {
             form,
             nodes: Vec::new(),
             varies: Vec::new(),
+            users: Vec::new(),
             index: HashMap::new(),
             rules: Vec::new(),
             rule_index: HashMap::new(),

@@ -42,3 +42,19 @@ call!(ConstraintHessianCall: Constraint,
 call!(GaussNewtonCall: Constraint, gauss_newton_at(1 Points<E, T>) -> Hessian<T, Points<E, T>, E::Triangle>);
 call!(ResidualCall: Residual, residual_at(1 E::Unknowns) -> ResidualValue<T, E::Rows>);
 call!(ResidualJacobianCall: Residual, jacobian_at(1 E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
+
+/// The Hessian, written in place.
+pub(super) struct HessianInto<'a, T: Real, E: Potential<T>>(
+    pub &'a E,
+    pub &'a E::Points,
+    pub &'a mut Hessian<T, E::Points, E::Triangle>,
+);
+
+impl<T: Real, E: Potential<T>> Kernel for HessianInto<'_, T, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        *self.2 = self.0.hessian_at::<L>(self.1);
+    }
+}

@@ -6,6 +6,7 @@
 //! N×N blocks row by row.
 
 use super::array::Array;
+use super::call::HessianInto;
 use super::cpu::Level;
 use super::declaration::Declaration;
 use super::flags::Flags;
@@ -112,6 +113,13 @@ pub trait Potential<T: Real>: Element {
     #[inline(always)]
     fn hessian_at<L: Level>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
         self.hessian(x)
+    }
+
+    /// [`Self::hessian`], written to `result` where it is: `*result = element.hessian(x)` would first make it elsewhere and copy some hundred
+    /// numbers, at about the cost of computing them.
+    #[inline]
+    fn hessian_into(&self, x: &Self::Points, result: &mut Hessian<T, Self::Points, Self::Triangle>) {
+        T::dispatch(HessianInto(self, x, result));
     }
 
     /// ∇²U v, for one vector per point in `v`, without forming ∇²U where that is cheaper.

@@ -29,7 +29,7 @@ pub(super) fn change<V: Lane<f64>>(
             a[j][i] = entry;
         }
     }
-    orthonormal.from_differences(&mut a);
+    orthonormal.make_orthonormal(&mut a);
     let mut vectors = [[zero; MOST]; MOST];
     for i in 0..n {
         vectors[i][i] = V::splat(1.0);
@@ -45,7 +45,7 @@ pub(super) fn change<V: Lane<f64>>(
     if !changed.any() {
         return changed;
     }
-    orthonormal.to_differences(&mut vectors);
+    orthonormal.make_differences(&mut vectors);
     let unscale = V::splat(1.0) / scale;
     for i in 0..n {
         for j in i..n {

@@ -67,11 +67,12 @@ fn largest_of<V: Lane<f64>>(numbers: &[V]) -> V {
 /// Where all of the numbers are finite.
 #[inline(always)]
 fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
-    let mut zero = V::splat(0.0);
+    let zero = V::splat(0.0);
+    let mut products = zero;
     for &number in numbers {
-        zero = zero + (number - number);
+        products = products + number * zero;
     }
-    zero.equal(V::splat(0.0))
+    products.equal(zero)
 }
 
 /// Changes Hessians, one a lane, given as upper triangles by the difference vectors of `orthonormal`; `vector` is the only one of these, if

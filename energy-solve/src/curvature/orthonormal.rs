@@ -61,7 +61,7 @@ impl Orthonormal {
 
     /// H ← Lᵀ H L, for a symmetric H.
     #[inline(always)]
-    pub(super) fn from_differences<V: Lane<f64>>(&self, h: &mut Square<V>) {
+    pub(super) fn make_orthonormal<V: Lane<f64>>(&self, h: &mut Square<V>) {
         if self.vectors == 1 {
             return; // one vector is only longer or shorter
         }
@@ -79,7 +79,7 @@ impl Orthonormal {
 
     /// V ← L⁻ᵀ V, for vectors that are the columns of V.
     #[inline(always)]
-    pub(super) fn to_differences<V: Lane<f64>>(&self, vectors: &mut Square<V>) {
+    pub(super) fn make_differences<V: Lane<f64>>(&self, vectors: &mut Square<V>) {
         if self.vectors == 1 {
             return;
         }
