@@ -29,6 +29,7 @@ elements! {
     bridson_force_damped: BridsonForceDamped;
     distance: Distance;
     distance_squared: DistanceSquared;
+    flat_bending: FlatBending;
     gravity: Gravity;
     hair_bend: HairBend;
     hinge_angle: HingeAngle;
@@ -36,6 +37,7 @@ elements! {
     hinge_cos_half: HingeCosHalf;
     hinge_sin_half: HingeSinHalf;
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
+    neo_hookean: NeoHookean;
     point_to_plane: PointToPlane;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;

@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 
 use crate::matrix::BlockMatrix;
-use crate::preconditioner::BlockJacobi;
+use crate::preconditioner::Preconditioner;
 use crate::solve::{SolveOptions, SolveReport, StopReason, norm, residual};
 use crate::vector::{add_scaled, dot};
 
@@ -9,7 +9,7 @@ use crate::vector::{add_scaled, dot};
 /// system D⁻¹A x = D⁻¹b. For force laws, whose Jacobians are not symmetric.
 pub fn bicgstab(
     matrix: &BlockMatrix,
-    preconditioner: &BlockJacobi,
+    preconditioner: &impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],
     options: &SolveOptions,

@@ -72,7 +72,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn character(&self) -> Character {
         let Declaration { symmetric, velocity_dependent, curved, .. } = *E::DECLARATION;
-        Character { symmetric, velocity_dependent, curved: curved || velocity_dependent }
+        Character { symmetric, velocity_dependent, quadratic: false, curved: curved || velocity_dependent }
     }
 
     fn stencils(&self) -> Stencils<'_> {

@@ -33,11 +33,13 @@
 
 mod active;
 mod bicgstab;
+mod block_jacobi;
 mod conjugate_gradients;
 mod counts;
 mod curvature;
 mod dofs;
 mod force_term;
+mod incomplete_cholesky;
 mod list;
 mod matrix;
 mod pattern;
@@ -50,16 +52,18 @@ mod term;
 mod vector;
 
 pub use bicgstab::bicgstab;
+pub use block_jacobi::BlockJacobi;
 pub use conjugate_gradients::conjugate_gradients;
 pub use counts::{Counts, Tally};
 pub use curvature::Curvature;
 pub use dofs::DofMap;
 pub use force_term::ForceTerm;
+pub use incomplete_cholesky::IncompleteCholesky;
 pub use list::{ElementList, ListError};
 pub use matrix::BlockMatrix;
 pub use pattern::{Pattern, Storage};
 pub use potential_term::PotentialTerm;
-pub use preconditioner::{BlockJacobi, SingularBlock};
+pub use preconditioner::{Preconditioner, SingularBlock};
 pub use solve::{SolveOptions, SolveReport, StopReason};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use term::{Character, Linearisation, Quantity, State, Stencils, Term, Weights};

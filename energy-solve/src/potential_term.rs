@@ -53,7 +53,8 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
     }
 
     fn character(&self) -> Character {
-        Character { symmetric: true, velocity_dependent: false, curved: E::DECLARATION.curved }
+        let Declaration { quadratic, curved, .. } = *E::DECLARATION;
+        Character { symmetric: true, velocity_dependent: false, quadratic, curved }
     }
 
     fn stencils(&self) -> Stencils<'_> {

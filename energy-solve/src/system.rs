@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use energy_dsl::Vector3;
+use energy_dsl::{Block, Vector3};
 
 use crate::counts::Counts;
 use crate::curvature::Curvature;
@@ -106,6 +106,14 @@ pub struct System {
     dofs: DofMap,
     pattern: Arc<Pattern>,
     terms: Vec<Counted>,
+    constant: Option<Constant>,
+}
+
+/// ∂f/∂x of the quadratic terms.
+#[derive(Debug)]
+struct Constant {
+    curvature: Curvature,
+    blocks: Vec<Block<f64>>,
 }
 
 /// A term, and what it did.
@@ -138,7 +146,7 @@ impl System {
             Counted { term, counts: Counts::default() }
         };
         let terms = terms.into_iter().map(placed).collect();
-        Ok(Self { dofs, pattern, terms })
+        Ok(Self { dofs, pattern, terms, constant: None })
     }
 
     /// Which vertices move.
@@ -166,6 +174,7 @@ impl System {
         Character {
             symmetric: all().all(|one| one.symmetric),
             velocity_dependent: all().any(|one| one.velocity_dependent),
+            quadratic: all().all(|one| one.quadratic),
             curved: all().any(|one| one.curved),
         }
     }
@@ -193,6 +202,21 @@ impl System {
             energies.push(TermEnergy { term: term.name(), energy });
         }
         Ok(energies)
+    }
+
+    /// −v·f of the terms that depend on velocities, in W: what they take out of the motion.
+    ///
+    /// # Errors
+    /// When the state is incomplete or not finite.
+    pub fn dissipated_power(&mut self, state: State<'_>) -> Result<f64, EvaluationError> {
+        self.check(state)?;
+        let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
+        for Counted { term, counts } in &mut self.terms {
+            if term.character().velocity_dependent {
+                counts.gradient += term.add_force(state, &mut force);
+            }
+        }
+        Ok(-crate::vector::dot(&force, state.v))
     }
 
     /// f(x, v), in N, of all vertices. Pinned ones get the force of the elements they share with free ones.
@@ -227,9 +251,17 @@ impl System {
     ) -> Result<LinearisedForces, EvaluationError> {
         self.check(state)?;
         assert!(self.owns(matrix), "the matrix must come from the same system");
-        matrix.clear();
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
         let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
+        // For the product every term is evaluated anyway.
+        let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
+        if with_constant {
+            self.find_constant(state, curvature);
+            let constant = self.constant.as_ref().expect("it was found");
+            matrix.set_scaled(weights.position, &constant.blocks);
+        } else {
+            matrix.clear();
+        }
         let mut product = if wanted { force.clone() } else { Vec::new() };
         let mut sum = Linearisation {
             weights,
@@ -239,7 +271,7 @@ impl System {
             stiffness_times_velocity: wanted.then_some(&mut product),
         };
         for Counted { term, counts } in &mut self.terms {
-            if term.character().curved {
+            if term.character().curved && !(with_constant && is_constant(&**term)) {
                 counts.hessian += term.add_linearisation(state, &mut sum);
             } else {
                 counts.gradient += term.add_force(state, sum.force);
@@ -249,6 +281,25 @@ impl System {
             return Err(self.find_non_finite_force(state));
         }
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
+    }
+
+    /// Evaluates the Hessians of the quadratic terms, once.
+    fn find_constant(&mut self, state: State<'_>, curvature: Curvature) {
+        if self.constant.as_ref().is_some_and(|constant| constant.curvature == curvature) {
+            return;
+        }
+        let mut blocks = vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1];
+        let mut sum = Linearisation {
+            weights: Weights { position: 1.0, velocity: 0.0 },
+            curvature,
+            matrix: &mut blocks,
+            force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
+            stiffness_times_velocity: None,
+        };
+        for Counted { term, counts } in self.terms.iter_mut().filter(|counted| is_constant(&*counted.term)) {
+            counts.hessian += term.add_linearisation(state, &mut sum);
+        }
+        self.constant = Some(Constant { curvature, blocks });
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
@@ -271,6 +322,12 @@ impl System {
     fn find_non_finite_force(&self, state: State<'_>) -> EvaluationError {
         blame(self.terms.iter().map(|counted| &*counted.term), Quantity::Force, state)
     }
+}
+
+/// Whether a term's Jacobians are evaluated only once.
+fn is_constant(term: &dyn Term) -> bool {
+    let Character { quadratic, curved, .. } = term.character();
+    quadratic && curved
 }
 
 /// Evaluates element by element until one is found whose energy or force is not finite.

@@ -12,6 +12,8 @@ pub struct Character {
     pub symmetric: bool,
     /// f depends on velocities.
     pub velocity_dependent: bool,
+    /// ∂f/∂x is the same at all positions: it is computed only once.
+    pub quadratic: bool,
     /// f depends on positions or velocities at all; gravity does not, and has no Jacobians to assemble.
     pub curved: bool,
 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockJacobi, BlockMatrix, Pattern, SolveOptions, SolveReport, StopReason, Storage, bicgstab, conjugate_gradients,
+    BlockJacobi, BlockMatrix, IncompleteCholesky, Pattern, SolveOptions, SolveReport, StopReason, Storage, bicgstab,
+    conjugate_gradients,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -140,4 +141,42 @@ fn singular_diagonal_blocks_are_named() {
     let mut matrix = matrix(6.0, 0.0);
     *matrix.diagonal_mut(7) = [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     assert_eq!(BlockJacobi::new(&matrix).unwrap_err().row, 7);
+}
+
+#[test]
+fn incomplete_cholesky_saves_iterations_and_is_exact_without_fill() {
+    let matrix = matrix(6.0, 0.0);
+    let b = right_hand_side();
+    let options = SolveOptions { relative_tolerance: 1e-12, ..SolveOptions::default() };
+    let mut factor = IncompleteCholesky::new(matrix.pattern());
+    factor.factor(&matrix).unwrap();
+    assert_eq!(factor.shift(), 0.0);
+    let mut x = vec![[0.0; 3]; ROWS];
+    let report = conjugate_gradients(&matrix, &factor, &b, &mut x, &options);
+    assert!(report.converged());
+    // A chain with second neighbours has no fill: the factorisation is complete.
+    assert!(report.iterations <= 2, "{} iterations", report.iterations);
+    let (expected, jacobi) = solve(conjugate_gradients, &matrix, &b, &options);
+    assert!(jacobi.iterations > 5);
+    for (found, expected) in x.iter().flatten().zip(expected.iter().flatten()) {
+        assert!((found - expected).abs() < 1e-10);
+    }
+}
+
+#[test]
+fn an_indefinite_matrix_has_a_shifted_factor_or_none() {
+    let mut broken = matrix(6.0, 0.0);
+    broken.diagonal_mut(4)[1][1] = -6.0;
+    let mut factor = IncompleteCholesky::new(broken.pattern());
+    assert_eq!(factor.factor(&broken).unwrap_err().row, 4);
+    // Positive diagonal blocks, but links too strong for them.
+    let mut linked = matrix(0.6, 0.0);
+    for row in 0..ROWS {
+        *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    }
+    let (slot, _) = linked.pattern().place(0, 1).unwrap();
+    linked.values_mut()[slot] = [[-1.2, 0.0, 0.0], [0.0; 3], [0.0; 3]];
+    let mut factor = IncompleteCholesky::new(linked.pattern());
+    factor.factor(&linked).unwrap();
+    assert!(factor.shift() > 0.0);
 }

@@ -23,7 +23,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let (points, rest, parameters) = (fields(&program.moving), fields(&program.rest), fields(declared));
     let rows = program.rows();
     let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
-    let Character { curved, velocity_dependent, symmetric } = character(program, routines);
+    let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
     let vectors = routines.vectors.iter().map(|vector| {
         let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
         quote!(&[#(#ends),*])
@@ -45,6 +45,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             properties: &[#(::energy_dsl::Property::#properties),*],
             translation_invariant: #invariant,
             curved: #curved,
+            quadratic: #quadratic,
             velocity_dependent: #velocity_dependent,
             symmetric: #symmetric,
             reduced_coordinates: #coordinates,
@@ -58,6 +59,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
 /// What a solver may rely on.
 struct Character {
     curved: bool,
+    quadratic: bool,
     velocity_dependent: bool,
     symmetric: bool,
 }
@@ -74,7 +76,9 @@ fn character(program: &Program, routines: &Routines) -> Character {
         let entry = |row: usize, column: usize| square[9 * (row / 3 * n + column / 3) + 3 * (row % 3) + column % 3];
         (0..3 * n).all(|row| (0..row).all(|column| entry(row, column) == entry(column, row)))
     };
+    let constant = |nodes: &Vec<NodeId>| nodes.iter().all(|&entry| !routines.graph.varies(entry));
     Character {
+        quadratic: group("hessian", 2).is_some_and(constant),
         curved: varies(group("hessian", 2).or(by_position)),
         velocity_dependent: varies(by_velocity),
         symmetric: [by_position, by_velocity].into_iter().flatten().all(mirrored),

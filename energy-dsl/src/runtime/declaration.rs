@@ -132,10 +132,13 @@ pub struct Declaration {
     pub rows: usize,
     /// What it claims of itself.
     pub properties: &'static [Property],
-    /// Whether the points enter only through their differences (like the next three, proved on the expression graph).
+    /// Whether the points enter only through their differences (like the next four, proved on the expression graph).
     pub translation_invariant: bool,
     /// Whether the second derivatives of the energy, or those of the force by position, are not all identically zero: gravity's are.
     pub curved: bool,
+    /// Whether the second derivatives of the energy are the same at all positions: its Hessian need be computed only once. Not said
+    /// of force laws.
+    pub quadratic: bool,
     /// Whether the force depends on velocities.
     pub velocity_dependent: bool,
     /// Whether all Jacobians of the force are symmetric, entry by entry the same expression.

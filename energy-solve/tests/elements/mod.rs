@@ -21,6 +21,7 @@ const fn declaration(name: &'static str, kind: Kind, formula: &'static str, rows
         properties: &[],
         translation_invariant: true,
         curved: true,
+        quadratic: false,
         velocity_dependent: matches!(kind, Kind::Force),
         symmetric: matches!(kind, Kind::Energy),
         reduced_coordinates: 3,

@@ -1,0 +1,37 @@
+use energy_macros::energy;
+
+energy! {
+    /// Bending of two triangles that are flat at rest, for motions that change no lengths: 3 k/(4 (A₁ + A₂)) ‖Σ cᵢ xᵢ‖², the weights c
+    /// those of the cotangent Laplacian (Bergou, Wardetzky, Harmon, Zorin and Grinspun 2006, §4). x1 and x2 are opposite the edge x3–x4. A quadratic: its Hessian is constant.
+    /// As a hinge it is ¾ k ‖e‖²/(A₁ + A₂) θ² for small angles.
+    #[audit]
+    #[invariant(translation, rotation)]
+    pub energy FlatBending(x1, x2, x3, x4: Point; rest X1, X2, X3, X4: Vec3; k: Scalar[J]) {
+        rest {
+            let e = X4 - X3;
+            let n1 = norm(cross(e, X1 - X3));
+            let n2 = norm(cross(e, X2 - X3));
+            // Cotangents of the angles at X3 and X4, in both triangles.
+            let at3 = dot(e, X1 - X3) / n1 + dot(e, X2 - X3) / n2;
+            let at4 = dot(X3 - X4, X1 - X4) / n1 + dot(X3 - X4, X2 - X4) / n2;
+            let apart2 = norm_squared(e) / n2;
+            let per_area = 2 / (n1 + n2);
+        }
+        // Σ c = 0: c₃ = cot at 4, c₄ = cot at 3, c₁ + c₂ = −(c₃ + c₄) by triangle, which is −‖e‖²/(2A).
+        let K = at4 * (x3 - x1) + at3 * (x4 - x1) - apart2 * (x2 - x1);
+        3 / 4 * k * per_area * norm_squared(K)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use energy_dsl::Element;
+
+    use super::FlatBending;
+
+    #[test]
+    fn its_hessian_need_be_computed_only_once() {
+        assert!(<FlatBending as Element>::DECLARATION.quadratic);
+        assert!(!<crate::NeoHookean as Element>::DECLARATION.quadratic);
+    }
+}
