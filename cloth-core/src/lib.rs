@@ -37,6 +37,7 @@ mod body;
 mod simulation;
 mod summary;
 
+pub mod bench;
 pub mod demo;
 pub mod fabric;
 pub mod integrator;

@@ -88,6 +88,10 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
         }
     }
 
+    fn has_energy(&self) -> bool {
+        self.energy.is_some()
+    }
+
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let (mut sum, mut flagged) = (0.0, 0);
         for &element in &self.active {

@@ -1,7 +1,7 @@
 use std::fmt::Debug;
 
 use energy_dsl::{
-    BLOCK, Batch, BatchWork, Block, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
+    Array, BLOCK, Batch, BatchWork, Block, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
     ReducedPotential, Vector3, for_each_batch, triangle_index,
 };
 
@@ -77,6 +77,10 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
             }
             self.places = Places::new(&self.active, self.list.stencils(), &pairs, dofs, pattern);
         }
+    }
+
+    fn has_energy(&self) -> bool {
+        true
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
@@ -201,8 +205,11 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         if let Some(orthonormal) = self.orthonormal
             && !exact
         {
-            let vector = only_vector::<E, L>(batch.points.as_ref());
-            let changed = curvature::change(reduced.hessian.as_mut(), self.sum.curvature, orthonormal, vector);
+            let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
+            let vectors = difference_vectors::<E, L>(batch.points.as_ref());
+            let known = E::DECLARATION.reduced_vectors.len().min(vectors.len());
+            let hessian = reduced.hessian.as_mut();
+            let changed = curvature::change(hessian, n, self.sum.curvature, orthonormal, &vectors[..known]);
             self.projected += lanes_in(changed, batch.count);
         }
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
@@ -285,18 +292,19 @@ fn add_mirrored(slots: &[u32], triangle: &[[f64; 9]], weight: f64, matrix: &mut 
     }
 }
 
-/// The one difference vector of elements that have no other.
+/// The difference vectors of elements that have one or two; nothing of others.
 #[inline(always)]
-fn only_vector<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> Option<Vector3<L::F64>> {
-    let [terms] = E::DECLARATION.reduced_vectors else { return None };
-    let mut vector = [L::F64::splat(0.0); 3];
-    for &(point, added) in *terms {
-        for axis in 0..3 {
-            let part = points[point][axis];
-            vector[axis] = if added { vector[axis] + part } else { vector[axis] - part };
+fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 3] {
+    let mut vectors = [[L::F64::splat(0.0); 3]; 3];
+    for (vector, terms) in vectors.iter_mut().zip(E::DECLARATION.reduced_vectors) {
+        for &(point, added) in *terms {
+            for axis in 0..3 {
+                let part = points[point][axis];
+                vector[axis] = if added { vector[axis] + part } else { vector[axis] - part };
+            }
         }
     }
-    Some(vector)
+    vectors
 }
 
 /// Subtracts ∇²U v.

@@ -105,6 +105,8 @@ pub trait Term: std::fmt::Debug {
     fn stencils(&self) -> Stencils<'_>;
     /// Finds out which elements have a free vertex, and where their blocks are stored.
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern);
+    /// Whether it has an energy.
+    fn has_energy(&self) -> bool;
     /// Σ U; `None` for a force law.
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)>;
     /// Adds f.

@@ -9,7 +9,7 @@ pub struct Fabric {
     /// Mass per area σ, in kg/m².
     #[serde(deserialize_with = "positive")]
     pub density: f64,
-    /// What resists stretching and bending: the table `mass-spring` or `stvk`.
+    /// What resists stretching and bending: the table `mass-spring`, `stvk` or `neo-hookean`.
     pub material: Material,
 }
 
@@ -19,8 +19,10 @@ pub struct Fabric {
 pub enum Material {
     /// Springs between vertices.
     MassSpring(MassSpring),
-    /// St. Venant–Kirchhoff triangles and hinges.
-    Stvk(Stvk),
+    /// St. Venant–Kirchhoff triangles and hinges: A (μ ‖E‖² + ½ λ tr² E), E = (FᵀF − 1)/2.
+    Stvk(Membrane),
+    /// Neo-Hookean triangles and hinges: A (½ μ (tr FᵀF − 2) − μ ln J + ½ λ ln² J), J the ratio of areas. No triangle loses its area.
+    NeoHookean(Membrane),
 }
 
 /// Springs of rest length L = ‖x̄_P − x̄_Q‖ with energy ½ K (‖x_P − x_Q‖ − L)². Their stiffness is per spring: it does not
@@ -42,26 +44,26 @@ pub struct MassSpring {
     pub damping: f64,
 }
 
-/// Triangles with energy A (μ ‖E‖² + ½ λ tr² E), E = (FᵀF − 1)/2, in plane stress: μ = Y h/(2(1+ν)), λ = Y h ν/(1−ν²).
+/// Triangles in plane stress, μ = Y h/(2(1+ν)), λ = Y h ν/(1−ν²), with hinges between them.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Stvk {
+pub struct Membrane {
     /// Young's modulus times thickness Y h, in N/m.
     #[serde(deserialize_with = "non_negative")]
     pub stretch_stiffness: f64,
     /// Poisson's ratio ν, in (−1, 1).
     #[serde(deserialize_with = "poisson_ratio")]
     pub poisson_ratio: f64,
-    /// What resists bending: `none` (the default), or the table `bridson` or `bridson-force`.
+    /// What resists bending: `none` (the default), or the table `bridson`, `bridson-force` or `flat`.
     #[serde(default)]
     pub bending: Bending,
 }
 
-impl Stvk {
+impl Membrane {
     /// Lamé's λ and μ of plane stress, times thickness, in N/m.
     ///
     /// ```
-    /// let fabric = cloth_core::fabric::Stvk { stretch_stiffness: 3.0, poisson_ratio: 0.5, bending: Default::default() };
+    /// let fabric = cloth_core::fabric::Membrane { stretch_stiffness: 3.0, poisson_ratio: 0.5, bending: Default::default() };
     /// assert_eq!(fabric.lame(), (2.0, 1.0));
     /// ```
     #[must_use]
@@ -81,6 +83,13 @@ pub enum Bending {
     /// The conservative potential K′ [2(cos(θ₀/2) − cos(θ/2)) − (θ − θ₀) sin(θ₀/2)], K′ = K ‖Ē‖²/(‖N̄₁‖ + ‖N̄₂‖) of the rest shape.
     Bridson {
         /// K, in N m. A flat sheet with regular diagonals bends along its grid with the flexural rigidity D = K/4.
+        #[serde(deserialize_with = "non_negative")]
+        stiffness: f64,
+    },
+    /// The quadratic potential 3 k/(4 (A₁ + A₂)) ‖Σ cᵢ xᵢ‖² of sheets that are flat at rest, c the weights of the cotangent Laplacian: its
+    /// Hessian is constant.
+    Flat {
+        /// k, in N m. A flat sheet with regular diagonals bends along its grid with the flexural rigidity D = 3 k/2.
         #[serde(deserialize_with = "non_negative")]
         stiffness: f64,
     },

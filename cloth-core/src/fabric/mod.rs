@@ -3,5 +3,5 @@
 mod description;
 mod terms;
 
-pub use description::{Bending, Fabric, MassSpring, Material, Stvk};
+pub use description::{Bending, Fabric, MassSpring, Material, Membrane};
 pub use terms::{FabricError, Garment, Surroundings, terms};

@@ -1,10 +1,11 @@
 use energy_dsl::{ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
-    BridsonBending, BridsonForce, BridsonForceDamped, Gravity, HookeSpring, Spring, StVK, ViscousDrag,
+    BridsonBending, BridsonForce, BridsonForceDamped, FlatBending, Gravity, HookeSpring, NeoHookean, Spring, StVK,
+    ViscousDrag,
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
-use super::{Bending, Fabric, MassSpring, Material, Stvk};
+use super::{Bending, Fabric, MassSpring, Material, Membrane};
 use crate::mesh::{
     Hinge, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm, rest_angle, subtract,
 };
@@ -17,6 +18,14 @@ pub enum FabricError {
     Rest {
         /// The triangle.
         triangle: usize,
+        /// What is wrong.
+        source: RestError,
+    },
+    /// A hinge refused its rest shape.
+    #[error("the hinge on vertices {vertices:?}: {source}")]
+    RestHinge {
+        /// Its vertices.
+        vertices: [usize; 4],
         /// What is wrong.
         source: RestError,
     },
@@ -59,7 +68,8 @@ pub fn terms(
     let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new() };
     match &fabric.material {
         Material::MassSpring(material) => garment.add_springs(material, mesh, springs)?,
-        Material::Stvk(material) => garment.add_stvk(material, mesh)?,
+        Material::Stvk(material) => garment.add_membrane(material, mesh, StVK::new)?,
+        Material::NeoHookean(material) => garment.add_membrane(material, mesh, NeoHookean::new)?,
     }
     garment.add_surroundings(surroundings)?;
     Ok(garment)
@@ -96,12 +106,20 @@ impl Garment {
         Ok(())
     }
 
-    fn add_stvk(&mut self, material: &Stvk, mesh: &TriangleMesh) -> Result<(), FabricError> {
+    fn add_membrane<E>(
+        &mut self,
+        material: &Membrane,
+        mesh: &TriangleMesh,
+        element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
+    ) -> Result<(), FabricError>
+    where
+        E: PackedPotential<f64> + std::fmt::Debug + 'static,
+    {
         if !self.leave_out("membrane", material.stretch_stiffness == 0.0, mesh.triangles().len()) {
             let (lambda, mu) = material.lame();
             let element = |triangle: usize| {
                 let [u0, u1, u2] = material_triangle(mesh.corners(triangle));
-                StVK::new(u0, u1, u2, lambda, mu).map_err(|source| FabricError::Rest { triangle, source })
+                element(u0, u1, u2, lambda, mu).map_err(|source| FabricError::Rest { triangle, source })
             };
             let elements = (0..mesh.triangles().len()).map(element).collect::<Result<Vec<_>, _>>()?;
             self.add_potential("membrane", mesh.triangles(), elements)?;
@@ -115,7 +133,9 @@ impl Garment {
         let angle = |hinge| rest_angle(mesh, hinge);
         let stiffness = match *bending {
             Bending::None => 0.0,
-            Bending::Bridson { stiffness } | Bending::BridsonForce { stiffness, .. } => stiffness,
+            Bending::Bridson { stiffness } | Bending::BridsonForce { stiffness, .. } | Bending::Flat { stiffness } => {
+                stiffness
+            }
         };
         let damping = if let Bending::BridsonForce { damping, .. } = bending { *damping } else { 0.0 };
         if self.leave_out("bending", stiffness == 0.0 && damping == 0.0, hinges.len()) {
@@ -126,6 +146,14 @@ impl Garment {
             Bending::Bridson { .. } => {
                 let element = |hinge| BridsonBending::new(stiffness * shape_factor(mesh, hinge), angle(hinge));
                 self.add_potential("bending", &stencils, hinges.iter().map(element).collect())
+            }
+            Bending::Flat { .. } => {
+                let element = |hinge: &Hinge| {
+                    let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
+                    FlatBending::new(x1, x2, x3, x4, stiffness)
+                        .map_err(|source| FabricError::RestHinge { vertices: hinge.vertices, source })
+                };
+                self.add_potential("bending", &stencils, hinges.iter().map(element).collect::<Result<_, _>>()?)
             }
             Bending::BridsonForce { .. } if damping == 0.0 => {
                 let element = |hinge| BridsonForce::new(stiffness, angle(hinge));

@@ -107,7 +107,7 @@ impl Integrator for ImplicitEuler {
             _ => body.system.matrix(),
         };
         let mut solution = self.solve(body, dt, Curvature::Exact, &mut matrix)?;
-        let mut step = StepReport { solves: 1, iterations: solution.report.iterations as u64, projected: false };
+        let mut step = StepReport { solves: 1, iterations: solution.report.iterations as u64, ..StepReport::default() };
         if solution.report.stopped == StopReason::IndefiniteCurvature {
             solution = self.solve(body, dt, Curvature::Clamped, &mut matrix)?;
             step.solves += 1;

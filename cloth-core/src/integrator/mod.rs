@@ -1,6 +1,7 @@
 //! Time stepping, one scheme to a file.
 
 mod implicit_euler;
+mod newton;
 mod symplectic_euler;
 
 use serde::Deserialize;
@@ -8,6 +9,7 @@ use serde::Deserialize;
 use energy_solve::{EvaluationError, StopReason};
 
 pub use implicit_euler::ImplicitEuler;
+pub use newton::{Newton, NewtonOptions, Phases};
 pub use symplectic_euler::SymplecticEuler;
 
 use crate::body::Body;
@@ -39,6 +41,20 @@ pub struct StepReport {
     pub iterations: u64,
     /// Whether it was solved again with projected curvature; see [`ImplicitEuler`].
     pub projected: bool,
+    /// How often a step of Newton's method was halved.
+    pub halvings: u64,
+    /// How long its parts took; measured by [`Newton`] only.
+    pub phases: Phases,
+}
+
+impl std::ops::AddAssign for StepReport {
+    fn add_assign(&mut self, other: Self) {
+        self.solves += other.solves;
+        self.iterations += other.iterations;
+        self.projected |= other.projected;
+        self.halvings += other.halvings;
+        self.phases += other.phases;
+    }
 }
 
 /// A step that failed.
@@ -67,6 +83,32 @@ pub enum StepError {
         /// The vertex with the largest entry of the residual.
         vertex: usize,
     },
+    /// No step along the search direction lowers the energy.
+    #[error(
+        "no step along the direction of Newton iteration {iterations} lowers the energy (its linear system: {stopped}). Try a smaller dt"
+    )]
+    Stuck {
+        /// Newton iterations done.
+        iterations: u64,
+        /// Why the linear solver stopped.
+        stopped: StopReason,
+    },
+    /// Newton's method did not converge.
+    #[error(
+        "Newton's method did not converge in {iterations} iterations: the last changed a velocity by {change:.3e} m/s. Try a smaller dt"
+    )]
+    NotConverged {
+        /// Iterations done.
+        iterations: u64,
+        /// The largest change of a velocity in the last, in m/s.
+        change: f64,
+    },
+    /// A force that is no gradient.
+    #[error("{term} has no energy for Newton's method to lower; use the integrator implicit-euler")]
+    NoEnergy {
+        /// The term's name.
+        term: String,
+    },
     /// The new state is infinite or NaN.
     #[error("vertex {vertex} would move to {position:?}. The step is unstable; try a smaller dt")]
     NonFinite {
@@ -84,6 +126,8 @@ pub enum Scheme {
     /// Linearised implicit Euler, one linear solve per step. The default.
     #[default]
     ImplicitEuler,
+    /// Implicit Euler by Newton's method with line search.
+    Newton,
     /// Symplectic Euler, explicit.
     SymplecticEuler,
 }
@@ -94,6 +138,7 @@ impl Scheme {
     pub fn integrator(self) -> Box<dyn Integrator> {
         match self {
             Self::ImplicitEuler => Box::new(ImplicitEuler::default()),
+            Self::Newton => Box::new(Newton::default()),
             Self::SymplecticEuler => Box::new(SymplecticEuler),
         }
     }

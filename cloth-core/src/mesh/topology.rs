@@ -54,7 +54,7 @@ struct Side {
 }
 
 /// The vertex pairs that a mass-spring fabric joins.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct SpringNetwork {
     /// Neighbours along warp and weft.
     pub structural: Vec<[usize; 2]>,

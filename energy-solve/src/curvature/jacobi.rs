@@ -3,61 +3,42 @@
 
 use energy_dsl::{Lane, Mask};
 
-use super::{Curvature, MOST, Orthonormal, Square, largest_of, upper_index};
+use super::{Curvature, MOST, Square};
 
 /// Sweeps converge quadratically: six or seven do for 12×12 matrices.
 const MOST_SWEEPS: usize = 16;
 
-/// Changes the matrices of the `open` lanes. Returns which lanes did change.
+/// By how much a matrix changes when its eigenvalues do, and in which lanes; leaves it diagonal.
 #[inline(always)]
-pub(super) fn change<V: Lane<f64>>(
-    upper: &mut [V],
-    curvature: Curvature,
-    orthonormal: &Orthonormal,
-    open: V::Mask,
-) -> V::Mask {
-    let n = orthonormal.coordinates();
+pub(super) fn difference<V: Lane<f64>>(a: &mut Square<V>, n: usize, curvature: Curvature) -> (Square<V>, V::Mask) {
     let zero = V::splat(0.0);
-    let largest = largest_of(upper);
-    // Entries near 1, so that their squares neither overflow nor vanish.
-    let scale = largest.power_of_two_scale();
-    let mut a = [[zero; MOST]; MOST];
-    for i in 0..n {
-        for j in i..n {
-            let entry = upper[upper_index(n, i, j)] * scale;
-            a[i][j] = entry;
-            a[j][i] = entry;
-        }
-    }
-    orthonormal.make_orthonormal(&mut a);
     let mut vectors = [[zero; MOST]; MOST];
     for i in 0..n {
         vectors[i][i] = V::splat(1.0);
     }
-    diagonalise(&mut a, &mut vectors, n);
-    let mut changes = [zero; MOST];
+    diagonalise(a, &mut vectors, n);
+    let mut difference = [[zero; MOST]; MOST];
     let mut changed = V::Mask::none();
-    for i in 0..n {
-        changes[i] = curvature.change(a[i][i]);
-        changed = changed | zero.less(changes[i]);
-    }
-    changed = changed & open;
-    if !changed.any() {
-        return changed;
-    }
-    orthonormal.make_differences(&mut vectors);
-    let unscale = V::splat(1.0) / scale;
-    for i in 0..n {
-        for j in i..n {
-            let mut sum = zero;
-            for k in 0..n {
-                sum = sum + changes[k] * vectors[i][k] * vectors[j][k];
+    for k in 0..n {
+        let change = curvature.change(a[k][k]);
+        let changes = zero.less(change);
+        if !changes.any() {
+            continue;
+        }
+        changed = changed | changes;
+        for i in 0..n {
+            let scaled = change * vectors[i][k];
+            for j in i..n {
+                difference[i][j] = difference[i][j] + scaled * vectors[j][k];
             }
-            let entry = &mut upper[upper_index(n, i, j)];
-            *entry = V::select(changed, *entry + sum * unscale, *entry);
         }
     }
-    changed
+    for i in 0..n {
+        for j in 0..i {
+            difference[i][j] = difference[j][i];
+        }
+    }
+    (difference, changed)
 }
 
 /// Rotates a symmetric matrix until it is diagonal; the columns of `vectors` are turned along.

@@ -7,6 +7,7 @@ mod definite;
 mod dense;
 mod jacobi;
 mod orthonormal;
+mod planar;
 mod radial;
 
 use energy_dsl::{Lane, Mask};
@@ -75,35 +76,84 @@ fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
     products.equal(zero)
 }
 
-/// Changes Hessians, one a lane, given as upper triangles by the difference vectors of `orthonormal`; `vector` is the only one of these, if
-/// there is one. Where there is nothing to change, nothing does, to the bit. Returns which lanes did change.
+/// Changes Hessians of `n` coordinates, one a lane, given as upper triangles by the difference vectors of `orthonormal`; `vectors` are these.
+/// Where there is nothing to change, nothing does, to the bit. Returns which lanes did change.
 ///
 /// Matrices that are not finite stay as they are.
 #[inline(always)]
 pub(crate) fn change<V: Lane<f64>>(
     upper: &mut [V],
+    n: usize,
     curvature: Curvature,
     orthonormal: &Orthonormal,
-    vector: Option<[V; 3]>,
+    vectors: &[[V; 3]],
 ) -> V::Mask {
-    let n = orthonormal.coordinates();
     let definite = is_semi_definite(upper, n);
     if definite.all() {
         return V::Mask::none();
     }
-    let mut open = !definite & are_finite(upper);
-    let mut changed = V::Mask::none();
-    if let Some(vector) = vector {
-        let (radial, with_change) = radial::change(upper, curvature, vector);
-        let chosen = open & radial;
-        for entry in 0..6 {
-            upper[entry] = V::select(chosen, with_change[entry], upper[entry]);
+    let open = !definite & are_finite(upper);
+    match vectors {
+        [vector] => {
+            let (radial, with_change) = radial::change(upper, curvature, *vector);
+            let chosen = open & radial;
+            for entry in 0..6 {
+                upper[entry] = V::select(chosen, with_change[entry], upper[entry]);
+            }
+            chosen | change_rest(upper, n, curvature, orthonormal, open & !radial)
         }
-        changed = changed | chosen;
-        open = open & !radial;
-        if !open.any() {
-            return changed;
+        [first, second] => {
+            let (planar, changed) = planar::change(upper, curvature, orthonormal, [*first, *second], open);
+            changed | change_rest(upper, n, curvature, orthonormal, open & !planar)
+        }
+        _ => change_rest(upper, n, curvature, orthonormal, open),
+    }
+}
+
+/// [`change`] without knowledge of any structure.
+#[inline(always)]
+fn change_rest<V: Lane<f64>>(
+    upper: &mut [V],
+    n: usize,
+    curvature: Curvature,
+    orthonormal: &Orthonormal,
+    open: V::Mask,
+) -> V::Mask {
+    if !open.any() {
+        return open;
+    }
+    let (mut a, scale) = scaled_square(upper, n);
+    orthonormal.make_orthonormal(&mut a, n);
+    let (mut difference, changed) = jacobi::difference(&mut a, n, curvature);
+    let changed = changed & open;
+    orthonormal.make_differences(&mut difference, n);
+    add_to(upper, &difference, n, scale, changed);
+    changed
+}
+
+/// The whole matrix, its entries brought near 1 by a power of two so that their squares neither overflow nor vanish; and the power.
+#[inline(always)]
+fn scaled_square<V: Lane<f64>>(upper: &[V], n: usize) -> (Square<V>, V) {
+    let scale = largest_of(upper).power_of_two_scale();
+    let mut a = [[V::splat(0.0); MOST]; MOST];
+    for i in 0..n {
+        for j in i..n {
+            let entry = upper[upper_index(n, i, j)] * scale;
+            a[i][j] = entry;
+            a[j][i] = entry;
         }
     }
-    changed | jacobi::change::<V>(upper, curvature, orthonormal, open)
+    (a, scale)
+}
+
+/// Adds a scaled difference where it is wanted.
+#[inline(always)]
+fn add_to<V: Lane<f64>>(upper: &mut [V], difference: &Square<V>, n: usize, scale: V, wanted: V::Mask) {
+    let unscale = V::splat(1.0) / scale;
+    for i in 0..n {
+        for j in i..n {
+            let entry = &mut upper[upper_index(n, i, j)];
+            *entry = V::select(wanted, *entry + difference[i][j] * unscale, *entry);
+        }
+    }
 }

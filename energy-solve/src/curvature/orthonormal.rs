@@ -12,7 +12,6 @@ const VECTORS: usize = MOST / 3;
 /// of Lᵀ H L are changed, not those of H, which differ.
 #[derive(Clone, Debug)]
 pub(crate) struct Orthonormal {
-    vectors: usize,
     /// L.
     lower: [[f64; VECTORS]; VECTORS],
     /// L⁻¹.
@@ -50,63 +49,51 @@ impl Orthonormal {
                 inverse[i][j] = -sum / lower[i][i];
             }
         }
-        Some(Self { vectors: n, lower, inverse })
-    }
-
-    /// The size of H.
-    #[inline(always)]
-    pub(crate) fn coordinates(&self) -> usize {
-        3 * self.vectors
+        Some(Self { lower, inverse })
     }
 
     /// H ← Lᵀ H L, for a symmetric H.
     #[inline(always)]
-    pub(super) fn make_orthonormal<V: Lane<f64>>(&self, h: &mut Square<V>) {
-        if self.vectors == 1 {
+    pub(super) fn make_orthonormal<V: Lane<f64>>(&self, h: &mut Square<V>, n: usize) {
+        self.congruent(&self.lower, h, n);
+    }
+
+    /// H ← L⁻ᵀ H L⁻¹, for a symmetric H.
+    #[inline(always)]
+    pub(super) fn make_differences<V: Lane<f64>>(&self, h: &mut Square<V>, n: usize) {
+        self.congruent(&self.inverse, h, n);
+    }
+
+    /// H ← Tᵀ H T.
+    #[inline(always)]
+    fn congruent<V: Lane<f64>>(&self, t: &[[f64; VECTORS]; VECTORS], h: &mut Square<V>, n: usize) {
+        if n == 3 {
             return; // one vector is only longer or shorter
         }
-        // Twice H ← (H L)ᵀ.
+        // Twice H ← (H T)ᵀ.
         for _ in 0..2 {
             let old = *h;
-            for row in 0..self.coordinates() {
-                let turned = self.columns_times(&self.lower, &old[row]);
-                for column in 0..self.coordinates() {
+            for row in 0..n {
+                let turned = columns_times(t, &old[row], n);
+                for column in 0..n {
                     h[column][row] = turned[column];
                 }
             }
         }
     }
+}
 
-    /// V ← L⁻ᵀ V, for vectors that are the columns of V.
-    #[inline(always)]
-    pub(super) fn make_differences<V: Lane<f64>>(&self, vectors: &mut Square<V>) {
-        if self.vectors == 1 {
-            return;
-        }
-        for column in 0..self.coordinates() {
-            let mut one = [V::splat(0.0); MOST];
-            for row in 0..self.coordinates() {
-                one[row] = vectors[row][column];
-            }
-            let turned = self.columns_times(&self.inverse, &one);
-            for row in 0..self.coordinates() {
-                vectors[row][column] = turned[row];
+/// (T ⊗ 1₃)ᵀ z, for a lower triangle T.
+#[inline(always)]
+fn columns_times<V: Lane<f64>>(t: &[[f64; VECTORS]; VECTORS], z: &[V; MOST], n: usize) -> [V; MOST] {
+    let mut product = [V::splat(0.0); MOST];
+    for vector in 0..n / 3 {
+        for k in vector..n / 3 {
+            for axis in 0..3 {
+                let place = 3 * vector + axis;
+                product[place] = product[place] + V::splat(t[k][vector]) * z[3 * k + axis];
             }
         }
     }
-
-    /// (T ⊗ 1₃)ᵀ z, for a lower triangle T.
-    #[inline(always)]
-    fn columns_times<V: Lane<f64>>(&self, t: &[[f64; VECTORS]; VECTORS], z: &[V; MOST]) -> [V; MOST] {
-        let mut product = [V::splat(0.0); MOST];
-        for vector in 0..self.vectors {
-            for k in vector..self.vectors {
-                for axis in 0..3 {
-                    let place = 3 * vector + axis;
-                    product[place] = product[place] + V::splat(t[k][vector]) * z[3 * k + axis];
-                }
-            }
-        }
-        product
-    }
+    product
 }

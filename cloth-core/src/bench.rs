@@ -1,0 +1,203 @@
+//! The benchmark: a sheet of a square metre, hung by two corners, on finer and finer meshes.
+
+use std::time::{Duration, Instant};
+
+use comfy_table::{CellAlignment, Table, presets};
+use energy_elements::ZeroLengthSpring;
+use energy_solve::{ElementList, ListError, PotentialTerm, System, SystemError};
+
+use crate::body::Body;
+use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
+use crate::integrator::{Integrator, Newton, NewtonOptions, Phases, StepError, StepReport};
+use crate::mesh::{Diagonals, MeshError, Plane, Sheet, SpringNetwork};
+
+/// A cloth of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cloth {
+    /// Fifty times softer than cotton: σ = 0.2 kg/m², E h = 5 N/m, ν = 0.3, k = 10⁻⁶ N m.
+    Soft,
+    /// Real cotton: σ = 0.1503 kg/m², E h = 261 N/m, ν = 0.243, k = 1.56·10⁻⁶ N m.
+    Cotton,
+}
+
+impl Cloth {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Soft, Self::Cotton];
+
+    /// What it is called.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Soft => "soft",
+            Self::Cotton => "cotton",
+        }
+    }
+
+    fn fabric(self) -> Fabric {
+        let (density, stretch_stiffness, poisson_ratio, stiffness) = match self {
+            Self::Soft => (0.2, 5.0, 0.3, 1e-6),
+            Self::Cotton => (0.1503, 261.0, 0.243, 1.56e-6),
+        };
+        let bending = Bending::Flat { stiffness };
+        Fabric { density, material: Material::NeoHookean(Membrane { stretch_stiffness, poisson_ratio, bending }) }
+    }
+}
+
+/// A scene of the benchmark that could not be set up or run.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The fabric.
+    #[error(transparent)]
+    Fabric(#[from] FabricError),
+    /// The corners.
+    #[error(transparent)]
+    List(#[from] ListError),
+    /// The sum of the terms.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// A step.
+    #[error("{cloth}, {vertices} vertices, step {step}: {source}")]
+    Step {
+        /// The cloth.
+        cloth: &'static str,
+        /// The number of vertices.
+        vertices: usize,
+        /// The step that failed, from 1.
+        step: u64,
+        /// What went wrong.
+        source: StepError,
+    },
+}
+
+/// The time step, in s.
+const DT: f64 = 0.01;
+/// What holds the corners, in N/m.
+const CORNER_STIFFNESS: f64 = 1e6;
+
+/// A square metre of cloth in z = 0, horizontal and at rest, `cells` cells along each side with all diagonals along (+, +); gravity
+/// along −z, a drag of 0.1 m v, and springs that hold the two corners of the edge y = ½.
+///
+/// # Errors
+/// When there are no cells.
+pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
+    let sheet = Sheet {
+        cells: [cells, cells],
+        size: [1.0, 1.0],
+        diagonals: Diagonals::Regular,
+        plane: Plane::Horizontal,
+        pleats: None,
+    };
+    let mesh = sheet.mesh()?;
+    let surroundings = Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.1 };
+    let mut garment = fabric::terms(&cloth.fabric(), &mesh, &SpringNetwork::default(), &surroundings)?;
+    let mut x = mesh.vertices().to_vec();
+    let mut pinned = vec![false; x.len()];
+    let mut held = Vec::new();
+    for corner in [sheet.vertex(0, cells), sheet.vertex(cells, cells)] {
+        held.push([corner, x.len()]);
+        x.push(x[corner]);
+        garment.masses.push(0.0);
+        pinned.push(true);
+    }
+    let springs = vec![ZeroLengthSpring::new(CORNER_STIFFNESS, 0.0); held.len()];
+    garment.terms.push(Box::new(PotentialTerm::new(ElementList::new("corners", springs, &held)?)));
+    let system = System::new(garment.terms, &pinned)?;
+    Ok(Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system })
+}
+
+/// What a run took.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured {
+    /// The cloth.
+    pub cloth: Cloth,
+    /// The number of vertices.
+    pub vertices: usize,
+    /// Steps done.
+    pub steps: u64,
+    /// Newton's method's iterations and what they took.
+    pub report: StepReport,
+    /// Everything from the mesh to the first step.
+    pub set_up: Duration,
+    /// All steps.
+    pub time: Duration,
+    /// The lowest point at the end, in m.
+    pub lowest: f64,
+}
+
+/// Runs a cloth for `seconds` of its time, calling `progress` after every step.
+///
+/// # Errors
+/// When a step fails.
+pub fn measure(cloth: Cloth, cells: usize, seconds: f64, mut progress: impl FnMut()) -> Result<Measured, BenchError> {
+    let started = Instant::now();
+    let mut body = hang(cloth, cells)?;
+    // The stop test of the comparison in the literature: absolute, at the scale of this scene.
+    let options = NewtonOptions { velocity_tolerance: 1e-3, impulse_tolerance: 1e-6, ..NewtonOptions::default() };
+    let mut integrator = Newton::with_options(options);
+    let set_up = started.elapsed();
+    let vertices = (cells + 1) * (cells + 1);
+    let steps = (seconds / DT).round() as u64;
+    let mut report = StepReport::default();
+    let started = Instant::now();
+    for step in 1..=steps {
+        let done = integrator.step(&mut body, DT);
+        report += done.map_err(|source| BenchError::Step { cloth: cloth.name(), vertices, step, source })?;
+        progress();
+    }
+    let time = started.elapsed();
+    let lowest = body.x.iter().fold(f64::INFINITY, |lowest, x| lowest.min(x[2]));
+    Ok(Measured { cloth, vertices, steps, report, set_up, time, lowest })
+}
+
+/// The runs as a table, with the growth of the time of a step from mesh to mesh.
+#[must_use]
+pub fn table(runs: &[Measured]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header([
+        "cloth",
+        "vertices",
+        "ms/step",
+        "Newton/step",
+        "CG/Newton",
+        "assembly",
+        "factor",
+        "solve",
+        "line search",
+        "set-up ms",
+        "lowest m",
+        "growth",
+    ]);
+    for (place, run) in runs.iter().enumerate() {
+        let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+        let a_step = |run: &Measured| milliseconds(run.time) / run.steps as f64;
+        let share = |time: Duration| format!("{:.0} %", 100.0 * time.as_secs_f64() / run.time.as_secs_f64());
+        let Phases { assembly, factorisation, solve, line_search } = run.report.phases;
+        let before = place.checked_sub(1).map(|before| &runs[before]).filter(|before| before.cloth == run.cloth);
+        let growth = before.map_or("–".to_owned(), |before| {
+            let (times, sizes) = (a_step(run) / a_step(before), run.vertices as f64 / before.vertices as f64);
+            format!("{:.2}", times.ln() / sizes.ln())
+        });
+        table.add_row([
+            run.cloth.name().to_owned(),
+            run.vertices.to_string(),
+            format!("{:.2}", a_step(run)),
+            format!("{:.1}", run.report.solves as f64 / run.steps as f64),
+            format!("{:.1}", run.report.iterations as f64 / run.report.solves as f64),
+            share(assembly),
+            share(factorisation),
+            share(solve),
+            share(line_search),
+            format!("{:.0}", milliseconds(run.set_up)),
+            format!("{:.4}", run.lowest),
+            growth,
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}

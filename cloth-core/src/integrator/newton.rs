@@ -1,0 +1,267 @@
+use std::time::{Duration, Instant};
+
+use energy_dsl::Vector3;
+use energy_solve::{
+    BlockMatrix, Curvature, EvaluationError, IncompleteCholesky, LinearisationOptions, SolveOptions, State, Weights,
+    conjugate_gradients, dot,
+};
+
+use super::{Integrator, StepError, StepReport};
+use crate::body::Body;
+
+/// Implicit Euler by Newton's method on the incremental potential (Gast, Schroeder, Stomakhin, Jiang and Teran 2015)
+///
+/// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + ½ h P(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
+///
+/// P the power that linear damping takes. Each element's Hessian is made positive semi-definite, so that every step of Newton's method
+/// leads downhill; it is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
+///
+/// Needs an energy of every force but those of damping: with [`crate::fabric::Bending::BridsonForce`], which has none, use
+/// [`super::ImplicitEuler`].
+#[derive(Clone, Debug, Default)]
+pub struct Newton {
+    options: NewtonOptions,
+    memory: Option<Memory>,
+}
+
+/// When a step is done, and how exactly its linear systems are solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NewtonOptions {
+    /// Done when an iteration changes no velocity by more, in m/s.
+    pub velocity_tolerance: f64,
+    /// Done when no vertex lacks more than this impulse, in N s.
+    pub impulse_tolerance: f64,
+    /// Give up after this many iterations.
+    pub iteration_limit: usize,
+    /// Each linear system's residual relative to its right-hand side.
+    pub linear_tolerance: f64,
+}
+
+impl Default for NewtonOptions {
+    /// 10⁻⁴ m/s, whatever the impulse; 100 iterations; linear systems to 0.1, which Newton's method makes up for.
+    fn default() -> Self {
+        Self { velocity_tolerance: 1e-4, impulse_tolerance: 0.0, iteration_limit: 100, linear_tolerance: 0.1 }
+    }
+}
+
+/// What stays from one step to the next.
+#[derive(Clone, Debug)]
+struct Memory {
+    matrix: BlockMatrix,
+    factor: IncompleteCholesky,
+}
+
+/// How long the parts of a step took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Phases {
+    /// Gradients, Hessians and assembly.
+    pub assembly: Duration,
+    /// The preconditioner's factorisation.
+    pub factorisation: Duration,
+    /// Conjugate gradients.
+    pub solve: Duration,
+    /// Energies along the search directions.
+    pub line_search: Duration,
+}
+
+impl std::ops::AddAssign for Phases {
+    fn add_assign(&mut self, other: Self) {
+        self.assembly += other.assembly;
+        self.factorisation += other.factorisation;
+        self.solve += other.solve;
+        self.line_search += other.line_search;
+    }
+}
+
+/// Halvings of a step before it counts as stuck: the last is 2⁻⁴⁰ of the first.
+const HALVINGS: usize = 40;
+/// How much of the decrease that the slope promises must come true (Armijo).
+const DECREASE: f64 = 1e-4;
+/// Decreases are not seen below this part of the energies they are differences of.
+const ROUNDING: f64 = 1e-13;
+
+impl Newton {
+    /// With other tolerances.
+    #[must_use]
+    pub fn with_options(options: NewtonOptions) -> Self {
+        Self { options, memory: None }
+    }
+}
+
+/// A step on its way.
+struct Step<'a> {
+    body: &'a mut Body,
+    dt: f64,
+    free: Vec<usize>,
+    start: Vec<Vector3<f64>>,
+    /// x̂.
+    inertial: Vec<Vector3<f64>>,
+    report: StepReport,
+}
+
+impl Step<'_> {
+    /// v = (x − x₀)/h.
+    fn velocities(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let velocity = |(x, start): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
+            std::array::from_fn(|axis| (x[axis] - start[axis]) / self.dt)
+        };
+        x.iter().zip(&self.start).map(velocity).collect()
+    }
+
+    /// E and the size of the numbers it is made of; infinite where an element's energy is.
+    fn energy(&mut self, x: &[Vector3<f64>]) -> Result<(f64, f64), EvaluationError> {
+        let started = Instant::now();
+        let (mut sum, mut size) = (0.0, 0.0);
+        for &vertex in &self.free {
+            let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - self.inertial[vertex][axis]);
+            sum += 0.5 * self.body.masses[vertex] * away.iter().map(|component| component * component).sum::<f64>();
+        }
+        size += sum;
+        let energies = match self.body.system.energies(x) {
+            Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => {
+                return Ok((f64::INFINITY, f64::INFINITY));
+            }
+            energies => energies?,
+        };
+        for energy in energies.iter().filter_map(|term| term.energy) {
+            sum += self.dt * self.dt * energy;
+            size += self.dt * self.dt * energy.abs();
+        }
+        if self.body.system.character().velocity_dependent {
+            let v = self.velocities(x);
+            let power = self.body.system.dissipated_power(State { x, v: &v })?;
+            sum += 0.5 * self.dt.powi(3) * power;
+            size += 0.5 * self.dt.powi(3) * power.abs();
+        }
+        self.report.phases.line_search += started.elapsed();
+        Ok((sum, size))
+    }
+
+    /// The matrix, M − h² ∂f/∂x − h ∂f/∂v, and −∇E = M (x̂ − x) + h² f of the free vertices.
+    fn linearise(
+        &mut self,
+        x: &[Vector3<f64>],
+        matrix: &mut BlockMatrix,
+    ) -> Result<Vec<Vector3<f64>>, EvaluationError> {
+        let started = Instant::now();
+        let v = self.velocities(x);
+        let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
+        let options = LinearisationOptions { weights, curvature: Curvature::Clamped, stiffness_times_velocity: false };
+        let linear = self.body.system.linearise(State { x, v: &v }, options, matrix)?;
+        let mut down = Vec::with_capacity(self.free.len());
+        for (row, &vertex) in self.free.iter().enumerate() {
+            let mass = self.body.masses[vertex];
+            let diagonal = matrix.diagonal_mut(row);
+            for axis in 0..3 {
+                diagonal[axis][axis] += mass;
+            }
+            down.push(std::array::from_fn(|axis| {
+                mass * (self.inertial[vertex][axis] - x[vertex][axis]) + self.dt * self.dt * linear.force[vertex][axis]
+            }));
+        }
+        self.report.phases.assembly += started.elapsed();
+        Ok(down)
+    }
+
+    /// x + s d on the free vertices.
+    fn moved(&self, x: &[Vector3<f64>], scale: f64, direction: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut moved = x.to_vec();
+        for (&vertex, d) in self.free.iter().zip(direction) {
+            for axis in 0..3 {
+                moved[vertex][axis] += scale * d[axis];
+            }
+        }
+        moved
+    }
+}
+
+fn largest(vectors: &[Vector3<f64>]) -> f64 {
+    vectors.as_flattened().iter().fold(0.0, |largest, component| component.abs().max(largest))
+}
+
+impl Integrator for Newton {
+    fn name(&self) -> &'static str {
+        "newton"
+    }
+
+    fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
+        let without = body.system.terms().map(|(term, _)| term);
+        if let Some(term) = without.into_iter().find(|term| !term.has_energy() && !term.character().velocity_dependent)
+        {
+            return Err(StepError::NoEnergy { term: term.name().to_owned() });
+        }
+        let Memory { mut matrix, mut factor } = match self.memory.take() {
+            Some(memory) if body.system.owns(&memory.matrix) => memory,
+            _ => {
+                let matrix = body.system.matrix();
+                Memory { factor: IncompleteCholesky::new(matrix.pattern()), matrix }
+            }
+        };
+        let free = body.system.dofs().free().to_vec();
+        let start = body.x.clone();
+        let mut inertial = start.clone();
+        for &vertex in &free {
+            for axis in 0..3 {
+                inertial[vertex][axis] += dt * body.v[vertex][axis];
+            }
+        }
+        let mut step = Step { body, dt, free, start, inertial, report: StepReport::default() };
+        let mut x = step.inertial.clone();
+        let mut energy = step.energy(&x)?;
+        if !energy.0.is_finite() {
+            x.clone_from(&step.start);
+            energy = step.energy(&x)?;
+        }
+        let (mut converged, mut change) = (false, f64::INFINITY);
+        while !converged {
+            if step.report.solves == self.options.iteration_limit as u64 {
+                return Err(StepError::NotConverged { iterations: step.report.solves, change });
+            }
+            let down = step.linearise(&x, &mut matrix)?;
+            // One iteration at least: on a fine mesh no vertex weighs much, and not even free fall lacks a large impulse.
+            if step.report.solves > 0 && largest(&down) < dt * self.options.impulse_tolerance {
+                break;
+            }
+            let started = Instant::now();
+            factor.factor(&matrix)?;
+            step.report.phases.factorisation += started.elapsed();
+
+            let started = Instant::now();
+            let linear = SolveOptions { relative_tolerance: self.options.linear_tolerance, ..SolveOptions::default() };
+            let mut direction = vec![[0.0; 3]; down.len()];
+            let solved = conjugate_gradients(&matrix, &factor, &down, &mut direction, &linear);
+            step.report.phases.solve += started.elapsed();
+            step.report.solves += 1;
+            step.report.iterations += solved.iterations as u64;
+
+            let slope = -dot(&down, &direction);
+            let mut scale = 1.0;
+            let mut halvings = 0;
+            let (moved, lower) = loop {
+                let moved = step.moved(&x, scale, &direction);
+                let trial = step.energy(&moved)?;
+                if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
+                    break (moved, trial);
+                }
+                if halvings == HALVINGS {
+                    return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
+                }
+                scale *= 0.5;
+                halvings += 1;
+            };
+            step.report.halvings += halvings as u64;
+            (x, energy) = (moved, lower);
+            change = scale * largest(&direction) / dt;
+            converged = change < self.options.velocity_tolerance;
+        }
+        let v = step.velocities(&x);
+        let report = step.report;
+        (body.x, body.v) = (x, v);
+        self.memory = Some(Memory { matrix, factor });
+        Ok(report)
+    }
+
+    fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {
+        Ok(None)
+    }
+}

@@ -1,0 +1,122 @@
+use energy_dsl::{Lane, Mask};
+
+use super::definite::is_semi_definite;
+use super::{Curvature, MOST, Orthonormal, Square, add_to, jacobi, scaled_square, upper_index};
+
+/// How large the entries may be that should vanish, relative to the largest.
+const TOLERANCE: f64 = 1e-10;
+
+/// A function of two vectors that no rotation or reflection changes (a membrane's energy, a hair's) has no second derivative between a
+/// displacement in their plane and one out of it. So its 6×6 Hessian falls into a 2×2 and a 4×4 matrix; compression shows in the
+/// former, and the latter is mostly definite. Changes the Hessians of the `open` lanes in which it is so (it is tested, not assumed).
+/// Returns these lanes, and which changed.
+#[inline(always)]
+pub(super) fn change<V: Lane<f64>>(
+    upper: &mut [V],
+    curvature: Curvature,
+    orthonormal: &Orthonormal,
+    [d, e]: [[V; 3]; 2],
+    open: V::Mask,
+) -> (V::Mask, V::Mask) {
+    let normal = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+    let (dd, nn) = (square(d), square(normal));
+    let spans = dd.is_moderate(2) & nn.is_moderate(4);
+    let one = V::splat(1.0);
+    let (per_d, per_n) = (one / dd.sqrt(), one / nn.sqrt());
+    let mut frame = [[one; 3]; 3];
+    for axis in 0..3 {
+        frame[0][axis] = d[axis] * per_d;
+        frame[2][axis] = normal[axis] * per_n;
+    }
+    let [t, _, n] = frame;
+    frame[1] = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
+
+    let (mut a, scale) = scaled_square(upper, 6);
+    orthonormal.make_orthonormal(&mut a, 6);
+    turn(&mut a, &frame);
+    let mut planar = open & spans;
+    let tolerance = V::splat(TOLERANCE);
+    for out in [2, 5] {
+        for within in IN_PLANE {
+            planar = planar & a[out][within].abs().less_or_equal(tolerance);
+        }
+    }
+    if !planar.any() {
+        return (planar, planar);
+    }
+
+    let zero = V::splat(0.0);
+    let mut difference = [[zero; MOST]; MOST];
+    let mut out = [[zero; MOST]; MOST];
+    for (i, row) in [2, 5].into_iter().enumerate() {
+        for (j, column) in [2, 5].into_iter().enumerate() {
+            out[i][j] = a[row][column];
+        }
+    }
+    let (part, mut changed) = jacobi::difference(&mut out, 2, curvature);
+    for (i, row) in [2, 5].into_iter().enumerate() {
+        for (j, column) in [2, 5].into_iter().enumerate() {
+            difference[row][column] = part[i][j];
+        }
+    }
+
+    let mut within = [[zero; MOST]; MOST];
+    let mut within_upper = [zero; 10];
+    for i in 0..4 {
+        for j in 0..4 {
+            within[i][j] = a[IN_PLANE[i]][IN_PLANE[j]];
+        }
+        for j in i..4 {
+            within_upper[upper_index(4, i, j)] = within[i][j];
+        }
+    }
+    let indefinite = planar & !is_semi_definite(&within_upper, 4);
+    if indefinite.any() {
+        let (part, also) = jacobi::difference(&mut within, 4, curvature);
+        changed = changed | (also & indefinite);
+        for i in 0..4 {
+            for j in 0..4 {
+                difference[IN_PLANE[i]][IN_PLANE[j]] = V::select(indefinite, part[i][j], zero);
+            }
+        }
+    }
+    let changed = changed & planar;
+    if changed.any() {
+        let back = [
+            [frame[0][0], frame[1][0], frame[2][0]],
+            [frame[0][1], frame[1][1], frame[2][1]],
+            [frame[0][2], frame[1][2], frame[2][2]],
+        ];
+        turn(&mut difference, &back);
+        orthonormal.make_differences(&mut difference, 6);
+        add_to(upper, &difference, 6, scale, changed);
+    }
+    (planar, changed)
+}
+
+/// The coordinates in the plane of both vectors.
+const IN_PLANE: [usize; 4] = [0, 1, 3, 4];
+
+#[inline(always)]
+fn square<V: Lane<f64>>(a: [V; 3]) -> V {
+    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+}
+
+/// A ← R A Rᵀ for a symmetric A, R acting on both vectors alike.
+#[inline(always)]
+fn turn<V: Lane<f64>>(a: &mut Square<V>, r: &[[V; 3]; 3]) {
+    // Twice A ← (R A)ᵀ.
+    for _ in 0..2 {
+        let old = *a;
+        for vector in 0..2 {
+            for axis in 0..3 {
+                for column in 0..6 {
+                    let first = 3 * vector;
+                    a[column][first + axis] = r[axis][0] * old[first][column]
+                        + r[axis][1] * old[first + 1][column]
+                        + r[axis][2] * old[first + 2][column];
+                }
+            }
+        }
+    }
+}
