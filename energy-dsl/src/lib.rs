@@ -43,6 +43,8 @@ mod routines;
 mod syntax;
 #[cfg(feature = "compiler")]
 mod textbook;
+#[cfg(feature = "compiler")]
+mod tower;
 
 pub use runtime::*;
 

@@ -93,24 +93,26 @@ impl std::fmt::Display for BlockName {
 
 /// One block, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Block {
+pub struct Block<T = f64> {
     /// Which one.
     pub name: BlockName,
     /// Numbers to a row.
     pub columns: usize,
     /// All numbers.
-    pub numbers: Vec<f64>,
+    pub numbers: Vec<T>,
 }
 
-impl Block {
-    pub(crate) fn new(name: BlockName, columns: usize, numbers: Vec<f64>) -> Self {
+impl<T: Clone> Block<T> {
+    pub(crate) fn new(name: BlockName, columns: usize, numbers: Vec<T>) -> Self {
         Self { name, columns, numbers }
     }
 
-    pub(crate) fn from_rows(name: BlockName, rows: &[Vec<f64>]) -> Self {
+    pub(crate) fn from_rows(name: BlockName, rows: &[Vec<T>]) -> Self {
         Self { name, columns: rows.first().map_or(0, Vec::len), numbers: rows.concat() }
     }
+}
 
+impl Block {
     /// The largest magnitude; NaN if there is one.
     #[must_use]
     pub fn largest(&self) -> f64 {

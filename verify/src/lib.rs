@@ -21,6 +21,7 @@ mod finite_difference;
 mod formula;
 mod geometry;
 mod listings;
+pub mod multiprecision;
 pub mod reference;
 mod sample;
 

@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use verify::audit::{Options, Report, audit_catalogue, describe_failure};
-use verify::reference::{BlockLine, PolicyLine, ReferenceReport, evaluate_file, reference};
+use verify::reference::{BlockLine, PolicyLine, ReferenceReport, Source, evaluate_file, reference};
 
 /// Audits the derivatives of declared elements, and measures them against multi-precision reference values.
 #[derive(Parser)]
@@ -63,13 +63,16 @@ enum Command {
         #[arg(long, conflicts_with_all = ["routine", "plan"])]
         counts: bool,
     },
-    /// Evaluate the records of a file and write them with the results, 17 digits, and flags.
+    /// Evaluate the records of a file and write them with the results of the generated code, 17 digits, and flags.
     Eval {
         /// A `potref-1` or `potref-policy-1` file.
         records: PathBuf,
         /// Where to write.
         #[arg(short, long)]
         output: PathBuf,
+        /// Instead of the generated code's results, the formula's in multi-precision, to so many digits.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=500))]
+        digits: Option<u16>,
     },
 }
 
@@ -121,8 +124,9 @@ fn run(command: Command) -> anyhow::Result<bool> {
             }
             Ok(true)
         }
-        Command::Eval { records, output } => {
-            let count = evaluate_file(&records, &output)?;
+        Command::Eval { records, output, digits } => {
+            let source = digits.map_or(Source::GeneratedCode, |digits| Source::Truth { digits: digits.into() });
+            let count = evaluate_file(&records, &output, source)?;
             println!("{count} records evaluated, written to {}", output.display());
             Ok(true)
         }
