@@ -3,9 +3,12 @@
 use crate::graph::{Graph, Input, NodeId, Op, reachable};
 use crate::runtime::{Baseline, Inputs, Mask, Number};
 
+/// What an operation yields.
 #[derive(Clone)]
-enum Computed<T: Number> {
+pub enum Computed<T: Number> {
+    /// A number.
     Number(T),
+    /// The outcome of a comparison.
     Mask(T::Mask),
 }
 
@@ -60,7 +63,18 @@ fn compute<T: Number>(
 ) -> Computed<T> {
     let n = |node| number(graph, values, node);
     let m = |node| mask::<T>(graph, values, node);
-    Computed::Number(match graph.fused(node) {
+    apply(graph.fused(node), inputs, precomputed, n, m)
+}
+
+/// One operation, its operands found by `n` and `m`.
+pub fn apply<T: Number>(
+    op: Op,
+    inputs: &Inputs<'_, T>,
+    precomputed: &[T],
+    n: impl Fn(NodeId) -> T,
+    m: impl Fn(NodeId) -> T::Mask,
+) -> Computed<T> {
+    Computed::Number(match op {
         Op::Constant(bits) => T::from_f64(f64::from_bits(bits)),
         Op::Pi => T::from_f64(0.0).atan2::<Baseline>(T::from_f64(-1.0)),
         Op::Input(input) => read(input, inputs, precomputed),

@@ -32,15 +32,21 @@ mod graph;
 #[cfg(feature = "compiler")]
 mod interpret;
 #[cfg(feature = "compiler")]
+mod interpreted;
+#[cfg(feature = "compiler")]
 mod listing;
 #[cfg(feature = "compiler")]
 mod lower;
+#[cfg(feature = "compiler")]
+mod mutation;
 #[cfg(feature = "compiler")]
 mod properties;
 #[cfg(feature = "compiler")]
 mod routines;
 #[cfg(feature = "compiler")]
 mod syntax;
+#[cfg(feature = "compiler")]
+mod tape;
 #[cfg(feature = "compiler")]
 mod textbook;
 #[cfg(feature = "compiler")]
@@ -49,11 +55,17 @@ mod tower;
 pub use runtime::*;
 
 #[cfg(feature = "compiler")]
+pub use check::unit_exponents;
+#[cfg(feature = "compiler")]
 pub use diagnostic::{Diagnostic, Diagnostics};
 #[cfg(feature = "compiler")]
 pub use functions::{Function, all as functions};
 #[cfg(feature = "compiler")]
+pub use interpreted::Interpreted;
+#[cfg(feature = "compiler")]
 pub use listing::{Listing, Path};
+#[cfg(feature = "compiler")]
+pub use mutation::{Fault, Mutation};
 #[cfg(feature = "compiler")]
 pub use textbook::Textbook;
 

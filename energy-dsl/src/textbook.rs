@@ -6,7 +6,7 @@ use crate::graph::{Input, NodeId, Op, reachable};
 use crate::interpret::interpret_with;
 use crate::lower::{TextbookFormula, lower_textbook};
 use crate::runtime::{Inputs, Number};
-use crate::syntax::parse;
+use crate::syntax::{parse, parse_file};
 use crate::tower::Tower;
 
 /// A declaration in its printed form, without robust primitives and rewrites, to be evaluated over any number type: what an
@@ -134,6 +134,18 @@ pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
         )
     })?;
     let items = parse(stream, &mut diagnostics);
+    let programs = check(&items, &mut diagnostics);
+    diagnostics.finish(programs)
+}
+
+/// The same of a file, where mathematical notation stands in strings without escapes. Messages name the file.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn file_programs(text: &str, file: &str) -> Result<Vec<Program>, Diagnostics> {
+    let mut diagnostics = Diagnostics::default();
+    let here = Span::of(proc_macro2::Span::call_site());
+    let items = parse_file(text, file, &here, &mut diagnostics);
     let programs = check(&items, &mut diagnostics);
     diagnostics.finish(programs)
 }

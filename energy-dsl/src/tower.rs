@@ -206,9 +206,7 @@ impl<T: Number> Number for Tower<T> {
         yes.combine(
             no,
             |yes, no| T::select(mask, yes, no),
-            |(yes, yes_slope), (no, no_slope)| {
-                (Self::select(mask, yes, no), Self::select(mask, yes_slope, no_slope))
-            },
+            |(yes, yes_slope), (no, no_slope)| (Self::select(mask, yes, no), Self::select(mask, yes_slope, no_slope)),
         )
     }
 }

@@ -33,6 +33,8 @@ pub(crate) struct Sweep {
     pub(crate) best: Vec<f64>,
     /// Observed order of the plain central difference, if its error fell far enough to be measured.
     pub(crate) order: Option<f64>,
+    /// Step, relative to the length, and the largest deviation of plain and extrapolated differences.
+    pub(crate) curve: Vec<(f64, f64, f64)>,
 }
 
 /// Differences of `lower`, a function of the stepped inputs, against `block`.
@@ -74,12 +76,14 @@ pub(crate) fn sweep(
             .fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) })
     };
     let mut best: Option<(f64, Vec<f64>)> = None;
+    let mut curve = Vec::new();
     let mut plain = Vec::new();
     for exponent in STEPS {
         let step = length * f64::from(exponent).exp2();
         let (whole, half) = (central(step)?, central(step / 2.0)?);
         plain.push((deviation(&whole), deviation(&half)));
         let extrapolated: Vec<f64> = whole.iter().zip(&half).map(|(w, h)| (4.0 * h - w) / 3.0).collect();
+        curve.push((step / length, deviation(&whole), deviation(&extrapolated)));
         for candidate in [whole, extrapolated] {
             let error = deviation(&candidate);
             if best.as_ref().is_none_or(|(least, _)| error < *least || least.is_nan()) {
@@ -93,5 +97,5 @@ pub(crate) fn sweep(
         .first()
         .filter(|(whole, half)| *half > 1e3 * error && *half > 1e-10 * largest(block) && *whole > *half)
         .map(|(w, h)| (w / h).log2());
-    Ok(Sweep { best, order })
+    Ok(Sweep { best, order, curve })
 }

@@ -71,17 +71,14 @@ fn constraint_blocks<T: Number>(expansion: &Expansion<T>, sample: &Sample) -> Ve
     let (stiffness, damping) = sample.stiffness_and_damping();
     let (stiffness, damping) = (T::from_f64(stiffness), T::from_f64(damping));
     let (n, rows) = (sample.positions.len(), expansion.values.len());
-    let velocities: Vec<T> =
-        (0..n).map(|i| T::from_f64(sample.velocities.get(i).copied().unwrap_or(0.0))).collect();
+    let velocities: Vec<T> = (0..n).map(|i| T::from_f64(sample.velocities.get(i).copied().unwrap_or(0.0))).collect();
     let c = |r: usize| expansion.values[r].clone();
     let j = |r: usize, i: usize| expansion.by_position[r][i].clone();
     let c_by = |r: usize, i: usize, k: usize| expansion.by_position_twice[r][i][k].clone();
     let v = |i: usize| velocities[i].clone();
     let rate: Vec<T> = (0..rows).map(|r| sum(n, |i| j(r, i) * v(i))).collect();
-    let rate_by: Vec<Vec<T>> =
-        (0..rows).map(|r| (0..n).map(|k| sum(n, |i| c_by(r, i, k) * v(i))).collect()).collect();
-    let pull: Vec<T> =
-        (0..rows).map(|r| stiffness.clone() * c(r) + damping.clone() * rate[r].clone()).collect();
+    let rate_by: Vec<Vec<T>> = (0..rows).map(|r| (0..n).map(|k| sum(n, |i| c_by(r, i, k) * v(i))).collect()).collect();
+    let pull: Vec<T> = (0..rows).map(|r| stiffness.clone() * c(r) + damping.clone() * rate[r].clone()).collect();
     let matrix = |entry: &dyn Fn(usize, usize) -> T| -> Vec<Vec<T>> {
         (0..n).map(|i| (0..n).map(|k| entry(i, k)).collect()).collect()
     };
@@ -89,8 +86,7 @@ fn constraint_blocks<T: Number>(expansion: &Expansion<T>, sample: &Sample) -> Ve
 
     let energy = stiffness.clone() / T::from_f64(2.0) * sum(rows, |r| c(r) * c(r));
     let gradient = vector(&|i| stiffness.clone() * sum(rows, |r| c(r) * j(r, i)));
-    let hessian =
-        matrix(&|i, k| stiffness.clone() * sum(rows, |r| j(r, i) * j(r, k) + c(r) * c_by(r, i, k)));
+    let hessian = matrix(&|i, k| stiffness.clone() * sum(rows, |r| j(r, i) * j(r, k) + c(r) * c_by(r, i, k)));
     let force = vector(&|i| -sum(rows, |r| j(r, i) * pull[r].clone()));
     let by_position = matrix(&|i, k| {
         -sum(rows, |r| {
@@ -118,8 +114,7 @@ fn sum<T: Number>(count: usize, term: impl Fn(usize) -> T) -> T {
 /// One evaluation with all coordinates moving: positions first, velocities after them.
 fn expand_by_jets<T: Number<Mask = bool>>(formula: &Textbook, sample: &Sample, order: Order) -> Expansion<T> {
     let (n, m) = (sample.positions.len(), if order == Order::First { sample.velocities.len() } else { 0 });
-    let constants =
-        |numbers: &[f64]| numbers.iter().map(|&x| Jet::constant(T::from_f64(x))).collect::<Vec<_>>();
+    let constants = |numbers: &[f64]| numbers.iter().map(|&x| Jet::constant(T::from_f64(x))).collect::<Vec<_>>();
     let moving = |numbers: &[f64], first: usize| -> Vec<Jet<T>> {
         let variable = |(i, &x): (usize, &f64)| Jet::variable(T::from_f64(x), first + i, n + m, order);
         numbers.iter().enumerate().map(variable).collect()

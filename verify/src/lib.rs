@@ -17,6 +17,7 @@ mod atomic_file;
 pub mod audit;
 mod blocks;
 pub mod dual;
+mod eigenvalues;
 mod finite_difference;
 mod formula;
 mod geometry;

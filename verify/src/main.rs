@@ -91,7 +91,11 @@ fn run(command: Command) -> anyhow::Result<bool> {
     match command {
         Command::Audit { names, samples, seed, quick, json } => {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let options = Options { samples: if quick { 20 } else { samples }, seed };
+            let options = if quick {
+                Options { seed, ..Options::quick() }
+            } else {
+                Options { samples, seed, ..Options::default() }
+            };
             let report = audit_catalogue(&names, options).map_err(anyhow::Error::msg)?;
             print_audit(&report);
             write_json(json.as_deref(), &report)?;
@@ -170,6 +174,20 @@ fn print_audit(report: &Report) {
     }
     for (name, why) in &report.refused {
         println!("\n{name} cannot be audited: {why}");
+    }
+    for section in &report.sections {
+        if let Some(m) = &section.mutations {
+            println!(
+                "{}: {} of {} planted faults noticed, {} equivalent",
+                section.element,
+                m.caught(),
+                m.mutants.len(),
+                m.equivalent
+            );
+        }
+    }
+    for (element, mutant) in report.missed() {
+        println!("{element}: missed {}", mutant.fault);
     }
     println!(
         "\n{} elements, {} checks, {} failed",

@@ -48,7 +48,12 @@ fn every_reference_value_comes_out_to_its_last_digits() {
                 blocks += 1;
                 if largest > 1e-280 && largest.is_finite() {
                     let worst = wanted.iter().zip(&got).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
-                    assert!(worst <= 1e-28 * largest, "{name} {} {block}: {:e}", reference["potential"], worst / largest);
+                    assert!(
+                        worst <= 1e-28 * largest,
+                        "{name} {} {block}: {:e}",
+                        reference["potential"],
+                        worst / largest
+                    );
                 } else {
                     // Zero where it is zero; beyond the doubles, both are.
                     assert!(wanted.iter().zip(&got).all(|(a, b)| a.high == b.high || largest > 0.0), "{name} {block}");

@@ -11,4 +11,5 @@ mod truth;
 
 pub use big::Big;
 pub(crate) use jet::{Jet, Order};
+pub(crate) use truth::worse;
 pub use truth::{TrueBlock, truth};

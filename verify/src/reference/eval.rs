@@ -72,8 +72,8 @@ fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result
             let truths = match source {
                 Source::GeneratedCode => Vec::new(),
                 Source::Truth { digits } => {
-                    let formula = Textbook::from_source(declaration.source)
-                        .map_err(|e| format!("{}: {e}", declaration.name))?;
+                    let formula =
+                        Textbook::from_source(declaration.source).map_err(|e| format!("{}: {e}", declaration.name))?;
                     truth(declaration, &formula, &sample, digits)
                 }
             };
