@@ -29,6 +29,10 @@ pub struct Interpreted {
     routines: Vec<InterpretedRoutine>,
 }
 
+/// The routines that blocks come from.
+const EVALUATED: [&str; 8] =
+    ["value", "gradient", "hessian", "force", "jacobians", "constraint_jacobian", "residual", "jacobian"];
+
 #[derive(Clone, Debug)]
 struct InterpretedRoutine {
     name: &'static str,
@@ -154,13 +158,21 @@ impl Interpreted {
         Ok(numbers)
     }
 
+    /// The outcome of every comparison in what computes ordinary configurations: which branches an input takes.
+    ///
+    /// # Errors
+    /// When the rest shape is degenerate.
+    pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Result<Vec<bool>, RestError> {
+        let rest = self.precomputed(inputs)?;
+        let routines = self.routines.iter().filter(|r| EVALUATED.contains(&r.name));
+        Ok(routines.flat_map(|routine| routine.ordinary.comparisons(inputs, &rest)).collect())
+    }
+
     /// Every fault that can be planted in what computes ordinary configurations.
     #[must_use]
     pub fn mutations(&self) -> Vec<Mutation> {
-        let evaluated =
-            ["value", "gradient", "hessian", "force", "jacobians", "constraint_jacobian", "residual", "jacobian"];
         let tapes = std::iter::once(("rest", &self.rest))
-            .chain(self.routines.iter().filter(|r| evaluated.contains(&r.name)).map(|r| (r.name, &r.ordinary)));
+            .chain(self.routines.iter().filter(|r| EVALUATED.contains(&r.name)).map(|r| (r.name, &r.ordinary)));
         let mut list = Vec::new();
         for (routine, tape) in tapes {
             for (place, &before) in tape.ops().iter().enumerate() {

@@ -43,13 +43,24 @@ impl Tape {
         tape
     }
 
-    /// The groups of numbers, and the masks.
-    pub(crate) fn run<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> (Vec<Vec<T>>, Vec<T::Mask>) {
+    fn values<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Vec<Computed<T>> {
         let mut values: Vec<Computed<T>> = Vec::with_capacity(self.ops.len());
         for &op in &self.ops {
             let value = apply(op, inputs, precomputed, |at| number(&values, at), |at| mask(&values, at));
             values.push(value);
         }
+        values
+    }
+
+    /// The outcomes of all comparisons.
+    pub(crate) fn comparisons<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Vec<T::Mask> {
+        let mask = |value| if let Computed::Mask(mask) = value { Some(mask) } else { None };
+        self.values(inputs, precomputed).into_iter().filter_map(mask).collect()
+    }
+
+    /// The groups of numbers, and the masks.
+    pub(crate) fn run<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> (Vec<Vec<T>>, Vec<T::Mask>) {
+        let values = self.values(inputs, precomputed);
         let group = |group: &Vec<NodeId>| group.iter().map(|&at| number(&values, at)).collect();
         (self.groups.iter().map(group).collect(), self.masks.iter().map(|&at| mask(&values, at)).collect())
     }

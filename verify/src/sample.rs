@@ -149,7 +149,7 @@ impl Sampler {
     pub(crate) fn sample(&mut self) -> Sample {
         let declaration = self.declaration;
         let count: usize = declaration.points.iter().map(|point| point.size).sum();
-        let positions = if has_points(declaration) { self.points(count) } else { self.uniforms(count, -1.0, 1.0) };
+        let positions = if has_points(declaration) { self.points(count) } else { self.unknowns(count) };
         let rest = self.rest();
         let mut parameters = Vec::new();
         for parameter in declaration.parameters {
@@ -163,6 +163,12 @@ impl Sampler {
             velocities = self.uniforms(count, -1.0, 1.0);
         }
         Sample { parameters, rest, positions, velocities }
+    }
+
+    /// Unknowns of one size, from ¼ to 4.
+    fn unknowns(&mut self, count: usize) -> Vec<f64> {
+        let scale = self.uniform(-2.0, 2.0).exp2();
+        self.uniforms(count, -scale, scale)
     }
 
     /// An input whose points have small whole coordinates: edges along axes, right angles, components that vanish.
@@ -181,6 +187,25 @@ impl Sampler {
             }
             demand /= 2.0;
         }
+    }
+
+    /// An input that may be anything but degenerate: with unknowns and parameters, or what differs between points, of very
+    /// different sizes.
+    pub(crate) fn odd_sample(&mut self) -> Sample {
+        let mut sample = self.sample();
+        let shrink = |numbers: &mut [f64], random: &mut Rng| {
+            let all = random.bool().then(|| random.i32(-20..1));
+            for x in numbers.iter_mut() {
+                *x *= f64::from(all.unwrap_or_else(|| random.i32(-6..1))).exp2();
+            }
+        };
+        if self.random.bool() {
+            shrink(&mut sample.parameters, &mut self.random);
+        }
+        if self.random.bool() {
+            shrink(&mut sample.positions, &mut self.random);
+        }
+        sample
     }
 
     /// Well-shaped points, scaled and moved at random.

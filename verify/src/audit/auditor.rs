@@ -91,11 +91,6 @@ impl<'a> Auditor<'a> {
         self.subject.answer(sample)
     }
 
-    /// Whether nothing has failed so far.
-    pub(super) fn passed(&self) -> bool {
-        self.lines.iter().all(|line| line.passed)
-    }
-
     /// Notes a finding; `detail` is asked for only if it is the worst of its check and block.
     pub(super) fn record(&mut self, finding: &Finding<'_>, detail: impl FnOnce() -> String) {
         let &Finding { check, block, error, order, sample } = finding;

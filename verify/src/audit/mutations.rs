@@ -1,17 +1,18 @@
 //! How sensitive the audit is: faults are planted in compiled routines, and each must be noticed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use energy_dsl::{Fault, Interpreted, Mutation};
 use fastrand::Rng;
 
-use super::auditor::{Auditor, Case, cases};
+use super::auditor::{Auditor, Case, case, cases};
 use super::report::{Check, Mutant, MutationScore};
 use super::subject::Subject;
 use crate::blocks::NoAnswer;
+use crate::sample::{Sample, Sampler};
 
 /// Inputs a fault may go unnoticed at before it counts as missed.
-const INPUTS: usize = 20;
+const INPUTS: usize = 40;
 
 /// Plants up to `wanted` faults, spread over kinds and routines. Faults that provably change nothing are counted apart.
 ///
@@ -19,7 +20,11 @@ const INPUTS: usize = 20;
 /// When an input has no answer even without a fault.
 pub(super) fn score(interpreted: &Interpreted, wanted: usize, seed: u64) -> Result<MutationScore, String> {
     let subject = subject(interpreted)?;
-    let cases = cases(&subject, INPUTS, INPUTS.min(4), seed ^ 0x6d75_7461_7465);
+    let mut trials: Vec<Trial> = cases(&subject, INPUTS, INPUTS, seed ^ 0x6d75_7461_7465)
+        .into_iter()
+        .map(|case| Trial { case, fails_anyway: Vec::new() })
+        .collect();
+    trials.extend(rare_branches(&subject, interpreted, &trials, seed));
     let mut score = MutationScore::default();
     for mutation in spread(interpreted.mutations(), seed) {
         if score.mutants.len() == wanted {
@@ -29,7 +34,7 @@ pub(super) fn score(interpreted: &Interpreted, wanted: usize, seed: u64) -> Resu
             score.equivalent += 1;
             continue;
         }
-        let caught_by = caught_by(&self::subject(&interpreted.mutated(&mutation))?, &cases);
+        let caught_by = caught_by(&self::subject(&interpreted.mutated(&mutation))?, &trials);
         score.mutants.push(Mutant { fault: mutation.to_string(), caught_by });
     }
     Ok(score)
@@ -40,20 +45,64 @@ fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
     Subject::new(interpreted.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), None)
 }
 
-/// The checks that fail at the first input at which one does.
-fn caught_by(broken: &Subject, cases: &[Case]) -> Vec<Check> {
-    for case in cases {
+/// An input, and the checks that fail there without any fault: near a singularity some routes lose their digits.
+struct Trial {
+    case: Case,
+    fails_anyway: Vec<Check>,
+}
+
+/// One input for each outcome of a comparison that no ordinary input has, as far as a search finds one.
+fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial], seed: u64) -> Vec<Trial> {
+    const CANDIDATES: usize = 4000;
+    let branches = |sample: &Sample| interpreted.branches(&sample.inputs()).ok();
+    let mut seen: BTreeSet<(usize, bool)> = BTreeSet::new();
+    for trial in ordinary {
+        seen.extend(branches(&trial.case.sample).into_iter().flatten().enumerate());
+    }
+    let comparisons = seen.iter().map(|(number, _)| number + 1).max().unwrap_or(0);
+    let mut sampler = Sampler::new(subject.declaration, seed ^ 0x6272_616e_6368);
+    let mut found = Vec::new();
+    for _ in 0..CANDIDATES {
+        if seen.len() == 2 * comparisons {
+            break;
+        }
+        let sample = sampler.odd_sample();
+        let Some(taken) = branches(&sample) else { continue };
+        if taken.iter().enumerate().all(|(number, &outcome)| seen.contains(&(number, outcome))) {
+            continue;
+        }
+        let case = case(subject, sample, sampler.rotation(), true);
+        let mut auditor = Auditor::new(subject);
+        let sound = look(&mut auditor, &case).is_ok();
+        let fails_anyway = failed(&auditor);
+        // Where the code under audit flags its own result, or has none, nothing can be held against it.
+        if sound && !fails_anyway.contains(&Check::Finite) && !fails_anyway.contains(&Check::Accuracy) {
+            seen.extend(taken.into_iter().enumerate());
+            found.push(Trial { case, fails_anyway });
+        }
+    }
+    found
+}
+
+fn failed(auditor: &Auditor<'_>) -> Vec<Check> {
+    let mut checks: Vec<Check> = auditor.lines.iter().filter(|line| !line.passed).map(|line| line.check).collect();
+    checks.sort_unstable();
+    checks.dedup();
+    checks
+}
+
+/// The checks that fail at the first input at which one does that would not without the fault.
+fn caught_by(broken: &Subject, trials: &[Trial]) -> Vec<Check> {
+    for trial in trials {
         let mut auditor = Auditor::new(broken);
-        match look(&mut auditor, case) {
-            Ok(()) if auditor.passed() => {}
-            Ok(()) => {
-                let mut checks: Vec<Check> = auditor.lines.iter().filter(|l| !l.passed).map(|l| l.check).collect();
-                checks.sort_unstable();
-                checks.dedup();
-                return checks;
-            }
-            // What cannot even be evaluated is noticed too.
-            Err(_) => return vec![Check::Finite],
+        // What cannot even be evaluated is noticed too.
+        if look(&mut auditor, &trial.case).is_err() {
+            return vec![Check::Finite];
+        }
+        let mut checks = failed(&auditor);
+        checks.retain(|check| !trial.fails_anyway.contains(check));
+        if !checks.is_empty() {
+            return checks;
         }
     }
     Vec::new()
