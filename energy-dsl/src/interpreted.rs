@@ -168,14 +168,16 @@ impl Interpreted {
         Ok(routines.flat_map(|routine| routine.ordinary.comparisons(inputs, &rest)).collect())
     }
 
-    /// Every fault that can be planted in what computes ordinary configurations.
+    /// Every fault that can be planted in what computes the numbers of ordinary configurations. Operations that only decide
+    /// which of two forms of the same number is computed are left alone: either is right.
     #[must_use]
     pub fn mutations(&self) -> Vec<Mutation> {
         let tapes = std::iter::once(("rest", &self.rest))
             .chain(self.routines.iter().filter(|r| EVALUATED.contains(&r.name)).map(|r| (r.name, &r.ordinary)));
         let mut list = Vec::new();
         for (routine, tape) in tapes {
-            for (place, &before) in tape.ops().iter().enumerate() {
+            let is_number = tape.are_numbers_of_results();
+            for (place, &before) in tape.ops().iter().enumerate().filter(|(place, _)| is_number[*place]) {
                 let planted = faults(before).into_iter().filter(|(_, after)| *after != before);
                 list.extend(planted.map(|(fault, after)| Mutation { fault, routine, place, before, after }));
             }

@@ -194,6 +194,8 @@ pub struct MutationScore {
     pub mutants: Vec<Mutant>,
     /// Faults that were drawn, but proved to change nothing but rounding, and so were not planted.
     pub equivalent: usize,
+    /// Faults that were planted and change results, but by less than two roundoffs of the block at every input tried.
+    pub within_rounding: usize,
 }
 
 impl MutationScore {
