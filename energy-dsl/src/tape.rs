@@ -120,6 +120,8 @@ impl Signed {
         let at = |id: NodeId| signed[id.0 as usize];
         match op {
             Op::Neg(a) => at(a).flipped(true),
+            // Passes a number on.
+            Op::Max(a, b) if a == b => at(a),
             Op::Add(a, b) => Self::sum(g, at(a), at(b)),
             Op::Sub(a, b) => Self::sum(g, at(a), at(b).flipped(true)),
             Op::Mul(a, b) => Self::product(g, at(a), at(b)),

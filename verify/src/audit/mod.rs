@@ -42,7 +42,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 200, truths: 24, mutations: 400, seed: 1 }
+        Self { samples: 200, truths: 24, mutations: 24, seed: 1 }
     }
 }
 

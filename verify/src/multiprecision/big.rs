@@ -231,6 +231,9 @@ impl Number for Big {
     fn power_of_two_scale(self) -> Self {
         Self::from_f64(1.0)
     }
+    fn is_moderate(self, _degree: u8) -> bool {
+        self.is_defined()
+    }
     fn less(self, other: Self) -> bool {
         self.order(&other) == Some(Ordering::Less)
     }
