@@ -38,6 +38,8 @@ mod listing;
 #[cfg(feature = "compiler")]
 mod lower;
 #[cfg(feature = "compiler")]
+mod mathml;
+#[cfg(feature = "compiler")]
 mod mutation;
 #[cfg(feature = "compiler")]
 mod properties;
@@ -64,6 +66,8 @@ pub use functions::{Function, all as functions};
 pub use interpreted::Interpreted;
 #[cfg(feature = "compiler")]
 pub use listing::{Listing, Path};
+#[cfg(feature = "compiler")]
+pub use mathml::mathml;
 #[cfg(feature = "compiler")]
 pub use mutation::{Fault, Mutation};
 #[cfg(feature = "compiler")]

@@ -23,6 +23,7 @@ mod formula;
 mod geometry;
 mod listings;
 pub mod multiprecision;
+mod plot;
 pub mod reference;
 mod sample;
 

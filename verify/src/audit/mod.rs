@@ -3,6 +3,9 @@
 mod accuracy;
 mod auditor;
 mod entry;
+mod html;
+mod input;
+mod junit;
 mod laws;
 mod momentum;
 mod mutations;
@@ -17,6 +20,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use energy_dsl::{Declaration, Element};
 
 use self::auditor::{Auditor, Case, case, cases};
+pub use self::html::html;
+pub use self::input::read_inputs;
+pub use self::junit::junit;
 pub use self::report::{
     Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, describe_failure,
 };

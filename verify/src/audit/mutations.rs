@@ -111,7 +111,7 @@ fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial
         let sound = look(&mut auditor, &case).is_ok();
         let fails_anyway = failed(&auditor);
         // Where the code under audit flags its own result, or has none, nothing can be held against it.
-            if sound && !fails_anyway.contains(&Check::Finite) && !fails_anyway.contains(&Check::Accuracy) {
+        if sound && !fails_anyway.contains(&Check::Finite) && !fails_anyway.contains(&Check::Accuracy) {
             seen.extend(taken.into_iter().enumerate());
             found.push(Trial { case, fails_anyway });
         }

@@ -283,6 +283,29 @@ impl Report {
         names.len()
     }
 
+    /// Adds another report: of each check of a block only the worse line is kept.
+    pub fn merge(&mut self, other: Self) {
+        for line in other.lines {
+            let same = |l: &&mut Line| l.element == line.element && l.check == line.check && l.block == line.block;
+            match self.lines.iter_mut().find(same) {
+                Some(known) => {
+                    let (inputs, passed) = (known.inputs + line.inputs, known.passed && line.passed);
+                    if !line.passed && known.passed || line.worst > known.worst {
+                        *known = line;
+                    }
+                    (known.inputs, known.passed) = (inputs, passed);
+                }
+                None => self.lines.push(line),
+            }
+        }
+        for section in other.sections {
+            if !self.sections.iter().any(|known| known.element == section.element) {
+                self.sections.push(section);
+            }
+        }
+        self.refused.extend(other.refused);
+    }
+
     pub(super) fn extend(&mut self, other: Self) {
         self.lines.extend(other.lines);
         self.sections.extend(other.sections);
