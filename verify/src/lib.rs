@@ -26,6 +26,7 @@ pub mod multiprecision;
 mod plot;
 pub mod reference;
 mod sample;
+pub mod stress;
 
 pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;

@@ -8,7 +8,8 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use verify::audit::{Options, Report, Target, audit_all, audit_at, catalogue_targets, describe_failure};
-use verify::reference::{BlockLine, PolicyLine, ReferenceReport, Source, evaluate_file, reference};
+use verify::reference::{BlockLine, PolicyLine, ReferenceReport, Source, evaluate_file, policy, reference};
+use verify::stress::{markdown, plots, stress};
 
 /// Audits the derivatives of declared elements, and measures them against multi-precision reference values.
 #[derive(Parser)]
@@ -45,7 +46,7 @@ enum Command {
         against: Option<String>,
         /// Audit at the input of this file only: one object with `positions`, `velocities`, `rest`, `parameters`, or a report
         /// written by `--json`, whose inputs are all run again.
-        #[arg(long, value_name = "FILE", conflicts_with_all = ["samples", "seed", "quick", "faults", "against"])]
+        #[arg(long, value_name = "FILE", conflicts_with_all = ["samples", "seed", "quick", "faults"])]
         at: Option<PathBuf>,
         /// Also write the report to this file.
         #[arg(long)]
@@ -68,6 +69,16 @@ enum Command {
         /// Exit status 1 on anything beyond tier A or B as well.
         #[arg(long)]
         strict: bool,
+    },
+    /// Sweep towards every singularity, down to 1e-300, and compare the generated code with the textbook form; then try every
+    /// degenerate input with a documented answer. Exit status 1 on a NaN, an error beyond 8 u·κ that is not flagged, or an answer
+    /// that is not the documented one.
+    Stress {
+        /// Elements; all of them if none is named.
+        names: Vec<String>,
+        /// Also write `stress.md`, `stress.json` and a plot of each sweep to this folder.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
     },
     /// Print the code generated for an element.
     Show {
@@ -115,12 +126,10 @@ fn run(command: Command) -> anyhow::Result<bool> {
                 false => Options { samples, seed, mutations: faults, ..Options::default() },
             };
             let targets = targets(&names, file.as_deref())?;
+            let energy = against.map(|name| target_of_energy(&name, file.as_deref())).transpose()?;
             let report = match at {
-                Some(at) => audit_at_inputs(&targets, &at)?,
-                None => {
-                    let energy = against.map(|name| target_of_energy(&name, file.as_deref())).transpose()?;
-                    audit_all(&targets, energy.as_ref(), options)
-                }
+                Some(at) => audit_at_inputs(&targets, energy.as_ref(), &at)?,
+                None => audit_all(&targets, energy.as_ref(), options),
             };
             print_audit(&report);
             write_json(json.as_deref(), &report)?;
@@ -129,7 +138,7 @@ fn run(command: Command) -> anyhow::Result<bool> {
             Ok(report.passed())
         }
         Command::Reference { folder, json, strict } => {
-            let folder = folder.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials"));
+            let folder = folder.unwrap_or_else(records);
             let report = reference(&folder)?;
             print_reference(&report);
             write_json(json.as_deref(), &report)?;
@@ -137,6 +146,27 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let beyond = report.lines.iter().any(|l| !l.beyond_tier_a.is_empty() || !l.beyond_tier_b.is_empty());
             let policy = report.policy.iter().all(|line| line.passed != Some(false));
             Ok(!nan && policy && !(strict && beyond))
+        }
+        Command::Stress { names, output } => {
+            let mut tracks = Vec::new();
+            for target in targets(&names, None)? {
+                tracks.extend(stress(&target).map_err(anyhow::Error::msg)?);
+            }
+            let table = markdown(&tracks);
+            print!("{table}");
+            if let Some(folder) = output {
+                std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+                write_text(Some(&folder.join("stress.md")), || table)?;
+                write_json(Some(&folder.join("stress.json")), &tracks)?;
+                for (file, svg) in plots(&tracks) {
+                    write_text(Some(&folder.join(file)), || svg)?;
+                }
+            }
+            let policy = policy(&records().join("policy.json"))?;
+            print_policy(&policy);
+            let failed = tracks.iter().filter(|track| !track.passed()).count();
+            println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
+            Ok(failed == 0 && policy.iter().all(|line| line.passed != Some(false)))
         }
         Command::Show { name, routine, plan, counts } => {
             for listing in verify::listings(&name)? {
@@ -186,7 +216,7 @@ fn target_of_energy(name: &str, file: Option<&Path>) -> anyhow::Result<Target> {
 }
 
 /// All checks at the inputs of a file, each at the element it names, or all at the one target.
-fn audit_at_inputs(targets: &[Target], file: &Path) -> anyhow::Result<Report> {
+fn audit_at_inputs(targets: &[Target], energy: Option<&Target>, file: &Path) -> anyhow::Result<Report> {
     let inputs = verify::audit::read_inputs(file)?;
     let mut report = Report::default();
     for (element, sample) in &inputs {
@@ -200,11 +230,16 @@ fn audit_at_inputs(targets: &[Target], file: &Path) -> anyhow::Result<Report> {
             file.display()
         );
         for target in chosen {
-            let part = audit_at(target, sample).map_err(|why| anyhow::anyhow!("{}: {why}", file.display()))?;
+            let part = audit_at(target, energy, sample).map_err(|why| anyhow::anyhow!("{}: {why}", file.display()))?;
             report.merge(part);
         }
     }
     Ok(report)
+}
+
+/// The reference records of this repository.
+fn records() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials")
 }
 
 fn write_text(path: Option<&Path>, text: impl FnOnce() -> String) -> anyhow::Result<()> {

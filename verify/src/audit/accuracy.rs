@@ -24,7 +24,7 @@ pub(super) fn in_roundoffs(truth: &TrueBlock, got: &[f64], natural: f64) -> f64 
 /// κ of a block: how much a relative componentwise perturbation of the edges between points (and of those of the rest shape; of
 /// what is no point, of every number) is amplified, in the largest norm; the most of sixteen random patterns of signs. What forms
 /// edges in working precision cannot in general be more accurate than κ roundoffs.
-pub(super) fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
+pub(crate) fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
     // Large against rounding, small against all else.
     const PERTURBATION: f64 = 1.0 / (1 << 20) as f64;
     let here = answer.block(block);

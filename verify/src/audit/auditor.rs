@@ -10,7 +10,7 @@ use crate::blocks::{Answer, Block, BlockName, NoAnswer};
 use crate::finite_difference::{Stepped, antiderivative};
 use crate::formula::expected_blocks;
 use crate::geometry::{Rotation, rotate_all};
-use crate::multiprecision::{TrueBlock, truth};
+use crate::multiprecision::{TrueBlock, truth_of_ordinary};
 use crate::sample::{Sample, Sampler};
 
 /// An input, with what does not depend on the code under audit.
@@ -59,7 +59,7 @@ pub(super) fn case(subject: &Subject, sample: Sample, turn: Rotation, with_truth
     let Subject { declaration, formula, .. } = subject;
     Case {
         dual: expected_blocks(declaration, formula, &sample),
-        truth: if with_truth { truth(declaration, formula, &sample, DIGITS) } else { Vec::new() },
+        truth: if with_truth { truth_of_ordinary(declaration, formula, &sample, DIGITS) } else { Vec::new() },
         sample,
         turn,
     }

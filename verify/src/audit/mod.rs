@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use energy_dsl::{Declaration, Element};
 
+pub(crate) use self::accuracy::amplification;
 use self::auditor::{Auditor, Case, case, cases};
 pub use self::html::html;
 pub use self::input::read_inputs;
@@ -26,7 +27,7 @@ pub use self::junit::junit;
 pub use self::report::{
     Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, describe_failure,
 };
-use self::subject::Subject;
+pub(crate) use self::subject::Subject;
 pub use self::subject::Target;
 use crate::blocks::{BlockName, Evaluate, NoAnswer};
 use crate::geometry::{Rotation, longest_distance, shortest_distance};
@@ -127,7 +128,7 @@ fn audit_target(target: &Target, energy: Option<&Target>, options: Options) -> R
 ///
 /// # Errors
 /// When the element cannot be audited, or the input does not fit it.
-pub fn audit_at(target: &Target, sample: &Sample) -> Result<Report, String> {
+pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Result<Report, String> {
     let subject = target.subject()?;
     sample.fits(subject.declaration)?;
     let turn = Rotation::from_unit_quaternion([0.5, -0.5, 0.5, 0.5]);
@@ -135,6 +136,9 @@ pub fn audit_at(target: &Target, sample: &Sample) -> Result<Report, String> {
     let mut section = section(&subject, 1);
     let mut auditor = Auditor::new(&subject);
     audit_case(&mut auditor, &mut section, &case).map_err(|error| error.to_string())?;
+    if let Some(energy) = energy {
+        against_energy(&mut auditor, &energy.subject()?, &case)?;
+    }
     Ok(Report { lines: auditor.lines, sections: vec![section], refused: Vec::new() })
 }
 

@@ -58,7 +58,7 @@ impl Auditor<'_> {
         routes.push(Route { name: "dual numbers".into(), numbers: &case.dual(block.name).numbers, uncertainty: dual });
         if let Some((lower, sweep)) = differences {
             routes.push(Route {
-                name: format!("differences of `{lower}`"),
+                name: format!("differences of `{lower}` (step {:.1e})", sweep.step),
                 numbers: &sweep.best,
                 uncertainty: Check::FiniteDifferences.tolerance(),
             });

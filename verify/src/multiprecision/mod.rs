@@ -11,5 +11,5 @@ mod truth;
 
 pub use big::Big;
 pub(crate) use jet::{Jet, Order};
-pub(crate) use truth::worse;
 pub use truth::{TrueBlock, truth};
+pub(crate) use truth::{truth_of_ordinary, worse};

@@ -6,9 +6,9 @@ use crate::blocks::Block;
 use crate::formula::blocks_over;
 use crate::sample::Sample;
 
-/// The precision from which on a block that only holds what shrinks with the precision is exactly zero: 1e-1800 of what was
-/// subtracted.
-const HIGHEST: usize = 6144;
+/// The precision from which on a block that only holds what shrinks with the precision is exactly zero: 1e-780 of what was
+/// subtracted, which is less than the square of the smallest double to that of 1.
+const HIGHEST: usize = 2600;
 
 /// A block of true numbers.
 #[derive(Clone, Debug)]
@@ -75,6 +75,34 @@ pub(crate) fn worse(a: f64, b: f64) -> f64 {
 /// ```
 #[must_use]
 pub fn truth(declaration: &Declaration, formula: &Textbook, sample: &Sample, digits: usize) -> Vec<TrueBlock> {
+    at_rising_precision(declaration, formula, sample, digits, Zeros::Confirmed)
+}
+
+/// The same where nothing cancels to the last digit: a block that comes out as exactly zero is taken to be so.
+pub(crate) fn truth_of_ordinary(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+    digits: usize,
+) -> Vec<TrueBlock> {
+    at_rising_precision(declaration, formula, sample, digits, Zeros::Believed)
+}
+
+/// What to make of a block that is exactly zero at some precision: 1 − x is, for x nearer to 1 than its last bit.
+#[derive(Clone, Copy, PartialEq)]
+enum Zeros {
+    Believed,
+    /// Only at the highest precision.
+    Confirmed,
+}
+
+fn at_rising_precision(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+    digits: usize,
+    zeros: Zeros,
+) -> Vec<TrueBlock> {
     // log₂ 10, and some bits for ordinary cancellation.
     let wanted = digits * 333 / 100 + 1;
     let at = |bits: usize| with_precision(bits, || blocks_over::<Big>(declaration, formula, sample));
@@ -85,7 +113,7 @@ pub fn truth(declaration: &Declaration, formula: &Textbook, sample: &Sample, dig
         bits = if settled.iter().all(Option::is_none) && bits == wanted + 48 { bits + bits / 2 } else { 2 * bits };
         let fine = at(bits);
         for (number, slot) in settled.iter_mut().enumerate().filter(|(_, slot)| slot.is_none()) {
-            *slot = agreed(&coarse[number], &fine[number], wanted, bits);
+            *slot = agreed(&coarse[number], &fine[number], wanted, bits, zeros);
         }
         if settled.iter().all(Option::is_some) {
             return settled.into_iter().flatten().collect();
@@ -95,13 +123,14 @@ pub fn truth(declaration: &Declaration, formula: &Textbook, sample: &Sample, dig
 }
 
 /// The block, if two precisions agree on it, or the higher one is the highest.
-fn agreed(coarse: &Block<Big>, fine: &Block<Big>, wanted: usize, bits: usize) -> Option<TrueBlock> {
+fn agreed(coarse: &Block<Big>, fine: &Block<Big>, wanted: usize, bits: usize, zeros: Zeros) -> Option<TrueBlock> {
     let wanted = -i64::try_from(wanted).unwrap_or(i64::MAX);
     let is_defined = fine.numbers.iter().all(Big::is_defined);
     let scale = largest(&fine.numbers);
     let close = |(a, b): (&Big, &Big)| (a.clone() - b.clone()).is_within(&scale, wanted);
     let agree = coarse.numbers.iter().zip(&fine.numbers).all(close);
-    if is_defined && !agree && bits < HIGHEST {
+    let is_doubtful = zeros == Zeros::Confirmed && scale.is_zero();
+    if is_defined && (!agree || is_doubtful) && bits < HIGHEST {
         return None;
     }
     let cleaned = coarse.numbers.iter().zip(&fine.numbers).map(|(a, b)| {
