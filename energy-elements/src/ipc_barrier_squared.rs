@@ -9,6 +9,8 @@ energy! {
         let d = p_k - p_l;
         let r = norm(d);
         let e = (r - dhat) * (r + dhat);
-        if r < dhat { κ * e^2 * log1p(-e / norm_squared(d)) } else { 0 }
+        // Where the points meet, infinite with derivatives that are taken as 0, and flagged.
+        let b = if r > 0 { κ * e^2 * log1p(-e / norm_squared(d)) } else { κ * dhat^4 / sign(r) };
+        if r < dhat { b } else { 0 }
     }
 }

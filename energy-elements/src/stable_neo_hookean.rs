@@ -17,14 +17,15 @@ energy! {
         let a = x1 - x0;
         let b = x2 - x0;
         let F = columns(a, b) * B;
-        // FᵀF − 1, and J − 1.
-        let G = (transpose(F) * F - d2 * identity(2)) / d2;
-        let j = (norm(cross(a, b)) - d) / d;
-        let uu = dot(vector(1, 0), G * vector(1, 0));
-        let uv = dot(vector(1, 0), G * vector(0, 1));
-        let vv = dot(vector(0, 1), G * vector(0, 1));
-        // (s₁² − s₂²)²/(s₁ + s₂)².
-        let shape = ((uu - vv)^2 + 4 * uv^2) / (4 + uu + vv + 2 * j);
+        let f_u = F * vector(1, 0);
+        let f_v = F * vector(0, 1);
+        let area = norm(cross(a, b));
+        // J − 1.
+        let j = (area - d) / d;
+        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        let square = ddot(F, F) / d2 + 2 * area / d;
+        let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
+        let shape = anisotropy / square;
         d / 4 * (μ * shape + λ * j^2)
     }
 }
