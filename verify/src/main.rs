@@ -291,11 +291,13 @@ fn print_audit(report: &Report) {
     let scores: Vec<_> = report.sections.iter().filter_map(|section| section.mutations.as_ref()).collect();
     if !scores.is_empty() {
         println!(
-            "\n{} of {} planted faults noticed; {} drawn ones proved to change nothing, {} to change last bits only",
+            "\n{} of {} planted faults noticed; of others drawn, {} provably change nothing, {} change last bits only, {} change \
+             nothing at any input tried",
             scores.iter().map(|score| score.caught()).sum::<usize>(),
             scores.iter().map(|score| score.mutants.len()).sum::<usize>(),
             scores.iter().map(|score| score.equivalent).sum::<usize>(),
-            scores.iter().map(|score| score.within_rounding).sum::<usize>()
+            scores.iter().map(|score| score.within_rounding).sum::<usize>(),
+            scores.iter().map(|score| score.without_effect).sum::<usize>()
         );
     }
     println!(

@@ -152,8 +152,11 @@ impl Sampler {
         let positions = if has_points(declaration) { self.points(count) } else { self.unknowns(count) };
         let rest = self.rest();
         let mut parameters = Vec::new();
+        // Lengths are of the size of the configuration, so that springs are short and long, and barriers near and far.
+        let length = if has_points(declaration) { shortest_distance(&positions).unwrap_or(1.0) } else { 1.0 };
         for parameter in declaration.parameters {
-            parameters.extend(self.parameter(parameter));
+            let scale = if parameter.unit == "m" { length } else { 1.0 };
+            parameters.extend(self.parameter(parameter).into_iter().map(|x| scale * x));
         }
         let mut velocities = Vec::new();
         if declaration.kind == Kind::Constraint {

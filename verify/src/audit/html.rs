@@ -187,12 +187,14 @@ fn faults(page: &mut String, section: &Section) {
     let Some(score) = &section.mutations else { return };
     let _ = writeln!(
         page,
-        "<h3>Planted faults</h3><p>{} of {} noticed; {} drawn ones proved to change nothing, {} change last bits only.</p>\
+        "<h3>Planted faults</h3><p>{} of {} noticed; of others drawn, {} provably change nothing, {} change last bits only, {} change nothing at \
+         any input tried.</p>\
          <details><summary>which check notices which</summary><table><tr><th>fault</th><th>noticed by</th></tr>",
         score.caught(),
         score.mutants.len(),
         score.equivalent,
-        score.within_rounding
+        score.within_rounding,
+        score.without_effect
     );
     for mutant in &score.mutants {
         let by: Vec<&str> = mutant.caught_by.iter().map(|check: &Check| check.title()).collect();

@@ -43,13 +43,15 @@ pub struct Options {
     pub truths: usize,
     /// Faults to plant in each element.
     pub mutations: usize,
+    /// At how many inputs a fault may show.
+    pub trials: usize,
     /// What the inputs are drawn from.
     pub seed: u64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 200, truths: 24, mutations: 24, seed: 1 }
+        Self { samples: 200, truths: 24, mutations: 24, trials: 40, seed: 1 }
     }
 }
 
@@ -57,7 +59,7 @@ impl Options {
     /// For every change of the code: seconds for all elements.
     #[must_use]
     pub fn quick() -> Self {
-        Self { samples: 20, truths: 5, mutations: 10, ..Self::default() }
+        Self { samples: 20, truths: 5, mutations: 10, trials: 15, ..Self::default() }
     }
 }
 
@@ -162,7 +164,8 @@ fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<
     let lines = auditor.lines;
     // Faults in what is at fault already tell nothing.
     if options.mutations > 0 && lines.iter().all(|line| line.passed) {
-        let score = subject.interpreted.as_ref().map(|i| mutations::score(i, options.mutations, options.seed));
+        let score =
+            subject.interpreted.as_ref().map(|i| mutations::score(i, options.mutations, options.trials, options.seed));
         section.mutations = score.transpose()?;
     }
     Ok(Report { lines, sections: vec![section], refused: Vec::new() })

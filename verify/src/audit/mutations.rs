@@ -12,16 +12,18 @@ use crate::blocks::NoAnswer;
 use crate::multiprecision::{Big, worse};
 use crate::sample::{Sample, Sampler};
 
-/// Inputs a fault may go unnoticed at before it counts as missed.
-const INPUTS: usize = 40;
-
-/// Plants up to `wanted` faults, spread over kinds and routines. Faults that provably change nothing are counted apart.
+/// Plants up to `wanted` faults, spread over kinds and routines; each has so many inputs to show at. Faults that provably change nothing are counted apart.
 ///
 /// # Errors
 /// When an input has no answer even without a fault.
-pub(super) fn score(interpreted: &Interpreted, wanted: usize, seed: u64) -> Result<MutationScore, String> {
+pub(super) fn score(
+    interpreted: &Interpreted,
+    wanted: usize,
+    inputs: usize,
+    seed: u64,
+) -> Result<MutationScore, String> {
     let subject = subject(interpreted)?;
-    let mut trials: Vec<Trial> = cases(&subject, INPUTS, INPUTS, seed ^ 0x6d75_7461_7465)
+    let mut trials: Vec<Trial> = cases(&subject, inputs, inputs, seed ^ 0x6d75_7461_7465)
         .into_iter()
         .map(|case| Trial { case, fails_anyway: Vec::new() })
         .collect();
@@ -37,9 +39,18 @@ pub(super) fn score(interpreted: &Interpreted, wanted: usize, seed: u64) -> Resu
         }
         let broken = interpreted.mutated(&mutation);
         let caught_by = caught_by(&self::subject(&broken)?, &trials);
-        if caught_by.is_empty() && is_within_rounding(interpreted, &broken, &trials) {
-            score.within_rounding += 1;
-            continue;
+        if caught_by.is_empty() {
+            match largest_difference(interpreted, &broken, &trials) {
+                Some(0.0) => {
+                    score.without_effect += 1;
+                    continue;
+                }
+                Some(difference) if difference < Check::Accuracy.tolerance() * f64::EPSILON / 2.0 => {
+                    score.within_rounding += 1;
+                    continue;
+                }
+                _ => {}
+            }
         }
         score.mutants.push(Mutant { fault: mutation.to_string(), caught_by });
     }
@@ -51,12 +62,12 @@ fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
     Subject::new(interpreted.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), None)
 }
 
-/// Whether a fault shows, but nowhere by more than a result's last bits: computed in multi-precision with and without it, all
-/// blocks differ by less than two roundoffs at every input, and by something at one. So does the last coefficient of a series.
-fn is_within_rounding(sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> bool {
-    let differences: Option<Vec<f64>> =
-        trials.iter().map(|trial| exact_difference(sound, broken, &trial.case.sample)).collect();
-    differences.is_some_and(|list| list.iter().all(|&d| d < f64::EPSILON) && list.iter().any(|&d| d > 0.0))
+/// How much a fault that went unnoticed changes results, without rounding: the largest difference of a block at any input. The last
+/// coefficient of a series changes its last bits; an operation that no input reaches, or whose other operand is 1 wherever
+/// it counts, changes nothing.
+fn largest_difference(sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> Option<f64> {
+    let mut differences = trials.iter().map(|trial| exact_difference(sound, broken, &trial.case.sample));
+    differences.try_fold(0.0_f64, |most, difference| Some(most.max(difference?)))
 }
 
 /// The largest difference of a block in units of its largest number, without rounding.

@@ -33,15 +33,13 @@ pub enum Check {
     MinusGradient,
     /// What velocities add to a force takes power away.
     Dissipation,
-    /// The Hessian projected to be positive semi-definite is so, and is the nearest that is.
-    Projection,
     /// No number is NaN or infinite, and no condition is flagged, at an ordinary input.
     Finite,
 }
 
 impl Check {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 14] = [
         Self::Accuracy,
         Self::DualNumbers,
         Self::FiniteDifferences,
@@ -55,7 +53,6 @@ impl Check {
         Self::RestStability,
         Self::MinusGradient,
         Self::Dissipation,
-        Self::Projection,
         Self::Finite,
     ];
 
@@ -76,7 +73,6 @@ impl Check {
             Self::RestStability => "stable at rest",
             Self::MinusGradient => "f = −∇U",
             Self::Dissipation => "damping dissipates",
-            Self::Projection => "projection",
             Self::Finite => "finite",
         }
     }
@@ -94,7 +90,7 @@ impl Check {
             Self::Symmetry | Self::Translation | Self::Units | Self::Finite => 0.0,
             Self::Routines => 1e-13,
             Self::LinearMomentum => 16.0 * f64::EPSILON / 2.0,
-            Self::MinusGradient | Self::RestStability | Self::Dissipation | Self::Projection => 1e-12,
+            Self::MinusGradient | Self::RestStability | Self::Dissipation => 1e-12,
             Self::AngularMomentum => 1e-11,
         }
     }
@@ -194,8 +190,10 @@ pub struct MutationScore {
     pub mutants: Vec<Mutant>,
     /// Faults that were drawn, but proved to change nothing but rounding, and so were not planted.
     pub equivalent: usize,
-    /// Faults that were planted and change results, but by less than two roundoffs of the block at every input tried.
+    /// Faults that were planted and change results, but at every input tried by less than the roundoffs that accuracy is allowed.
     pub within_rounding: usize,
+    /// Faults that were planted and change nothing at any input tried, not even in multi-precision: what no ordinary input reaches.
+    pub without_effect: usize,
 }
 
 impl MutationScore {
