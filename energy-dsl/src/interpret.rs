@@ -3,17 +3,30 @@
 use crate::graph::{Graph, Input, NodeId, Op, reachable};
 use crate::runtime::{Baseline, Inputs, Mask, Number};
 
+/// What an operation yields.
 #[derive(Clone)]
-enum Computed<T: Number> {
+pub enum Computed<T: Number> {
+    /// A number.
     Number(T),
+    /// The outcome of a comparison.
     Mask(T::Mask),
 }
 
 /// The values of `outputs`, none of which may be a mask.
 pub fn interpret<T: Number>(graph: &Graph, outputs: &[NodeId], inputs: &Inputs<'_, T>) -> Vec<T> {
+    interpret_with(graph, outputs, inputs, &[])
+}
+
+/// The same of a graph that reads numbers computed before.
+pub fn interpret_with<T: Number>(
+    graph: &Graph,
+    outputs: &[NodeId],
+    inputs: &Inputs<'_, T>,
+    precomputed: &[T],
+) -> Vec<T> {
     let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
     for node in reachable(graph, outputs) {
-        values[node.0 as usize] = Some(compute(graph, node, inputs, &values));
+        values[node.0 as usize] = Some(compute(graph, node, inputs, precomputed, &values));
     }
     outputs.iter().map(|&o| number(graph, &values, o)).collect()
 }
@@ -22,7 +35,7 @@ pub fn interpret<T: Number>(graph: &Graph, outputs: &[NodeId], inputs: &Inputs<'
 pub fn interpret_mask<T: Number>(graph: &Graph, output: NodeId, inputs: &Inputs<'_, T>) -> T::Mask {
     let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
     for node in reachable(graph, &[output]) {
-        values[node.0 as usize] = Some(compute(graph, node, inputs, &values));
+        values[node.0 as usize] = Some(compute(graph, node, inputs, &[], &values));
     }
     mask(graph, &values, output)
 }
@@ -45,14 +58,26 @@ fn compute<T: Number>(
     graph: &Graph,
     node: NodeId,
     inputs: &Inputs<'_, T>,
+    precomputed: &[T],
     values: &[Option<Computed<T>>],
 ) -> Computed<T> {
     let n = |node| number(graph, values, node);
     let m = |node| mask::<T>(graph, values, node);
-    Computed::Number(match graph.fused(node) {
+    apply(graph.fused(node), inputs, precomputed, n, m)
+}
+
+/// One operation, its operands found by `n` and `m`.
+pub fn apply<T: Number>(
+    op: Op,
+    inputs: &Inputs<'_, T>,
+    precomputed: &[T],
+    n: impl Fn(NodeId) -> T,
+    m: impl Fn(NodeId) -> T::Mask,
+) -> Computed<T> {
+    Computed::Number(match op {
         Op::Constant(bits) => T::from_f64(f64::from_bits(bits)),
         Op::Pi => T::from_f64(0.0).atan2::<Baseline>(T::from_f64(-1.0)),
-        Op::Input(input) => read(input, inputs),
+        Op::Input(input) => read(input, inputs, precomputed),
         Op::Neg(a) => -n(a),
         Op::Add(a, b) => n(a) + n(b),
         Op::Sub(a, b) => n(a) - n(b),
@@ -91,12 +116,12 @@ fn compute<T: Number>(
     })
 }
 
-fn read<T: Number>(input: Input, inputs: &Inputs<'_, T>) -> T {
+fn read<T: Number>(input: Input, inputs: &Inputs<'_, T>, precomputed: &[T]) -> T {
     match input {
         Input::Position(i) => inputs.positions[usize::from(i)].clone(),
         Input::Velocity(i) => inputs.velocities.get(usize::from(i)).cloned().unwrap_or_else(|| T::from_f64(0.0)),
         Input::Parameter(i) => inputs.parameters[usize::from(i)].clone(),
         Input::Rest(i) => inputs.rest[usize::from(i)].clone(),
-        Input::Precomputed(_) => unreachable!("compiler bug: the interpreter runs whole programs"),
+        Input::Precomputed(i) => precomputed[usize::from(i)].clone(),
     }
 }

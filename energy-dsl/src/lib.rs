@@ -32,9 +32,15 @@ mod graph;
 #[cfg(feature = "compiler")]
 mod interpret;
 #[cfg(feature = "compiler")]
+mod interpreted;
+#[cfg(feature = "compiler")]
 mod listing;
 #[cfg(feature = "compiler")]
 mod lower;
+#[cfg(feature = "compiler")]
+mod mathml;
+#[cfg(feature = "compiler")]
+mod mutation;
 #[cfg(feature = "compiler")]
 mod properties;
 #[cfg(feature = "compiler")]
@@ -42,16 +48,28 @@ mod routines;
 #[cfg(feature = "compiler")]
 mod syntax;
 #[cfg(feature = "compiler")]
+mod tape;
+#[cfg(feature = "compiler")]
 mod textbook;
+#[cfg(feature = "compiler")]
+mod tower;
 
 pub use runtime::*;
 
+#[cfg(feature = "compiler")]
+pub use check::unit_exponents;
 #[cfg(feature = "compiler")]
 pub use diagnostic::{Diagnostic, Diagnostics};
 #[cfg(feature = "compiler")]
 pub use functions::{Function, all as functions};
 #[cfg(feature = "compiler")]
+pub use interpreted::Interpreted;
+#[cfg(feature = "compiler")]
 pub use listing::{Listing, Path};
+#[cfg(feature = "compiler")]
+pub use mathml::mathml;
+#[cfg(feature = "compiler")]
+pub use mutation::{Fault, Mutation};
 #[cfg(feature = "compiler")]
 pub use textbook::Textbook;
 

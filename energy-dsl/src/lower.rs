@@ -42,12 +42,21 @@ pub fn lower(program: &Program) -> (RestFormula, Formula) {
     (rest, Formula { graph: moving.graph, outputs })
 }
 
+/// A program as it is printed, nothing differentiated.
+#[derive(Clone, Debug)]
+pub struct TextbookFormula {
+    /// The formula, where the derivatives that it names are [`Input::Precomputed`], three to each.
+    pub formula: Formula,
+    /// The derivatives it names: of which node by which point. A later one may read earlier ones.
+    pub gradients: Vec<(NodeId, usize)>,
+}
+
 /// The whole program in its textbook form.
 #[must_use]
-pub fn lower_textbook(program: &Program) -> Formula {
+pub fn lower_textbook(program: &Program) -> TextbookFormula {
     let mut lowering = Lowering::new(program, Form::Textbook, None);
     let outputs = lowering.expression(&program.result).parts;
-    Formula { graph: lowering.graph, outputs }
+    TextbookFormula { formula: Formula { graph: lowering.graph, outputs }, gradients: lowering.gradients }
 }
 
 /// The bindings of the `rest` block that the moving part reads, in order.
@@ -76,11 +85,13 @@ struct Lowering<'a> {
     done: BTreeMap<usize, Lowered>,
     /// Where the stored bindings start, when they are read and not computed.
     slots: Option<BTreeMap<usize, usize>>,
+    /// In the textbook form, the derivatives left to whoever evaluates it.
+    gradients: Vec<(NodeId, usize)>,
 }
 
 impl<'a> Lowering<'a> {
     fn new(program: &'a Program, form: Form, slots: Option<BTreeMap<usize, usize>>) -> Self {
-        Self { program, graph: Graph::new(form), done: BTreeMap::new(), slots }
+        Self { program, graph: Graph::new(form), done: BTreeMap::new(), slots, gradients: Vec::new() }
     }
 
     fn inputs(&mut self, shape: Shape, first: usize, input: fn(u16) -> Input) -> Lowered {
@@ -138,6 +149,14 @@ impl<'a> Lowering<'a> {
     }
 
     fn gradient(&mut self, of: NodeId, point: usize) -> Vec<NodeId> {
+        if self.graph.form() == Form::Textbook {
+            let known = self.gradients.iter().position(|&known| known == (of, point));
+            let number = known.unwrap_or_else(|| {
+                self.gradients.push((of, point));
+                self.gradients.len() - 1
+            });
+            return self.inputs(Shape::Vector(3), 3 * number, Input::Precomputed).parts;
+        }
         let g = &mut self.graph;
         let coordinates = Coordinates::of_points(g, &[of], Moving::Positions);
         let reduced = first_derivatives(g, &[of], &coordinates).remove(0);

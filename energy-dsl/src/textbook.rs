@@ -2,10 +2,12 @@ use proc_macro2::TokenStream;
 
 use crate::check::{Program, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
-use crate::interpret::interpret;
-use crate::lower::{Formula, lower_textbook};
+use crate::graph::{Input, NodeId, Op, reachable};
+use crate::interpret::interpret_with;
+use crate::lower::{TextbookFormula, lower_textbook};
 use crate::runtime::{Inputs, Number};
-use crate::syntax::parse;
+use crate::syntax::{parse, parse_file};
+use crate::tower::Tower;
 
 /// A declaration in its printed form, without robust primitives and rewrites, to be evaluated over any number type: what an
 /// audit holds generated code against.
@@ -19,7 +21,7 @@ use crate::syntax::parse;
 #[derive(Clone, Debug)]
 pub struct Textbook {
     program: Program,
-    formula: Formula,
+    formula: TextbookFormula,
 }
 
 impl Textbook {
@@ -44,10 +46,77 @@ impl Textbook {
 
     /// The value, row by row: U; C; the forces, three numbers to a point; or r. A constraint's stiffness and damping are not read.
     ///
+    /// A derivative that the formula names (`gradient(U, p)`) is had by dual numbers over `T`: nothing of the compiler's own
+    /// differentiation is used.
+    ///
     /// # Panics
     /// When an input slice is shorter than declared.
     pub fn evaluate<T: Number>(&self, inputs: &Inputs<'_, T>) -> Vec<T> {
-        interpret(&self.formula.graph, &self.formula.outputs, inputs)
+        let formula = &self.formula.formula;
+        if self.formula.gradients.is_empty() {
+            return interpret_with(&formula.graph, &formula.outputs, inputs, &[]);
+        }
+        let inputs = TowerInputs::of(inputs);
+        let gradients = self.gradients(&formula.outputs, &inputs, 1);
+        let rows = interpret_with(&formula.graph, &formula.outputs, &inputs.borrow(), &gradients);
+        rows.into_iter().map(Tower::into_plain).collect()
+    }
+
+    /// The named derivatives that `outputs` read, three numbers to each (0 for those they do not read), each moved by an ε of
+    /// its own depth.
+    fn gradients<T: Number>(&self, outputs: &[NodeId], inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
+        let graph = &self.formula.formula.graph;
+        let mut numbers = vec![Tower::from_f64(0.0); 3 * self.formula.gradients.len()];
+        for node in reachable(graph, outputs) {
+            let Op::Input(Input::Precomputed(number)) = graph.op(node) else { continue };
+            let number = usize::from(number);
+            let (of, point) = self.formula.gradients[number / 3];
+            let moved = inputs.raised(3 * point + number % 3, depth);
+            let within = self.gradients(&[of], &moved, depth + 1);
+            numbers[number] = interpret_with(graph, &[of], &moved.borrow(), &within).remove(0).slope(depth);
+        }
+        numbers
+    }
+}
+
+/// Inputs as towers of dual numbers.
+struct TowerInputs<T> {
+    parameters: Vec<Tower<T>>,
+    rest: Vec<Tower<T>>,
+    positions: Vec<Tower<T>>,
+    velocities: Vec<Tower<T>>,
+}
+
+impl<T: Number> TowerInputs<T> {
+    fn of(inputs: &Inputs<'_, T>) -> Self {
+        let plain = |numbers: &[T]| numbers.iter().cloned().map(Tower::Plain).collect::<Vec<_>>();
+        Self {
+            parameters: plain(inputs.parameters),
+            rest: plain(inputs.rest),
+            positions: plain(inputs.positions),
+            velocities: plain(inputs.velocities),
+        }
+    }
+
+    /// One coordinate moved by the ε of this depth.
+    fn raised(&self, coordinate: usize, depth: usize) -> Self {
+        let mut positions = self.positions.clone();
+        positions[coordinate] = positions[coordinate].clone().raised(depth);
+        Self {
+            parameters: self.parameters.clone(),
+            rest: self.rest.clone(),
+            positions,
+            velocities: self.velocities.clone(),
+        }
+    }
+
+    fn borrow(&self) -> Inputs<'_, Tower<T>> {
+        Inputs {
+            parameters: &self.parameters,
+            rest: &self.rest,
+            positions: &self.positions,
+            velocities: &self.velocities,
+        }
     }
 }
 
@@ -65,6 +134,18 @@ pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
         )
     })?;
     let items = parse(stream, &mut diagnostics);
+    let programs = check(&items, &mut diagnostics);
+    diagnostics.finish(programs)
+}
+
+/// The same of a file, where mathematical notation stands in strings without escapes. Messages name the file.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn file_programs(text: &str, file: &str) -> Result<Vec<Program>, Diagnostics> {
+    let mut diagnostics = Diagnostics::default();
+    let here = Span::of(proc_macro2::Span::call_site());
+    let items = parse_file(text, file, &here, &mut diagnostics);
     let programs = check(&items, &mut diagnostics);
     diagnostics.finish(programs)
 }

@@ -25,10 +25,14 @@ macro_rules! catalogue {
 #[must_use]
 pub fn catalogue() -> &'static [CatalogueEntry] {
     const CATALOGUE: &[CatalogueEntry] = catalogue![
+        AsRigidAsPossible,
+        BaraffWitkinShear,
+        BaraffWitkinStretch,
         BridsonBending,
         BridsonForce,
         BridsonForceDamped,
         Distance,
+        DistanceBarrier,
         DistanceSquared,
         FlatBending,
         Gravity,
@@ -43,7 +47,10 @@ pub fn catalogue() -> &'static [CatalogueEntry] {
         PowerLaw,
         QuadraticHinge,
         Spring,
+        SquaredDistanceBarrier,
         StVK,
+        StableNeoHookean,
+        StableNeoHookeanLog,
         ViscousDrag,
         ZeroLengthSpring,
     ];

@@ -24,9 +24,12 @@ macro_rules! elements {
 }
 
 elements! {
+    arap: AsRigidAsPossible;
     bridson_bending: BridsonBending;
     bridson_force: BridsonForce;
     bridson_force_damped: BridsonForceDamped;
+    bw_shear: BaraffWitkinShear;
+    bw_stretch: BaraffWitkinStretch;
     distance: Distance;
     distance_squared: DistanceSquared;
     flat_bending: FlatBending;
@@ -37,11 +40,15 @@ elements! {
     hinge_cos_half: HingeCosHalf;
     hinge_sin_half: HingeSinHalf;
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
+    ipc_barrier: DistanceBarrier;
+    ipc_barrier_squared: SquaredDistanceBarrier;
     neo_hookean: NeoHookean;
     point_to_plane: PointToPlane;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
     spring: Spring;
+    stable_neo_hookean: StableNeoHookean;
+    stable_neo_hookean_log: StableNeoHookeanLog;
     stvk: StVK;
     viscous_drag: ViscousDrag;
     zero_length_spring: ZeroLengthSpring;

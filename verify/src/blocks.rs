@@ -3,11 +3,11 @@
 use energy_dsl::{Declaration, Flags, Inputs, Kind, Outputs, RestError};
 use serde::Serialize;
 
-/// How an element is evaluated, whatever its type.
+/// How a generated element is evaluated, whatever its type.
 pub type Evaluate = fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>;
 
 /// The blocks that an element may return.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum BlockName {
     /// U.
     #[serde(rename = "energy")]
@@ -93,24 +93,26 @@ impl std::fmt::Display for BlockName {
 
 /// One block, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Block {
+pub struct Block<T = f64> {
     /// Which one.
     pub name: BlockName,
     /// Numbers to a row.
     pub columns: usize,
     /// All numbers.
-    pub numbers: Vec<f64>,
+    pub numbers: Vec<T>,
 }
 
-impl Block {
-    pub(crate) fn new(name: BlockName, columns: usize, numbers: Vec<f64>) -> Self {
+impl<T: Clone> Block<T> {
+    pub(crate) fn new(name: BlockName, columns: usize, numbers: Vec<T>) -> Self {
         Self { name, columns, numbers }
     }
 
-    pub(crate) fn from_rows(name: BlockName, rows: &[Vec<f64>]) -> Self {
+    pub(crate) fn from_rows(name: BlockName, rows: &[Vec<T>]) -> Self {
         Self { name, columns: rows.first().map_or(0, Vec::len), numbers: rows.concat() }
     }
+}
 
+impl Block {
     /// The largest magnitude; NaN if there is one.
     #[must_use]
     pub fn largest(&self) -> f64 {
@@ -128,6 +130,8 @@ pub(crate) fn largest(numbers: &[f64]) -> f64 {
 pub struct Answer {
     /// The blocks in the order of [`BlockName::of_kind`].
     pub blocks: Vec<Block>,
+    /// The same blocks as other routines return them: the routine, and the block.
+    pub repeats: Vec<(&'static str, Block)>,
     /// Conditions met, by order of derivative.
     pub flags: [Flags<f64>; 3],
 }
@@ -179,7 +183,7 @@ pub enum NoAnswer {
 /// On a degenerate rest shape, a missing block or one of the wrong length.
 pub fn evaluate(
     declaration: &'static Declaration,
-    evaluate: Evaluate,
+    evaluate: impl Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,
     inputs: &Inputs<'_, f64>,
 ) -> Result<Answer, NoAnswer> {
     let mut outputs = evaluate(inputs)?;
@@ -197,7 +201,14 @@ pub fn evaluate(
         }
         blocks.push(Block::new(name, columns, numbers));
     }
-    Ok(Answer { blocks, flags: outputs.flags })
+    let mut repeats = Vec::new();
+    for (routine, block, numbers) in outputs.repeats {
+        let same: Option<&Block> = blocks.iter().find(|b: &&Block| b.name.name() == block);
+        if let Some(same) = same.filter(|same| same.numbers.len() == numbers.len()) {
+            repeats.push((routine, Block::new(same.name, same.columns, numbers)));
+        }
+    }
+    Ok(Answer { blocks, repeats, flags: outputs.flags })
 }
 
 /// Rows and columns of a block; vectors are one row.

@@ -82,7 +82,12 @@ impl Number for Hyper {
         Self(self.0.ln())
     }
     fn atan2<L: Level>(self, x: Self) -> Self {
-        Self(self.0.atan2(x.0))
+        // num-dual's own divides by x, and by x² in its derivatives.
+        if x.0.re.abs() >= self.0.re.abs() {
+            return Self(self.0.atan2(x.0));
+        }
+        let quarter = Self::constant(std::f64::consts::FRAC_PI_2.copysign(self.0.re));
+        quarter - Self((x.0 / self.0).atan())
     }
     fn powf<L: Level>(self, exponent: Self) -> Self {
         // A constant exponent allows a base that is negative or zero, which exp(e ln x) does not.
@@ -130,6 +135,16 @@ mod tests {
         assert!((angle.eps1 + 4.0 / 25.0).abs() < 1e-15, "{angle:?}");
         assert!((angle.eps2 - 3.0 / 25.0).abs() < 1e-15, "{angle:?}");
         assert!((angle.eps1eps2 - 7.0 / 625.0).abs() < 1e-15, "{angle:?}");
+    }
+
+    /// On the y axis, where y/x is infinite: φ_x = −1/y, φ_xy = 1/y².
+    #[test]
+    fn the_angle_of_a_point_on_the_axis() {
+        for y in [2.0, -2.0] {
+            let angle = Hyper::variable(y, false, true).atan2::<Baseline>(Hyper::variable(0.0, true, false)).0;
+            assert_eq!(angle.re, std::f64::consts::FRAC_PI_2.copysign(y));
+            assert_eq!((angle.eps1, angle.eps2, angle.eps1eps2), (-1.0 / y, 0.0, 0.25));
+        }
     }
 
     #[test]

@@ -29,10 +29,14 @@ pub(crate) fn antiderivative(block: BlockName, kind: Kind) -> Option<(BlockName,
 /// A sweep over steps.
 #[derive(Clone, Debug)]
 pub(crate) struct Sweep {
-    /// The differences at the best step, row-major: row of the lower block, then stepped input.
+    /// The extrapolated differences at the step where they vary least, row-major: row of the lower block, then stepped input.
     pub(crate) best: Vec<f64>,
+    /// That step.
+    pub(crate) step: f64,
     /// Observed order of the plain central difference, if its error fell far enough to be measured.
     pub(crate) order: Option<f64>,
+    /// Step, relative to the length, and the largest deviation of plain and extrapolated differences.
+    pub(crate) curve: Vec<(f64, f64, f64)>,
 }
 
 /// Differences of `lower`, a function of the stepped inputs, against `block`.
@@ -66,32 +70,29 @@ pub(crate) fn sweep(
         }
         Ok(differences)
     };
-    let deviation = |differences: &[f64]| {
-        differences
-            .iter()
-            .zip(block)
-            .map(|(d, b)| (d - b).abs())
-            .fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) })
-    };
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    let mut plain = Vec::new();
+    let deviation = |differences: &[f64]| largest_difference(differences, block);
+    let (mut curve, mut plain, mut extrapolations) = (Vec::new(), Vec::new(), Vec::new());
     for exponent in STEPS {
         let step = length * f64::from(exponent).exp2();
         let (whole, half) = (central(step)?, central(step / 2.0)?);
         plain.push((deviation(&whole), deviation(&half)));
         let extrapolated: Vec<f64> = whole.iter().zip(&half).map(|(w, h)| (4.0 * h - w) / 3.0).collect();
-        for candidate in [whole, extrapolated] {
-            let error = deviation(&candidate);
-            if best.as_ref().is_none_or(|(least, _)| error < *least || least.is_nan()) {
-                best = Some((error, candidate));
-            }
-        }
+        curve.push((step / length, deviation(&whole), deviation(&extrapolated)));
+        extrapolations.push((step, extrapolated));
     }
-    let (error, best) = best.unwrap_or_default();
+    // Without looking at the block: where two steps in a row agree best, truncation and rounding are least.
+    let disagreement = |k: usize| largest_difference(&extrapolations[k].1, &extrapolations[k + 1].1);
+    let chosen = (0..extrapolations.len() - 1).min_by(|&a, &b| disagreement(a).total_cmp(&disagreement(b)));
+    let (step, best) = extrapolations.swap_remove(chosen.unwrap_or_default());
+    let error = deviation(&best);
     // The first step's fall, where it is not yet lost in rounding.
     let order = plain
         .first()
         .filter(|(whole, half)| *half > 1e3 * error && *half > 1e-10 * largest(block) && *whole > *half)
         .map(|(w, h)| (w / h).log2());
-    Ok(Sweep { best, order })
+    Ok(Sweep { best, step, order, curve })
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, |most: f64, d| if d.is_nan() { d } else { most.max(d) })
 }

@@ -1,21 +1,22 @@
 //! A formula as written, evaluated and differentiated by arithmetic that is independent of the generated code.
 
-use energy_dsl::{Declaration, Inputs, Kind, Textbook};
+use energy_dsl::{Declaration, Inputs, Kind, Number, Textbook};
 
 use crate::blocks::{Block, BlockName};
 use crate::dual::Hyper;
+use crate::multiprecision::{Jet, Order};
 use crate::sample::Sample;
 
 /// A formula's rows with their first and second derivatives at one input.
-struct Expansion {
+struct Expansion<T> {
     /// The rows.
-    values: Vec<f64>,
+    values: Vec<T>,
     /// Row by coordinate.
-    by_position: Vec<Vec<f64>>,
-    /// Row by pair of coordinates.
-    by_position_twice: Vec<Vec<Vec<f64>>>,
+    by_position: Vec<Vec<T>>,
+    /// Row by pair of coordinates; empty where none was asked for.
+    by_position_twice: Vec<Vec<Vec<T>>>,
     /// Row by velocity component; empty unless the declaration is a force.
-    by_velocity: Vec<Vec<f64>>,
+    by_velocity: Vec<Vec<T>>,
 }
 
 /// The rows of a formula in plain double arithmetic.
@@ -23,66 +24,80 @@ pub(crate) fn rows(formula: &Textbook, sample: &Sample) -> Vec<f64> {
     formula.evaluate(&sample.inputs())
 }
 
-/// Every block of a declaration, from its formula alone.
+/// Every block of a declaration from its formula alone, by hyper-dual numbers.
 pub(crate) fn expected_blocks(declaration: &Declaration, formula: &Textbook, sample: &Sample) -> Vec<Block> {
-    match declaration.kind {
-        Kind::Energy => {
-            let expansion = expand(formula, sample, true);
-            vec![
-                Block::new(BlockName::Energy, 1, expansion.values.clone()),
-                Block::new(BlockName::Gradient, expansion.by_position[0].len(), expansion.by_position[0].clone()),
-                Block::from_rows(BlockName::Hessian, &expansion.by_position_twice[0]),
-            ]
-        }
-        Kind::Force => {
-            let expansion = expand(formula, sample, false);
-            vec![
-                Block::new(BlockName::Force, expansion.values.len(), expansion.values.clone()),
-                Block::from_rows(BlockName::ForceByPosition, &expansion.by_position),
-                Block::from_rows(BlockName::ForceByVelocity, &expansion.by_velocity),
-            ]
-        }
-        Kind::Residual => {
-            let expansion = expand(formula, sample, false);
-            vec![
-                Block::new(BlockName::Residual, expansion.values.len(), expansion.values.clone()),
-                Block::from_rows(BlockName::Jacobian, &expansion.by_position),
-            ]
-        }
-        Kind::Constraint => constraint_blocks(&expand(formula, sample, true), sample),
+    blocks(declaration.kind, expand(formula, sample, order(declaration.kind) == Order::Second), sample)
+}
+
+/// The same over any number type, by jets. The numbers are made here, so that they have the precision of the caller.
+pub(crate) fn blocks_over<T: Number<Mask = bool>>(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+) -> Vec<Block<T>> {
+    blocks(declaration.kind, expand_by_jets(formula, sample, order(declaration.kind)), sample)
+}
+
+/// How often a formula must be differentiated for the blocks of its kind.
+fn order(kind: Kind) -> Order {
+    match kind {
+        Kind::Energy | Kind::Constraint => Order::Second,
+        Kind::Force | Kind::Residual => Order::First,
+    }
+}
+
+fn blocks<T: Number>(kind: Kind, expansion: Expansion<T>, sample: &Sample) -> Vec<Block<T>> {
+    match kind {
+        Kind::Energy => vec![
+            Block::new(BlockName::Energy, 1, expansion.values),
+            Block::new(BlockName::Gradient, expansion.by_position[0].len(), expansion.by_position[0].clone()),
+            Block::from_rows(BlockName::Hessian, &expansion.by_position_twice[0]),
+        ],
+        Kind::Force => vec![
+            Block::new(BlockName::Force, expansion.values.len(), expansion.values),
+            Block::from_rows(BlockName::ForceByPosition, &expansion.by_position),
+            Block::from_rows(BlockName::ForceByVelocity, &expansion.by_velocity),
+        ],
+        Kind::Residual => vec![
+            Block::new(BlockName::Residual, expansion.values.len(), expansion.values),
+            Block::from_rows(BlockName::Jacobian, &expansion.by_position),
+        ],
+        Kind::Constraint => constraint_blocks(&expansion, sample),
     }
 }
 
 /// Witkin's ½ k_s CᵀC and −Jᵀ (k_s C + k_d J v) with their derivatives, written out over C, J and ∂²C.
-fn constraint_blocks(expansion: &Expansion, sample: &Sample) -> Vec<Block> {
-    let Expansion { values, by_position: jacobian, by_position_twice: second, .. } = expansion;
+fn constraint_blocks<T: Number>(expansion: &Expansion<T>, sample: &Sample) -> Vec<Block<T>> {
     let (stiffness, damping) = sample.stiffness_and_damping();
-    let n = sample.positions.len();
-    let rows = values.len();
-    let velocity = |i: usize| sample.velocities.get(i).copied().unwrap_or(0.0);
-    let rate = |r: usize| (0..n).map(|i| jacobian[r][i] * velocity(i)).sum::<f64>();
-    let rate_by = |r: usize, k: usize| (0..n).map(|j| second[r][j][k] * velocity(j)).sum::<f64>();
-    let over_rows = |term: &dyn Fn(usize) -> f64| (0..rows).map(term).sum::<f64>();
-    let matrix = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+    let (stiffness, damping) = (T::from_f64(stiffness), T::from_f64(damping));
+    let (n, rows) = (sample.positions.len(), expansion.values.len());
+    let velocities: Vec<T> = (0..n).map(|i| T::from_f64(sample.velocities.get(i).copied().unwrap_or(0.0))).collect();
+    let c = |r: usize| expansion.values[r].clone();
+    let j = |r: usize, i: usize| expansion.by_position[r][i].clone();
+    let c_by = |r: usize, i: usize, k: usize| expansion.by_position_twice[r][i][k].clone();
+    let v = |i: usize| velocities[i].clone();
+    let rate: Vec<T> = (0..rows).map(|r| sum(n, |i| j(r, i) * v(i))).collect();
+    let rate_by: Vec<Vec<T>> = (0..rows).map(|r| (0..n).map(|k| sum(n, |i| c_by(r, i, k) * v(i))).collect()).collect();
+    let pull: Vec<T> = (0..rows).map(|r| stiffness.clone() * c(r) + damping.clone() * rate[r].clone()).collect();
+    let matrix = |entry: &dyn Fn(usize, usize) -> T| -> Vec<Vec<T>> {
         (0..n).map(|i| (0..n).map(|k| entry(i, k)).collect()).collect()
     };
-    let vector = |entry: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n).map(entry).collect() };
+    let vector = |entry: &dyn Fn(usize) -> T| -> Vec<T> { (0..n).map(entry).collect() };
 
-    let energy = over_rows(&|r| stiffness / 2.0 * values[r] * values[r]);
-    let gradient = vector(&|i| over_rows(&|r| stiffness * values[r] * jacobian[r][i]));
-    let hessian =
-        matrix(&|i, k| over_rows(&|r| stiffness * (jacobian[r][i] * jacobian[r][k] + values[r] * second[r][i][k])));
-    let force = vector(&|i| over_rows(&|r| -jacobian[r][i] * (stiffness * values[r] + damping * rate(r))));
+    let energy = stiffness.clone() / T::from_f64(2.0) * sum(rows, |r| c(r) * c(r));
+    let gradient = vector(&|i| stiffness.clone() * sum(rows, |r| c(r) * j(r, i)));
+    let hessian = matrix(&|i, k| stiffness.clone() * sum(rows, |r| j(r, i) * j(r, k) + c(r) * c_by(r, i, k)));
+    let force = vector(&|i| -sum(rows, |r| j(r, i) * pull[r].clone()));
     let by_position = matrix(&|i, k| {
-        over_rows(&|r| {
-            -second[r][i][k] * (stiffness * values[r] + damping * rate(r))
-                - jacobian[r][i] * (stiffness * jacobian[r][k] + damping * rate_by(r, k))
+        -sum(rows, |r| {
+            c_by(r, i, k) * pull[r].clone()
+                + j(r, i) * (stiffness.clone() * j(r, k) + damping.clone() * rate_by[r][k].clone())
         })
     });
-    let by_velocity = matrix(&|i, k| over_rows(&|r| -damping * jacobian[r][i] * jacobian[r][k]));
+    let by_velocity = matrix(&|i, k| -(damping.clone() * sum(rows, |r| j(r, i) * j(r, k))));
     vec![
-        Block::new(BlockName::Constraint, rows, values.clone()),
-        Block::from_rows(BlockName::Jacobian, jacobian),
+        Block::new(BlockName::Constraint, rows, expansion.values.clone()),
+        Block::from_rows(BlockName::Jacobian, &expansion.by_position),
         Block::new(BlockName::Energy, 1, vec![energy]),
         Block::new(BlockName::Gradient, n, gradient),
         Block::from_rows(BlockName::Hessian, &hessian),
@@ -92,8 +107,36 @@ fn constraint_blocks(expansion: &Expansion, sample: &Sample) -> Vec<Block> {
     ]
 }
 
+fn sum<T: Number>(count: usize, term: impl Fn(usize) -> T) -> T {
+    (0..count).fold(T::from_f64(0.0), |sum, i| sum + term(i))
+}
+
+/// One evaluation with all coordinates moving: positions first, velocities after them.
+fn expand_by_jets<T: Number<Mask = bool>>(formula: &Textbook, sample: &Sample, order: Order) -> Expansion<T> {
+    let (n, m) = (sample.positions.len(), if order == Order::First { sample.velocities.len() } else { 0 });
+    let constants = |numbers: &[f64]| numbers.iter().map(|&x| Jet::constant(T::from_f64(x))).collect::<Vec<_>>();
+    let moving = |numbers: &[f64], first: usize| -> Vec<Jet<T>> {
+        let variable = |(i, &x): (usize, &f64)| Jet::variable(T::from_f64(x), first + i, n + m, order);
+        numbers.iter().enumerate().map(variable).collect()
+    };
+    let rows = formula.evaluate(&Inputs {
+        parameters: &constants(&sample.parameters),
+        rest: &constants(&sample.rest),
+        positions: &moving(&sample.positions, 0),
+        velocities: &if m > 0 { moving(&sample.velocities, n) } else { constants(&sample.velocities) },
+    });
+    let row = |row: &Jet<T>, range: std::ops::Range<usize>| range.map(|i| row.by(i)).collect::<Vec<T>>();
+    let twice = |row: &Jet<T>| (0..n).map(|i| (0..n).map(|j| row.by_both(i, j)).collect()).collect();
+    Expansion {
+        by_position: rows.iter().map(|r| row(r, 0..n)).collect(),
+        by_position_twice: if order == Order::Second { rows.iter().map(twice).collect() } else { Vec::new() },
+        by_velocity: rows.iter().map(|r| row(r, n..n + m)).collect(),
+        values: rows.into_iter().map(|r| r.value).collect(),
+    }
+}
+
 /// One hyper-dual evaluation per pair of coordinates, or per coordinate where no second derivative is wanted.
-fn expand(formula: &Textbook, sample: &Sample, second: bool) -> Expansion {
+fn expand(formula: &Textbook, sample: &Sample, second: bool) -> Expansion<f64> {
     let n = sample.positions.len();
     let values = rows(formula, sample);
     let mut by_position = vec![vec![0.0; n]; values.len()];

@@ -48,6 +48,12 @@ pub(crate) fn shortest_distance(points: &[f64]) -> Option<f64> {
     distances.filter(|&d| d > 0.0).min_by(f64::total_cmp)
 }
 
+/// The longest distance between two points in space; none without a pair.
+pub(crate) fn longest_distance(points: &[f64]) -> Option<f64> {
+    let points: Vec<&[f64]> = points.chunks(3).collect();
+    pairs(points.len()).map(|(i, j)| norm(&difference(points[i], points[j]))).max_by(f64::total_cmp)
+}
+
 fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }

@@ -1,15 +1,17 @@
 //! The audit of generated derivatives.
 //!
-//! Every block that an element returns is compared with two independent routes: hyper-dual numbers run through the
-//! declaration's *textbook* form ([`dual::Hyper`], num-dual), and finite differences of the block one order below, over a sweep
-//! of steps. Symmetry and the momenta that the declaration implies are checked beside. [`reference`](mod@reference) measures errors
-//! against multi-precision values.
+//! Every block that an element returns is compared with three independent routes: multi-precision and hyper-dual numbers run
+//! through the declaration's *textbook* form ([`multiprecision`], [`dual::Hyper`]), and finite differences of the block one
+//! order below, at a step chosen by where they vary least. Where routes disagree, the audit names the one to suspect. The laws that
+//! a declaration implies are checked beside, and faults are planted that must be noticed ([`audit`](mod@audit)).
+//! [`reference`](mod@reference) measures errors against values computed elsewhere, [`stress`](mod@stress) along the way to every
+//! singularity.
 //!
 //! ```
 //! use energy_elements::HairBend;
 //!
-//! // In a test of one's own: panics and names element, block and entry if a derivative is wrong.
-//! verify::assert_derivatives::<HairBend>(20);
+//! // In a test of one's own: panics and names element, block and entry, what each route gives, and the input.
+//! verify::assert_derivatives!(HairBend, samples = 20);
 //! ```
 #![forbid(unsafe_code)]
 
@@ -17,15 +19,40 @@ mod atomic_file;
 pub mod audit;
 mod blocks;
 pub mod dual;
+mod eigenvalues;
 mod finite_difference;
 mod formula;
 mod geometry;
 mod listings;
+pub mod multiprecision;
+mod plot;
 pub mod reference;
 mod sample;
+pub mod stress;
 
 pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
 pub use listings::listings;
 pub use sample::Sample;
+
+/// Audits an element in a test: `assert_derivatives!(MyMaterial)`, or with `samples = 200` random inputs. See
+/// [`assert_derivatives`](fn@assert_derivatives) for what a failure says.
+///
+/// ```
+/// use energy_macros::energy;
+///
+/// energy! { energy Pull(p, q: Point; k: Scalar[N/m]) = "k/2 ‖p − q‖²"; }
+///
+/// verify::assert_derivatives!(Pull);
+/// verify::assert_derivatives!(Pull, samples = 20);
+/// ```
+#[macro_export]
+macro_rules! assert_derivatives {
+    ($element:ty) => {
+        $crate::assert_derivatives!($element, samples = 200)
+    };
+    ($element:ty, samples = $samples:expr $(,)?) => {
+        $crate::assert_derivatives::<$element>($samples)
+    };
+}

@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
-use verify::audit::{Options, Report, audit_catalogue, describe_failure};
-use verify::reference::{BlockLine, PolicyLine, ReferenceReport, evaluate_file, reference};
+use verify::audit::{Options, Report, Target, audit_all, audit_at, catalogue_targets, describe_failure};
+use verify::reference::{BlockLine, PolicyLine, ReferenceReport, Source, evaluate_file, policy, reference};
+use verify::stress::{markdown, plots, stress};
 
 /// Audits the derivatives of declared elements, and measures them against multi-precision reference values.
 #[derive(Parser)]
@@ -20,22 +21,42 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Compare every derivative with dual numbers and finite differences; exit status 1 on any failure.
+    /// Compare every derivative with multi-precision, dual numbers and finite differences, check the laws it must keep, and plant
+    /// faults that must be noticed; exit status 1 on any failure.
     Audit {
-        /// Elements to audit; all of them if none is named.
+        /// Elements to audit, of the catalogue or of the file; all of them if none is named.
         names: Vec<String>,
+        /// Audit the declarations of this file (`.energy`) instead of the catalogue's.
+        #[arg(long)]
+        file: Option<PathBuf>,
         /// Random inputs for each element.
         #[arg(long, default_value_t = 200)]
         samples: usize,
         /// What the inputs are drawn from.
         #[arg(long, default_value_t = 1)]
         seed: u64,
+        /// Faults to plant in each element.
+        #[arg(long, default_value_t = 24)]
+        faults: usize,
         /// A few samples only.
-        #[arg(long, conflicts_with = "samples")]
+        #[arg(long, conflicts_with_all = ["samples", "faults"])]
         quick: bool,
+        /// An energy, of the file or the catalogue, that the audited forces must be minus the gradient of.
+        #[arg(long, value_name = "ENERGY")]
+        against: Option<String>,
+        /// Audit at the input of this file only: one object with `positions`, `velocities`, `rest`, `parameters`, or a report
+        /// written by `--json`, whose inputs are all run again.
+        #[arg(long, value_name = "FILE", conflicts_with_all = ["samples", "seed", "quick", "faults"])]
+        at: Option<PathBuf>,
         /// Also write the report to this file.
         #[arg(long)]
         json: Option<PathBuf>,
+        /// Also write it as one page with formulas and plots.
+        #[arg(long)]
+        html: Option<PathBuf>,
+        /// Also write it as JUnit XML.
+        #[arg(long)]
+        junit: Option<PathBuf>,
     },
     /// Measure the generated code against reference values; exit status 1 on a NaN, or a degenerate input not treated as
     /// documented. Errors beyond tier A or B are listed.
@@ -48,6 +69,16 @@ enum Command {
         /// Exit status 1 on anything beyond tier A or B as well.
         #[arg(long)]
         strict: bool,
+    },
+    /// Sweep towards every singularity, down to 1e-300, and compare the generated code with the textbook form; then try every
+    /// degenerate input with a documented answer. Exit status 1 on a NaN, an error beyond 8 u·κ that is not flagged, or an answer
+    /// that is not the documented one.
+    Stress {
+        /// Elements; all of them if none is named.
+        names: Vec<String>,
+        /// Also write `stress.md`, `stress.json` and a plot of each sweep to this folder.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
     },
     /// Print the code generated for an element.
     Show {
@@ -63,13 +94,16 @@ enum Command {
         #[arg(long, conflicts_with_all = ["routine", "plan"])]
         counts: bool,
     },
-    /// Evaluate the records of a file and write them with the results, 17 digits, and flags.
+    /// Evaluate the records of a file and write them with the results of the generated code, 17 digits, and flags.
     Eval {
         /// A `potref-1` or `potref-policy-1` file.
         records: PathBuf,
         /// Where to write.
         #[arg(short, long)]
         output: PathBuf,
+        /// Instead of the generated code's results, the formula's in multi-precision, to so many digits.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=500))]
+        digits: Option<u16>,
     },
 }
 
@@ -86,16 +120,25 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<bool> {
     match command {
-        Command::Audit { names, samples, seed, quick, json } => {
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let options = Options { samples: if quick { 20 } else { samples }, seed };
-            let report = audit_catalogue(&names, options).map_err(anyhow::Error::msg)?;
+        Command::Audit { names, file, samples, seed, faults, quick, against, at, json, html, junit } => {
+            let options = match quick {
+                true => Options { seed, ..Options::quick() },
+                false => Options { samples, seed, mutations: faults, ..Options::default() },
+            };
+            let targets = targets(&names, file.as_deref())?;
+            let energy = against.map(|name| target_of_energy(&name, file.as_deref())).transpose()?;
+            let report = match at {
+                Some(at) => audit_at_inputs(&targets, energy.as_ref(), &at)?,
+                None => audit_all(&targets, energy.as_ref(), options),
+            };
             print_audit(&report);
             write_json(json.as_deref(), &report)?;
+            write_text(html.as_deref(), || verify::audit::html(&report))?;
+            write_text(junit.as_deref(), || verify::audit::junit(&report))?;
             Ok(report.passed())
         }
         Command::Reference { folder, json, strict } => {
-            let folder = folder.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials"));
+            let folder = folder.unwrap_or_else(records);
             let report = reference(&folder)?;
             print_reference(&report);
             write_json(json.as_deref(), &report)?;
@@ -103,6 +146,27 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let beyond = report.lines.iter().any(|l| !l.beyond_tier_a.is_empty() || !l.beyond_tier_b.is_empty());
             let policy = report.policy.iter().all(|line| line.passed != Some(false));
             Ok(!nan && policy && !(strict && beyond))
+        }
+        Command::Stress { names, output } => {
+            let mut tracks = Vec::new();
+            for target in targets(&names, None)? {
+                tracks.extend(stress(&target).map_err(anyhow::Error::msg)?);
+            }
+            let table = markdown(&tracks);
+            print!("{table}");
+            if let Some(folder) = output {
+                std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+                write_text(Some(&folder.join("stress.md")), || table)?;
+                write_json(Some(&folder.join("stress.json")), &tracks)?;
+                for (file, svg) in plots(&tracks) {
+                    write_text(Some(&folder.join(file)), || svg)?;
+                }
+            }
+            let policy = policy(&records().join("policy.json"))?;
+            print_policy(&policy);
+            let failed = tracks.iter().filter(|track| !track.passed()).count();
+            println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
+            Ok(failed == 0 && policy.iter().all(|line| line.passed != Some(false)))
         }
         Command::Show { name, routine, plan, counts } => {
             for listing in verify::listings(&name)? {
@@ -121,12 +185,66 @@ fn run(command: Command) -> anyhow::Result<bool> {
             }
             Ok(true)
         }
-        Command::Eval { records, output } => {
-            let count = evaluate_file(&records, &output)?;
+        Command::Eval { records, output, digits } => {
+            let source = digits.map_or(Source::GeneratedCode, |digits| Source::Truth { digits: digits.into() });
+            let count = evaluate_file(&records, &output, source)?;
             println!("{count} records evaluated, written to {}", output.display());
             Ok(true)
         }
     }
+}
+
+/// The elements of the catalogue, or of a file, with these names; all of them for an empty list.
+fn targets(names: &[String], file: Option<&Path>) -> anyhow::Result<Vec<Target>> {
+    let Some(file) = file else {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        return catalogue_targets(&names).map_err(anyhow::Error::msg);
+    };
+    let all = Target::of_file(file)?;
+    if let Some(unknown) = names.iter().find(|name| all.iter().all(|target| target.name() != *name)) {
+        let known: Vec<&str> = all.iter().map(Target::name).collect();
+        anyhow::bail!("{} declares no {unknown}; it declares {}", file.display(), known.join(", "));
+    }
+    Ok(all.into_iter().filter(|target| names.is_empty() || names.iter().any(|name| name == target.name())).collect())
+}
+
+fn target_of_energy(name: &str, file: Option<&Path>) -> anyhow::Result<Target> {
+    let own = file.map(Target::of_file).transpose()?.unwrap_or_default();
+    let found = own.into_iter().find(|target| target.name() == name);
+    let found = found.or_else(|| energy_elements::find(name).map(Target::of_catalogue));
+    found.with_context(|| format!("neither the file nor the catalogue has an energy `{name}`"))
+}
+
+/// All checks at the inputs of a file, each at the element it names, or all at the one target.
+fn audit_at_inputs(targets: &[Target], energy: Option<&Target>, file: &Path) -> anyhow::Result<Report> {
+    let inputs = verify::audit::read_inputs(file)?;
+    let mut report = Report::default();
+    for (element, sample) in &inputs {
+        let chosen: Vec<&Target> = match element {
+            Some(name) => targets.iter().filter(|target| target.name() == name).collect(),
+            None => targets.iter().collect(),
+        };
+        anyhow::ensure!(
+            element.is_some() || chosen.len() == 1,
+            "{}: name the element the input is for",
+            file.display()
+        );
+        for target in chosen {
+            let part = audit_at(target, energy, sample).map_err(|why| anyhow::anyhow!("{}: {why}", file.display()))?;
+            report.merge(part);
+        }
+    }
+    Ok(report)
+}
+
+/// The reference records of this repository.
+fn records() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials")
+}
+
+fn write_text(path: Option<&Path>, text: impl FnOnce() -> String) -> anyhow::Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    verify::write_whole(path, text().as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn write_json(path: Option<&Path>, report: &impl serde::Serialize) -> anyhow::Result<()> {
@@ -167,11 +285,26 @@ fn print_audit(report: &Report) {
     for (name, why) in &report.refused {
         println!("\n{name} cannot be audited: {why}");
     }
+    for (element, mutant) in report.missed() {
+        println!("\n{element}: nothing noticed a planted fault: {}", mutant.fault);
+    }
+    let scores: Vec<_> = report.sections.iter().filter_map(|section| section.mutations.as_ref()).collect();
+    if !scores.is_empty() {
+        println!(
+            "\n{} of {} planted faults noticed; of others drawn, {} provably change nothing, {} change last bits only, {} change \
+             nothing at any input tried",
+            scores.iter().map(|score| score.caught()).sum::<usize>(),
+            scores.iter().map(|score| score.mutants.len()).sum::<usize>(),
+            scores.iter().map(|score| score.equivalent).sum::<usize>(),
+            scores.iter().map(|score| score.within_rounding).sum::<usize>(),
+            scores.iter().map(|score| score.without_effect).sum::<usize>()
+        );
+    }
     println!(
         "\n{} elements, {} checks, {} failed",
         report.elements(),
         report.lines.len(),
-        failures.len() + report.refused.len()
+        failures.len() + report.refused.len() + report.missed().count()
     );
 }
 

@@ -4,19 +4,24 @@ use std::fmt;
 
 use energy_dsl::{Declaration, Field, Inputs, Kind};
 use fastrand::Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Rotation, difference, is_well_shaped, rotate, shortest_distance};
 
 /// One input of an element, flattened in declared order.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Parameters; a constraint's stiffness and damping at the end.
+    #[serde(default)]
     pub parameters: Vec<f64>,
     /// Rest shape.
+    #[serde(default)]
     pub rest: Vec<f64>,
     /// Positions, or a residual's unknowns.
     pub positions: Vec<f64>,
     /// Velocities; empty for an energy or a residual.
+    #[serde(default)]
     pub velocities: Vec<f64>,
 }
 
@@ -30,6 +35,28 @@ impl Sample {
             positions: &self.positions,
             velocities: &self.velocities,
         }
+    }
+
+    /// Whether it holds as many numbers as the declaration takes.
+    ///
+    /// # Errors
+    /// Which list does not, and how many it should hold.
+    pub fn fits(&self, declaration: &Declaration) -> Result<(), String> {
+        let size = |fields: &[Field]| fields.iter().map(|field| field.size).sum::<usize>();
+        let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
+        let moving = size(declaration.points);
+        let velocities = matches!(declaration.kind, Kind::Force | Kind::Constraint);
+        let check = |what: &str, list: &[f64], expected: usize| {
+            if list.len() != expected {
+                return Err(format!("`{what}` holds {} numbers, {} takes {expected}", list.len(), declaration.name));
+            }
+            let bad = list.iter().position(|x| !x.is_finite());
+            bad.map_or(Ok(()), |at| Err(format!("`{what}`[{at}] is not finite")))
+        };
+        check("positions", &self.positions, moving)?;
+        check("velocities", &self.velocities, if velocities { moving } else { 0 })?;
+        check("rest", &self.rest, size(declaration.rest))?;
+        check("parameters", &self.parameters, size(declaration.parameters) + implied)
     }
 
     /// k_s and k_d, the last two parameters of a constraint.
@@ -122,11 +149,14 @@ impl Sampler {
     pub(crate) fn sample(&mut self) -> Sample {
         let declaration = self.declaration;
         let count: usize = declaration.points.iter().map(|point| point.size).sum();
-        let positions = if has_points(declaration) { self.points(count) } else { self.uniforms(count, -1.0, 1.0) };
+        let positions = if has_points(declaration) { self.points(count) } else { self.unknowns(count) };
         let rest = self.rest();
         let mut parameters = Vec::new();
+        // Lengths are of the size of the configuration, so that springs are short and long, and barriers near and far.
+        let length = if has_points(declaration) { shortest_distance(&positions).unwrap_or(1.0) } else { 1.0 };
         for parameter in declaration.parameters {
-            parameters.extend(self.parameter(parameter));
+            let scale = if parameter.unit == "m" { length } else { 1.0 };
+            parameters.extend(self.parameter(parameter).into_iter().map(|x| scale * x));
         }
         let mut velocities = Vec::new();
         if declaration.kind == Kind::Constraint {
@@ -136,6 +166,49 @@ impl Sampler {
             velocities = self.uniforms(count, -1.0, 1.0);
         }
         Sample { parameters, rest, positions, velocities }
+    }
+
+    /// Unknowns of one size, from ¼ to 4.
+    fn unknowns(&mut self, count: usize) -> Vec<f64> {
+        let scale = self.uniform(-2.0, 2.0).exp2();
+        self.uniforms(count, -scale, scale)
+    }
+
+    /// An input whose points have small whole coordinates: edges along axes, right angles, components that vanish.
+    pub(crate) fn lattice_sample(&mut self) -> Sample {
+        let sample = self.sample();
+        if !has_points(self.declaration) {
+            return sample;
+        }
+        let mut demand = 1.0;
+        loop {
+            for _ in 0..1000 {
+                let positions: Vec<f64> = sample.positions.iter().map(|_| f64::from(self.random.i32(-1..=1))).collect();
+                if is_well_shaped(&positions, 3, demand) {
+                    return Sample { positions, ..sample };
+                }
+            }
+            demand /= 2.0;
+        }
+    }
+
+    /// An input that may be anything but degenerate: with unknowns and parameters, or what differs between points, of very
+    /// different sizes.
+    pub(crate) fn odd_sample(&mut self) -> Sample {
+        let mut sample = self.sample();
+        let shrink = |numbers: &mut [f64], random: &mut Rng| {
+            let all = random.bool().then(|| random.i32(-20..1));
+            for x in numbers.iter_mut() {
+                *x *= f64::from(all.unwrap_or_else(|| random.i32(-6..1))).exp2();
+            }
+        };
+        if self.random.bool() {
+            shrink(&mut sample.parameters, &mut self.random);
+        }
+        if self.random.bool() {
+            shrink(&mut sample.positions, &mut self.random);
+        }
+        sample
     }
 
     /// Well-shaped points, scaled and moved at random.

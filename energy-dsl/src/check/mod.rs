@@ -9,6 +9,7 @@ mod typed;
 mod units;
 
 pub use typed::{Input, Program, Source, Typed, TypedKind};
+pub use units::unit_exponents;
 
 use crate::diagnostic::Diagnostics;
 use crate::syntax::{Declaration, Item, UserFunction, canonical};

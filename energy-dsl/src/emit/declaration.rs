@@ -57,14 +57,14 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
 }
 
 /// What a solver may rely on.
-struct Character {
-    curved: bool,
-    quadratic: bool,
-    velocity_dependent: bool,
-    symmetric: bool,
+pub(crate) struct Character {
+    pub(crate) curved: bool,
+    pub(crate) quadratic: bool,
+    pub(crate) velocity_dependent: bool,
+    pub(crate) symmetric: bool,
 }
 
-fn character(program: &Program, routines: &Routines) -> Character {
+pub(crate) fn character(program: &Program, routines: &Routines) -> Character {
     let group = |routine: &str, number: usize| {
         let routine = routines.list.iter().find(|r| r.name == routine)?;
         routine.groups.get(number)
@@ -97,11 +97,11 @@ fn fields(inputs: &[Input]) -> TokenStream {
 
 fn routine(graph: &Graph, routine: &Routine) -> TokenStream {
     let name = routine.name;
-    let (reduced, full) = (counted(graph, &routine.reduced_outputs()), counted(graph, &routine.outputs()));
+    let (reduced, full) = (tokens(graph, &routine.reduced_outputs()), tokens(graph, &routine.outputs()));
     quote!(::energy_dsl::Routine { name: #name, reduced: #reduced, full: #full })
 }
 
-fn counted(graph: &Graph, outputs: &[NodeId]) -> TokenStream {
+fn tokens(graph: &Graph, outputs: &[NodeId]) -> TokenStream {
     let OperationCount { basic, fused, divisions_and_roots, transcendental, error_terms } = count(graph, outputs);
     quote! {
         ::energy_dsl::OperationCount {

@@ -277,7 +277,7 @@ fn audit_test(name: &Ident, program: &Program) -> TokenStream {
         #[cfg(test)]
         #[test]
         fn #test() {
-            ::verify::assert_derivatives::<#name<f64>>(#samples);
+            ::verify::assert_derivatives!(#name<f64>, samples = #samples);
         }
     }
 }

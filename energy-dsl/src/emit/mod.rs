@@ -6,4 +6,5 @@ mod methods;
 mod schedule;
 mod traits;
 
+pub(crate) use declaration::{Character, character};
 pub use items::emit;

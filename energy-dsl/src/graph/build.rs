@@ -3,6 +3,7 @@
 //! that are powers of two is regrouped, which is exact.
 
 use super::{Form, Graph, Input, NodeId, Op, Primitive};
+use crate::runtime::Number;
 
 impl Graph {
     pub(crate) fn push(&mut self, op: Op, varies: bool) -> NodeId {
@@ -82,9 +83,17 @@ impl Graph {
         }
     }
 
+    /// Whether an operation on constants is done here: always where doubles compute, but the textbook form, which is also
+    /// evaluated to more digits, only takes results that are exact.
+    fn folds(&self, exact: bool) -> bool {
+        exact || self.form() == Form::Robust
+    }
+
     /// a + b.
     pub fn add(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
+            && self.folds(x.sum_error(y) == 0.0)
+        {
             return self.constant(x + y);
         }
         if self.is(a, 0.0) {
@@ -112,7 +121,9 @@ impl Graph {
 
     /// a − b. With a = 1 and b a cosine between vectors, 1 − cos of the angle; with a = ‖d‖ and b a length, the elongation.
     pub fn sub(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
+            && self.folds(x.sum_error(-y) == 0.0)
+        {
             return self.constant(x - y);
         }
         if a == b {
@@ -153,7 +164,9 @@ impl Graph {
 
     /// a · b. A squared elongation becomes its own primitive.
     pub fn mul(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
+            && self.folds(x.mul_add(y, -(x * y)) == 0.0)
+        {
             return self.constant(x * y);
         }
         let (a, b) = if self.as_constant(b).is_some() { (b, a) } else { (a, b) };
@@ -217,7 +230,9 @@ impl Graph {
             return a;
         }
         if let Some(y) = self.as_constant(b) {
-            if let Some(x) = self.as_constant(a) {
+            if let Some(x) = self.as_constant(a)
+                && self.folds((x / y).mul_add(y, -x) == 0.0)
+            {
                 return self.constant(x / y);
             }
             if is_power_of_two(y) {
@@ -235,8 +250,8 @@ impl Graph {
 
     fn unary(&mut self, a: NodeId, fold: fn(f64) -> f64, op: fn(NodeId) -> Op) -> NodeId {
         match self.as_constant(a) {
-            Some(x) => self.constant(fold(x)),
-            None => self.node(op(a)),
+            Some(x) if self.folds(is_exact(x, fold(x))) => self.constant(fold(x)),
+            _ => self.node(op(a)),
         }
     }
 
@@ -319,7 +334,9 @@ impl Graph {
     /// a^b without recognition.
     pub(crate) fn plain_pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
         let Some(exponent) = self.as_constant(b) else { return self.node(Op::Pow(a, b)) };
-        if let Some(x) = self.as_constant(a) {
+        if let Some(x) = self.as_constant(a)
+            && self.folds(false)
+        {
             return self.constant(x.powf(exponent));
         }
         let doubled = 2.0 * exponent;
@@ -350,6 +367,12 @@ impl Graph {
             }
         }
     }
+}
+
+/// Whether a function of one number is known to have an exact result: |x|, a root that is a double, or at 0 and 1 what are
+/// integers there.
+fn is_exact(x: f64, result: f64) -> bool {
+    result == x.abs() || result.mul_add(result, -x) == 0.0 || (result.fract() == 0.0 && (x == 0.0 || x == 1.0))
 }
 
 pub(super) fn is_power_of_two(value: f64) -> bool {

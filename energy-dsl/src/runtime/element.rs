@@ -67,6 +67,8 @@ pub struct Outputs<T: Number> {
     /// Block name and its numbers. Energies: `energy`, `grad`, `hess`. Forces: `force`, `dfdx`, `dfdv`. Constraints: all six and
     /// `constraint`, `jacobian`. Residuals: `residual`, `jacobian`.
     pub blocks: Vec<(&'static str, Vec<T>)>,
+    /// What routines return beside the block they are for: the routine, which block it is, and its numbers, to be held against that.
+    pub repeats: Vec<(&'static str, &'static str, Vec<T>)>,
     /// Conditions met, by order of derivative: value, first, second.
     pub flags: [Flags<T>; 3],
 }

@@ -46,6 +46,11 @@ pub fn evaluate_potential<T: Real, E: Potential<T>>(element: &E, inputs: &Inputs
             ("grad", flat(gradient.gradient.as_ref())),
             ("hess", full_triangle(E::Points::LEN, hessian.hessian.as_ref())),
         ],
+        repeats: vec![
+            ("gradient", "energy", vec![gradient.value]),
+            ("hessian", "energy", vec![hessian.value]),
+            ("hessian", "grad", flat(hessian.gradient.as_ref())),
+        ],
         flags: [value.flags, gradient.flags, hessian.flags],
     }
 }
@@ -62,6 +67,7 @@ pub fn evaluate_force_law<T: Real, E: ForceLaw<T>>(element: &E, inputs: &Inputs<
             ("dfdx", full_square(n, jacobians.by_position.as_ref())),
             ("dfdv", full_square(n, jacobians.by_velocity.as_ref())),
         ],
+        repeats: vec![("jacobians", "force", flat(jacobians.force.as_ref()))],
         flags: [force.flags, jacobians.flags, jacobians.flags],
     }
 }
@@ -74,6 +80,7 @@ pub fn evaluate_constraint<T: Real, E: Constraint<T>>(element: &E, inputs: &Inpu
     let x: <E as Potential<T>>::Points = points(inputs.positions);
     let jacobian = element.constraint_jacobian(&x);
     outputs.blocks.extend(force.blocks);
+    outputs.repeats.extend(force.repeats);
     outputs.blocks.push(("constraint", jacobian.value.as_ref().to_vec()));
     outputs.blocks.push(("jacobian", flat(jacobian.jacobian.as_ref())));
     outputs
@@ -86,6 +93,7 @@ pub fn evaluate_residual<T: Real, E: Residual<T>>(element: &E, inputs: &Inputs<'
     let (residual, jacobian) = (element.residual(&u), element.jacobian(&u));
     Outputs {
         blocks: vec![("residual", residual.value.as_ref().to_vec()), ("jacobian", jacobian.jacobian.as_ref().to_vec())],
+        repeats: vec![("jacobian", "residual", jacobian.value.as_ref().to_vec())],
         flags: [residual.flags, jacobian.flags, Flags::clear()],
     }
 }

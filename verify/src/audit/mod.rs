@@ -1,34 +1,65 @@
 //! What is checked of a declared element, and the report of it.
 
+mod accuracy;
+mod auditor;
 mod entry;
+mod html;
+mod input;
+mod junit;
+mod laws;
 mod momentum;
+mod mutations;
 mod properties;
 mod report;
+mod routes;
+mod subject;
 
-use energy_dsl::{Declaration, Element, Kind, Textbook};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate, largest};
-use crate::finite_difference::{Stepped, antiderivative, sweep};
-use crate::formula::{expected_blocks, rows};
-use crate::geometry::rotate_all;
-use crate::sample::{Sample, Sampler, has_points};
+use energy_dsl::{Declaration, Element};
 
-use self::entry::entry_name;
-use self::momentum::momentum_errors;
-pub use self::report::{Check, Line, Report, describe_failure};
+pub(crate) use self::accuracy::amplification;
+use self::auditor::{Auditor, Case, case, cases};
+pub use self::html::html;
+pub use self::input::read_inputs;
+pub use self::junit::junit;
+pub use self::report::{
+    Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, describe_failure,
+};
+pub(crate) use self::subject::Subject;
+pub use self::subject::Target;
+use crate::blocks::{BlockName, Evaluate, NoAnswer};
+use crate::geometry::{Rotation, longest_distance, shortest_distance};
+use crate::multiprecision::TrueBlock;
+use crate::sample::{Sample, has_points};
 
 /// How thorough an audit is.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Random inputs for each element.
     pub samples: usize,
+    /// At how many of them multi-precision is computed.
+    pub truths: usize,
+    /// Faults to plant in each element.
+    pub mutations: usize,
+    /// At how many inputs a fault may show.
+    pub trials: usize,
     /// What the inputs are drawn from.
     pub seed: u64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 200, seed: 1 }
+        Self { samples: 200, truths: 24, mutations: 24, trials: 40, seed: 1 }
+    }
+}
+
+impl Options {
+    /// For every change of the code: seconds for all elements.
+    #[must_use]
+    pub fn quick() -> Self {
+        Self { samples: 20, truths: 5, mutations: 10, trials: 15, ..Self::default() }
     }
 }
 
@@ -37,260 +68,181 @@ impl Default for Options {
 /// # Errors
 /// The first name that the catalogue does not have.
 pub fn audit_catalogue(names: &[&str], options: Options) -> Result<Report, String> {
+    Ok(audit_all(&catalogue_targets(names)?, None, options))
+}
+
+/// The elements of the catalogue with these names; all of them for an empty list.
+///
+/// # Errors
+/// The first name that the catalogue does not have.
+pub fn catalogue_targets(names: &[&str]) -> Result<Vec<Target>, String> {
     let catalogue = energy_elements::catalogue();
     if let Some(unknown) = names.iter().find(|name| energy_elements::find(name).is_none()) {
         let known = catalogue.iter().map(|entry| entry.declaration.name).collect::<Vec<_>>().join(", ");
         return Err(format!("no declared element is called {unknown}; there are {known}"));
     }
-    let mut report = Report::default();
-    for entry in catalogue.iter().filter(|e| names.is_empty() || names.contains(&e.declaration.name)) {
-        let part = audit(entry.declaration, entry.evaluate, options);
-        report.lines.extend(part.lines);
-        report.refused.extend(part.refused);
-    }
-    Ok(report)
+    let chosen = catalogue.iter().filter(|e| names.is_empty() || names.contains(&e.declaration.name));
+    Ok(chosen.map(Target::of_catalogue).collect())
 }
 
-/// Audits one element.
+/// An audit of all targets, on all processors; the report is in their order. Where an energy is given, they are forces that must be
+/// minus its gradient: at the same points, with its parameters by name.
+#[must_use]
+pub fn audit_all(targets: &[Target], energy: Option<&Target>, options: Options) -> Report {
+    let next = AtomicUsize::new(0);
+    let reports: Mutex<Vec<Option<Report>>> = Mutex::new(targets.iter().map(|_| None).collect());
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(targets.len());
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some((number, target)) = {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    targets.get(number).map(|target| (number, target))
+                } {
+                    let report = audit_target(target, energy, options);
+                    if let Ok(mut reports) = reports.lock() {
+                        reports[number] = Some(report);
+                    }
+                }
+            });
+        }
+    });
+    let mut all = Report::default();
+    for report in reports.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).into_iter().flatten() {
+        all.extend(report);
+    }
+    all
+}
+
+fn audit_target(target: &Target, energy: Option<&Target>, options: Options) -> Report {
+    let refused = |why: String| Report { refused: vec![(target.name().into(), why)], ..Report::default() };
+    let energy = match energy.map(Target::subject).transpose() {
+        Ok(energy) => energy,
+        Err(why) => return refused(why),
+    };
+    match target.subject() {
+        Ok(subject) => run(&subject, energy.as_ref(), options).unwrap_or_else(refused),
+        Err(why) => refused(why),
+    }
+}
+
+/// An audit of all checks at one input that was asked for.
+///
+/// # Errors
+/// When the element cannot be audited, or the input does not fit it.
+pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Result<Report, String> {
+    let subject = target.subject()?;
+    sample.fits(subject.declaration)?;
+    let turn = Rotation::from_unit_quaternion([0.5, -0.5, 0.5, 0.5]);
+    let case = case(&subject, sample.clone(), turn, true);
+    let mut section = section(&subject, 1);
+    let mut auditor = Auditor::new(&subject);
+    audit_case(&mut auditor, &mut section, &case).map_err(|error| error.to_string())?;
+    if let Some(energy) = energy {
+        against_energy(&mut auditor, &energy.subject()?, &case)?;
+    }
+    Ok(Report { lines: auditor.lines, sections: vec![section], refused: Vec::new() })
+}
+
+/// Audits one generated element. Without its source compiled again, no faults are planted.
 #[must_use]
 pub fn audit(declaration: &'static Declaration, evaluate: Evaluate, options: Options) -> Report {
-    let mut report = Report::default();
-    match Textbook::from_source(declaration.source) {
-        Ok(formula) => {
-            let mut auditor = Auditor { declaration, evaluate, formula, lines: Vec::new() };
-            match auditor.run(options) {
-                Ok(()) => report.lines = auditor.lines,
-                Err(error) => report.refused.push((declaration.name.into(), error.to_string())),
-            }
+    let report = Subject::new(declaration, Box::new(evaluate), None).and_then(|subject| run(&subject, None, options));
+    report.unwrap_or_else(|why| Report { refused: vec![(declaration.name.into(), why)], ..Report::default() })
+}
+
+fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<Report, String> {
+    let cases = cases(subject, options.samples, options.truths, options.seed);
+    let mut auditor = Auditor::new(subject);
+    let mut section = section(subject, cases.len());
+    for case in &cases {
+        audit_case(&mut auditor, &mut section, case).map_err(|error| error.to_string())?;
+        if let Some(energy) = energy {
+            against_energy(&mut auditor, energy, case)?;
         }
-        Err(errors) => report.refused.push((declaration.name.into(), errors.to_string())),
     }
-    report
+    let lines = auditor.lines;
+    // Faults in what is at fault already tell nothing.
+    if options.mutations > 0 && lines.iter().all(|line| line.passed) {
+        let score =
+            subject.interpreted.as_ref().map(|i| mutations::score(i, options.mutations, options.trials, options.seed));
+        section.mutations = score.transpose()?;
+    }
+    Ok(Report { lines, sections: vec![section], refused: Vec::new() })
+}
+
+fn section(subject: &Subject, inputs: usize) -> Section {
+    let declaration = subject.declaration;
+    Section {
+        element: declaration.name,
+        kind: declaration.kind.keyword(),
+        docs: declaration.docs,
+        source: declaration.source,
+        inputs,
+        accuracy: Vec::new(),
+        curves: Vec::new(),
+        spots: Vec::new(),
+        mutations: None,
+    }
+}
+
+fn audit_case(auditor: &mut Auditor<'_>, section: &mut Section, case: &Case) -> Result<(), NoAnswer> {
+    let answer = auditor.answer(&case.sample)?;
+    auditor.laws(case, &answer)?;
+    let curves = auditor.routes(case, &answer, &mut section.accuracy)?;
+    if section.curves.is_empty() {
+        section.curves = curves;
+    }
+    if has_points(auditor.declaration) {
+        let size = longest_distance(&case.sample.positions).unwrap_or(1.0);
+        let shape = shortest_distance(&case.sample.positions).unwrap_or(size) / size;
+        let error = |truth: &TrueBlock| truth.error_in_roundoffs(&answer.block(truth.block.name).numbers);
+        let spots = case.truth.iter().filter(|truth| truth.is_defined && truth.largest() > 0.0);
+        section.spots.extend(spots.map(|t| Spot { block: t.block.name, size, shape, error: error(t) }));
+    }
+    Ok(())
+}
+
+/// Holds a force against an energy at one input.
+fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case) -> Result<(), String> {
+    let (force, potential) = (auditor.declaration, energy.declaration);
+    if !auditor.subject.has_velocities() {
+        return Err(format!("{} is no force: it cannot be held against {}", force.name, potential.name));
+    }
+    let mut still = case.sample.clone();
+    still.velocities.fill(0.0);
+    let mut sample = Sample { velocities: Vec::new(), parameters: Vec::new(), ..still.clone() };
+    for wanted in potential.parameters {
+        let mut numbers = still.parameters.as_slice();
+        let found = force.parameters.iter().find_map(|field| {
+            let (own, others) = numbers.split_at(field.size);
+            numbers = others;
+            (field.name == wanted.name && field.size == wanted.size).then_some(own)
+        });
+        let found = found.ok_or_else(|| {
+            format!("{} has a parameter `{}` that {} has not", potential.name, wanted.name, force.name)
+        })?;
+        sample.parameters.extend_from_slice(found);
+    }
+    if sample.positions.len() != potential.points.iter().map(|p| p.size).sum::<usize>() {
+        return Err(format!("{} and {} are of different numbers of points", force.name, potential.name));
+    }
+    let answer = auditor.answer(&still).map_err(|e| e.to_string())?;
+    let gradient = energy.answer(&sample).map_err(|e| e.to_string())?;
+    let expected: Vec<f64> = gradient.block(BlockName::Gradient).numbers.iter().map(|g| -g).collect();
+    auditor.minus_gradient(&still, answer.block(BlockName::Force), &expected, potential.name);
+    Ok(())
 }
 
 /// Audits an element in a test.
 ///
 /// # Panics
-/// When a check fails, with the element, the block, the entry, both values and the input.
+/// When a check fails, with the element, the block, the entry, the values by all routes, the step of differences and the input.
 pub fn assert_derivatives<E: Element>(samples: usize) {
-    let options = Options { samples, ..Options::default() };
+    let options = Options { samples, truths: samples.min(5), mutations: 0, ..Options::default() };
     let report = audit(E::DECLARATION, E::evaluate::<f64>, options);
     let mut problems: Vec<String> =
         report.refused.iter().map(|(name, why)| format!("{name} cannot be audited: {why}")).collect();
     problems.extend(report.failures().map(describe_failure));
     assert!(problems.is_empty(), "\n{}", problems.join("\n"));
-}
-
-struct Auditor {
-    declaration: &'static Declaration,
-    evaluate: Evaluate,
-    formula: Textbook,
-    lines: Vec<Line>,
-}
-
-/// A block found another way.
-struct Route<'a> {
-    name: String,
-    numbers: &'a [f64],
-    /// The order of convergence, where it was observed.
-    order: Option<f64>,
-}
-
-impl Auditor {
-    fn run(&mut self, options: Options) -> Result<(), NoAnswer> {
-        let mut sampler = Sampler::new(self.declaration, options.seed);
-        for _ in 0..options.samples {
-            let sample = sampler.sample();
-            let turn = sampler.rotation();
-            let answer = self.answer(&sample)?;
-            self.finite(&sample, &answer);
-            for (block, expected) in answer.blocks.iter().zip(self.expected(&sample, &answer)) {
-                let route =
-                    Route { name: "textbook form by dual numbers".into(), numbers: &expected.numbers, order: None };
-                self.compare(Check::DualNumbers, &sample, &answer, block, &route);
-            }
-            self.differences(&sample, &answer)?;
-            self.symmetry(&sample, &answer);
-            self.claims(&sample, &answer, |vectors| rotate_all(&turn, vectors))?;
-            if has_points(self.declaration) && self.declaration.translation_invariant {
-                self.momenta(&sample, &answer, |vectors| rotate_all(&turn, vectors));
-            }
-        }
-        Ok(())
-    }
-
-    fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
-        evaluate(self.declaration, self.evaluate, &sample.inputs())
-    }
-
-    /// The expected blocks in the order of the answer's.
-    fn expected(&self, sample: &Sample, answer: &Answer) -> Vec<Block> {
-        let expected = expected_blocks(self.declaration, &self.formula, sample);
-        answer
-            .blocks
-            .iter()
-            .map(|block| {
-                expected.iter().find(|e| e.name == block.name).expect("the same kind has the same blocks").clone()
-            })
-            .collect()
-    }
-
-    fn record(
-        &mut self,
-        check: Check,
-        block: BlockName,
-        error: f64,
-        order: Option<f64>,
-        detail: impl FnOnce() -> String,
-    ) {
-        let passed = error <= check.tolerance();
-        let at = self.lines.iter().position(|l| l.check == check && l.block == block);
-        let at = at.unwrap_or_else(|| {
-            self.lines.push(Line {
-                element: self.declaration.name,
-                block,
-                check,
-                worst: -1.0,
-                tolerance: check.tolerance(),
-                passed: true,
-                order: None,
-                detail: String::new(),
-            });
-            self.lines.len() - 1
-        });
-        let line = &mut self.lines[at];
-        line.passed &= passed;
-        if let Some(order) = order {
-            line.order = Some(line.order.map_or(order, |least: f64| least.min(order)));
-        }
-        // A NaN is worse than anything.
-        if error > line.worst || (error.is_nan() && !line.worst.is_nan()) {
-            line.worst = error;
-            line.detail = detail();
-        }
-    }
-
-    /// The length over which stepping an input changes an element.
-    fn length(&self, sample: &Sample, stepped: Stepped) -> f64 {
-        if stepped == Stepped::Positions { sample.feature_length(self.declaration) } else { 1.0 }
-    }
-
-    /// How large a block is by nature: what its antiderivative would need to change by its own size over a length. A derivative
-    /// that vanishes is rounding error of about a unit of roundoff of this, on every route.
-    fn natural_size(&self, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
-        antiderivative(block, self.declaration.kind).map_or(0.0, |(lower, stepped)| {
-            let lower_size = answer.block(lower).largest().max(self.natural_size(sample, answer, lower));
-            lower_size / self.length(sample, stepped)
-        })
-    }
-
-    /// Compares a block with what it should be, number by number, relative to the largest (or its natural size).
-    fn compare(&mut self, check: Check, sample: &Sample, answer: &Answer, block: &Block, route: &Route<'_>) {
-        let scale =
-            largest(route.numbers).max(largest(&block.numbers)).max(self.natural_size(sample, answer, block.name));
-        let errors = block.numbers.iter().zip(route.numbers).map(|(got, want)| (got - want).abs());
-        let (entry, error) = errors
-            .enumerate()
-            .fold((0, 0.0_f64), |worst, next| if next.1 > worst.1 || next.1.is_nan() { next } else { worst });
-        let relative = if scale == 0.0 { 0.0 } else { error / scale };
-        let declaration = self.declaration;
-        self.record(check, block.name, relative, route.order, || {
-            format!(
-                "  entry {}: generated code gives {:.17e}, {} gives {:.17e}, at{}",
-                entry_name(declaration, block, entry),
-                block.numbers[entry],
-                route.name,
-                route.numbers[entry],
-                sample.describe(declaration)
-            )
-        });
-    }
-
-    fn finite(&mut self, sample: &Sample, answer: &Answer) {
-        let declaration = self.declaration;
-        for block in &answer.blocks {
-            let bad = block.numbers.iter().position(|x| !x.is_finite());
-            let flagged = answer.flags[block.name.order(declaration.kind)].any();
-            let error = if bad.is_some() || flagged { f64::INFINITY } else { 0.0 };
-            self.record(Check::Finite, block.name, error, None, || match bad {
-                Some(entry) => format!(
-                    "  entry {} is {}, at{}",
-                    entry_name(declaration, block, entry),
-                    block.numbers[entry],
-                    sample.describe(declaration)
-                ),
-                None => format!("  flagged as degenerate or a kink, at{}", sample.describe(declaration)),
-            });
-        }
-    }
-
-    fn differences(&mut self, sample: &Sample, answer: &Answer) -> Result<(), NoAnswer> {
-        let kind = self.declaration.kind;
-        for block in &answer.blocks {
-            let Some((lower, stepped)) = antiderivative(block.name, kind) else { continue };
-            let length = self.length(sample, stepped);
-            let found = sweep(sample, stepped, length, &block.numbers, |moved| {
-                self.answer(moved).map(|answer| answer.block(lower).numbers.clone())
-            })?;
-            let route = Route { name: format!("differences of `{lower}`"), numbers: &found.best, order: found.order };
-            self.compare(Check::FiniteDifferences, sample, answer, block, &route);
-        }
-        Ok(())
-    }
-
-    fn symmetry(&mut self, sample: &Sample, answer: &Answer) {
-        let declaration = self.declaration;
-        let Some(hessian) = answer.blocks.iter().find(|b| b.name == BlockName::Hessian) else { return };
-        let n = hessian.columns;
-        let transposed: Vec<f64> = (0..n * n).map(|e| hessian.numbers[e % n * n + e / n]).collect();
-        let worst = (0..n * n).find(|&e| hessian.numbers[e] != transposed[e]);
-        self.record(Check::Symmetry, hessian.name, if worst.is_some() { 1.0 } else { 0.0 }, None, || match worst {
-            Some(entry) => format!(
-                "  entry {} is {:.17e}, its mirror image {:.17e}, at{}",
-                entry_name(declaration, hessian, entry),
-                hessian.numbers[entry],
-                transposed[entry],
-                sample.describe(declaration)
-            ),
-            None => String::new(),
-        });
-    }
-
-    /// Σ f = 0 follows from translation invariance for whatever has a potential, and so does Σ x × f = 0 from rotation
-    /// invariance; a force that has none may keep either law or not, so it must keep what its own textbook form keeps.
-    fn momenta(&mut self, sample: &Sample, answer: &Answer, turn: impl Fn(&[f64]) -> Vec<f64>) {
-        let close = |a: f64, b: f64| (a - b).abs() <= 1e-10 * a.abs().max(b.abs());
-        let here = rows(&self.formula, sample);
-        let mut turned = sample.clone();
-        turned.positions = turn(&sample.positions);
-        let there = rows(&self.formula, &turned);
-        let invariant = here.iter().zip(&there).all(|(a, b)| close(*a, *b));
-        let squared = |rows: &[f64]| rows.iter().map(|c| c * c).sum::<f64>();
-        let laws = match self.declaration.kind {
-            Kind::Energy => vec![(BlockName::Gradient, true, invariant)],
-            // ½ k CᵀC turns with the points if ‖C‖ does; its damping force only if every row of C does.
-            Kind::Constraint => vec![
-                (BlockName::Gradient, true, close(squared(&here), squared(&there))),
-                (BlockName::Force, true, invariant),
-            ],
-            Kind::Force => {
-                let (linear, angular) = momentum_errors(&sample.positions, &here, 0.0);
-                vec![(BlockName::Force, linear < 1e-10, angular < 1e-10)]
-            }
-            Kind::Residual => Vec::new(),
-        };
-        let declaration = self.declaration;
-        let detail =
-            || format!("  summed over {} points, at{}", declaration.points.len(), sample.describe(declaration));
-        for (block, linear_is_law, angular_is_law) in laws {
-            let natural = self.natural_size(sample, answer, block);
-            let (linear, angular) = momentum_errors(&sample.positions, &answer.block(block).numbers, natural);
-            if linear_is_law {
-                self.record(Check::LinearMomentum, block, linear, None, detail);
-            }
-            if angular_is_law {
-                self.record(Check::AngularMomentum, block, angular, None, detail);
-            }
-        }
-    }
 }

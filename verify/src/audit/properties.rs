@@ -2,18 +2,16 @@
 
 use energy_dsl::{Kind, Property};
 
-use super::{Auditor, Check};
+use super::auditor::{Auditor, Case};
+use super::report::Check;
 use crate::blocks::{Answer, BlockName, NoAnswer, largest};
 use crate::sample::Sample;
 
-impl Auditor {
-    /// Checks each claim at one input; `turn` is a rotation of vectors.
-    pub(super) fn claims(
-        &mut self,
-        sample: &Sample,
-        answer: &Answer,
-        turn: impl Fn(&[f64]) -> Vec<f64>,
-    ) -> Result<(), NoAnswer> {
+impl Auditor<'_> {
+    /// Checks each claim at one input.
+    pub(super) fn claims(&mut self, case: &Case, answer: &Answer) -> Result<(), NoAnswer> {
+        let sample = &case.sample;
+        let turn = |vectors: &[f64]| case.turned(vectors);
         for property in self.declaration.properties {
             let (moved, expected) = match property {
                 // Proved when it was compiled.
@@ -23,6 +21,9 @@ impl Auditor {
                 Property::ZeroForceAtRest => (at_rest(sample), Expected::Zero),
             };
             let there = self.answer(&moved)?;
+            if *property == Property::ZeroForceAtRest && self.declaration.kind == Kind::Energy {
+                self.semi_definite_at_rest(&moved, there.block(BlockName::Hessian));
+            }
             let block = compared(self.declaration.kind, expected);
             let (here, there) = (&answer.block(block).numbers, &there.block(block).numbers);
             let wanted = match expected {
@@ -38,7 +39,7 @@ impl Auditor {
                 .fold(0.0_f64, |m, e| if e > m || e.is_nan() { e } else { m });
             let error = if worst == 0.0 { 0.0 } else { worst / scale };
             let declaration = self.declaration;
-            self.record(Check::Claims, block, error, None, || {
+            self.note(Check::Claims, block, error, sample, || {
                 format!(
                     "  it claims #[{}], but `{block}` is {there:?} where {wanted:?} was expected, after moving{}",
                     property.attribute(),
@@ -69,7 +70,7 @@ fn compared(kind: Kind, expected: Expected) -> BlockName {
     }
 }
 
-fn turned(sample: &Sample, turn: impl Fn(&[f64]) -> Vec<f64>) -> Sample {
+fn turned(sample: &Sample, turn: &impl Fn(&[f64]) -> Vec<f64>) -> Sample {
     Sample { positions: turn(&sample.positions), velocities: turn(&sample.velocities), ..sample.clone() }
 }
 

@@ -1,20 +1,33 @@
 use std::path::Path;
 
-use energy_dsl::Flags;
+use energy_dsl::{Flags, Textbook};
 use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
 use super::mapping::{is_undeclared, mapping};
 use crate::atomic_file::write_whole;
 use crate::blocks::{NoAnswer, evaluate};
+use crate::multiprecision::truth;
+
+/// What fills the blocks of evaluated records.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The generated code: 17 digits.
+    GeneratedCode,
+    /// The formula in multi-precision: so many digits; `undefined` where it has no value.
+    Truth {
+        /// How many.
+        digits: usize,
+    },
+}
 
 /// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the same records with `out` filled by the
-/// generated code, 17 digits, and `flags`: by block, whether it is `degenerate` or a `kink`. A degenerate rest shape, or a potential
+/// generated code or the truth, and `flags` of the generated code: by block, whether it is `degenerate` or a `kink`. A degenerate rest shape, or a potential
 /// of the reference set that no element computes yet, leaves `out` empty and says so in `error`. Returns the number of records.
 ///
 /// # Errors
 /// When the input is malformed or names an unknown potential, or the output cannot be written; nothing is written then.
-pub fn evaluate_file(input: &Path, output: &Path) -> Result<usize, RecordError> {
+pub fn evaluate_file(input: &Path, output: &Path, source: Source) -> Result<usize, RecordError> {
     let mut file: Value = read(input)?;
     let common = file.get("potential").and_then(Value::as_str).map(str::to_owned);
     let Some(records) = file.get_mut("records").and_then(Value::as_array_mut) else {
@@ -25,7 +38,7 @@ pub fn evaluate_file(input: &Path, output: &Path) -> Result<usize, RecordError> 
         let own = record.get("potential").and_then(Value::as_str).map(str::to_owned);
         let fail = |message: String| RecordError::record(input, &id, message);
         let potential = own.or_else(|| common.clone()).ok_or_else(|| fail("`potential` is missing".into()))?;
-        evaluate_record(record, &potential).map_err(fail)?;
+        evaluate_record(record, &potential, source).map_err(fail)?;
     }
     let count = records.len();
     let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
@@ -33,7 +46,7 @@ pub fn evaluate_file(input: &Path, output: &Path) -> Result<usize, RecordError> 
     Ok(count)
 }
 
-fn evaluate_record(value: &mut Value, potential: &str) -> Result<(), String> {
+fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result<(), String> {
     let record: Record = serde_json::from_value(value.clone()).map_err(|e| e.to_string())?;
     let fields = value.as_object_mut().ok_or("a record is an object")?;
     let without_answer = |fields: &mut Map<String, Value>, why: String| {
@@ -56,12 +69,25 @@ fn evaluate_record(value: &mut Value, potential: &str) -> Result<(), String> {
     let (mut out, mut flags) = (Map::new(), Map::new());
     match evaluate(declaration, mapping.entry.evaluate, &sample.inputs()) {
         Ok(answer) => {
+            let truths = match source {
+                Source::GeneratedCode => Vec::new(),
+                Source::Truth { digits } => {
+                    let formula =
+                        Textbook::from_source(declaration.source).map_err(|e| format!("{}: {e}", declaration.name))?;
+                    truth(declaration, &formula, &sample, digits)
+                }
+            };
             for block in &answer.blocks {
                 let name = block.name.name();
                 if asked.as_ref().is_some_and(|asked| !asked.iter().any(|a| a == name)) {
                     continue;
                 }
-                let digits: Vec<Value> = block.numbers.iter().map(|x| json!(format!("{x:.16e}"))).collect();
+                let digits: Vec<Value> = match (source, truths.iter().find(|t| t.block.name == block.name)) {
+                    (Source::Truth { digits }, Some(truth)) => {
+                        truth.block.numbers.iter().map(|x| json!(x.to_decimal(digits))).collect()
+                    }
+                    _ => block.numbers.iter().map(|x| json!(format!("{x:.16e}"))).collect(),
+                };
                 let single = digits.len() == 1 && name == "energy";
                 out.insert(name.into(), if single { digits[0].clone() } else { Value::Array(digits) });
                 let Flags { degenerate, kink } = answer.flags[block.name.order(declaration.kind)];

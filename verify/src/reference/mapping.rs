@@ -19,6 +19,13 @@ pub struct Mapping {
 type Row = (&'static str, &'static str, &'static [&'static str], Option<&'static str>, bool);
 
 const TABLE: &[Row] = &[
+    ("arap_membrane", "AsRigidAsPossible", &["mu"], Some("rest_uv"), false),
+    ("bw_shear", "BaraffWitkinShear", &["k"], Some("rest_uv"), false),
+    ("bw_stretch", "BaraffWitkinStretch", &["k", "b_u", "b_v"], Some("rest_uv"), false),
+    ("ipc_barrier", "DistanceBarrier", &["kappa", "dhat"], None, true),
+    ("ipc_barrier_sq", "SquaredDistanceBarrier", &["kappa", "dhat"], None, true),
+    ("snh_log_membrane", "StableNeoHookeanLog", &["lambda", "mu"], Some("rest_uv"), false),
+    ("snh_membrane", "StableNeoHookean", &["lambda", "mu"], Some("rest_uv"), false),
     ("bridson_conservative", "BridsonBending", &["Kprime", "theta0"], None, false),
     ("bridson_force", "BridsonForce", &["K", "theta0"], None, false),
     ("bridson_force_damped", "BridsonForceDamped", &["K", "k_d", "theta0"], None, false),
@@ -39,8 +46,7 @@ const TABLE: &[Row] = &[
 ];
 
 /// Potentials of the reference set whose elements are still to be declared.
-const UNDECLARED: &[&str] =
-    &["arap_membrane", "bw_shear", "bw_stretch", "ipc_barrier", "ipc_barrier_sq", "snh_log_membrane", "snh_membrane"];
+const UNDECLARED: &[&str] = &[];
 
 impl Mapping {
     /// Whether the potential is a force, so that its records hold velocities.

@@ -8,7 +8,7 @@ mod mapping;
 mod policy;
 mod report;
 
-pub use eval::evaluate_file;
+pub use eval::{Source, evaluate_file};
 pub use exact::Truth;
 pub use file::{Record, RecordError};
 pub use mapping::{Mapping, mapping};

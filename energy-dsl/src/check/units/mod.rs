@@ -47,6 +47,17 @@ pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
     }
 }
 
+/// The exponents of kg, m and s in a unit as written, as in `N/m`; nothing for what is not one.
+///
+/// ```
+/// assert_eq!(energy_dsl::unit_exponents("N/m"), Some([1.0, 0.0, -2.0]));
+/// assert_eq!(energy_dsl::unit_exponents("stone"), None);
+/// ```
+#[must_use]
+pub fn unit_exponents(unit: &str) -> Option<[f64; 3]> {
+    dimension::parse(unit).ok().map(|dimension| dimension.base)
+}
+
 /// Whether a unit is that of a quantity, and not of a number. Reports what cannot be read.
 fn read(unit: &str, span: &Span, diagnostics: &mut Diagnostics) -> bool {
     if unit.is_empty() {

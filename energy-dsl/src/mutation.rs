@@ -1,0 +1,160 @@
+//! Faults to plant in compiled code, so that an audit can show that it would notice them.
+
+use std::fmt;
+
+use crate::graph::{Input, Op};
+
+/// The kinds of fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Fault {
+    /// + for −, or a minus sign lost.
+    FlippedSign,
+    /// One term of a sum left out.
+    DroppedTerm,
+    /// One factor of a product left out.
+    DroppedFactor,
+    /// Twice a constant.
+    ChangedFactor,
+    /// Operands exchanged where that matters.
+    SwappedOperands,
+    /// One operand used twice, the other not at all.
+    WrongOperand,
+    /// Another function: cosine for sine, a minimum for a maximum, no root.
+    WrongFunction,
+    /// Another component of a point or parameter.
+    WrongInput,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::FlippedSign => "flipped sign",
+            Self::DroppedTerm => "dropped term",
+            Self::DroppedFactor => "dropped factor",
+            Self::ChangedFactor => "changed factor",
+            Self::SwappedOperands => "swapped operands",
+            Self::WrongOperand => "wrong operand",
+            Self::WrongFunction => "wrong function",
+            Self::WrongInput => "wrong input",
+        })
+    }
+}
+
+/// One fault in one operation of one routine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mutation {
+    /// What is done.
+    pub fault: Fault,
+    /// The routine it is done to; `rest` is what the rest shape decides.
+    pub routine: &'static str,
+    pub(crate) place: usize,
+    pub(crate) before: Op,
+    pub(crate) after: Op,
+}
+
+impl fmt::Display for Mutation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { fault, routine, place, before, after } = self;
+        write!(f, "{fault} in `{routine}`, operation {place}: {} for {}", symbol(*after), symbol(*before))
+    }
+}
+
+/// The faults that fit an operation.
+pub(crate) fn faults(op: Op) -> Vec<(Fault, Op)> {
+    use Fault::{
+        ChangedFactor, DroppedFactor, DroppedTerm, FlippedSign, SwappedOperands, WrongFunction, WrongInput,
+        WrongOperand,
+    };
+    // max(a, a) is a: the operation of a list that only passes on.
+    let pass = |a| Op::Max(a, a);
+    match op {
+        Op::Neg(a) => vec![(FlippedSign, pass(a))],
+        Op::Add(a, b) => vec![
+            (FlippedSign, Op::Sub(a, b)),
+            (DroppedTerm, pass(a)),
+            (DroppedTerm, pass(b)),
+            (WrongOperand, Op::Add(a, a)),
+        ],
+        Op::Sub(a, b) => vec![
+            (FlippedSign, Op::Add(a, b)),
+            (DroppedTerm, pass(a)),
+            (DroppedTerm, Op::Neg(b)),
+            (SwappedOperands, Op::Sub(b, a)),
+        ],
+        Op::Mul(a, b) => vec![(DroppedFactor, pass(a)), (DroppedFactor, pass(b)), (WrongOperand, Op::Mul(a, a))],
+        Op::Div(a, b) => {
+            vec![(SwappedOperands, Op::Div(b, a)), (WrongFunction, Op::Mul(a, b)), (DroppedFactor, pass(a))]
+        }
+        Op::MulAdd(a, b, c) => vec![
+            (FlippedSign, Op::NegMulAdd(a, b, c)),
+            (DroppedTerm, pass(c)),
+            (DroppedTerm, Op::Mul(a, b)),
+            (WrongOperand, Op::MulAdd(a, a, c)),
+        ],
+        Op::MulSub(a, b, c) => vec![
+            (FlippedSign, Op::MulAdd(a, b, c)),
+            (DroppedTerm, Op::Neg(c)),
+            (DroppedTerm, Op::Mul(a, b)),
+            (SwappedOperands, Op::NegMulAdd(a, b, c)),
+        ],
+        Op::NegMulAdd(a, b, c) => {
+            vec![(FlippedSign, Op::MulAdd(a, b, c)), (DroppedTerm, pass(c)), (SwappedOperands, Op::MulSub(a, b, c))]
+        }
+        Op::Sqrt(a) => vec![(WrongFunction, pass(a))],
+        Op::Abs(a) => vec![(WrongFunction, pass(a))],
+        Op::Sin(a) => vec![(WrongFunction, Op::Cos(a))],
+        Op::Cos(a) => vec![(WrongFunction, Op::Sin(a))],
+        Op::Exp(a) => vec![(WrongFunction, pass(a))],
+        Op::Ln(a) => vec![(WrongFunction, pass(a))],
+        Op::Atan2(a, b) => vec![(SwappedOperands, Op::Atan2(b, a))],
+        Op::Pow(a, b) => vec![(SwappedOperands, Op::Pow(b, a))],
+        Op::Min(a, b) => vec![(WrongFunction, Op::Max(a, b))],
+        Op::Max(a, b) => vec![(WrongFunction, Op::Min(a, b))],
+        Op::Select(mask, a, b) => vec![(SwappedOperands, Op::Select(mask, b, a))],
+        Op::Constant(bits) if f64::from_bits(bits) != 0.0 => {
+            vec![(ChangedFactor, Op::Constant((2.0 * f64::from_bits(bits)).to_bits()))]
+        }
+        Op::Input(input) => vec![(WrongInput, Op::Input(neighbour(input)))],
+        _ => Vec::new(),
+    }
+}
+
+/// The other component of a pair: always one that there is, for the first two of each list.
+fn neighbour(input: Input) -> Input {
+    match input {
+        // The axes of one point: x for y, y for z, z for x.
+        Input::Position(i) => Input::Position(i / 3 * 3 + (i + 2) % 3),
+        Input::Velocity(i) => Input::Velocity(i / 3 * 3 + (i + 2) % 3),
+        other => other,
+    }
+}
+
+fn symbol(op: Op) -> &'static str {
+    match op {
+        Op::Constant(_) => "a constant",
+        Op::Input(_) => "an input",
+        Op::Neg(_) => "−a",
+        Op::Add(a, b) if a == b => "a + a",
+        Op::Add(..) => "a + b",
+        Op::Sub(..) => "a − b",
+        Op::Mul(a, b) if a == b => "a a",
+        Op::Mul(..) => "a b",
+        Op::Div(..) => "a / b",
+        Op::MulAdd(..) => "a b + c",
+        Op::MulSub(..) => "a b − c",
+        Op::NegMulAdd(..) => "c − a b",
+        Op::Sqrt(_) => "√a",
+        Op::Abs(_) => "|a|",
+        Op::Sin(_) => "sin a",
+        Op::Cos(_) => "cos a",
+        Op::Exp(_) => "exp a",
+        Op::Ln(_) => "ln a",
+        Op::Atan2(..) => "atan2",
+        Op::Pow(..) => "a^b",
+        Op::Max(a, b) if a == b => "an operand alone",
+        Op::Min(..) => "min",
+        Op::Max(..) => "max",
+        Op::Select(..) => "a selection",
+        _ => "another",
+    }
+}

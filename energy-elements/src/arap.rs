@@ -1,0 +1,31 @@
+use energy_macros::energy;
+
+energy! {
+    /// As-rigid-as-possible membrane on a triangle: A μ/2 ((s₁ − 1)² + (s₂ − 1)²), s the singular values of F = D D_m⁻¹ (Sorkine &
+    /// Alexa 2007). Half the squares of their sum less 2, (I + 2J − 4)/(√(I + 2J) + 2), and of their difference, which keeps its digits
+    /// near rest; I = tr FᵀF, J = ‖w_u × w_v‖. Where J = 0 its derivatives are 0 of J and flagged.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy AsRigidAsPossible(x0, x1, x2: Point; rest u0, u1, u2: Vec2; μ: Scalar[N/m]) {
+        rest {
+            let D_m = columns(u1 - u0, u2 - u0);
+            let B = adjugate(D_m);
+            let d = det(D_m);
+            let d2 = d^2;
+        }
+        let a = x1 - x0;
+        let b = x2 - x0;
+        let F = columns(a, b) * B;
+        let f_u = F * vector(1, 0);
+        let f_v = F * vector(0, 1);
+        let area = norm(cross(a, b));
+        // J − 1, and I − 2.
+        let j = (area - d) / d;
+        let i = trace(transpose(F) * F - d2 * identity(2)) / d2;
+        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        let square = ddot(F, F) / d2 + 2 * area / d;
+        let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
+        d * μ / 8 * (((i + 2 * j) / (sqrt(square) + 2))^2 + anisotropy / square)
+    }
+}

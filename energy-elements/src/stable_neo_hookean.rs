@@ -1,0 +1,31 @@
+use energy_macros::energy;
+
+energy! {
+    /// Stable neo-Hookean membrane on a triangle without logarithm: A (μ/2 (I − 2) − μ (J − 1) + λ/2 (J − 1)²) (after Smith et al.
+    /// 2018). I = tr FᵀF, J = ‖w_u × w_v‖; I − 2J = (s₁ − s₂)² is formed from the anisotropy of FᵀF, which keeps its digits near rest.
+    /// Where J = 0 its derivatives are 0 of J and flagged.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy StableNeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
+        rest {
+            let D_m = columns(u1 - u0, u2 - u0);
+            let B = adjugate(D_m);
+            let d = det(D_m);
+            let d2 = d^2;
+        }
+        let a = x1 - x0;
+        let b = x2 - x0;
+        let F = columns(a, b) * B;
+        let f_u = F * vector(1, 0);
+        let f_v = F * vector(0, 1);
+        let area = norm(cross(a, b));
+        // J − 1.
+        let j = (area - d) / d;
+        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        let square = ddot(F, F) / d2 + 2 * area / d;
+        let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
+        let shape = anisotropy / square;
+        d / 4 * (μ * shape + λ * j^2)
+    }
+}

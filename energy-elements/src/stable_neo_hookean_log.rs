@@ -1,0 +1,43 @@
+use energy_macros::energy;
+
+energy! {
+    /// x − ln(1 + x): near 0 by 2 artanh z = ln(1 + x), z = x/(2 + x), x − 2z = x z.
+    fn x_minus_log1p(x) {
+        let z = x / (2 + x);
+        let y = z^2;
+        let tail = y * (1/5 + y * (1/7 + y * (1/9 + y * (1/11 + y * (1/13 + y * (1/15 + y * (1/17 + y * (1/19
+            + y * (1/21 + y * (1/23 + y * (1/25 + y * (1/27 + y * (1/29 + y * (1/31 + y * (1/33)))))))))))))));
+        if abs(x) < 0.25 { z * (x - 2 * y * (1/3 + tail)) } else { x - log1p(x) }
+    }
+
+    /// Stable neo-Hookean membrane on a triangle with logarithm (Smith et al. 2018), stable at rest in two dimensions:
+    /// A (μ/2 (I − 2) − μ/2 ln((I + 1)/3) + λ/2 ((J − α)² − (1 − α)²)), α = 1 + 2μ/(3λ). I = tr FᵀF, J = ‖w_u × w_v‖. What is linear in the
+    /// strain cancels and is not formed: I − 2J = (s₁ − s₂)² comes from the anisotropy of FᵀF. Where J = 0 its derivatives are 0
+    /// of J and flagged.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy StableNeoHookeanLog(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
+        rest {
+            let D_m = columns(u1 - u0, u2 - u0);
+            let B = adjugate(D_m);
+            let d = det(D_m);
+            let d2 = d^2;
+        }
+        let a = x1 - x0;
+        let b = x2 - x0;
+        let F = columns(a, b) * B;
+        let f_u = F * vector(1, 0);
+        let f_v = F * vector(0, 1);
+        let area = norm(cross(a, b));
+        // J − 1, and I − 2.
+        let j = (area - d) / d;
+        let i = trace(transpose(F) * F - d2 * identity(2)) / d2;
+        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        let square = ddot(F, F) / d2 + 2 * area / d;
+        let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
+        let shape = anisotropy / square;
+        // I − 2 − ln((I + 1)/3) = 2x + (x − ln(1 + x)), x = (I − 2)/3; of 2x the part 4j/3 cancels, and 2 shape/3 is left.
+        d / 4 * (μ * (2/3 * shape + x_minus_log1p(i / 3)) + λ * j^2)
+    }
+}

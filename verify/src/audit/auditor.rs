@@ -1,0 +1,136 @@
+//! One element under audit: its inputs with what they must give, and the notes taken.
+
+use std::collections::BTreeMap;
+
+use energy_dsl::Declaration;
+
+use super::report::{Check, Line};
+use super::subject::Subject;
+use crate::blocks::{Answer, Block, BlockName, NoAnswer};
+use crate::finite_difference::{Stepped, antiderivative};
+use crate::formula::expected_blocks;
+use crate::geometry::{Rotation, rotate_all};
+use crate::multiprecision::{TrueBlock, truth_of_ordinary};
+use crate::sample::{Sample, Sampler};
+
+/// An input, with what does not depend on the code under audit.
+pub(super) struct Case {
+    pub(super) sample: Sample,
+    pub(super) turn: Rotation,
+    /// By hyper-dual numbers through the textbook form.
+    pub(super) dual: Vec<Block>,
+    /// In multi-precision; of some cases only, for it takes time.
+    pub(super) truth: Vec<TrueBlock>,
+}
+
+impl Case {
+    pub(super) fn turned(&self, vectors: &[f64]) -> Vec<f64> {
+        rotate_all(&self.turn, vectors)
+    }
+
+    pub(super) fn dual(&self, name: BlockName) -> &Block {
+        self.dual.iter().find(|block| block.name == name).expect("the same kind has the same blocks")
+    }
+
+    pub(super) fn truth(&self, name: BlockName) -> Option<&TrueBlock> {
+        self.truth.iter().find(|truth| truth.block.name == name)
+    }
+}
+
+/// Digits of the truth that doubles are held against.
+const DIGITS: usize = 25;
+/// Every so many inputs one has whole coordinates.
+const LATTICE: usize = 5;
+
+/// Inputs drawn from a seed, `with_truth` of them with multi-precision blocks.
+pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: u64) -> Vec<Case> {
+    let mut sampler = Sampler::new(subject.declaration, seed);
+    (0..samples)
+        .map(|number| {
+            let is_lattice = number % LATTICE == LATTICE - 1;
+            let sample = if is_lattice { sampler.lattice_sample() } else { sampler.sample() };
+            case(subject, sample, sampler.rotation(), number < with_truth)
+        })
+        .collect()
+}
+
+/// One input that was asked for.
+pub(super) fn case(subject: &Subject, sample: Sample, turn: Rotation, with_truth: bool) -> Case {
+    let Subject { declaration, formula, .. } = subject;
+    Case {
+        dual: expected_blocks(declaration, formula, &sample),
+        truth: if with_truth { truth_of_ordinary(declaration, formula, &sample, DIGITS) } else { Vec::new() },
+        sample,
+        turn,
+    }
+}
+
+/// What is being audited, and what was noted.
+pub(super) struct Auditor<'a> {
+    pub(super) subject: &'a Subject,
+    pub(super) declaration: &'static Declaration,
+    pub(super) lines: Vec<Line>,
+    places: BTreeMap<(Check, BlockName), usize>,
+}
+
+/// What is noted of one comparison.
+pub(super) struct Finding<'a> {
+    pub(super) check: Check,
+    pub(super) block: BlockName,
+    pub(super) error: f64,
+    pub(super) order: Option<f64>,
+    pub(super) sample: &'a Sample,
+}
+
+impl<'a> Auditor<'a> {
+    pub(super) fn new(subject: &'a Subject) -> Self {
+        Self { subject, declaration: subject.declaration, lines: Vec::new(), places: BTreeMap::new() }
+    }
+
+    pub(super) fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
+        self.subject.answer(sample)
+    }
+
+    /// Notes a finding; `detail` is asked for only if it is the worst of its check and block.
+    pub(super) fn record(&mut self, finding: &Finding<'_>, detail: impl FnOnce() -> String) {
+        let &Finding { check, block, error, order, sample } = finding;
+        let element = self.declaration.name;
+        let lines = &mut self.lines;
+        let at = *self.places.entry((check, block)).or_insert_with(|| {
+            lines.push(Line::new(element, block, check));
+            lines.len() - 1
+        });
+        let line = &mut self.lines[at];
+        line.inputs += 1;
+        line.passed &= error <= check.tolerance();
+        if let Some(order) = order {
+            line.order = Some(line.order.map_or(order, |least: f64| least.min(order)));
+        }
+        // A NaN is worse than anything.
+        if line.input.is_none() || error > line.worst || (error.is_nan() && !line.worst.is_nan()) {
+            line.worst = error;
+            line.detail = detail();
+            line.input = Some(sample.clone());
+        }
+    }
+
+    /// The length over which stepping an input changes an element.
+    pub(super) fn length(&self, sample: &Sample, stepped: Stepped) -> f64 {
+        if stepped == Stepped::Positions { sample.feature_length(self.declaration) } else { 1.0 }
+    }
+
+    /// How large a block is by nature. A derivative: what its antiderivative would need to change by its own size over a length.
+    /// What is not one: what its derivative amounts to over a length. Where a block vanishes, rounding errors of about a unit of
+    /// roundoff of this are left on every route.
+    pub(super) fn natural_size(&self, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
+        let kind = self.declaration.kind;
+        if let Some((lower, stepped)) = antiderivative(block, kind) {
+            let lower_size = answer.block(lower).largest().max(self.natural_size(sample, answer, lower));
+            return lower_size / self.length(sample, stepped);
+        }
+        let upper = BlockName::of_kind(kind).iter().copied().find(|&upper| {
+            antiderivative(upper, kind).is_some_and(|(lower, stepped)| lower == block && stepped == Stepped::Positions)
+        });
+        upper.map_or(0.0, |upper| answer.block(upper).largest() * self.length(sample, Stepped::Positions))
+    }
+}

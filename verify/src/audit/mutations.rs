@@ -1,0 +1,178 @@
+//! How sensitive the audit is: faults are planted in compiled routines, and each must be noticed.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use energy_dsl::{Fault, Inputs, Interpreted, Mutation, Number, Outputs};
+use fastrand::Rng;
+
+use super::auditor::{Auditor, Case, case, cases};
+use super::report::{Check, Mutant, MutationScore};
+use super::subject::Subject;
+use crate::blocks::NoAnswer;
+use crate::multiprecision::{Big, worse};
+use crate::sample::{Sample, Sampler};
+
+/// Plants up to `wanted` faults, spread over kinds and routines; each has so many inputs to show at. Faults that provably change nothing are counted apart.
+///
+/// # Errors
+/// When an input has no answer even without a fault.
+pub(super) fn score(
+    interpreted: &Interpreted,
+    wanted: usize,
+    inputs: usize,
+    seed: u64,
+) -> Result<MutationScore, String> {
+    let subject = subject(interpreted)?;
+    let mut trials: Vec<Trial> = cases(&subject, inputs, inputs, seed ^ 0x6d75_7461_7465)
+        .into_iter()
+        .map(|case| Trial { case, fails_anyway: Vec::new() })
+        .collect();
+    trials.extend(rare_branches(&subject, interpreted, &trials, seed));
+    let mut score = MutationScore::default();
+    for mutation in spread(interpreted.mutations(), seed) {
+        if score.mutants.len() == wanted {
+            break;
+        }
+        if interpreted.is_proved_equivalent(&mutation) {
+            score.equivalent += 1;
+            continue;
+        }
+        let broken = interpreted.mutated(&mutation);
+        let caught_by = caught_by(&self::subject(&broken)?, &trials);
+        if caught_by.is_empty() {
+            match largest_difference(interpreted, &broken, &trials) {
+                Some(0.0) => {
+                    score.without_effect += 1;
+                    continue;
+                }
+                Some(difference) if difference < Check::Accuracy.tolerance() * f64::EPSILON / 2.0 => {
+                    score.within_rounding += 1;
+                    continue;
+                }
+                _ => {}
+            }
+        }
+        score.mutants.push(Mutant { fault: mutation.to_string(), caught_by });
+    }
+    Ok(score)
+}
+
+fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
+    let runs = interpreted.clone();
+    Subject::new(interpreted.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), None)
+}
+
+/// How much a fault that went unnoticed changes results, without rounding: the largest difference of a block at any input. The last
+/// coefficient of a series changes its last bits; an operation that no input reaches, or whose other operand is 1 wherever
+/// it counts, changes nothing.
+fn largest_difference(sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> Option<f64> {
+    let mut differences = trials.iter().map(|trial| exact_difference(sound, broken, &trial.case.sample));
+    differences.try_fold(0.0_f64, |most, difference| Some(most.max(difference?)))
+}
+
+/// The largest difference of a block in units of its largest number, without rounding.
+fn exact_difference(sound: &Interpreted, broken: &Interpreted, sample: &Sample) -> Option<f64> {
+    let big = |numbers: &[f64]| numbers.iter().map(|&x| Big::from_f64(x)).collect::<Vec<_>>();
+    let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| big(list));
+    let inputs = Inputs { parameters: &lists[0], rest: &lists[1], positions: &lists[2], velocities: &lists[3] };
+    let (before, after) = (sound.evaluate(&inputs).ok()?, broken.evaluate(&inputs).ok()?);
+    let numbers = |outputs: Outputs<Big>| {
+        let repeats = outputs.repeats.into_iter().map(|(_, _, numbers)| numbers);
+        outputs.blocks.into_iter().map(|(_, numbers)| numbers).chain(repeats).collect::<Vec<_>>()
+    };
+    let mut most = 0.0_f64;
+    for (a, b) in numbers(before).iter().zip(&numbers(after)) {
+        let size = a.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        let change = a.iter().zip(b).map(|(a, b)| (a.clone() - b.clone()).to_f64().abs()).fold(0.0, worse);
+        if change != 0.0 {
+            most = worse(most, change / size);
+        }
+    }
+    (!most.is_nan()).then_some(most)
+}
+
+/// An input, and the checks that fail there without any fault: near a singularity some routes lose their digits.
+struct Trial {
+    case: Case,
+    fails_anyway: Vec<Check>,
+}
+
+/// One input for each outcome of a comparison that no ordinary input has, as far as a search finds one.
+fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial], seed: u64) -> Vec<Trial> {
+    const CANDIDATES: usize = 4000;
+    let branches = |sample: &Sample| interpreted.branches(&sample.inputs()).ok();
+    let mut seen: BTreeSet<(usize, bool)> = BTreeSet::new();
+    for trial in ordinary {
+        seen.extend(branches(&trial.case.sample).into_iter().flatten().enumerate());
+    }
+    let comparisons = seen.iter().map(|(number, _)| number + 1).max().unwrap_or(0);
+    let mut sampler = Sampler::new(subject.declaration, seed ^ 0x6272_616e_6368);
+    let mut found = Vec::new();
+    for _ in 0..CANDIDATES {
+        if seen.len() == 2 * comparisons {
+            break;
+        }
+        let sample = sampler.odd_sample();
+        let Some(taken) = branches(&sample) else { continue };
+        if taken.iter().enumerate().all(|(number, &outcome)| seen.contains(&(number, outcome))) {
+            continue;
+        }
+        let case = case(subject, sample, sampler.rotation(), true);
+        let mut auditor = Auditor::new(subject);
+        let sound = look(&mut auditor, &case).is_ok();
+        let fails_anyway = failed(&auditor);
+        // Where the code under audit flags its own result, or has none, nothing can be held against it.
+        if sound && !fails_anyway.contains(&Check::Finite) && !fails_anyway.contains(&Check::Accuracy) {
+            seen.extend(taken.into_iter().enumerate());
+            found.push(Trial { case, fails_anyway });
+        }
+    }
+    found
+}
+
+fn failed(auditor: &Auditor<'_>) -> Vec<Check> {
+    let mut checks: Vec<Check> = auditor.lines.iter().filter(|line| !line.passed).map(|line| line.check).collect();
+    checks.sort_unstable();
+    checks.dedup();
+    checks
+}
+
+/// The checks that fail at the first input at which one does that would not without the fault.
+fn caught_by(broken: &Subject, trials: &[Trial]) -> Vec<Check> {
+    for trial in trials {
+        let mut auditor = Auditor::new(broken);
+        // What cannot even be evaluated is noticed too.
+        if look(&mut auditor, &trial.case).is_err() {
+            return vec![Check::Finite];
+        }
+        let mut checks = failed(&auditor);
+        checks.retain(|check| !trial.fails_anyway.contains(check));
+        if !checks.is_empty() {
+            return checks;
+        }
+    }
+    Vec::new()
+}
+
+fn look(auditor: &mut Auditor<'_>, case: &Case) -> Result<(), NoAnswer> {
+    let answer = auditor.answer(&case.sample)?;
+    auditor.laws(case, &answer)?;
+    auditor.routes(case, &answer, &mut Vec::new())?;
+    Ok(())
+}
+
+/// In an order that takes kinds of fault and routines by turns.
+fn spread(mut mutations: Vec<Mutation>, seed: u64) -> Vec<Mutation> {
+    Rng::with_seed(seed).shuffle(&mut mutations);
+    let mut by_kind: BTreeMap<(Fault, &str), Vec<Mutation>> = BTreeMap::new();
+    for mutation in mutations {
+        by_kind.entry((mutation.fault, mutation.routine)).or_default().push(mutation);
+    }
+    let mut kinds: Vec<Vec<Mutation>> = by_kind.into_values().collect();
+    Rng::with_seed(seed).shuffle(&mut kinds);
+    let mut order = Vec::new();
+    while kinds.iter().any(|kind| !kind.is_empty()) {
+        order.extend(kinds.iter_mut().filter_map(Vec::pop));
+    }
+    order
+}

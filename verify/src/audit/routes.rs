@@ -1,0 +1,209 @@
+//! The routes to each block, held against each other: generated code, multi-precision, dual numbers, finite differences.
+
+use super::accuracy::{amplification, in_roundoffs};
+use super::auditor::{Auditor, Case, Finding};
+use super::entry::entry_name;
+use super::report::{Accuracy, Check, StepCurve};
+use crate::blocks::{Answer, Block, BlockName, NoAnswer, largest};
+use crate::finite_difference::{Sweep, antiderivative, sweep};
+
+/// A block found one way.
+struct Route<'a> {
+    name: String,
+    numbers: &'a [f64],
+    /// Its own relative error, at an ordinary input.
+    uncertainty: f64,
+}
+
+impl Auditor<'_> {
+    /// Compares each block with all routes to it. Returns the curves of the differences' errors against their steps.
+    pub(super) fn routes(
+        &mut self,
+        case: &Case,
+        answer: &Answer,
+        accuracy: &mut Vec<Accuracy>,
+    ) -> Result<Vec<StepCurve>, NoAnswer> {
+        let mut curves = Vec::new();
+        for block in &answer.blocks {
+            let differences = self.differences(case, block)?;
+            if let Some((lower, sweep)) = &differences {
+                let (block, of) = (block.name, *lower);
+                curves.push(StepCurve { block, of, errors: relative(&sweep.curve, answer.block(block).largest()) });
+            }
+            self.compare_all(case, answer, block, differences.as_ref());
+            self.measure(case, answer, block, accuracy);
+        }
+        Ok(curves)
+    }
+
+    fn differences(&self, case: &Case, block: &Block) -> Result<Option<(BlockName, Sweep)>, NoAnswer> {
+        let Some((lower, stepped)) = antiderivative(block.name, self.declaration.kind) else { return Ok(None) };
+        let length = self.length(&case.sample, stepped);
+        let found = sweep(&case.sample, stepped, length, &block.numbers, |moved| {
+            self.answer(moved).map(|answer| answer.block(lower).numbers.clone())
+        })?;
+        Ok(Some((lower, found)))
+    }
+
+    fn compare_all(&mut self, case: &Case, answer: &Answer, block: &Block, differences: Option<&(BlockName, Sweep)>) {
+        let digits: Option<Vec<f64>> = case
+            .truth(block.name)
+            .filter(|t| t.is_defined)
+            .map(|t| t.block.numbers.iter().map(|x| x.to_f64()).collect());
+        let mut routes = vec![Route { name: "generated code".into(), numbers: &block.numbers, uncertainty: 0.0 }];
+        if let Some(digits) = &digits {
+            routes.push(Route { name: "multi-precision".into(), numbers: digits, uncertainty: 0.0 });
+        }
+        let dual = Check::DualNumbers.tolerance();
+        routes.push(Route { name: "dual numbers".into(), numbers: &case.dual(block.name).numbers, uncertainty: dual });
+        if let Some((lower, sweep)) = differences {
+            routes.push(Route {
+                name: format!("differences of `{lower}` (step {:.1e})", sweep.step),
+                numbers: &sweep.best,
+                uncertainty: Check::FiniteDifferences.tolerance(),
+            });
+        }
+        let scale = routes.iter().map(|route| largest(route.numbers)).fold(0.0, f64::max);
+        let scale = scale.max(self.natural_size(&case.sample, answer, block.name));
+        let order = differences.and_then(|(_, sweep)| sweep.order);
+        for route in &routes[1..] {
+            let check = match route.uncertainty {
+                0.0 => continue,
+                u if u == dual => Check::DualNumbers,
+                _ => Check::FiniteDifferences,
+            };
+            let (entry, error) = distance(&block.numbers, route.numbers);
+            let declaration = self.declaration;
+            let order = if check == Check::FiniteDifferences { order } else { None };
+            let finding = Finding {
+                check,
+                block: block.name,
+                error: if scale == 0.0 { 0.0 * error } else { error / scale },
+                order,
+                sample: &case.sample,
+            };
+            self.record(&finding, || {
+                let values: Vec<String> =
+                    routes.iter().map(|r| format!("{} {:.17e}", r.name, r.numbers[entry])).collect();
+                format!(
+                    "  entry {}: {}\n  {}\n  at{}",
+                    entry_name(declaration, block, entry),
+                    values.join(", "),
+                    verdict(&routes, scale),
+                    case.sample.describe(declaration)
+                )
+            });
+        }
+    }
+
+    /// The error in units of roundoff, and over what rounded edges excuse.
+    fn measure(&mut self, case: &Case, answer: &Answer, block: &Block, accuracy: &mut Vec<Accuracy>) {
+        let Some(truth) = case.truth(block.name).filter(|truth| truth.is_defined) else { return };
+        let natural = self.natural_size(&case.sample, answer, block.name);
+        let error = in_roundoffs(truth, &block.numbers, natural);
+        let at = accuracy.iter().position(|a| a.block == block.name).unwrap_or_else(|| {
+            accuracy.push(Accuracy::new(block.name));
+            accuracy.len() - 1
+        });
+        let line = &mut accuracy[at];
+        line.inputs += 1;
+        let entry = || entry_name(self.declaration, block, truth.worst_entry(&block.numbers));
+        if line.input.is_none() || error > line.worst || error.is_nan() {
+            (line.worst, line.entry, line.input) = (error, entry(), Some(case.sample.clone()));
+        }
+        // κ ≥ 1: where even the error itself is no worse than what is known, κ need not be.
+        let by_kappa = if error > line.worst_kappa || error.is_nan() {
+            error / amplification(self.subject, &case.sample, answer, block.name).max(1.0)
+        } else {
+            0.0
+        };
+        if line.input_kappa.is_none() || by_kappa > line.worst_kappa || by_kappa.is_nan() {
+            (line.worst_kappa, line.input_kappa) = (by_kappa, Some(case.sample.clone()));
+        }
+        let finding =
+            Finding { check: Check::Accuracy, block: block.name, error: by_kappa, order: None, sample: &case.sample };
+        let declaration = self.declaration;
+        self.record(&finding, || {
+            let worst = truth.worst_entry(&block.numbers);
+            format!(
+                "  entry {}: generated code {:.17e}, multi-precision {}\n  at{}",
+                entry_name(declaration, block, worst),
+                block.numbers[worst],
+                truth.block.numbers[worst].to_decimal(DIGITS_SHOWN),
+                case.sample.describe(declaration)
+            )
+        });
+    }
+}
+
+const DIGITS_SHOWN: usize = 25;
+
+fn relative(curve: &[(f64, f64, f64)], size: f64) -> Vec<(f64, f64, f64)> {
+    let size = if size > 0.0 { size } else { 1.0 };
+    curve.iter().map(|(step, plain, extrapolated)| (*step, plain / size, extrapolated / size)).collect()
+}
+
+/// The largest difference, and its place.
+fn distance(a: &[f64], b: &[f64]) -> (usize, f64) {
+    let errors = a.iter().zip(b).map(|(x, y)| (x - y).abs()).enumerate();
+    errors.fold((0, 0.0_f64), |worst, next| if next.1 > worst.1 || next.1.is_nan() { next } else { worst })
+}
+
+/// Which routes agree, and so which one to suspect: multi-precision, where it was computed, is right to all its digits; without it
+/// the majority is believed.
+fn verdict(routes: &[Route<'_>], scale: f64) -> String {
+    let agree = |a: &Route<'_>, b: &Route<'_>| {
+        let allowed = a.uncertainty.max(b.uncertainty).max(1e-10) * scale;
+        distance(a.numbers, b.numbers).1 <= allowed
+    };
+    let mut camps: Vec<Vec<&Route<'_>>> = Vec::new();
+    for route in routes {
+        match camps.iter_mut().find(|camp| camp.iter().any(|other| agree(other, route))) {
+            Some(camp) => camp.push(route),
+            None => camps.push(vec![route]),
+        }
+    }
+    let names = |camp: &[&Route<'_>]| camp.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", ");
+    if camps.len() == 1 {
+        return "all routes agree to within what each can tell".into();
+    }
+    let is_true = |camp: &Vec<&Route<'_>>| camp.iter().any(|r| r.name == "multi-precision");
+    let believed = camps.iter().position(is_true).or_else(|| {
+        let most = camps.iter().map(Vec::len).max()?;
+        let largest: Vec<usize> = (0..camps.len()).filter(|&i| camps[i].len() == most).collect();
+        (largest.len() == 1).then(|| largest[0])
+    });
+    match believed {
+        Some(believed) => {
+            let others: Vec<String> = (0..camps.len()).filter(|&i| i != believed).map(|i| names(&camps[i])).collect();
+            let with = names(&camps[believed]);
+            format!("wrong: {}; in agreement: {with}", others.join(", and otherwise "))
+        }
+        None => format!("no two agree, none can be believed: {}", names(&routes.iter().collect::<Vec<_>>())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn route(name: &str, numbers: &'static [f64], uncertainty: f64) -> Route<'static> {
+        Route { name: name.into(), numbers, uncertainty }
+    }
+
+    #[test]
+    fn the_odd_one_out_is_named() {
+        let routes = [
+            route("generated code", &[1.0, 2.0], 0.0),
+            route("multi-precision", &[1.0, 2.0], 0.0),
+            route("dual numbers", &[1.0, 2.5], 1e-9),
+            route("differences of `energy`", &[1.0, 2.000_000_01], 2e-7),
+        ];
+        assert_eq!(
+            verdict(&routes, 2.0),
+            "wrong: dual numbers; in agreement: generated code, multi-precision, differences of `energy`"
+        );
+        let tie = [route("generated code", &[1.0], 0.0), route("dual numbers", &[2.0], 1e-9)];
+        assert!(verdict(&tie, 2.0).starts_with("no two agree"));
+    }
+}

@@ -1,0 +1,106 @@
+use std::path::Path;
+
+use anyhow::Context;
+use energy_dsl::{Declaration, Inputs, Interpreted, Kind, Outputs, RestError, Textbook};
+use energy_elements::CatalogueEntry;
+
+use crate::blocks::{Answer, NoAnswer, evaluate};
+use crate::sample::Sample;
+
+/// How an element is evaluated.
+pub(crate) type EvaluateAny = Box<dyn Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>>;
+
+/// What is audited: an element of the catalogue, or a declaration of a text read at run time.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// One declaration, and what it uses.
+    source: String,
+    name: String,
+    entry: Option<&'static CatalogueEntry>,
+}
+
+impl Target {
+    /// An element of the catalogue.
+    #[must_use]
+    pub fn of_catalogue(entry: &'static CatalogueEntry) -> Self {
+        let declaration = entry.declaration;
+        Self { source: declaration.source.into(), name: declaration.name.into(), entry: Some(entry) }
+    }
+
+    /// Every declaration of a text, as a `.energy` file holds it; messages call it `name`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text.
+    pub fn of_text(text: &str, name: &str) -> Result<Vec<Self>, energy_dsl::Diagnostics> {
+        // A declaration's own source brings along what it uses, and stands alone.
+        let target = |element: &Interpreted| Self {
+            source: element.declaration().source.into(),
+            name: element.declaration().name.into(),
+            entry: None,
+        };
+        Ok(Interpreted::from_file(text, name)?.iter().map(target).collect())
+    }
+
+    /// Every declaration of a file.
+    ///
+    /// # Errors
+    /// When it cannot be read, or whatever is wrong with the text.
+    pub fn of_file(path: &Path) -> anyhow::Result<Vec<Self>> {
+        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let targets =
+            Self::of_text(&text, &path.display().to_string()).map_err(|errors| anyhow::anyhow!("{errors}"))?;
+        anyhow::ensure!(!targets.is_empty(), "{} declares nothing", path.display());
+        Ok(targets)
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(crate) fn subject(&self) -> Result<Subject, String> {
+        let interpreted = self.interpreted()?;
+        match self.entry {
+            Some(entry) => Subject::new(entry.declaration, Box::new(entry.evaluate), Some(interpreted)),
+            None => {
+                let declaration = interpreted.declaration();
+                let runs = interpreted.clone();
+                Subject::new(declaration, Box::new(move |inputs| runs.evaluate(inputs)), Some(interpreted))
+            }
+        }
+    }
+
+    fn interpreted(&self) -> Result<Interpreted, String> {
+        let mut declared = Interpreted::from_source(&self.source).map_err(|errors| errors.to_string())?;
+        declared.pop().ok_or_else(|| format!("{}: its source declares nothing", self.name))
+    }
+}
+
+/// An element under audit.
+pub(crate) struct Subject {
+    pub(crate) declaration: &'static Declaration,
+    pub(crate) evaluate: EvaluateAny,
+    pub(crate) formula: Textbook,
+    /// The compiled routines to plant faults in.
+    pub(crate) interpreted: Option<Interpreted>,
+}
+
+impl Subject {
+    pub(crate) fn new(
+        declaration: &'static Declaration,
+        evaluate: EvaluateAny,
+        interpreted: Option<Interpreted>,
+    ) -> Result<Self, String> {
+        let formula = Textbook::from_source(declaration.source).map_err(|errors| errors.to_string())?;
+        Ok(Self { declaration, evaluate, formula, interpreted })
+    }
+
+    pub(crate) fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
+        evaluate(self.declaration, &self.evaluate, &sample.inputs())
+    }
+
+    pub(crate) fn has_velocities(&self) -> bool {
+        matches!(self.declaration.kind, Kind::Force | Kind::Constraint)
+    }
+}

@@ -1,0 +1,15 @@
+//! Truth: value, gradient and Hessian of any declaration, also one read at run time, to as many digits as are asked for.
+//!
+//! The declaration's textbook form is evaluated once over *jets*, numbers that carry their first and second derivatives by all
+//! coordinates at once, of multi-precision numbers. Nothing of the compiler's differentiation, of its robust primitives or of its
+//! rewrites takes part. The same is done at ever higher precision until two results in a row agree: cancellation, however bad,
+//! costs time and no digits.
+
+mod big;
+mod jet;
+mod truth;
+
+pub use big::Big;
+pub(crate) use jet::{Jet, Order};
+pub use truth::{TrueBlock, truth};
+pub(crate) use truth::{truth_of_ordinary, worse};

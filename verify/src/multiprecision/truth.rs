@@ -1,0 +1,146 @@
+use energy_dsl::{Declaration, Number, Textbook};
+
+use super::Big;
+use super::big::with_precision;
+use crate::blocks::Block;
+use crate::formula::blocks_over;
+use crate::sample::Sample;
+
+/// The precision from which on a block that only holds what shrinks with the precision is exactly zero: 1e-780 of what was
+/// subtracted, which is less than the square of the smallest double to that of 1.
+const HIGHEST: usize = 2600;
+
+/// A block of true numbers.
+#[derive(Clone, Debug)]
+pub struct TrueBlock {
+    /// The numbers, right to the digits asked for relative to the largest of them.
+    pub block: Block<Big>,
+    /// Whether it has a value: not where the formula divides by zero.
+    pub is_defined: bool,
+}
+
+impl TrueBlock {
+    /// The largest magnitude.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        largest(&self.block.numbers).to_f64()
+    }
+
+    /// The largest error of numbers in units of roundoff of the block's largest (never less than the least normal double, below
+    /// which a relative error means nothing). NaN where one is NaN, infinite where the block is exactly zero and they are not.
+    #[must_use]
+    pub fn error_in_roundoffs(&self, got: &[f64]) -> f64 {
+        let worst = self.block.numbers.iter().zip(got).map(|(t, &g)| t.error_of(g)).fold(0.0, worse);
+        let largest = self.largest();
+        match worst {
+            0.0 => 0.0,
+            // Right where the double is infinite too; else one of them is infinitely wrong.
+            _ if largest.is_infinite() => worst,
+            _ if largest == 0.0 && self.block.numbers.iter().all(Big::is_zero) => f64::INFINITY,
+            _ => worst / largest.max(f64::MIN_POSITIVE) / (f64::EPSILON / 2.0),
+        }
+    }
+
+    /// The place of the largest error.
+    #[must_use]
+    pub fn worst_entry(&self, got: &[f64]) -> usize {
+        let errors = self.block.numbers.iter().zip(got).map(|(t, &g)| t.error_of(g)).enumerate();
+        errors.fold((0, 0.0), |worst, next| if next.1 > worst.1 || next.1.is_nan() { next } else { worst }).0
+    }
+}
+
+pub(crate) fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b <= a { a } else { b }
+}
+
+/// Every block of a declaration at one input, to `digits` decimal digits relative to each block's largest number. Entries that are
+/// nothing but rounding are exactly zero.
+///
+/// ```
+/// use energy_dsl::Textbook;
+/// use verify::{BlockName, Sample, multiprecision::truth};
+///
+/// let bend = energy_elements::find("HairBend").unwrap().declaration;
+/// let formula = Textbook::from_source(bend.source).unwrap();
+/// // A turn by 1e-8: 1 − cos has no digit left in doubles.
+/// let sample = Sample {
+///     parameters: vec![2.0],
+///     rest: vec![],
+///     positions: vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 1e-8, 0.0],
+///     velocities: vec![],
+/// };
+/// let energy = &truth(bend, &formula, &sample, 50)[0];
+/// assert_eq!(energy.block.name, BlockName::Energy);
+/// assert!(energy.block.numbers[0].to_decimal(20).starts_with("4.9999999999999998") );
+/// ```
+#[must_use]
+pub fn truth(declaration: &Declaration, formula: &Textbook, sample: &Sample, digits: usize) -> Vec<TrueBlock> {
+    at_rising_precision(declaration, formula, sample, digits, Zeros::Confirmed)
+}
+
+/// The same where nothing cancels to the last digit: a block that comes out as exactly zero is taken to be so.
+pub(crate) fn truth_of_ordinary(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+    digits: usize,
+) -> Vec<TrueBlock> {
+    at_rising_precision(declaration, formula, sample, digits, Zeros::Believed)
+}
+
+/// What to make of a block that is exactly zero at some precision: 1 − x is, for x nearer to 1 than its last bit.
+#[derive(Clone, Copy, PartialEq)]
+enum Zeros {
+    Believed,
+    /// Only at the highest precision.
+    Confirmed,
+}
+
+fn at_rising_precision(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+    digits: usize,
+    zeros: Zeros,
+) -> Vec<TrueBlock> {
+    // log₂ 10, and some bits for ordinary cancellation.
+    let wanted = digits * 333 / 100 + 1;
+    let at = |bits: usize| with_precision(bits, || blocks_over::<Big>(declaration, formula, sample));
+    let mut bits = wanted + 48;
+    let mut coarse = at(bits);
+    let mut settled: Vec<Option<TrueBlock>> = vec![None; coarse.len()];
+    loop {
+        bits = if settled.iter().all(Option::is_none) && bits == wanted + 48 { bits + bits / 2 } else { 2 * bits };
+        let fine = at(bits);
+        for (number, slot) in settled.iter_mut().enumerate().filter(|(_, slot)| slot.is_none()) {
+            *slot = agreed(&coarse[number], &fine[number], wanted, bits, zeros);
+        }
+        if settled.iter().all(Option::is_some) {
+            return settled.into_iter().flatten().collect();
+        }
+        coarse = fine;
+    }
+}
+
+/// The block, if two precisions agree on it, or the higher one is the highest.
+fn agreed(coarse: &Block<Big>, fine: &Block<Big>, wanted: usize, bits: usize, zeros: Zeros) -> Option<TrueBlock> {
+    let wanted = -i64::try_from(wanted).unwrap_or(i64::MAX);
+    let is_defined = fine.numbers.iter().all(Big::is_defined);
+    let scale = largest(&fine.numbers);
+    let close = |(a, b): (&Big, &Big)| (a.clone() - b.clone()).is_within(&scale, wanted);
+    let agree = coarse.numbers.iter().zip(&fine.numbers).all(close);
+    let is_doubtful = zeros == Zeros::Confirmed && scale.is_zero();
+    if is_defined && (!agree || is_doubtful) && bits < HIGHEST {
+        return None;
+    }
+    let cleaned = coarse.numbers.iter().zip(&fine.numbers).map(|(a, b)| {
+        // What two precisions do not agree on to a bit is rounding.
+        let is_rounding = is_defined && !(a.clone() - b.clone()).is_within(b, -1);
+        if is_rounding { Big::from_f64(0.0) } else { b.clone() }
+    });
+    Some(TrueBlock { block: Block::new(fine.name, fine.columns, cleaned.collect()), is_defined })
+}
+
+fn largest(numbers: &[Big]) -> Big {
+    numbers.iter().fold(Big::from_f64(0.0), Big::larger)
+}

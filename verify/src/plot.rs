@@ -1,0 +1,90 @@
+//! Plots as SVG.
+
+use plotters::prelude::*;
+
+/// A named curve, or cloud of points.
+pub(crate) struct Curve {
+    pub(crate) name: String,
+    pub(crate) points: Vec<(f64, f64)>,
+    /// Whether its points are joined.
+    pub(crate) joined: bool,
+}
+
+/// Curves over logarithmic axes; points that are not positive and finite are left out. Nothing without a point.
+pub(crate) fn logarithmic(
+    title: &str,
+    (across, up): (&str, &str),
+    curves: &[Curve],
+    size: (u32, u32),
+) -> Option<String> {
+    let shown = |(x, y): &(f64, f64)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite();
+    let all: Vec<(f64, f64)> = curves.iter().flat_map(|c| &c.points).copied().filter(|p| shown(p)).collect();
+    let range = |pick: fn(&(f64, f64)) -> f64| {
+        let (low, high) = all.iter().map(pick).fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
+        // Beyond this a logarithmic axis has no labels left.
+        (low / 2.0).max(1e-305)..(high * 2.0).min(1e305)
+    };
+    if all.is_empty() {
+        return None;
+    }
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        root.fill(&WHITE).ok()?;
+        let mut chart = ChartBuilder::on(&root)
+            .caption(title, ("sans-serif", 15))
+            .margin(8)
+            .x_label_area_size(34)
+            .y_label_area_size(58)
+            .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+            .ok()?;
+        let exponent = |x: &f64| format!("{x:.0e}");
+        chart
+            .configure_mesh()
+            .x_desc(across)
+            .y_desc(up)
+            .x_labels(8)
+            .y_labels(8)
+            .x_label_formatter(&exponent)
+            .y_label_formatter(&exponent)
+            .light_line_style(WHITE)
+            .draw()
+            .ok()?;
+        for (number, curve) in curves.iter().enumerate() {
+            let colour = Palette99::pick(number).to_rgba();
+            let points: Vec<(f64, f64)> = curve.points.iter().copied().filter(|p| shown(p)).collect();
+            if curve.joined {
+                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2))).ok()?;
+            }
+            chart
+                .draw_series(points.into_iter().map(|p| Circle::new(p, 3, colour.filled())))
+                .ok()?
+                .label(curve.name.clone())
+                .legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+        }
+        if curves.len() > 1 {
+            chart
+                .configure_series_labels()
+                .background_style(WHITE.mix(0.8))
+                .border_style(BLACK.mix(0.3))
+                .draw()
+                .ok()?;
+        }
+        root.present().ok()?;
+    }
+    Some(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_drawn_is_left_out() {
+        let curve = |points: &[(f64, f64)]| [Curve { name: "error".into(), points: points.to_vec(), joined: true }];
+        let axes = ("step", "error");
+        assert!(logarithmic("", axes, &curve(&[(1.0, 0.0), (f64::NAN, 1.0)]), (300, 200)).is_none());
+        let svg = logarithmic("t", axes, &curve(&[(1e-300, 1e-16), (1.0, 1e300)]), (300, 200)).unwrap();
+        assert!(svg.starts_with("<svg") && svg.matches("<circle").count() == 2, "{svg}");
+    }
+}

@@ -1,0 +1,116 @@
+//! Sweeps towards every singularity, down to 1e-300: what the textbook form loses on the way, and what the generated code keeps.
+
+mod report;
+mod sweeps;
+
+pub use report::{markdown, plots};
+pub use sweeps::{Sweep, sweeps};
+
+use serde::Serialize;
+
+use crate::audit::{Subject, Target, amplification};
+use crate::blocks::BlockName;
+use crate::formula::expected_blocks;
+use crate::multiprecision::truth;
+use crate::sample::Sample;
+
+/// The errors of one block at one place of a sweep, in units of roundoff of its largest number.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// How far from the singularity: an angle, a length, a scale.
+    pub parameter: f64,
+    /// Of the generated code.
+    pub robust: f64,
+    /// Of the same over max(1, κ).
+    pub robust_kappa: f64,
+    /// Of the textbook form by dual numbers.
+    pub naive: f64,
+    /// Whether the generated code returned a NaN.
+    pub nan: bool,
+    /// Whether the exact block is beyond the range of doubles.
+    pub overflows: bool,
+    /// Whether the generated code flagged its result.
+    pub flagged: bool,
+    /// Whether the exact block has a value at all.
+    pub is_defined: bool,
+}
+
+impl Point {
+    /// Whether the generated code is as accurate as its edges allow, or says that its result is a convention; never a NaN. Where
+    /// the textbook form divides 0 by 0 there may yet be a limit: the table of degenerate inputs knows it.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        !self.nan && (self.flagged || !self.is_defined || self.overflows || self.robust_kappa <= 8.0)
+    }
+}
+
+/// One block of one element along one sweep.
+#[derive(Clone, Debug, Serialize)]
+pub struct Track {
+    /// The element.
+    pub element: &'static str,
+    /// Which way.
+    pub sweep: &'static str,
+    /// The block.
+    pub block: BlockName,
+    /// What was found, from far to near.
+    pub points: Vec<Point>,
+}
+
+impl Track {
+    /// Whether every point passed.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.points.iter().all(Point::passed)
+    }
+}
+
+/// Every sweep that fits an element.
+///
+/// # Errors
+/// When the element cannot be read.
+pub fn stress(target: &Target) -> Result<Vec<Track>, String> {
+    let subject = target.subject()?;
+    let mut tracks = Vec::new();
+    for Sweep { name, inputs } in sweeps(subject.declaration) {
+        let mut own: Vec<Track> = Vec::new();
+        for (parameter, sample) in inputs {
+            for (block, point) in at(&subject, &sample, parameter) {
+                match own.iter_mut().find(|track| track.block == block) {
+                    Some(track) => track.points.push(point),
+                    None => {
+                        own.push(Track { element: subject.declaration.name, sweep: name, block, points: vec![point] })
+                    }
+                }
+            }
+        }
+        tracks.extend(own);
+    }
+    Ok(tracks)
+}
+
+/// All blocks at one input; none where the rest shape is refused.
+fn at(subject: &Subject, sample: &Sample, parameter: f64) -> Vec<(BlockName, Point)> {
+    const DIGITS: usize = 20;
+    let declaration = subject.declaration;
+    let Ok(answer) = subject.answer(sample) else { return Vec::new() };
+    let naive = expected_blocks(declaration, &subject.formula, sample);
+    let truths = truth(declaration, &subject.formula, sample, DIGITS);
+    let point = |block: &crate::blocks::Block| {
+        let truth = truths.iter().find(|t| t.block.name == block.name)?;
+        let naive = naive.iter().find(|n| n.name == block.name)?;
+        let nan = block.numbers.iter().any(|x| x.is_nan());
+        let overflows = truth.largest().is_infinite();
+        let robust = if truth.is_defined { truth.error_in_roundoffs(&block.numbers) } else { 0.0 };
+        let robust_kappa = match robust {
+            error if error > 8.0 => error / amplification(subject, sample, &answer, block.name).max(1.0),
+            error => error,
+        };
+        let naive = if truth.is_defined { truth.error_in_roundoffs(&naive.numbers) } else { f64::NAN };
+        let flagged = answer.flags[block.name.order(declaration.kind)].any();
+        let is_defined = truth.is_defined;
+        let point = Point { parameter, robust, robust_kappa, naive, nan, overflows, flagged, is_defined };
+        Some((block.name, point))
+    };
+    answer.blocks.iter().filter_map(point).collect()
+}
