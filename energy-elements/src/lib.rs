@@ -36,11 +36,13 @@ elements! {
     hinge_cos_half: HingeCosHalf;
     hinge_sin_half: HingeSinHalf;
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
-    point_to_plane: PointToPlane;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
     spring: Spring;
     stvk: StVK;
+    tracking: BlendedMotion4, BlendedPoint1, BlendedPoint4, BlendedPoint8, Binding, BoneBinding, FrozenPlane1, FrozenPlane4,
+        FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane, SkeletonPlane,
+        SkeletonPoint, TukeyLoss, TwistMotion;
     viscous_drag: ViscousDrag;
     zero_length_spring: ZeroLengthSpring;
 }
