@@ -108,23 +108,29 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         self.numbers.clear();
         self.stencils.clear();
         self.weights.clear();
+        let mut last = None;
         for (place, Placed { element, stencil, weight }) in elements.into_iter().enumerate() {
             assert!((stencil as usize) < self.couplings.len(), "stencil {stencil} of {}", self.couplings.len());
             if place % BLOCK == 0 {
-                self.numbers.resize(self.numbers.len() + E::NUMBERS * BLOCK, 0.0);
+                self.numbers.resize(self.numbers.len() + Self::BLOCK_NUMBERS, 0.0);
             }
             self.write(place, &element);
             self.stencils.push(stencil);
             self.weights.push(weight);
+            last = Some(element);
+        }
+        if let Some(element) = last {
             // Lanes left over repeat the last element.
-            if place % BLOCK == 0 {
-                (1..BLOCK).for_each(|lane| self.write(place + lane, &element));
-            }
+            let places = self.stencils.len();
+            (places..places.next_multiple_of(BLOCK)).for_each(|place| self.write(place, &element));
         }
     }
 
+    /// Numbers of a block of elements; elements without any take up room nevertheless, so that they have places.
+    const BLOCK_NUMBERS: usize = BLOCK * if E::NUMBERS == 0 { 1 } else { E::NUMBERS };
+
     fn write(&mut self, place: usize, element: &E) {
-        element.store(&mut self.numbers[place / BLOCK * E::NUMBERS * BLOCK + place % BLOCK..], BLOCK);
+        element.store(&mut self.numbers[place / BLOCK * Self::BLOCK_NUMBERS + place % BLOCK..], BLOCK);
     }
 
     /// Calls `take` with each element's number, r and J (row by row, without weights): for tests, and those who want J itself.
@@ -175,7 +181,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
 
     #[inline(always)]
     fn load<L: Level>(&self, first: usize) -> E::Wide<L::F64> {
-        E::load::<L::F64>(&self.numbers[first / BLOCK * E::NUMBERS * BLOCK + first % BLOCK..], BLOCK)
+        E::load::<L::F64>(&self.numbers[first / BLOCK * Self::BLOCK_NUMBERS + first % BLOCK..], BLOCK)
     }
 
     /// The unknowns of as many elements as there are lanes.
