@@ -158,9 +158,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     /// All residuals without weights, element by element.
     #[must_use]
     pub fn residuals(&self, x: &[[f64; D]]) -> Vec<f64> {
-        let mut all = Vec::with_capacity(self.stencils.len() * Self::rows());
-        self.for_each_jacobian(x, |_, residual, _| all.extend_from_slice(residual));
-        all
+        dispatch(Residuals { term: self, x })
     }
 
     /// The weight of an element, λ w, without that of the loss.
@@ -278,6 +276,28 @@ impl<E: PackedResidual<f64> + Debug, F: FnMut(usize, f64), const D: usize> Kerne
             first += lanes;
         }
         TermSum { energy: term.lambda * energy, degenerate }
+    }
+}
+
+/// Residuals only.
+struct Residuals<'a, E, const D: usize> {
+    term: &'a ResidualTerm<E, D>,
+    x: &'a [[f64; D]],
+}
+
+impl<E: PackedResidual<f64> + Debug, const D: usize> Kernel for Residuals<'_, E, D> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Vec<f64> {
+        let (term, rows) = (self.term, ResidualTerm::<E, D>::rows());
+        let mut all = vec![0.0; rows * term.stencils.len()];
+        for first in (0..term.stencils.len()).step_by(L::F64::LANES) {
+            let count = L::F64::LANES.min(term.stencils.len() - first);
+            let result = term.load::<L>(first).residual_at::<L>(&term.gather::<L>(first, self.x));
+            L::F64::store_transposed(result.value.as_ref(), count, &mut all[rows * first..], rows);
+        }
+        all
     }
 }
 

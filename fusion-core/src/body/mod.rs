@@ -1,0 +1,13 @@
+//! Skinned bodies: a mesh at rest, bones, and how much each vertex follows each bone.
+
+mod figure;
+mod gltf_file;
+mod makehuman;
+mod mesh;
+mod skinned;
+
+pub use figure::{figure, figure_motion};
+pub use gltf_file::{GltfError, read_gltf};
+pub use makehuman::{MakeHumanError, read_makehuman};
+pub use mesh::{Mesh, obj_text, vertex_normals};
+pub use skinned::{Bone, BodyError, SkinnedBody};
