@@ -40,6 +40,7 @@ pub mod energy;
 pub mod evaluation;
 pub mod model;
 pub mod protocol;
+mod random;
 pub mod skeleton;
 pub mod tracker;
 pub mod twist;

@@ -3,7 +3,10 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::body::{Mesh, SkinnedBody};
-use crate::depth::{Camera, DepthImage, SensorNoise, render};
+use crate::depth::{Camera, DepthImage, SensorNoise, render, visible_vertices};
+use crate::evaluation::{FrameErrors, TrackErrors};
+use crate::skeleton::{BoneNoise, noisy};
+use crate::tracker::{FrameError, FrameReport, Tracker};
 
 /// A moving body in the camera's coordinates. The first frame is the rest shape.
 #[derive(Clone, Debug)]
@@ -50,6 +53,44 @@ impl Recording {
         noise.add(&mut image, &mut fastrand::Rng::with_seed(frame as u64));
         image
     }
+}
+
+/// What a body tracker says of a recording: the true motions with errors, always the same ones for a frame.
+#[must_use]
+pub fn reported_bones(recording: &Recording, frame: usize, noise: BoneNoise) -> Vec<Isometry3<f64>> {
+    let mut random = fastrand::Rng::with_seed(1000 + frame as u64);
+    noisy(&recording.body.bones, &recording.motions[frame], noise, &mut random)
+}
+
+/// Tracks all frames but the first, which is the model's rest, and measures each. `each` hears of every frame; a frame that was skipped
+/// is measured as the tracker left it.
+pub fn track_recording(
+    recording: &Recording,
+    tracker: &mut Tracker,
+    sensor: SensorNoise,
+    bones: Option<BoneNoise>,
+    mut each: impl FnMut(usize, &Result<FrameReport, FrameError>),
+) -> TrackErrors {
+    let mut errors = TrackErrors::default();
+    for frame in 1..recording.motions.len() {
+        let image = recording.image(frame, sensor);
+        let reported = bones.map(|noise| reported_bones(recording, frame, noise));
+        each(frame, &tracker.track(&image, reported.as_deref()));
+        errors.frames.push(measured(recording, frame, &tracker.vertices()));
+    }
+    errors
+}
+
+/// The errors of the skinned skeleton without any tracking.
+#[must_use]
+pub fn skeleton_alone(recording: &Recording, noise: BoneNoise) -> TrackErrors {
+    let frame = |frame| measured(recording, frame, &recording.body.posed(&reported_bones(recording, frame, noise)).vertices);
+    TrackErrors { frames: (1..recording.motions.len()).map(frame).collect() }
+}
+
+fn measured(recording: &Recording, frame: usize, found: &[Vector3<f64>]) -> FrameErrors {
+    let truth = recording.truth(frame);
+    FrameErrors::new(found, &truth.vertices, &visible_vertices(&truth, &recording.camera))
 }
 
 /// From the world, y up, to a camera at a place looking along a horizontal direction: x right, y down, z forwards.

@@ -3,7 +3,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
-use obj::raw::object::{RawPolygon, parse_obj};
+use obj::raw::object::{Polygon, parse_obj};
 use serde::Deserialize;
 
 use super::mesh::Mesh;
@@ -129,11 +129,11 @@ impl Groups {
             .map_err(|error| MakeHumanError::Mesh { path: path.to_owned(), message: error.to_string() })?;
         let positions =
             raw.positions.iter().map(|p| METRES * Vector3::new(p.0, p.1, p.2).map(f64::from)).collect();
-        let corners = |polygon: &RawPolygon| -> Vec<usize> {
+        let corners = |polygon: &Polygon| -> Vec<usize> {
             match polygon {
-                RawPolygon::P(list) => list.clone(),
-                RawPolygon::PT(list) | RawPolygon::PN(list) => list.iter().map(|corner| corner.0).collect(),
-                RawPolygon::PTN(list) => list.iter().map(|corner| corner.0).collect(),
+                Polygon::P(list) => list.clone(),
+                Polygon::PT(list) | Polygon::PN(list) => list.iter().map(|corner| corner.0).collect(),
+                Polygon::PTN(list) => list.iter().map(|corner| corner.0).collect(),
             }
         };
         let polygons = raw

@@ -1,10 +1,9 @@
-use std::f64::consts::TAU;
-
 use nalgebra::Vector3;
 
 use super::camera::Camera;
 use super::image::DepthImage;
 use crate::body::Mesh;
+use crate::random::gaussian;
 
 /// A structured-light sensor's noise: a standard deviation of k (0.0012 + 0.0019 (z − 0.4)²) m at depth z, then rounding to steps.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -31,12 +30,6 @@ impl SensorNoise {
             *depth = (if self.step > 0.0 { (noisy / self.step).round() * self.step } else { noisy }).max(0.0) as f32;
         }
     }
-}
-
-/// A normal deviate (Box and Muller).
-fn gaussian(random: &mut fastrand::Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
-    radius * (TAU * random.f64()).cos()
 }
 
 /// The depths of a mesh, in the camera's coordinates: the nearest triangle at every pixel, by a z-buffer. Triangles that reach behind

@@ -1,13 +1,14 @@
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::body::Bone;
+use crate::random::gaussian;
 
-/// How wrong a body tracker's bones are.
+/// How wrong a body tracker's bones are: standard deviations of normal errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BoneNoise {
-    /// Each bone is turned by this about its joint, about a random axis, rad.
+    /// Of the angle, rad, by which each bone is turned about its joint, about a random axis.
     pub turn: f64,
-    /// And shifted by this in a random direction, m.
+    /// Of each coordinate of its shift, m.
     pub shift: f64,
 }
 
@@ -21,20 +22,15 @@ pub fn noisy(
 ) -> Vec<Isometry3<f64>> {
     let mut one = |(bone, motion): (&Bone, &Isometry3<f64>)| {
         let joint = motion.transform_point(&bone.head.into()).coords;
-        let turn = UnitQuaternion::from_axis_angle(&direction(random), noise.turn);
-        let shift = noise.shift * *direction(random);
+        let turn = UnitQuaternion::from_axis_angle(&direction(random), noise.turn * gaussian(random));
+        let shift = noise.shift * Vector3::from_fn(|_, _| gaussian(random));
         Isometry3::from_parts(Translation3::from(joint - turn * joint + shift), turn) * motion
     };
     bones.iter().zip(motions).map(&mut one).collect()
 }
 
 fn direction(random: &mut fastrand::Rng) -> Unit<Vector3<f64>> {
-    loop {
-        let v = Vector3::from_fn(|_, _| 2.0 * random.f64() - 1.0);
-        if (0.01..=1.0).contains(&v.norm()) {
-            return Unit::new_normalize(v);
-        }
-    }
+    Unit::try_new(Vector3::from_fn(|_, _| gaussian(random)), 1e-6).unwrap_or(Vector3::x_axis())
 }
 
 #[cfg(test)]
@@ -46,10 +42,14 @@ mod tests {
         let bone = Bone { name: "arm".into(), parent: None, head: [1.0, 2.0, 3.0], tail: [1.0, 3.0, 3.0] };
         let mut random = fastrand::Rng::with_seed(3);
         let noise = BoneNoise { turn: 0.1, shift: 0.02 };
-        let wrong = noisy(&[bone.clone()], &[Isometry3::identity()], noise, &mut random)[0];
-        assert!((wrong.rotation.angle() - 0.1).abs() < 1e-12);
-        let joint = wrong.transform_point(&bone.head.into()).coords - Vector3::from(bone.head);
-        assert!((joint.norm() - 0.02).abs() < 1e-12);
+        let (mut turns, mut shifts) = (0.0, 0.0);
+        for _ in 0..4000 {
+            let wrong = noisy(std::slice::from_ref(&bone), &[Isometry3::identity()], noise, &mut random)[0];
+            turns += wrong.rotation.angle().powi(2);
+            shifts += (wrong.transform_point(&bone.head.into()).coords - Vector3::from(bone.head)).norm_squared();
+        }
+        assert!(((turns / 4000.0).sqrt() / 0.1 - 1.0).abs() < 0.05, "{turns}");
+        assert!(((shifts / 12000.0).sqrt() / 0.02 - 1.0).abs() < 0.05, "{shifts}");
         let none = noisy(&[bone], &[Isometry3::identity()], BoneNoise::default(), &mut random)[0];
         assert!((none.to_homogeneous() - nalgebra::Matrix4::identity()).norm() < 1e-14);
     }
