@@ -20,7 +20,7 @@ pub struct Gates {
 
 impl Default for Gates {
     fn default() -> Self {
-        Self { distance: 0.04, angle: 60.0_f64.to_radians(), normal_reach: 2 }
+        Self { distance: 0.04, angle: 45.0_f64.to_radians(), normal_reach: 2 }
     }
 }
 

@@ -36,7 +36,7 @@ pub struct TermWeights {
 
 impl Default for TermWeights {
     fn default() -> Self {
-        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 1.0, joints: 100.0 }
+        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 3.0, joints: 1000.0 }
     }
 }
 

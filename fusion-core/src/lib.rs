@@ -39,6 +39,7 @@ pub mod depth;
 pub mod energy;
 pub mod evaluation;
 pub mod model;
+pub mod plot;
 pub mod protocol;
 mod random;
 pub mod skeleton;

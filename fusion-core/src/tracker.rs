@@ -31,13 +31,24 @@ pub struct TrackerOptions {
 impl Default for TrackerOptions {
     fn default() -> Self {
         Self {
-            energy: EnergyOptions::default(),
+            energy: EnergyOptions { data_tukey: Some(0.05), ..EnergyOptions::default() },
             iterations: 6,
             gates: Gates::default(),
             first_distance: 0.06,
             damping: 1e-3,
             least_matches: 50,
         }
+    }
+}
+
+impl TrackerOptions {
+    /// For a body tracker that is off by a few degrees and centimetres: bones are unknowns too, matches are sought further away and more
+    /// often.
+    #[must_use]
+    pub fn with_unknown_bones() -> Self {
+        let mut options = Self { iterations: 12, first_distance: 0.1, ..Self::default() };
+        options.energy.bones = BoneMode::Unknown;
+        options
     }
 }
 
