@@ -128,7 +128,7 @@ impl Limb {
                 let next = (step + 1) % around;
                 let [p, q] = [step, next].map(|at| first + ring * around + at);
                 let [r, s] = [p + around, q + around];
-                triangles.extend([[p, r, q], [q, r, s]]);
+                triangles.extend([[p, q, r], [q, s, r]]);
             }
         }
         for (ring, end) in [(0, 0), (rings as u32, joints.len() - 1)] {
@@ -137,7 +137,7 @@ impl Limb {
             weights.push(vec![(self.bones[end.min(self.bones.len() - 1)], 1.0)]);
             for step in 0..around {
                 let [p, q] = [step, (step + 1) % around].map(|at| first + ring * around + at);
-                triangles.push(if ring == 0 { [pole, p, q] } else { [pole, q, p] });
+                triangles.push(if ring == 0 { [pole, q, p] } else { [pole, p, q] });
             }
         }
     }
