@@ -4,12 +4,15 @@
 mod eval;
 mod exact;
 mod file;
+mod fusion;
+mod fusion_system;
 mod mapping;
 mod policy;
 mod report;
 
 pub use eval::evaluate_file;
 pub use exact::Truth;
+pub use fusion::{FamilyLine, fusion_reference};
 pub use file::{Record, RecordError};
 pub use mapping::{Mapping, mapping};
 pub use policy::{PolicyLine, policy};
