@@ -235,11 +235,11 @@ Frame Time: .01
     fn mistakes_are_refused_with_their_line() {
         for (from, to, line) in [
             ("Frames: 2", "Frames: 3", 20),
-            ("-90 0 0", "-90 0", 18),
-            ("-90 0 0", "-90 0 nan", 18),
-            ("OFFSET 0 2 0", "OFFSET 0 2", 6),
-            ("CHANNELS 3 Z", "CHANNELS 3 W", 7),
-            ("CHANNELS 3", "CHANNELS 2", 7),
+            ("-90 0 0", "-90 0", 19),
+            ("-90 0 0", "-90 0 nan", 19),
+            ("OFFSET 0 2 0", "OFFSET 0 2", 7),
+            ("CHANNELS 3 Z", "CHANNELS 3 W", 8),
+            ("CHANNELS 3", "CHANNELS 2", 8),
             ("Frame Time: .01", "Frame Time: 0", 17),
         ] {
             let (found, message) = Bvh::parse(&ARM.replacen(from, to, 1)).unwrap_err();
