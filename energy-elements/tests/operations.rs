@@ -46,3 +46,13 @@ fn routines_leave_out_what_was_not_asked_for() {
     let membrane = find("StVK").unwrap().declaration;
     assert!(10 * operations(membrane, "hessian_vector") < 7 * operations(membrane, "hessian"));
 }
+
+/// A blend's row is contracted to eight numbers first and carried to each node then, by reverse accumulation that the planner finds,
+/// in spite of the signs that are chosen on the way.
+#[test]
+fn a_row_of_the_data_term_grows_with_its_nodes_only() {
+    let jacobian = |name| operations(find(name).unwrap().declaration, "jacobian");
+    let (four, eight) = (jacobian("NonrigidPlane4"), jacobian("NonrigidPlane8"));
+    assert!(four <= 1250, "{four} operations for four nodes");
+    assert!(eight <= 2 * four, "{eight} operations for eight nodes, {four} for four");
+}

@@ -42,10 +42,11 @@ fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second
 }
 
 /// Whether reverse accumulation is right, on the ordinary path or everywhere. Through a selection it multiplies the derivative of
-/// the other branch, which may be infinite, by zero; unless it is known which branch is taken.
+/// the other branch, which may be infinite, by zero; unless it is known which branch is taken, or both are constant (a sign).
 pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], second_order: bool, everywhere: bool) -> bool {
     let nodes = differentiable(g, roots, second_order);
     nodes.into_iter().all(|node| match g.op(node) {
+        Op::Select(_, yes, no) if !g.varies(yes) && !g.varies(no) => true,
         Op::Select(mask, ..) => !everywhere && g.is_decided(mask),
         Op::Min(..) | Op::Max(..) => false,
         _ => true,

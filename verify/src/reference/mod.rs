@@ -4,6 +4,8 @@
 mod eval;
 mod exact;
 mod file;
+mod fusion;
+mod fusion_system;
 mod mapping;
 mod policy;
 mod report;
@@ -11,6 +13,7 @@ mod report;
 pub use eval::{Source, evaluate_file};
 pub use exact::Truth;
 pub use file::{Record, RecordError};
+pub use fusion::{FamilyLine, fusion_reference};
 pub use mapping::{Mapping, mapping};
 pub use policy::{PolicyLine, policy};
 pub use report::{BlockLine, ReferenceReport, reference};

@@ -1,0 +1,292 @@
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Numbers in a stored row of a block: as many as the widest register takes, so that a row is one or a few loads. The numbers past
+/// the block's own columns mean nothing.
+pub(crate) const WIDTH: usize = 8;
+
+/// A stored block: D rows of [`WIDTH`] numbers, of which the first D count.
+pub(crate) type WideBlock<const D: usize> = [[f64; WIDTH]; D];
+
+/// Stencils that do not fit a pattern.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CouplingError {
+    /// There is no such block of unknowns.
+    #[error("element {element} acts on block {block} of unknowns, but there are only {blocks}")]
+    OutOfRange {
+        /// Which element, from 0.
+        element: usize,
+        /// The block it names.
+        block: usize,
+        /// How many there are.
+        blocks: usize,
+    },
+    /// An element acts on different blocks.
+    #[error("element {element} names block {block} of unknowns twice")]
+    Repeated {
+        /// Which element, from 0.
+        element: usize,
+        /// The block.
+        block: usize,
+    },
+    /// Two blocks meet in an element that do not in the pattern.
+    #[error(
+        "element {element} couples blocks {first} and {second}, which the pattern does not; build the pattern from all stencils"
+    )]
+    NotInPattern {
+        /// Which element, from 0.
+        element: usize,
+        /// A block.
+        first: usize,
+        /// Another.
+        second: usize,
+    },
+}
+
+/// Which blocks of JᵀJ are not zero: those on the diagonal, and those of blocks of unknowns that meet in an element. The upper half
+/// is kept, by rows, columns ascending.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NormalPattern {
+    row_start: Vec<usize>,
+    columns: Vec<u32>,
+}
+
+impl NormalPattern {
+    /// The pattern of `blocks` blocks of unknowns of which each stencil couples all of its own.
+    ///
+    /// # Errors
+    /// When a stencil names a block that is not there.
+    pub fn new<'a>(blocks: usize, stencils: impl IntoIterator<Item = &'a [u32]>) -> Result<Self, CouplingError> {
+        let mut right: Vec<BTreeSet<u32>> = (0..blocks as u32).map(|row| BTreeSet::from([row])).collect();
+        for (element, stencil) in stencils.into_iter().enumerate() {
+            if let Some(&block) = stencil.iter().find(|&&block| block as usize >= blocks) {
+                return Err(CouplingError::OutOfRange { element, block: block as usize, blocks });
+            }
+            for &a in stencil {
+                right[a as usize].extend(stencil.iter().filter(|&&b| b > a));
+            }
+        }
+        let mut pattern = Self { row_start: vec![0], columns: Vec::new() };
+        for columns in right {
+            pattern.columns.extend(columns);
+            pattern.row_start.push(pattern.columns.len());
+        }
+        Ok(pattern)
+    }
+
+    /// Blocks of unknowns.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.row_start.len() - 1
+    }
+
+    /// Stored blocks: the diagonal and what is above it.
+    #[must_use]
+    pub fn stored(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The columns of a row from the diagonal on.
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[u32] {
+        &self.columns[self.row_start[row]..self.row_start[row + 1]]
+    }
+
+    /// The place of block (row, column), row ≤ column.
+    #[must_use]
+    pub fn slot(&self, row: usize, column: usize) -> Option<usize> {
+        self.row(row).binary_search(&(column as u32)).ok().map(|at| self.row_start[row] + at)
+    }
+
+    pub(crate) fn row_start(&self, row: usize) -> usize {
+        self.row_start[row]
+    }
+}
+
+/// The blocks that each of many elements acts on, and where the products of their derivatives lie in JᵀJ. It is found once, and
+/// serves as long as the stencils do; elements may come and go.
+#[derive(Clone, Debug)]
+pub struct Couplings {
+    arity: usize,
+    blocks: Vec<u32>,
+    /// For each pair i ≤ j of an element's blocks twice the place, plus one if block j comes first in the matrix.
+    slots: Vec<u32>,
+}
+
+impl Couplings {
+    /// Looks the stencils up in a pattern.
+    ///
+    /// # Errors
+    /// When a stencil repeats a block, or couples blocks that the pattern does not.
+    pub fn new<const K: usize>(pattern: &NormalPattern, stencils: &[[u32; K]]) -> Result<Self, CouplingError> {
+        let blocks = pattern.blocks();
+        let mut slots = Vec::with_capacity(stencils.len() * K * (K + 1) / 2);
+        for (element, stencil) in stencils.iter().enumerate() {
+            for (i, &first) in stencil.iter().enumerate() {
+                for (j, &second) in stencil.iter().enumerate().skip(i) {
+                    let (a, b) = (first.min(second) as usize, first.max(second) as usize);
+                    if b >= blocks {
+                        return Err(CouplingError::OutOfRange { element, block: b, blocks });
+                    }
+                    if a == b && i != j {
+                        return Err(CouplingError::Repeated { element, block: a });
+                    }
+                    let slot =
+                        pattern.slot(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
+                    slots.push(2 * slot as u32 + u32::from(first > second));
+                }
+            }
+        }
+        Ok(Self { arity: K, blocks: stencils.concat(), slots })
+    }
+
+    /// How many stencils there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.blocks.len() / self.arity.max(1)
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// Blocks of unknowns that an element acts on.
+    #[must_use]
+    pub fn arity(&self) -> usize {
+        self.arity
+    }
+
+    /// The blocks of stencil `at`.
+    #[inline(always)]
+    #[must_use]
+    pub fn stencil(&self, at: usize) -> &[u32] {
+        &self.blocks[at * self.arity..][..self.arity]
+    }
+
+    /// See `slots`.
+    #[inline(always)]
+    pub(crate) fn slots(&self, at: usize) -> &[u32] {
+        let pairs = self.arity * (self.arity + 1) / 2;
+        &self.slots[at * pairs..][..pairs]
+    }
+}
+
+/// JᵀJ, symmetric, of D×D blocks: the upper half, by a [`NormalPattern`].
+#[derive(Clone, Debug)]
+pub struct NormalMatrix<const D: usize> {
+    pattern: Arc<NormalPattern>,
+    pub(crate) values: Vec<WideBlock<D>>,
+}
+
+impl<const D: usize> NormalMatrix<D> {
+    const FITS: () = assert!(D <= WIDTH, "a block has at most eight rows");
+
+    /// The zero matrix.
+    #[must_use]
+    pub fn zeros(pattern: Arc<NormalPattern>) -> Self {
+        let () = Self::FITS;
+        let values = vec![[[0.0; WIDTH]; D]; pattern.stored()];
+        Self { pattern, values }
+    }
+
+    /// Its pattern.
+    #[must_use]
+    pub fn pattern(&self) -> &Arc<NormalPattern> {
+        &self.pattern
+    }
+
+    /// Sets it to zero.
+    pub fn clear(&mut self) {
+        self.values.fill([[0.0; WIDTH]; D]);
+    }
+
+    /// Block (row, column); zero where there is none.
+    #[must_use]
+    pub fn block(&self, row: usize, column: usize) -> [[f64; D]; D] {
+        let place = self.pattern.slot(row.min(column), row.max(column));
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                place.map_or(0.0, |at| if row <= column { self.values[at][i][j] } else { self.values[at][j][i] })
+            })
+        })
+    }
+
+    /// y = (A + μ 1) x.
+    pub fn multiply_damped(&self, damping: f64, x: &[[f64; D]], y: &mut [[f64; D]]) {
+        for (y, x) in y.iter_mut().zip(x) {
+            *y = x.map(|x| damping * x);
+        }
+        for row in 0..self.pattern.blocks() {
+            let start = self.pattern.row_start(row);
+            for (at, &column) in self.pattern.row(row).iter().enumerate() {
+                let (block, column) = (&self.values[start + at], column as usize);
+                for i in 0..D {
+                    y[row][i] += (0..D).map(|j| block[i][j] * x[column][j]).sum::<f64>();
+                }
+                if column != row {
+                    for i in 0..D {
+                        for j in 0..D {
+                            y[column][j] += block[i][j] * x[row][i];
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    pub(crate) fn diagonal(&self, row: usize) -> &WideBlock<D> {
+        &self.values[self.pattern.row_start(row)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pattern_is_the_diagonal_and_what_stencils_couple() {
+        let pattern = NormalPattern::new(4, [[3, 0].as_slice(), &[0, 1]]).unwrap();
+        assert_eq!(
+            (0..4).map(|row| pattern.row(row).to_vec()).collect::<Vec<_>>(),
+            [vec![0, 1, 3], vec![1], vec![2], vec![3]]
+        );
+        assert_eq!(pattern.slot(0, 3), Some(2));
+        assert_eq!(pattern.slot(1, 3), None);
+    }
+
+    #[test]
+    fn stencils_that_do_not_fit_are_refused() {
+        let pattern = NormalPattern::new(3, [[0, 1].as_slice()]).unwrap();
+        assert!(matches!(Couplings::new(&pattern, &[[0, 0]]), Err(CouplingError::Repeated { element: 0, block: 0 })));
+        assert!(matches!(
+            Couplings::new(&pattern, &[[0, 1], [0, 7]]),
+            Err(CouplingError::OutOfRange { element: 1, .. })
+        ));
+        assert!(matches!(
+            Couplings::new(&pattern, &[[2, 1]]),
+            Err(CouplingError::NotInPattern { first: 1, second: 2, .. })
+        ));
+        assert!(NormalPattern::new(3, [[3].as_slice()]).is_err());
+    }
+
+    #[test]
+    fn products_see_both_halves() {
+        let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
+        let mut matrix = NormalMatrix::<2>::zeros(pattern);
+        // Whatever stands beside a block's own columns counts for nothing.
+        for (at, value) in matrix.values.iter_mut().enumerate() {
+            for i in 0..2 {
+                value[i] = [f64::NAN; WIDTH];
+                for j in 0..2 {
+                    value[i][j] = if at == 1 { (1 + 2 * i + j) as f64 } else { f64::from(u8::from(i == j)) };
+                }
+            }
+        }
+        let mut y = [[0.0; 2]; 2];
+        matrix.multiply_damped(10.0, &[[1.0, 0.0], [0.0, 1.0]], &mut y);
+        assert_eq!(y, [[11.0 + 2.0, 4.0], [1.0, 11.0 + 2.0]]);
+        assert_eq!(matrix.block(1, 0), [[1.0, 3.0], [2.0, 4.0]]);
+    }
+}

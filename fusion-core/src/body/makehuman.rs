@@ -1,0 +1,233 @@
+use std::collections::BTreeMap;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use obj::raw::object::{Polygon, parse_obj};
+use serde::Deserialize;
+
+use super::mesh::Mesh;
+use super::skinned::{BodyError, Bone, SkinnedBody};
+
+/// Files that do not describe a body.
+#[derive(Debug, thiserror::Error)]
+pub enum MakeHumanError {
+    /// A file cannot be read.
+    #[error("cannot read {}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The mesh is malformed.
+    #[error("{}: not a Wavefront OBJ: {message}", .path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// What the parser found.
+        message: String,
+    },
+    /// The rig or the weights are malformed.
+    #[error("{}", .path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What the parser found, and where.
+        source: serde_json::Error,
+    },
+    /// The mesh lacks a group that is needed.
+    #[error("{}: the mesh has no group `{group}`, which {needed_by} needs", .path.display())]
+    MissingGroup {
+        /// The mesh.
+        path: PathBuf,
+        /// The group.
+        group: String,
+        /// What for.
+        needed_by: String,
+    },
+    /// A file names something that is not there.
+    #[error("{}: {message}", .path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// What, and where.
+        message: String,
+    },
+    /// The parts do not fit.
+    #[error("{}", .path.display())]
+    Body {
+        /// The mesh.
+        path: PathBuf,
+        /// Why.
+        source: BodyError,
+    },
+}
+
+#[derive(Deserialize)]
+struct RigBone {
+    parent: String,
+    head: Place,
+    tail: Place,
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "strategy", rename_all = "UPPERCASE")]
+enum Place {
+    /// The centre of a small cube that is part of the mesh.
+    Cube { cube_name: String },
+    /// The mean of vertices.
+    Mean { vertex_indices: Vec<usize> },
+    /// A vertex.
+    Vertex { vertex_index: usize },
+}
+
+#[derive(Deserialize)]
+struct WeightFile {
+    weights: BTreeMap<String, Vec<(usize, f64)>>,
+}
+
+/// A mesh with its named groups.
+struct Groups {
+    path: PathBuf,
+    positions: Vec<Vector3<f64>>,
+    polygons: BTreeMap<String, Vec<Vec<usize>>>,
+}
+
+/// Decimetres, the unit of the mesh, to metres.
+const METRES: f64 = 0.1;
+
+/// Reads a body as MakeHuman stores it: an OBJ in decimetres whose group `body` is the skin and whose groups `joint-…` are small cubes
+/// that mark joints, a rig that says which joints each bone joins, and skinning weights by bone and vertex of the OBJ.
+///
+/// # Errors
+/// When a file is malformed, or names a joint, bone or vertex that is not there.
+pub fn read_makehuman(mesh: &Path, rig: &Path, weights: &Path) -> Result<SkinnedBody, MakeHumanError> {
+    let groups = Groups::read(mesh)?;
+    let bones = read_bones(rig, &groups)?;
+    let file: WeightFile = read_json(weights)?;
+    let mut by_vertex = vec![Vec::new(); groups.positions.len()];
+    for (name, list) in &file.weights {
+        let unknown = |message| MakeHumanError::Unknown { path: weights.to_owned(), message };
+        let bone = bones
+            .iter()
+            .position(|bone| bone.name == *name)
+            .ok_or_else(|| unknown(format!("weights for bone `{name}`, which the rig does not have")))?;
+        for &(vertex, weight) in list {
+            let row = by_vertex.get_mut(vertex);
+            row.ok_or_else(|| unknown(format!("bone `{name}`: no vertex {vertex}")))?.push((bone, weight));
+        }
+    }
+    groups.skin(bones, &by_vertex)
+}
+
+impl Groups {
+    fn read(path: &Path) -> Result<Self, MakeHumanError> {
+        let unreadable = |source| MakeHumanError::Unreadable { path: path.to_owned(), source };
+        let file = std::fs::File::open(path).map_err(unreadable)?;
+        let raw = parse_obj(BufReader::new(file))
+            .map_err(|error| MakeHumanError::Mesh { path: path.to_owned(), message: error.to_string() })?;
+        let positions = raw.positions.iter().map(|p| METRES * Vector3::new(p.0, p.1, p.2).map(f64::from)).collect();
+        let corners = |polygon: &Polygon| -> Vec<usize> {
+            match polygon {
+                Polygon::P(list) => list.clone(),
+                Polygon::PT(list) | Polygon::PN(list) => list.iter().map(|corner| corner.0).collect(),
+                Polygon::PTN(list) => list.iter().map(|corner| corner.0).collect(),
+            }
+        };
+        let polygons = raw
+            .groups
+            .iter()
+            .map(|(name, group)| {
+                let ranges = group.polygons.iter().flat_map(|range| &raw.polygons[range.start..range.end]);
+                (name.clone(), ranges.map(corners).collect())
+            })
+            .collect();
+        Ok(Self { path: path.to_owned(), positions, polygons })
+    }
+
+    fn group(&self, group: &str, needed_by: &str) -> Result<&[Vec<usize>], MakeHumanError> {
+        self.polygons.get(group).map(Vec::as_slice).ok_or_else(|| MakeHumanError::MissingGroup {
+            path: self.path.clone(),
+            group: group.to_owned(),
+            needed_by: needed_by.to_owned(),
+        })
+    }
+
+    fn mean(&self, vertices: impl Iterator<Item = usize>) -> Option<Vector3<f64>> {
+        let places: Option<Vec<_>> = vertices.map(|vertex| self.positions.get(vertex)).collect();
+        places.filter(|p| !p.is_empty()).map(|p| p.iter().copied().sum::<Vector3<f64>>() / p.len() as f64)
+    }
+
+    /// The skin: group `body`, quadrilaterals cut in two, with those vertices only that it uses.
+    fn skin(&self, bones: Vec<Bone>, weights: &[Vec<(usize, f64)>]) -> Result<SkinnedBody, MakeHumanError> {
+        let mut place = vec![None; self.positions.len()];
+        let (mut vertices, mut rows, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+        for polygon in self.group("body", "the skin")? {
+            let corners: Vec<u32> = polygon
+                .iter()
+                .map(|&vertex| {
+                    *place[vertex].get_or_insert_with(|| {
+                        vertices.push(self.positions[vertex]);
+                        rows.push(weights[vertex].clone());
+                        vertices.len() as u32 - 1
+                    })
+                })
+                .collect();
+            triangles.extend((2..corners.len()).map(|i| [corners[0], corners[i - 1], corners[i]]));
+        }
+        SkinnedBody::new(Mesh::new(vertices, triangles), bones, rows)
+            .map_err(|source| MakeHumanError::Body { path: self.path.clone(), source })
+    }
+}
+
+/// The bones, parents first.
+fn read_bones(path: &Path, groups: &Groups) -> Result<Vec<Bone>, MakeHumanError> {
+    let rig: BTreeMap<String, RigBone> = read_json(path)?;
+    let unknown = |message| MakeHumanError::Unknown { path: path.to_owned(), message };
+    let mut bones: Vec<Bone> = Vec::with_capacity(rig.len());
+    while bones.len() < rig.len() {
+        let before = bones.len();
+        for (name, bone) in &rig {
+            if bones.iter().any(|known| known.name == *name) {
+                continue;
+            }
+            let parent = bones.iter().position(|known| known.name == bone.parent);
+            if parent.is_none() && !bone.parent.is_empty() {
+                continue;
+            }
+            let end = |place: &Place| -> Result<[f64; 3], MakeHumanError> {
+                let found = match place {
+                    Place::Cube { cube_name } => groups.mean(distinct(groups.group(cube_name, name)?).into_iter()),
+                    Place::Mean { vertex_indices } => groups.mean(vertex_indices.iter().copied()),
+                    Place::Vertex { vertex_index } => groups.mean([*vertex_index].into_iter()),
+                };
+                found
+                    .map(Into::into)
+                    .ok_or_else(|| unknown(format!("bone `{name}` ends at vertices that do not exist")))
+            };
+            bones.push(Bone { name: name.clone(), parent, head: end(&bone.head)?, tail: end(&bone.tail)? });
+        }
+        if bones.len() == before {
+            let lost = rig.keys().find(|name| bones.iter().all(|bone| bone.name != **name)).expect("one is missing");
+            return Err(unknown(format!(
+                "bone `{lost}`: its parent `{}` is missing, or hangs on it",
+                rig[lost].parent
+            )));
+        }
+    }
+    Ok(bones)
+}
+
+fn distinct(polygons: &[Vec<usize>]) -> Vec<usize> {
+    let mut vertices = polygons.concat();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, MakeHumanError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| MakeHumanError::Unreadable { path: path.to_owned(), source })?;
+    serde_json::from_str(&text).map_err(|source| MakeHumanError::Json { path: path.to_owned(), source })
+}

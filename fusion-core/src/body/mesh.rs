@@ -1,0 +1,56 @@
+use std::fmt::Write as _;
+
+use nalgebra::Vector3;
+
+/// Triangles over vertices, with unit normals at the vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Positions, m.
+    pub vertices: Vec<Vector3<f64>>,
+    /// Unit normals; zero at a vertex of no triangle.
+    pub normals: Vec<Vector3<f64>>,
+    /// Vertices of each triangle, anticlockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// The mesh with the normals that its triangles have.
+    #[must_use]
+    pub fn new(vertices: Vec<Vector3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
+        let normals = vertex_normals(&vertices, &triangles);
+        Self { vertices, normals, triangles }
+    }
+
+    /// The mean of the vertices; the origin if there are none.
+    #[must_use]
+    pub fn centroid(&self) -> Vector3<f64> {
+        self.vertices.iter().sum::<Vector3<f64>>() / self.vertices.len().max(1) as f64
+    }
+}
+
+/// Mean normals of the triangles at each vertex, weighted by area.
+#[must_use]
+pub fn vertex_normals(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<f64>> {
+    let mut normals = vec![Vector3::zeros(); vertices.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|vertex| vertices[vertex as usize]);
+        let normal = (b - a).cross(&(c - a));
+        for &vertex in triangle {
+            normals[vertex as usize] += normal;
+        }
+    }
+    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_default()).collect()
+}
+
+/// A mesh as Wavefront OBJ, micrometres kept.
+#[must_use]
+pub fn obj_text(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> String {
+    let mut text = String::new();
+    for v in vertices {
+        writeln!(text, "v {:.6} {:.6} {:.6}", v.x, v.y, v.z).expect("writing to a string succeeds");
+    }
+    for [a, b, c] in triangles {
+        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).expect("writing to a string succeeds");
+    }
+    text
+}

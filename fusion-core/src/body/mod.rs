@@ -1,0 +1,15 @@
+//! Skinned bodies: a mesh at rest, bones, and how much each vertex follows each bone.
+
+mod figure;
+mod gltf_file;
+mod makehuman;
+mod mesh;
+mod skinned;
+mod stored;
+
+pub use figure::{figure, figure_motion};
+pub use gltf_file::{GltfError, read_gltf};
+pub use makehuman::{MakeHumanError, read_makehuman};
+pub use mesh::{Mesh, obj_text, vertex_normals};
+pub use skinned::{BodyError, Bone, SkinnedBody};
+pub use stored::{BodyFileError, read_body, read_vertices, write_body};

@@ -1,0 +1,185 @@
+use nalgebra::{Isometry3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::mesh::Mesh;
+
+/// A bone at rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bone {
+    /// Its name.
+    pub name: String,
+    /// The bone it hangs on; none for a root. Parents come before their children.
+    pub parent: Option<usize>,
+    /// The joint it turns about, m.
+    pub head: [f64; 3],
+    /// Its other end, m.
+    pub tail: [f64; 3],
+}
+
+/// A body that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BodyError {
+    /// Nothing to track.
+    #[error("the body has no vertices, or no triangles")]
+    Empty,
+    /// A triangle names a vertex that is not there.
+    #[error("triangle {triangle} names vertex {vertex} of {vertices}")]
+    TriangleOutOfRange {
+        /// The triangle.
+        triangle: usize,
+        /// What it names.
+        vertex: usize,
+        /// Vertices there are.
+        vertices: usize,
+    },
+    /// A number that is none.
+    #[error("vertex {vertex} is not finite")]
+    NonFinite {
+        /// The vertex.
+        vertex: usize,
+    },
+    /// Weights for another number of vertices.
+    #[error("{found} rows of skinning weights for {vertices} vertices")]
+    WeightCount {
+        /// Rows.
+        found: usize,
+        /// Vertices.
+        vertices: usize,
+    },
+    /// A weight for a bone that is not there, negative, or not a number; or a vertex that follows no bone.
+    #[error("vertex {vertex}: its skinning weights must be positive, of existing bones, and at least one")]
+    BadWeights {
+        /// The vertex.
+        vertex: usize,
+    },
+    /// A parent must come before its child.
+    #[error("bone `{bone}` comes before its parent")]
+    Order {
+        /// The child.
+        bone: String,
+    },
+}
+
+/// A mesh that bones move by linear blend skinning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SkinnedBody {
+    /// The mesh at rest.
+    pub mesh: Mesh,
+    /// Its bones.
+    pub bones: Vec<Bone>,
+    /// For each vertex the bones it follows and how much; each row sums to one.
+    pub weights: Vec<Vec<(usize, f64)>>,
+}
+
+impl SkinnedBody {
+    /// Checks all parts, and brings each vertex's weights to a sum of one.
+    ///
+    /// # Errors
+    /// When the parts do not fit.
+    pub fn new(mesh: Mesh, bones: Vec<Bone>, mut weights: Vec<Vec<(usize, f64)>>) -> Result<Self, BodyError> {
+        let vertices = mesh.vertices.len();
+        if vertices == 0 || mesh.triangles.is_empty() {
+            return Err(BodyError::Empty);
+        }
+        if let Some(vertex) = mesh.vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+            return Err(BodyError::NonFinite { vertex });
+        }
+        for (triangle, corners) in mesh.triangles.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&vertex| vertex as usize >= vertices) {
+                return Err(BodyError::TriangleOutOfRange { triangle, vertex: vertex as usize, vertices });
+            }
+        }
+        if let Some(bone) = bones.iter().enumerate().find(|(i, b)| b.parent.is_some_and(|p| p >= *i)) {
+            return Err(BodyError::Order { bone: bone.1.name.clone() });
+        }
+        if weights.len() != vertices {
+            return Err(BodyError::WeightCount { found: weights.len(), vertices });
+        }
+        for (vertex, row) in weights.iter_mut().enumerate() {
+            let sum: f64 = row.iter().map(|(_, weight)| weight).sum();
+            let good = row.iter().all(|&(bone, weight)| bone < bones.len() && weight >= 0.0);
+            if !(good && sum > 0.0 && sum.is_finite()) {
+                return Err(BodyError::BadWeights { vertex });
+            }
+            row.iter_mut().for_each(|(_, weight)| *weight /= sum);
+        }
+        Ok(Self { mesh, bones, weights })
+    }
+
+    /// Vertices and normals (of length one) where motions of the bones, from rest, take them: Σ η_j T_j v.
+    ///
+    /// # Panics
+    /// When there are not as many motions as bones.
+    #[must_use]
+    pub fn posed(&self, motions: &[Isometry3<f64>]) -> Mesh {
+        assert_eq!(motions.len(), self.bones.len(), "a motion for every bone");
+        let blend = |vertex: usize, of: &dyn Fn(&Isometry3<f64>) -> Vector3<f64>| {
+            self.weights[vertex].iter().map(|&(bone, weight)| weight * of(&motions[bone])).sum::<Vector3<f64>>()
+        };
+        let all = 0..self.mesh.vertices.len();
+        let vertices = all
+            .clone()
+            .map(|i| blend(i, &|motion| motion.transform_point(&self.mesh.vertices[i].into()).coords))
+            .collect();
+        let normals = all
+            .map(|i| blend(i, &|motion| motion.rotation * self.mesh.normals[i]).try_normalize(0.0).unwrap_or_default())
+            .collect();
+        Mesh { vertices, normals, triangles: self.mesh.triangles.clone() }
+    }
+
+    /// The body as motions of its bones leave it, as a new rest shape.
+    #[must_use]
+    pub fn at_rest_in(&self, motions: &[Isometry3<f64>]) -> Self {
+        let moved = |bone: usize, point: [f64; 3]| motions[bone].transform_point(&point.into()).coords.into();
+        let bones = self
+            .bones
+            .iter()
+            .enumerate()
+            .map(|(i, bone)| Bone { head: moved(i, bone.head), tail: moved(i, bone.tail), ..bone.clone() })
+            .collect();
+        let posed = self.posed(motions);
+        let mesh = Mesh::new(posed.vertices, posed.triangles);
+        Self { mesh, bones, weights: self.weights.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Translation3;
+
+    fn triangle() -> Mesh {
+        Mesh::new(vec![Vector3::zeros(), Vector3::x(), Vector3::y()], vec![[0, 1, 2]])
+    }
+
+    fn bone(parent: Option<usize>) -> Bone {
+        Bone { name: "b".into(), parent, head: [0.0; 3], tail: [0.0, 1.0, 0.0] }
+    }
+
+    #[test]
+    fn vertices_follow_their_bones() {
+        let weights = vec![vec![(0, 1.0)], vec![(0, 2.0), (1, 2.0)], vec![(1, 3.0)]];
+        let body = SkinnedBody::new(triangle(), vec![bone(None), bone(Some(0))], weights).unwrap();
+        let motions =
+            [Isometry3::identity(), Isometry3::from_parts(Translation3::new(0.0, 0.0, 1.0), Default::default())];
+        let posed = body.posed(&motions);
+        assert_eq!(posed.vertices, [Vector3::zeros(), Vector3::new(1.0, 0.0, 0.5), Vector3::new(0.0, 1.0, 1.0)]);
+        assert_eq!(body.at_rest_in(&motions).bones[1].tail, [0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_refused() {
+        let good = vec![vec![(0, 1.0)]; 3];
+        let refuse = |mesh, bones, weights| SkinnedBody::new(mesh, bones, weights).unwrap_err();
+        assert_eq!(refuse(Mesh::default(), vec![], vec![]), BodyError::Empty);
+        assert!(matches!(refuse(triangle(), vec![], good.clone()), BodyError::BadWeights { vertex: 0 }));
+        assert!(matches!(refuse(triangle(), vec![bone(Some(0))], good.clone()), BodyError::Order { .. }));
+        assert!(matches!(refuse(triangle(), vec![bone(None)], vec![]), BodyError::WeightCount { .. }));
+        let mut far = triangle();
+        far.triangles[0][2] = 3;
+        assert!(matches!(refuse(far, vec![bone(None)], good.clone()), BodyError::TriangleOutOfRange { vertex: 3, .. }));
+        let mut broken = triangle();
+        broken.vertices[1].x = f64::NAN;
+        assert!(matches!(refuse(broken, vec![bone(None)], good), BodyError::NonFinite { vertex: 1 }));
+    }
+}

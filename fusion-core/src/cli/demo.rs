@@ -1,0 +1,67 @@
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use fusion_core::skeleton::BoneNoise;
+use verify::audit::{Options, audit_catalogue, describe_failure};
+
+use super::evaluate::{Evaluate, summary};
+use super::print;
+use super::render::Render;
+use super::track::Track;
+
+/// The demonstration.
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Where the files go; those of an earlier demo are replaced.
+    #[arg(short, long, default_value = "out/fusion")]
+    output: PathBuf,
+    /// Thirtieths of a second to track.
+    #[arg(long, default_value_t = 60)]
+    frames: usize,
+}
+
+/// The declared residuals that the demonstration's energy is made of.
+const TERMS: [&str; 6] = ["NonrigidPlane4", "GraphEdge", "Binding", "BoneBinding", "SkeletonPlane", "BlendedPoint4"];
+
+impl Demo {
+    pub fn run(&self) -> Result<()> {
+        audit()?;
+        let runs = [
+            ("exact bones", BoneNoise::default(), false),
+            ("noisy bones", BoneNoise { turn: 5.0_f64.to_radians(), shift: 0.02 }, true),
+        ];
+        let mut rows = Vec::new();
+        for (name, noise, unknown_bones) in runs {
+            print(&format!("{name}:\n"))?;
+            let folder = self.output.join(name.replace(' ', "-"));
+            let (recording, track) = (folder.join("recording"), folder.join("track"));
+            Render::figure(self.frames.max(1), noise, &recording).run()?;
+            let tracked = Track::of(&recording, unknown_bones, &track).run()?;
+            if tracked.tracked == 0 {
+                bail!("none of {} frames could be tracked", tracked.skipped);
+            }
+            rows.push((name, Evaluate::of(&recording, &track).run()?));
+            print("\n")?;
+        }
+        let table: Vec<(String, &_)> = rows
+            .iter()
+            .flat_map(|(name, one)| {
+                [(format!("{name}, tracked"), &one.track), (format!("{name}, skeleton alone"), &one.skeleton)]
+            })
+            .collect();
+        let table: Vec<(&str, &_)> = table.iter().map(|(name, errors)| (name.as_str(), *errors)).collect();
+        print(&format!("{}\n", summary(&table)))
+    }
+}
+
+/// Every term is compared with dual numbers and finite differences before it is used.
+fn audit() -> Result<()> {
+    let options = Options { samples: 50, ..Options::default() };
+    let report = audit_catalogue(&TERMS, options).map_err(anyhow::Error::msg)?;
+    if !report.passed() {
+        let failures: Vec<String> = report.failures().map(describe_failure).collect();
+        bail!("the audit failed; nothing was tracked\n{}", failures.join("\n"));
+    }
+    print(&format!("audit of {} terms on {} random inputs each: passed\n\n", TERMS.len(), options.samples))
+}

@@ -1,0 +1,128 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use comfy_table::{CellAlignment, Table, presets};
+use fusion_core::body::{Mesh, read_body, read_vertices};
+use fusion_core::depth::{DepthSequence, visible_vertices};
+use fusion_core::evaluation::{ErrorSummary, FrameErrors, TrackErrors};
+use fusion_core::plot::errors_svg;
+use fusion_core::skeleton::Skeleton;
+use serde::Serialize;
+
+use super::folder::{MODEL, SKELETON, mesh_file, write};
+use super::print;
+
+/// What to measure.
+#[derive(Debug, Args)]
+pub struct Evaluate {
+    /// A rendered recording.
+    recording: PathBuf,
+    /// Its track.
+    track: PathBuf,
+}
+
+#[derive(Serialize)]
+struct Line {
+    frame: usize,
+    vertices: &'static str,
+    mean_mm: f64,
+    median_mm: f64,
+    p95_mm: f64,
+    share_below_25_mm: f64,
+}
+
+/// The errors of a track, and of the skeleton alone.
+pub struct Evaluated {
+    /// The track's.
+    pub track: TrackErrors,
+    /// The skinned skeleton's.
+    pub skeleton: TrackErrors,
+}
+
+impl Evaluate {
+    pub fn of(recording: &Path, track: &Path) -> Self {
+        Self { recording: recording.to_owned(), track: track.to_owned() }
+    }
+
+    pub fn run(&self) -> Result<Evaluated> {
+        let evaluated = self.measure()?;
+        let (table, plot) = (self.track.join("errors.csv"), self.track.join("errors.svg"));
+        write(&table, &csv(&evaluated.track)?)?;
+        let picture = errors_svg(&evaluated.track).map_err(anyhow::Error::msg)?;
+        write(&plot, picture.as_bytes())?;
+        let rows = [("tracked", &evaluated.track), ("skeleton alone", &evaluated.skeleton)];
+        print(&format!("{}\nwrote {} and {}\n", summary(&rows), table.display(), plot.display()))?;
+        Ok(evaluated)
+    }
+
+    /// Measures every frame but the first, which is the model's rest.
+    fn measure(&self) -> Result<Evaluated> {
+        let sequence = DepthSequence::open(&self.recording)?;
+        let body = read_body(&self.recording.join(MODEL))?;
+        let skeleton = Skeleton::read(&self.recording.join(SKELETON))?;
+        let mut evaluated = Evaluated { track: TrackErrors::default(), skeleton: TrackErrors::default() };
+        for frame in 1..sequence.len() {
+            let truth = read_vertices(&mesh_file(&self.recording, "truth", frame)).context("the truth")?;
+            let found = read_vertices(&mesh_file(&self.track, "meshes", frame)).context("the track")?;
+            ensure!(
+                truth.len() == found.len(),
+                "frame {frame}: the track has {} vertices, the truth {}; is it another recording's?",
+                found.len(),
+                truth.len()
+            );
+            let mesh = Mesh::new(truth, body.mesh.triangles.clone());
+            let visible = visible_vertices(&mesh, &sequence.info.camera);
+            evaluated.track.frames.push(FrameErrors::new(&found, &mesh.vertices, &visible));
+            if let Some(motions) = skeleton.motions(frame, &body.bones)? {
+                let posed = body.posed(&motions).vertices;
+                evaluated.skeleton.frames.push(FrameErrors::new(&posed, &mesh.vertices, &visible));
+            }
+        }
+        ensure!(!evaluated.track.frames.is_empty(), "the recording has no frame after its first");
+        Ok(evaluated)
+    }
+}
+
+fn csv(errors: &TrackErrors) -> Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for (at, frame) in errors.frames.iter().enumerate() {
+        for (vertices, of) in [("all", &frame.all), ("visible", &frame.visible)] {
+            let summary = ErrorSummary::of(of.clone());
+            table.serialize(Line {
+                frame: at + 1,
+                vertices,
+                mean_mm: summary.mean,
+                median_mm: summary.median,
+                p95_mm: summary.p95,
+                share_below_25_mm: summary.share_below_25,
+            })?;
+        }
+    }
+    Ok(table.into_inner()?)
+}
+
+/// A table of end-point errors, one run a row and kind of vertices.
+pub fn summary(rows: &[(&str, &TrackErrors)]) -> Table {
+    let mut table = Table::new();
+    let headings = ["run", "vertices", "mean, mm", "median, mm", "95 %, mm", "share < 25 mm"];
+    table.load_preset(presets::NOTHING).set_header(headings);
+    for column in 2..6 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for (name, errors) in rows {
+        for (vertices, one) in [("all", errors.all()), ("visible", errors.visible())] {
+            table.add_row([
+                (*name).to_owned(),
+                vertices.to_owned(),
+                format!("{:.2}", one.mean),
+                format!("{:.2}", one.median),
+                format!("{:.2}", one.p95),
+                format!("{:.3}", one.share_below_25),
+            ]);
+        }
+    }
+    table
+}

@@ -1,0 +1,13 @@
+//! Depth images: cameras, files, rendering with a sensor's noise, normals.
+
+mod camera;
+mod image;
+mod png_file;
+mod render;
+mod sequence;
+
+pub use camera::Camera;
+pub use image::DepthImage;
+pub use png_file::{DepthFileError, read_depth, read_mask, write_depth};
+pub use render::{SensorNoise, render, visible_vertices};
+pub use sequence::{DepthSequence, SequenceError, SequenceInfo};

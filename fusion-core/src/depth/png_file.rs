@@ -1,0 +1,128 @@
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use super::image::DepthImage;
+
+/// An image that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum DepthFileError {
+    /// The file.
+    #[error("{}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not a PNG, or a damaged one.
+    #[error("{}", .path.display())]
+    Png {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder found.
+        source: png::DecodingError,
+    },
+    /// Another kind of image.
+    #[error("{}: expected {expected}, found {found}", .path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is needed.
+        expected: &'static str,
+        /// What there is.
+        found: String,
+    },
+    /// Encoding failed.
+    #[error("{}", .path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: png::EncodingError,
+    },
+}
+
+struct Grey {
+    width: usize,
+    height: usize,
+    bytes: Vec<u8>,
+}
+
+fn read_grey(path: &Path, depth: png::BitDepth, expected: &'static str) -> Result<Grey, DepthFileError> {
+    let file = std::fs::File::open(path).map_err(|source| DepthFileError::File { path: path.into(), source })?;
+    let broken = |source| DepthFileError::Png { path: path.into(), source };
+    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(broken)?;
+    let (colour, bits) = reader.output_color_type();
+    let size = reader.output_buffer_size().unwrap_or(0);
+    if (colour, bits) != (png::ColorType::Grayscale, depth) || size == 0 {
+        let found = format!("{colour:?} of {} bits", bits as u8);
+        return Err(DepthFileError::Format { path: path.into(), expected, found });
+    }
+    let mut bytes = vec![0; size];
+    let info = reader.next_frame(&mut bytes).map_err(broken)?;
+    bytes.truncate(info.buffer_size());
+    Ok(Grey { width: info.width as usize, height: info.height as usize, bytes })
+}
+
+/// Reads a depth image: 16-bit grey, `per_metre` steps to a metre (1000 for millimetres, 5000 in the TUM's data), 0 where nothing was
+/// measured.
+///
+/// # Errors
+/// When the file cannot be read, or is another kind of image.
+pub fn read_depth(path: &Path, per_metre: f64) -> Result<DepthImage, DepthFileError> {
+    let Grey { width, height, bytes } = read_grey(path, png::BitDepth::Sixteen, "16-bit grey depth")?;
+    let steps = bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]]));
+    let depth = steps.map(|step| (f64::from(step) / per_metre) as f32).collect();
+    Ok(DepthImage { width, height, depth })
+}
+
+/// Reads a mask: 8-bit grey, 0 where depths are to be ignored. Returns width, height and the pixels.
+///
+/// # Errors
+/// When the file cannot be read, or is another kind of image.
+pub fn read_mask(path: &Path) -> Result<(usize, usize, Vec<u8>), DepthFileError> {
+    let Grey { width, height, bytes } = read_grey(path, png::BitDepth::Eight, "an 8-bit grey mask")?;
+    Ok((width, height, bytes))
+}
+
+/// Writes a depth image, whole or not at all. Depths are rounded to steps; beyond the largest step they are left out.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_depth(path: &Path, image: &DepthImage, per_metre: f64) -> Result<(), DepthFileError> {
+    let failed = |source| DepthFileError::Encode { path: path.into(), source };
+    let mut bytes = Vec::with_capacity(2 * image.depth.len());
+    for &depth in &image.depth {
+        let step = (f64::from(depth) * per_metre).round();
+        let step = if step >= 1.0 && step <= f64::from(u16::MAX) { step as u16 } else { 0 };
+        bytes.extend(step.to_be_bytes());
+    }
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, image.width as u32, image.height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(&bytes).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    verify::write_whole(path, &file).map_err(|source| DepthFileError::File { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depths_survive_a_file_but_for_rounding() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("d.png");
+        let image = DepthImage { width: 3, height: 2, depth: vec![0.0, 1.0, 2.5004, f32::NAN, -1.0, 70.0] };
+        write_depth(&path, &image, 1000.0).unwrap();
+        let read = read_depth(&path, 1000.0).unwrap();
+        assert_eq!(read.depth, [0.0, 1.0, 2.5, 0.0, 0.0, 0.0]);
+        assert_eq!((read.width, read.height, read.valid()), (3, 2, 2));
+        let error = read_mask(&path).unwrap_err().to_string();
+        assert!(error.contains("expected an 8-bit grey mask, found Grayscale of 16 bits"), "{error}");
+        std::fs::write(&path, b"no image").unwrap();
+        assert!(matches!(read_depth(&path, 1000.0), Err(DepthFileError::Png { .. })));
+    }
+}

@@ -1,0 +1,37 @@
+//! `fusion`: renders, tracks and evaluates bodies in depth images.
+
+#![forbid(unsafe_code)]
+
+mod cli;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+/// Tracks a deforming body in depth images.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Audits the terms of the energy, renders a figure of tubes, tracks it with exact and with noisy bones, and measures both.
+    Demo(cli::demo::Demo),
+    /// Renders a body in motion as a depth camera sees it: images, model, skeleton, truth.
+    Render(cli::render::Render),
+    /// Tracks a model through depth images: motions of its nodes, moved meshes, a table of frames.
+    Track(cli::track::Track),
+    /// Measures a track against the truth: table and plot.
+    Evaluate(cli::evaluate::Evaluate),
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().command {
+        Command::Demo(demo) => demo.run(),
+        Command::Render(render) => render.run(),
+        Command::Track(track) => track.run().map(drop),
+        Command::Evaluate(evaluate) => evaluate.run().map(drop),
+    }
+}

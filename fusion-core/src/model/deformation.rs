@@ -1,0 +1,227 @@
+use nalgebra::{Isometry3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::attachments::{Attachments, FillReport};
+use super::neighbours::nearest;
+use super::nodes::sample_nodes;
+use crate::body::{Bone, Mesh, SkinnedBody};
+
+/// How a model is made of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ModelOptions {
+    /// Distance of nodes, m; also the width of their influence.
+    pub node_radius: f64,
+    /// K, nodes that move a vertex: 1, 4 or 8.
+    pub nodes_per_vertex: usize,
+    /// Neighbours of a node in the graph.
+    pub graph_neighbours: usize,
+    /// Metres that a wholly different attachment counts for in the distances between nodes and vertices, so that the two arms, or arm and
+    /// trunk, do not move each other where they touch.
+    pub attachment_length: f64,
+    /// Attach nodes to the nearest bone within this, m, then fill and relax; `None` takes the skinning weights of the body.
+    pub attachment_reach: Option<f64>,
+    /// Passes of relaxation after a fill.
+    pub relaxations: usize,
+}
+
+impl Default for ModelOptions {
+    fn default() -> Self {
+        Self {
+            node_radius: 0.06,
+            nodes_per_vertex: 4,
+            graph_neighbours: 8,
+            attachment_length: 0.1,
+            attachment_reach: None,
+            relaxations: 2,
+        }
+    }
+}
+
+/// A body from which no model can be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ModelError {
+    /// Only some K are compiled.
+    #[error("{0} nodes per vertex: 1, 4 or 8 can be had")]
+    NodesPerVertex(usize),
+    /// There are fewer nodes than a vertex or a node needs.
+    #[error(
+        "{nodes} nodes, but {needed} are needed ({what}); sample them more densely than {radius_mm} mm, or ask for fewer"
+    )]
+    TooFewNodes {
+        /// Nodes there are.
+        nodes: usize,
+        /// How many are needed.
+        needed: usize,
+        /// What for.
+        what: &'static str,
+        /// The radius they were sampled at.
+        radius_mm: usize,
+    },
+    /// A length that is none.
+    #[error("`{name}` must be a finite number above 0")]
+    BadLength {
+        /// Which.
+        name: &'static str,
+    },
+}
+
+/// Nodes on a body, and everything that stays as it is while they move. Coordinates are relative to [`Self::origin`], the centroid of the
+/// mesh at rest: turns about a far origin would couple a node's two parts.
+#[derive(Clone, Debug)]
+pub struct DeformationModel {
+    /// The origin in the world.
+    pub origin: Vector3<f64>,
+    /// The mesh at rest.
+    pub mesh: Mesh,
+    /// The bones at rest.
+    pub bones: Vec<Bone>,
+    /// The nodes' places at rest.
+    pub nodes: Vec<Vector3<f64>>,
+    /// For each node its neighbours, without itself.
+    pub graph: Vec<Vec<usize>>,
+    /// How much each node follows each bone.
+    pub attachments: Attachments,
+    /// For each vertex the nodes that move it, nearest first.
+    pub vertex_nodes: Vec<Vec<u32>>,
+    /// How much each of them does.
+    pub vertex_weights: Vec<Vec<f64>>,
+    /// How much each vertex follows each bone: the mean of its nodes' attachments.
+    pub vertex_bones: Vec<Vec<(usize, f64)>>,
+    /// What was left when attachments were filled.
+    pub fill: FillReport,
+    /// How it was made.
+    pub options: ModelOptions,
+}
+
+impl DeformationModel {
+    /// Samples nodes on a body and connects them.
+    ///
+    /// # Errors
+    /// When K is none of 1, 4, 8, or there are too few nodes.
+    pub fn new(body: &SkinnedBody, options: ModelOptions) -> Result<Self, ModelError> {
+        let ModelOptions { node_radius, nodes_per_vertex, graph_neighbours, attachment_length, .. } = options;
+        if ![1, 4, 8].contains(&nodes_per_vertex) {
+            return Err(ModelError::NodesPerVertex(nodes_per_vertex));
+        }
+        if !(node_radius > 0.0 && node_radius.is_finite()) {
+            return Err(ModelError::BadLength { name: "node_radius" });
+        }
+        if !(attachment_length >= 0.0 && attachment_length.is_finite()) {
+            return Err(ModelError::BadLength { name: "attachment_length" });
+        }
+        let origin = body.mesh.centroid();
+        let mut mesh = body.mesh.clone();
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex -= origin);
+        let shifted = |point: [f64; 3]| (Vector3::from(point) - origin).into();
+        let bones: Vec<Bone> = body
+            .bones
+            .iter()
+            .map(|bone| Bone { head: shifted(bone.head), tail: shifted(bone.tail), ..bone.clone() })
+            .collect();
+
+        let chosen = sample_nodes(&mesh.vertices, node_radius);
+        let nodes: Vec<Vector3<f64>> = chosen.iter().map(|&vertex| mesh.vertices[vertex]).collect();
+        for (needed, what) in
+            [(nodes_per_vertex, "to move a vertex"), (graph_neighbours + 1, "for a node's neighbours")]
+        {
+            if nodes.len() < needed {
+                let radius_mm = (1e3 * node_radius) as usize;
+                return Err(ModelError::TooFewNodes { nodes: nodes.len(), needed, what, radius_mm });
+            }
+        }
+        let dense = |vertex: usize| {
+            let mut row = vec![0.0; bones.len()];
+            body.weights[vertex].iter().for_each(|&(bone, weight)| row[bone] += weight);
+            row
+        };
+        let skinning: Vec<Vec<f64>> = chosen.iter().map(|&vertex| dense(vertex)).collect();
+        let (attachments, fill) = attach(&nodes, &bones, &skinning, &options);
+
+        let square_length = attachment_length * attachment_length;
+        let graph: Vec<Vec<usize>> = (0..nodes.len())
+            .map(|i| {
+                let extra = |j: usize| square_length * attachments.square_distance(i, j);
+                nearest(&nodes[i], &nodes, graph_neighbours, extra, Some(i)).into_iter().map(|(j, _)| j).collect()
+            })
+            .collect();
+        let (mut vertex_nodes, mut vertex_weights, mut vertex_bones) = (Vec::new(), Vec::new(), Vec::new());
+        for (vertex, place) in mesh.vertices.iter().enumerate() {
+            let own = dense(vertex);
+            let extra = |j: usize| {
+                let square: f64 = own.iter().zip(&skinning[j]).map(|(a, b)| (a - b) * (a - b)).sum();
+                square_length * square
+            };
+            let around = nearest(place, &nodes, nodes_per_vertex, extra, None);
+            // The nearest node counts fully, so that far ones cannot all vanish.
+            let weights: Vec<f64> =
+                around.iter().map(|(_, s)| (-(s - around[0].1) / (2.0 * node_radius * node_radius)).exp()).collect();
+            vertex_bones.push(mean_attachment(&attachments, &around, &weights));
+            vertex_nodes.push(around.iter().map(|&(node, _)| node as u32).collect());
+            vertex_weights.push(weights);
+        }
+        Ok(Self {
+            origin,
+            mesh,
+            bones,
+            nodes,
+            graph,
+            attachments,
+            vertex_nodes,
+            vertex_weights,
+            vertex_bones,
+            fill,
+            options,
+        })
+    }
+
+    /// A motion of the world as one of the model's coordinates: (R, t) becomes (R, t + R o − o).
+    #[must_use]
+    pub fn centred(&self, motion: &Isometry3<f64>) -> Isometry3<f64> {
+        let shift = motion.translation.vector + motion.rotation * self.origin - self.origin;
+        Isometry3::from_parts(shift.into(), motion.rotation)
+    }
+}
+
+/// Attachments of the nodes: the body's skinning weights, or the nearest bones smoothed.
+fn attach(
+    nodes: &[Vector3<f64>],
+    bones: &[Bone],
+    skinning: &[Vec<f64>],
+    options: &ModelOptions,
+) -> (Attachments, FillReport) {
+    let Some(reach) = options.attachment_reach else {
+        return (Attachments::given(skinning.to_vec()), FillReport { passes: 0, left: Vec::new() });
+    };
+    let segments: Vec<[Vector3<f64>; 2]> = bones.iter().map(|bone| [bone.head.into(), bone.tail.into()]).collect();
+    let mut attachments = Attachments::nearest_bone(nodes, &segments, reach);
+    // Edges both ways: otherwise a fill can stall before nodes that nobody calls a neighbour.
+    let mut graph: Vec<Vec<usize>> = (0..nodes.len())
+        .map(|i| {
+            let around = nearest(&nodes[i], nodes, options.graph_neighbours, |_| 0.0, Some(i));
+            around.into_iter().map(|(j, _)| j).collect()
+        })
+        .collect();
+    for (i, around) in graph.clone().iter().enumerate() {
+        for &j in around {
+            if !graph[j].contains(&i) {
+                graph[j].push(i);
+            }
+        }
+    }
+    let report = attachments.fill(&graph);
+    (0..options.relaxations).for_each(|_| attachments.relax_once(&graph));
+    (attachments, report)
+}
+
+/// Σ w_k H_k/Σ w_k, its bones from the heaviest on.
+fn mean_attachment(attachments: &Attachments, around: &[(usize, f64)], weights: &[f64]) -> Vec<(usize, f64)> {
+    let bones = attachments.rows.first().map_or(0, Vec::len);
+    let sum: f64 = weights.iter().sum();
+    let mean = |bone: usize| {
+        around.iter().zip(weights).map(|(&(node, _), w)| w * attachments.rows[node][bone]).sum::<f64>() / sum
+    };
+    let mut mixed: Vec<(usize, f64)> = (0..bones).map(|bone| (bone, mean(bone))).filter(|(_, w)| *w > 0.0).collect();
+    mixed.sort_by(|a, b| b.1.total_cmp(&a.1));
+    mixed
+}

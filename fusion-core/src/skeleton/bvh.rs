@@ -1,0 +1,254 @@
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+/// A file that is not a BVH motion.
+#[derive(Debug, thiserror::Error)]
+pub enum BvhError {
+    /// The file cannot be read.
+    #[error("cannot read {}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Something in it is wrong.
+    #[error("{}:{line}: {message}", .path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+/// One number of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Channel {
+    Shift(usize),
+    Turn(usize),
+}
+
+/// A joint of the hierarchy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Its name.
+    pub name: String,
+    /// The joint it hangs on; none for the root.
+    pub parent: Option<usize>,
+    /// Its place relative to its parent, in the file's unit.
+    pub offset: Vector3<f64>,
+    channels: Vec<Channel>,
+}
+
+/// A motion in Biovision's format: a hierarchy of joints, and for each frame the numbers of their channels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bvh {
+    /// Joints, parents first.
+    pub joints: Vec<Joint>,
+    /// Ends of the chains: the joint, and the end's place relative to it.
+    pub ends: Vec<(usize, Vector3<f64>)>,
+    /// Seconds from one frame to the next.
+    pub frame_time: f64,
+    frames: Vec<Vec<f64>>,
+}
+
+impl Bvh {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// When it cannot be read or is malformed; the line is named.
+    pub fn read(path: &Path) -> Result<Self, BvhError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| BvhError::Unreadable { path: path.to_owned(), source })?;
+        Self::parse(&text).map_err(|(line, message)| BvhError::Malformed {
+            path: path.to_owned(),
+            line: line + 1,
+            message,
+        })
+    }
+
+    /// Parses a text; an error has its line, from 0.
+    fn parse(text: &str) -> Result<Self, (usize, String)> {
+        let lines: Vec<&str> = text.lines().collect();
+        let mut at = 0;
+        let (joints, ends) = hierarchy(&lines, &mut at)?;
+        let value = |at: usize, key: &str| -> Result<f64, (usize, String)> {
+            let rest = lines.get(at).and_then(|line| line.trim().strip_prefix(key));
+            let number = rest.and_then(|rest| rest.trim().parse::<f64>().ok());
+            number.ok_or_else(|| (at, format!("expected `{key}` and a number")))
+        };
+        let count = value(at, "Frames:")?;
+        let frame_time = value(at + 1, "Frame Time:")?;
+        if !(frame_time > 0.0 && frame_time.is_finite()) {
+            return Err((at + 1, "the frame time must be above 0".into()));
+        }
+        let channels: usize = joints.iter().map(|joint| joint.channels.len()).sum();
+        let mut frames = Vec::new();
+        for (number, line) in lines.iter().enumerate().skip(at + 2).filter(|(_, line)| !line.trim().is_empty()) {
+            let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse::<f64>).collect();
+            let numbers = numbers.map_err(|error| (number, error.to_string()))?;
+            if numbers.len() != channels || numbers.iter().any(|x| !x.is_finite()) {
+                return Err((number, format!("a frame has {channels} finite numbers, this one {}", numbers.len())));
+            }
+            frames.push(numbers);
+        }
+        if frames.len() as f64 != count {
+            return Err((lines.len(), format!("{count} frames announced, {} found", frames.len())));
+        }
+        Ok(Self { joints, ends, frame_time, frames })
+    }
+
+    /// How many frames there are.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Where each joint is in a frame, and how it is turned, in the file's unit; none past the last frame.
+    #[must_use]
+    pub fn pose(&self, frame: usize) -> Option<Vec<Isometry3<f64>>> {
+        let mut numbers = self.frames.get(frame)?.iter();
+        let mut pose: Vec<Isometry3<f64>> = Vec::with_capacity(self.joints.len());
+        for joint in &self.joints {
+            let (mut shift, mut rotation) = (joint.offset, UnitQuaternion::identity());
+            for (channel, &number) in joint.channels.iter().zip(numbers.by_ref()) {
+                match *channel {
+                    Channel::Shift(axis) => shift[axis] += number,
+                    Channel::Turn(axis) => {
+                        let mut turn = Vector3::zeros();
+                        turn[axis] = number.to_radians();
+                        rotation *= UnitQuaternion::from_scaled_axis(turn);
+                    }
+                }
+            }
+            let own = Isometry3::from_parts(Translation3::from(shift), rotation);
+            pose.push(joint.parent.map_or(own, |parent| pose[parent] * own));
+        }
+        Some(pose)
+    }
+}
+
+type Ends = Vec<(usize, Vector3<f64>)>;
+
+/// The joints from `HIERARCHY` up to `MOTION`.
+fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usize, String)> {
+    let (mut joints, mut ends): (Vec<Joint>, Ends) = (Vec::new(), Vec::new());
+    // The open braces: joints, or an end site.
+    let mut open: Vec<Option<usize>> = Vec::new();
+    let mut next: Option<usize> = None;
+    while let Some(line) = lines.get(*at) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let wrong = |message: &str| (*at, message.to_owned());
+        match words.as_slice() {
+            [] | ["HIERARCHY"] => {}
+            ["MOTION"] if open.is_empty() && !joints.is_empty() => {
+                *at += 1;
+                return Ok((joints, ends));
+            }
+            ["ROOT" | "JOINT", name @ ..] if !name.is_empty() => {
+                let parent = open.last().copied().flatten();
+                if parent.is_none() && !joints.is_empty() {
+                    return Err(wrong("one root is expected, and joints inside it"));
+                }
+                next = Some(joints.len());
+                joints.push(Joint { name: name.join(" "), parent, offset: Vector3::zeros(), channels: Vec::new() });
+            }
+            ["End", "Site"] => next = None,
+            ["{"] => open.push(next.take()),
+            ["}"] => {
+                open.pop().ok_or_else(|| wrong("a `}` too many"))?;
+            }
+            ["OFFSET", numbers @ ..] => {
+                let numbers: Vec<f64> = numbers.iter().filter_map(|n| n.parse().ok()).collect();
+                let &[x, y, z] = numbers.as_slice() else { return Err(wrong("an offset is three numbers")) };
+                match open.as_slice() {
+                    [.., Some(joint)] => joints[*joint].offset = Vector3::new(x, y, z),
+                    [.., Some(joint), None] => ends.push((*joint, Vector3::new(x, y, z))),
+                    _ => return Err(wrong("an offset outside of a joint")),
+                }
+            }
+            ["CHANNELS", count, names @ ..] => {
+                let joint = open.last().copied().flatten().ok_or_else(|| wrong("channels outside of a joint"))?;
+                let channels: Option<Vec<Channel>> = names.iter().map(|name| channel(name)).collect();
+                let channels = channels.ok_or_else(|| wrong("channels are Xposition, …, Zrotation"))?;
+                if count.parse() != Ok(channels.len()) {
+                    return Err(wrong("the number of channels is not that of their names"));
+                }
+                joints[joint].channels = channels;
+            }
+            _ => return Err(wrong("expected JOINT, End Site, OFFSET, CHANNELS, a brace or MOTION")),
+        }
+        *at += 1;
+    }
+    Err((*at, "the file ends before its MOTION".into()))
+}
+
+fn channel(name: &str) -> Option<Channel> {
+    let axis = "XYZ".find(name.get(..1)?)?;
+    match &name[1..] {
+        "position" => Some(Channel::Shift(axis)),
+        "rotation" => Some(Channel::Turn(axis)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ARM: &str = "HIERARCHY
+ROOT Shoulder
+{
+  OFFSET 1 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+  JOINT Elbow
+  {
+    OFFSET 0 2 0
+    CHANNELS 3 Zrotation Yrotation Xrotation
+    End Site
+    {
+      OFFSET 0 3 0
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: .01
+0 0 0 0 0 0 0 0 0
+5 0 0 90 0 0 -90 0 0
+";
+
+    #[test]
+    fn joints_turn_what_hangs_on_them() {
+        let bvh = Bvh::parse(ARM).unwrap();
+        assert_eq!((bvh.frames(), bvh.joints.len(), bvh.ends[0].0), (2, 2, 1));
+        let pose = bvh.pose(1).unwrap();
+        // The upper arm points to −x, the lower one up again.
+        assert!((pose[1].translation.vector - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-12);
+        let hand = pose[1].transform_point(&bvh.ends[0].1.into()).coords;
+        assert!((hand - Vector3::new(4.0, 3.0, 0.0)).norm() < 1e-12);
+        assert!(bvh.pose(2).is_none());
+    }
+
+    #[test]
+    fn mistakes_are_refused_with_their_line() {
+        for (from, to, line) in [
+            ("Frames: 2", "Frames: 3", 20),
+            ("-90 0 0", "-90 0", 19),
+            ("-90 0 0", "-90 0 nan", 19),
+            ("OFFSET 0 2 0", "OFFSET 0 2", 7),
+            ("CHANNELS 3 Z", "CHANNELS 3 W", 8),
+            ("CHANNELS 3", "CHANNELS 2", 8),
+            ("Frame Time: .01", "Frame Time: 0", 17),
+        ] {
+            let (found, message) = Bvh::parse(&ARM.replacen(from, to, 1)).unwrap_err();
+            assert_eq!(found, line, "{to}: {message}");
+        }
+        assert!(Bvh::parse("HIERARCHY\nROOT a\n{\n").is_err());
+        assert!(Bvh::parse("").is_err());
+    }
+}

@@ -1,0 +1,11 @@
+//! Motions of a body's bones: from motion capture, or as stored; with errors as body trackers make them.
+
+mod bvh;
+mod noise;
+mod retarget;
+mod stored;
+
+pub use bvh::{Bvh, BvhError, Joint};
+pub use noise::{BoneNoise, noisy};
+pub use retarget::{Retarget, RetargetError};
+pub use stored::{Skeleton, SkeletonError};

@@ -1,0 +1,56 @@
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+
+use crate::body::Bone;
+use crate::random::gaussian;
+
+/// How wrong a body tracker's bones are: standard deviations of normal errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct BoneNoise {
+    /// Of the angle, rad, by which each bone is turned about its joint, about a random axis.
+    pub turn: f64,
+    /// Of each coordinate of its shift, m.
+    pub shift: f64,
+}
+
+/// Motions with errors, anew for every bone and call.
+#[must_use]
+pub fn noisy(
+    bones: &[Bone],
+    motions: &[Isometry3<f64>],
+    noise: BoneNoise,
+    random: &mut fastrand::Rng,
+) -> Vec<Isometry3<f64>> {
+    let mut one = |(bone, motion): (&Bone, &Isometry3<f64>)| {
+        let joint = motion.transform_point(&bone.head.into()).coords;
+        let turn = UnitQuaternion::from_axis_angle(&direction(random), noise.turn * gaussian(random));
+        let shift = noise.shift * Vector3::from_fn(|_, _| gaussian(random));
+        Isometry3::from_parts(Translation3::from(joint - turn * joint + shift), turn) * motion
+    };
+    bones.iter().zip(motions).map(&mut one).collect()
+}
+
+fn direction(random: &mut fastrand::Rng) -> Unit<Vector3<f64>> {
+    Unit::try_new(Vector3::from_fn(|_, _| gaussian(random)), 1e-6).unwrap_or(Vector3::x_axis())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_as_large_as_asked_for() {
+        let bone = Bone { name: "arm".into(), parent: None, head: [1.0, 2.0, 3.0], tail: [1.0, 3.0, 3.0] };
+        let mut random = fastrand::Rng::with_seed(3);
+        let noise = BoneNoise { turn: 0.1, shift: 0.02 };
+        let (mut turns, mut shifts) = (0.0, 0.0);
+        for _ in 0..4000 {
+            let wrong = noisy(std::slice::from_ref(&bone), &[Isometry3::identity()], noise, &mut random)[0];
+            turns += wrong.rotation.angle().powi(2);
+            shifts += (wrong.transform_point(&bone.head.into()).coords - Vector3::from(bone.head)).norm_squared();
+        }
+        assert!(((turns / 4000.0).sqrt() / 0.1 - 1.0).abs() < 0.05, "{turns}");
+        assert!(((shifts / 12000.0).sqrt() / 0.02 - 1.0).abs() < 0.05, "{shifts}");
+        let none = noisy(&[bone], &[Isometry3::identity()], BoneNoise::default(), &mut random)[0];
+        assert!((none.to_homogeneous() - nalgebra::Matrix4::identity()).norm() < 1e-14);
+    }
+}

@@ -1,0 +1,107 @@
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+use crate::body::Bone;
+
+/// A skeleton's file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SkeletonError {
+    /// The file cannot be read or written.
+    #[error("{}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is malformed.
+    #[error("{}", .path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What the parser found, and where.
+        source: serde_json::Error,
+    },
+    /// The model's weights refer to a bone that the skeleton does not move.
+    #[error("the skeleton has no bone `{bone}`, which the model's weights refer to; it has {known}")]
+    MissingBone {
+        /// The bone.
+        bone: String,
+        /// The bones it has.
+        known: String,
+    },
+    /// A frame has too few bones, or a number that is none.
+    #[error("frame {frame}: every bone needs a unit quaternion and a shift, all finite")]
+    BadFrame {
+        /// The frame.
+        frame: usize,
+    },
+}
+
+/// What a body tracker delivers: for each frame the motion of each bone from the model's rest to that frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Skeleton {
+    /// Names of the bones.
+    pub bones: Vec<String>,
+    /// For each frame, for each bone (w, x, y, z | x, y, z): unit quaternion and shift, m.
+    pub frames: Vec<Vec<[f64; 7]>>,
+}
+
+impl Skeleton {
+    /// Of bones, without frames.
+    #[must_use]
+    pub fn of(bones: &[Bone]) -> Self {
+        Self { bones: bones.iter().map(|bone| bone.name.clone()).collect(), frames: Vec::new() }
+    }
+
+    /// Adds a frame.
+    pub fn push(&mut self, motions: &[Isometry3<f64>]) {
+        let numbers = |motion: &Isometry3<f64>| {
+            let (q, t) = (motion.rotation, motion.translation);
+            [q.w, q.i, q.j, q.k, t.x, t.y, t.z]
+        };
+        self.frames.push(motions.iter().map(numbers).collect());
+    }
+
+    /// The motions of a model's bones in a frame, in the model's order; none past the last frame.
+    ///
+    /// # Errors
+    /// When a bone is missing, or a number is none.
+    pub fn motions(&self, frame: usize, bones: &[Bone]) -> Result<Option<Vec<Isometry3<f64>>>, SkeletonError> {
+        let Some(numbers) = self.frames.get(frame) else { return Ok(None) };
+        let motion =
+            |bone: &Bone| {
+                let at = self.bones.iter().position(|name| *name == bone.name).ok_or_else(|| {
+                    SkeletonError::MissingBone { bone: bone.name.clone(), known: self.bones.join(", ") }
+                })?;
+                let bad = SkeletonError::BadFrame { frame };
+                let Some(&[w, i, j, k, x, y, z]) = numbers.get(at) else { return Err(bad) };
+                let q = Quaternion::new(w, i, j, k);
+                if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.is_finite())) {
+                    return Err(bad);
+                }
+                Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
+            };
+        bones.iter().map(motion).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// When it cannot be read or is malformed.
+    pub fn read(path: &Path) -> Result<Self, SkeletonError> {
+        let text = std::fs::read_to_string(path).map_err(|source| SkeletonError::File { path: path.into(), source })?;
+        serde_json::from_str(&text).map_err(|source| SkeletonError::Json { path: path.into(), source })
+    }
+
+    /// Writes a file, whole or not at all.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), SkeletonError> {
+        let text = serde_json::to_vec(self).map_err(|source| SkeletonError::Json { path: path.into(), source })?;
+        verify::write_whole(path, &text).map_err(|source| SkeletonError::File { path: path.into(), source })
+    }
+}

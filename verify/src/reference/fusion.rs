@@ -1,0 +1,477 @@
+//! The residuals of body tracking against multi-precision values (see `data/fusion/README.md`): errors in the max-norm of each array.
+
+use std::path::Path;
+
+use energy_dsl::Residual;
+use energy_elements::{
+    Binding, BlendedMotion4, BlendedPoint1, BlendedPoint4, BlendedPoint8, FrozenPlane1, FrozenPlane4, FrozenPlane8,
+    GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, SkeletonPlane, SkeletonPoint, TwistMotion,
+};
+use energy_solve::Loss;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::exact::Truth;
+use super::file::{RecordError, read};
+use super::fusion_system;
+use crate::dual::Hyper;
+
+/// The errors of one array of one family over all cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct FamilyLine {
+    /// The family.
+    pub family: &'static str,
+    /// The array.
+    pub array: String,
+    /// Cases looked at.
+    pub cases: usize,
+    /// The worst error relative to the largest entry (or to what the array is a difference of).
+    pub worst: f64,
+    /// Its case.
+    pub worst_case: String,
+    /// What a careful implementation keeps to, with some room.
+    pub bound: f64,
+}
+
+impl FamilyLine {
+    /// Whether the bound is kept; NaN never is.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.worst <= self.bound
+    }
+}
+
+/// Lines as cases come in.
+#[derive(Default)]
+pub(super) struct Lines(Vec<FamilyLine>);
+
+impl Lines {
+    /// Compares one array. `scale` is what errors are relative to; the array's largest entry if that is larger.
+    pub(super) fn compare(
+        &mut self,
+        case: &Case<'_>,
+        (array, scale, bound): (&str, f64, f64),
+        found: &[f64],
+        truth: &Value,
+    ) -> Result<(), String> {
+        let truths = case.truths(truth).map_err(|error| format!("{array}: {error}"))?;
+        if truths.len() != found.len() {
+            return Err(format!("{array}: {} numbers computed, {} expected", found.len(), truths.len()));
+        }
+        let largest = truths.iter().fold(scale, |most, truth| most.max(truth.high.abs()));
+        let error = found.iter().zip(&truths).map(|(found, truth)| truth.error_of(*found)).fold(0.0, worse);
+        // An array that vanishes must vanish exactly.
+        let relative = if error == 0.0 { 0.0 } else { error / largest };
+        self.note(case, array, relative, bound);
+        Ok(())
+    }
+
+    /// Notes whether something is exactly as it must be.
+    pub(super) fn exact(&mut self, case: &Case<'_>, array: &str, right: bool) {
+        self.note(case, array, if right { 0.0 } else { f64::INFINITY }, 0.0);
+    }
+
+    fn note(&mut self, case: &Case<'_>, array: &str, error: f64, bound: f64) {
+        let known = self.0.iter().position(|l| l.family == case.family && l.array == array && l.bound == bound);
+        let at = known.unwrap_or_else(|| {
+            let (family, array) = (case.family, array.to_owned());
+            self.0.push(FamilyLine { family, array, cases: 0, worst: 0.0, worst_case: String::new(), bound });
+            self.0.len() - 1
+        });
+        let line = &mut self.0[at];
+        line.cases += 1;
+        if worse(line.worst, error) != line.worst {
+            line.worst = error;
+            line.worst_case.clone_from(&case.id);
+        }
+    }
+}
+
+/// The larger; NaN if either is.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
+/// One case of a family.
+pub(super) struct Case<'a> {
+    family: &'static str,
+    id: String,
+    value: &'a Value,
+}
+
+impl Case<'_> {
+    /// A field of the case.
+    pub(super) fn field(&self, name: &str) -> Result<&Value, String> {
+        self.value.get(name).ok_or_else(|| format!("`{name}` is missing"))
+    }
+
+    /// A field of its results.
+    pub(super) fn out(&self, name: &str) -> Result<&Value, String> {
+        self.field("out")?.get(name).ok_or_else(|| format!("`out.{name}` is missing"))
+    }
+
+    /// All numbers of a field, in order.
+    pub(super) fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+        numbers(self.field(name)?).map_err(|error| format!("{name}: {error}"))
+    }
+
+    /// A number.
+    pub(super) fn number(&self, name: &str) -> Result<f64, String> {
+        self.numbers(name)?.first().copied().ok_or_else(|| format!("`{name}` is empty"))
+    }
+
+    /// Three numbers.
+    pub(super) fn vector(&self, name: &str) -> Result<[f64; 3], String> {
+        fixed(&self.numbers(name)?, name)
+    }
+
+    /// The twists of all nodes.
+    pub(super) fn twists(&self) -> Result<Vec<[f64; 6]>, String> {
+        let (theta, t) = (self.numbers("theta")?, self.numbers("t")?);
+        let both = theta.chunks_exact(3).zip(t.chunks_exact(3));
+        Ok(both.map(|(a, b)| [a[0], a[1], a[2], b[0], b[1], b[2]]).collect())
+    }
+
+    /// The parameter `turn` of the declared residuals.
+    pub(super) fn turn(&self) -> Result<f64, String> {
+        turn(self.field("conv")?.as_str().unwrap_or_default())
+    }
+
+    fn truths(&self, value: &Value) -> Result<Vec<Truth>, String> {
+        let mut all = Vec::new();
+        flatten(value, &mut |text| {
+            all.push(text.parse()?);
+            Ok(())
+        })?;
+        Ok(all)
+    }
+}
+
+fn turn(convention: &str) -> Result<f64, String> {
+    match convention {
+        "doc" => Ok(1.0),
+        "std" => Ok(0.5),
+        other => Err(format!("unknown convention `{other}`")),
+    }
+}
+
+/// An array of known length.
+pub(super) fn fixed<const N: usize>(numbers: &[f64], name: &str) -> Result<[f64; N], String> {
+    numbers.try_into().map_err(|_| format!("`{name}` has {} numbers, expected {N}", numbers.len()))
+}
+
+/// All numbers below a value, in order.
+pub(super) fn numbers(value: &Value) -> Result<Vec<f64>, String> {
+    let mut all = Vec::new();
+    flatten(value, &mut |text| {
+        all.push(text.parse().map_err(|_| format!("`{text}` is not a number"))?);
+        Ok(())
+    })?;
+    Ok(all)
+}
+
+fn flatten(value: &Value, take: &mut impl FnMut(&str) -> Result<(), String>) -> Result<(), String> {
+    match value {
+        Value::Array(list) => list.iter().try_for_each(|one| flatten(one, take)),
+        Value::String(text) => take(text),
+        Value::Number(number) => take(&number.to_string()),
+        other => Err(format!("expected a number, found {other}")),
+    }
+}
+
+type Check = fn(&Case<'_>, &mut Lines) -> Result<(), String>;
+
+/// Measures the generated code against a `reference.json` of body tracking. Smoothing of attachments (`hsmooth`) involves no declared
+/// residual, and is compared where it is implemented, in `fusion-core`.
+///
+/// # Errors
+/// When the file cannot be read or a case is malformed.
+pub fn fusion_reference(path: &Path) -> Result<Vec<FamilyLine>, RecordError> {
+    let file: Value = read(path)?;
+    let families: [(&'static str, Check); 8] = [
+        ("exp", exponential),
+        ("dqb", blend),
+        ("nonrigid", nonrigid),
+        ("lbs_plane", skinned),
+        ("graph", graph),
+        ("binding", binding),
+        ("huber", huber),
+        ("system", fusion_system::system),
+    ];
+    let mut lines = Lines::default();
+    for (family, check) in families {
+        let cases = file.get(family).and_then(Value::as_array);
+        let cases = cases.ok_or_else(|| RecordError::record(path, family, "the family is missing"))?;
+        for value in cases {
+            let id = value.get("id").and_then(Value::as_str).unwrap_or("without id").to_owned();
+            let case = Case { family, id, value };
+            check(&case, &mut lines).map_err(|message| RecordError::record(path, &case.id, message))?;
+        }
+    }
+    Ok(lines.0)
+}
+
+/// exp: 8 numbers and their derivatives, in both conventions, down to no turn at all.
+fn exponential(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let twist = case.twists()?[0];
+    // Rounding ‖θ‖ turns by as much.
+    let (suffix, bound) = if case.number("norm")? <= 3.2 { ("", 1.2e-15) } else { (", ‖θ‖ > π", 8e-15) };
+    for convention in ["doc", "std"] {
+        let out = case.out(convention)?;
+        let at = TwistMotion::new(turn(convention)?).jacobian(&twist);
+        lines.compare(case, (&format!("q {convention}{suffix}"), 0.0, bound), &at.value, &out["q"])?;
+        lines.compare(case, (&format!("J {convention}{suffix}"), 0.0, bound), &at.jacobian, &out["J"])?;
+    }
+    Ok(())
+}
+
+/// dqb: sum, unit dual quaternion, motion, moved point and normal, and their derivatives.
+fn blend(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let (turn, mut w) = (case.turn()?, fixed::<4>(&case.numbers("w")?, "w")?);
+    let (v, n) = (case.vector("v")?, case.vector("n")?);
+    let twists = case.twists()?;
+    let motions: Vec<[f64; 8]> = twists.iter().map(|twist| TwistMotion::new(turn).residual(twist).value).collect();
+    let sign = |k: usize| {
+        let product: f64 = (0..4).map(|i| motions[k][i] * motions[0][i]).sum();
+        if product >= 0.0 { 1.0 } else { -1.0 }
+    };
+    let signs: [f64; 4] = std::array::from_fn(sign);
+    let aligned = case.field("align")?.as_bool() == Some(true);
+    if aligned {
+        lines.exact(case, "sign", numbers(case.out("sign")?)? == signs);
+    } else {
+        // The declared blend aligns; weights with the opposite signs undo it.
+        w = std::array::from_fn(|k| signs[k] * w[k]);
+    }
+    // The nearly antipodal blend cancels.
+    let antipodal = numbers(case.out("norm")?)?[0] < 0.1 * w.iter().map(|w| w.abs()).sum::<f64>();
+    let (suffix, bound) = if antipodal { (", nearly antipodal", 6e-14) } else { ("", 4e-15) };
+    let unknowns = fixed::<24>(twists.as_flattened(), "twists")?;
+    let at = BlendedMotion4::new(turn, w, v, n).jacobian(&unknowns);
+    let mut compare = |name: &str, found: &[f64]| {
+        lines.compare(case, (&format!("{name}{suffix}"), 0.0, bound), found, case.out(name)?)
+    };
+    compare("b", &at.value[..8])?;
+    compare("norm", &[at.value[..4].iter().fold(0.0_f64, |length, x| length.hypot(*x))])?;
+    compare("qhat", &at.value[8..16])?;
+    compare("vhat", &at.value[16..19])?;
+    compare("nhat", &at.value[19..])?;
+    compare("Jq", &at.jacobian[8 * 24..16 * 24])?;
+    compare("Jv", &at.jacobian[16 * 24..19 * 24])?;
+    compare("Jn", &at.jacobian[19 * 24..])?;
+    // The columns of R are the moved axes, the last column of T the moved origin.
+    let mut motion = [0.0; 12];
+    for axis in 0..3 {
+        let unit = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        let moved = BlendedPoint4::new(turn, w, [0.0; 3], unit).residual(&unknowns).value;
+        for row in 0..3 {
+            motion[4 * row + axis] = moved[3 + row];
+            motion[4 * row + 3] = moved[row];
+        }
+    }
+    compare("T", &motion)
+}
+
+/// What the three K of the data term have in common: (v̂, n̂), (r, J), (r, J) with the normal held.
+struct Plane {
+    moved: [f64; 6],
+    r: f64,
+    jacobian: Vec<f64>,
+    frozen: Vec<f64>,
+}
+
+macro_rules! plane_of {
+    ($k:literal, $unknowns:literal, $point:ident, $plane:ident, $frozen:ident, |$w:ident, $rest:ident| $($weights:tt)*) => {
+        |turn: f64, $w: &[f64], v: [f64; 3], n: [f64; 3], u: [f64; 3], twists: &[f64]| -> Result<Plane, String> {
+            let unknowns = fixed::<$unknowns>(twists, "twists")?;
+            let moved = plane_of!(@new $point, turn, $w, $k, [v, n], $($weights)*).residual(&unknowns).value;
+            let at = plane_of!(@new $plane, turn, $w, $k, [v, n, u], $($weights)*).jacobian(&unknowns);
+            let m = [moved[3], moved[4], moved[5]];
+            let frozen = plane_of!(@new $frozen, turn, $w, $k, [v, m, u], $($weights)*).jacobian(&unknowns);
+            Ok(Plane { moved, r: at.value[0], jacobian: at.jacobian.to_vec(), frozen: frozen.jacobian.to_vec() })
+        }
+    };
+    (@new $name:ident, $turn:ident, $w:ident, $k:literal, [$($rest:expr),*], one) => { $name::new($turn, $($rest),*) };
+    (@new $name:ident, $turn:ident, $w:ident, $k:literal, [$($rest:expr),*], many) => {
+        $name::new($turn, fixed::<$k>($w, "w")?, $($rest),*)
+    };
+}
+
+/// nonrigid: the data term for K = 1, 4, 8 with its Jacobian, full and with the normal held; the exact Hessian by dual numbers through
+/// the generated Jacobian.
+fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let (turn, mut w, lambda) = (case.turn()?, case.numbers("w")?, case.number("lambda_n")?);
+    let (v, n, u) = (case.vector("v")?, case.vector("n")?, case.vector("u")?);
+    let twists = case.twists()?;
+    let flat = twists.as_flattened();
+    if case.field("align")?.as_bool() != Some(true) {
+        let motions: Vec<[f64; 8]> = twists.iter().map(|twist| TwistMotion::new(turn).residual(twist).value).collect();
+        for (w, motion) in w.iter_mut().zip(&motions) {
+            let product: f64 = (0..4).map(|i| motion[i] * motions[0][i]).sum();
+            *w = if product >= 0.0 { *w } else { -*w };
+        }
+    }
+    let plane = match w.len() {
+        1 => plane_of!(1, 6, BlendedPoint1, NonrigidPlane1, FrozenPlane1, |_w, rest| one)(turn, &w, v, n, u, flat)?,
+        4 => plane_of!(4, 24, BlendedPoint4, NonrigidPlane4, FrozenPlane4, |w, rest| many)(turn, &w, v, n, u, flat)?,
+        8 => plane_of!(8, 48, BlendedPoint8, NonrigidPlane8, FrozenPlane8, |w, rest| many)(turn, &w, v, n, u, flat)?,
+        other => return Err(format!("K = {other}: 1, 4 and 8 are declared")),
+    };
+    let steepest = plane.jacobian.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    let Plane { moved, r, jacobian, frozen } = plane;
+    let gradient: Vec<f64> = jacobian.iter().map(|entry| 2.0 * lambda * entry * r).collect();
+    let mut compare = |name: &str, scale: f64, bound: f64, found: &[f64]| {
+        lines.compare(case, (name, scale, bound), found, case.out(name)?)
+    };
+    compare("vhat", 0.0, 4e-15, &moved[..3])?;
+    compare("nhat", 0.0, 4e-15, &moved[3..])?;
+    // A difference of lengths of order one.
+    compare("r", 1.0, 1.8e-15, &[r])?;
+    compare("J", 0.0, 2.8e-15, &jacobian)?;
+    compare("J_frozen_normal", 0.0, 2.8e-15, &frozen)?;
+    compare("E", 2.0 * lambda * r.abs(), 1.8e-15, &[lambda * r * r])?;
+    compare("gradE", 2.0 * lambda * steepest * (1.0 + r.abs()), 2.8e-15, &gradient)?;
+    if let Some(truth) = case.field("out")?.get("hess_r") {
+        let hessian = match w.len() {
+            1 => second_derivatives(&twists, |x| hyper_plane1(turn, v, n, u).jacobian(&x).jacobian.to_vec())?,
+            _ => {
+                let w = fixed::<4>(&w, "w")?;
+                second_derivatives(&twists, |x: [Hyper; 24]| {
+                    hyper_plane4(turn, w, v, n, u).jacobian(&x).jacobian.to_vec()
+                })?
+            }
+        };
+        lines.compare(case, ("hess_r", 0.0, 1e-14), &hessian, truth)?;
+    }
+    Ok(())
+}
+
+fn hyper_plane1(turn: f64, v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> NonrigidPlane1<Hyper> {
+    let [v, n, u] = [v, n, u].map(|vector| vector.map(Hyper::constant));
+    NonrigidPlane1::new(Hyper::constant(turn), v, n, u)
+}
+
+fn hyper_plane4(turn: f64, w: [f64; 4], v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> NonrigidPlane4<Hyper> {
+    let [v, n, u] = [v, n, u].map(|vector| vector.map(Hyper::constant));
+    NonrigidPlane4::new(Hyper::constant(turn), w.map(Hyper::constant), v, n, u)
+}
+
+/// The derivatives of a generated Jacobian, by dual numbers.
+fn second_derivatives<const U: usize>(
+    twists: &[[f64; 6]],
+    jacobian: impl Fn([Hyper; U]) -> Vec<Hyper>,
+) -> Result<Vec<f64>, String> {
+    let x = fixed::<U>(twists.as_flattened(), "twists")?;
+    let row = |moving: usize| {
+        let at = std::array::from_fn(|i| Hyper::variable(x[i], i == moving, false));
+        jacobian(at).into_iter().map(|entry| entry.0.eps1).collect::<Vec<f64>>()
+    };
+    Ok((0..U).flat_map(row).collect())
+}
+
+/// lbs_plane: the same for a linear blend. Cases with fewer nodes leave the others at weight zero.
+fn skinned(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let (turn, w) = (case.turn()?, case.numbers("w")?);
+    let (v, n, u) = (case.vector("v")?, case.vector("n")?, case.vector("u")?);
+    let k = w.len();
+    let mut unknowns = [0.0; 24];
+    unknowns[..6 * k].copy_from_slice(case.twists()?.as_flattened());
+    let mut share = [0.0; 4];
+    share.get_mut(..k).ok_or("more than four nodes")?.copy_from_slice(&w);
+    let at = SkeletonPlane::new(turn, share, v, n, u).jacobian(&unknowns);
+    let moved = SkeletonPoint::new(turn, share, v, n).residual(&unknowns).value;
+    if at.jacobian[6 * k..].iter().any(|&entry| entry != 0.0) {
+        return Err("a node of weight zero has a derivative".into());
+    }
+    lines.compare(case, ("v", 1.0, 1.8e-15), &moved[..3], &case.field("out")?["v"])?;
+    lines.compare(case, ("n", 1.0, 1.8e-15), &moved[3..], &case.field("out")?["n"])?;
+    lines.compare(case, ("r", 1.0, 1.8e-15), &at.value, case.out("r")?)?;
+    lines.compare(case, ("J", 0.0, 2.8e-15), &at.jacobian[..6 * k], case.out("J")?)
+}
+
+/// graph: an edge with its Jacobian, and the three weights.
+fn graph(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let (turn, lambda, delta) = (case.turn()?, case.number("lambda_g")?, case.number("delta")?);
+    let mut unknowns = Vec::new();
+    for name in ["theta_i", "t_i", "theta_j", "t_j"] {
+        unknowns.extend(case.numbers(name)?);
+    }
+    let at = GraphEdge::new(turn, case.vector("x_j")?).jacobian(&fixed(&unknowns, "twists")?);
+    let square: f64 = at.value.iter().map(|h| h * h).sum();
+    let product = |column: usize| (0..3).map(|row| at.jacobian[12 * row + column] * at.value[row]).sum::<f64>();
+    let gradient: Vec<f64> = (0..12).map(product).collect();
+    let (h_i, h_j) = (case.numbers("H_i")?, case.numbers("H_j")?);
+    let s: f64 = h_i.iter().zip(&h_j).map(|(a, b)| (a - b) * (a - b)).sum();
+    lines.compare(case, ("J", 0.0, 8e-16), &at.jacobian, case.out("J")?)?;
+    let places = 1.0;
+    lines.compare(case, ("h", places, 1.8e-15), &at.value, case.out("h")?)?;
+    lines.compare(case, ("hh", 2.0 * square.sqrt(), 3.6e-15), &[square], case.out("hh")?)?;
+    lines.compare(case, ("JTh", 1.0, 7e-15), &gradient, case.out("JTh")?)?;
+    lines.compare(case, ("s", 0.0, 8e-16), &[s], case.out("s")?)?;
+    for (name, psi) in weights(s, delta) {
+        lines.compare(case, (&format!("psi {name}"), 0.0, 1.8e-15), &[psi], &case.out("psi")?[name])?;
+        let scale = 2.0 * lambda * psi;
+        let weighted: Vec<f64> = gradient.iter().map(|entry| scale * entry).collect();
+        let label = format!("gradE {name}");
+        lines.compare(case, (&label, scale, 9e-15), &weighted, &case.out("gradE")?[name])?;
+        let energy = lambda * psi * square;
+        lines.compare(case, (&format!("E {name}"), scale * square.sqrt(), 5e-15), &[energy], &case.out("E")?[name])?;
+    }
+    Ok(())
+}
+
+/// ψ as printed, of s and of √s.
+pub(super) fn weights(s: f64, delta: f64) -> [(&'static str, f64); 3] {
+    let weight = |y: f64| if y == 0.0 { 1.0 } else { HuberLoss::new(delta).jacobian(&[y]).jacobian[0] / y };
+    [
+        ("printed_huber_of_s", HuberLoss::new(delta).residual(&[s]).value[0]),
+        ("weight_of_s", weight(s)),
+        ("weight_of_norm", weight(s.sqrt())),
+    ]
+}
+
+/// binding: a node at its bones.
+fn binding(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let (turn, lambda, x) = (case.turn()?, case.number("lambda_b")?, case.vector("x")?);
+    let mut twist = case.numbers("theta")?;
+    twist.extend(case.numbers("t")?);
+    let target = bound_place(&case.numbers("Tb")?, &case.numbers("eta")?, &x);
+    let at = Binding::new(turn, x, target).jacobian(&fixed(&twist, "twist")?);
+    let energy: f64 = at.value.iter().map(|r| lambda * r * r).sum();
+    let gradient: Vec<f64> = (0..6)
+        .map(|column| (0..3).map(|row| 2.0 * lambda * at.jacobian[6 * row + column] * at.value[row]).sum())
+        .collect();
+    lines.compare(case, ("xtilde", 1.0, 1.6e-15), &target, case.out("xtilde")?)?;
+    lines.compare(case, ("r", 1.0, 1.6e-15), &at.value, case.out("r")?)?;
+    lines.compare(case, ("J", 0.0, 1.6e-15), &at.jacobian, case.out("J")?)?;
+    lines.compare(case, ("E", lambda, 4e-15), &[energy], case.out("E")?)?;
+    lines.compare(case, ("gradE", lambda, 4e-15), &gradient, case.out("gradE")?)
+}
+
+/// Σ η_j T_bj x, motions being rows of 3×4.
+pub(super) fn bound_place(motions: &[f64], shares: &[f64], x: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|row| {
+        let of = |motion: &[f64]| {
+            let m = &motion[4 * row..];
+            m[0] * x[0] + m[1] * x[1] + m[2] * x[2] + m[3]
+        };
+        motions.chunks_exact(12).zip(shares).map(|(motion, share)| share * of(motion)).sum()
+    })
+}
+
+/// huber: the loss, its derivative, its weight, and the form of a squared argument that solvers use.
+fn huber(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
+    let (y, delta) = (case.number("y")?, case.number("delta")?);
+    let at = HuberLoss::new(delta).jacobian(&[y]);
+    let weight = if y == 0.0 { 1.0 } else { at.jacobian[0] / y };
+    lines.compare(case, ("rho", 0.0, 8e-16), &at.value, case.out("rho")?)?;
+    lines.compare(case, ("drho", 0.0, 8e-16), &at.jacobian, case.out("drho")?)?;
+    lines.compare(case, ("weight", 0.0, 8e-16), &[weight], case.out("weight")?)?;
+    lines.exact(case, "inside", case.out("inside")?.as_bool() == Some(y.abs() <= delta));
+    if let Ok(truth) = case.out("ceres_rho") {
+        let (rho, slope) = Loss::Huber(delta).of(y);
+        lines.compare(case, ("of a square: ρ", 0.0, 8e-16), &[rho], truth)?;
+        lines.compare(case, ("of a square: ρ′", 0.0, 8e-16), &[slope], case.out("ceres_drho")?)?;
+    }
+    Ok(())
+}
