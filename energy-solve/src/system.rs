@@ -204,19 +204,22 @@ impl System {
         Ok(energies)
     }
 
-    /// −v·f of the terms that depend on velocities, in W: what they take out of the motion.
+    /// −v·(f(x, v) − f(x, 0)), in W: what damping takes out of the motion. Terms without it are not evaluated.
     ///
     /// # Errors
     /// When the state is incomplete or not finite.
     pub fn dissipated_power(&mut self, state: State<'_>) -> Result<f64, EvaluationError> {
         self.check(state)?;
-        let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        for Counted { term, counts } in &mut self.terms {
-            if term.character().velocity_dependent {
-                counts.gradient += term.add_force(state, &mut force);
+        let mut power = 0.0;
+        for Counted { term, counts } in self.terms.iter_mut().filter(|c| c.term.character().velocity_dependent) {
+            let still = vec![[0.0; 3]; state.v.len()];
+            for (v, sign) in [(state.v, -1.0), (still.as_slice(), 1.0)] {
+                let mut force = still.clone();
+                counts.gradient += term.add_force(State { x: state.x, v }, &mut force);
+                power += sign * crate::vector::dot(&force, state.v);
             }
         }
-        Ok(-crate::vector::dot(&force, state.v))
+        Ok(power)
     }
 
     /// f(x, v), in N, of all vertices. Pinned ones get the force of the elements they share with free ones.

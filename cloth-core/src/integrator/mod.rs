@@ -103,9 +103,11 @@ pub enum StepError {
         /// The largest change of a velocity in the last, in m/s.
         change: f64,
     },
-    /// A force that is no gradient.
-    #[error("{term} has no energy for Newton's method to lower; use the integrator implicit-euler")]
-    NoEnergy {
+    /// A force that is no gradient, also not within a step.
+    #[error(
+        "{term}: its forces come from no energy that Newton's method could lower; use the integrator implicit-euler"
+    )]
+    NotSymmetric {
         /// The term's name.
         term: String,
     },

@@ -2,8 +2,8 @@ use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, IncompleteCholesky, LinearisationOptions, SolveOptions, State, Weights,
-    conjugate_gradients, dot,
+    BlockMatrix, Curvature, EvaluationError, IncompleteCholesky, LinearisationOptions, SolveOptions, State, Term,
+    Weights, conjugate_gradients, dot,
 };
 
 use super::{Integrator, StepError, StepReport};
@@ -16,8 +16,8 @@ use crate::body::Body;
 /// P the power that linear damping takes. Each element's Hessian is made positive semi-definite, so that every step of Newton's method
 /// leads downhill; it is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
 ///
-/// Needs an energy of every force but those of damping: with [`crate::fabric::Bending::BridsonForce`], which has none, use
-/// [`super::ImplicitEuler`].
+/// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along
+/// their length, whose Jacobians are not symmetric, use [`super::ImplicitEuler`].
 #[derive(Clone, Debug, Default)]
 pub struct Newton {
     options: NewtonOptions,
@@ -185,10 +185,12 @@ impl Integrator for Newton {
     }
 
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
-        let without = body.system.terms().map(|(term, _)| term);
-        if let Some(term) = without.into_iter().find(|term| !term.has_energy() && !term.character().velocity_dependent)
-        {
-            return Err(StepError::NoEnergy { term: term.name().to_owned() });
+        let fits = |term: &dyn Term| {
+            let character = term.character();
+            character.symmetric && (term.has_energy() || character.velocity_dependent)
+        };
+        if let Some((term, _)) = body.system.terms().find(|(term, _)| !fits(*term)) {
+            return Err(StepError::NotSymmetric { term: term.name().to_owned() });
         }
         let Memory { mut matrix, mut factor } = match self.memory.take() {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
