@@ -180,7 +180,7 @@ fn dual_row(w: &[f64; 4], v: &[f64; 3], n: &[f64; 3], u: &[f64; 3], unknowns: &[
     gradient.into()
 }
 
-fn plane<D: DualNum<f64> + Copy>(w: &[f64; 4], v: &[f64; 3], n: &[f64; 3], u: &[f64; 3], x: impl Fn(usize) -> D) -> D {
+fn plane<D: DualNum<Primitive = f64> + Copy>(w: &[f64; 4], v: &[f64; 3], n: &[f64; 3], u: &[f64; 3], x: impl Fn(usize) -> D) -> D {
     let zero = D::from(0.0);
     let product = |a: [D; 4], b: [D; 4]| {
         [
