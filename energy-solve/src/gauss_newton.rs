@@ -287,8 +287,8 @@ impl<const D: usize> GaussNewton<D> {
         let mut reports = Vec::new();
         while reports.len() < iteration_limit {
             let report = self.iterate(terms, x)?;
-            let done =
-                report.outcome != Outcome::Decreased || report.before - report.after <= relative_decrease * report.before;
+            let done = report.outcome != Outcome::Decreased
+                || report.before - report.after <= relative_decrease * report.before;
             reports.push(report);
             if done {
                 break;

@@ -30,7 +30,9 @@ pub enum CouplingError {
         block: usize,
     },
     /// Two blocks meet in an element that do not in the pattern.
-    #[error("element {element} couples blocks {first} and {second}, which the pattern does not; build the pattern from all stencils")]
+    #[error(
+        "element {element} couples blocks {first} and {second}, which the pattern does not; build the pattern from all stencils"
+    )]
     NotInPattern {
         /// Which element, from 0.
         element: usize,
@@ -129,7 +131,8 @@ impl Couplings {
                     if a == b && i != j {
                         return Err(CouplingError::Repeated { element, block: a });
                     }
-                    let slot = pattern.slot(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
+                    let slot =
+                        pattern.slot(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
                     slots.push(2 * slot as u32 + u32::from(first > second));
                 }
             }
@@ -245,7 +248,10 @@ mod tests {
     #[test]
     fn a_pattern_is_the_diagonal_and_what_stencils_couple() {
         let pattern = NormalPattern::new(4, [[3, 0].as_slice(), &[0, 1]]).unwrap();
-        assert_eq!((0..4).map(|row| pattern.row(row).to_vec()).collect::<Vec<_>>(), [vec![0, 1, 3], vec![1], vec![2], vec![3]]);
+        assert_eq!(
+            (0..4).map(|row| pattern.row(row).to_vec()).collect::<Vec<_>>(),
+            [vec![0, 1, 3], vec![1], vec![2], vec![3]]
+        );
         assert_eq!(pattern.slot(0, 3), Some(2));
         assert_eq!(pattern.slot(1, 3), None);
     }
@@ -254,8 +260,14 @@ mod tests {
     fn stencils_that_do_not_fit_are_refused() {
         let pattern = NormalPattern::new(3, [[0, 1].as_slice()]).unwrap();
         assert!(matches!(Couplings::new(&pattern, &[[0, 0]]), Err(CouplingError::Repeated { element: 0, block: 0 })));
-        assert!(matches!(Couplings::new(&pattern, &[[0, 1], [0, 7]]), Err(CouplingError::OutOfRange { element: 1, .. })));
-        assert!(matches!(Couplings::new(&pattern, &[[2, 1]]), Err(CouplingError::NotInPattern { first: 1, second: 2, .. })));
+        assert!(matches!(
+            Couplings::new(&pattern, &[[0, 1], [0, 7]]),
+            Err(CouplingError::OutOfRange { element: 1, .. })
+        ));
+        assert!(matches!(
+            Couplings::new(&pattern, &[[2, 1]]),
+            Err(CouplingError::NotInPattern { first: 1, second: 2, .. })
+        ));
         assert!(NormalPattern::new(3, [[3].as_slice()]).is_err());
     }
 

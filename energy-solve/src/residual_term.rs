@@ -149,9 +149,13 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     #[must_use]
     pub fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
         let mut sum = 0.0;
-        dispatch(Jacobians { term: self, x, work: |_: usize, residual: &[f64], jacobian: &[f64]| {
-            sum += residual[0] + std::hint::black_box(jacobian)[0];
-        } });
+        dispatch(Jacobians {
+            term: self,
+            x,
+            work: |_: usize, residual: &[f64], jacobian: &[f64]| {
+                sum += residual[0] + std::hint::black_box(jacobian)[0];
+            },
+        });
         sum
     }
 
@@ -184,12 +188,9 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
 
     /// The unknowns of as many elements as there are lanes.
     #[inline(always)]
-    fn gather<L: Level>(
-        &self,
-        first: usize,
-        x: &[[f64; D]],
-    ) -> <E::Wide<L::F64> as Residual<L::F64>>::Unknowns {
-        let mut unknowns = <<E::Wide<L::F64> as Residual<L::F64>>::Unknowns as Array<L::F64>>::repeat(L::F64::splat(0.0));
+    fn gather<L: Level>(&self, first: usize, x: &[[f64; D]]) -> <E::Wide<L::F64> as Residual<L::F64>>::Unknowns {
+        let mut unknowns =
+            <<E::Wide<L::F64> as Residual<L::F64>>::Unknowns as Array<L::F64>>::repeat(L::F64::splat(0.0));
         let last = self.stencils.len() - 1;
         for (k, block) in unknowns.as_mut().chunks_exact_mut(D).enumerate() {
             let mut numbers = [[0.0; WIDTH]; D];

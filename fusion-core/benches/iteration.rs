@@ -82,10 +82,14 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
     energy.set_bones(&model, Some(&[Isometry3::identity(); 4]));
     let mut random = fastrand::Rng::with_seed(1);
     let mut near = |size: f64| size * (2.0 * random.f64() - 1.0);
-    let x: Vec<Twist> = (0..model.nodes.len()).map(|_| std::array::from_fn(|i| near(if i < 3 { 0.2 } else { 0.03 }))).collect();
+    let x: Vec<Twist> =
+        (0..model.nodes.len()).map(|_| std::array::from_fn(|i| near(if i < 3 { 0.2 } else { 0.03 }))).collect();
     let moved = energy.moved(&x);
     let pairs: Vec<Pair> = (0..model.mesh.vertices.len())
-        .map(|vertex| Pair { vertex: vertex as u32, point: moved.vertices[vertex] + Vector3::from_fn(|_, _| near(0.01)) })
+        .map(|vertex| Pair {
+            vertex: vertex as u32,
+            point: moved.vertices[vertex] + Vector3::from_fn(|_, _| near(0.01)),
+        })
         .collect();
     let filling = median(|| energy.set_pairs(&model, &pairs, &moved));
     let derivatives = median(|| {
@@ -101,7 +105,10 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
     println!("  derivatives                       {derivatives:8.2} ms");
     let solvers = [
         ("Cholesky", NormalSolverKind::Cholesky),
-        ("conjugate gradients, 1e-4", NormalSolverKind::ConjugateGradients { relative_tolerance: 1e-4, iteration_limit: 2000 }),
+        (
+            "conjugate gradients, 1e-4",
+            NormalSolverKind::ConjugateGradients { relative_tolerance: 1e-4, iteration_limit: 2000 },
+        ),
     ];
     for (name, solver) in solvers {
         let options = GaussNewtonOptions { solver, ..GaussNewtonOptions::default() };
@@ -170,7 +177,9 @@ fn others(model: &DeformationModel, pairs: &[Pair], x: &[Twist]) {
             black_box(dual_row(&w, &v, &n, &u, &unknowns));
         }
     });
-    println!("  data term's rows alone: generated, one by one {scalar:.2} ms; central differences {differences:.2} ms; num-dual {dual:.2} ms");
+    println!(
+        "  data term's rows alone: generated, one by one {scalar:.2} ms; central differences {differences:.2} ms; num-dual {dual:.2} ms"
+    );
 }
 
 /// The gradient of n̂·(v̂ − u) by dual numbers over the textbook's formulas.
@@ -180,7 +189,13 @@ fn dual_row(w: &[f64; 4], v: &[f64; 3], n: &[f64; 3], u: &[f64; 3], unknowns: &[
     gradient.into()
 }
 
-fn plane<D: DualNum<Primitive = f64> + Copy>(w: &[f64; 4], v: &[f64; 3], n: &[f64; 3], u: &[f64; 3], x: impl Fn(usize) -> D) -> D {
+fn plane<D: DualNum<Primitive = f64> + Copy>(
+    w: &[f64; 4],
+    v: &[f64; 3],
+    n: &[f64; 3],
+    u: &[f64; 3],
+    x: impl Fn(usize) -> D,
+) -> D {
     let zero = D::from(0.0);
     let product = |a: [D; 4], b: [D; 4]| {
         [

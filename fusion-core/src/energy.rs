@@ -356,8 +356,7 @@ impl FusionEnergy {
             }
         }));
         let own: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
-        let binding =
-            ResidualTerm::new("binding", Arc::new(Couplings::new(&pattern, &own)?), options.weights.binding);
+        let binding = ResidualTerm::new("binding", Arc::new(Couplings::new(&pattern, &own)?), options.weights.binding);
         let bones = skinning.map(|stencils| stencils.terms(model, &options, &pattern)).transpose()?;
         Ok(Self { options, pattern, data, graph, binding, bones })
     }
@@ -413,7 +412,12 @@ impl FusionEnergy {
         let mut terms: Vec<&dyn LeastSquaresTerm<6>> = vec![self.data.term(), &self.graph];
         match &self.bones {
             Some(bones) => {
-                terms.extend([&bones.skeleton as &dyn LeastSquaresTerm<6>, &bones.binding, &bones.prior, &bones.joints]);
+                terms.extend([
+                    &bones.skeleton as &dyn LeastSquaresTerm<6>,
+                    &bones.binding,
+                    &bones.prior,
+                    &bones.joints,
+                ]);
             }
             None => terms.push(&self.binding),
         }

@@ -9,8 +9,7 @@ use crate::evaluation::{ErrorSummary, TrackErrors};
 /// # Errors
 /// When there is nothing to draw: no frames, or errors that are not finite.
 pub fn errors_svg(errors: &TrackErrors) -> Result<String, String> {
-    let summaries: Vec<ErrorSummary> =
-        errors.frames.iter().map(|frame| ErrorSummary::of(frame.all.clone())).collect();
+    let summaries: Vec<ErrorSummary> = errors.frames.iter().map(|frame| ErrorSummary::of(frame.all.clone())).collect();
     let highest = summaries.iter().map(|one| one.p95.max(one.mean)).fold(0.0, f64::max);
     if summaries.is_empty() || summaries.iter().any(|one| !one.mean.is_finite()) {
         return Err("no frames with finite errors to draw".into());

@@ -84,7 +84,8 @@ pub fn track_recording(
 /// The errors of the skinned skeleton without any tracking.
 #[must_use]
 pub fn skeleton_alone(recording: &Recording, noise: BoneNoise) -> TrackErrors {
-    let frame = |frame| measured(recording, frame, &recording.body.posed(&reported_bones(recording, frame, noise)).vertices);
+    let frame =
+        |frame| measured(recording, frame, &recording.body.posed(&reported_bones(recording, frame, noise)).vertices);
     TrackErrors { frames: (1..recording.motions.len()).map(frame).collect() }
 }
 

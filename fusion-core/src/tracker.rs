@@ -166,11 +166,7 @@ impl Tracker {
     ///
     /// # Errors
     /// When the image, the bones or the matches cannot be used: the reason. The track is then as before.
-    pub fn track(
-        &mut self,
-        image: &DepthImage,
-        bones: Option<&[Isometry3<f64>]>,
-    ) -> Result<FrameReport, FrameError> {
+    pub fn track(&mut self, image: &DepthImage, bones: Option<&[Isometry3<f64>]>) -> Result<FrameReport, FrameError> {
         let before = self.twists.clone();
         let result = self.check(image, bones).and_then(|()| self.follow(image, bones));
         if result.is_err() {
@@ -204,8 +200,7 @@ impl Tracker {
         if let Some(motions) = &centred {
             self.start_from(motions);
         }
-        let mut report =
-            FrameReport { counts: MatchCounts::default(), iterations: Vec::new(), skeleton_energy: None };
+        let mut report = FrameReport { counts: MatchCounts::default(), iterations: Vec::new(), skeleton_energy: None };
         for iteration in 0..self.options.iterations {
             let moved = self.energy.moved(&self.twists);
             let gates = Gates { distance: self.distance(iteration), ..self.options.gates };
@@ -225,7 +220,10 @@ impl Tracker {
                 let lambda = self.options.energy.weights.skeleton;
                 report.skeleton_energy = Some(skeleton_energy(&self.model, lambda, motions, &pairs));
             }
-            if done && iteration + 1 < self.options.iterations && self.distance(iteration) <= self.options.gates.distance {
+            if done
+                && iteration + 1 < self.options.iterations
+                && self.distance(iteration) <= self.options.gates.distance
+            {
                 break;
             }
         }

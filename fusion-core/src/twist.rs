@@ -114,10 +114,8 @@ mod tests {
     #[test]
     fn a_blend_of_equal_motions_is_the_motion_whatever_its_sign() {
         let motion = AngleConvention::HalfAngle.motion(&[1.4, 0.3, 0.0, 1.0, 2.0, 3.0]);
-        let negative = Isometry3::from_parts(
-            motion.translation,
-            UnitQuaternion::new_unchecked(-motion.rotation.into_inner()),
-        );
+        let negative =
+            Isometry3::from_parts(motion.translation, UnitQuaternion::new_unchecked(-motion.rotation.into_inner()));
         let blend = blended([(0.7, &motion), (0.3, &negative)].into_iter());
         assert!((blend.to_homogeneous() - motion.to_homogeneous()).norm() < 1e-14);
         assert_eq!(blended([(0.0, &motion)].into_iter()), Isometry3::identity());

@@ -48,10 +48,13 @@ fn fill_and_relax_as_in_the_reference() {
         }
         let mut whole = Attachments { rows: rows(&case["H0"]), assigned: flags(&case["assigned0"]) };
         let report = whole.fill(&graph);
-        assert_eq!(report.passes as u64, case["out"]["fill_iters"].as_str().map_or_else(
-            || case["out"]["fill_iters"].as_u64().unwrap(),
-            |text| text.parse().unwrap(),
-        ), "{id}");
+        assert_eq!(
+            report.passes as u64,
+            case["out"]["fill_iters"]
+                .as_str()
+                .map_or_else(|| case["out"]["fill_iters"].as_u64().unwrap(), |text| text.parse().unwrap(),),
+            "{id}"
+        );
         assert!(passes >= report.passes);
         assert_eq!(report.left.len(), whole.assigned.iter().filter(|&&assigned| !assigned).count());
     }

@@ -20,8 +20,7 @@ fn folder() -> Option<PathBuf> {
 /// A jump, frames 420 to 660 at 30 Hz, in front of a camera at 2.6 m.
 fn recording(folder: &Path) -> Recording {
     let file = |name: &str| folder.join(name);
-    let body =
-        read_makehuman(&file("base.obj"), &file("rig.cmu_mb.json"), &file("weights.cmu_mb.json")).unwrap();
+    let body = read_makehuman(&file("base.obj"), &file("rig.cmu_mb.json"), &file("weights.cmu_mb.json")).unwrap();
     assert_eq!((body.mesh.vertices.len(), body.bones.len()), (13_380, 31));
     let motion = Bvh::read(&file("01_01.bvh")).unwrap();
     let retarget = Retarget::new(&body.bones, &motion).unwrap();

@@ -8,7 +8,9 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use verify::audit::{Options, Report, audit_catalogue, describe_failure};
-use verify::reference::{BlockLine, FamilyLine, PolicyLine, ReferenceReport, evaluate_file, fusion_reference, reference};
+use verify::reference::{
+    BlockLine, FamilyLine, PolicyLine, ReferenceReport, evaluate_file, fusion_reference, reference,
+};
 
 /// Audits the derivatives of declared elements, and measures them against multi-precision reference values.
 #[derive(Parser)]

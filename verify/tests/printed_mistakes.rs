@@ -93,7 +93,8 @@ fn printed_mistakes_are_caught() {
     // A3, tr(∂f/∂T ∂T/∂t_x) without the transpose: T's last column by t_x is the first axis, so that the printed trace is 0.
     let plane = NonrigidPlane4::new(1.0, W, V, N, U);
     let single = NonrigidPlane4::new(1.0, [1.0, 0.0, 0.0, 0.0], V, N, U).jacobian(&all);
-    let by_t = finite_differences(all, |x| vec![NonrigidPlane4::new(1.0, [1.0, 0.0, 0.0, 0.0], V, N, U).residual(x).value[0]]);
+    let by_t =
+        finite_differences(all, |x| vec![NonrigidPlane4::new(1.0, [1.0, 0.0, 0.0, 0.0], V, N, U).residual(x).value[0]]);
     table.push(("A3  tr(AB) for tr(AᵀB), by t_x", by_t[3][0].abs(), (single.jacobian[3] - by_t[3][0]).abs()));
 
     // A5, ∂E/∂α = ∂f/∂α: the gradient of E = f² is 2 f ∂f/∂α.
@@ -107,7 +108,9 @@ fn printed_mistakes_are_caught() {
     let edge: [f64; 12] = all[..12].try_into().unwrap();
     let (printed, right) = (PrintedEdge::<f64>::new(V), GraphEdge::new(1.0, V));
     let truth = finite_differences(edge, |x| right.residual(x).value.to_vec());
-    let columns = |jacobian: &[f64]| (0..12).flat_map(|c| (0..3).map(move |r| (r, c))).map(|(r, c)| jacobian[12 * r + c]).collect::<Vec<f64>>();
+    let columns = |jacobian: &[f64]| {
+        (0..12).flat_map(|c| (0..3).map(move |r| (r, c))).map(|(r, c)| jacobian[12 * r + c]).collect::<Vec<f64>>()
+    };
     let (wrong, good) = (columns(&printed.jacobian(&edge).jacobian), columns(&right.jacobian(&edge).jacobian));
     table.push(("A8  ∂h/∂ξ_j with the sign of ξ_i", largest(&wrong, &truth.concat()), largest(&good, &truth.concat())));
     let homogeneous = right.residual(&edge).value.iter().map(|h| h * h).sum::<f64>();
@@ -116,15 +119,23 @@ fn printed_mistakes_are_caught() {
     // A9, the norm of eight numbers.
     let blended = BlendedMotion4::new(1.0, W, V, N).residual(&all).value;
     let both = PrintedBlend::<f64>::new(W, V).residual(&all).value;
-    table.push(("A9  b over the norm of all eight", largest(&both[..3], &blended[16..19]), largest(&both[3..], &blended[16..19])));
+    table.push((
+        "A9  b over the norm of all eight",
+        largest(&both[..3], &blended[16..19]),
+        largest(&both[3..], &blended[16..19]),
+    ));
 
     // A10, the energy's linear blend with the derivative of the dual quaternions'.
     let linear = PrintedPlane::<f64>::new(W, V, N, U);
     let truth = finite_differences(all, |x| linear.residual(x).value.to_vec()).concat();
-    table.push(("A10 derivative of the other blend", largest(&at.jacobian, &truth), largest(&linear.jacobian(&all).jacobian, &truth)));
+    table.push((
+        "A10 derivative of the other blend",
+        largest(&at.jacobian, &truth),
+        largest(&linear.jacobian(&all).jacobian, &truth),
+    ));
 
     // A12, ρ(s) as a weight: none where a weight must be whole.
-    let printed = HuberLoss::new(0.2).residual(&[0.0]).value[0];
+    let printed: f64 = HuberLoss::new(0.2).residual(&[0.0]).value[0];
     table.push(("A12 ψ = ρ(s) at s = 0", (printed - 1.0).abs(), 0.0));
 
     // A15, JᵀJ d = Jᵀr: it leads uphill.
@@ -133,7 +144,9 @@ fn printed_mistakes_are_caught() {
 
     // C1, half the angle.
     let truth = finite_differences(TWISTS[0], |x| TwistMotion::new(1.0).residual(x).value.to_vec());
-    let rows = |jacobian: &[f64]| (0..6).flat_map(|c| (0..8).map(move |r| (r, c))).map(|(r, c)| jacobian[6 * r + c]).collect::<Vec<f64>>();
+    let rows = |jacobian: &[f64]| {
+        (0..6).flat_map(|c| (0..8).map(move |r| (r, c))).map(|(r, c)| jacobian[6 * r + c]).collect::<Vec<f64>>()
+    };
     let half = rows(&HalfExponential::<f64>::new().jacobian(&TWISTS[0]).jacobian);
     table.push(("C1  half the angle", largest(&half, &truth.concat()), largest(&rows(&jacobian), &truth.concat())));
 

@@ -51,7 +51,8 @@ pub fn read_gltf(path: &Path) -> Result<SkinnedBody, GltfError> {
         .find_map(|node| node.mesh().zip(node.skin()))
         .ok_or_else(|| missing("no skinned mesh; export the body with its armature"))?;
 
-    let (bones, order) = bones(&skin, data).ok_or_else(|| missing("the skin has no inverse bind matrices, or cyclic joints"))?;
+    let (bones, order) =
+        bones(&skin, data).ok_or_else(|| missing("the skin has no inverse bind matrices, or cyclic joints"))?;
     let (mut vertices, mut triangles, mut weights) = (Vec::new(), Vec::new(), Vec::new());
     for primitive in mesh.primitives().filter(|p| p.mode() == gltf::mesh::Mode::Triangles) {
         let reader = primitive.reader(data);

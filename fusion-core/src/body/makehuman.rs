@@ -127,8 +127,7 @@ impl Groups {
         let file = std::fs::File::open(path).map_err(unreadable)?;
         let raw = parse_obj(BufReader::new(file))
             .map_err(|error| MakeHumanError::Mesh { path: path.to_owned(), message: error.to_string() })?;
-        let positions =
-            raw.positions.iter().map(|p| METRES * Vector3::new(p.0, p.1, p.2).map(f64::from)).collect();
+        let positions = raw.positions.iter().map(|p| METRES * Vector3::new(p.0, p.1, p.2).map(f64::from)).collect();
         let corners = |polygon: &Polygon| -> Vec<usize> {
             match polygon {
                 Polygon::P(list) => list.clone(),
@@ -203,13 +202,18 @@ fn read_bones(path: &Path, groups: &Groups) -> Result<Vec<Bone>, MakeHumanError>
                     Place::Mean { vertex_indices } => groups.mean(vertex_indices.iter().copied()),
                     Place::Vertex { vertex_index } => groups.mean([*vertex_index].into_iter()),
                 };
-                found.map(Into::into).ok_or_else(|| unknown(format!("bone `{name}` ends at vertices that do not exist")))
+                found
+                    .map(Into::into)
+                    .ok_or_else(|| unknown(format!("bone `{name}` ends at vertices that do not exist")))
             };
             bones.push(Bone { name: name.clone(), parent, head: end(&bone.head)?, tail: end(&bone.tail)? });
         }
         if bones.len() == before {
             let lost = rig.keys().find(|name| bones.iter().all(|bone| bone.name != **name)).expect("one is missing");
-            return Err(unknown(format!("bone `{lost}`: its parent `{}` is missing, or hangs on it", rig[lost].parent)));
+            return Err(unknown(format!(
+                "bone `{lost}`: its parent `{}` is missing, or hangs on it",
+                rig[lost].parent
+            )));
         }
     }
     Ok(bones)
@@ -223,7 +227,7 @@ fn distinct(polygons: &[Vec<usize>]) -> Vec<usize> {
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, MakeHumanError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| MakeHumanError::Unreadable { path: path.to_owned(), source })?;
+    let text =
+        std::fs::read_to_string(path).map_err(|source| MakeHumanError::Unreadable { path: path.to_owned(), source })?;
     serde_json::from_str(&text).map_err(|source| MakeHumanError::Json { path: path.to_owned(), source })
 }

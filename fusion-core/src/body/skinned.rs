@@ -160,7 +160,8 @@ mod tests {
     fn vertices_follow_their_bones() {
         let weights = vec![vec![(0, 1.0)], vec![(0, 2.0), (1, 2.0)], vec![(1, 3.0)]];
         let body = SkinnedBody::new(triangle(), vec![bone(None), bone(Some(0))], weights).unwrap();
-        let motions = [Isometry3::identity(), Isometry3::from_parts(Translation3::new(0.0, 0.0, 1.0), Default::default())];
+        let motions =
+            [Isometry3::identity(), Isometry3::from_parts(Translation3::new(0.0, 0.0, 1.0), Default::default())];
         let posed = body.posed(&motions);
         assert_eq!(posed.vertices, [Vector3::zeros(), Vector3::new(1.0, 0.0, 0.5), Vector3::new(0.0, 1.0, 1.0)]);
         assert_eq!(body.at_rest_in(&motions).bones[1].tail, [0.0, 1.0, 1.0]);

@@ -46,7 +46,9 @@ impl Demo {
         }
         let table: Vec<(String, &_)> = rows
             .iter()
-            .flat_map(|(name, one)| [(format!("{name}, tracked"), &one.track), (format!("{name}, skeleton alone"), &one.skeleton)])
+            .flat_map(|(name, one)| {
+                [(format!("{name}, tracked"), &one.track), (format!("{name}, skeleton alone"), &one.skeleton)]
+            })
             .collect();
         let table: Vec<(&str, &_)> = table.iter().map(|(name, errors)| (name.as_str(), *errors)).collect();
         print(&format!("{}\n", summary(&table)))

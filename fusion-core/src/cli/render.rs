@@ -3,7 +3,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use fusion_core::body::{SkinnedBody, figure, figure_motion, obj_text, read_body, read_gltf, read_makehuman, write_body};
+use fusion_core::body::{
+    SkinnedBody, figure, figure_motion, obj_text, read_body, read_gltf, read_makehuman, write_body,
+};
 use fusion_core::depth::{Camera, DepthSequence, SensorNoise, SequenceInfo, write_depth};
 use fusion_core::protocol::{Recording, reported_bones};
 use fusion_core::skeleton::{BoneNoise, Bvh, Retarget, Skeleton};
@@ -75,7 +77,9 @@ impl Render {
     pub fn run(&self) -> Result<()> {
         ensure!(self.step > 0, "--step must be 1 at least");
         ensure!(self.distance > 0.0 && self.distance.is_finite(), "--distance must be above 0 m");
-        for (name, value) in [("--noise", self.noise), ("--bone-turn", self.bone_turn), ("--bone-shift", self.bone_shift)] {
+        for (name, value) in
+            [("--noise", self.noise), ("--bone-turn", self.bone_turn), ("--bone-shift", self.bone_shift)]
+        {
             ensure!(value >= 0.0 && value.is_finite(), "{name} must be a finite number, 0 or above");
         }
         let (body, motions) = self.posed()?;
@@ -98,7 +102,8 @@ impl Render {
         if self.body == "figure" {
             ensure!(self.motion.is_none(), "the figure has its own motion; leave --motion out");
             let last = self.to.unwrap_or(self.from + 120);
-            let motions = (self.from..=last).step_by(self.step).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
+            let motions =
+                (self.from..=last).step_by(self.step).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
             return Ok((figure(), motions));
         }
         let body = read_any_body(Path::new(&self.body))?;
@@ -107,7 +112,11 @@ impl Render {
         let retarget = Retarget::new(&body.bones, &motion)?;
         let missing: Vec<&str> = retarget.missing().collect();
         if !missing.is_empty() {
-            eprintln!("warning: {} has no joint for {}: they move with their parents", path.display(), missing.join(", "));
+            eprintln!(
+                "warning: {} has no joint for {}: they move with their parents",
+                path.display(),
+                missing.join(", ")
+            );
         }
         let last = self.to.unwrap_or(motion.frames() - 1);
         ensure!(last < motion.frames(), "--to {last}: {} has {} frames", path.display(), motion.frames());

@@ -114,6 +114,8 @@ mod tests {
         let square: f64 = image.depth.iter().map(|&d| (f64::from(d) - 2.4).powi(2)).sum::<f64>() / 1e4;
         assert!((square.sqrt() / 0.0088 - 1.0).abs() < 0.03, "{}", square.sqrt());
         SensorNoise { factor: 0.0, step: 0.001 }.add(&mut image, &mut fastrand::Rng::with_seed(1));
-        assert!(image.depth.iter().all(|&d| (f64::from(d) * 1e3).fract().min(1.0 - (f64::from(d) * 1e3).fract()) < 1e-3));
+        assert!(
+            image.depth.iter().all(|&d| (f64::from(d) * 1e3).fract().min(1.0 - (f64::from(d) * 1e3).fract()) < 1e-3)
+        );
     }
 }

@@ -91,8 +91,8 @@ impl DepthSequence {
     /// When it lacks intrinsics or images.
     pub fn open(folder: &Path) -> Result<Self, SequenceError> {
         let path = folder.join(Self::INTRINSICS);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|source| SequenceError::File { path: path.clone(), source })?;
+        let text =
+            std::fs::read_to_string(&path).map_err(|source| SequenceError::File { path: path.clone(), source })?;
         let info: SequenceInfo =
             serde_json::from_str(&text).map_err(|source| SequenceError::Json { path: path.clone(), source })?;
         let scale = (info.depth_scale.is_nan() || info.depth_scale <= 0.0).then_some("depth_scale must be above 0");

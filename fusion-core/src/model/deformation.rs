@@ -122,7 +122,9 @@ impl DeformationModel {
 
         let chosen = sample_nodes(&mesh.vertices, node_radius);
         let nodes: Vec<Vector3<f64>> = chosen.iter().map(|&vertex| mesh.vertices[vertex]).collect();
-        for (needed, what) in [(nodes_per_vertex, "to move a vertex"), (graph_neighbours + 1, "for a node's neighbours")] {
+        for (needed, what) in
+            [(nodes_per_vertex, "to move a vertex"), (graph_neighbours + 1, "for a node's neighbours")]
+        {
             if nodes.len() < needed {
                 let radius_mm = (1e3 * node_radius) as usize;
                 return Err(ModelError::TooFewNodes { nodes: nodes.len(), needed, what, radius_mm });

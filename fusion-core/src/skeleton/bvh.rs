@@ -62,10 +62,13 @@ impl Bvh {
     /// # Errors
     /// When it cannot be read or is malformed; the line is named.
     pub fn read(path: &Path) -> Result<Self, BvhError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| BvhError::Unreadable { path: path.to_owned(), source })?;
-        Self::parse(&text)
-            .map_err(|(line, message)| BvhError::Malformed { path: path.to_owned(), line: line + 1, message })
+        let text =
+            std::fs::read_to_string(path).map_err(|source| BvhError::Unreadable { path: path.to_owned(), source })?;
+        Self::parse(&text).map_err(|(line, message)| BvhError::Malformed {
+            path: path.to_owned(),
+            line: line + 1,
+            message,
+        })
     }
 
     /// Parses a text; an error has its line, from 0.

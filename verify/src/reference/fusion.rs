@@ -336,7 +336,9 @@ fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
             1 => second_derivatives(&twists, |x| hyper_plane1(turn, v, n, u).jacobian(&x).jacobian.to_vec())?,
             _ => {
                 let w = fixed::<4>(&w, "w")?;
-                second_derivatives(&twists, |x: [Hyper; 24]| hyper_plane4(turn, w, v, n, u).jacobian(&x).jacobian.to_vec())?
+                second_derivatives(&twists, |x: [Hyper; 24]| {
+                    hyper_plane4(turn, w, v, n, u).jacobian(&x).jacobian.to_vec()
+                })?
             }
         };
         lines.compare(case, ("hess_r", 0.0, 1e-14), &hessian, truth)?;

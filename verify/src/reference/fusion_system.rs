@@ -51,8 +51,7 @@ pub(super) fn system(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let (step, _) = solver.solve(case.number("mu")?).map_err(|e| fail(&e))?;
     compare("step", step.as_flattened())?;
     compare("predicted_decrease", &[solver.predicted_decrease(&step)])?;
-    let after: Vec<[f64; 6]> =
-        x.iter().zip(&step).map(|(x, d)| std::array::from_fn(|i| x[i] + d[i])).collect();
+    let after: Vec<[f64; 6]> = x.iter().zip(&step).map(|(x, d)| std::array::from_fn(|i| x[i] + d[i])).collect();
     let energy_after = all.iter().map(|term| term.energy(&after).energy).sum();
 
     // It has the step's error times the slope of the energy there.
