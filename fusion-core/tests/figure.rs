@@ -1,0 +1,126 @@
+//! The figure of tubes: tracked, and through whatever goes wrong.
+
+use fusion_core::body::{figure, figure_motion};
+use fusion_core::depth::{Camera, DepthImage, SensorNoise};
+use fusion_core::energy::{BoneMode, EnergyOptions, FusionEnergy, NormalDerivative};
+use fusion_core::evaluation::{ErrorSummary, FrameErrors};
+use fusion_core::model::{DeformationModel, ModelError, ModelOptions};
+use fusion_core::protocol::{Recording, skeleton_alone, track_recording};
+use fusion_core::skeleton::{BoneNoise, Skeleton, SkeletonError};
+use fusion_core::tracker::{FrameError, Tracker, TrackerOptions};
+use fusion_core::twist::AngleConvention;
+
+fn recording(frames: usize) -> Recording {
+    let motions: Vec<_> = (0..=frames).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
+    Recording::new(&figure(), &motions, Camera::VGA, 2.6)
+}
+
+fn tracker(recording: &Recording, model: ModelOptions, options: TrackerOptions) -> Tracker {
+    Tracker::new(DeformationModel::new(&recording.body, model).unwrap(), recording.camera, options).unwrap()
+}
+
+#[test]
+fn noisy_bones_are_improved_upon() {
+    let recording = recording(8);
+    let noise = BoneNoise { turn: 0.0873, shift: 0.02 };
+    let mut tracker = tracker(&recording, ModelOptions::default(), TrackerOptions::with_unknown_bones());
+    let errors = track_recording(&recording, &mut tracker, SensorNoise::default(), Some(noise), |frame, result| {
+        let report = result.as_ref().unwrap_or_else(|error| panic!("frame {frame}: {error}"));
+        assert!(report.iterations.iter().all(|step| step.after <= step.before));
+    });
+    let (tracked, alone) = (errors.all(), skeleton_alone(&recording, noise).all());
+    assert!(tracked.median < 12.0 && tracked.median < 0.5 * alone.median, "{tracked:?}, alone {alone:?}");
+}
+
+#[test]
+fn every_choice_of_energy_follows_the_figure() {
+    let recording = recording(2);
+    for k in [1, 4, 8] {
+        for angle in [AngleConvention::HalfAngle, AngleConvention::RotationVector] {
+            for normal in [NormalDerivative::Full, NormalDerivative::Frozen] {
+                let mut options = TrackerOptions::default();
+                (options.energy.angle, options.energy.normal) = (angle, normal);
+                // Bones at rest: the data must do the work.
+                options.energy.weights.binding = 0.1;
+                let model = ModelOptions { nodes_per_vertex: k, ..ModelOptions::default() };
+                let mut tracker = tracker(&recording, model, options);
+                for frame in 1..=2 {
+                    tracker.track(&recording.image(frame, SensorNoise::default()), None).unwrap();
+                }
+                let truth = recording.truth(2).vertices;
+                let errors = FrameErrors::new(&tracker.vertices(), &truth, &vec![true; truth.len()]);
+                let median = ErrorSummary::of(errors.all).median;
+                assert!(median < 6.0, "K = {k}, {angle:?}, {normal:?}: median {median} mm");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bad_frame_is_refused_with_its_reason_and_leaves_the_track_as_it_was() {
+    let recording = recording(2);
+    let mut tracker = tracker(&recording, ModelOptions::default(), TrackerOptions::default());
+    let good = recording.image(1, SensorNoise::default());
+    tracker.track(&good, Some(&recording.motions[1])).unwrap();
+    let before = tracker.twists().to_vec();
+
+    let empty = DepthImage::empty(640, 480);
+    assert_eq!(tracker.track(&empty, None).unwrap_err(), FrameError::NothingMeasured);
+    let mut nan = good.clone();
+    nan.depth[640 * 7 + 5] = f32::NAN;
+    assert_eq!(tracker.track(&nan, None).unwrap_err(), FrameError::NotANumber { u: 5, v: 7 });
+    let small = DepthImage::empty(10, 10);
+    assert!(matches!(tracker.track(&small, None).unwrap_err(), FrameError::Size { found: [10, 10], .. }));
+    let mut wall = DepthImage::empty(640, 480);
+    wall.depth.fill(5.0);
+    assert!(matches!(tracker.track(&wall, None).unwrap_err(), FrameError::TooFewMatches { .. }));
+    let few = &recording.motions[1][..3];
+    assert_eq!(tracker.track(&good, Some(few)).unwrap_err(), FrameError::BoneCount { expected: 16, found: 3 });
+
+    assert_eq!(tracker.twists(), before, "bit by bit");
+    tracker.track(&recording.image(2, SensorNoise::default()), Some(&recording.motions[2])).unwrap();
+}
+
+#[test]
+fn models_that_cannot_be_are_refused() {
+    let body = figure();
+    let refuse = |options| DeformationModel::new(&body, options).unwrap_err();
+    let with = ModelOptions::default();
+    assert_eq!(refuse(ModelOptions { nodes_per_vertex: 3, ..with }), ModelError::NodesPerVertex(3));
+    let sparse = refuse(ModelOptions { node_radius: 1.0, nodes_per_vertex: 8, ..with });
+    assert!(matches!(sparse, ModelError::TooFewNodes { needed: 8, radius_mm: 1000, .. }), "{sparse}");
+    assert_eq!(refuse(ModelOptions { node_radius: f64::NAN, ..with }), ModelError::BadLength { name: "node_radius" });
+}
+
+#[test]
+fn a_skeleton_without_a_bone_is_refused_by_its_name() {
+    let body = figure();
+    let mut skeleton = Skeleton::of(&body.bones);
+    skeleton.push(&figure_motion(0.5));
+    assert_eq!(skeleton.motions(0, &body.bones).unwrap().unwrap().len(), 16);
+    assert!(skeleton.motions(1, &body.bones).unwrap().is_none());
+    skeleton.bones[3] = "Tail".into();
+    let error = skeleton.motions(0, &body.bones).unwrap_err();
+    assert!(matches!(&error, SkeletonError::MissingBone { bone, .. } if bone == "Head"), "{error}");
+}
+
+#[test]
+fn nodes_attached_to_the_nearest_bones_are_all_reached() {
+    let options = ModelOptions { attachment_reach: Some(0.07), ..ModelOptions::default() };
+    let model = DeformationModel::new(&figure(), options).unwrap();
+    assert!(model.fill.left.is_empty() && model.fill.passes > 0, "{:?}", model.fill);
+    for row in &model.attachments.rows {
+        assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12 && row.iter().all(|&share| share >= 0.0));
+    }
+}
+
+#[test]
+fn bones_as_unknowns_add_their_blocks() {
+    let model = DeformationModel::new(&figure(), ModelOptions::default()).unwrap();
+    let known = FusionEnergy::new(&model, EnergyOptions::default()).unwrap();
+    let options = EnergyOptions { bones: BoneMode::Unknown, ..EnergyOptions::default() };
+    let unknown = FusionEnergy::new(&model, options).unwrap();
+    assert_eq!(unknown.pattern().blocks(), known.pattern().blocks() + 16);
+    let names: Vec<&str> = unknown.terms().iter().map(|term| term.name()).collect();
+    assert_eq!(names, ["nonrigid", "graph", "skeleton", "binding", "prior", "joints"]);
+}
