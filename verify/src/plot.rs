@@ -17,12 +17,16 @@ pub(crate) fn logarithmic(
     curves: &[Curve],
     size: (u32, u32),
 ) -> Option<String> {
-    let shown = |(x, y): &(f64, f64)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite();
-    let all: Vec<(f64, f64)> = curves.iter().flat_map(|c| &c.points).copied().filter(|p| shown(p)).collect();
+    // Logarithms on linear axes: these have labels at any range, down to 1e-300.
+    let logarithms = |curve: &Curve| -> Vec<(f64, f64)> {
+        let shown = curve.points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
+        shown.map(|(x, y)| (x.log10(), y.log10())).collect()
+    };
+    let all: Vec<(f64, f64)> = curves.iter().flat_map(logarithms).collect();
     let range = |pick: fn(&(f64, f64)) -> f64| {
-        let (low, high) = all.iter().map(pick).fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
-        // Beyond this a logarithmic axis has no labels left.
-        (low / 2.0).max(1e-305)..(high * 2.0).min(1e305)
+        let values = all.iter().map(pick);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        low - 0.3..high + 0.3
     };
     if all.is_empty() {
         return None;
@@ -36,9 +40,9 @@ pub(crate) fn logarithmic(
             .margin(8)
             .x_label_area_size(34)
             .y_label_area_size(58)
-            .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+            .build_cartesian_2d(range(|p| p.0), range(|p| p.1))
             .ok()?;
-        let exponent = |x: &f64| format!("{x:.0e}");
+        let exponent = |x: &f64| format!("1e{x:.0}");
         chart
             .configure_mesh()
             .x_desc(across)
@@ -52,7 +56,7 @@ pub(crate) fn logarithmic(
             .ok()?;
         for (number, curve) in curves.iter().enumerate() {
             let colour = Palette99::pick(number).to_rgba();
-            let points: Vec<(f64, f64)> = curve.points.iter().copied().filter(|p| shown(p)).collect();
+            let points = logarithms(curve);
             if curve.joined {
                 chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2))).ok()?;
             }

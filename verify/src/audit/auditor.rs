@@ -48,10 +48,18 @@ pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: 
     (0..samples)
         .map(|number| {
             let is_lattice = number % LATTICE == LATTICE - 1;
-            let sample = if is_lattice { sampler.lattice_sample() } else { sampler.sample() };
+            let mut sample = if is_lattice { sampler.lattice_sample() } else { sampler.sample() };
+            if is_lattice && is_flagged(subject, &sample) {
+                sample = sampler.sample();
+            }
             case(subject, sample, sampler.rotation(), number < with_truth)
         })
         .collect()
+}
+
+/// Whether the element says that an input is no ordinary one: then there is nothing to hold it to.
+fn is_flagged(subject: &Subject, sample: &Sample) -> bool {
+    subject.answer(sample).is_ok_and(|answer| answer.flags.iter().any(|flags| flags.any()))
 }
 
 /// One input that was asked for.

@@ -236,8 +236,8 @@ impl Auditor<'_> {
             let expected: Vec<f64> = gradient.numbers.iter().map(|g| -g).collect();
             self.minus_gradient(sample, at_rest, &expected, "this energy");
         }
-        if declaration.velocity_dependent {
-            let added: Vec<f64> = moving.numbers.iter().zip(&at_rest.numbers).map(|(a, b)| a - b).collect();
+        let added: Vec<f64> = moving.numbers.iter().zip(&at_rest.numbers).map(|(a, b)| a - b).collect();
+        if declaration.velocity_dependent && is_damping(&added, answer.block(BlockName::ForceByVelocity)) {
             let power: f64 = added.iter().zip(&sample.velocities).map(|(f, v)| f * v).sum();
             let scale = largest(&added).max(f64::EPSILON * moving.largest()) * largest(&sample.velocities);
             let error = if power <= 0.0 { 0.0 } else { power / scale };
@@ -278,6 +278,17 @@ impl Auditor<'_> {
             )
         });
     }
+}
+
+/// Whether what velocities add to a force ought to take power away: where ∂f/∂v is symmetric, or all points together feel none of it.
+/// A lift or a drive is neither.
+fn is_damping(added: &[f64], by_velocity: &Block) -> bool {
+    let n = by_velocity.columns;
+    let entry = |i: usize, j: usize| by_velocity.numbers[i * n + j];
+    let largest_entry = by_velocity.largest();
+    let symmetric = (0..n).all(|i| (0..i).all(|j| (entry(i, j) - entry(j, i)).abs() <= 1e-12 * largest_entry));
+    let total = (0..3).map(|axis| added.iter().skip(axis).step_by(3).sum::<f64>().abs()).fold(0.0, f64::max);
+    symmetric || total <= 1e-12 * largest(added)
 }
 
 const NUMBER: [f64; 3] = [0.0; 3];
