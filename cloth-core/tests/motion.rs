@@ -79,7 +79,7 @@ fn newton_never_adds_energy() {
     for fabric in [STVK, NEO_HOOKEAN, &undamped] {
         let mut body = distorted(fabric);
         let mut newton = Newton::default();
-        let mut energy_of = |body: &mut Body| {
+        let energy_of = |body: &mut Body| {
             let energies = body.system.energies(&body.x).unwrap();
             energies.iter().filter_map(|term| term.energy).sum::<f64>() + body.kinetic_energy()
         };
