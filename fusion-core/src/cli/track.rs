@@ -43,17 +43,11 @@ pub struct Track {
 }
 
 /// Parameters as a file has them.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 struct Parameters {
     model: ModelOptions,
     tracker: TrackerOptions,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { model: ModelOptions::default(), tracker: TrackerOptions::default() }
-    }
 }
 
 /// A line of the table of frames.
