@@ -157,7 +157,8 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let nan = report.lines.iter().any(|line| line.nan > 0);
             let beyond = report.lines.iter().any(|l| !l.beyond_tier_a.is_empty() || !l.beyond_tier_b.is_empty());
             let policy = report.policy.iter().all(|line| line.passed != Some(false));
-            Ok(!nan && policy && !exceeded && !(strict && beyond))
+            let failed = nan || !policy || exceeded || (strict && beyond);
+            Ok(!failed)
         }
         Command::Stress { names, output } => {
             let mut tracks = Vec::new();
