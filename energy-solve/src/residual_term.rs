@@ -50,6 +50,8 @@ pub trait LeastSquaresTerm<const D: usize>: Debug {
     fn linearise(&self, x: &[[f64; D]], equations: &mut NormalEquations<D>) -> TermSum;
     /// The first element whose energy is not finite.
     fn find_non_finite(&self, x: &[[f64; D]]) -> Option<usize>;
+    /// Computes all Jacobians and keeps none: what derivatives alone cost. Returns the sum of some of their entries.
+    fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64;
 }
 
 /// An element on one of the stencils of a term's [`Couplings`].
@@ -134,35 +136,27 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     }
 
     /// Calls `take` with each element's number, r and J (row by row, without weights): for tests, and those who want J itself.
-    pub fn for_each_jacobian(&self, x: &[[f64; D]], mut take: impl FnMut(usize, &[f64], &[f64])) {
-        let (rows, unknowns) = (Self::rows(), self.couplings.arity() * D);
-        dispatch(Jacobians {
-            term: self,
-            x,
-            work: |element: usize, residual: &[f64], jacobian: &[f64]| {
-                take(element, residual, &jacobian[..rows * unknowns]);
-            },
-        });
-    }
-
-    /// Computes all Jacobians, keeps none, and returns the sum of the residuals: what derivatives alone cost.
-    #[must_use]
-    pub fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
-        let mut sum = 0.0;
-        dispatch(Jacobians {
-            term: self,
-            x,
-            work: |_: usize, residual: &[f64], jacobian: &[f64]| {
-                sum += residual[0] + std::hint::black_box(jacobian)[0];
-            },
-        });
-        sum
+    pub fn for_each_jacobian(&self, x: &[[f64; D]], take: &mut dyn FnMut(usize, &[f64], &[f64])) {
+        let (rows, entries) = (Self::rows(), Self::rows() * self.couplings.arity() * D);
+        let mut chunk = Chunk::default();
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            let count = self.linearise_chunk(first, x, &mut chunk);
+            for at in 0..count {
+                take(first + at, &chunk.residuals[at * rows..][..rows], &chunk.jacobians[at * entries..][..entries]);
+            }
+        }
     }
 
     /// All residuals without weights, element by element.
     #[must_use]
     pub fn residuals(&self, x: &[[f64; D]]) -> Vec<f64> {
-        dispatch(Residuals { term: self, x })
+        let mut all = Vec::with_capacity(self.stencils.len() * Self::rows());
+        let mut chunk = Chunk::default();
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            let count = self.evaluate_chunk(first, x, &mut chunk);
+            all.extend_from_slice(&chunk.residuals[..count * Self::rows()]);
+        }
+        all
     }
 
     /// The weight of an element, λ w, without that of the loss.
@@ -209,6 +203,56 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     }
 }
 
+/// Elements that are evaluated before their results are used: so many that what is done with them can be compiled apart, so few that
+/// they stay in the cache.
+const CHUNK: usize = 64;
+
+/// Results of some elements.
+#[derive(Debug, Default)]
+struct Chunk {
+    residuals: Vec<f64>,
+    jacobians: Vec<f64>,
+    /// Those that met a singularity, counted from the chunk's first.
+    degenerate: Vec<usize>,
+}
+
+impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
+    /// Residuals of the elements from `first` on; returns how many.
+    fn evaluate_chunk(&self, first: usize, x: &[[f64; D]], chunk: &mut Chunk) -> usize {
+        let count = CHUNK.min(self.stencils.len() - first);
+        chunk.degenerate.clear();
+        chunk.residuals.resize(CHUNK * Self::rows(), 0.0);
+        dispatch(Residuals { term: self, x, first, count, chunk });
+        count
+    }
+
+    /// Residuals and Jacobians of the elements from `first` on; returns how many.
+    fn linearise_chunk(&self, first: usize, x: &[[f64; D]], chunk: &mut Chunk) -> usize {
+        let count = CHUNK.min(self.stencils.len() - first);
+        chunk.degenerate.clear();
+        chunk.residuals.resize(CHUNK * Self::rows(), 0.0);
+        // A block's row is read as a whole register, which reaches past the end of the last block.
+        chunk.jacobians.resize(CHUNK * Self::rows() * self.couplings.arity() * D + WIDTH, 0.0);
+        dispatch(Jacobians { term: self, x, first, count, chunk });
+        count
+    }
+
+    /// The roots of the elements' weights, and what they add to the energy. Those that met a singularity weigh nothing.
+    fn weigh(&self, first: usize, count: usize, chunk: &Chunk, mut each: impl FnMut(usize, f64, f64)) {
+        let rows = Self::rows();
+        for at in 0..count {
+            if chunk.degenerate.contains(&at) {
+                each(at, 0.0, 0.0);
+                continue;
+            }
+            let square = chunk.residuals[at * rows..][..rows].iter().map(|r| r * r).sum();
+            let (loss, slope) = self.loss.of(square);
+            let weight = self.lambda * self.weights[first + at];
+            each(at, weight * loss, (weight * slope).sqrt());
+        }
+    }
+}
+
 impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for ResidualTerm<E, D> {
     fn name(&self) -> &str {
         &self.name
@@ -223,173 +267,156 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for Res
     }
 
     fn energy(&self, x: &[[f64; D]]) -> TermSum {
-        dispatch(Energies { term: self, x, each: |_: usize, _: f64| {} })
+        let (mut sum, mut chunk) = (TermSum::default(), Chunk::default());
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            let count = self.evaluate_chunk(first, x, &mut chunk);
+            self.weigh(first, count, &chunk, |_, energy, _| sum.energy += energy);
+            sum.degenerate += chunk.degenerate.len();
+        }
+        sum
     }
 
     fn linearise(&self, x: &[[f64; D]], equations: &mut NormalEquations<D>) -> TermSum {
-        dispatch(Assembly { term: self, x, equations })
+        let (mut sum, mut chunk, mut roots) = (TermSum::default(), Chunk::default(), [0.0; CHUNK]);
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            let count = self.linearise_chunk(first, x, &mut chunk);
+            self.weigh(first, count, &chunk, |at, energy, root| {
+                sum.energy += energy;
+                roots[at] = root;
+            });
+            sum.degenerate += chunk.degenerate.len();
+            dispatch(Products {
+                couplings: &self.couplings,
+                stencils: &self.stencils[first..first + count],
+                roots: &roots[..count],
+                rows: Self::rows(),
+                chunk: &mut chunk,
+                equations,
+            });
+        }
+        sum
     }
 
     fn find_non_finite(&self, x: &[[f64; D]]) -> Option<usize> {
-        let mut found = None;
-        dispatch(Energies {
-            term: self,
-            x,
-            each: |element: usize, energy: f64| {
+        let mut chunk = Chunk::default();
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            let count = self.evaluate_chunk(first, x, &mut chunk);
+            let mut found = None;
+            self.weigh(first, count, &chunk, |at, energy, _| {
                 if !energy.is_finite() && found.is_none() {
-                    found = Some(element);
+                    found = Some(first + at);
                 }
-            },
-        });
-        found
-    }
-}
-
-/// Values only.
-struct Energies<'a, E, F, const D: usize> {
-    term: &'a ResidualTerm<E, D>,
-    x: &'a [[f64; D]],
-    each: F,
-}
-
-impl<E: PackedResidual<f64> + Debug, F: FnMut(usize, f64), const D: usize> Kernel for Energies<'_, E, F, D> {
-    type Output = TermSum;
-
-    #[inline(always)]
-    fn run<L: Level>(mut self) -> TermSum {
-        let (term, lanes, mut first) = (self.term, L::F64::LANES, 0);
-        let (mut energy, mut degenerate) = (0.0, 0);
-        while first < term.stencils.len() {
-            let result = term.load::<L>(first).residual_at::<L>(&term.gather::<L>(first, self.x));
-            let mut square = L::F64::splat(0.0);
-            for &row in result.value.as_ref() {
-                square = square + row * row;
+            });
+            if found.is_some() {
+                return found;
             }
-            for lane in 0..lanes.min(term.stencils.len() - first) {
-                if result.flags.degenerate.lane(lane) {
-                    degenerate += 1;
-                    continue;
-                }
-                let one = term.weights[first + lane] * term.loss.of(square.extract(lane)).0;
-                (self.each)(first + lane, one);
-                energy += one;
-            }
-            first += lanes;
         }
-        TermSum { energy: term.lambda * energy, degenerate }
+        None
+    }
+
+    fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
+        let (mut sum, mut chunk) = (0.0, Chunk::default());
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            self.linearise_chunk(first, x, &mut chunk);
+            sum += std::hint::black_box(&chunk.jacobians)[0];
+        }
+        sum
     }
 }
 
-/// Residuals only.
+/// r of a chunk.
 struct Residuals<'a, E, const D: usize> {
     term: &'a ResidualTerm<E, D>,
     x: &'a [[f64; D]],
+    first: usize,
+    count: usize,
+    chunk: &'a mut Chunk,
 }
 
 impl<E: PackedResidual<f64> + Debug, const D: usize> Kernel for Residuals<'_, E, D> {
-    type Output = Vec<f64>;
-
-    #[inline(always)]
-    fn run<L: Level>(self) -> Vec<f64> {
-        let (term, rows) = (self.term, ResidualTerm::<E, D>::rows());
-        let mut all = vec![0.0; rows * term.stencils.len()];
-        for first in (0..term.stencils.len()).step_by(L::F64::LANES) {
-            let count = L::F64::LANES.min(term.stencils.len() - first);
-            let result = term.load::<L>(first).residual_at::<L>(&term.gather::<L>(first, self.x));
-            L::F64::store_transposed(result.value.as_ref(), count, &mut all[rows * first..], rows);
-        }
-        all
-    }
-}
-
-/// J of one element after the other.
-struct Jacobians<'a, E, F, const D: usize> {
-    term: &'a ResidualTerm<E, D>,
-    x: &'a [[f64; D]],
-    work: F,
-}
-
-impl<E: PackedResidual<f64> + Debug, F: FnMut(usize, &[f64], &[f64]), const D: usize> Kernel
-    for Jacobians<'_, E, F, D>
-{
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Level>(mut self) {
-        let term = self.term;
-        let (rows, unknowns) = (ResidualTerm::<E, D>::rows(), term.couplings.arity() * D);
-        let (lanes, mut first) = (L::F64::LANES, 0);
-        let mut residuals = vec![0.0; lanes * rows];
-        let mut jacobians = vec![0.0; lanes * rows * unknowns + WIDTH];
-        while first < term.stencils.len() {
-            let count = lanes.min(term.stencils.len() - first);
-            let result = term.load::<L>(first).jacobian_at::<L>(&term.gather::<L>(first, self.x));
-            L::F64::store_transposed(result.value.as_ref(), count, &mut residuals, rows);
-            L::F64::store_transposed(result.jacobian.as_ref(), count, &mut jacobians, rows * unknowns);
-            for lane in 0..count {
-                let jacobian = &jacobians[lane * rows * unknowns..];
-                (self.work)(first + lane, &residuals[lane * rows..][..rows], jacobian);
+    fn run<L: Level>(self) {
+        let Self { term, x, first, count, chunk } = self;
+        let rows = ResidualTerm::<E, D>::rows();
+        for at in (0..count).step_by(L::F64::LANES) {
+            let lanes = L::F64::LANES.min(count - at);
+            let result = term.load::<L>(first + at).residual_at::<L>(&term.gather::<L>(first + at, x));
+            L::F64::store_transposed(result.value.as_ref(), lanes, &mut chunk.residuals[rows * at..], rows);
+            if result.flags.degenerate.any() {
+                note(&mut chunk.degenerate, at, lanes, result.flags.degenerate);
             }
-            first += lanes;
         }
     }
 }
 
-/// JᵀJ and Jᵀr.
-struct Assembly<'a, E, const D: usize> {
+/// r and J of a chunk.
+struct Jacobians<'a, E, const D: usize> {
     term: &'a ResidualTerm<E, D>,
     x: &'a [[f64; D]],
+    first: usize,
+    count: usize,
+    chunk: &'a mut Chunk,
+}
+
+impl<E: PackedResidual<f64> + Debug, const D: usize> Kernel for Jacobians<'_, E, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { term, x, first, count, chunk } = self;
+        let rows = ResidualTerm::<E, D>::rows();
+        let entries = rows * term.couplings.arity() * D;
+        for at in (0..count).step_by(L::F64::LANES) {
+            let lanes = L::F64::LANES.min(count - at);
+            let result = term.load::<L>(first + at).jacobian_at::<L>(&term.gather::<L>(first + at, x));
+            L::F64::store_transposed(result.value.as_ref(), lanes, &mut chunk.residuals[rows * at..], rows);
+            L::F64::store_transposed(result.jacobian.as_ref(), lanes, &mut chunk.jacobians[entries * at..], entries);
+            if result.flags.degenerate.any() {
+                note(&mut chunk.degenerate, at, lanes, result.flags.degenerate);
+            }
+        }
+    }
+}
+
+/// Out of line: singularities are rare.
+#[cold]
+#[inline(never)]
+fn note<M: Mask>(degenerate: &mut Vec<usize>, at: usize, lanes: usize, mask: M) {
+    degenerate.extend((0..lanes).filter(|&lane| mask.lane(lane)).map(|lane| at + lane));
+}
+
+/// Adds JᵀJ and Jᵀr of a chunk: the same code for all elements.
+struct Products<'a, const D: usize> {
+    couplings: &'a Couplings,
+    stencils: &'a [u32],
+    roots: &'a [f64],
+    rows: usize,
+    chunk: &'a mut Chunk,
     equations: &'a mut NormalEquations<D>,
 }
 
-impl<E: PackedResidual<f64> + Debug, const D: usize> Kernel for Assembly<'_, E, D> {
-    type Output = TermSum;
+impl<const D: usize> Kernel for Products<'_, D> {
+    type Output = ();
 
     #[inline(always)]
-    fn run<L: Level>(self) -> TermSum {
-        let (term, equations) = (self.term, self.equations);
-        let (rows, unknowns) = (ResidualTerm::<E, D>::rows(), term.couplings.arity() * D);
-        let (lanes, mut first) = (L::F64::LANES, 0);
-        let mut residuals = vec![0.0; lanes * rows];
-        // A block's row is read as a whole register, which reaches past the end of the last block.
-        let mut jacobians = vec![0.0; lanes * rows * unknowns + WIDTH];
-        let (mut energy, mut degenerate) = (0.0, 0);
-        while first < term.stencils.len() {
-            let count = lanes.min(term.stencils.len() - first);
-            let result = term.load::<L>(first).jacobian_at::<L>(&term.gather::<L>(first, self.x));
-            L::F64::store_transposed(result.value.as_ref(), count, &mut residuals, rows);
-            L::F64::store_transposed(result.jacobian.as_ref(), count, &mut jacobians, rows * unknowns);
-            for lane in 0..count {
-                if result.flags.degenerate.lane(lane) {
-                    degenerate += 1;
-                    continue;
-                }
-                let element = first + lane;
-                let residual = &mut residuals[lane * rows..][..rows];
-                let jacobian = &mut jacobians[lane * rows * unknowns..][..rows * unknowns + WIDTH];
-                let square: f64 = residual.iter().map(|r| r * r).sum();
-                let (loss, slope) = term.loss.of(square);
-                energy += term.weights[element] * loss;
-                let weight = term.lambda * term.weights[element] * slope;
-                if weight == 0.0 {
-                    continue;
-                }
-                let root = weight.sqrt();
-                residual.iter_mut().for_each(|r| *r *= root);
-                jacobian[..rows * unknowns].iter_mut().for_each(|entry| *entry *= root);
-                let at = term.stencils[element] as usize;
-                add_right::<D>(&mut equations.right, term.couplings.stencil(at), residual, jacobian, unknowns);
-                add_products::<L, D>(
-                    &mut equations.matrix.values,
-                    term.couplings.slots(at),
-                    term.couplings.arity(),
-                    (rows, unknowns),
-                    jacobian,
-                );
+    fn run<L: Level>(self) {
+        let Self { couplings, stencils, roots, rows, chunk, equations } = self;
+        let unknowns = couplings.arity() * D;
+        for (at, (&stencil, &root)) in stencils.iter().zip(roots).enumerate() {
+            if root == 0.0 {
+                continue;
             }
-            first += lanes;
+            let stencil = stencil as usize;
+            let residual = &mut chunk.residuals[at * rows..][..rows];
+            let jacobian = &mut chunk.jacobians[at * rows * unknowns..][..rows * unknowns + WIDTH];
+            residual.iter_mut().for_each(|r| *r *= root);
+            jacobian[..rows * unknowns].iter_mut().for_each(|entry| *entry *= root);
+            add_right::<D>(&mut equations.right, couplings.stencil(stencil), residual, jacobian, unknowns);
+            let (slots, arity) = (couplings.slots(stencil), couplings.arity());
+            add_products::<L, D>(&mut equations.matrix.values, slots, arity, (rows, unknowns), jacobian);
         }
-        TermSum { energy: term.lambda * energy, degenerate }
     }
 }
 

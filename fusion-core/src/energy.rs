@@ -195,7 +195,6 @@ trait DataTerm: Debug + Send {
     fn set_pairs(&mut self, model: &DeformationModel, pairs: &[Pair], normals: Option<&[Vector3<f64>]>);
     fn moved(&self, x: &[Twist]) -> Moved;
     fn term(&self) -> &dyn LeastSquaresTerm<6>;
-    fn evaluate_jacobians(&self, x: &[Twist]) -> f64;
 }
 
 #[derive(Debug)]
@@ -268,10 +267,6 @@ impl<B: Blend<K>, const K: usize> DataTerm for Nonrigid<B, K> {
 
     fn term(&self) -> &dyn LeastSquaresTerm<6> {
         if self.is_frozen { &self.frozen } else { &self.full }
-    }
-
-    fn evaluate_jacobians(&self, x: &[Twist]) -> f64 {
-        if self.is_frozen { self.frozen.evaluate_jacobians(x) } else { self.full.evaluate_jacobians(x) }
     }
 }
 
@@ -428,21 +423,6 @@ impl FusionEnergy {
     #[must_use]
     pub fn moved(&self, x: &[Twist]) -> Moved {
         self.data.moved(x)
-    }
-
-    /// Computes all Jacobians of all terms but keeps none: what derivatives alone cost.
-    #[must_use]
-    pub fn evaluate_jacobians(&self, x: &[Twist]) -> f64 {
-        let bones = self.bones.as_ref().map_or_else(
-            || self.binding.evaluate_jacobians(x),
-            |bones| {
-                bones.skeleton.evaluate_jacobians(x)
-                    + bones.binding.evaluate_jacobians(x)
-                    + bones.prior.evaluate_jacobians(x)
-                    + bones.joints.evaluate_jacobians(x)
-            },
-        );
-        self.data.evaluate_jacobians(x) + self.graph.evaluate_jacobians(x) + bones
     }
 }
 

@@ -48,11 +48,11 @@ fn fill_and_relax_as_in_the_reference() {
         }
         let mut whole = Attachments { rows: rows(&case["H0"]), assigned: flags(&case["assigned0"]) };
         let report = whole.fill(&graph);
+        // The reference counts the pass that finds nothing left to do where a fill stalls.
+        let stalled = usize::from(!report.left.is_empty());
         assert_eq!(
-            report.passes as u64,
-            case["out"]["fill_iters"]
-                .as_str()
-                .map_or_else(|| case["out"]["fill_iters"].as_u64().unwrap(), |text| text.parse().unwrap(),),
+            report.passes + stalled,
+            rows(&serde_json::json!([[case["out"]["fill_iters"]]]))[0][0] as usize,
             "{id}"
         );
         assert!(passes >= report.passes);
