@@ -1,12 +1,12 @@
 use energy_macros::energy;
 
 energy! {
-    /// x − ln(1 + x): near 0 by 2 artanh z = ln(1 + x), z = x/(2 + x), x − 2z = x z.
+    /// x − ln(1 + x), to 28 digits with second derivatives: near 0 by 2 artanh z = ln(1 + x), z = x/(2 + x), x − 2z = x z.
     fn x_minus_log1p(x) {
         let z = x / (2 + x);
         let y = z^2;
         let tail = y * (1/5 + y * (1/7 + y * (1/9 + y * (1/11 + y * (1/13 + y * (1/15 + y * (1/17 + y * (1/19
-            + y * (1/21 + y * (1/23 + y * (1/25 + y * (1/27 + y * (1/29 + y * (1/31 + y * (1/33)))))))))))))));
+            + y * (1/21 + y * (1/23 + y * (1/25 + y * (1/27 + y * (1/29 + y * (1/31 + y * (1/33 + y * (1/35 + y * (1/37)))))))))))))))));
         if abs(x) < 0.25 { z * (x - 2 * y * (1/3 + tail)) } else { x - log1p(x) }
     }
 
