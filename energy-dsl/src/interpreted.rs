@@ -1,7 +1,7 @@
 use crate::check::{Input, Program};
 use crate::diagnostic::Diagnostics;
 use crate::emit::{Character, character};
-use crate::graph::{NodeId, count};
+use crate::graph::{self, NodeId, Op, count};
 use crate::mutation::{Mutation, faults};
 use crate::routines::{Routines, differentiate};
 use crate::runtime::{
@@ -174,11 +174,14 @@ impl Interpreted {
     pub fn mutations(&self) -> Vec<Mutation> {
         let tapes = std::iter::once(("rest", &self.rest))
             .chain(self.routines.iter().filter(|r| EVALUATED.contains(&r.name)).map(|r| (r.name, &r.ordinary)));
+        // A residual's unknowns need not come by threes: what is no input cannot be read by mistake.
+        let unknowns: usize = self.declaration.points.iter().map(|field| field.size).sum();
+        let exists = |op: Op| !matches!(op, Op::Input(graph::Input::Position(i)) if usize::from(i) >= unknowns);
         let mut list = Vec::new();
         for (routine, tape) in tapes {
             let is_number = tape.are_numbers_of_results();
             for (place, &before) in tape.ops().iter().enumerate().filter(|(place, _)| is_number[*place]) {
-                let planted = faults(before).into_iter().filter(|(_, after)| *after != before);
+                let planted = faults(before).into_iter().filter(|(_, after)| *after != before && exists(*after));
                 list.extend(planted.map(|(fault, after)| Mutation { fault, routine, place, before, after }));
             }
         }

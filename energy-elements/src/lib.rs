@@ -42,12 +42,11 @@ elements! {
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
     ipc_barrier: DistanceBarrier;
     ipc_barrier_squared: SquaredDistanceBarrier;
-    neo_hookean: NeoHookean;
+    neo_hookean_log: NeoHookean, StableNeoHookeanLog;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
     spring: Spring;
     stable_neo_hookean: StableNeoHookean;
-    stable_neo_hookean_log: StableNeoHookeanLog;
     stvk: StVK;
     tracking: BlendedMotion4, BlendedPoint1, BlendedPoint4, BlendedPoint8, Binding, BoneBinding, FrozenPlane1, FrozenPlane4,
         FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane, SkeletonPlane,

@@ -59,7 +59,7 @@ impl Options {
     /// For every change of the code: seconds for all elements.
     #[must_use]
     pub fn quick() -> Self {
-        Self { samples: 20, truths: 5, mutations: 10, trials: 15, ..Self::default() }
+        Self { samples: 20, truths: 5, mutations: 10, trials: 25, ..Self::default() }
     }
 }
 

@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use energy_dsl::{Fault, Inputs, Interpreted, Mutation, Number, Outputs};
 use fastrand::Rng;
 
+use super::amplification;
 use super::auditor::{Auditor, Case, case, cases};
 use super::report::{Check, Mutant, MutationScore};
 use super::subject::Subject;
-use crate::blocks::NoAnswer;
+use crate::blocks::{BlockName, NoAnswer};
 use crate::multiprecision::{Big, worse};
 use crate::sample::{Sample, Sampler};
 
@@ -40,12 +41,12 @@ pub(super) fn score(
         let broken = interpreted.mutated(&mutation);
         let caught_by = caught_by(&self::subject(&broken)?, &trials);
         if caught_by.is_empty() {
-            match largest_difference(interpreted, &broken, &trials) {
+            match largest_difference(&subject, interpreted, &broken, &trials) {
                 Some(0.0) => {
                     score.without_effect += 1;
                     continue;
                 }
-                Some(difference) if difference < Check::Accuracy.tolerance() * f64::EPSILON / 2.0 => {
+                Some(part) if part < 1.0 => {
                     score.within_rounding += 1;
                     continue;
                 }
@@ -62,33 +63,46 @@ fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
     Subject::new(interpreted.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), None)
 }
 
-/// How much a fault that went unnoticed changes results, without rounding: the largest difference of a block at any input. The last
-/// coefficient of a series changes its last bits; an operation that no input reaches, or whose other operand is 1 wherever
-/// it counts, changes nothing.
-fn largest_difference(sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> Option<f64> {
-    let mut differences = trials.iter().map(|trial| exact_difference(sound, broken, &trial.case.sample));
-    differences.try_fold(0.0_f64, |most, difference| Some(most.max(difference?)))
+/// How much a fault that went unnoticed changes results, without rounding: the largest difference at any input, as a part of what it may be
+/// there unnoticed. That is, of a block, twice what accuracy is allowed, 8 u·max(1, κ), because rounding may hide as much; of what a
+/// routine repeats of another, what routines may differ by. The last coefficient of a series changes last bits only; an operation
+/// that no input reaches, or whose other operand is 1 wherever it counts, changes nothing.
+fn largest_difference(subject: &Subject, sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> Option<f64> {
+    let mut most = 0.0_f64;
+    for Trial { case, .. } in trials {
+        let [blocks, repeats] = exact_differences(sound, broken, &case.sample)?;
+        let answer = subject.answer(&case.sample).ok()?;
+        let names = BlockName::of_kind(subject.declaration.kind).iter();
+        let kappa = names.map(|&block| amplification(subject, &case.sample, &answer, block)).fold(1.0, f64::max);
+        let allowed = Check::Accuracy.tolerance() * f64::EPSILON * kappa;
+        most = most.max(blocks / allowed).max(repeats / Check::Routines.tolerance());
+    }
+    Some(most)
 }
 
-/// The largest difference of a block in units of its largest number, without rounding.
-fn exact_difference(sound: &Interpreted, broken: &Interpreted, sample: &Sample) -> Option<f64> {
+/// The largest difference of a block in units of its largest number, without rounding; and that of what routines repeat.
+fn exact_differences(sound: &Interpreted, broken: &Interpreted, sample: &Sample) -> Option<[f64; 2]> {
     let big = |numbers: &[f64]| numbers.iter().map(|&x| Big::from_f64(x)).collect::<Vec<_>>();
     let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| big(list));
     let inputs = Inputs { parameters: &lists[0], rest: &lists[1], positions: &lists[2], velocities: &lists[3] };
     let (before, after) = (sound.evaluate(&inputs).ok()?, broken.evaluate(&inputs).ok()?);
     let numbers = |outputs: Outputs<Big>| {
-        let repeats = outputs.repeats.into_iter().map(|(_, _, numbers)| numbers);
-        outputs.blocks.into_iter().map(|(_, numbers)| numbers).chain(repeats).collect::<Vec<_>>()
+        let blocks: Vec<_> = outputs.blocks.into_iter().map(|(_, numbers)| numbers).collect();
+        let repeats: Vec<_> = outputs.repeats.into_iter().map(|(_, _, numbers)| numbers).collect();
+        [blocks, repeats]
     };
-    let mut most = 0.0_f64;
-    for (a, b) in numbers(before).iter().zip(&numbers(after)) {
-        let size = a.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
-        let change = a.iter().zip(b).map(|(a, b)| (a.clone() - b.clone()).to_f64().abs()).fold(0.0, worse);
-        if change != 0.0 {
-            most = worse(most, change / size);
-        }
-    }
-    (!most.is_nan()).then_some(most)
+    let (before, after) = (numbers(before), numbers(after));
+    let most = [0, 1].map(|kind| {
+        let pairs = before[kind].iter().zip(&after[kind]);
+        pairs.map(|(a, b)| relative_difference(a, b)).fold(0.0, worse)
+    });
+    most.iter().all(|most| !most.is_nan()).then_some(most)
+}
+
+fn relative_difference(a: &[Big], b: &[Big]) -> f64 {
+    let size = a.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+    let change = a.iter().zip(b).map(|(a, b)| (a.clone() - b.clone()).to_f64().abs()).fold(0.0, worse);
+    if change == 0.0 { 0.0 } else { change / size }
 }
 
 /// An input, and the checks that fail there without any fault: near a singularity some routes lose their digits.

@@ -40,4 +40,31 @@ energy! {
         // I − 2 − ln((I + 1)/3) = 2x + (x − ln(1 + x)), x = (I − 2)/3; of 2x the part 4j/3 cancels, and 2 shape/3 is left.
         d / 4 * (μ * (2/3 * shape + x_minus_log1p(i / 3)) + λ * j^2)
     }
+
+    /// Neo-Hookean membrane on a triangle: A (μ/2 (I − 2) − μ ln J + λ/2 ln² J), I = tr FᵀF, J = ‖w_u × w_v‖ (Bonet and Wood, *Nonlinear
+    /// Continuum Mechanics for Finite Element Analysis*, §6.4, in two dimensions). λ and μ are per length, as for `StVK`. Infinite where the
+    /// triangle has no area: no step of a solver that lowers the energy turns it over. I − 2 − 2 ln J is formed as
+    /// (s₁ − s₂)² + 2 (j − ln(1 + j)), j = J − 1, neither of which cancels near rest.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy NeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
+        rest {
+            let D_m = columns(u1 - u0, u2 - u0);
+            let B = adjugate(D_m);
+            let d = det(D_m);
+            let d2 = d^2;
+        }
+        let a = x1 - x0;
+        let b = x2 - x0;
+        let F = columns(a, b) * B;
+        let f_u = F * vector(1, 0);
+        let f_v = F * vector(0, 1);
+        let area = norm(cross(a, b));
+        let j = (area - d) / d;
+        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        let square = ddot(F, F) / d2 + 2 * area / d;
+        let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
+        d / 4 * (μ * (anisotropy / square + 2 * x_minus_log1p(j)) + λ * log1p(j)^2)
+    }
 }
