@@ -135,18 +135,6 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         element.store(&mut self.numbers[place / BLOCK * Self::BLOCK_NUMBERS + place % BLOCK..], BLOCK);
     }
 
-    /// Calls `take` with each element's number, r and J (row by row, without weights): for tests, and those who want J itself.
-    pub fn for_each_jacobian(&self, x: &[[f64; D]], take: &mut dyn FnMut(usize, &[f64], &[f64])) {
-        let (rows, entries) = (Self::rows(), Self::rows() * self.couplings.arity() * D);
-        let mut chunk = Chunk::default();
-        for first in (0..self.stencils.len()).step_by(CHUNK) {
-            let count = self.linearise_chunk(first, x, &mut chunk);
-            for at in 0..count {
-                take(first + at, &chunk.residuals[at * rows..][..rows], &chunk.jacobians[at * entries..][..entries]);
-            }
-        }
-    }
-
     /// All residuals without weights, element by element.
     #[must_use]
     pub fn residuals(&self, x: &[[f64; D]]) -> Vec<f64> {
