@@ -102,10 +102,10 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let tracking = folder.as_ref().unwrap_or(&data.join("fusion")).join("reference.json");
             let tracked = if tracking.exists() { fusion_reference(&tracking)? } else { Vec::new() };
             print_families(&tracked);
-            let exceeded = tracked.iter().any(|line| !line.passed());
+            let within = tracked.iter().all(FamilyLine::passed);
             if folder.is_some() && !tracked.is_empty() {
                 write_json(json.as_deref(), &tracked)?;
-                return Ok(!exceeded);
+                return Ok(within);
             }
             let folder = folder.unwrap_or_else(|| data.join("potentials"));
             let report = reference(&folder)?;
@@ -114,7 +114,7 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let nan = report.lines.iter().any(|line| line.nan > 0);
             let beyond = report.lines.iter().any(|l| !l.beyond_tier_a.is_empty() || !l.beyond_tier_b.is_empty());
             let policy = report.policy.iter().all(|line| line.passed != Some(false));
-            Ok(!nan && policy && !exceeded && !(strict && beyond))
+            Ok(!nan && policy && within && !(strict && beyond))
         }
         Command::Show { name, routine, plan, counts } => {
             for listing in verify::listings(&name)? {

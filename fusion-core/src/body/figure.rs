@@ -24,8 +24,11 @@ const SPINE: usize = 1;
 const CHEST: usize = 2;
 const HEAD: usize = 3;
 
-/// Name, parent, head, tail; x to the figure's left, y up, z forwards.
-const BONES: [(&str, Option<usize>, [f64; 3], [f64; 3]); 16] = [
+/// Name, parent, head, tail.
+type BoneRow = (&'static str, Option<usize>, [f64; 3], [f64; 3]);
+
+/// x to the figure's left, y up, z forwards.
+const BONES: [BoneRow; 16] = [
     ("Hips", None, [0.0, 0.95, 0.0], [0.0, 1.08, 0.0]),
     ("Spine", Some(HIPS), [0.0, 1.08, 0.0], [0.0, 1.25, 0.0]),
     ("Chest", Some(SPINE), [0.0, 1.25, 0.0], [0.0, 1.48, 0.0]),
@@ -183,7 +186,7 @@ pub fn figure_motion(time: f64) -> Vec<Isometry3<f64>> {
     rotations[SPINE] = turn(z, 0.10 * swing(2.0, 0.0));
     rotations[CHEST] = turn(x, 0.15 * bend);
     rotations[HEAD] = turn(y, 0.3 * swing(4.0, 0.1) - 0.3 * 0.587_785_252_292_473_1);
-    rotations[4] = turn(z, -1.0 * lower);
+    rotations[4] = turn(z, -lower);
     rotations[5] = turn(y, -0.9 * bend);
     rotations[6] = turn(z, 0.2 * wave);
     rotations[7] = turn(z, 0.5 * lower);
