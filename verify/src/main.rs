@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use verify::audit::{Options, Report, audit_catalogue, describe_failure};
 use verify::reference::{
-    BlockLine, FamilyLine, PolicyLine, ReferenceReport, evaluate_file, fusion_reference, reference,
+    BlockLine, FamilyLine, PolicyLine, ReferenceReport, evaluate_file, evaluate_fusion, fusion_reference, reference,
 };
 
 /// Audits the derivatives of declared elements, and measures them against multi-precision reference values.
@@ -67,7 +67,7 @@ enum Command {
     },
     /// Evaluate the records of a file and write them with the results, 17 digits, and flags.
     Eval {
-        /// A `potref-1` or `potref-policy-1` file.
+        /// A `potref-1` or `potref-policy-1` file, or one of body tracking (see `data/fusion`).
         records: PathBuf,
         /// Where to write.
         #[arg(short, long)]
@@ -134,7 +134,10 @@ fn run(command: Command) -> anyhow::Result<bool> {
             Ok(true)
         }
         Command::Eval { records, output } => {
-            let count = evaluate_file(&records, &output)?;
+            let count = match evaluate_fusion(&records, &output)? {
+                Some(count) => count,
+                None => evaluate_file(&records, &output)?,
+            };
             println!("{count} records evaluated, written to {}", output.display());
             Ok(true)
         }
