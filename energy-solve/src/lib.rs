@@ -73,7 +73,7 @@ pub use normal_solver::{NormalSolution, NormalSolver, NormalSolverKind, SolverEr
 pub use pattern::{Pattern, Storage};
 pub use potential_term::PotentialTerm;
 pub use preconditioner::{Preconditioner, SingularBlock};
-pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm, TakeRow, TermSum};
+pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm, TermSum};
 pub use solve::{SolveOptions, SolveReport, StopReason};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use term::{Character, Linearisation, Quantity, State, Stencils, Term, Weights};

@@ -6,9 +6,6 @@ use energy_dsl::{Array, BLOCK, Declaration, Kernel, Lane, Level, Mask, Number, P
 use crate::loss::Loss;
 use crate::normal_matrix::{Couplings, NormalMatrix, WIDTH, WideBlock};
 
-/// Takes what was evaluated of an element: its number, its residual and its Jacobian, row by row.
-pub type TakeRow<'a> = dyn FnMut(usize, &[f64], &[f64]) + 'a;
-
 /// What a term adds up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TermSum {
@@ -136,18 +133,6 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
 
     fn write(&mut self, place: usize, element: &E) {
         element.store(&mut self.numbers[place / BLOCK * Self::BLOCK_NUMBERS + place % BLOCK..], BLOCK);
-    }
-
-    /// Calls `take` with each element's number, r and J (row by row, without weights): for tests, and those who want J itself.
-    pub fn for_each_jacobian(&self, x: &[[f64; D]], take: &mut TakeRow<'_>) {
-        let (rows, entries) = (Self::rows(), Self::rows() * self.couplings.arity() * D);
-        let mut chunk = Chunk::default();
-        for first in (0..self.stencils.len()).step_by(CHUNK) {
-            let count = self.linearise_chunk(first, x, &mut chunk);
-            for at in 0..count {
-                take(first + at, &chunk.residuals[at * rows..][..rows], &chunk.jacobians[at * entries..][..entries]);
-            }
-        }
     }
 
     /// All residuals without weights, element by element.

@@ -19,6 +19,9 @@ pub fn errors_svg(errors: &TrackErrors) -> Result<String, String> {
     Ok(text)
 }
 
+/// Name, colour, and what is drawn.
+type Line = (&'static str, RGBColor, fn(&ErrorSummary) -> f64);
+
 fn draw(text: &mut String, summaries: &[ErrorSummary], highest: f64) -> Result<(), Box<dyn std::error::Error>> {
     let area = SVGBackend::with_string(text, (800, 420)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -29,8 +32,7 @@ fn draw(text: &mut String, summaries: &[ErrorSummary], highest: f64) -> Result<(
         .y_label_area_size(48)
         .build_cartesian_2d(1.0..(summaries.len().max(2) as f64), 0.0..1.05 * highest)?;
     chart.configure_mesh().x_desc("frame").y_desc("mm").light_line_style(WHITE).draw()?;
-    type Curve = (&'static str, RGBColor, fn(&ErrorSummary) -> f64);
-    let lines: [Curve; 3] = [
+    let lines: [Line; 3] = [
         ("95 %", RGBColor(204, 121, 167), |one| one.p95),
         ("mean", RGBColor(0, 114, 178), |one| one.mean),
         ("median", RGBColor(0, 158, 115), |one| one.median),

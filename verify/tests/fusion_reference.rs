@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use verify::reference::fusion_reference;
+use verify::reference::{evaluate_fusion, fusion_reference};
 
 fn file() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data/fusion/reference.json")
@@ -37,4 +37,26 @@ fn a_wrong_digit_is_found_and_a_broken_file_refused() {
     std::fs::write(&path, value.to_string()).unwrap();
     let error = fusion_reference(&path).unwrap_err().to_string();
     assert!(error.contains("graph-pub-0") && error.contains("theta_i"), "{error}");
+}
+
+#[test]
+fn cases_without_truth_are_evaluated() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.json"), folder.path().join("out.json"));
+    let mut value: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(file()).unwrap()).unwrap();
+    let families = value.as_object_mut().unwrap();
+    families.retain(|family, _| family == "graph" || family == "dqb");
+    let truth = families["graph"][0]["out"]["J"].clone();
+    for case in families.values_mut().flat_map(|cases| cases.as_array_mut().unwrap()) {
+        case.as_object_mut().unwrap().remove("out");
+    }
+    std::fs::write(&input, value.to_string()).unwrap();
+    assert_eq!(evaluate_fusion(&input, &output).unwrap(), Some(14 + 8));
+    let written: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&output).unwrap()).unwrap();
+    let number = |value: &serde_json::Value| value.as_str().unwrap().parse::<f64>().unwrap();
+    let found: Vec<f64> = written["graph"][0]["out"]["J"].as_array().unwrap().iter().map(number).collect();
+    let truth: Vec<f64> = truth.as_array().unwrap().iter().flat_map(|r| r.as_array().unwrap()).map(number).collect();
+    assert!(found.iter().zip(&truth).all(|(a, b)| (a - b).abs() < 1e-14) && found.len() == 36);
+    std::fs::write(&input, "{}").unwrap();
+    assert_eq!(evaluate_fusion(&input, &output).unwrap(), None);
 }

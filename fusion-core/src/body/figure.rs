@@ -25,10 +25,10 @@ const CHEST: usize = 2;
 const HEAD: usize = 3;
 
 /// Name, parent, head, tail.
-type BonePlan = (&'static str, Option<usize>, [f64; 3], [f64; 3]);
+type BoneRow = (&'static str, Option<usize>, [f64; 3], [f64; 3]);
 
-/// The figure's bones; x to the figure's left, y up, z forwards.
-const BONES: [BonePlan; 16] = [
+/// x to the figure's left, y up, z forwards.
+const BONES: [BoneRow; 16] = [
     ("Hips", None, [0.0, 0.95, 0.0], [0.0, 1.08, 0.0]),
     ("Spine", Some(HIPS), [0.0, 1.08, 0.0], [0.0, 1.25, 0.0]),
     ("Chest", Some(SPINE), [0.0, 1.25, 0.0], [0.0, 1.48, 0.0]),

@@ -4,6 +4,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use fusion_core::body::obj_text;
 use fusion_core::depth::DepthSequence;
+use fusion_core::energy::BoneMode;
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::skeleton::Skeleton;
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
@@ -43,7 +44,7 @@ pub struct Track {
 }
 
 /// Parameters as a file has them.
-#[derive(Clone, Copy, Debug, Deserialize, Default)]
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Parameters {
     model: ModelOptions,
@@ -162,13 +163,10 @@ impl Track {
             }
             None => Parameters::default(),
         };
-        if self.unknown_bones {
-            let known = parameters.tracker;
-            parameters.tracker = TrackerOptions::with_unknown_bones();
-            if self.options.is_some() {
-                parameters.tracker = known;
-                parameters.tracker.energy.bones = fusion_core::energy::BoneMode::Unknown;
-            }
+        match (self.unknown_bones, &self.options) {
+            (true, None) => parameters.tracker = TrackerOptions::with_unknown_bones(),
+            (true, Some(_)) => parameters.tracker.energy.bones = BoneMode::Unknown,
+            (false, _) => {}
         }
         Ok(parameters)
     }

@@ -9,11 +9,12 @@ use energy_elements::{
 };
 use energy_solve::Loss;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::exact::Truth;
 use super::file::{RecordError, read};
 use super::fusion_system;
+use crate::atomic_file::write_whole;
 use crate::dual::Hyper;
 
 /// The errors of one array of one family over all cases.
@@ -41,9 +42,12 @@ impl FamilyLine {
     }
 }
 
-/// Lines as cases come in.
+/// Lines as cases come in, and what was computed for the last one.
 #[derive(Default)]
-pub(super) struct Lines(Vec<FamilyLine>);
+pub(super) struct Lines {
+    all: Vec<FamilyLine>,
+    computed: Map<String, Value>,
+}
 
 impl Lines {
     /// Compares one array. `scale` is what errors are relative to; the array's largest entry if that is larger.
@@ -54,6 +58,10 @@ impl Lines {
         found: &[f64],
         truth: &Value,
     ) -> Result<(), String> {
+        self.computed.insert(array.to_owned(), found.iter().map(|x| Value::String(format!("{x:.16e}"))).collect());
+        if case.evaluated_only {
+            return Ok(());
+        }
         let truths = case.truths(truth).map_err(|error| format!("{array}: {error}"))?;
         if truths.len() != found.len() {
             return Err(format!("{array}: {} numbers computed, {} expected", found.len(), truths.len()));
@@ -68,17 +76,19 @@ impl Lines {
 
     /// Notes whether something is exactly as it must be.
     pub(super) fn exact(&mut self, case: &Case<'_>, array: &str, right: bool) {
-        self.note(case, array, if right { 0.0 } else { f64::INFINITY }, 0.0);
+        if !case.evaluated_only {
+            self.note(case, array, if right { 0.0 } else { f64::INFINITY }, 0.0);
+        }
     }
 
     fn note(&mut self, case: &Case<'_>, array: &str, error: f64, bound: f64) {
-        let known = self.0.iter().position(|l| l.family == case.family && l.array == array && l.bound == bound);
+        let known = self.all.iter().position(|l| l.family == case.family && l.array == array && l.bound == bound);
         let at = known.unwrap_or_else(|| {
             let (family, array) = (case.family, array.to_owned());
-            self.0.push(FamilyLine { family, array, cases: 0, worst: 0.0, worst_case: String::new(), bound });
-            self.0.len() - 1
+            self.all.push(FamilyLine { family, array, cases: 0, worst: 0.0, worst_case: String::new(), bound });
+            self.all.len() - 1
         });
-        let line = &mut self.0[at];
+        let line = &mut self.all[at];
         line.cases += 1;
         if worse(line.worst, error) != line.worst {
             line.worst = error;
@@ -97,6 +107,8 @@ pub(super) struct Case<'a> {
     family: &'static str,
     id: String,
     value: &'a Value,
+    /// There is no truth to compare with.
+    evaluated_only: bool,
 }
 
 impl Case<'_> {
@@ -107,6 +119,9 @@ impl Case<'_> {
 
     /// A field of its results.
     pub(super) fn out(&self, name: &str) -> Result<&Value, String> {
+        if self.evaluated_only {
+            return Ok(&Value::Null);
+        }
         self.field("out")?.get(name).ok_or_else(|| format!("`out.{name}` is missing"))
     }
 
@@ -175,6 +190,7 @@ fn flatten(value: &Value, take: &mut impl FnMut(&str) -> Result<(), String>) -> 
         Value::Array(list) => list.iter().try_for_each(|one| flatten(one, take)),
         Value::String(text) => take(text),
         Value::Number(number) => take(&number.to_string()),
+        Value::Null => Ok(()),
         other => Err(format!("expected a number, found {other}")),
     }
 }
@@ -188,34 +204,64 @@ type Check = fn(&Case<'_>, &mut Lines) -> Result<(), String>;
 /// When the file cannot be read or a case is malformed.
 pub fn fusion_reference(path: &Path) -> Result<Vec<FamilyLine>, RecordError> {
     let file: Value = read(path)?;
-    let families: [(&'static str, Check); 8] = [
-        ("exp", exponential),
-        ("dqb", blend),
-        ("nonrigid", nonrigid),
-        ("lbs_plane", skinned),
-        ("graph", graph),
-        ("binding", binding),
-        ("huber", huber),
-        ("system", fusion_system::system),
-    ];
     let mut lines = Lines::default();
-    for (family, check) in families {
+    for (family, check) in FAMILIES {
         let cases = file.get(family).and_then(Value::as_array);
         let cases = cases.ok_or_else(|| RecordError::record(path, family, "the family is missing"))?;
         for value in cases {
-            let id = value.get("id").and_then(Value::as_str).unwrap_or("without id").to_owned();
-            let case = Case { family, id, value };
+            let case = Case { family, id: identity(value), value, evaluated_only: false };
             check(&case, &mut lines).map_err(|message| RecordError::record(path, &case.id, message))?;
         }
     }
-    Ok(lines.0)
+    Ok(lines.all)
+}
+
+/// Evaluates the cases of a file of body tracking, any families of it, and writes them with `out` filled by the generated code: by array
+/// its numbers one after the other, 17 digits. Returns how many; nothing if the file has none of the families.
+///
+/// # Errors
+/// When the input is malformed, or the output cannot be written; nothing is written then.
+pub fn evaluate_fusion(input: &Path, output: &Path) -> Result<Option<usize>, RecordError> {
+    let mut file: Value = read(input)?;
+    let mut count = None;
+    for (family, check) in FAMILIES {
+        let Some(cases) = file.get_mut(family).and_then(Value::as_array_mut) else { continue };
+        for value in cases {
+            let mut lines = Lines::default();
+            let case = Case { family, id: identity(value), value, evaluated_only: true };
+            check(&case, &mut lines).map_err(|message| RecordError::record(input, &case.id, message))?;
+            value["out"] = Value::Object(lines.computed);
+            *count.get_or_insert(0) += 1;
+        }
+    }
+    if count.is_some() {
+        let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
+        write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
+    }
+    Ok(count)
+}
+
+const FAMILIES: [(&str, Check); 8] = [
+    ("exp", exponential),
+    ("dqb", blend),
+    ("nonrigid", nonrigid),
+    ("lbs_plane", skinned),
+    ("graph", graph),
+    ("binding", binding),
+    ("huber", huber),
+    ("system", fusion_system::system),
+];
+
+fn identity(case: &Value) -> String {
+    case.get("id").and_then(Value::as_str).unwrap_or("without id").to_owned()
 }
 
 /// exp: 8 numbers and their derivatives, in both conventions, down to no turn at all.
 fn exponential(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let twist = case.twists()?[0];
     // Rounding ‖θ‖ turns by as much.
-    let (suffix, bound) = if case.number("norm")? <= 3.2 { ("", 1.2e-15) } else { (", ‖θ‖ > π", 8e-15) };
+    let length = twist[0].hypot(twist[1]).hypot(twist[2]);
+    let (suffix, bound) = if length <= 3.2 { ("", 1.2e-15) } else { (", ‖θ‖ > π", 8e-15) };
     for convention in ["doc", "std"] {
         let out = case.out(convention)?;
         let at = TwistMotion::new(turn(convention)?).jacobian(&twist);
@@ -243,16 +289,17 @@ fn blend(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
         // The declared blend aligns; weights with the opposite signs undo it.
         w = std::array::from_fn(|k| signs[k] * w[k]);
     }
-    // The nearly antipodal blend cancels.
-    let antipodal = numbers(case.out("norm")?)?[0] < 0.1 * w.iter().map(|w| w.abs()).sum::<f64>();
-    let (suffix, bound) = if antipodal { (", nearly antipodal", 6e-14) } else { ("", 4e-15) };
     let unknowns = fixed::<24>(twists.as_flattened(), "twists")?;
     let at = BlendedMotion4::new(turn, w, v, n).jacobian(&unknowns);
+    let norm = at.value[..4].iter().fold(0.0_f64, |length, x| length.hypot(*x));
+    // The nearly antipodal blend cancels.
+    let antipodal = norm < 0.1 * w.iter().map(|w| w.abs()).sum::<f64>();
+    let (suffix, bound) = if antipodal { (", nearly antipodal", 6e-14) } else { ("", 4e-15) };
     let mut compare = |name: &str, found: &[f64]| {
         lines.compare(case, (&format!("{name}{suffix}"), 0.0, bound), found, case.out(name)?)
     };
     compare("b", &at.value[..8])?;
-    compare("norm", &[at.value[..4].iter().fold(0.0_f64, |length, x| length.hypot(*x))])?;
+    compare("norm", &[norm])?;
     compare("qhat", &at.value[8..16])?;
     compare("vhat", &at.value[16..19])?;
     compare("nhat", &at.value[19..])?;
@@ -331,8 +378,9 @@ fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     compare("J_frozen_normal", 0.0, 2.8e-15, &frozen)?;
     compare("E", 2.0 * lambda * r.abs(), 1.8e-15, &[lambda * r * r])?;
     compare("gradE", 2.0 * lambda * steepest * (1.0 + r.abs()), 2.8e-15, &gradient)?;
-    if let Some(truth) = case.field("out")?.get("hess_r") {
+    if let Ok(truth) = case.out("hess_r") {
         let hessian = match w.len() {
+            8 => return Ok(()),
             1 => second_derivatives(&twists, |x| hyper_plane1(turn, v, n, u).jacobian(&x).jacobian.to_vec())?,
             _ => {
                 let w = fixed::<4>(&w, "w")?;
@@ -383,8 +431,8 @@ fn skinned(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     if at.jacobian[6 * k..].iter().any(|&entry| entry != 0.0) {
         return Err("a node of weight zero has a derivative".into());
     }
-    lines.compare(case, ("v", 1.0, 1.8e-15), &moved[..3], &case.field("out")?["v"])?;
-    lines.compare(case, ("n", 1.0, 1.8e-15), &moved[3..], &case.field("out")?["n"])?;
+    lines.compare(case, ("v", 1.0, 1.8e-15), &moved[..3], case.out("v")?)?;
+    lines.compare(case, ("n", 1.0, 1.8e-15), &moved[3..], case.out("n")?)?;
     lines.compare(case, ("r", 1.0, 1.8e-15), &at.value, case.out("r")?)?;
     lines.compare(case, ("J", 0.0, 2.8e-15), &at.jacobian[..6 * k], case.out("J")?)
 }

@@ -13,7 +13,7 @@ mod report;
 pub use eval::{Source, evaluate_file};
 pub use exact::Truth;
 pub use file::{Record, RecordError};
-pub use fusion::{FamilyLine, fusion_reference};
+pub use fusion::{FamilyLine, evaluate_fusion, fusion_reference};
 pub use mapping::{Mapping, mapping};
 pub use policy::{PolicyLine, policy};
 pub use report::{BlockLine, ReferenceReport, reference};

@@ -1,0 +1,78 @@
+//! The binary `fusion`, as users run it.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn fusion(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fusion")).args(arguments).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn error_of(output: &Output) -> String {
+    assert!(!output.status.success());
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_recording_is_rendered_tracked_and_evaluated() {
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, track) = (folder.path().join("recording"), folder.path().join("track"));
+    let (recording, track) = (text(&recording), text(&track));
+    assert!(fusion(&["render", "--to", "4", "-o", recording]).status.success());
+    let again = error_of(&fusion(&["render", "--to", "4", "-o", recording]));
+    assert!(again.contains("--overwrite"), "{again}");
+
+    // One image is damaged, one is gone: both are skipped with a reason, the others tracked.
+    std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
+    std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
+    let output = fusion(&["track", recording, "-o", track]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(Path::new(track).join("frames.csv")).unwrap();
+    let status: Vec<&str> = table.lines().skip(1).map(|line| line.split(',').nth(1).unwrap()).collect();
+    assert_eq!(status, ["tracked", "tracked", "skipped", "skipped", "tracked"], "{table}");
+    assert!(table.contains("000002.png"), "{table}");
+
+    let output = fusion(&["evaluate", recording, track]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(printed.contains("median, mm") && printed.contains("skeleton alone"), "{printed}");
+    let plot = std::fs::read_to_string(Path::new(track).join("errors.svg")).unwrap();
+    assert!(plot.starts_with("<svg") && plot.contains("median"));
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = text(folder.path());
+    let missing = error_of(&fusion(&["track", here, "-o", &format!("{here}/t")]));
+    assert!(missing.contains("intrinsics.json"), "{missing}");
+    let recording = folder.path().join("recording");
+    let recording = text(&recording);
+    assert!(fusion(&["render", "--to", "1", "-o", recording]).status.success());
+    let skeleton = Path::new(recording).join("skeleton.json");
+    let renamed = std::fs::read_to_string(&skeleton).unwrap().replace("\"Head\"", "\"Tail\"");
+    std::fs::write(&skeleton, renamed).unwrap();
+    let track = format!("{here}/track");
+    let bone = error_of(&fusion(&["track", recording, "-o", &track]));
+    assert!(bone.contains("no bone `Head`"), "{bone}");
+    assert!(!Path::new(&track).exists(), "refused before anything is written");
+    assert!(fusion(&["track", recording, "--no-bones", "-o", &track]).status.success());
+    let options = Path::new(here).join("options.json");
+    std::fs::write(&options, r#"{"model": {"nodes_per_vertex": 8, "node_radius": 2.0}}"#).unwrap();
+    let few = error_of(&fusion(&[
+        "track",
+        recording,
+        "--no-bones",
+        "--options",
+        text(&options),
+        "-o",
+        &track,
+        "--overwrite",
+    ]));
+    assert!(few.contains("nodes, but 8 are needed"), "{few}");
+    let body = error_of(&fusion(&["render", "--body", here, "-o", recording, "--overwrite"]));
+    assert!(body.contains("no file base"), "{body}");
+}
