@@ -44,6 +44,9 @@ pub(crate) fn sweep(
     lower: impl Fn(&Sample) -> Result<Vec<f64>, NoAnswer>,
 ) -> Result<Sweep, NoAnswer> {
     const STEPS: [i32; 5] = [-6, -8, -10, -12, -14];
+    // Where the function itself jumps nearby (a sign is chosen), only steps that do not reach the jump say anything.
+    const FINER: [i32; 3] = [-17, -20, -23];
+    const SUSPICIOUS: f64 = 1e-7;
     let inputs = match stepped {
         Stepped::Positions => sample.positions.len(),
         Stepped::Velocities => sample.velocities.len(),
@@ -75,7 +78,11 @@ pub(crate) fn sweep(
     };
     let mut best: Option<(f64, Vec<f64>)> = None;
     let mut plain = Vec::new();
-    for exponent in STEPS {
+    for exponent in STEPS.into_iter().chain(FINER) {
+        let far_off = best.as_ref().is_none_or(|(error, _)| error.is_nan() || *error > SUSPICIOUS * largest(block));
+        if FINER.contains(&exponent) && !far_off {
+            break;
+        }
         let step = length * f64::from(exponent).exp2();
         let (whole, half) = (central(step)?, central(step / 2.0)?);
         plain.push((deviation(&whole), deviation(&half)));
