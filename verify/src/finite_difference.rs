@@ -48,6 +48,9 @@ pub(crate) fn sweep(
     lower: impl Fn(&Sample) -> Result<Vec<f64>, NoAnswer>,
 ) -> Result<Sweep, NoAnswer> {
     const STEPS: [i32; 5] = [-6, -8, -10, -12, -14];
+    // Where the function itself jumps nearby (a sign is chosen), only steps that do not reach the jump say anything.
+    const FINER: [i32; 3] = [-17, -20, -23];
+    const SUSPICIOUS: f64 = 1e-7;
     let inputs = match stepped {
         Stepped::Positions => sample.positions.len(),
         Stepped::Velocities => sample.velocities.len(),
@@ -71,8 +74,14 @@ pub(crate) fn sweep(
         Ok(differences)
     };
     let deviation = |differences: &[f64]| largest_difference(differences, block);
-    let (mut curve, mut plain, mut extrapolations) = (Vec::new(), Vec::new(), Vec::new());
-    for exponent in STEPS {
+    let (mut curve, mut plain) = (Vec::new(), Vec::new());
+    let mut extrapolations: Vec<(f64, Vec<f64>)> = Vec::new();
+    for exponent in STEPS.into_iter().chain(FINER) {
+        let agree =
+            |pair: &[(f64, Vec<f64>)]| largest_difference(&pair[0].1, &pair[1].1) <= SUSPICIOUS * largest(&pair[1].1);
+        if FINER.contains(&exponent) && extrapolations.windows(2).any(agree) {
+            break;
+        }
         let step = length * f64::from(exponent).exp2();
         let (whole, half) = (central(step)?, central(step / 2.0)?);
         plain.push((deviation(&whole), deviation(&half)));
