@@ -26,7 +26,12 @@ fn ordinary(name: &str) -> (Vec<f64>, Vec<f64>) {
     let declaration = find(name).unwrap().declaration;
     let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
     let parameters = declaration.parameters.iter().map(|p| p.size).sum::<usize>() + implied;
-    let rest = if declaration.rest.is_empty() { vec![] } else { vec![0.1, 0.0, 1.0, 0.25, 0.0, 0.75] };
+    let rest = match declaration.rest.iter().map(|field| field.size).sum::<usize>() {
+        0 => vec![],
+        6 => vec![0.1, 0.0, 1.0, 0.25, 0.0, 0.75],
+        12 => vec![0.5, -1.0, 0.0, 0.25, 0.75, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        other => panic!("{name}: no rest shape of {other} numbers here"),
+    };
     (vec![0.75; parameters], rest)
 }
 

@@ -1,9 +1,10 @@
-//! Random well-typed programs: what the compiler makes of them agrees with hyper-dual numbers run through the text, by every
-//! routine and on both paths. `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
+//! Random well-typed programs: what the compiler makes of them agrees with hyper-dual numbers and with multi-precision numbers
+//! run through the text, by every routine and on both paths. `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
 
-use energy_dsl::{Inputs, Listing, Path, Textbook};
+use energy_dsl::{Inputs, Interpreted, Listing, Path, Textbook};
 use proptest::prelude::*;
 use verify::dual::Hyper;
+use verify::{Sample, multiprecision};
 
 /// Three points, two scalars and a vector.
 const SIGNATURE: &str = "p, q, r: Point; k, L: Scalar, u: Vec3";
@@ -93,6 +94,22 @@ fn expected(textbook: &Textbook, parameters: &[f64], x: &[f64]) -> [Vec<f64>; 3]
     [vec![at(0, 0).re], gradient, triangle]
 }
 
+/// The same by multi-precision numbers, right to 30 digits; none where the formula divides by zero.
+fn true_blocks(source: &str, textbook: &Textbook, parameters: &[f64], x: &[f64]) -> Option<[Vec<f64>; 3]> {
+    let sample = Sample { parameters: parameters.into(), rest: vec![], positions: x.into(), velocities: vec![] };
+    let declaration = Interpreted::from_source(source).ok()?.first()?.declaration();
+    let blocks = multiprecision::truth(declaration, textbook, &sample, 30);
+    let numbers = |k: usize| blocks[k].block.numbers.iter().map(multiprecision::Big::to_f64).collect::<Vec<f64>>();
+    let [value, gradient, hessian] = [numbers(0), numbers(1), numbers(2)];
+    let mut triangle = Vec::with_capacity(54);
+    for i in 0..3 {
+        for j in i..3 {
+            triangle.extend((0..9).map(|e| hessian[9 * (3 * i + e / 3) + 3 * j + e % 3]));
+        }
+    }
+    blocks.iter().all(|b| b.is_defined).then_some([value, gradient, triangle])
+}
+
 fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |largest, n| largest.max(n.abs()))
 }
@@ -101,7 +118,11 @@ fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseErr
     let source = format!("energy Random({SIGNATURE}) {{ {formula} + 0 * (k + L + dot(u, p - q) + dot(u, r)) }}");
     let textbook = Textbook::from_source(&source).map_err(|e| TestCaseError::fail(format!("{source}: {e}")))?;
     let listing = Listing::from_source(&source).map_err(|e| TestCaseError::fail(format!("{source}: {e}")))?.remove(0);
-    let truth = expected(&textbook, parameters, x);
+    let by_duals = expected(&textbook, parameters, x);
+    prop_assume!(by_duals.iter().flatten().all(|n| n.is_finite() && n.abs() < 1e30));
+    let truth = true_blocks(&source, &textbook, parameters, x);
+    prop_assume!(truth.is_some());
+    let truth = truth.expect("just seen");
     prop_assume!(truth.iter().flatten().all(|n| n.is_finite() && n.abs() < 1e30));
     // What the formula makes of a change in the last places of its inputs is what it may differ by.
     let moved: Vec<f64> = x.iter().enumerate().map(|(i, x)| x * (1.0 + (i as f64 - 4.5) * 2e-15)).collect();
@@ -113,16 +134,16 @@ fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseErr
     for path in [Path::Chosen, Path::General] {
         for (routine, blocks) in [("value", 1), ("gradient", 2), ("hessian", 3)] {
             let found = listing.evaluate(routine, path, &inputs).expect("an energy has it");
-            for ((found, truth), nearby) in found.iter().zip(&truth).zip(&nearby).take(blocks) {
+            for (((found, by_duals), truth), nearby) in found.iter().zip(&by_duals).zip(&truth).zip(&nearby).take(blocks) {
                 let sensitivity = truth.iter().zip(nearby).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 // A kink or jump between the two inputs: no derivative to compare.
                 prop_assume!(sensitivity <= 1e-3 * largest(truth) || largest(truth) < 1e-12);
                 // Inputs are of size 1: what cancels leaves their rounding.
                 let bound = 1e-10 * largest(truth) + 1e4 * sensitivity + 1e-12;
-                for (entry, (a, b)) in found.iter().zip(truth).enumerate() {
+                for (entry, ((a, b), c)) in found.iter().zip(truth).zip(by_duals).enumerate() {
                     prop_assert!(
-                        (a - b).abs() <= bound,
-                        "{source}\n{routine} on the path {path:?}, entry {entry}: {a:e}, by dual numbers {b:e}, bound {bound:e}"
+                        (a - b).abs() <= bound && (a - c).abs() <= bound,
+                        "{source}\n{routine} on the path {path:?}, entry {entry}: {a:e}, truly {b:e}, by dual numbers {c:e}, bound {bound:e}"
                     );
                 }
             }
@@ -140,7 +161,7 @@ proptest! {
     })]
 
     #[test]
-    fn compiled_programs_agree_with_dual_numbers(
+    fn compiled_programs_agree_with_dual_numbers_and_with_the_truth(
         formula in (1..4_u32).prop_flat_map(scalar),
         parameters in prop::collection::vec(0.2..1.8_f64, 5),
         x in prop::collection::vec(-1.0..1.0_f64, 9),
