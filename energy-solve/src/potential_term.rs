@@ -7,7 +7,7 @@ use energy_dsl::{
 
 use crate::active::{active_elements, points_of};
 use crate::counts::Tally;
-use crate::curvature::{self, Curvature, Orthonormal, change_dense};
+use crate::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::dofs::DofMap;
 use crate::list::ElementList;
 use crate::pattern::{Pattern, Storage, index};
@@ -104,6 +104,7 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
             places: &self.places,
             orthonormal: self.orthonormal.as_ref(),
             rows: vec![0.0; numbers * BLOCK],
+            numbers: vec![0.0; MOST_NUMBERS * BLOCK],
             flagged: 0,
             projected: 0,
         };
@@ -193,6 +194,8 @@ struct Hessians<'a, 'b> {
     places: &'a Places,
     orthonormal: Option<&'a Orthonormal>,
     rows: Vec<f64>,
+    /// What [`Indefinite`] needs.
+    numbers: Vec<f64>,
     flagged: u64,
     projected: u64,
 }
@@ -206,11 +209,11 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
             && !exact
         {
             let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
-            let vectors = difference_vectors::<E, L>(batch.points.as_ref());
-            let known = E::DECLARATION.reduced_vectors.len().min(vectors.len());
             let hessian = reduced.hessian.as_mut();
-            let changed = curvature::change(hessian, n, self.sum.curvature, orthonormal, &vectors[..known]);
-            self.projected += lanes_in(changed, batch.count);
+            if !is_semi_definite(hessian, n).all() {
+                let changed = self.change_indefinite::<E, L>(orthonormal, hessian, batch.points.as_ref());
+                self.projected += u64::from((changed & (u32::MAX >> (32 - batch.count))).count_ones());
+            }
         }
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
         if self.orthonormal.is_none() && !exact {
@@ -227,6 +230,34 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
 }
 
 impl Hessians<'_, '_> {
+    /// Changes the curvature of Hessians some of which are indefinite; returns as bits which changed.
+    #[inline(always)]
+    fn change_indefinite<E: PackedPotential<f64>, L: Level>(
+        &mut self,
+        orthonormal: &Orthonormal,
+        hessian: &mut [L::F64],
+        points: &[Vector3<L::F64>],
+    ) -> u32 {
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        let vectors = E::DECLARATION.reduced_vectors.len();
+        let known = if vectors <= 2 { difference_vectors::<E, L>(points) } else { [[L::F64::splat(0.0); 3]; 2] };
+        for (number, stored) in hessian.iter().chain(known.as_flattened()).zip(self.numbers.chunks_exact_mut(lanes)) {
+            number.store(stored);
+        }
+        let indefinite = Indefinite {
+            n: 3 * vectors,
+            curvature: self.sum.curvature,
+            orthonormal,
+            vectors: if vectors <= 2 { vectors } else { 0 },
+            numbers: &mut self.numbers,
+        };
+        let changed = indefinite.change(L::NAME);
+        for (number, stored) in hessian.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
+            *number = L::F64::load(stored);
+        }
+        changed
+    }
+
     /// Turns the blocks (i, j) that are stored as (j, i).
     #[inline(always)]
     fn turn<L: Level>(&self, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
@@ -292,10 +323,10 @@ fn add_mirrored(slots: &[u32], triangle: &[[f64; 9]], weight: f64, matrix: &mut 
     }
 }
 
-/// The difference vectors of elements that have one or two; nothing of others.
+/// The one or two difference vectors of an element.
 #[inline(always)]
-fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 3] {
-    let mut vectors = [[L::F64::splat(0.0); 3]; 3];
+fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
+    let mut vectors = [[L::F64::splat(0.0); 3]; 2];
     for (vector, terms) in vectors.iter_mut().zip(E::DECLARATION.reduced_vectors) {
         for &(point, added) in *terms {
             for axis in 0..3 {

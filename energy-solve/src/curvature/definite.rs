@@ -9,7 +9,7 @@ const TOLERANCE: f64 = 64.0 * f64::EPSILON;
 /// Where A + τ I has a factorisation L D Lᵀ with D > 0, so that no eigenvalue of A is below −τ. It costs n³/6 multiplications and n
 /// divisions, a small part of finding eigenvalues.
 #[inline(always)]
-pub(super) fn is_semi_definite<V: Lane<f64>>(upper: &[V], n: usize) -> V::Mask {
+pub(crate) fn is_semi_definite<V: Lane<f64>>(upper: &[V], n: usize) -> V::Mask {
     let zero = V::splat(0.0);
     let mut a = [zero; MOST * (MOST + 1) / 2];
     a[..upper.len()].copy_from_slice(upper);

@@ -10,9 +10,9 @@ mod orthonormal;
 mod planar;
 mod radial;
 
-use energy_dsl::{Lane, Mask};
+use energy_dsl::{Kernel, Lane, Level, LevelName, Mask, dispatch_at};
 
-use definite::is_semi_definite;
+pub(crate) use definite::is_semi_definite;
 pub(crate) use dense::change_dense;
 pub(crate) use orthonormal::Orthonormal;
 
@@ -76,23 +76,64 @@ fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
     products.equal(zero)
 }
 
-/// Changes Hessians of `n` coordinates, one a lane, given as upper triangles by the difference vectors of `orthonormal`; `vectors` are these.
-/// Where there is nothing to change, nothing does, to the bit. Returns which lanes did change.
-///
-/// Matrices that are not finite stay as they are.
+/// The most numbers that describe a Hessian to be changed: its upper triangle, then two difference vectors.
+pub(crate) const MOST_NUMBERS: usize = MOST * (MOST + 1) / 2 + 6;
+
+/// Hessians of `n` coordinates, one a lane, some of them indefinite. It is the same for all elements: compiled once for each level,
+/// and not into the loop over each kind of element.
+#[derive(Debug)]
+pub(crate) struct Indefinite<'a> {
+    pub(crate) n: usize,
+    pub(crate) curvature: Curvature,
+    pub(crate) orthonormal: &'a Orthonormal,
+    /// How many difference vectors there are, if not more than two.
+    pub(crate) vectors: usize,
+    /// Number by number for all lanes: the upper triangles by the difference vectors of `orthonormal`, then these.
+    pub(crate) numbers: &'a mut [f64],
+}
+
+impl Indefinite<'_> {
+    /// Changes the upper triangles. Where there is nothing to change, nothing does, to the bit. Returns as bits which lanes did.
+    /// Matrices that are not finite stay as they are.
+    ///
+    /// `level` is that by whose lanes the numbers are laid out.
+    pub(crate) fn change(self, level: &str) -> u32 {
+        let name = level.parse::<LevelName>().ok();
+        name.and_then(|name| dispatch_at(name, self)).expect("the caller runs at this level")
+    }
+}
+
+impl Kernel for Indefinite<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> u32 {
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        let entries = self.n * (self.n + 1) / 2;
+        let mut numbers = [L::F64::splat(0.0); MOST_NUMBERS];
+        for (number, stored) in numbers.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
+            *number = L::F64::load(stored);
+        }
+        let (upper, vectors) = numbers.split_at_mut(entries);
+        let vectors = vectors.as_chunks::<3>().0;
+        let changed = change(upper, self.n, self.curvature, self.orthonormal, &vectors[..self.vectors]);
+        for (number, stored) in upper.iter().zip(self.numbers.chunks_exact_mut(lanes)) {
+            number.store(stored);
+        }
+        changed.bits()
+    }
+}
+
 #[inline(always)]
-pub(crate) fn change<V: Lane<f64>>(
+fn change<V: Lane<f64>>(
     upper: &mut [V],
     n: usize,
     curvature: Curvature,
     orthonormal: &Orthonormal,
     vectors: &[[V; 3]],
 ) -> V::Mask {
-    let definite = is_semi_definite(upper, n);
-    if definite.all() {
-        return V::Mask::none();
-    }
-    let open = !definite & are_finite(upper);
+    let mut open = !is_semi_definite(upper, n) & are_finite(upper);
+    let mut changed = V::Mask::none();
     match vectors {
         [vector] => {
             let (radial, with_change) = radial::change(upper, curvature, *vector);
@@ -100,14 +141,17 @@ pub(crate) fn change<V: Lane<f64>>(
             for entry in 0..6 {
                 upper[entry] = V::select(chosen, with_change[entry], upper[entry]);
             }
-            chosen | change_rest(upper, n, curvature, orthonormal, open & !radial)
+            changed = chosen;
+            open = open & !radial;
         }
         [first, second] => {
-            let (planar, changed) = planar::change(upper, curvature, orthonormal, [*first, *second], open);
-            changed | change_rest(upper, n, curvature, orthonormal, open & !planar)
+            let (planar, also) = planar::change(upper, curvature, orthonormal, [*first, *second], open);
+            changed = also;
+            open = open & !planar;
         }
-        _ => change_rest(upper, n, curvature, orthonormal, open),
+        _ => {}
     }
+    changed | change_rest(upper, n, curvature, orthonormal, open)
 }
 
 /// [`change`] without knowledge of any structure.
