@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
@@ -11,7 +11,8 @@ use cloth_core::bench::{self, Cloth};
 use cloth_core::output::{OutputFolder, animation_glb, obj_text, picture_png};
 use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
-use cloth_core::{Simulation, demo, materials};
+use cloth_core::fabric::MEASURED;
+use cloth_core::{Simulation, demo, materials, trajectory_error};
 use energy_dsl::Vector3;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -82,6 +83,18 @@ enum Command {
         /// How long is simulated, in s. Default: 1, and 0.3 from 129 vertices a side.
         #[arg(long)]
         seconds: Option<f64>,
+        /// Compares integrators instead: time against error of the trajectory, for steps from 16 to 0.5 ms.
+        #[arg(long)]
+        error: bool,
+        /// With --error: where the figures go as CSV, Markdown and SVG.
+        #[arg(short, long, requires = "error")]
+        output: Option<PathBuf>,
+    },
+    /// Prints fabrics that were measured, as tables for scene files, with their sources.
+    Fabrics {
+        /// `denim`, `interlock`, `ribbon` or `dots`; all if none is named.
+        #[arg(value_parser = clap::builder::PossibleValuesParser::new(MEASURED.map(|fabric| fabric.name)))]
+        names: Vec<String>,
     },
 }
 
@@ -151,7 +164,15 @@ fn main() -> Result<()> {
                 Ok(())
             })
         }
-        Command::Bench { sizes, cloth, seconds } => {
+        Command::Fabrics { names } => {
+            let wanted = MEASURED.iter().filter(|fabric| names.is_empty() || names.iter().any(|name| name == fabric.name));
+            print(&wanted.map(|fabric| fabric.table).collect::<Vec<_>>().join("\n"))
+        }
+        Command::Bench { cloth, error: true, output, .. } => {
+            let cloths = if cloth.is_empty() { vec![Cloth::Soft] } else { cloth };
+            cloths.into_iter().try_for_each(|cloth| compare(cloth, output.as_deref()))
+        }
+        Command::Bench { sizes, cloth, seconds, .. } => {
             let cloths = if cloth.is_empty() { Cloth::ALL.to_vec() } else { cloth };
             let mut runs = Vec::new();
             for cloth in cloths {
@@ -165,6 +186,31 @@ fn main() -> Result<()> {
             print(&format!("{}\n", bench::table(&runs)))
         }
     }
+}
+
+/// Compares the integrators, prints the table, and writes it.
+fn compare(cloth: Cloth, output: Option<&Path>) -> Result<()> {
+    let progress = progress_bar(42);
+    let runs = trajectory_error::compare(cloth, || progress.inc(1))?;
+    progress.finish_and_clear();
+    let table = trajectory_error::markdown(&runs);
+    print(&format!("{} cloth\n\n{table}\n", cloth.name()))?;
+    if let Some(path) = output {
+        std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        let picture = trajectory_error::svg(&runs).map_err(anyhow::Error::msg)?;
+        for (extension, text) in [("csv", trajectory_error::csv(&runs)), ("md", table), ("svg", picture)] {
+            write_whole(&path.join(format!("{}-error.{extension}", cloth.name())), &text)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes a file that appears under its name only once it is complete.
+fn write_whole(path: &Path, text: &str) -> Result<()> {
+    let part = path.with_extension("part");
+    std::fs::write(&part, text)
+        .and_then(|()| std::fs::rename(&part, path))
+        .with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Simulates to the end and writes everything.

@@ -24,6 +24,7 @@ use energy_solve::{EvaluationError, ListError, SystemError};
 pub use cantilever::Cantilever;
 pub use elastica::Elastica;
 pub use lateral_buckling::LateralBuckling;
+pub(crate) use orders::runge_kutta;
 pub use strip::{MeshKind, Strip};
 
 use crate::fabric::FabricError;
