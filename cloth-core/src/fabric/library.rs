@@ -40,4 +40,14 @@ mod tests {
             assert!(d[0][0] > 1e-5 && d[2][2] > 1e-6, "{}: {d:?}", fabric.name);
         }
     }
+
+    #[test]
+    fn the_strip_of_denim_is_that_of_the_table() {
+        let scene = Scene::parse(include_str!("../../../scenes/strip.toml"), "strip.toml".as_ref()).unwrap();
+        let denim = MEASURED[0].table.split("[fabric]").nth(1).unwrap();
+        let Material::Stvk(membrane) = &scene.fabric.material else { panic!("another material") };
+        let Bending::Plate(crate::fabric::Rigidity::Orthotropic { warp, .. }) = membrane.bending else { panic!("no plate") };
+        assert!(denim.contains("density = 0.324") && scene.fabric.density == 0.324 && (warp - 64.196_457e-6).abs() < 1e-15);
+        assert!(scene.adaptive);
+    }
 }

@@ -53,7 +53,7 @@ impl Cantilever {
         let surroundings = Surroundings { gravity: [0.0, 0.0, -1.0], drag: 0.0 };
         let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;
         let rest = mesh.vertices();
-        let clamped: Vec<bool> = rest.iter().map(|p| p[0] < 1.5 * spacing).collect();
+        let clamped: Vec<bool> = rest.iter().map(|p| p[0] < 1.2 * spacing).collect();
         let system = System::new(garment.terms, &clamped)?;
         let shape = Elastica::new(self.gamma);
         let start = rest.iter().zip(&clamped).map(|(p, &clamped)| {

@@ -13,7 +13,7 @@ pub struct Elastica {
 }
 
 /// Steps of the classical Runge–Kutta method along the strip.
-const STEPS: usize = 4000;
+const STEPS: usize = 1000;
 
 impl Elastica {
     /// The shape for Γ > 0.
@@ -29,7 +29,7 @@ impl Elastica {
         let clamped = |logarithm: f64| shoot(gamma, logarithm.exp(), |_, _| {}) - FRAC_PI_2;
         // δ(0) grows with δ(1).
         let (mut low, mut high) = (-2.0 * gamma.sqrt() - 10.0, FRAC_PI_2.ln());
-        for _ in 0..200 {
+        for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if clamped(middle) > 0.0 { high = middle } else { low = middle }
         }
@@ -63,15 +63,20 @@ impl Elastica {
     /// The Γ whose strip hangs with that H/W.
     #[must_use]
     pub fn fit(drop_over_reach: f64) -> f64 {
-        let (mut low, mut high) = ((1e-4_f64).ln(), (1e5_f64).ln());
-        for _ in 0..60 {
-            let middle: f64 = 0.5 * (low + high);
-            if Self::new(middle.exp()).drop_over_reach() > drop_over_reach { high = middle } else { low = middle }
-            if high - low < 1e-9 {
+        // By secants: ln H/W grows with ln Γ, nearly straight on, with slopes from ½ to 1.
+        let miss = |logarithm: f64| (Self::new(logarithm.exp()).drop_over_reach() / drop_over_reach).ln();
+        let mut last = (8.0 * drop_over_reach).ln();
+        let mut off = miss(last);
+        let mut here = last - off;
+        for _ in 0..40 {
+            let next = miss(here);
+            if (here - last).abs() < 1e-11 || next == off {
                 break;
             }
+            let slope = ((next - off) / (here - last)).clamp(0.3, 1.2);
+            (last, off, here) = (here, next, here - next / slope);
         }
-        (0.5 * (low + high)).exp()
+        here.exp()
     }
 }
 

@@ -32,7 +32,7 @@ impl Equilibrium {
     /// The nearest equilibrium from `start`: Newton's method on the energy with a direct solver, with the exact Hessian where it is positive
     /// definite, else with each element's clamped, and a line search. `along` is the direction in which the mesh is long.
     pub fn find(
-        mut system: System,
+        system: System,
         start: Vec<Vector3<f64>>,
         masses: Vec<f64>,
         weight: f64,

@@ -65,7 +65,7 @@ impl LateralBuckling {
         let surroundings = Surroundings { gravity: [0.0, -1.0, 0.0], drag: 0.0 };
         let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;
         let rest = mesh.vertices();
-        let clamped: Vec<bool> = rest.iter().map(|p| p[0] < 1.5 * spacing).collect();
+        let clamped: Vec<bool> = rest.iter().map(|p| p[0] < 1.2 * spacing).collect();
         let system = System::new(garment.terms, &clamped)?;
         let start = rest.to_vec();
         let found = Equilibrium::find(system, start, garment.masses, self.aspect, |vertex| rest[vertex][0])?;

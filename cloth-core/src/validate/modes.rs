@@ -52,7 +52,7 @@ fn strip(bending: Bending, gravity: f64, clamped: bool, segments: usize) -> Resu
     let surroundings = Surroundings { gravity: [gravity, 0.0, 0.0], drag: 0.0 };
     let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;
     let rest = mesh.vertices();
-    let reach = if clamped { 1.5 * spacing } else { 1e-9 };
+    let reach = if clamped { 1.2 * spacing } else { 1e-9 };
     let held: Vec<bool> = rest.iter().map(|p| p[0] < reach).collect();
     let system = System::new(garment.terms, &held)?;
     let start = rest.iter().map(|p| [p[0] + gravity / MEMBRANE * p[0] * (1.0 - 0.5 * p[0]), p[1], 0.0]).collect();
