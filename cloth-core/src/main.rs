@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use cloth_core::bench::{self, Cloth};
+use cloth_core::fabric::MEASURED;
 use cloth_core::output::{OutputFolder, animation_glb, obj_text, picture_png};
 use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
-use cloth_core::fabric::MEASURED;
 use cloth_core::{Simulation, demo, materials, trajectory_error};
 use energy_dsl::Vector3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -165,7 +165,8 @@ fn main() -> Result<()> {
             })
         }
         Command::Fabrics { names } => {
-            let wanted = MEASURED.iter().filter(|fabric| names.is_empty() || names.iter().any(|name| name == fabric.name));
+            let wanted =
+                MEASURED.iter().filter(|fabric| names.is_empty() || names.iter().any(|name| name == fabric.name));
             print(&wanted.map(|fabric| fabric.table).collect::<Vec<_>>().join("\n"))
         }
         Command::Bench { cloth, error: true, output, .. } => {

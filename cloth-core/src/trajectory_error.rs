@@ -88,7 +88,8 @@ pub fn csv(runs: &[Run]) -> String {
     let mut text = "integrator,dt_s,wall_s,error_m,order,failure\n".to_owned();
     for run in runs {
         let error = run.error.as_ref().map_or(String::new(), |error| format!("{error:.6e}"));
-        let failure = run.error.as_ref().err().map_or(String::new(), |error| error.to_string().replace(['"', '\n'], " "));
+        let failure =
+            run.error.as_ref().err().map_or(String::new(), |error| error.to_string().replace(['"', '\n'], " "));
         let order = run.order.map_or(String::new(), |order| format!("{order:.3}"));
         writeln!(text, "{},{},{:.6},{error},{order},\"{failure}\"", run.integrator, run.dt, run.wall)
             .expect("writing to a string succeeds");
@@ -129,7 +130,8 @@ pub fn svg(runs: &[Run]) -> Result<String, String> {
 
 fn draw(text: &mut String, points: &[(&'static str, f64, f64)]) -> Result<(), Box<dyn std::error::Error>> {
     let range = |of: fn(&(&'static str, f64, f64)) -> f64| {
-        let (low, high) = points.iter().map(of).fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) =
+            points.iter().map(of).fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
         (0.7 * low..1.4 * high).log_scale()
     };
     let area = SVGBackend::with_string(text, (800, 500)).into_drawing_area();

@@ -89,12 +89,13 @@ fn on_a_lattice_it_is_the_declared_element() {
     let topology = Topology::of(&mesh);
     let one = &curvatures(&mesh, &topology, None).unwrap()[0];
     let angles = angles(&topology, &bent);
-    let kappa: [f64; 3] =
-        std::array::from_fn(|k| one.angles.iter().map(|(hinge, b)| b[k] * angles[*hinge]).sum());
+    let kappa: [f64; 3] = std::array::from_fn(|k| one.angles.iter().map(|(hinge, b)| b[k] * angles[*hinge]).sum());
     let (rigidity, nu) = (2.0, 0.3);
     let d = Rigidity::Flexural { rigidity, poisson_ratio: nu }.matrix().unwrap();
-    let energy: f64 =
-        (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| 0.5 * one.area * kappa[i] * d[i][j] * kappa[j]).sum();
+    let energy: f64 = (0..3)
+        .flat_map(|i| (0..3).map(move |j| (i, j)))
+        .map(|(i, j)| 0.5 * one.area * kappa[i] * d[i][j] * kappa[j])
+        .sum();
     // x₀ x₁ x₂, then the corners across from each.
     let order = [0, 1, 2, 3, 4, 5];
     let [x0, x1, x2, y0, y1, y2] = order.map(|vertex| rest[vertex]);
@@ -159,7 +160,8 @@ fn forces_and_hessians_are_derivatives_of_the_energy() {
         options.curvature = Curvature::Clamped;
         system.linearise(State { x: &x, v: &still }, options, &mut matrix).unwrap();
         matrix.multiply(&system.dofs().gather(&moving), &mut whole);
-        let quadratic: f64 = free.iter().zip(&whole).map(|(&i, f)| (0..3).map(|k| f[k] * moving[i][k]).sum::<f64>()).sum();
+        let quadratic: f64 =
+            free.iter().zip(&whole).map(|(&i, f)| (0..3).map(|k| f[k] * moving[i][k]).sum::<f64>()).sum();
         assert!(quadratic < 0.0);
     }
 }
@@ -176,7 +178,8 @@ fn a_creased_sheet_is_at_rest_in_its_own_shape() {
 #[test]
 fn a_warp_across_the_cloth_is_refused() {
     let (mesh, _) = star();
-    let flat = TriangleMesh::new(mesh.vertices().iter().map(|p| [p[0], p[1], 0.0]).collect(), mesh.triangles().to_vec());
+    let flat =
+        TriangleMesh::new(mesh.vertices().iter().map(|p| [p[0], p[1], 0.0]).collect(), mesh.triangles().to_vec());
     let error = PlateTerm::new("bending", &flat.unwrap(), &WOVEN, [0.0, 0.0, 1.0]).unwrap_err();
     assert_eq!(
         error.to_string(),

@@ -9,8 +9,8 @@ use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::mesh::{
-    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm, rest_angle, subtract,
-    thread_triangle,
+    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm,
+    rest_angle, subtract, thread_triangle,
 };
 
 /// A fabric that cannot be laid on a mesh.
@@ -103,7 +103,8 @@ pub fn terms(
         }
         Material::Arap(material) => {
             let mu = material.stretch_stiffness;
-            garment.add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
+            garment
+                .add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
             ((0.0, 0.5 * mu), &material.bending)
         }
         Material::BaraffWitkin(material) => {

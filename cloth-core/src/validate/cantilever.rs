@@ -47,8 +47,7 @@ impl Cantilever {
         };
         let mesh = strip.mesh()?;
         let plate = Rigidity::Flexural { rigidity: 1.0 / self.gamma, poisson_ratio: self.poisson_ratio };
-        let membrane =
-            Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: 0.0, bending: Bending::Plate(plate) };
+        let membrane = Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: 0.0, bending: Bending::Plate(plate) };
         let fabric = Fabric::new(1.0, Material::Stvk(membrane));
         let surroundings = Surroundings { gravity: [0.0, 0.0, -1.0], drag: 0.0 };
         let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;
@@ -123,8 +122,14 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
 fn order() -> Result<Finding, ValidateError> {
     let error = |segments: usize| -> Result<f64, ValidateError> {
         let aspect = 0.1;
-        let case =
-            Cantilever { gamma: 20.0, poisson_ratio: 0.0, aspect, mesh: MeshKind::Diagonal, orientation: 0.0, segments };
+        let case = Cantilever {
+            gamma: 20.0,
+            poisson_ratio: 0.0,
+            aspect,
+            mesh: MeshKind::Diagonal,
+            orientation: 0.0,
+            segments,
+        };
         case.fit()
     };
     let [coarse, middle, fine] = [error(20)?, error(40)?, error(80)?];

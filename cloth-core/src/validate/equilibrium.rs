@@ -1,7 +1,5 @@
 use energy_dsl::Vector3;
-use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, State, System, Weights, dot,
-};
+use energy_solve::{BlockMatrix, Curvature, EvaluationError, LinearisationOptions, State, System, Weights, dot};
 
 use super::ValidateError;
 use super::banded::Banded;

@@ -2,9 +2,7 @@ use super::equilibrium::Equilibrium;
 use super::special::zero_between;
 use super::strip::{MeshKind, Strip};
 use super::{Finding, ValidateError};
-use crate::fabric::{
-    self, Arap, BaraffWitkin, Bending, Fabric, Material, Membrane, Surroundings, Woven,
-};
+use crate::fabric::{self, Arap, BaraffWitkin, Bending, Fabric, Material, Membrane, Surroundings, Woven};
 use crate::mesh::SpringNetwork;
 use energy_solve::System;
 
@@ -22,8 +20,7 @@ struct Sample {
 const STIFFNESS: f64 = 10.0;
 
 fn samples() -> Vec<Sample> {
-    let membrane =
-        |poisson_ratio| Membrane { stretch_stiffness: STIFFNESS, poisson_ratio, bending: Bending::None };
+    let membrane = |poisson_ratio| Membrane { stretch_stiffness: STIFFNESS, poisson_ratio, bending: Bending::None };
     let stvk: Density = |lambda, mu, a, b| {
         let (e, f) = (0.5 * (a * a - 1.0), 0.5 * (b * b - 1.0));
         mu * (e * e + f * f) + 0.5 * lambda * (e + f).powi(2)
@@ -115,8 +112,7 @@ fn measured(material: Material, segments: usize) -> Result<f64, ValidateError> {
     // Stretched a little, so that it is in tension from the start.
     let start = rest.iter().map(|p| [p[0] + 0.1 * (p[0] - 0.5 * p[0] * p[0]), p[1], 0.0]);
     let found = Equilibrium::find(system, start.collect(), garment.masses, strip.width, |vertex| rest[vertex][0])?;
-    let end: Vec<f64> =
-        rest.iter().zip(&found.x).filter(|(p, _)| p[0] > 1.0 - 1e-9).map(|(_, x)| x[0] - 1.0).collect();
+    let end: Vec<f64> = rest.iter().zip(&found.x).filter(|(p, _)| p[0] > 1.0 - 1e-9).map(|(_, x)| x[0] - 1.0).collect();
     Ok(end.iter().sum::<f64>() / end.len() as f64)
 }
 

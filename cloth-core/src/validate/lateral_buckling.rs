@@ -56,11 +56,8 @@ impl LateralBuckling {
         let mesh = strip.mesh()?;
         // The weight is the same for all, and the plate gets softer.
         let plate = Rigidity::Flexural { rigidity: 1.0 / gamma, poisson_ratio: self.poisson_ratio };
-        let membrane = Membrane {
-            stretch_stiffness: MEMBRANE,
-            poisson_ratio: self.poisson_ratio,
-            bending: Bending::Plate(plate),
-        };
+        let membrane =
+            Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: self.poisson_ratio, bending: Bending::Plate(plate) };
         let fabric = Fabric::new(1.0, Material::Stvk(membrane));
         let surroundings = Surroundings { gravity: [0.0, -1.0, 0.0], drag: 0.0 };
         let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;

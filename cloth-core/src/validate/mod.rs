@@ -96,7 +96,9 @@ pub enum ValidateError {
         area: f64,
     },
     /// No equilibrium was found.
-    #[error("no equilibrium: a vertex still feels {force:.2e} N, of {weight:.2e} N in all; try more segments or a smaller load")]
+    #[error(
+        "no equilibrium: a vertex still feels {force:.2e} N, of {weight:.2e} N in all; try more segments or a smaller load"
+    )]
     NoEquilibrium {
         /// The largest force left, in N.
         force: f64,
@@ -114,8 +116,7 @@ pub enum ValidateError {
 }
 
 /// The questions.
-pub const QUESTIONS: [&str; 7] =
-    ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum"];
+pub const QUESTIONS: [&str; 7] = ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum"];
 
 /// Asks the questions named (all, if none is), telling each finding as it is made. `quick` leaves out the finer meshes.
 ///
@@ -147,7 +148,10 @@ pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Res
 /// The head of the table that [`line`] makes.
 #[must_use]
 pub fn head() -> String {
-    format!("{:<18} {:<46} {:>15} {:>15} {:>10} {:>8}  verdict", "question", "case", "measured", "exact", "error", "limit")
+    format!(
+        "{:<18} {:<46} {:>15} {:>15} {:>10} {:>8}  verdict",
+        "question", "case", "measured", "exact", "error", "limit"
+    )
 }
 
 /// One finding as a line.

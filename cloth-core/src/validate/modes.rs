@@ -45,10 +45,8 @@ fn strip(bending: Bending, gravity: f64, clamped: bool, segments: usize) -> Resu
     let width = 4.0 * spacing;
     let shape = Strip { kind: MeshKind::Diagonal, orientation: 0.0, length, width, spacing, clamped };
     let mesh = shape.mesh()?;
-    let fabric = Fabric::new(
-        1.0,
-        Material::Stvk(Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: 0.0, bending }),
-    );
+    let fabric =
+        Fabric::new(1.0, Material::Stvk(Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: 0.0, bending }));
     let surroundings = Surroundings { gravity: [gravity, 0.0, 0.0], drag: 0.0 };
     let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;
     let rest = mesh.vertices();

@@ -157,9 +157,12 @@ impl Strip {
             let find = |right: i64, up: i64| {
                 corners.iter().copied().find(|&vertex| cell(vertex) == Some([low[0] + right, low[1] + up]))
             };
-            let (Some(a), Some(b), Some(c), Some(d)) = (find(0, 0), find(1, 0), find(1, 1), find(0, 1)) else { continue };
+            let (Some(a), Some(b), Some(c), Some(d)) = (find(0, 0), find(1, 0), find(1, 1), find(0, 1)) else {
+                continue;
+            };
             let turned = self.kind == MeshKind::Alternating && (low[0] + low[1]).rem_euclid(2) == 1;
-            [triangles[first], triangles[second]] = if turned { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] };
+            [triangles[first], triangles[second]] =
+                if turned { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] };
         }
     }
 }

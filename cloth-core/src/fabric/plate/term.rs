@@ -1,6 +1,5 @@
 use energy_dsl::{
-    Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3,
-    for_each_batch,
+    Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, for_each_batch,
 };
 use energy_elements::HingeAngle;
 use energy_solve::{
@@ -305,10 +304,12 @@ impl Term for PlateTerm {
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
         let is_free = |&vertex: &usize| dofs.place(vertex).is_some();
-        self.active = (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
+        self.active =
+            (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let index = |number: usize| u32::try_from(number).expect("fewer than 2³² vertices and blocks");
         let angle = HingeAngle::new();
-        self.packed = Packed::from_fn(self.hinges.len(), 4, |_| &angle, |hinge, point| index(self.hinges[hinge][point]));
+        self.packed =
+            Packed::from_fn(self.hinges.len(), 4, |_| &angle, |hinge, point| index(self.hinges[hinge][point]));
         self.hinge_rows = self.hinges.iter().map(|hinge| hinge.map(|vertex| dofs.place(vertex))).collect();
         let slot = |i: usize, j: usize| {
             let rows = dofs.place(i).zip(dofs.place(j));
@@ -317,7 +318,8 @@ impl Term for PlateTerm {
         self.places.clear();
         for &patch in &self.active {
             let vertices = &self.patches[patch].vertices;
-            let pairs = || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
+            let pairs =
+                || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
             // Vertices ascend, and so do their rows: no block of the upper triangle is turned.
             let slots = pairs().map(|(i, j)| slot(i, j)).collect();
             let mirrored = match pattern.storage() {
@@ -376,7 +378,8 @@ impl Term for PlateTerm {
     fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
         let angles = self.angles(state.x);
         let is_finite = |patch: &Patch| {
-            let finite = |angle: &Angle| angles.gradients[12 * angle.hinge..][..12].iter().all(|number| number.is_finite());
+            let finite =
+                |angle: &Angle| angles.gradients[12 * angle.hinge..][..12].iter().all(|number| number.is_finite());
             patch.residual(&angles.values).iter().all(|number| number.is_finite()) && patch.angles.iter().all(finite)
         };
         self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))
@@ -398,7 +401,9 @@ fn add_outer_products(rows: &[[Vector3<f64>; 3]], weight: f64, places: &PatchPla
                 }
             }
             add_scaled(&mut matrix[places.slots[pair] as usize], weight, &block, false);
-            if i != j && let Some(&slot) = mirrored.next() {
+            if i != j
+                && let Some(&slot) = mirrored.next()
+            {
                 add_scaled(&mut matrix[slot as usize], weight, &block, true);
             }
             pair += 1;

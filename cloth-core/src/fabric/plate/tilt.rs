@@ -175,13 +175,13 @@ impl Side {
         // t is n turned to the left: the triangle lies to the left of its side.
         let (n, m) = (angle.cos(), angle.sin());
         let [tau, eta] = self.apex;
-        let [tt, tn, nn] = [
-            0.5 * (tau * tau - 0.25 * self.length * self.length) / eta,
-            -tau,
-            0.5 * eta,
-        ];
+        let [tt, tn, nn] = [0.5 * (tau * tau - 0.25 * self.length * self.length) / eta, -tau, 0.5 * eta];
         // H_tt, H_tn and H_nn with t = (−m, n).
-        [tt * m * m - tn * n * m + nn * n * n, tt * n * n + tn * n * m + nn * m * m, -tt * n * m + 0.5 * tn * (n * n - m * m) + nn * n * m]
+        [
+            tt * m * m - tn * n * m + nn * n * n,
+            tt * n * n + tn * n * m + nn * m * m,
+            -tt * n * m + 0.5 * tn * (n * n - m * m) + nn * n * m,
+        ]
     }
 }
 
