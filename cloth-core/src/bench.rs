@@ -39,7 +39,7 @@ impl Cloth {
             Self::Cotton => (0.1503, 261.0, 0.243, 1.56e-6),
         };
         let bending = Bending::Flat { stiffness };
-        Fabric { density, material: Material::NeoHookean(Membrane { stretch_stiffness, poisson_ratio, bending }) }
+        Fabric::new(density, Material::NeoHookean(Membrane { stretch_stiffness, poisson_ratio, bending }))
     }
 }
 

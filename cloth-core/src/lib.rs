@@ -45,6 +45,8 @@ pub mod materials;
 pub mod mesh;
 pub mod output;
 pub mod scene;
+pub mod trajectory_error;
+pub mod validate;
 
 pub use body::Body;
 pub use simulation::{Simulation, SimulationError};

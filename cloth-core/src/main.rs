@@ -3,14 +3,16 @@
 #![forbid(unsafe_code)]
 
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use cloth_core::bench::{self, Cloth};
+use cloth_core::fabric::MEASURED;
 use cloth_core::output::{OutputFolder, animation_glb, obj_text, picture_png};
 use cloth_core::scene::Scene;
-use cloth_core::{Simulation, demo, materials};
+use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
+use cloth_core::{Simulation, demo, materials, trajectory_error};
 use energy_dsl::Vector3;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -43,6 +45,33 @@ enum Command {
     },
     /// Lists the declared elements: formula, parameters with units, operations per routine.
     Materials,
+    /// Compares with known answers: what theory says exactly about strips, sheets and motions. Exit status 1 when one is missed.
+    Validate {
+        /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `orders`, `momentum`; all if none is named.
+        #[arg(value_parser = clap::builder::PossibleValuesParser::new(validate::QUESTIONS))]
+        questions: Vec<String>,
+        /// Coarser meshes and fewer cases: a few seconds.
+        #[arg(long)]
+        quick: bool,
+        /// A cantilever or, with `buckling`, a strip on edge of your own: Γ = σ g L³/D of the cantilever.
+        #[arg(long, value_parser = positive)]
+        gamma: Option<f64>,
+        /// Poisson's ratio of the plate.
+        #[arg(long, value_parser = ratio)]
+        nu: Option<f64>,
+        /// Width over length.
+        #[arg(long, value_parser = positive)]
+        aspect: Option<f64>,
+        /// The mesh.
+        #[arg(long)]
+        mesh: Option<MeshKind>,
+        /// The angle of the mesh to the strip, in degrees.
+        #[arg(long, allow_negative_numbers = true)]
+        orientation: Option<f64>,
+        /// Edges along the strip.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(4..))]
+        segments: Option<u16>,
+    },
     /// Times a square metre of cloth hung by two corners, implicit Euler by Newton's method, steps of 10 ms, on one thread.
     Bench {
         /// Vertices along each side.
@@ -54,11 +83,46 @@ enum Command {
         /// How long is simulated, in s. Default: 1, and 0.3 from 129 vertices a side.
         #[arg(long)]
         seconds: Option<f64>,
+        /// Compares integrators instead: time against error of the trajectory, for steps from 16 to 0.5 ms.
+        #[arg(long)]
+        error: bool,
+        /// With --error: where the figures go as CSV, Markdown and SVG.
+        #[arg(short, long, requires = "error")]
+        output: Option<PathBuf>,
     },
+    /// Prints fabrics that were measured, as tables for scene files, with their sources.
+    Fabrics {
+        /// `denim`, `interlock`, `ribbon` or `dots`; all if none is named.
+        #[arg(value_parser = clap::builder::PossibleValuesParser::new(MEASURED.map(|fabric| fabric.name)))]
+        names: Vec<String>,
+    },
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "it is a number above 0".to_owned())
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.abs() < 1.0).ok_or_else(|| "it is a number between −1 and 1".to_owned())
 }
 
 fn cloth_named(name: &str) -> Result<Cloth, String> {
     Cloth::ALL.into_iter().find(|cloth| cloth.name() == name).ok_or_else(|| "it is soft or cotton".to_owned())
+}
+
+/// Prints findings as they are made; an error when one is missed.
+fn validate(ask: impl FnOnce(&mut dyn FnMut(&Finding)) -> Result<(), ValidateError>) -> Result<()> {
+    print(&format!("{}\n", validate::head()))?;
+    let (mut missed, mut all) = (0, 0);
+    ask(&mut |finding| {
+        all += 1;
+        missed += usize::from(!finding.passed());
+        // A reader that has seen enough is no reason to stop.
+        let _ = print(&format!("{}\n", validate::line(finding)));
+    })?;
+    print(&format!("{} of {all} answers within their limits\n", all - missed))?;
+    anyhow::ensure!(missed == 0, "{missed} of {all} answers are outside their limits");
+    Ok(())
 }
 
 fn main() -> Result<()> {
@@ -77,7 +141,39 @@ fn main() -> Result<()> {
             run(simulation, &scene, &folder)
         }
         Command::Materials => print(&materials::listing()),
-        Command::Bench { sizes, cloth, seconds } => {
+        Command::Validate { questions, quick, gamma, nu, aspect, mesh, orientation, segments } => {
+            let own = gamma.is_some()
+                || nu.is_some()
+                || aspect.is_some()
+                || mesh.is_some()
+                || orientation.is_some()
+                || segments.is_some();
+            if !own {
+                return validate(|tell| validate::ask(&questions, quick, tell).map(|_| ()));
+            }
+            let (poisson_ratio, aspect) = (nu.unwrap_or(0.0), aspect.unwrap_or(0.1));
+            let (mesh, orientation) = (mesh.unwrap_or(MeshKind::Diagonal), orientation.unwrap_or(0.0));
+            let segments = usize::from(segments.unwrap_or(if quick { 40 } else { 80 }));
+            validate(|tell| {
+                if questions.iter().any(|question| question == "buckling") {
+                    tell(&LateralBuckling { poisson_ratio, aspect, mesh, orientation, segments }.ask()?);
+                } else {
+                    let gamma = gamma.unwrap_or(1.0);
+                    tell(&Cantilever { gamma, poisson_ratio, aspect, mesh, orientation, segments }.ask()?);
+                }
+                Ok(())
+            })
+        }
+        Command::Fabrics { names } => {
+            let wanted =
+                MEASURED.iter().filter(|fabric| names.is_empty() || names.iter().any(|name| name == fabric.name));
+            print(&wanted.map(|fabric| fabric.table).collect::<Vec<_>>().join("\n"))
+        }
+        Command::Bench { cloth, error: true, output, .. } => {
+            let cloths = if cloth.is_empty() { vec![Cloth::Soft] } else { cloth };
+            cloths.into_iter().try_for_each(|cloth| compare(cloth, output.as_deref()))
+        }
+        Command::Bench { sizes, cloth, seconds, .. } => {
             let cloths = if cloth.is_empty() { Cloth::ALL.to_vec() } else { cloth };
             let mut runs = Vec::new();
             for cloth in cloths {
@@ -91,6 +187,31 @@ fn main() -> Result<()> {
             print(&format!("{}\n", bench::table(&runs)))
         }
     }
+}
+
+/// Compares the integrators, prints the table, and writes it.
+fn compare(cloth: Cloth, output: Option<&Path>) -> Result<()> {
+    let progress = progress_bar(42);
+    let runs = trajectory_error::compare(cloth, || progress.inc(1))?;
+    progress.finish_and_clear();
+    let table = trajectory_error::markdown(&runs);
+    print(&format!("{} cloth\n\n{table}\n", cloth.name()))?;
+    if let Some(path) = output {
+        std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        let picture = trajectory_error::svg(&runs).map_err(anyhow::Error::msg)?;
+        for (extension, text) in [("csv", trajectory_error::csv(&runs)), ("md", table), ("svg", picture)] {
+            write_whole(&path.join(format!("{}-error.{extension}", cloth.name())), &text)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes a file that appears under its name only once it is complete.
+fn write_whole(path: &Path, text: &str) -> Result<()> {
+    let part = path.with_extension("part");
+    std::fs::write(&part, text)
+        .and_then(|()| std::fs::rename(&part, path))
+        .with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Simulates to the end and writes everything.

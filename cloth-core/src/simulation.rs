@@ -63,7 +63,7 @@ impl Simulation {
         let garment = fabric::terms(&scene.fabric, &mesh, &springs, &surroundings)?;
         let system = System::new(garment.terms, &pinned)?;
         let mut body = Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system };
-        let integrator = scene.integrator.integrator();
+        let integrator = scene.stepper();
         let mut summary = Summary { left_out: garment.left_out, integrator: integrator.name(), ..Summary::default() };
         summary.vertices = pinned.len();
         summary.pinned = pinned.iter().filter(|&&pinned| pinned).count();

@@ -38,16 +38,21 @@ elements! {
     hinge_angle: HingeAngle;
     hinge_cos: HingeCos;
     hinge_cos_half: HingeCosHalf;
+    hinge_damping: HingeDamping;
     hinge_sin_half: HingeSinHalf;
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
     ipc_barrier: DistanceBarrier;
     ipc_barrier_squared: SquaredDistanceBarrier;
     neo_hookean_log: NeoHookean, StableNeoHookeanLog;
+    orthotropic_stvk: OrthotropicStVK;
+    plate_bending: PlateBending;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
     spring: Spring;
     stable_neo_hookean: StableNeoHookean;
+    strain_rate_damping: StrainRateDamping;
     stvk: StVK;
+    thread_limit: ThreadLimit;
     tracking: BlendedMotion4, BlendedPoint1, BlendedPoint4, BlendedPoint8, Binding, BoneBinding, FrozenPlane1, FrozenPlane4,
         FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane, SkeletonPlane,
         SkeletonPoint, TukeyLoss, TwistMotion;

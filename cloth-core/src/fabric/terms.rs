@@ -1,13 +1,16 @@
 use energy_dsl::{ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
-    BridsonBending, BridsonForce, BridsonForceDamped, FlatBending, Gravity, HookeSpring, NeoHookean, Spring, StVK,
-    ViscousDrag,
+    AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, BridsonForce, BridsonForceDamped,
+    FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
+    StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
-use super::{Bending, Fabric, MassSpring, Material, Membrane};
+use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
+use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::mesh::{
-    Hinge, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm, rest_angle, subtract,
+    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm,
+    rest_angle, subtract, thread_triangle,
 };
 
 /// A fabric that cannot be laid on a mesh.
@@ -28,6 +31,21 @@ pub enum FabricError {
         vertices: [usize; 4],
         /// What is wrong.
         source: RestError,
+    },
+    /// The plate.
+    #[error("bending: {0}")]
+    Plate(#[from] PlateError),
+    /// The stiffnesses of woven cloth.
+    #[error("material.orthotropic-stvk: {0}")]
+    Woven(#[from] RigidityError),
+    /// The directions of the threads.
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
+    /// A limit that is met at rest.
+    #[error("strain_limit.stretch must be above 1, the length at rest; it is {stretch}")]
+    Limit {
+        /// As given.
+        stretch: f64,
     },
     /// Elements and stencils do not fit.
     #[error(transparent)]
@@ -66,13 +84,107 @@ pub fn terms(
 ) -> Result<Garment, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
     let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new() };
-    match &fabric.material {
-        Material::MassSpring(material) => garment.add_springs(material, mesh, springs)?,
-        Material::Stvk(material) => garment.add_membrane(material, mesh, StVK::new)?,
-        Material::NeoHookean(material) => garment.add_membrane(material, mesh, NeoHookean::new)?,
+    let cloth = Laid { mesh, triangles: laid(mesh, fabric)?, warp: fabric.warp };
+    // λ and μ of small strains, for damping.
+    let (stiffness, bending) = match &fabric.material {
+        Material::MassSpring(material) => {
+            garment.add_springs(material, mesh, springs)?;
+            ((0.0, 0.0), &Bending::None)
+        }
+        Material::Stvk(material) => (garment.add_isotropic(&cloth, material.lame(), StVK::new)?, &material.bending),
+        Material::NeoHookean(material) => {
+            (garment.add_isotropic(&cloth, material.lame(), NeoHookean::new)?, &material.bending)
+        }
+        Material::StableNeoHookean(material) => {
+            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?, &material.bending)
+        }
+        Material::StableNeoHookeanLog(material) => {
+            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?, &material.bending)
+        }
+        Material::Arap(material) => {
+            let mu = material.stretch_stiffness;
+            garment
+                .add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
+            ((0.0, 0.5 * mu), &material.bending)
+        }
+        Material::BaraffWitkin(material) => {
+            let ([b_u, b_v], stretch, shear) = (material.rest_stretch, material.stretch, material.shear);
+            garment.add_membrane("stretch", stretch == 0.0, &cloth, |[u0, u1, u2]| {
+                BaraffWitkinStretch::new(u0, u1, u2, stretch / area([u0, u1, u2]), b_u, b_v)
+            })?;
+            garment.add_membrane("shear", shear == 0.0, &cloth, |[u0, u1, u2]| {
+                BaraffWitkinShear::new(u0, u1, u2, shear / area([u0, u1, u2]))
+            })?;
+            ((0.0, 0.5 * stretch), &material.bending)
+        }
+        Material::OrthotropicStvk(material) => {
+            let strips = Rigidity::Orthotropic {
+                warp: material.warp,
+                weft: material.weft,
+                bias: material.bias,
+                poisson_ratio: material.poisson_ratio,
+            };
+            let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = strips.matrix()?;
+            garment.add_membrane("membrane", false, &cloth, |[u0, u1, u2]| {
+                OrthotropicStVK::new(u0, u1, u2, c_uu, c_uv, c_vv, c_ss)
+            })?;
+            ((c_uv, c_ss), &material.bending)
+        }
+    };
+    if let Some(limit) = &fabric.strain_limit {
+        garment.add_strain_limit(limit, &cloth)?;
+    }
+    garment.add_bending(bending, &cloth)?;
+    if let Some(rayleigh) = &fabric.rayleigh {
+        garment.add_rayleigh(rayleigh, stiffness, bending, &cloth)?;
     }
     garment.add_surroundings(surroundings)?;
     Ok(garment)
+}
+
+/// A mesh with the directions of its threads.
+struct Laid<'a> {
+    mesh: &'a TriangleMesh,
+    triangles: Vec<MaterialTriangle>,
+    warp: Vector3<f64>,
+}
+
+/// Every triangle in the plane: along warp and weft, where that matters.
+fn laid(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, ThreadError> {
+    let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_));
+    let all = 0..mesh.triangles().len();
+    if !woven && fabric.strain_limit.is_none() {
+        return Ok(all.map(|triangle| material_triangle(mesh.corners(triangle))).collect());
+    }
+    let warp = fabric.warp;
+    all.map(|triangle| thread_triangle(mesh.corners(triangle), warp).ok_or(ThreadError { triangle, warp })).collect()
+}
+
+fn area([a, b, c]: MaterialTriangle) -> f64 {
+    0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+}
+
+/// Of small strains ε the declared element's density is ½ μ (ε₁ − ε₂)² + ½ λ (ε₁ + ε₂)²; Hooke's has λ + μ there.
+fn stable_neo_hookean(
+    u0: [f64; 2],
+    u1: [f64; 2],
+    u2: [f64; 2],
+    lambda: f64,
+    mu: f64,
+) -> Result<StableNeoHookean, RestError> {
+    StableNeoHookean::new(u0, u1, u2, lambda + mu, mu)
+}
+
+/// Of small strains ε the declared element's density is ⅓ μ (ε₁ − ε₂)² + (μ/9 + λ/2) (ε₁ + ε₂)²; Hooke's is ½ μ (ε₁ − ε₂)² +
+/// ½ (λ + μ) (ε₁ + ε₂)².
+fn stable_neo_hookean_log(
+    u0: [f64; 2],
+    u1: [f64; 2],
+    u2: [f64; 2],
+    lambda: f64,
+    mu: f64,
+) -> Result<StableNeoHookeanLog, RestError> {
+    StableNeoHookeanLog::new(u0, u1, u2, lambda + 2.0 / 3.0 * mu, 1.5 * mu)
 }
 
 impl Garment {
@@ -108,31 +220,83 @@ impl Garment {
 
     fn add_membrane<E>(
         &mut self,
-        material: &Membrane,
-        mesh: &TriangleMesh,
-        element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
+        name: &str,
+        is_zero: bool,
+        cloth: &Laid<'_>,
+        element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
     ) -> Result<(), FabricError>
     where
         E: PackedPotential<f64> + std::fmt::Debug + 'static,
     {
-        if !self.leave_out("membrane", material.stretch_stiffness == 0.0, mesh.triangles().len()) {
-            let (lambda, mu) = material.lame();
-            let element = |triangle: usize| {
-                let [u0, u1, u2] = material_triangle(mesh.corners(triangle));
-                element(u0, u1, u2, lambda, mu).map_err(|source| FabricError::Rest { triangle, source })
-            };
-            let elements = (0..mesh.triangles().len()).map(element).collect::<Result<Vec<_>, _>>()?;
-            self.add_potential("membrane", mesh.triangles(), elements)?;
+        if self.leave_out(name, is_zero, cloth.triangles.len()) {
+            return Ok(());
         }
-        self.add_bending(&material.bending, mesh)
+        let elements = elements(cloth, element)?;
+        self.add_potential(name, cloth.mesh.triangles(), elements)
     }
 
-    fn add_bending(&mut self, bending: &Bending, mesh: &TriangleMesh) -> Result<(), FabricError> {
+    /// Returns λ and μ again.
+    fn add_isotropic<E>(
+        &mut self,
+        cloth: &Laid<'_>,
+        (lambda, mu): (f64, f64),
+        element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
+    ) -> Result<(f64, f64), FabricError>
+    where
+        E: PackedPotential<f64> + std::fmt::Debug + 'static,
+    {
+        self.add_membrane("membrane", mu == 0.0, cloth, |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
+        Ok((lambda, mu))
+    }
+
+    fn add_strain_limit(&mut self, limit: &StrainLimit, cloth: &Laid<'_>) -> Result<(), FabricError> {
+        let StrainLimit { stretch, stiffness } = *limit;
+        if stretch <= 1.0 {
+            return Err(FabricError::Limit { stretch });
+        }
+        self.add_membrane("strain limit", stiffness == 0.0, cloth, |[u0, u1, u2]| {
+            ThreadLimit::new(u0, u1, u2, stiffness, stretch)
+        })
+    }
+
+    fn add_rayleigh(
+        &mut self,
+        rayleigh: &Rayleigh,
+        (lambda, mu): (f64, f64),
+        bending: &Bending,
+        cloth: &Laid<'_>,
+    ) -> Result<(), FabricError> {
+        let beta = rayleigh.stretching;
+        if !self.leave_out("membrane damping", beta * mu == 0.0, cloth.triangles.len()) {
+            let element = |[u0, u1, u2]: MaterialTriangle| StrainRateDamping::new(u0, u1, u2, beta * lambda, beta * mu);
+            self.add_force("membrane damping", cloth.mesh.triangles(), elements(cloth, element)?)?;
+        }
+        let (beta, rigidity) = (rayleigh.bending, rigidity_along_grid(bending)?);
+        let hinges = Topology::of(cloth.mesh).hinges;
+        if !self.leave_out("bending damping", beta * rigidity == 0.0, hinges.len()) {
+            let stencils: Vec<[usize; 4]> = hinges.iter().map(|hinge| hinge.vertices).collect();
+            // c ‖e‖²/(A₁ + A₂) θ² bends a sheet with regular diagonals along its grid with the rigidity 2c.
+            let element = |hinge| HingeDamping::new(2.0 * beta * rigidity * shape_factor(cloth.mesh, hinge));
+            self.add_force("bending damping", &stencils, hinges.iter().map(element).collect())?;
+        }
+        Ok(())
+    }
+
+    fn add_bending(&mut self, bending: &Bending, cloth: &Laid<'_>) -> Result<(), FabricError> {
+        let mesh = cloth.mesh;
+        if let Bending::Plate(rigidity) = bending {
+            let is_zero = rigidity_along_grid(bending)? == 0.0;
+            let plate = PlateTerm::new("bending", mesh, rigidity, cloth.warp)?;
+            if !self.leave_out("bending", is_zero, plate.triangles()) {
+                self.terms.push(Box::new(plate));
+            }
+            return Ok(());
+        }
         let hinges = Topology::of(mesh).hinges;
         let stencils: Vec<[usize; 4]> = hinges.iter().map(|hinge| hinge.vertices).collect();
         let angle = |hinge| rest_angle(mesh, hinge);
         let stiffness = match *bending {
-            Bending::None => 0.0,
+            Bending::None | Bending::Plate(_) => 0.0,
             Bending::Bridson { stiffness } | Bending::BridsonForce { stiffness, .. } | Bending::Flat { stiffness } => {
                 stiffness
             }
@@ -142,7 +306,7 @@ impl Garment {
             return Ok(());
         }
         match bending {
-            Bending::None => Ok(()),
+            Bending::None | Bending::Plate(_) => Ok(()),
             Bending::Bridson { .. } => {
                 let element = |hinge| BridsonBending::new(stiffness * shape_factor(mesh, hinge), angle(hinge));
                 self.add_potential("bending", &stencils, hinges.iter().map(element).collect())
@@ -214,6 +378,27 @@ impl Garment {
         }
         true
     }
+}
+
+/// The flexural rigidity along the warp, in N m; of hinges, on a sheet with regular diagonals.
+fn rigidity_along_grid(bending: &Bending) -> Result<f64, FabricError> {
+    Ok(match bending {
+        Bending::None => 0.0,
+        Bending::Plate(rigidity) => rigidity.matrix()?[0][0],
+        Bending::Bridson { stiffness } | Bending::BridsonForce { stiffness, .. } => 0.25 * stiffness,
+        Bending::Flat { stiffness } => 1.5 * stiffness,
+    })
+}
+
+/// An element for each triangle.
+fn elements<E>(
+    cloth: &Laid<'_>,
+    element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
+) -> Result<Vec<E>, FabricError> {
+    let one = |(triangle, laid): (usize, &MaterialTriangle)| {
+        element(*laid).map_err(|source| FabricError::Rest { triangle, source })
+    };
+    cloth.triangles.iter().enumerate().map(one).collect()
 }
 
 /// ‖Ē‖²/(‖N̄₁‖ + ‖N̄₂‖) of a hinge at rest.

@@ -1,16 +1,32 @@
 //! Time stepping, one scheme to a file.
 
+mod adaptive;
+mod bdf2;
+mod explicit_euler;
 mod implicit_euler;
+mod implicit_midpoint;
 mod newton;
+mod stability;
+mod substep;
 mod symplectic_euler;
+mod trapezoid;
+mod verlet;
 
 use serde::Deserialize;
 
 use energy_solve::{EvaluationError, StopReason};
 
+pub use adaptive::{Adaptive, Rejection};
+pub use bdf2::Bdf2;
+pub use explicit_euler::ExplicitEuler;
 pub use implicit_euler::ImplicitEuler;
+pub use implicit_midpoint::ImplicitMidpoint;
 pub use newton::{Newton, NewtonOptions, Phases};
 pub use symplectic_euler::SymplecticEuler;
+pub use trapezoid::Trapezoid;
+pub use verlet::Verlet;
+
+use energy_dsl::Vector3;
 
 use crate::body::Body;
 
@@ -43,6 +59,8 @@ pub struct StepReport {
     pub projected: bool,
     /// How often a step of Newton's method was halved.
     pub halvings: u64,
+    /// Steps that were rejected and tried again with a smaller size; see [`Adaptive`].
+    pub rejected: u64,
     /// How long its parts took; measured by [`Newton`] only.
     pub phases: Phases,
 }
@@ -53,6 +71,7 @@ impl std::ops::AddAssign for StepReport {
         self.iterations += other.iterations;
         self.projected |= other.projected;
         self.halvings += other.halvings;
+        self.rejected += other.rejected;
         self.phases += other.phases;
     }
 }
@@ -111,6 +130,14 @@ pub enum StepError {
         /// The term's name.
         term: String,
     },
+    /// An adaptive step that failed at every size.
+    #[error("rejected down to a step of {dt:.3e} s: {reason}")]
+    Hopeless {
+        /// The smallest size tried, in s.
+        dt: f64,
+        /// Why it was rejected.
+        reason: Box<StepError>,
+    },
     /// The new state is infinite or NaN.
     #[error("vertex {vertex} would move to {position:?}. The step is unstable; try a smaller dt")]
     NonFinite {
@@ -130,29 +157,78 @@ pub enum Scheme {
     ImplicitEuler,
     /// Implicit Euler by Newton's method with line search.
     Newton,
+    /// The two-step backward differentiation formula, implicit.
+    Bdf2,
+    /// The implicit midpoint rule.
+    ImplicitMidpoint,
+    /// The trapezoidal rule, implicit: Newmark's average acceleration.
+    Trapezoid,
     /// Symplectic Euler, explicit.
     SymplecticEuler,
+    /// Velocity Verlet, explicit.
+    Verlet,
+    /// Explicit Euler.
+    ExplicitEuler,
+    /// Explicit Euler as the mass–spring cloth model prints it, without the step in x' = x + v.
+    ExplicitEulerAsPrinted,
 }
 
 impl Scheme {
+    /// All.
+    pub const ALL: [Self; 9] = [
+        Self::ImplicitEuler,
+        Self::Newton,
+        Self::Bdf2,
+        Self::ImplicitMidpoint,
+        Self::Trapezoid,
+        Self::SymplecticEuler,
+        Self::Verlet,
+        Self::ExplicitEuler,
+        Self::ExplicitEulerAsPrinted,
+    ];
+
     /// The integrator.
     #[must_use]
     pub fn integrator(self) -> Box<dyn Integrator> {
         match self {
             Self::ImplicitEuler => Box::new(ImplicitEuler::default()),
             Self::Newton => Box::new(Newton::default()),
+            Self::Bdf2 => Box::new(Bdf2::default()),
+            Self::ImplicitMidpoint => Box::new(ImplicitMidpoint::default()),
+            Self::Trapezoid => Box::new(Trapezoid::default()),
             Self::SymplecticEuler => Box::new(SymplecticEuler),
+            Self::Verlet => Box::new(Verlet::default()),
+            Self::ExplicitEuler => Box::new(ExplicitEuler::default()),
+            Self::ExplicitEulerAsPrinted => Box::new(ExplicitEuler::as_printed()),
         }
     }
 }
 
-/// Moves the free vertices with new velocities, x' = x + h v', unless a number is not finite.
-fn advance(body: &mut Body, velocities: &[[f64; 3]], dt: f64) -> Result<(), StepError> {
-    let free = body.system.dofs().free();
-    let moved = |(&vertex, v): (&usize, &[f64; 3])| -> [f64; 3] {
-        std::array::from_fn(|axis| body.x[vertex][axis] + dt * v[axis])
+/// Solved to 10⁻⁷ m/s, so that the solver's error lies below that of a scheme of second order.
+fn second_order_tolerances() -> NewtonOptions {
+    NewtonOptions { velocity_tolerance: 1e-7, linear_tolerance: 1e-3, ..NewtonOptions::default() }
+}
+
+/// v + h M⁻¹ f of the free vertices.
+fn kicked(body: &Body, v: &[Vector3<f64>], force: &[Vector3<f64>], dt: f64) -> Vec<Vector3<f64>> {
+    let one = |&vertex: &usize| -> Vector3<f64> {
+        std::array::from_fn(|axis| v[vertex][axis] + dt / body.masses[vertex] * force[vertex][axis])
     };
-    let positions: Vec<[f64; 3]> = free.iter().zip(velocities).map(moved).collect();
+    body.system.dofs().free().iter().map(one).collect()
+}
+
+/// Moves the free vertices with new velocities, x' = x + h v', unless a number is not finite.
+fn advance(body: &mut Body, velocities: &[Vector3<f64>], dt: f64) -> Result<(), StepError> {
+    place(body, velocities, dt, velocities)
+}
+
+/// Moves the free vertices by h u and gives them new velocities, unless a number is not finite.
+fn place(body: &mut Body, u: &[Vector3<f64>], dt: f64, velocities: &[Vector3<f64>]) -> Result<(), StepError> {
+    let free = body.system.dofs().free();
+    let moved = |(&vertex, u): (&usize, &Vector3<f64>)| -> Vector3<f64> {
+        std::array::from_fn(|axis| body.x[vertex][axis] + dt * u[axis])
+    };
+    let positions: Vec<Vector3<f64>> = free.iter().zip(u).map(moved).collect();
     if let Some(place) = positions.iter().position(|p| p.iter().any(|coordinate| !coordinate.is_finite())) {
         return Err(StepError::NonFinite { vertex: free[place], position: positions[place] });
     }

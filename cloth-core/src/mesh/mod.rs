@@ -7,7 +7,7 @@ mod topology;
 mod triangle_mesh;
 
 pub use obj::{ObjError, read_obj};
-pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle};
+pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle};
 pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};
 pub use topology::{Hinge, SpringNetwork, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};

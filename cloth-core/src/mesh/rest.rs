@@ -20,6 +20,29 @@ pub fn material_triangle([a, b, c]: [Vector3<f64>; 3]) -> MaterialTriangle {
     [[0.0; 2], [length, 0.0], [dot(base, side) / length, norm(cross(base, side)) / length]]
 }
 
+/// Lays a triangle in the plane with the first axis along the warp, projected on it: the first corner at the origin. `None` when the warp
+/// stands across the triangle.
+///
+/// ```
+/// use cloth_core::mesh::thread_triangle;
+/// let laid = thread_triangle([[0.0; 3], [0.0, 2.0, 0.0], [-3.0, 0.0, 0.0]], [1.0, 0.0, 0.5]).unwrap();
+/// assert_eq!(laid, [[0.0, 0.0], [0.0, 2.0], [-3.0, 0.0]]);
+/// assert_eq!(thread_triangle([[0.0; 3], [0.0, 2.0, 0.0], [-3.0, 0.0, 0.0]], [0.0, 0.0, 1.0]), None);
+/// ```
+#[must_use]
+pub fn thread_triangle([a, b, c]: [Vector3<f64>; 3], warp: Vector3<f64>) -> Option<MaterialTriangle> {
+    let (base, side) = (subtract(b, a), subtract(c, a));
+    let normal = cross(base, side);
+    let unit = |vector: Vector3<f64>| vector.map(|component| component / norm(vector));
+    let across = cross(unit(normal), unit(warp));
+    if norm(across).is_nan() || norm(across) < 1e-6 {
+        return None;
+    }
+    let v = unit(across);
+    let u = cross(v, unit(normal));
+    Some([[0.0; 2], [dot(base, u), dot(base, v)], [dot(side, u), dot(side, v)]])
+}
+
 /// The mass of each vertex, in kg: a third of σ A of every triangle it is a corner of. σ in kg/m².
 #[must_use]
 pub fn lumped_masses(mesh: &TriangleMesh, density: f64) -> Vec<f64> {

@@ -12,7 +12,7 @@ pub use error::SceneError;
 pub use pins::{Pin, PinError, pinned_vertices};
 
 use crate::fabric::Fabric;
-use crate::integrator::Scheme;
+use crate::integrator::{Adaptive, Integrator, Scheme};
 use crate::mesh::{MeshError, ObjError, PleatsError, Sheet, SpringNetwork, Topology, TriangleMesh, read_obj};
 use numbers::{finite_triple, non_negative, positive};
 
@@ -33,9 +33,13 @@ pub struct Scene {
     /// Drag per mass, in 1/s: the force −drag m v on every vertex. Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     pub drag: f64,
-    /// `implicit-euler` (the default) or `symplectic-euler`.
+    /// `implicit-euler` (the default), `newton`, `bdf2`, `implicit-midpoint`, `trapezoid`, `symplectic-euler`, `verlet`, `explicit-euler` or
+    /// `explicit-euler-as-printed`.
     #[serde(default)]
     pub integrator: Scheme,
+    /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`]. Default false.
+    #[serde(default)]
+    pub adaptive: bool,
     /// Time step h, in s.
     #[serde(deserialize_with = "positive")]
     pub dt: f64,
@@ -124,6 +128,13 @@ impl Scene {
                 Ok(Shape { start: mesh.vertices().to_vec(), mesh, springs })
             }
         }
+    }
+
+    /// The integrator.
+    #[must_use]
+    pub fn stepper(&self) -> Box<dyn Integrator> {
+        let scheme = self.integrator.integrator();
+        if self.adaptive { Box::new(Adaptive::new(scheme)) } else { scheme }
     }
 
     /// The number of steps.

@@ -1,0 +1,412 @@
+use energy_dsl::{
+    Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, for_each_batch,
+};
+use energy_elements::HingeAngle;
+use energy_solve::{
+    Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage, Tally, Term,
+};
+
+use super::rigidity::cholesky;
+use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
+use crate::mesh::{Topology, TriangleMesh, dot, rest_angle};
+
+/// Plate bending of a whole mesh: Σ ½ ‖r‖² over the triangles, r = Σ b (θ − θ̄) three combinations of dihedral angles.
+///
+/// Every dihedral angle is evaluated once, by the declared element [`HingeAngle`], whichever triangles need it. The Hessian is
+/// Σ ∇r ∇rᵀ, positive semi-definite, where negative curvature is to go; the rest of it, Σ m ∇²θ with the moments m = ∂U/∂θ, is smaller by the
+/// angle between neighbours and belongs to the exact Hessian only.
+#[derive(Clone, Debug)]
+pub struct PlateTerm {
+    name: String,
+    hinges: Vec<[usize; 4]>,
+    rest: Vec<f64>,
+    patches: Vec<Patch>,
+    /// The vertices of the patches, each filled up to the most by repeating its first.
+    stencils: Vec<usize>,
+    arity: usize,
+    /// The patches with a free vertex, and what else is known once vertices have places.
+    active: Vec<usize>,
+    packed: Packed<HingeAngle>,
+    places: Vec<PatchPlaces>,
+    hinge_rows: Vec<[Option<usize>; 4]>,
+    pattern: Option<Pattern>,
+}
+
+/// A triangle and the hinges that its curvature depends on.
+#[derive(Clone, Debug)]
+struct Patch {
+    /// Its vertices, ascending.
+    vertices: Vec<usize>,
+    /// The hinges: their number, b, and the places of their points among the vertices.
+    angles: Vec<Angle>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Angle {
+    hinge: usize,
+    b: [f64; 3],
+    local: [u8; 4],
+}
+
+/// Where the blocks of a patch are stored: of pairs (i, j), i ≤ j, and mirrored if all blocks are.
+#[derive(Clone, Debug)]
+struct PatchPlaces {
+    slots: Vec<u32>,
+    mirrored: Vec<u32>,
+}
+
+/// A plate that cannot be laid on a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PlateError {
+    /// The stiffnesses.
+    #[error(transparent)]
+    Rigidity(#[from] RigidityError),
+    /// The directions of the threads.
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
+}
+
+impl PlateTerm {
+    /// Plate bending of a mesh from its rest shape, which may be curved. The warp lies along the given direction, projected on each triangle.
+    ///
+    /// # Errors
+    /// When no plate has such stiffnesses, or the warp of woven cloth stands across a triangle.
+    pub fn new(
+        name: impl Into<String>,
+        mesh: &TriangleMesh,
+        rigidity: &Rigidity,
+        warp: Vector3<f64>,
+    ) -> Result<Self, PlateError> {
+        let factor = cholesky(&rigidity.matrix()?);
+        let topology = Topology::of(mesh);
+        let hinges: Vec<[usize; 4]> = topology.hinges.iter().map(|hinge| hinge.vertices).collect();
+        let rest = topology.hinges.iter().map(|hinge| rest_angle(mesh, hinge)).collect();
+        let woven = matches!(rigidity, Rigidity::Orthotropic { .. });
+        let curvatures = curvatures(mesh, &topology, woven.then_some(warp))?;
+        let patches: Vec<Patch> = curvatures.iter().filter_map(|one| Patch::new(one, &factor, &hinges)).collect();
+        let arity = patches.iter().map(|patch| patch.vertices.len()).max().unwrap_or(1);
+        let mut stencils = Vec::with_capacity(arity * patches.len());
+        for patch in &patches {
+            stencils.extend(&patch.vertices);
+            stencils.extend(std::iter::repeat_n(patch.vertices[0], arity - patch.vertices.len()));
+        }
+        Ok(Self {
+            name: name.into(),
+            hinges,
+            rest,
+            patches,
+            stencils,
+            arity,
+            active: Vec::new(),
+            packed: Packed::new::<4>(&[], &[]),
+            places: Vec::new(),
+            hinge_rows: Vec::new(),
+            pattern: None,
+        })
+    }
+
+    /// The number of triangles that resist bending.
+    #[must_use]
+    pub fn triangles(&self) -> usize {
+        self.patches.len()
+    }
+
+    fn tally(&self, flagged: u64) -> Tally {
+        let evaluated = self.active.len() as u64;
+        Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
+    }
+
+    /// θ and ∇θ of all hinges.
+    fn angles(&self, x: &[Vector3<f64>]) -> Angles {
+        let count = self.hinges.len();
+        let mut angles = Angles { values: vec![0.0; count], gradients: vec![0.0; 12 * count], flagged: 0 };
+        for_each_batch(&self.packed, x, &mut angles);
+        for (angle, rest) in angles.values.iter_mut().zip(&self.rest) {
+            *angle -= rest;
+        }
+        angles
+    }
+
+    /// m = ∂U/∂θ of all hinges.
+    fn moments(&self, angles: &Angles) -> Vec<f64> {
+        let mut moments = vec![0.0; self.hinges.len()];
+        for &patch in &self.active {
+            let patch = &self.patches[patch];
+            let r = patch.residual(&angles.values);
+            for angle in &patch.angles {
+                moments[angle.hinge] += dot(angle.b, r);
+            }
+        }
+        moments
+    }
+
+    fn subtract_force(&self, angles: &Angles, moments: &[f64], force: &mut [Vector3<f64>]) {
+        for ((hinge, moment), gradient) in self.hinges.iter().zip(moments).zip(angles.gradients.as_chunks::<12>().0) {
+            for (point, &vertex) in hinge.iter().enumerate() {
+                for axis in 0..3 {
+                    force[vertex][axis] -= moment * gradient[3 * point + axis];
+                }
+            }
+        }
+    }
+
+    /// Adds −Σ m ∇²θ and its product with v.
+    fn add_turning(&self, moments: &[f64], state: State<'_>, sum: &mut Linearisation<'_>) {
+        let pattern = self.pattern.as_ref().expect("a term is placed before it is evaluated");
+        for (number, (&vertices, &moment)) in self.hinges.iter().zip(moments).enumerate() {
+            if moment == 0.0 {
+                continue;
+            }
+            let at = HingeAngle::<f64>::new().hessian(&vertices.map(|vertex| state.x[vertex]));
+            let blocks: &[Block<f64>] = at.hessian.as_ref();
+            let rows = self.hinge_rows[number];
+            let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
+            for ((i, j), block) in pairs.zip(blocks) {
+                let block = block.map(|row| row.map(|entry| -moment * entry));
+                if let Some(product) = &mut sum.stiffness_times_velocity {
+                    add_times(&mut product[vertices[i]], &block, &state.v[vertices[j]], false);
+                    if i != j {
+                        add_times(&mut product[vertices[j]], &block, &state.v[vertices[i]], true);
+                    }
+                }
+                let Some((row, column)) = rows[i].zip(rows[j]) else { continue };
+                let places = [(row, column, false), (column, row, true)];
+                let both = if pattern.storage() == Storage::Whole && i != j { 2 } else { 1 };
+                for &(row, column, turned) in &places[..both] {
+                    let (slot, flipped) = pattern.place(row, column).expect("hinges are within patches");
+                    add_scaled(&mut sum.matrix[slot], sum.weights.position, &block, turned != flipped);
+                }
+            }
+        }
+    }
+}
+
+/// θ − θ̄ and ∇θ of all hinges.
+struct Angles {
+    values: Vec<f64>,
+    gradients: Vec<f64>,
+    flagged: u64,
+}
+
+impl BatchWork<HingeAngle> for Angles {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
+        let (first, count) = (batch.first, batch.count);
+        let result = batch.element.gradient_at::<L>(batch.points);
+        result.value.store_ragged(&mut self.values[first..first + count]);
+        let gradient = result.gradient.as_ref().as_flattened();
+        L::F64::store_transposed(gradient, count, &mut self.gradients[12 * first..], 12);
+        let flags = (result.flags.degenerate | result.flags.kink).bits();
+        self.flagged += u64::from((flags & (u32::MAX >> (32 - count))).count_ones());
+    }
+}
+
+impl Patch {
+    /// r = √A (1 − Q Qᵀ) Lᵀ κ with D = L Lᵀ: Q spans what the free edges' angles can reach, and would make zero. `None` when nothing is left.
+    fn new(curvature: &Curvature, factor: &[[f64; 3]; 3], hinges: &[[usize; 4]]) -> Option<Self> {
+        let scaled = |b: &[f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|k| curvature.area.sqrt() * (0..3).map(|i| factor[i][k] * b[i]).sum::<f64>())
+        };
+        let mut directions: Vec<[f64; 3]> = Vec::new();
+        for free in &curvature.free {
+            let mut direction = scaled(free);
+            let before = dot(direction, direction);
+            directions.iter().for_each(|q| remove(&mut direction, q));
+            let length = dot(direction, direction);
+            if length > 1e-20 * before {
+                directions.push(direction.map(|component| component / length.sqrt()));
+            }
+        }
+        let mut angles = Vec::new();
+        for &(hinge, b) in &curvature.angles {
+            let mut b = scaled(&b);
+            directions.iter().for_each(|q| remove(&mut b, q));
+            angles.push(Angle { hinge, b, local: [0; 4] });
+        }
+        let largest = angles.iter().map(|angle| dot(angle.b, angle.b)).fold(0.0, f64::max);
+        angles.retain(|angle| dot(angle.b, angle.b) > 1e-24 * largest);
+        let mut vertices: Vec<usize> = angles.iter().flat_map(|angle| hinges[angle.hinge]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        for angle in &mut angles {
+            angle.local = hinges[angle.hinge].map(|vertex| {
+                u8::try_from(vertices.partition_point(|&known| known < vertex)).expect("a patch has few vertices")
+            });
+        }
+        (!angles.is_empty()).then_some(Self { vertices, angles })
+    }
+
+    fn residual(&self, values: &[f64]) -> [f64; 3] {
+        let mut r = [0.0; 3];
+        for angle in &self.angles {
+            for k in 0..3 {
+                r[k] += angle.b[k] * values[angle.hinge];
+            }
+        }
+        r
+    }
+
+    /// ∇r: for each vertex, three vectors.
+    fn gradients(&self, gradients: &[f64], rows: &mut Vec<[Vector3<f64>; 3]>) {
+        rows.clear();
+        rows.resize(self.vertices.len(), [[0.0; 3]; 3]);
+        for angle in &self.angles {
+            let gradient = &gradients[12 * angle.hinge..][..12];
+            for point in 0..4 {
+                let row = &mut rows[angle.local[point] as usize];
+                for k in 0..3 {
+                    for axis in 0..3 {
+                        row[k][axis] += angle.b[k] * gradient[3 * point + axis];
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn remove(vector: &mut [f64; 3], unit: &[f64; 3]) {
+    let part = dot(*vector, *unit);
+    (0..3).for_each(|k| vector[k] -= part * unit[k]);
+}
+
+fn add_times(sum: &mut Vector3<f64>, block: &Block<f64>, v: &Vector3<f64>, turned: bool) {
+    for row in 0..3 {
+        for column in 0..3 {
+            sum[row] += if turned { block[column][row] } else { block[row][column] } * v[column];
+        }
+    }
+}
+
+fn add_scaled(sum: &mut Block<f64>, scale: f64, block: &Block<f64>, turned: bool) {
+    for row in 0..3 {
+        for column in 0..3 {
+            sum[row][column] += scale * if turned { block[column][row] } else { block[row][column] };
+        }
+    }
+}
+
+impl Term for PlateTerm {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        <HingeAngle as Element>::DECLARATION
+    }
+
+    fn character(&self) -> Character {
+        Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true }
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils { arity: self.arity, vertices: &self.stencils }
+    }
+
+    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        let is_free = |&vertex: &usize| dofs.place(vertex).is_some();
+        self.active =
+            (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
+        let index = |number: usize| u32::try_from(number).expect("fewer than 2³² vertices and blocks");
+        let angle = HingeAngle::new();
+        self.packed =
+            Packed::from_fn(self.hinges.len(), 4, |_| &angle, |hinge, point| index(self.hinges[hinge][point]));
+        self.hinge_rows = self.hinges.iter().map(|hinge| hinge.map(|vertex| dofs.place(vertex))).collect();
+        let slot = |i: usize, j: usize| {
+            let rows = dofs.place(i).zip(dofs.place(j));
+            index(rows.and_then(|(row, column)| pattern.place(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
+        };
+        self.places.clear();
+        for &patch in &self.active {
+            let vertices = &self.patches[patch].vertices;
+            let pairs =
+                || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
+            // Vertices ascend, and so do their rows: no block of the upper triangle is turned.
+            let slots = pairs().map(|(i, j)| slot(i, j)).collect();
+            let mirrored = match pattern.storage() {
+                Storage::Upper => Vec::new(),
+                Storage::Whole => pairs().filter(|(i, j)| i != j).map(|(i, j)| slot(j, i)).collect(),
+            };
+            self.places.push(PatchPlaces { slots, mirrored });
+        }
+        self.pattern = Some(pattern.clone());
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        let angles = self.angles(x);
+        let half_square = |&patch: &usize| {
+            let r = self.patches[patch].residual(&angles.values);
+            0.5 * dot(r, r)
+        };
+        Some((self.active.iter().map(half_square).sum(), self.tally(angles.flagged)))
+    }
+
+    fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        let angles = self.angles(state.x);
+        self.subtract_force(&angles, &self.moments(&angles), force);
+        self.tally(angles.flagged)
+    }
+
+    fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let angles = self.angles(state.x);
+        let moments = self.moments(&angles);
+        self.subtract_force(&angles, &moments, sum.force);
+        let weight = -sum.weights.position;
+        let mut rows = Vec::new();
+        for (&patch, places) in self.active.iter().zip(&self.places) {
+            let patch = &self.patches[patch];
+            patch.gradients(&angles.gradients, &mut rows);
+            add_outer_products(&rows, weight, places, sum.matrix);
+            if let Some(product) = &mut sum.stiffness_times_velocity {
+                for k in 0..3 {
+                    let rate: f64 = patch.vertices.iter().zip(&rows).map(|(&i, row)| dot(row[k], state.v[i])).sum();
+                    for (&i, row) in patch.vertices.iter().zip(&rows) {
+                        (0..3).for_each(|axis| product[i][axis] -= rate * row[k][axis]);
+                    }
+                }
+            }
+        }
+        if sum.curvature == Negative::Exact {
+            self.add_turning(&moments, state, sum);
+        }
+        self.tally(angles.flagged)
+    }
+
+    fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
+        let angles = self.angles(state.x);
+        let is_finite = |patch: &Patch| {
+            let finite =
+                |angle: &Angle| angles.gradients[12 * angle.hinge..][..12].iter().all(|number| number.is_finite());
+            patch.residual(&angles.values).iter().all(|number| number.is_finite()) && patch.angles.iter().all(finite)
+        };
+        self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))
+    }
+}
+
+/// Adds Σ ∇r ∇rᵀ of a patch.
+fn add_outer_products(rows: &[[Vector3<f64>; 3]], weight: f64, places: &PatchPlaces, matrix: &mut [Block<f64>]) {
+    let mut pair = 0;
+    let mut mirrored = places.mirrored.iter();
+    for i in 0..rows.len() {
+        for j in i..rows.len() {
+            let mut block = [[0.0; 3]; 3];
+            for k in 0..3 {
+                for row in 0..3 {
+                    for column in 0..3 {
+                        block[row][column] += rows[i][k][row] * rows[j][k][column];
+                    }
+                }
+            }
+            add_scaled(&mut matrix[places.slots[pair] as usize], weight, &block, false);
+            if i != j
+                && let Some(&slot) = mirrored.next()
+            {
+                add_scaled(&mut matrix[slot as usize], weight, &block, true);
+            }
+            pair += 1;
+        }
+    }
+}

@@ -1,0 +1,246 @@
+use energy_dsl::Vector3;
+
+use super::{ThreadError, laid};
+use crate::mesh::{Topology, TriangleMesh};
+
+/// How far the surface's normal at the middle of each edge lies from half-way between its two triangles'.
+///
+/// For a quadratic height field with curvature H, the slope at the middle of an edge, outwards and relative to the slope of the flat
+/// triangle, is p = (½ (H_tt τ² − 2 H_tn τ η + H_nn η²) − ⅛ H_tt L²)/η: t along the edge of length L, n outwards, the apex at (τ, −η) from
+/// the middle. The dihedral angle is p + p′ of the two triangles, the tilt ½ (p − p′).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tilts {
+    /// Of each hinge, φ = Σ c (θ − θ̄): other hinges and their c, seen from its first triangle.
+    pub tilts: Vec<Vec<(usize, f64)>>,
+    /// The three sides of each triangle.
+    pub(super) sides: Vec<[Side; 3]>,
+}
+
+/// A side of a triangle, in its coordinates along warp and weft.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Side {
+    /// In m.
+    pub length: f64,
+    /// Outwards.
+    pub normal: [f64; 2],
+    /// The hinge, if there is a triangle across.
+    pub hinge: Option<usize>,
+    /// The triangle across.
+    across: Option<usize>,
+    /// Of the apex: τ and η.
+    apex: [f64; 2],
+}
+
+/// A row that takes (H_uu, H_vv, 2H_uv) to a number.
+type Row = [f64; 3];
+
+/// How many rings of triangles around an edge are tried before its tilt is given up to least squares.
+const RINGS: usize = 4;
+/// Below this part of its scale a tilt is rounding.
+const NEGLIGIBLE: f64 = 1e-11;
+/// The smallest determinant of MᵀM, over the cube of a third of its trace, with which hinges determine a curvature.
+const WELL_POSED: f64 = 1e-3;
+
+impl Tilts {
+    /// The tilts of a mesh at rest.
+    ///
+    /// # Errors
+    /// When the warp stands across a triangle.
+    pub fn of(mesh: &TriangleMesh, topology: &Topology, warp: Option<Vector3<f64>>) -> Result<Self, ThreadError> {
+        let mut sides = Vec::with_capacity(mesh.triangles().len());
+        for triangle in 0..mesh.triangles().len() {
+            sides.push(sides_of(laid(mesh, triangle, warp)?));
+        }
+        for (number, hinge) in topology.hinges.iter().enumerate() {
+            let [_, _, start, end] = hinge.vertices;
+            for (at, &triangle) in hinge.triangles.iter().enumerate() {
+                let corners = mesh.triangles()[triangle];
+                let first = if at == 0 { start } else { end };
+                let side = corners.iter().position(|&corner| corner == first).expect("a hinge joins its triangles");
+                debug_assert_eq!(corners[(side + 1) % 3], if at == 0 { end } else { start });
+                sides[triangle][side].hinge = Some(number);
+                sides[triangle][side].across = Some(hinge.triangles[1 - at]);
+            }
+        }
+        let mut tilts = Self { tilts: Vec::with_capacity(topology.hinges.len()), sides };
+        for hinge in 0..topology.hinges.len() {
+            let tilt = tilts.tilt(hinge, topology.hinges[hinge].triangles);
+            tilts.tilts.push(tilt);
+        }
+        Ok(tilts)
+    }
+
+    /// The tilt of one hinge: the combination of least norm of the angles around it.
+    fn tilt(&self, hinge: usize, [first, second]: [usize; 2]) -> Vec<(usize, f64)> {
+        let mut patch = Patch::new(self, first);
+        patch.enter(second);
+        let sides = [first, second].map(|triangle| (triangle, self.side(triangle, hinge)));
+        let rows = sides.map(|(triangle, side)| side.slope(patch.turn(triangle)));
+        let wanted: Row = std::array::from_fn(|k| 0.5 * (rows[0][k] - rows[1][k]));
+        if size(wanted) <= NEGLIGIBLE * (size(rows[0]) + size(rows[1])) {
+            return Vec::new();
+        }
+        let mut ring = 1;
+        let (angles, gram) = loop {
+            let angles = patch.angles();
+            let gram = gram(&angles);
+            let third = (gram[0][0] + gram[1][1] + gram[2][2]) / 3.0;
+            if determinant(&gram) > WELL_POSED * third.powi(3) || ring == RINGS || !patch.grow() {
+                break (angles, gram);
+            }
+            ring += 1;
+        };
+        let multiplier = solve_positive(gram, wanted);
+        let part = |&(number, row): &(usize, Row)| (number, (0..3).map(|k| row[k] * multiplier[k]).sum());
+        angles.iter().map(part).filter(|(_, c): &(usize, f64)| c.abs() > NEGLIGIBLE).collect()
+    }
+
+    fn side(&self, triangle: usize, hinge: usize) -> &Side {
+        self.sides[triangle].iter().find(|side| side.hinge == Some(hinge)).expect("a hinge joins its triangles")
+    }
+}
+
+/// Triangles unfolded into the plane of the first, each with the angle by which its own coordinates are turned there.
+struct Patch<'a> {
+    tilts: &'a Tilts,
+    triangles: Vec<(usize, f64)>,
+}
+
+impl<'a> Patch<'a> {
+    fn new(tilts: &'a Tilts, first: usize) -> Self {
+        Self { tilts, triangles: vec![(first, 0.0)] }
+    }
+
+    fn turn(&self, triangle: usize) -> f64 {
+        self.triangles.iter().find(|(known, _)| *known == triangle).map_or(0.0, |(_, turn)| *turn)
+    }
+
+    fn contains(&self, triangle: usize) -> bool {
+        self.triangles.iter().any(|(known, _)| *known == triangle)
+    }
+
+    /// Unfolds a neighbour of one that is there.
+    fn enter(&mut self, triangle: usize) {
+        if let Some(turn) = self.turn_across(triangle) {
+            self.triangles.push((triangle, turn));
+        }
+    }
+
+    /// How a neighbour of one that is there is turned: what is outwards for the one is inwards for the other.
+    fn turn_across(&self, triangle: usize) -> Option<f64> {
+        let sides = &self.tilts.sides[triangle];
+        sides.iter().find_map(|side| {
+            let (_, turn) = self.triangles.iter().find(|(known, _)| Some(*known) == side.across)?;
+            let other = self.tilts.side(side.across?, side.hinge?);
+            Some(turn + direction(other.normal) - direction(side.normal) + std::f64::consts::PI)
+        })
+    }
+
+    /// Adds all neighbours; false when there are none.
+    fn grow(&mut self) -> bool {
+        let before = self.triangles.len();
+        for at in 0..before {
+            for side in self.tilts.sides[self.triangles[at].0] {
+                if let Some(across) = side.across.filter(|&across| !self.contains(across)) {
+                    self.enter(across);
+                }
+            }
+        }
+        self.triangles.len() > before
+    }
+
+    /// The hinges along the sides of its triangles, and their dihedral angles in a quadratic height field.
+    fn angles(&self) -> Vec<(usize, Row)> {
+        let mut angles: Vec<(usize, Row)> = Vec::new();
+        for &(triangle, turn) in &self.triangles {
+            for side in &self.tilts.sides[triangle] {
+                let (Some(hinge), Some(across)) = (side.hinge, side.across) else { continue };
+                if angles.iter().any(|(known, _)| *known == hinge) {
+                    continue;
+                }
+                let other = self.tilts.side(across, hinge);
+                let turn_across = turn + direction(side.normal) - direction(other.normal) + std::f64::consts::PI;
+                let (here, there) = (side.slope(turn), other.slope(turn_across));
+                angles.push((hinge, std::array::from_fn(|k| here[k] + there[k])));
+            }
+        }
+        angles
+    }
+}
+
+impl Side {
+    /// p of a quadratic height field, in coordinates in which the triangle's own are turned.
+    fn slope(&self, turn: f64) -> Row {
+        let angle = direction(self.normal) + turn;
+        // t is n turned to the left: the triangle lies to the left of its side.
+        let (n, m) = (angle.cos(), angle.sin());
+        let [tau, eta] = self.apex;
+        let [tt, tn, nn] = [0.5 * (tau * tau - 0.25 * self.length * self.length) / eta, -tau, 0.5 * eta];
+        // H_tt, H_tn and H_nn with t = (−m, n).
+        [
+            tt * m * m - tn * n * m + nn * n * n,
+            tt * n * n + tn * n * m + nn * m * m,
+            -tt * n * m + 0.5 * tn * (n * n - m * m) + nn * n * m,
+        ]
+    }
+}
+
+fn sides_of(corners: [[f64; 2]; 3]) -> [Side; 3] {
+    std::array::from_fn(|side| {
+        let [start, end, apex] = [corners[side], corners[(side + 1) % 3], corners[(side + 2) % 3]];
+        let edge = [end[0] - start[0], end[1] - start[1]];
+        let length = edge[0].hypot(edge[1]);
+        let along = edge.map(|component| component / length);
+        let reach = [apex[0] - start[0], apex[1] - start[1]];
+        let tau = reach[0] * along[0] + reach[1] * along[1] - 0.5 * length;
+        let eta = along[0] * reach[1] - along[1] * reach[0];
+        Side { length, normal: [along[1], -along[0]], hinge: None, across: None, apex: [tau, eta] }
+    })
+}
+
+fn direction([x, y]: [f64; 2]) -> f64 {
+    y.atan2(x)
+}
+
+fn size(row: Row) -> f64 {
+    row.iter().fold(0.0, |largest, component| component.abs().max(largest))
+}
+
+fn gram(angles: &[(usize, Row)]) -> [Row; 3] {
+    let mut gram = [[0.0; 3]; 3];
+    for (_, row) in angles {
+        for i in 0..3 {
+            for j in 0..3 {
+                gram[i][j] += row[i] * row[j];
+            }
+        }
+    }
+    gram
+}
+
+fn determinant(m: &[Row; 3]) -> f64 {
+    let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
+    m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
+}
+
+/// (G + ε)⁻¹ b, ε a part of 10⁻¹² of G: directions that no hinge sees get nothing.
+fn solve_positive(mut gram: [Row; 3], mut b: Row) -> Row {
+    let small = 1e-12 * (gram[0][0] + gram[1][1] + gram[2][2]);
+    (0..3).for_each(|k| gram[k][k] += small);
+    for k in 0..3 {
+        for row in k + 1..3 {
+            let factor = gram[row][k] / gram[k][k];
+            for column in k..3 {
+                gram[row][column] -= factor * gram[k][column];
+            }
+            b[row] -= factor * b[k];
+        }
+    }
+    for k in (0..3).rev() {
+        for column in k + 1..3 {
+            b[k] -= gram[k][column] * b[column];
+        }
+        b[k] /= gram[k][k];
+    }
+    b
+}

@@ -1,0 +1,40 @@
+//! Implicit Euler from another state than the body's: what the midpoint rule, the trapezoidal rule and BDF2 come down to.
+
+use energy_dsl::Vector3;
+
+use super::{Integrator, Newton, StepError, StepReport};
+use crate::body::Body;
+
+/// Where implicit Euler starts from.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Substep {
+    /// X, in m.
+    pub x: Vec<Vector3<f64>>,
+    /// V, in m/s.
+    pub v: Vec<Vector3<f64>>,
+}
+
+impl Substep {
+    /// The body's own state.
+    pub fn of(body: &Body) -> Self {
+        Self { x: body.x.clone(), v: body.v.clone() }
+    }
+}
+
+/// Solves x' = X + h v', v' = V + h M⁻¹ f(x', v') of the body. On an error it has the state `before` again.
+pub(super) fn start_from(
+    body: &mut Body,
+    before: &Substep,
+    from: &Substep,
+    newton: &mut Newton,
+    dt: f64,
+) -> Result<StepReport, StepError> {
+    body.x.clone_from(&from.x);
+    body.v.clone_from(&from.v);
+    let report = newton.step(body, dt);
+    if report.is_err() {
+        body.x.clone_from(&before.x);
+        body.v.clone_from(&before.v);
+    }
+    report
+}

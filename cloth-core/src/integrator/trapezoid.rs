@@ -1,0 +1,54 @@
+use energy_dsl::Vector3;
+use energy_solve::{EvaluationError, State};
+
+use super::substep::{Substep, start_from};
+use super::{Integrator, Newton, NewtonOptions, StepError, StepReport};
+use crate::body::Body;
+
+/// The trapezoidal rule, which is Newmark's method of average acceleration (β = ¼, γ = ½; Newmark 1959):
+///
+/// x' = x + ½ h (v + v'),  v' = v + ½ h M⁻¹ (f(x, v) + f(x', v')).
+///
+/// Second order, without damping of its own. It is implicit Euler with half the step from where an explicit half step leads, found by
+/// [`Newton`] on the incremental potential.
+#[derive(Clone, Debug)]
+pub struct Trapezoid {
+    newton: Newton,
+}
+
+impl Default for Trapezoid {
+    fn default() -> Self {
+        Self::with_options(super::second_order_tolerances())
+    }
+}
+
+impl Trapezoid {
+    /// With other tolerances.
+    #[must_use]
+    pub fn with_options(options: NewtonOptions) -> Self {
+        Self { newton: Newton::with_options(options) }
+    }
+}
+
+impl Integrator for Trapezoid {
+    fn name(&self) -> &'static str {
+        "trapezoid"
+    }
+
+    fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
+        let half = 0.5 * dt;
+        let before = Substep::of(body);
+        let force = body.system.forces(State { x: &body.x, v: &body.v })?;
+        let mut from = before.clone();
+        for &vertex in body.system.dofs().free() {
+            let v: Vector3<f64> = body.v[vertex];
+            from.x[vertex] = std::array::from_fn(|axis| body.x[vertex][axis] + half * v[axis]);
+            from.v[vertex] = std::array::from_fn(|axis| v[axis] + half / body.masses[vertex] * force[vertex][axis]);
+        }
+        start_from(body, &before, &from, &mut self.newton, half)
+    }
+
+    fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {
+        Ok(None)
+    }
+}

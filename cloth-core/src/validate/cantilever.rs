@@ -1,0 +1,138 @@
+use super::elastica::Elastica;
+use super::equilibrium::Equilibrium;
+use super::strip::{MeshKind, Strip};
+use super::{Finding, ValidateError};
+use crate::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroundings};
+use crate::mesh::SpringNetwork;
+use energy_solve::System;
+
+/// A strip clamped horizontally at one end that bends under its own weight: Γ = σ g L³/D.
+///
+/// Two columns of vertices are clamped; its length L counts from midway between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cantilever {
+    /// Γ.
+    pub gamma: f64,
+    /// Poisson's ratio ν of the plate. The rigidity of a strip with free edges lies between (1 − ν²) D, narrow, and D, wide.
+    pub poisson_ratio: f64,
+    /// Width over length.
+    pub aspect: f64,
+    /// The mesh.
+    pub mesh: MeshKind,
+    /// The angle of the mesh to the strip, in degrees.
+    pub orientation: f64,
+    /// Edges along the strip, from the first of the clamped columns on.
+    pub segments: usize,
+}
+
+/// E h of the membrane over the strip's weight per width.
+const MEMBRANE: f64 = 3e3;
+
+impl Cantilever {
+    /// The Γ that the strip's shape stands for: that of the elastica with the same drop over reach.
+    ///
+    /// # Errors
+    /// When the strip cannot be meshed or comes to no rest.
+    pub fn fit(&self) -> Result<f64, ValidateError> {
+        // In units of the length, the density and gravity.
+        let spacing = 1.0 / (self.segments as f64 - 0.5);
+        let origin = 0.5 * spacing;
+        let strip = Strip {
+            kind: self.mesh,
+            orientation: self.orientation,
+            length: 1.0 + origin,
+            width: self.aspect,
+            spacing,
+            clamped: true,
+        };
+        let mesh = strip.mesh()?;
+        let plate = Rigidity::Flexural { rigidity: 1.0 / self.gamma, poisson_ratio: self.poisson_ratio };
+        let membrane = Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: 0.0, bending: Bending::Plate(plate) };
+        let fabric = Fabric::new(1.0, Material::Stvk(membrane));
+        let surroundings = Surroundings { gravity: [0.0, 0.0, -1.0], drag: 0.0 };
+        let garment = fabric::terms(&fabric, &mesh, &SpringNetwork::default(), &surroundings)?;
+        let rest = mesh.vertices();
+        let clamped: Vec<bool> = rest.iter().map(|p| p[0] < 1.2 * spacing).collect();
+        let system = System::new(garment.terms, &clamped)?;
+        let shape = Elastica::new(self.gamma);
+        let start = rest.iter().zip(&clamped).map(|(p, &clamped)| {
+            let [reach, drop] = if clamped { [p[0] - origin, 0.0] } else { shape.at(p[0] - origin) };
+            [reach + origin, p[1], -drop]
+        });
+        let weight = self.aspect;
+        let found = Equilibrium::find(system, start.collect(), garment.masses, weight, |vertex| rest[vertex][0])?;
+        let tip: Vec<&[f64; 3]> =
+            rest.iter().zip(&found.x).filter(|(p, _)| p[0] > strip.length - 1e-9).map(|(_, x)| x).collect();
+        let mean = |axis: usize| tip.iter().map(|x| x[axis]).sum::<f64>() / tip.len() as f64;
+        Ok(Elastica::fit(-mean(2) / (mean(0) - origin)))
+    }
+
+    /// The finding that the fitted Γ is Γ, over the rigidity of a narrow strip where ν is not 0.
+    ///
+    /// # Errors
+    /// As [`Self::fit`].
+    pub fn ask(&self) -> Result<Finding, ValidateError> {
+        let limit = if self.gamma > 100.0 { 0.02 } else { 0.01 };
+        let measured = self.fit()?;
+        let mut case =
+            format!("{} {}°, {} segments, Γ = {}", self.mesh.name(), self.orientation, self.segments, self.gamma);
+        if self.poisson_ratio == 0.0 {
+            return Ok(Finding::relative("cantilever", case, measured, self.gamma, limit));
+        }
+        // Anything between a narrow and a wide strip is right.
+        let narrow = self.gamma / (1.0 - self.poisson_ratio * self.poisson_ratio);
+        case += &format!(", ν = {}, b/L = {}", self.poisson_ratio, self.aspect);
+        let exact = measured.clamp(self.gamma.min(narrow), self.gamma.max(narrow));
+        Ok(Finding::relative("cantilever", case, measured, exact, limit))
+    }
+}
+
+pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    let (segments, gammas): (_, &[f64]) =
+        if quick { (40, &[1.0, 20.0]) } else { (80, &[0.1, 1.0, 10.0, 100.0, 1000.0]) };
+    let orientations: &[f64] = if quick { &[0.0, 30.0] } else { &[0.0, 30.0, 45.0, 90.0] };
+    for mesh in MeshKind::ALL {
+        for &orientation in orientations {
+            for &gamma in gammas {
+                let aspect = 5.0 / segments as f64;
+                let case = Cantilever { gamma, poisson_ratio: 0.0, aspect, mesh, orientation, segments };
+                tell(case.ask()?);
+            }
+        }
+    }
+    if quick {
+        return Ok(());
+    }
+    tell(order()?);
+    let wide = |aspect| Cantilever {
+        gamma: 5.0,
+        poisson_ratio: 0.3,
+        aspect,
+        mesh: MeshKind::Random,
+        orientation: 0.0,
+        segments: 40,
+    };
+    for aspect in [0.15, 1.0] {
+        tell(wide(aspect).ask()?);
+    }
+    Ok(())
+}
+
+/// The error falls with the square of the segments' length.
+fn order() -> Result<Finding, ValidateError> {
+    let error = |segments: usize| -> Result<f64, ValidateError> {
+        let aspect = 0.1;
+        let case = Cantilever {
+            gamma: 20.0,
+            poisson_ratio: 0.0,
+            aspect,
+            mesh: MeshKind::Diagonal,
+            orientation: 0.0,
+            segments,
+        };
+        case.fit()
+    };
+    let [coarse, middle, fine] = [error(20)?, error(40)?, error(80)?];
+    let order = ((coarse - middle) / (middle - fine)).abs().log2();
+    Ok(Finding::absolute("cantilever", "diagonal 0°, Γ = 20: order from 20, 40, 80".into(), order, 2.0, 0.2))
+}

@@ -1,0 +1,166 @@
+use energy_dsl::Vector3;
+use energy_solve::{BlockMatrix, Curvature, EvaluationError, LinearisationOptions, State, System, Weights, dot};
+
+use super::ValidateError;
+use super::banded::Banded;
+
+/// A cloth at rest under its loads.
+#[derive(Debug)]
+pub(super) struct Equilibrium {
+    /// The forces.
+    pub system: System,
+    /// Positions, in m.
+    pub x: Vec<Vector3<f64>>,
+    /// The mass of each vertex, in kg.
+    pub masses: Vec<f64>,
+    /// The free block rows in an order in which they couple to near ones.
+    order: Vec<usize>,
+    /// ∂²U/∂x² at the equilibrium.
+    matrix: BlockMatrix,
+}
+
+/// Newton iterations before the search is given up.
+const ITERATIONS: usize = 400;
+/// A force that is no more than this part of all weight counts as none.
+const FORCE: f64 = 1e-10;
+/// The most a vertex may move in an iteration, over the size of the whole.
+const STRIDE: f64 = 0.1;
+
+impl Equilibrium {
+    /// The nearest equilibrium from `start`: Newton's method on the energy with a direct solver, with the exact Hessian where it is positive
+    /// definite, else with each element's clamped, and a line search. `along` is the direction in which the mesh is long.
+    pub fn find(
+        system: System,
+        start: Vec<Vector3<f64>>,
+        masses: Vec<f64>,
+        weight: f64,
+        along: impl Fn(usize) -> f64,
+    ) -> Result<Self, ValidateError> {
+        let free = system.dofs().free().to_vec();
+        let mut order: Vec<usize> = (0..free.len()).collect();
+        order.sort_by(|&a, &b| along(free[a]).total_cmp(&along(free[b])));
+        let matrix = system.matrix();
+        let mut found = Self { matrix, system, x: start, masses, order };
+        let size = extent(&found.x);
+        let mut energy = found.energy(&found.x.clone())?;
+        let mut force = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            let down = found.linearise(Curvature::Exact)?;
+            force = down.as_flattened().iter().fold(0.0, |largest, f| f.abs().max(largest));
+            if force <= FORCE * weight {
+                return Ok(found);
+            }
+            let direction = found.direction(&down)?;
+            let longest = direction.as_flattened().iter().fold(0.0_f64, |longest, d| longest.max(d.abs()));
+            let mut scale = (STRIDE * size / longest).min(1.0);
+            let slope = dot(&down, &direction);
+            let rounding = 1e-13 * (energy.1 + weight * size);
+            let mut accepted = false;
+            for _ in 0..40 {
+                let moved = found.moved(&free, scale, &direction);
+                let lower = found.energy(&moved)?;
+                if lower.0 <= energy.0 - 1e-4 * scale * slope + rounding {
+                    (found.x, energy, accepted) = (moved, lower, true);
+                    break;
+                }
+                scale *= 0.5;
+            }
+            if !accepted {
+                break;
+            }
+        }
+        Err(ValidateError::NoEquilibrium { force, weight })
+    }
+
+    /// U, and the size of what it is a sum of.
+    fn energy(&mut self, x: &[Vector3<f64>]) -> Result<(f64, f64), ValidateError> {
+        let energies = match self.system.energies(x) {
+            Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => {
+                return Ok((f64::INFINITY, 0.0));
+            }
+            energies => energies?,
+        };
+        let all = energies.iter().filter_map(|term| term.energy);
+        Ok(all.fold((0.0, 0.0), |(sum, size), energy| (sum + energy, size + energy.abs())))
+    }
+
+    /// −∇U of the free vertices; the Hessian goes to the matrix.
+    fn linearise(&mut self, curvature: Curvature) -> Result<Vec<Vector3<f64>>, ValidateError> {
+        let still = vec![[0.0; 3]; self.x.len()];
+        let weights = Weights { position: -1.0, velocity: 0.0 };
+        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+        let linear = self.system.linearise(State { x: &self.x, v: &still }, options, &mut self.matrix)?;
+        Ok(self.system.dofs().gather(&linear.force))
+    }
+
+    /// Downhill.
+    fn direction(&mut self, down: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, ValidateError> {
+        if let Some(factor) = self.factor(0.0) {
+            return Ok(factor.solve(down));
+        }
+        self.linearise(Curvature::Clamped)?;
+        let mut shift = 1e-9 * self.stiffest();
+        loop {
+            if let Some(factor) = self.factor(shift) {
+                return Ok(factor.solve(down));
+            }
+            shift *= 100.0;
+        }
+    }
+
+    /// The largest stiffness over mass.
+    fn stiffest(&self) -> f64 {
+        let free = self.system.dofs().free();
+        let one = |(row, &vertex): (usize, &usize)| self.matrix.diagonal(row)[0][0].abs() / self.masses[vertex];
+        free.iter().enumerate().map(one).fold(0.0, f64::max)
+    }
+
+    /// The factor of the Hessian + `shift` M; `None` where it is not positive definite.
+    pub fn factor(&self, shift: f64) -> Option<Banded> {
+        let masses: Vec<f64> = self.system.dofs().free().iter().map(|&vertex| self.masses[vertex]).collect();
+        Banded::factor(&self.matrix, &self.order, &masses, shift)
+    }
+
+    /// The smallest ω² of small motions about the equilibrium, by inverse iteration; `None` where it is unstable.
+    pub fn lowest_mode(&self) -> Option<f64> {
+        let factor = self.factor(0.0)?;
+        let free = self.system.dofs().free();
+        let masses: Vec<f64> = free.iter().map(|&vertex| self.masses[vertex]).collect();
+        // Any start that is not orthogonal to the mode.
+        let mut u: Vec<Vector3<f64>> =
+            (0..free.len()).map(|row| [1.0, 0.7, 1.3].map(|c| c + 0.1 * ((row * 37 % 101) as f64 / 101.0))).collect();
+        let mut omega_squared = f64::INFINITY;
+        for _ in 0..2000 {
+            let right: Vec<Vector3<f64>> = u.iter().zip(&masses).map(|(u, m)| u.map(|c| m * c)).collect();
+            let next = factor.solve(&right);
+            let heavy: Vec<Vector3<f64>> = next.iter().zip(&masses).map(|(u, m)| u.map(|c| m * c)).collect();
+            let (squared, mixed) = (dot(&next, &heavy), dot(&next, &right));
+            let before = omega_squared;
+            omega_squared = mixed / squared;
+            u = next.into_iter().map(|u| u.map(|c| c / squared.sqrt())).collect();
+            if (omega_squared / before - 1.0).abs() < 1e-10 {
+                break;
+            }
+        }
+        Some(omega_squared)
+    }
+
+    fn moved(&self, free: &[usize], scale: f64, direction: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut moved = self.x.clone();
+        for (&vertex, d) in free.iter().zip(direction) {
+            (0..3).for_each(|axis| moved[vertex][axis] += scale * d[axis]);
+        }
+        moved
+    }
+}
+
+/// The longest side of the box around points.
+fn extent(points: &[Vector3<f64>]) -> f64 {
+    let side = |axis: usize| {
+        let (low, high) = points
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[axis]), high.max(p[axis])));
+        high - low
+    };
+    (0..3).map(side).fold(0.0, f64::max)
+}
