@@ -13,6 +13,7 @@ mod evaluate;
 mod flags;
 mod real;
 mod results;
+mod unbounded;
 
 pub use array::Array;
 pub use batch::{
@@ -35,6 +36,9 @@ pub use element::{
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};
 pub use real::{Mask, Number, Real};
+pub use unbounded::Unbounded;
+#[doc(hidden)]
+pub use unbounded::{WithCare, with_care};
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
