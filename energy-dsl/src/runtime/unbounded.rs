@@ -262,9 +262,9 @@ impl<S: Scalar> Number for Unbounded<S> {
         }
         (self - root * root) - root.product_error::<L>(root)
     }
-    /// 1: nothing needs scaling.
     fn power_of_two_scale(self) -> Self {
-        Self::from_f64(1.0)
+        let exponent = if self.is_plain() { -self.split().1 } else { 0 };
+        Self { significand: S::ONE, exponent }
     }
     fn less(self, other: Self) -> bool {
         let (x, y, _) = self.aligned(other);
@@ -308,8 +308,9 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, L: Level, const INPUTS: 
         }
         let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
         // Levels differ in nothing else.
-        let (results, flags) =
+        let (mut results, mut flags) =
             if L::FUSED { W::run::<T::Unbounded, Fused>(&own) } else { W::run::<T::Unbounded, Baseline>(&own) };
+        settle(&own, &mut results, &mut flags);
         for (output, result) in outputs.iter_mut().zip(results) {
             output.set_lane(lane, result);
         }
@@ -318,6 +319,18 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, L: Level, const INPUTS: 
     }
     let mask = <T::Mask as Mask>::from_bits;
     (outputs, Flags { degenerate: mask(degenerate), kink: mask(kink) })
+}
+
+/// A result that is not a number though all that was read are (0/0 at a singularity, say) is taken as 0, and flagged.
+pub(crate) fn settle<T: Number>(inputs: &[T], results: &mut [T], flags: &mut Flags<T>) {
+    let is_number = |x: &T| x.clone().equal(x.clone()).all();
+    if !inputs.iter().all(is_number) {
+        return;
+    }
+    for result in results.iter_mut().filter(|x| !is_number(x)) {
+        *result = T::from_f64(0.0);
+        flags.degenerate = !T::Mask::none();
+    }
 }
 
 #[cfg(test)]
@@ -382,6 +395,17 @@ mod tests {
         let tiny = of(-1000.0).exp::<Baseline>();
         assert_eq!(tiny.to_scalar(), 0.0);
         assert!(((tiny * of(500.0).exp::<Baseline>()).to_scalar() / (-500.0_f64).exp() - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn what_is_no_number_is_0_and_flagged_unless_it_was_read() {
+        let (nan, one) = (of(f64::NAN), of(1.0));
+        let mut results = [one, one / of(0.0) - one / of(0.0)];
+        let mut flags = Flags::clear();
+        settle(&[one, nan], &mut results, &mut flags);
+        assert!(!flags.any() && f64::is_nan(results[1].to_scalar()));
+        settle(&[one, one], &mut results, &mut flags);
+        assert!(flags.degenerate && results.map(Unbounded::to_scalar) == [1.0, 0.0]);
     }
 
     #[test]
