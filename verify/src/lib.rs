@@ -22,6 +22,7 @@ pub mod dual;
 mod eigenvalues;
 mod finite_difference;
 mod formula;
+pub mod fuzz;
 mod geometry;
 mod listings;
 pub mod multiprecision;

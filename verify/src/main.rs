@@ -8,6 +8,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use verify::audit::{Options, Report, Target, audit_all, audit_at, catalogue_targets, describe_failure};
+use verify::fuzz;
 use verify::reference::{
     BlockLine, FamilyLine, PolicyLine, ReferenceReport, Source, evaluate_file, fusion_reference, policy, reference,
 };
@@ -84,6 +85,21 @@ enum Command {
         /// Also write `stress.md`, `stress.json` and a plot of each sweep to this folder.
         #[arg(short, long)]
         output: Option<PathBuf>,
+    },
+    /// Feed the compiler of the language with edited inputs of a corpus; exit status 1 on a panic, or an input that takes more than 20
+    /// seconds, which is added to the corpus.
+    Fuzz {
+        /// What reads the inputs.
+        target: fuzz::Target,
+        /// For how long.
+        #[arg(long, default_value_t = 1.0)]
+        minutes: f64,
+        /// What the edits are drawn from.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// A folder of inputs instead of the repository's own.
+        #[arg(long)]
+        corpus: Option<PathBuf>,
     },
     /// Print the code generated for an element.
     Show {
@@ -185,6 +201,24 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let failed = tracks.iter().filter(|track| !track.passed()).count();
             println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
             Ok(failed == 0 && policy.iter().all(|line| line.passed != Some(false)))
+        }
+        Command::Fuzz { target, minutes, seed, corpus } => {
+            let time = std::time::Duration::try_from_secs_f64(60.0 * minutes).context("--minutes")?;
+            let corpus = corpus.unwrap_or_else(|| target.corpus());
+            let run = |text: &str| target.run(text);
+            match fuzz::fuzz(&corpus, target.words(), fuzz::Budget::Time(time), seed, run) {
+                Ok(fuzz::Summary { corpus, edited, outcomes }) => {
+                    println!("{corpus} inputs and {edited} edited ones: {outcomes} different outcomes, none a panic or slow");
+                    Ok(true)
+                }
+                Err(error) => match error.downcast::<fuzz::Finding>() {
+                    Ok(finding) => {
+                        println!("{finding}");
+                        Ok(false)
+                    }
+                    Err(error) => Err(error),
+                },
+            }
         }
         Command::Show { name, routine, plan, counts } => {
             for listing in verify::listings(&name)? {
