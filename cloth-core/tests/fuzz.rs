@@ -28,7 +28,8 @@ fn minutes() -> Budget {
     Budget::Time(Duration::from_secs_f64(60.0 * minutes))
 }
 
-const OBJ_WORDS: &[&str] = &["v ", "f ", "vn ", "vt ", "o ", "g ", "\n", "/", "//", " 1", " -1", " 0", "#", "\\\n", "1e308", "\r\n"];
+const OBJ_WORDS: &[&str] =
+    &["v ", "f ", "vn ", "vt ", "o ", "g ", "\n", "/", "//", " 1", " -1", " 0", "#", "\\\n", "1e308", "\r\n"];
 
 fn run_obj(corpus: &Path, budget: Budget) -> anyhow::Result<verify::fuzz::Summary> {
     let folder = tempfile::tempdir()?;
@@ -39,8 +40,25 @@ fn run_obj(corpus: &Path, budget: Budget) -> anyhow::Result<verify::fuzz::Summar
     })
 }
 
-const SCENE_WORDS: &[&str] =
-    &["[[pin]]\n", "[sheet]\n", "[mesh]\n", "= ", "\"", "true", "[", "]", "\n", "-1", "0", "1e9", "nan", "inf", "{", "}", "'"];
+const SCENE_WORDS: &[&str] = &[
+    "[[pin]]\n",
+    "[sheet]\n",
+    "[mesh]\n",
+    "= ",
+    "\"",
+    "true",
+    "[",
+    "]",
+    "\n",
+    "-1",
+    "0",
+    "1e9",
+    "nan",
+    "inf",
+    "{",
+    "}",
+    "'",
+];
 
 fn run_scene(corpus: &Path, budget: Budget) -> anyhow::Result<verify::fuzz::Summary> {
     fuzz(corpus, SCENE_WORDS, budget, 1, |text| match Scene::parse(text, Path::new("scene.toml")) {

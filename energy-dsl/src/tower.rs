@@ -132,7 +132,6 @@ impl<T: Number> Number for Tower<T> {
         *self = value;
     }
 
-
     fn from_f64(value: f64) -> Self {
         Self::Plain(T::from_f64(value))
     }

@@ -3,8 +3,8 @@
 #![allow(mixed_script_confusables)] // θ0 is what the declaration calls it
 
 use energy_dsl::{
-    BLOCK, Hessians, Kernel, Lane, Level, Packed, PackedPotential, PackedResidual, Potential, Residual, Vector3, dispatch,
-    for_each_batch,
+    BLOCK, Hessians, Kernel, Lane, Level, Packed, PackedPotential, PackedResidual, Potential, Residual, Vector3,
+    dispatch, for_each_batch,
 };
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, Binding, BlendedMotion4, DistanceBarrier, FlatBending,
@@ -45,12 +45,8 @@ where
     let (mut energies, mut gradients) = (vec![0.0; COUNT], vec![0.0; COUNT * 3 * N]);
     let triangle = 9 * N * (N + 1) / 2;
     let mut triangles = vec![0.0; COUNT * triangle];
-    let mut wide = Hessians {
-        energies: &mut energies,
-        gradients: &mut gradients,
-        triangles: &mut triangles,
-        flagged: Vec::new(),
-    };
+    let mut wide =
+        Hessians { energies: &mut energies, gradients: &mut gradients, triangles: &mut triangles, flagged: Vec::new() };
     for_each_batch(&Packed::new(&vec![element; COUNT], &stencils), &x, &mut wide);
     let flagged = wide.flagged;
     let name = E::DECLARATION.name;
@@ -101,9 +97,11 @@ impl<E: PackedResidual<f64>> Kernel for Jacobians<'_, E> {
             let wide = E::load::<L::F64>(&numbers, BLOCK);
             let read = |i: usize| L::F64::from_fn(|lane| unknowns[of(lane)][i]);
             let at = wide.jacobian_at::<L>(&energy_dsl::Array::from_fn(read));
-            results.extend((0..elements.len()).map(|lane| {
-                at.value.as_ref().iter().chain(at.jacobian.as_ref()).map(|x| x.extract(lane)).collect()
-            }));
+            results.extend(
+                (0..elements.len()).map(|lane| {
+                    at.value.as_ref().iter().chain(at.jacobian.as_ref()).map(|x| x.extract(lane)).collect()
+                }),
+            );
         }
         results
     }

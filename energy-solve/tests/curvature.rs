@@ -7,7 +7,8 @@ use std::fmt::Debug;
 use energy_dsl::{Block, PackedPotential, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, DistanceBarrier, FlatBending, HairBend,
-    HookeSpring, NeoHookean, PowerLaw, QuadraticHinge, SquaredDistanceBarrier, StVK, StableNeoHookean, StableNeoHookeanLog,
+    HookeSpring, NeoHookean, PowerLaw, QuadraticHinge, SquaredDistanceBarrier, StVK, StableNeoHookean,
+    StableNeoHookeanLog,
 };
 use energy_solve::{Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
 use nalgebra::DMatrix;

@@ -63,7 +63,6 @@ impl Number for Hyper {
         *self = value;
     }
 
-
     fn from_f64(value: f64) -> Self {
         Self::constant(value)
     }

@@ -182,7 +182,8 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
         let mut graph = Graph::new(Form::Textbook);
         let places = first..first + nodes.len();
         first = places.end;
-        let places: Vec<NodeId> = places.map(|i| graph.input(Input::Precomputed(u16::try_from(i).expect("few numbers")))).collect();
+        let places: Vec<NodeId> =
+            places.map(|i| graph.input(Input::Precomputed(u16::try_from(i).expect("few numbers")))).collect();
         let read = |input: Input| {
             let Input::Precomputed(number) = input else { unreachable!("compiler bug: numbers only") };
             let number = usize::from(number);

@@ -36,12 +36,12 @@ pub use element::{
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};
 pub use real::{Mask, Number, Real};
-#[cfg(feature = "compiler")]
-pub(crate) use unbounded::settle;
-pub use unbounded::Unbounded;
-#[doc(hidden)]
-pub use unbounded::{WithCare, with_care};
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
+pub use unbounded::Unbounded;
+#[cfg(feature = "compiler")]
+pub(crate) use unbounded::settle;
+#[doc(hidden)]
+pub use unbounded::{WithCare, with_care};

@@ -132,6 +132,8 @@ macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $result:expr) => {
         impl<S: Scalar> $trait for Unbounded<S> {
             type Output = Self;
+            // Routines are thousands of operations, and cold: calls compile soon and stay small.
+            #[inline(never)]
             fn $method(self, other: Self) -> Self {
                 let ($a, $b) = (self, other);
                 $result
@@ -166,9 +168,11 @@ impl<S: Scalar> Number for Unbounded<S> {
         *self = value;
     }
 
+    #[inline(never)]
     fn from_f64(value: f64) -> Self {
         Self::new(S::nearest(value), 0)
     }
+    #[inline(never)]
     fn sqrt(self) -> Self {
         if self.exponent % 2 == 0 {
             return Self::new(self.significand.sqrt(), self.exponent / 2);
@@ -178,19 +182,24 @@ impl<S: Scalar> Number for Unbounded<S> {
     fn abs(self) -> Self {
         Self { significand: self.significand.abs(), ..self }
     }
+    #[inline(never)]
     fn min(self, other: Self) -> Self {
         if other.less(self) { other } else { self }
     }
+    #[inline(never)]
     fn max(self, other: Self) -> Self {
         if self.less(other) { other } else { self }
     }
+    #[inline(never)]
     fn sin<L: Level>(self) -> Self {
         // So near 0 it is x.
         if self.is_plain() && self.split().1 < -60 { self } else { Self::new(self.to_scalar().sin::<L>(), 0) }
     }
+    #[inline(never)]
     fn cos<L: Level>(self) -> Self {
         Self::new(self.to_scalar().cos::<L>(), 0)
     }
+    #[inline(never)]
     fn exp<L: Level>(self) -> Self {
         let plain = self.to_scalar();
         let result = plain.exp::<L>();
@@ -205,6 +214,7 @@ impl<S: Scalar> Number for Unbounded<S> {
         let k = (x / std::f64::consts::LN_2).round();
         Self::by_double(Number::exp::<L>((x - k * HIGH) - k * LOW), k as i32)
     }
+    #[inline(never)]
     fn ln<L: Level>(self) -> Self {
         if !self.is_plain() || self.fits() {
             return Self::new(self.to_scalar().ln::<L>(), 0);
@@ -212,6 +222,7 @@ impl<S: Scalar> Number for Unbounded<S> {
         let (significand, exponent) = self.to_double();
         Self::by_double(Number::ln::<L>(significand) + f64::from(exponent) * std::f64::consts::LN_2, 0)
     }
+    #[inline(never)]
     fn atan2<L: Level>(self, x: Self) -> Self {
         let (y, x_aligned, _) = self.aligned(x);
         // Where y is less than the last bit of x > 0, the angle is their quotient.
@@ -219,6 +230,7 @@ impl<S: Scalar> Number for Unbounded<S> {
         let quotient = self / x;
         if is_slight && quotient.split().1 < -80 { quotient } else { Self::new(y.atan2::<L>(x_aligned), 0) }
     }
+    #[inline(never)]
     fn powf<L: Level>(self, exponent: Self) -> Self {
         let power = exponent.to_scalar();
         let (_, own) = self.split();
@@ -236,9 +248,11 @@ impl<S: Scalar> Number for Unbounded<S> {
         let significand = Number::powf::<L>(significand, power) * Number::powf::<L>(2.0, fraction);
         Self::by_double(significand, whole as i32)
     }
+    #[inline(never)]
     fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
         if L::FUSED { self.fused::<L>(factor, addend) } else { self * factor + addend }
     }
+    #[inline(never)]
     fn sum_error(self, other: Self) -> Self {
         let is_far = self.is_plain() && other.is_plain() && (self.exponent - other.exponent).abs() > S::REACH;
         if is_far {
@@ -247,33 +261,40 @@ impl<S: Scalar> Number for Unbounded<S> {
         let (x, y, exponent) = self.aligned(other);
         Self::new(x.sum_error(y), exponent)
     }
+    #[inline(never)]
     fn product_error<L: Level>(self, other: Self) -> Self {
         Self::new(self.significand.product_error::<L>(other.significand), self.exponent + other.exponent)
     }
+    #[inline(never)]
     fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
         if L::FUSED {
             return self.fused::<L>(factor, -subtrahend);
         }
         (self * factor - subtrahend) + self.product_error::<L>(factor)
     }
+    #[inline(never)]
     fn root_error<L: Level>(self, root: Self) -> Self {
         if L::FUSED {
             return (-root).fused::<L>(root, self);
         }
         (self - root * root) - root.product_error::<L>(root)
     }
+    #[inline(never)]
     fn power_of_two_scale(self) -> Self {
         let exponent = if self.is_plain() { -self.split().1 } else { 0 };
         Self { significand: S::ONE, exponent }
     }
+    #[inline(never)]
     fn less(self, other: Self) -> bool {
         let (x, y, _) = self.aligned(other);
         x < y
     }
+    #[inline(never)]
     fn less_or_equal(self, other: Self) -> bool {
         let (x, y, _) = self.aligned(other);
         x <= y
     }
+    #[inline(never)]
     fn equal(self, other: Self) -> bool {
         let (x, y, _) = self.aligned(other);
         x == y

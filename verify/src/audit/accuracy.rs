@@ -120,7 +120,10 @@ mod tests {
                     let kappa = amplification(&subject, &sample, &answer, name).max(1.0);
                     let error = if error == 0.0 { 0.0 } else { error / scale / SINGLE_ROUNDOFF / kappa };
                     if error.is_nan() || error > 8.0 {
-                        beyond.push(format!("{} {name}: {error:.1} u·κ, κ = {kappa:.1}, at {sample:?}", declaration.name));
+                        beyond.push(format!(
+                            "{} {name}: {error:.1} u·κ, κ = {kappa:.1}, at {sample:?}",
+                            declaration.name
+                        ));
                     }
                 }
             }

@@ -171,7 +171,6 @@ impl Number for Big {
         *self = value;
     }
 
-
     fn from_f64(value: f64) -> Self {
         Self(value.is_finite().then(|| float(value)))
     }

@@ -170,7 +170,6 @@ impl<T: Number<Mask = bool>> Number for Jet<T> {
         *self = value;
     }
 
-
     fn from_f64(value: f64) -> Self {
         Self::constant(T::from_f64(value))
     }
