@@ -5,7 +5,7 @@ use crate::graph::{self, NodeId, Op, count};
 use crate::mutation::{Mutation, faults};
 use crate::routines::{Routines, differentiate};
 use crate::runtime::{
-    Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, RestError, Routine, triangle_index,
+    Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, RestError, Routine, settle, triangle_index,
 };
 use crate::tape::Tape;
 use crate::textbook::{file_programs, programs};
@@ -224,14 +224,43 @@ impl<T: Number> Results<T> {
 
 impl InterpretedRoutine {
     fn run<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> Results<T> {
-        let (tape, present) = match &self.general {
-            Some(general) if !general.guard.run(inputs, rest).1[0].all() => (&general.tape, general.flags),
-            _ => (&self.ordinary, self.ordinary_flags),
-        };
+        if let Some(general) = self.general.as_ref().filter(|g| !g.guard.run(inputs, rest).1[0].all()) {
+            return general.run(inputs, rest);
+        }
+        let (tape, present) = (&self.ordinary, self.ordinary_flags);
         let (groups, masks) = tape.run(inputs, rest);
         let mut masks = masks.into_iter();
         let mut mask = |is_there: bool| if is_there { masks.next() } else { None }.unwrap_or_else(T::Mask::none);
         let flags = Flags { degenerate: mask(present[0]), kink: mask(present[1]) };
+        Results { groups, flags }
+    }
+}
+
+impl GeneralPath {
+    /// In numbers whose exponents do not end.
+    fn run<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> Results<T> {
+        let unbounded = |numbers: &[T]| numbers.iter().map(|x| x.unbounded(0)).collect::<Vec<_>>();
+        let inputs = Inputs {
+            parameters: &unbounded(inputs.parameters),
+            rest: &unbounded(inputs.rest),
+            positions: &unbounded(inputs.positions),
+            velocities: &unbounded(inputs.velocities),
+        };
+        let rest = unbounded(rest);
+        let (mut groups, masks) = self.tape.run(&inputs, &rest);
+        let number = |value: T::Unbounded| {
+            let mut number = T::from_f64(0.0);
+            number.set_lane(0, value);
+            number
+        };
+        let mut masks = masks.into_iter();
+        let mut mask = |is_there| if is_there { masks.next() } else { None }.unwrap_or_else(Mask::none);
+        let mut flags = Flags { degenerate: mask(self.flags[0]), kink: mask(self.flags[1]) };
+        let read = [inputs.parameters, inputs.rest, inputs.positions, inputs.velocities, &rest].concat();
+        groups.iter_mut().for_each(|group| settle(&read, group, &mut flags));
+        let groups = groups.into_iter().map(|group| group.into_iter().map(number).collect()).collect();
+        let mask = |mask: <T::Unbounded as Number>::Mask| T::Mask::from_bits(u32::from(mask.any()));
+        let flags = Flags { degenerate: mask(flags.degenerate), kink: mask(flags.kink) };
         Results { groups, flags }
     }
 }

@@ -123,6 +123,14 @@ impl<T: Number> Neg for Tower<T> {
 
 impl<T: Number> Number for Tower<T> {
     type Mask = T::Mask;
+    type Unbounded = Self;
+
+    fn unbounded(&self, _lane: usize) -> Self {
+        self.clone()
+    }
+    fn set_lane(&mut self, _lane: usize, value: Self) {
+        *self = value;
+    }
 
     fn from_f64(value: f64) -> Self {
         Self::Plain(T::from_f64(value))

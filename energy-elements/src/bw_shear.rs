@@ -9,11 +9,15 @@ energy! {
     pub energy BaraffWitkinShear(x0, x1, x2: Point; rest u0, u1, u2: Vec2; k: Scalar) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            let B = adjugate(D_m);
-            let per_d = 1 / det(D_m);
+            // Scaled, so that triangles of any size are computed near 1.
+            let d = det(D_m);
+            let s = power_of_two(d);
+            let B = adjugate(D_m) * s;
+            // A²/2 for w's that are s det D_m too large; not a number, and so refused, where A⁻² has no place among numbers.
+            let A2 = d^2 / (8 * (d * s)^4);
+            let weight = A2 * (A2 * (1 / A2));
         }
-        // det D_m times [w_u w_v]; A = det D_m/2.
         let F = columns(x1 - x0, x2 - x0) * B;
-        k / 8 * (per_d * dot(F * vector(1, 0), F * vector(0, 1)))^2
+        k * weight * dot(F * vector(1, 0), F * vector(0, 1))^2
     }
 }

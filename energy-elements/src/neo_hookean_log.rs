@@ -1,13 +1,18 @@
 use energy_macros::energy;
 
 energy! {
-    /// x − ln(1 + x), to 28 digits with second derivatives: near 0 by 2 artanh z = ln(1 + x), z = x/(2 + x), x − 2z = x z.
-    fn x_minus_log1p(x) {
+    /// x − ln(1 + x) for |x| < ¼, to 28 digits with second derivatives: 2 artanh z = ln(1 + x), z = x/(2 + x), x − 2z = x z.
+    fn x_minus_log1p_near_0(x) {
         let z = x / (2 + x);
         let y = z^2;
         let tail = y * (1/5 + y * (1/7 + y * (1/9 + y * (1/11 + y * (1/13 + y * (1/15 + y * (1/17 + y * (1/19
             + y * (1/21 + y * (1/23 + y * (1/25 + y * (1/27 + y * (1/29 + y * (1/31 + y * (1/33 + y * (1/35 + y * (1/37)))))))))))))))));
-        if abs(x) < 0.25 { z * (x - 2 * y * (1/3 + tail)) } else { x - log1p(x) }
+        z * (x - 2 * y * (1/3 + tail))
+    }
+
+    /// x − ln(1 + x).
+    fn x_minus_log1p(x) {
+        if abs(x) < 0.25 { x_minus_log1p_near_0(x) } else { x - log1p(x) }
     }
 
     /// Stable neo-Hookean membrane on a triangle with logarithm (Smith et al. 2018), stable at rest in two dimensions:
@@ -20,9 +25,11 @@ energy! {
     pub energy StableNeoHookeanLog(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            let B = adjugate(D_m);
+            // Scaled, so that triangles of any size are computed near 1.
             let d = det(D_m);
-            let d2 = d^2;
+            let s = power_of_two(d);
+            let B = adjugate(D_m) * s;
+            let d2 = (d * s)^2;
         }
         let a = x1 - x0;
         let b = x2 - x0;
@@ -51,9 +58,11 @@ energy! {
     pub energy NeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            let B = adjugate(D_m);
+            // Scaled, so that triangles of any size are computed near 1.
             let d = det(D_m);
-            let d2 = d^2;
+            let s = power_of_two(d);
+            let B = adjugate(D_m) * s;
+            let d2 = (d * s)^2;
         }
         let a = x1 - x0;
         let b = x2 - x0;
@@ -62,9 +71,15 @@ energy! {
         let f_v = F * vector(0, 1);
         let area = norm(cross(a, b));
         let j = (area - d) / d;
+        let J = area / d;
         // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
-        let square = ddot(F, F) / d2 + 2 * area / d;
+        let square = ddot(F, F) / d2 + 2 * J;
         let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
-        d / 4 * (μ * (anisotropy / square + 2 * x_minus_log1p(j)) + λ * log1p(j)^2)
+        // ln J, near rest from j, and j − ln J.
+        let is_near = abs(j) < 0.25;
+        let near = x_minus_log1p_near_0(j);
+        let l = if is_near { j - near } else { log(J) };
+        let excess = if is_near { near } else { j - log(J) };
+        d / 4 * (μ * (anisotropy / square + 2 * excess) + λ * l^2)
     }
 }

@@ -10,9 +10,11 @@ energy! {
     pub energy StableNeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            let B = adjugate(D_m);
+            // Scaled, so that triangles of any size are computed near 1.
             let d = det(D_m);
-            let d2 = d^2;
+            let s = power_of_two(d);
+            let B = adjugate(D_m) * s;
+            let d2 = (d * s)^2;
         }
         let a = x1 - x0;
         let b = x2 - x0;

@@ -10,12 +10,14 @@ energy! {
     pub energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            let B = adjugate(D_m);
-            let d = det(D_m)^2;
+            // Scaled, so that triangles of any size are computed near 1.
+            let s = power_of_two(det(D_m));
+            let B = adjugate(D_m) * s;
+            let d = (det(D_m) * s)^2;
             let per_d = 1 / (2 * d);
             let A = det(D_m) / 2;
         }
-        // F = D D_m⁻¹, its division by det D_m left to the end: edges that are exact give an exact zero at rest.
+        // F = D D_m⁻¹, its division by s det D_m left to the end: edges that are exact give an exact zero at rest.
         let F = columns(x1 - x0, x2 - x0) * B;
         let E = per_d * (transpose(F) * F - d * identity(2));
         A * (μ * ddot(E, E) + λ / 2 * trace(E)^2)

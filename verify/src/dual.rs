@@ -53,6 +53,15 @@ impl Neg for Hyper {
 
 impl Number for Hyper {
     type Mask = bool;
+    type Unbounded = Self;
+
+    fn unbounded(&self, _lane: usize) -> Self {
+        self.clone()
+    }
+
+    fn set_lane(&mut self, _lane: usize, value: Self) {
+        *self = value;
+    }
 
     fn from_f64(value: f64) -> Self {
         Self::constant(value)

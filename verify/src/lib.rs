@@ -17,11 +17,13 @@
 
 mod atomic_file;
 pub mod audit;
+pub mod bench;
 mod blocks;
 pub mod dual;
 mod eigenvalues;
 mod finite_difference;
 mod formula;
+pub mod fuzz;
 mod geometry;
 mod listings;
 pub mod multiprecision;

@@ -8,6 +8,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use verify::audit::{Options, Report, Target, audit_all, audit_at, catalogue_targets, describe_failure};
+use verify::fuzz;
 use verify::reference::{
     BlockLine, FamilyLine, PolicyLine, ReferenceReport, Source, evaluate_file, fusion_reference, policy, reference,
 };
@@ -76,11 +77,37 @@ enum Command {
     /// degenerate input with a documented answer. Exit status 1 on a NaN, an error beyond 8 u·κ that is not flagged, or an answer
     /// that is not the documented one.
     Stress {
-        /// Elements; all of them if none is named.
+        /// Elements, of the catalogue or of the file; all of them if none is named.
         names: Vec<String>,
+        /// Sweep the declarations of this file (`.energy`) instead of the catalogue's; degenerate inputs are left out.
+        #[arg(long)]
+        file: Option<PathBuf>,
         /// Also write `stress.md`, `stress.json` and a plot of each sweep to this folder.
         #[arg(short, long)]
         output: Option<PathBuf>,
+    },
+    /// Time every way to a Hessian on one element of each family, and measure its error against multi-precision.
+    Bench {
+        /// Elements; all that are timed if none is named.
+        names: Vec<String>,
+        /// Also write `bench.md`, `bench.csv` and a plot of each element to this folder.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
+    },
+    /// Feed the compiler of the language with edited inputs of a corpus; exit status 1 on a panic, or an input that takes more than 20
+    /// seconds, which is added to the corpus.
+    Fuzz {
+        /// What reads the inputs.
+        target: fuzz::Target,
+        /// For how long.
+        #[arg(long, default_value_t = 1.0)]
+        minutes: f64,
+        /// What the edits are drawn from.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// A folder of inputs instead of the repository's own.
+        #[arg(long)]
+        corpus: Option<PathBuf>,
     },
     /// Print the code generated for an element.
     Show {
@@ -160,9 +187,9 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let failed = nan || !policy || exceeded || (strict && beyond);
             Ok(!failed)
         }
-        Command::Stress { names, output } => {
+        Command::Stress { names, file, output } => {
             let mut tracks = Vec::new();
-            for target in targets(&names, None)? {
+            for target in targets(&names, file.as_deref())? {
                 tracks.extend(stress(&target).map_err(anyhow::Error::msg)?);
             }
             let table = markdown(&tracks);
@@ -175,11 +202,47 @@ fn run(command: Command) -> anyhow::Result<bool> {
                     write_text(Some(&folder.join(file)), || svg)?;
                 }
             }
-            let policy = policy(&records().join("policy.json"))?;
-            print_policy(&policy);
+            let policy = if file.is_some() { Vec::new() } else { policy(&records().join("policy.json"))? };
+            if !policy.is_empty() {
+                print_policy(&policy);
+            }
             let failed = tracks.iter().filter(|track| !track.passed()).count();
             println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
             Ok(failed == 0 && policy.iter().all(|line| line.passed != Some(false)))
+        }
+        Command::Bench { names, output } => {
+            let list = verify::bench::bench(&names).map_err(anyhow::Error::msg)?;
+            let table = verify::bench::markdown(&list);
+            print!("{table}");
+            if let Some(folder) = output {
+                std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+                write_text(Some(&folder.join("bench.md")), || table)?;
+                write_text(Some(&folder.join("bench.csv")), || verify::bench::csv(&list))?;
+                for (file, svg) in verify::bench::plots(&list) {
+                    write_text(Some(&folder.join(file)), || svg)?;
+                }
+            }
+            Ok(true)
+        }
+        Command::Fuzz { target, minutes, seed, corpus } => {
+            let time = std::time::Duration::try_from_secs_f64(60.0 * minutes).context("--minutes")?;
+            let corpus = corpus.unwrap_or_else(|| target.corpus());
+            let run = |text: &str| target.run(text);
+            match fuzz::fuzz(&corpus, target.words(), fuzz::Budget::Time(time), seed, run) {
+                Ok(fuzz::Summary { corpus, edited, outcomes }) => {
+                    println!(
+                        "{corpus} inputs and {edited} edited ones: {outcomes} different outcomes, none a panic or slow"
+                    );
+                    Ok(true)
+                }
+                Err(error) => match error.downcast::<fuzz::Finding>() {
+                    Ok(finding) => {
+                        println!("{finding}");
+                        Ok(false)
+                    }
+                    Err(error) => Err(error),
+                },
+            }
         }
         Command::Show { name, routine, plan, counts } => {
             for listing in verify::listings(&name)? {

@@ -3,13 +3,15 @@
 //! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L, and `f`, which runs it at the machine's best
 //! level. Where precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general` by `f_is_ordinary`.
 
+use std::cell::RefCell;
+
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::schedule::Schedule;
 use crate::check::{Input as DeclaredInput, Program};
-use crate::graph::{Input, NodeId};
-use crate::routines::Routines;
+use crate::graph::{Form, Graph, Input, NodeId};
+use crate::routines::{General, Routines};
 use crate::runtime::Kind;
 
 /// What turns a group of outputs into an expression.
@@ -44,7 +46,7 @@ pub(super) fn implementation(
     routines: &Routines,
 ) -> TokenStream {
     let of = format_ident!("{of}");
-    let (levelled, general): (Vec<_>, Vec<_>) = methods.iter().map(|m| method(m, program, routines)).unzip();
+    let (levelled, general): (Vec<_>, Vec<_>) = methods.iter().map(|m| method(m, name, program, routines)).unzip();
     let general = general.iter().any(|g| !g.is_empty()).then(|| {
         quote! {
             #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
@@ -65,7 +67,7 @@ pub(super) fn implementation(
 }
 
 /// The method and its levelled form; the form with all precautions, if they were split off.
-fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
+fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
     let routine = routines
         .list
         .iter()
@@ -102,7 +104,7 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
                 }
             };
             let guard = mask(program, routines, general.ordinary);
-            let everything = self::body(method, program, routines, &general.groups, general.flags);
+            let WithCare { inputs, outputs, numbers, code } = with_care(method, name, program, routines, general);
             let general = quote! {
                 /// Where `_if_ordinary` suffices.
                 #[inline(always)]
@@ -115,13 +117,17 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
                     #ordinary
                 }
 
-                /// With all precautions; lanes that need none keep the bits they would have alone.
+                /// With all precautions, in numbers whose exponents do not end; lanes that need none keep the bits they would
+                /// have alone.
                 #[cold]
                 #[inline(never)]
                 fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #parts {
-                    let mut general = { #everything };
+                    #code
+                    let ordinary = self.#is_ordinary::<L>(#(#names),*);
+                    let (numbers, flags) =
+                        ::energy_dsl::with_care::<WithCare, T, L, #numbers>(&[#(#inputs),*], !ordinary);
+                    let mut general = ::energy_dsl::#result { #outputs flags };
                     if T::WIDE {
-                        let ordinary = self.#is_ordinary::<L>(#(#names),*);
                         let here = self.#if_ordinary::<L>(#(#names),*);
                         general = ::energy_dsl::Choose::choose(ordinary, &here, &general);
                     }
@@ -143,6 +149,67 @@ fn method(method: &Method, program: &Program, routines: &Routines) -> (TokenStre
         }
     };
     (methods, general)
+}
+
+/// A routine with all precautions: over any number, from what it reads to what it returns.
+struct WithCare {
+    /// What it reads, as the element's method reads it.
+    inputs: Vec<TokenStream>,
+    /// The fields of the result, out of `numbers`.
+    outputs: TokenStream,
+    /// How many numbers it reads and returns.
+    numbers: TokenStream,
+    code: TokenStream,
+}
+
+fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routines, general: &General) -> WithCare {
+    let inputs = RefCell::new(Vec::new());
+    let read = |input: Input| {
+        let mut inputs = inputs.borrow_mut();
+        inputs.push(read_input(program, input));
+        let number = inputs.len() - 1;
+        quote!(inputs[#number])
+    };
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let all: Vec<NodeId> = general.groups.concat();
+    let results = schedule.array(&all);
+    let (degenerate, kink) = (schedule.mask(general.flags[0]), schedule.mask(general.flags[1]));
+    let statements = schedule.statements();
+    let mut first = 0;
+    let outputs = method.fields.iter().zip(&general.groups).map(|((field, layout), nodes)| {
+        let field = format_ident!("{field}");
+        // The layout of numbers that stand one after the other.
+        let mut graph = Graph::new(Form::Textbook);
+        let places = first..first + nodes.len();
+        first = places.end;
+        let places: Vec<NodeId> =
+            places.map(|i| graph.input(Input::Precomputed(u16::try_from(i).expect("few numbers")))).collect();
+        let read = |input: Input| {
+            let Input::Precomputed(number) = input else { unreachable!("compiler bug: numbers only") };
+            let number = usize::from(number);
+            quote!(numbers[#number])
+        };
+        let value = layout(&mut Schedule::new(&graph, &read), &places);
+        quote!(#field: #value,)
+    });
+    let outputs = outputs.collect();
+    let inputs = inputs.into_inner();
+    let (reads, returns) = (inputs.len(), all.len());
+    let what = format!("`{}` of [`{name}`].", method.routine);
+    let code = quote! {
+        #[doc = #what]
+        struct WithCare;
+
+        impl ::energy_dsl::WithCare<#reads, #returns> for WithCare {
+            fn run<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(
+                inputs: &[T; #reads],
+            ) -> ([T; #returns], ::energy_dsl::Flags<T>) {
+                #statements
+                (#results, ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink })
+            }
+        }
+    };
+    WithCare { inputs, outputs, numbers: quote!(#reads, #returns), code }
 }
 
 /// Statements, then a mask.

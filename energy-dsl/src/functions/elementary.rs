@@ -102,6 +102,14 @@ pub(super) const FUNCTIONS: &[Function] = &[
         a[0].node()
     )),
     scalar_function!(
+        "power_of_two",
+        "power_of_two(x)",
+        "The power of two s with 1 ≤ s |x| < 2 (1 where x is 0), in the unit of 1/x; its derivative is taken as 0. Multiplying by it is exact: for bringing a rest shape of any size near 1, in formulas whose result does not depend on it.",
+        one_scalar,
+        "0",
+        |g, a| g.power_of_two_scale(a[0].node())
+    ),
+    scalar_function!(
         "one_minus_cos",
         "one_minus_cos(x)",
         "1 − cos x = 2 sin²(x/2), without cancellation at 0; so is `1 - cos(x)`.",

@@ -13,6 +13,7 @@ mod evaluate;
 mod flags;
 mod real;
 mod results;
+mod unbounded;
 
 pub use array::Array;
 pub use batch::{
@@ -39,3 +40,8 @@ pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
+pub use unbounded::Unbounded;
+#[cfg(feature = "compiler")]
+pub(crate) use unbounded::settle;
+#[doc(hidden)]
+pub use unbounded::{WithCare, with_care};

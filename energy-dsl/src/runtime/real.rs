@@ -3,6 +3,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, Pow, Sin, Unary, sin_cos};
+use super::unbounded::Unbounded;
 
 /// The outcome of a comparison: `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
@@ -61,6 +62,14 @@ pub trait Number:
     type Mask: Mask;
     /// Whether there are several lanes, so that a mask may hold for some and not for others.
     const WIDE: bool = false;
+    /// What extraordinary configurations are computed with: numbers of one lane, of the same precision, whose exponents do not
+    /// end. A type whose numbers neither overflow nor vanish, or that has no such counterpart, names itself.
+    type Unbounded: Number<Unbounded = Self::Unbounded>;
+
+    /// One lane (of which a scalar has one, number 0).
+    fn unbounded(&self, lane: usize) -> Self::Unbounded;
+    /// Replaces one lane by the number nearest to `value`.
+    fn set_lane(&mut self, lane: usize, value: Self::Unbounded);
 
     /// The number nearest to a double.
     fn from_f64(value: f64) -> Self;
@@ -132,15 +141,24 @@ pub trait Number:
 }
 
 /// A [`Number`] that generated code can run over.
-pub trait Real: Number + Copy {}
+pub trait Real: Number<Unbounded: Copy> + Copy {}
 
-impl<T: Number + Copy> Real for T {}
+impl<T: Number<Unbounded: Copy> + Copy> Real for T {}
 
 macro_rules! number_for_float {
     ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $binary:ident) => {
         impl Number for $float {
             type Mask = bool;
+            type Unbounded = Unbounded<$float>;
 
+            #[inline]
+            fn unbounded(&self, _lane: usize) -> Self::Unbounded {
+                Unbounded::of(*self)
+            }
+            #[inline]
+            fn set_lane(&mut self, _lane: usize, value: Self::Unbounded) {
+                *self = value.to_scalar();
+            }
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
                 value as $float

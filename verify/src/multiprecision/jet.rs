@@ -160,6 +160,15 @@ impl<T: Number> Neg for Jet<T> {
 
 impl<T: Number<Mask = bool>> Number for Jet<T> {
     type Mask = bool;
+    type Unbounded = Self;
+
+    fn unbounded(&self, _lane: usize) -> Self {
+        self.clone()
+    }
+
+    fn set_lane(&mut self, _lane: usize, value: Self) {
+        *self = value;
+    }
 
     fn from_f64(value: f64) -> Self {
         Self::constant(T::from_f64(value))

@@ -50,7 +50,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
         "norm_squared" => call.units[0].map(|d| d.power(2.0)),
         "det" => call.units[0].map(|d| d.power(size)),
         "adjugate" => call.units[0].map(|d| d.power(size - 1.0)),
-        "inverse" => call.units[0].map(|d| d.power(-1.0)),
+        "inverse" | "power_of_two" => call.units[0].map(|d| d.power(-1.0)),
         "huber" | "pseudo_huber" => inference.same(call.name, &all, call.span).map(|d| d.power(2.0)),
         "norm" => call.units[0].clone(),
         "unit" if call.is(0, Shape::DualQuat) => {

@@ -8,6 +8,7 @@ use super::register::{DoubleRegister, Register, Scalar};
 use super::{Kernel, Level};
 use crate::runtime::elementary::{Atan2, Cos, Double, Exp, Ln, Pow, Sin};
 use crate::runtime::real::Number;
+use crate::runtime::unbounded::Unbounded;
 
 /// A register as a number.
 #[derive(Clone, Copy)]
@@ -86,7 +87,15 @@ impl<R: Register> Lane<R::Scalar> for Lanes<R> {
 impl<R: Register> Number for Lanes<R> {
     type Mask = R::Mask;
     const WIDE: bool = R::LANES > 1;
+    type Unbounded = Unbounded<R::Scalar>;
 
+    fn unbounded(&self, lane: usize) -> Self::Unbounded {
+        Unbounded::of(self.extract(lane))
+    }
+    fn set_lane(&mut self, lane: usize, value: Self::Unbounded) {
+        let (old, new) = (*self, value.to_scalar());
+        *self = Self::from_fn(|at| if at == lane { new } else { old.extract(at) });
+    }
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
         Self::splat(R::Scalar::nearest(value))

@@ -46,6 +46,17 @@ impl Level for Baseline {
     type F32 = Lanes<portable::F32x4>;
 }
 
+/// Baseline, with fused operations by library calls: what gives the bits of fused levels outside their kernels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fused;
+
+impl Level for Fused {
+    const NAME: &'static str = "fused";
+    const FUSED: bool = true;
+    type F64 = Lanes<portable::F64x2>;
+    type F32 = Lanes<portable::F32x4>;
+}
+
 /// Work that can be compiled for any [`Level`].
 pub trait Kernel {
     /// What it returns.

@@ -22,15 +22,29 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     const SPLITTER: Self;
     /// The number one.
     const ONE: Self;
+    /// The exponent of the least normal number.
+    const FIRST: i32;
+    /// The exponent of the largest numbers.
+    const LAST: i32;
+    /// Between which magnitudes significands of [`crate::runtime::Unbounded`] are left as they are.
+    const SPAN: (Self, Self);
+    /// Numbers whose exponents differ by more do not meet in a sum, nor in a fused one.
+    const REACH: i32;
 
     /// The number nearest to a double.
     fn nearest(value: f64) -> Self;
+    /// In double precision.
+    fn to_f64(self) -> f64;
+    /// ⌊log₂|self|⌋ of a normal number.
+    fn exponent(self) -> i32;
+    /// 2^exponent, a normal number.
+    fn power_of_two(exponent: i32) -> Self;
     /// From where to where [`crate::Number::is_moderate`] holds.
     fn moderate_bounds(degree: u8) -> (Self, Self);
 }
 
 macro_rules! scalar {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal) => {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal, $span:literal, $reach:literal) => {
         impl Scalar for $float {
             const SIGN: Self = -0.0;
             const MAGNITUDE: Self = $float::from_bits($bits::MAX >> 1);
@@ -39,10 +53,26 @@ macro_rules! scalar {
             const LEAST_NORMAL: Self = $float::MIN_POSITIVE;
             const SPLITTER: Self = $splitter;
             const ONE: Self = 1.0;
+            const FIRST: i32 = 1 - $bias;
+            const LAST: i32 = $bias;
+            const SPAN: (Self, Self) = (1.0 / $span, $span);
+            const REACH: i32 = $reach;
 
             #[inline(always)]
             fn nearest(value: f64) -> Self {
                 value as $float
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline(always)]
+            fn exponent(self) -> i32 {
+                ((self.to_bits() << 1) >> ($mantissa_bits + 1)) as i32 - $bias
+            }
+            #[inline(always)]
+            fn power_of_two(exponent: i32) -> Self {
+                $float::from_bits(((exponent + $bias) as $bits) << $mantissa_bits)
             }
             #[inline(always)]
             fn moderate_bounds(degree: u8) -> (Self, Self) {
@@ -54,8 +84,9 @@ macro_rules! scalar {
     };
 }
 
-scalar!(f64, u64, 52, 1023, 134_217_729.0, 80);
-scalar!(f32, u32, 23, 127, 4097.0, 12);
+// Products of two significands, with all their bits, and a third number shifted by the reach, are normal numbers.
+scalar!(f64, u64, 52, 1023, 134_217_729.0, 80, 340_282_366_920_938_463_463_374_607_431_768_211_456.0, 500);
+scalar!(f32, u32, 23, 127, 4097.0, 12, 16.0, 95);
 
 /// A register of numbers. Where it needs features of the processor, it is used in kernels run at [`Self::Level`] only.
 pub trait Register: Copy {
