@@ -115,7 +115,8 @@ impl PlateTerm {
     /// θ − θ̄ and ∇θ of all hinges.
     fn angles(&self, x: &[Vector3<f64>]) -> Angles {
         let count = self.hinges.len();
-        let mut angles = Angles { values: Vec::with_capacity(count), gradients: Vec::with_capacity(12 * count), flagged: 0 };
+        let mut angles =
+            Angles { values: Vec::with_capacity(count), gradients: Vec::with_capacity(12 * count), flagged: 0 };
         let element = HingeAngle::<f64>::new();
         for (hinge, rest) in self.hinges.iter().zip(&self.rest) {
             let at = element.gradient(&hinge.map(|vertex| x[vertex]));
