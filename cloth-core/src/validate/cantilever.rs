@@ -25,8 +25,8 @@ pub struct Cantilever {
     pub segments: usize,
 }
 
-/// E h of the membrane over the strip's weight per width.
-const MEMBRANE: f64 = 3e3;
+/// E h of the membrane over the strip's weight per width: stiff enough not to stretch, soft enough to let flat triangles bend across their edges.
+const MEMBRANE: f64 = 1e3;
 
 impl Cantilever {
     /// The Γ that the strip's shape stands for: that of the elastica with the same drop over reach.

@@ -23,6 +23,10 @@ pub(super) struct Equilibrium {
 const ITERATIONS: usize = 400;
 /// A force that is no more than this part of all weight counts as none.
 const FORCE: f64 = 1e-10;
+/// Where no step leads further down, a force that is no more than this part counts as rounding.
+const ROUNDED: f64 = 1e-7;
+/// A step that moves no vertex by more than this part of the size of the whole is the last.
+const SHORTEST: f64 = 1e-13;
 /// The most a vertex may move in an iteration, over the size of the whole.
 const STRIDE: f64 = 0.1;
 
@@ -52,6 +56,9 @@ impl Equilibrium {
             }
             let direction = found.direction(&down)?;
             let longest = direction.as_flattened().iter().fold(0.0_f64, |longest, d| longest.max(d.abs()));
+            if longest < SHORTEST * size {
+                break;
+            }
             let mut scale = (STRIDE * size / longest).min(1.0);
             let slope = dot(&down, &direction);
             let rounding = 1e-13 * (energy.1 + weight * size);
@@ -68,6 +75,11 @@ impl Equilibrium {
             if !accepted {
                 break;
             }
+        }
+        // Stiff membranes round their forces to no better.
+        if force <= ROUNDED * weight {
+            found.linearise(Curvature::Exact)?;
+            return Ok(found);
         }
         Err(ValidateError::NoEquilibrium { force, weight })
     }

@@ -63,7 +63,7 @@ fn plate(rigidity: f64) -> Bending {
 }
 
 pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
-    let segments = if quick { 30 } else { 60 };
+    let segments = if quick { 60 } else { 120 };
     for links in [1, 3, 20] {
         let x = zero_between(0.0, 2.5 / links as f64, |x| laguerre(links, x));
         let exact = (links as f64 * x).sqrt();

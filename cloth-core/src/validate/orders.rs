@@ -113,7 +113,7 @@ fn schemes() -> Vec<(Box<dyn Integrator>, f64, f64)> {
 }
 
 /// The time that is stepped over, in s.
-const TIME: f64 = 0.5;
+const TIME: f64 = 0.2;
 
 fn error(body: &mut Body, scheme: &mut dyn Integrator, steps: usize, truth: &Body) -> Result<f64, ValidateError> {
     for _ in 0..steps {

@@ -1,6 +1,4 @@
-use energy_dsl::{
-    Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, for_each_batch,
-};
+use energy_dsl::{Block, Declaration, Element, Potential, Vector3};
 use energy_elements::HingeAngle;
 use energy_solve::{
     Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage, Tally, Term,
@@ -26,7 +24,6 @@ pub struct PlateTerm {
     arity: usize,
     /// The patches with a free vertex, and what else is known once vertices have places.
     active: Vec<usize>,
-    packed: Packed<HingeAngle>,
     places: Vec<PatchPlaces>,
     hinge_rows: Vec<[Option<usize>; 4]>,
     pattern: Option<Pattern>,
@@ -98,7 +95,6 @@ impl PlateTerm {
             stencils,
             arity,
             active: Vec::new(),
-            packed: Packed::new::<4>(&[], &[]),
             places: Vec::new(),
             hinge_rows: Vec::new(),
             pattern: None,
@@ -116,13 +112,17 @@ impl PlateTerm {
         Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
     }
 
-    /// θ and ∇θ of all hinges.
+    /// θ − θ̄ and ∇θ of all hinges.
     fn angles(&self, x: &[Vector3<f64>]) -> Angles {
         let count = self.hinges.len();
-        let mut angles = Angles { values: vec![0.0; count], gradients: vec![0.0; 12 * count], flagged: 0 };
-        for_each_batch(&self.packed, x, &mut angles);
-        for (angle, rest) in angles.values.iter_mut().zip(&self.rest) {
-            *angle -= rest;
+        let mut angles =
+            Angles { values: Vec::with_capacity(count), gradients: Vec::with_capacity(12 * count), flagged: 0 };
+        let element = HingeAngle::<f64>::new();
+        for (hinge, rest) in self.hinges.iter().zip(&self.rest) {
+            let at = element.gradient(&hinge.map(|vertex| x[vertex]));
+            angles.values.push(at.value - rest);
+            angles.gradients.extend(at.gradient.as_flattened());
+            angles.flagged += u64::from(at.flags.any());
         }
         angles
     }
@@ -186,19 +186,6 @@ struct Angles {
     values: Vec<f64>,
     gradients: Vec<f64>,
     flagged: u64,
-}
-
-impl BatchWork<HingeAngle> for Angles {
-    #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
-        let (first, count) = (batch.first, batch.count);
-        let result = batch.element.gradient_at::<L>(batch.points);
-        result.value.store_ragged(&mut self.values[first..first + count]);
-        let gradient = result.gradient.as_ref().as_flattened();
-        L::F64::store_transposed(gradient, count, &mut self.gradients[12 * first..], 12);
-        let flags = (result.flags.degenerate | result.flags.kink).bits();
-        self.flagged += u64::from((flags & (u32::MAX >> (32 - count))).count_ones());
-    }
 }
 
 impl Patch {
@@ -307,9 +294,6 @@ impl Term for PlateTerm {
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let index = |number: usize| u32::try_from(number).expect("fewer than 2³² vertices and blocks");
-        let angle = HingeAngle::new();
-        self.packed =
-            Packed::from_fn(self.hinges.len(), 4, |_| &angle, |hinge, point| index(self.hinges[hinge][point]));
         self.hinge_rows = self.hinges.iter().map(|hinge| hinge.map(|vertex| dofs.place(vertex))).collect();
         let slot = |i: usize, j: usize| {
             let rows = dofs.place(i).zip(dofs.place(j));
