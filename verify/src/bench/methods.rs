@@ -84,15 +84,15 @@ impl<'a> Methods<'a> {
             self.measure("complex step", |i| by_complex_step(&complexes[i])),
             self.measure("num-dual", |i| by_hyper_dual(&hypers[i])),
         ];
-        let timed = self.time(|i| drop(black_box(singles[i].0.hessian(black_box(&singles[i].1)).hessian)));
+        let timed = self.time(|i| discard(singles[i].0.hessian(black_box(&singles[i].1)).hessian));
         let error = self.error(|i| full(singles[i].0.hessian(&singles[i].1).hessian.as_ref(), f64::from));
         list.push(self.measured("generated, f32", timed, error));
-        let timed = self.time(|i| drop(black_box(doubles[i].0.hessian(black_box(&doubles[i].1)).hessian)));
+        let timed = self.time(|i| discard(doubles[i].0.hessian(black_box(&doubles[i].1)).hessian));
         let error = self.error(|i| full(doubles[i].0.hessian(&doubles[i].1).hessian.as_ref(), |x| x));
         list.push(self.measured("generated, f64", timed, error));
         // The same bits as the scalar where products and sums fuse alike.
         list.push(self.measured("generated, f64 lanes", time_lanes(&doubles), error));
-        let timed = self.time(|i| drop(black_box(hessian(self.subject, &self.samples[i]))));
+        let timed = self.time(|i| discard(hessian(self.subject, &self.samples[i])));
         list.push(self.measured("multi-precision, 30 digits", timed, 1e-30));
         list
     }
@@ -103,7 +103,7 @@ impl<'a> Methods<'a> {
 
     fn measure(&self, method: &'static str, run: impl Fn(usize) -> Vec<f64>) -> Measured {
         let error = self.error(&run);
-        self.measured(method, self.time(|i| drop(black_box(run(i)))), error)
+        self.measured(method, self.time(|i| discard(run(i))), error)
     }
 
     /// Nanoseconds of one run, the least of some rounds over all inputs.
@@ -119,6 +119,12 @@ impl<'a> Methods<'a> {
         };
         self.truths.iter().enumerate().map(of).fold(0.0, worse)
     }
+}
+
+/// Makes a result, and does not read it.
+#[inline(always)]
+fn discard<T>(result: T) {
+    let _ = black_box(result);
 }
 
 /// Nanoseconds of one of the `count` things that a round does, in the fastest round.
