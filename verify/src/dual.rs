@@ -56,7 +56,7 @@ impl Number for Hyper {
     type Unbounded = Self;
 
     fn unbounded(&self, _lane: usize) -> Self {
-        self.clone()
+        *self
     }
 
     fn set_lane(&mut self, _lane: usize, value: Self) {

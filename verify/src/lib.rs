@@ -17,7 +17,6 @@
 
 mod atomic_file;
 pub mod audit;
-pub mod bench;
 mod blocks;
 pub mod dual;
 mod eigenvalues;
