@@ -134,7 +134,9 @@ fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseErr
     for path in [Path::Chosen, Path::General] {
         for (routine, blocks) in [("value", 1), ("gradient", 2), ("hessian", 3)] {
             let found = listing.evaluate(routine, path, &inputs).expect("an energy has it");
-            for (((found, by_duals), truth), nearby) in found.iter().zip(&by_duals).zip(&truth).zip(&nearby).take(blocks) {
+            for (((found, by_duals), truth), nearby) in
+                found.iter().zip(&by_duals).zip(&truth).zip(&nearby).take(blocks)
+            {
                 let sensitivity = truth.iter().zip(nearby).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 // A kink or jump between the two inputs: no derivative to compare.
                 prop_assume!(sensitivity <= 1e-3 * largest(truth) || largest(truth) < 1e-12);

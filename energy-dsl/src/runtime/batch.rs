@@ -135,7 +135,9 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
     }
 
     fn write(&mut self, place: usize, element: &E) {
-        element.store(&mut self.numbers[place / BLOCK * E::NUMBERS * BLOCK + place % BLOCK..], BLOCK);
+        if E::NUMBERS > 0 {
+            element.store(&mut self.numbers[place / BLOCK * E::NUMBERS * BLOCK + place % BLOCK..], BLOCK);
+        }
     }
 }
 
