@@ -72,3 +72,44 @@ fn difference<K: Subject>(found: &[f64], expected: &[f64]) -> f64 {
 fn max_or_nan(a: f64, b: f64) -> f64 {
     if b.is_nan() || b > a { b } else { a }
 }
+
+// Within the library: tests beside it would have the program compiled, kernels and all, only to be at hand.
+#[cfg(test)]
+mod tests {
+    use super::agreement;
+    use crate::kernels::{HairBendKernel, HingeKernel, PointToPlaneKernel, SpringKernel, StVKKernel};
+    use crate::{Subject, samples};
+
+    /// A multiple of every number of lanes.
+    const ELEMENTS: usize = 320;
+
+    fn check<K: Subject>() {
+        let difference = agreement::<K>(&samples::<K>(ELEMENTS)).unwrap_or_else(|difference| panic!("{difference}"));
+        assert!(difference > 0.0, "different code rounds differently: was anything compared?");
+    }
+
+    #[test]
+    fn springs_agree() {
+        check::<SpringKernel>();
+    }
+
+    #[test]
+    fn hair_bends_agree() {
+        check::<HairBendKernel>();
+    }
+
+    #[test]
+    fn hinges_agree() {
+        check::<HingeKernel>();
+    }
+
+    #[test]
+    fn membranes_agree() {
+        check::<StVKKernel>();
+    }
+
+    #[test]
+    fn points_to_planes_agree() {
+        check::<PointToPlaneKernel>();
+    }
+}
