@@ -2,9 +2,9 @@ use energy_macros::energy;
 
 energy! {
     /// Bending of an isotropic plate on a triangle x0x1x2 whose neighbours' far corners are y0, y1, y2 (y0 across the edge x1x2, and so
-    /// on), with the flexural rigidity D = Y h³/(12(1 − ν²)):
+    /// on), with the flexural rigidity D = Y h³/(12(1 − ν²)), λ = ν D and μ = (1 − ν) D/2:
     ///
-    /// A D/2 (ν tr² κ + (1 − ν) ‖κ‖²),  κ = 1/(2A) Σ ‖e‖ (θ − θ̄) n ⊗ n
+    /// A (λ/2 tr² κ + μ ‖κ‖²),  κ = 1/(2A) Σ ‖e‖ (θ − θ̄) n ⊗ n
     ///
     /// summed over its three edges, n their normals in its plane, θ their dihedral angles, θ̄ those at rest, A its area at rest. That is
     /// the lowest Hellan–Herrmann–Johnson element (Comodi 1989) with each edge's normal half-way between those of its triangles, as in
@@ -13,7 +13,7 @@ energy! {
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
-    pub energy PlateBending(x0, x1, x2, y0, y1, y2: Point; rest X0, X1, X2, Y0, Y1, Y2: Vec3; D: Scalar[J], ν: Scalar[1]) {
+    pub energy PlateBending(x0, x1, x2, y0, y1, y2: Point; rest X0, X1, X2, Y0, Y1, Y2: Vec3; λ, μ: Scalar[J]) {
         rest {
             let a0 = X2 - X1;
             let a1 = X0 - X2;
@@ -34,6 +34,6 @@ energy! {
         let q1 = l1 * (dihedral(x1, y1, x2, x0) - θ1);
         let q2 = l2 * (dihedral(x2, y2, x0, x1) - θ2);
         let norm2 = q0^2 + q1^2 + q2^2 + c01 * q0 * q1 + c12 * q1 * q2 + c20 * q2 * q0;
-        D * per_A * (ν * (q0 + q1 + q2)^2 + (1 - ν) * norm2)
+        per_A * (λ * (q0 + q1 + q2)^2 + 2 * μ * norm2)
     }
 }

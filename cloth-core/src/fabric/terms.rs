@@ -126,7 +126,7 @@ pub fn terms(
             };
             let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = strips.matrix()?;
             garment.add_membrane("membrane", false, &cloth, |[u0, u1, u2]| {
-                OrthotropicStVK::new(u0, u1, u2, c_uu, c_uv, c_vv, c_ss)
+                OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
             })?;
             ((c_uv, c_ss), &material.bending)
         }
