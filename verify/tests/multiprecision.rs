@@ -2,6 +2,7 @@
 //! routes.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 use verify::reference::{Source, Truth, evaluate_file};
@@ -24,42 +25,53 @@ fn distance(a: Truth, b: Truth) -> f64 {
     ((a.high - b.high) + (a.low - b.low)).abs()
 }
 
-#[test]
-fn every_reference_value_comes_out_to_its_last_digits() {
-    let folder = tempfile::tempdir().unwrap();
+/// Compares one file; returns how many records and blocks it has.
+fn check(path: &Path, folder: &Path) -> (usize, usize) {
+    let name = path.file_name().unwrap().to_str().unwrap();
+    let out = folder.join(name);
+    evaluate_file(path, &out, Source::Truth { digits: 50 }).unwrap();
+    let (reference, computed) = (json(path), json(&out));
     let (mut records, mut blocks) = (0, 0);
-    for entry in std::fs::read_dir(data()).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        if name == "policy.json" || !name.ends_with(".json") {
-            continue;
-        }
-        let out = folder.path().join(&name);
-        evaluate_file(&path, &out, Source::Truth { digits: 50 }).unwrap();
-        let (reference, computed) = (json(&path), json(&out));
-        for (wanted, got) in
-            reference["records"].as_array().unwrap().iter().zip(computed["records"].as_array().unwrap())
-        {
-            let got = got["out"].as_object().unwrap();
-            records += usize::from(!got.is_empty());
-            for (block, digits) in got {
-                let (wanted, got) = (numbers(&wanted["out"][block]), numbers(digits));
-                let largest = wanted.iter().map(|t| t.high.abs()).fold(0.0, f64::max);
-                blocks += 1;
-                if largest > 1e-280 && largest.is_finite() {
-                    let worst = wanted.iter().zip(&got).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
-                    assert!(
-                        worst <= 1e-28 * largest,
-                        "{name} {} {block}: {:e}",
-                        reference["potential"],
-                        worst / largest
-                    );
-                } else {
-                    // Zero where it is zero; beyond the doubles, both are.
-                    assert!(wanted.iter().zip(&got).all(|(a, b)| a.high == b.high || largest > 0.0), "{name} {block}");
-                }
+    for (wanted, got) in reference["records"].as_array().unwrap().iter().zip(computed["records"].as_array().unwrap()) {
+        let got = got["out"].as_object().unwrap();
+        records += usize::from(!got.is_empty());
+        for (block, digits) in got {
+            let (wanted, got) = (numbers(&wanted["out"][block]), numbers(digits));
+            let largest = wanted.iter().map(|t| t.high.abs()).fold(0.0, f64::max);
+            blocks += 1;
+            if largest > 1e-280 && largest.is_finite() {
+                let worst = wanted.iter().zip(&got).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
+                let potential = &reference["potential"];
+                assert!(worst <= 1e-28 * largest, "{name} {potential} {block}: {:e}", worst / largest);
+            } else {
+                // Zero where it is zero; beyond the doubles, both are.
+                assert!(wanted.iter().zip(&got).all(|(a, b)| a.high == b.high || largest > 0.0), "{name} {block}");
             }
         }
     }
+    (records, blocks)
+}
+
+#[test]
+fn every_reference_value_comes_out_to_its_last_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = std::fs::read_dir(data()).unwrap().map(|entry| entry.unwrap().path());
+    let files: Vec<PathBuf> =
+        paths.filter(|path| path.extension().is_some_and(|e| e == "json") && !path.ends_with("policy.json")).collect();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut counted = (0, 0);
+        while let Some(path) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let (records, blocks) = check(path, folder.path());
+            counted = (counted.0 + records, counted.1 + blocks);
+        }
+        counted
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let (records, blocks) = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let counts = workers.into_iter().map(|worker| worker.join().expect("its message is printed above"));
+        counts.fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1))
+    });
     assert!(records >= 500 && blocks >= 1500, "{records} records, {blocks} blocks");
 }
