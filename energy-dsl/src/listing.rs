@@ -60,10 +60,10 @@ impl Listing {
         pretty(self.code.clone())
     }
 
-    /// The method of a routine (`value`, `hessian`, …), and the one that handles what is not ordinary, if there is one.
+    /// The method of a routine (`value`, `hessian`, …), and those it calls where inputs are ordinary and where they are not.
     #[must_use]
     pub fn routine(&self, name: &str) -> Option<String> {
-        let wanted = [format!("{name}_at"), format!("{name}_in_general")];
+        let wanted = ["at", "is_ordinary", "if_ordinary", "in_general"].map(|part| format!("{name}_{part}"));
         let methods: Vec<String> = methods(&self.code)
             .into_iter()
             .filter(|method| wanted.contains(&method.sig.ident.to_string()))

@@ -134,7 +134,9 @@ pub fn terms(
     if let Some(limit) = &fabric.strain_limit {
         garment.add_strain_limit(limit, &cloth)?;
     }
-    garment.add_bending(bending, &cloth)?;
+    if !matches!(fabric.material, Material::MassSpring(_)) {
+        garment.add_bending(bending, &cloth)?;
+    }
     if let Some(rayleigh) = &fabric.rayleigh {
         garment.add_rayleigh(rayleigh, stiffness, bending, &cloth)?;
     }
