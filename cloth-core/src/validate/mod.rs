@@ -145,7 +145,7 @@ pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Res
     Ok(findings)
 }
 
-/// The head of the table that [`line`] makes.
+/// The head of the table that [`line()`] makes.
 #[must_use]
 pub fn head() -> String {
     format!(
