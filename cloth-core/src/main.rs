@@ -135,8 +135,9 @@ fn main() -> Result<()> {
             run(simulation, &scene, &folder)
         }
         Command::Run { scene, output, overwrite } => {
-            let scene = Scene::read(&scene)?;
-            let simulation = Simulation::new(&scene)?;
+            let file = scene;
+            let scene = Scene::read(&file)?;
+            let simulation = Simulation::new(&scene).with_context(|| file.display().to_string())?;
             let folder = OutputFolder::open(&output, overwrite)?;
             run(simulation, &scene, &folder)
         }
@@ -191,7 +192,7 @@ fn main() -> Result<()> {
 
 /// Compares the integrators, prints the table, and writes it.
 fn compare(cloth: Cloth, output: Option<&Path>) -> Result<()> {
-    let progress = progress_bar(42);
+    let progress = progress_bar(trajectory_error::RUNS);
     let runs = trajectory_error::compare(cloth, || progress.inc(1))?;
     progress.finish_and_clear();
     let table = trajectory_error::markdown(&runs);
@@ -200,18 +201,11 @@ fn compare(cloth: Cloth, output: Option<&Path>) -> Result<()> {
         std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {}", path.display()))?;
         let picture = trajectory_error::svg(&runs).map_err(anyhow::Error::msg)?;
         for (extension, text) in [("csv", trajectory_error::csv(&runs)), ("md", table), ("svg", picture)] {
-            write_whole(&path.join(format!("{}-error.{extension}", cloth.name())), &text)?;
+            let file = path.join(format!("{}-error.{extension}", cloth.name()));
+            verify::write_whole(&file, text.as_bytes()).with_context(|| format!("cannot write {}", file.display()))?;
         }
     }
     Ok(())
-}
-
-/// Writes a file that appears under its name only once it is complete.
-fn write_whole(path: &Path, text: &str) -> Result<()> {
-    let part = path.with_extension("part");
-    std::fs::write(&part, text)
-        .and_then(|()| std::fs::rename(&part, path))
-        .with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Simulates to the end and writes everything.

@@ -6,9 +6,7 @@ use std::time::Instant;
 use plotters::prelude::*;
 
 use crate::bench::{self, BenchError, Cloth};
-use crate::integrator::{
-    Bdf2, ImplicitEuler, ImplicitMidpoint, Integrator, Newton, StepError, SymplecticEuler, Trapezoid, Verlet,
-};
+use crate::integrator::{Scheme, StepError};
 use crate::mesh::{norm, subtract};
 use crate::validate::{ValidateError, runge_kutta};
 
@@ -44,6 +42,10 @@ const CELLS: usize = 16;
 const TIME: f64 = 0.32;
 /// Steps of the reference, a Runge–Kutta method of fourth order.
 const REFERENCE_STEPS: usize = 12_800;
+/// How often the step is halved.
+const HALVINGS: usize = 5;
+/// How many runs [`compare`] makes.
+pub const RUNS: u64 = (Scheme::ALL.len() * (HALVINGS + 1)) as u64;
 
 /// Runs the benchmark's hanging sheet of 17 × 17 vertices with steps of 16 ms halved down to 0.5 ms, for every integrator.
 ///
@@ -52,21 +54,12 @@ const REFERENCE_STEPS: usize = 12_800;
 pub fn compare(cloth: Cloth, mut progress: impl FnMut()) -> Result<Vec<Run>, ComparisonError> {
     let mut truth = bench::hang(cloth, CELLS)?;
     runge_kutta(&mut truth, TIME, REFERENCE_STEPS)?;
-    let schemes: [fn() -> Box<dyn Integrator>; 7] = [
-        || Box::new(SymplecticEuler),
-        || Box::new(Verlet::default()),
-        || Box::new(ImplicitEuler::default()),
-        || Box::new(Newton::default()),
-        || Box::new(ImplicitMidpoint::default()),
-        || Box::new(Trapezoid::default()),
-        || Box::new(Bdf2::default()),
-    ];
     let mut runs: Vec<Run> = Vec::new();
-    for scheme in schemes {
+    for scheme in Scheme::ALL {
         let mut before: Option<f64> = None;
-        for halvings in 0..6 {
+        for halvings in 0..=HALVINGS {
             let steps = 20_usize << halvings;
-            let (mut body, mut scheme) = (bench::hang(cloth, CELLS)?, scheme());
+            let (mut body, mut scheme) = (bench::hang(cloth, CELLS)?, scheme.integrator());
             let dt = TIME / steps as f64;
             let started = Instant::now();
             let stepped = (0..steps).try_for_each(|_| scheme.step(&mut body, dt).map(|_| ()));

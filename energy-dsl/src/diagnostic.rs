@@ -135,11 +135,11 @@ impl fmt::Display for Diagnostics {
                 f.write_str("\n\n")?;
             }
             if diagnostic.span.place_in_file().is_some() {
-                write!(f, "error at {diagnostic}")?;
+                write!(f, "{diagnostic}")?;
                 continue;
             }
             let start = diagnostic.span.token.start();
-            write!(f, "error at {}:{}: {diagnostic}", start.line, start.column + 1)?;
+            write!(f, "{}:{}: {diagnostic}", start.line, start.column + 1)?;
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ energy! {
         let θ = dihedral(x1, x2, x3, x4);
         k * (θ - θ0)^2
     }
+    energy Angle(x1, x2, x3, x4: Point) { dihedral(x1, x2, x3, x4) }
 }
 
 fn positions() -> Vec<[f64; 3]> {
@@ -88,6 +89,11 @@ fn batches_of_springs_are_springs() {
 #[test]
 fn batches_of_hinges_are_hinges() {
     check::<_, 4, 10>(|i| Hinge { k: 1.0 + i as f64, θ0: 0.1 * i as f64 });
+}
+
+#[test]
+fn batches_of_elements_without_parameters_are_such_elements() {
+    check::<_, 4, 10>(|_| Angle::new());
 }
 
 #[test]

@@ -210,9 +210,10 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         {
             let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
             let hessian = reduced.hessian.as_mut();
-            if !is_semi_definite(hessian, n).all() {
-                let changed = self.change_indefinite::<E, L>(orthonormal, hessian, batch.points.as_ref());
-                self.projected += u64::from((changed & (u32::MAX >> (32 - batch.count))).count_ones());
+            let open = (!is_semi_definite(hessian, n)).bits() & (u32::MAX >> (32 - batch.count));
+            if open != 0 {
+                let changed = self.change_indefinite::<E, L>(orthonormal, hessian, open, batch.points.as_ref());
+                self.projected += u64::from(changed.count_ones());
             }
         }
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
@@ -236,6 +237,7 @@ impl Hessians<'_, '_> {
         &mut self,
         orthonormal: &Orthonormal,
         hessian: &mut [L::F64],
+        open: u32,
         points: &[Vector3<L::F64>],
     ) -> u32 {
         let lanes = <L::F64 as Lane<f64>>::LANES;
@@ -249,6 +251,7 @@ impl Hessians<'_, '_> {
             curvature: self.sum.curvature,
             orthonormal,
             vectors: if vectors <= 2 { vectors } else { 0 },
+            open,
             numbers: &mut self.numbers,
         };
         let changed = indefinite.change(L::NAME);

@@ -16,5 +16,5 @@ pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
             .with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
         entry.declaration.source.to_owned()
     };
-    Listing::from_source(&source).map_err(|errors| anyhow::anyhow!("{name}: {errors}"))
+    Listing::from_source(&source).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
 }

@@ -266,5 +266,8 @@ fn declarations_of_a_file_are_shown_and_their_errors_placed() {
     let output = verify(&["show", bad.to_str().unwrap()]);
     let message = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2));
-    assert!(message.contains("bad.energy: error at 2:9") && message.contains("did you mean `norm`"), "{message}");
+    assert!(
+        message.contains("bad.energy:2:9: unknown function") && message.contains("did you mean `norm`"),
+        "{message}"
+    );
 }

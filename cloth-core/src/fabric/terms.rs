@@ -89,23 +89,25 @@ pub fn terms(
     let (stiffness, bending) = match &fabric.material {
         Material::MassSpring(material) => {
             garment.add_springs(material, mesh, springs)?;
-            ((0.0, 0.0), &Bending::None)
+            ((0.0, 0.0), None)
         }
-        Material::Stvk(material) => (garment.add_isotropic(&cloth, material.lame(), StVK::new)?, &material.bending),
+        Material::Stvk(material) => {
+            (garment.add_isotropic(&cloth, material.lame(), StVK::new)?, Some(&material.bending))
+        }
         Material::NeoHookean(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), NeoHookean::new)?, &material.bending)
+            (garment.add_isotropic(&cloth, material.lame(), NeoHookean::new)?, Some(&material.bending))
         }
         Material::StableNeoHookean(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?, &material.bending)
+            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?, Some(&material.bending))
         }
         Material::StableNeoHookeanLog(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?, &material.bending)
+            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?, Some(&material.bending))
         }
         Material::Arap(material) => {
             let mu = material.stretch_stiffness;
             garment
                 .add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
-            ((0.0, 0.5 * mu), &material.bending)
+            ((0.0, 0.5 * mu), Some(&material.bending))
         }
         Material::BaraffWitkin(material) => {
             let ([b_u, b_v], stretch, shear) = (material.rest_stretch, material.stretch, material.shear);
@@ -115,7 +117,7 @@ pub fn terms(
             garment.add_membrane("shear", shear == 0.0, &cloth, |[u0, u1, u2]| {
                 BaraffWitkinShear::new(u0, u1, u2, shear / area([u0, u1, u2]))
             })?;
-            ((0.0, 0.5 * stretch), &material.bending)
+            ((0.0, 0.5 * stretch), Some(&material.bending))
         }
         Material::OrthotropicStvk(material) => {
             let strips = Rigidity::Orthotropic {
@@ -128,17 +130,17 @@ pub fn terms(
             garment.add_membrane("membrane", false, &cloth, |[u0, u1, u2]| {
                 OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
             })?;
-            ((c_uv, c_ss), &material.bending)
+            ((c_uv, c_ss), Some(&material.bending))
         }
     };
     if let Some(limit) = &fabric.strain_limit {
         garment.add_strain_limit(limit, &cloth)?;
     }
-    if !matches!(fabric.material, Material::MassSpring(_)) {
+    if let Some(bending) = bending {
         garment.add_bending(bending, &cloth)?;
     }
     if let Some(rayleigh) = &fabric.rayleigh {
-        garment.add_rayleigh(rayleigh, stiffness, bending, &cloth)?;
+        garment.add_rayleigh(rayleigh, stiffness, bending.unwrap_or(&Bending::None), &cloth)?;
     }
     garment.add_surroundings(surroundings)?;
     Ok(garment)

@@ -1,6 +1,6 @@
 use super::equilibrium::Equilibrium;
 use super::special::zero_between;
-use super::strip::{MeshKind, Strip};
+use super::strip::Strip;
 use super::{Finding, ValidateError};
 use crate::fabric::{self, Bending, Fabric, Material, Membrane, Surroundings};
 use crate::mesh::SpringNetwork;
@@ -16,15 +16,7 @@ fn parameter(span: f64) -> f64 {
 
 /// The sag over the length of an inextensible strip without bending stiffness, held by its ends.
 fn sag(span: f64, segments: usize) -> Result<f64, ValidateError> {
-    let spacing = 1.0 / segments as f64;
-    let strip = Strip {
-        kind: MeshKind::Diagonal,
-        orientation: 0.0,
-        length: 1.0,
-        width: 2.0 * spacing,
-        spacing,
-        clamped: false,
-    };
+    let strip = Strip::narrow(segments);
     let mesh = strip.mesh()?;
     let membrane = Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: 0.0, bending: Bending::None };
     let fabric = Fabric::new(1.0, Material::Stvk(membrane));

@@ -1,6 +1,6 @@
 use super::equilibrium::Equilibrium;
 use super::special::zero_between;
-use super::strip::{MeshKind, Strip};
+use super::strip::Strip;
 use super::{Finding, ValidateError};
 use crate::fabric::{self, Arap, BaraffWitkin, Bending, Fabric, Material, Membrane, Surroundings, Woven};
 use crate::mesh::SpringNetwork;
@@ -94,15 +94,7 @@ fn exact(density: Density, lambda: f64, mu: f64) -> f64 {
 }
 
 fn measured(material: Material, segments: usize) -> Result<f64, ValidateError> {
-    let spacing = 1.0 / segments as f64;
-    let strip = Strip {
-        kind: MeshKind::Diagonal,
-        orientation: 0.0,
-        length: 1.0,
-        width: 2.0 * spacing,
-        spacing,
-        clamped: false,
-    };
+    let strip = Strip::narrow(segments);
     let mesh = strip.mesh()?;
     let surroundings = Surroundings { gravity: [1.0, 0.0, 0.0], drag: 0.0 };
     let garment = fabric::terms(&Fabric::new(1.0, material), &mesh, &SpringNetwork::default(), &surroundings)?;

@@ -17,8 +17,6 @@ mod orders;
 mod special;
 mod strip;
 
-use std::fmt::Write as _;
-
 use energy_solve::{EvaluationError, ListError, SystemError};
 
 pub use cantilever::Cantilever;
@@ -157,9 +155,7 @@ pub fn head() -> String {
 /// One finding as a line.
 #[must_use]
 pub fn line(finding: &Finding) -> String {
-    let mut text = String::new();
-    write!(
-        text,
+    format!(
         "{:<18} {:<46} {:>15.8} {:>15.8} {:>+10.1e} {:>8.0e}  {}",
         finding.question,
         finding.case,
@@ -169,6 +165,4 @@ pub fn line(finding: &Finding) -> String {
         finding.limit,
         if finding.passed() { "ok" } else { "FAILED" }
     )
-    .expect("writing to a string succeeds");
-    text
 }

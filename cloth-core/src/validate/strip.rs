@@ -54,6 +54,13 @@ pub struct Strip {
 const CLEARANCE: f64 = 0.45;
 
 impl Strip {
+    /// A strip of length 1, two squares wide, with all diagonals alike.
+    pub(super) fn narrow(segments: usize) -> Self {
+        let spacing = 1.0 / segments as f64;
+        let width = 2.0 * spacing;
+        Self { kind: MeshKind::Diagonal, orientation: 0.0, length: 1.0, width, spacing, clamped: false }
+    }
+
     /// The strip as a mesh in the first two axes; lengths are in m.
     ///
     /// # Errors
@@ -106,11 +113,7 @@ impl Strip {
         let (sine, cosine) = self.orientation.to_radians().sin_cos();
         let up = if self.kind == MeshKind::Equilateral { [0.5, 0.75_f64.sqrt()] } else { [0.0, 1.0] };
         let reach = ((self.length + self.width) / s).ceil() as i64 * 2 + 2;
-        let mut state = 12_345_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-        };
+        let mut random = random_numbers(12_345);
         let mut points = Vec::new();
         for j in -reach..=reach {
             for i in -reach..=reach {
@@ -169,12 +172,17 @@ impl Strip {
 
 /// Moved at random by a little, so that no four lie on a circle.
 fn perturbed(points: &[Point], by: f64) -> Vec<Point> {
-    let mut state = 99_u32;
-    let mut random = || {
+    let mut random = random_numbers(99);
+    points.iter().map(|&[x, y]| [x + by * random(), y + by * random()]).collect()
+}
+
+/// Numbers in [−½, ½) by a linear congruence, the same on every machine.
+fn random_numbers(seed: u32) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        by * (f64::from(state >> 8) / f64::from(1 << 24) - 0.5)
-    };
-    points.iter().map(|&[x, y]| [x + random(), y + random()]).collect()
+        f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+    }
 }
 
 #[cfg(test)]

@@ -95,11 +95,14 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 .collect();
             let field_types = method.field_types.iter().rev();
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
+            // In all lanes, while they are at the level; those that need more are replaced.
             let select = quote! {
-                if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
-                    self.#if_ordinary::<L>(#(#names),*)
+                let ordinary = self.#is_ordinary::<L>(#(#names),*);
+                let here = self.#if_ordinary::<L>(#(#names),*);
+                if ::energy_dsl::Mask::all(ordinary) {
+                    here
                 } else {
-                    let (#(#fields),*) = self.#in_general::<L>(#(#names),*);
+                    let (#(#fields),*) = self.#in_general(#(#names,)* ordinary, (#(here.#fields),*));
                     ::energy_dsl::#result { #(#fields),* }
                 }
             };
@@ -117,18 +120,16 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                     #ordinary
                 }
 
-                /// With all precautions, in numbers whose exponents do not end; lanes that need none keep the bits they would
-                /// have alone.
+                /// With all precautions, in numbers whose exponents do not end; lanes that need none stay as they are.
                 #[cold]
                 #[inline(never)]
-                fn #in_general<L: ::energy_dsl::Level>(#arguments) -> #parts {
+                fn #in_general(#arguments, ordinary: T::Mask, (#(#fields),*): #parts) -> #parts {
                     #code
-                    let ordinary = self.#is_ordinary::<L>(#(#names),*);
+                    let here = ::energy_dsl::#result { #(#fields),* };
                     let (numbers, flags) =
-                        ::energy_dsl::with_care::<WithCare, T, L, #numbers>(&[#(#inputs),*], !ordinary);
+                        ::energy_dsl::with_care::<WithCare, T, #numbers>(&[#(#inputs),*], !ordinary);
                     let mut general = ::energy_dsl::#result { #outputs flags };
                     if T::WIDE {
-                        let here = self.#if_ordinary::<L>(#(#names),*);
                         general = ::energy_dsl::Choose::choose(ordinary, &here, &general);
                     }
                     (#(general.#fields),*)
@@ -201,7 +202,13 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
         struct WithCare;
 
         impl ::energy_dsl::WithCare<#reads, #returns> for WithCare {
-            fn run<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(
+            fn compiled() -> &'static ::energy_dsl::Precautions<#reads, #returns> {
+                static COMPILED: ::energy_dsl::Precautions<#reads, #returns> =
+                    ::energy_dsl::Precautions::of::<WithCare>();
+                &COMPILED
+            }
+
+            fn run_at<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(
                 inputs: &[T; #reads],
             ) -> ([T; #returns], ::energy_dsl::Flags<T>) {
                 #statements

@@ -134,6 +134,12 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         }
     }
 
+    /// The numbers of an element and those beside it; there are none of elements without parameters.
+    #[inline(always)]
+    fn numbers_from(&self, block: usize, offset: usize) -> &[S] {
+        if E::NUMBERS == 0 { &[] } else { &self.numbers[block * E::NUMBERS * BLOCK + offset..] }
+    }
+
     fn write(&mut self, place: usize, element: &E) {
         if E::NUMBERS > 0 {
             element.store(&mut self.numbers[place / BLOCK * E::NUMBERS * BLOCK + place % BLOCK..], BLOCK);
@@ -207,7 +213,7 @@ impl<E: PackedPotential<f64>, W: BatchWork<E>> Kernel for Batches<'_, E, W> {
         let mut first = 0;
         while first < packed.elements {
             let (block, offset) = (first / BLOCK, first % BLOCK);
-            let element = E::load::<L::F64>(&packed.numbers[block * E::NUMBERS * BLOCK + offset..], BLOCK);
+            let element = E::load::<L::F64>(packed.numbers_from(block, offset), BLOCK);
             let mut points = <WidePoints<E, L::F64> as Array<Vector3<L::F64>>>::repeat([L::F64::splat(0.0); 3]);
             for (point, wide) in points.as_mut().iter_mut().enumerate() {
                 *wide = L::F64::gather(positions, &packed.stencils[(block * n + point) * BLOCK + offset..][..lanes]);

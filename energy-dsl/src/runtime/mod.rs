@@ -44,4 +44,4 @@ pub use unbounded::Unbounded;
 #[cfg(feature = "compiler")]
 pub(crate) use unbounded::settle;
 #[doc(hidden)]
-pub use unbounded::{WithCare, with_care};
+pub use unbounded::{Precautions, WithCare, with_care};

@@ -3,7 +3,8 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, Pow, Sin, Unary, sin_cos};
-use super::unbounded::Unbounded;
+use super::flags::Flags;
+use super::unbounded::{Unbounded, WithCare};
 
 /// The outcome of a comparison: `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
@@ -134,6 +135,16 @@ pub trait Number:
     fn equal(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Runs a routine with all precautions over this type.
+    #[doc(hidden)]
+    fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+        inputs: &[Self; INPUTS],
+    ) -> ([Self; OUTPUTS], Flags<Self>)
+    where
+        Self: Real,
+    {
+        W::run(inputs)
+    }
     /// Runs a kernel over this type at the level that suits it: the best this machine has for `f64` and `f32`.
     fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Baseline>()

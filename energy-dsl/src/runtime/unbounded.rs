@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::cpu::{Baseline, Fused, Level, Scalar};
+use super::cpu::{Fused, Level, Scalar};
 use super::flags::Flags;
 use super::real::{Mask, Number, Real};
 
@@ -302,13 +302,49 @@ impl<S: Scalar> Number for Unbounded<S> {
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
+    fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+        inputs: &[Self; INPUTS],
+    ) -> ([Self; OUTPUTS], Flags<Self>) {
+        S::precautions(W::compiled())(inputs)
+    }
 }
 
-/// A routine with all precautions, of numbers read to numbers returned, at a level.
+/// A routine with all precautions, of numbers read to numbers returned.
+///
+/// It runs with fused operations whatever the level: what depends on it is so rare that their time does not matter, and all
+/// levels give the same bits.
 #[doc(hidden)]
 pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
+    /// Runs it at a level.
+    fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+
+    /// The routine as the crate that declares it compiled it.
+    fn compiled() -> &'static Precautions<INPUTS, OUTPUTS>;
+
     /// Runs it.
-    fn run<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+    fn run<T: Real>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>) {
+        Self::run_at::<T, Fused>(inputs)
+    }
+}
+
+/// A routine over a type of numbers.
+pub(crate) type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+
+/// A routine with all precautions in each precision. A `static` of it is compiled where it stands, and not again in every crate
+/// that evaluates the element.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
+    pub(crate) double: Routine<Unbounded<f64>, INPUTS, OUTPUTS>,
+    pub(crate) single: Routine<Unbounded<f32>, INPUTS, OUTPUTS>,
+}
+
+impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
+    /// Those of a routine.
+    #[must_use]
+    pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
+        Self { double: W::run::<Unbounded<f64>>, single: W::run::<Unbounded<f32>> }
+    }
 }
 
 /// Runs a routine with all precautions in the lanes where `extraordinary` holds; the others are 0. Scalar and lanes give the same
@@ -317,7 +353,7 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
 #[cold]
 #[inline(never)]
 #[must_use]
-pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, L: Level, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
     inputs: &[T; INPUTS],
     extraordinary: T::Mask,
 ) -> ([T; OUTPUTS], Flags<T>) {
@@ -328,9 +364,7 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, L: Level, const INPUTS: 
             continue;
         }
         let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
-        // Levels differ in nothing else.
-        let (mut results, mut flags) =
-            if L::FUSED { W::run::<T::Unbounded, Fused>(&own) } else { W::run::<T::Unbounded, Baseline>(&own) };
+        let (mut results, mut flags) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(&own);
         settle(&own, &mut results, &mut flags);
         for (output, result) in outputs.iter_mut().zip(results) {
             output.set_lane(lane, result);
@@ -356,6 +390,7 @@ pub(crate) fn settle<T: Number>(inputs: &[T], results: &mut [T], flags: &mut Fla
 
 #[cfg(test)]
 mod tests {
+    use super::super::cpu::Baseline;
     use super::*;
 
     fn of<S: Scalar>(value: S) -> Unbounded<S> {

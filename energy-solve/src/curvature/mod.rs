@@ -88,6 +88,8 @@ pub(crate) struct Indefinite<'a> {
     pub(crate) orthonormal: &'a Orthonormal,
     /// How many difference vectors there are, if not more than two.
     pub(crate) vectors: usize,
+    /// The lanes whose Hessians are indefinite, as bits.
+    pub(crate) open: u32,
     /// Number by number for all lanes: the upper triangles by the difference vectors of `orthonormal`, then these.
     pub(crate) numbers: &'a mut [f64],
 }
@@ -116,7 +118,7 @@ impl Kernel for Indefinite<'_> {
         }
         let (upper, vectors) = numbers.split_at_mut(entries);
         let vectors = vectors.as_chunks::<3>().0;
-        let changed = change(upper, self.n, self.curvature, self.orthonormal, &vectors[..self.vectors]);
+        let changed = change(upper, self.n, self.curvature, self.orthonormal, &vectors[..self.vectors], self.open);
         for (number, stored) in upper.iter().zip(self.numbers.chunks_exact_mut(lanes)) {
             number.store(stored);
         }
@@ -131,8 +133,9 @@ fn change<V: Lane<f64>>(
     curvature: Curvature,
     orthonormal: &Orthonormal,
     vectors: &[[V; 3]],
+    open: u32,
 ) -> V::Mask {
-    let mut open = !is_semi_definite(upper, n) & are_finite(upper);
+    let mut open = V::Mask::from_bits(open) & are_finite(upper);
     let mut changed = V::Mask::none();
     match vectors {
         [vector] => {

@@ -1,4 +1,6 @@
-use energy_dsl::{Block, Declaration, Element, Potential, Vector3};
+use energy_dsl::{
+    BLOCK, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, for_each_batch,
+};
 use energy_elements::HingeAngle;
 use energy_solve::{
     Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage, Tally, Term,
@@ -27,6 +29,9 @@ pub struct PlateTerm {
     places: Vec<PatchPlaces>,
     hinge_rows: Vec<[Option<usize>; 4]>,
     pattern: Option<Pattern>,
+    /// The hinges that active patches need, and the same packed.
+    needed: Vec<usize>,
+    packed: Packed<HingeAngle>,
 }
 
 /// A triangle and the hinges that its curvature depends on.
@@ -98,6 +103,8 @@ impl PlateTerm {
             places: Vec::new(),
             hinge_rows: Vec::new(),
             pattern: None,
+            needed: Vec::new(),
+            packed: Packed::new::<4>(&[], &[]),
         })
     }
 
@@ -112,23 +119,29 @@ impl PlateTerm {
         Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
     }
 
-    /// θ − θ̄ and ∇θ of all hinges.
-    fn angles(&self, x: &[Vector3<f64>]) -> Angles {
-        let count = self.hinges.len();
-        let mut angles =
-            Angles { values: Vec::with_capacity(count), gradients: Vec::with_capacity(12 * count), flagged: 0 };
-        let element = HingeAngle::<f64>::new();
-        for (hinge, rest) in self.hinges.iter().zip(&self.rest) {
-            let at = element.gradient(&hinge.map(|vertex| x[vertex]));
-            angles.values.push(at.value - rest);
-            angles.gradients.extend(at.gradient.as_flattened());
-            angles.flagged += u64::from(at.flags.any());
-        }
+    /// θ − θ̄ of all hinges that are needed.
+    fn values(&self, x: &[Vector3<f64>]) -> Values<'_> {
+        let mut values =
+            Values { needed: &self.needed, angles: self.rest.iter().map(|rest| -rest).collect(), flagged: 0 };
+        for_each_batch(&self.packed, x, &mut values);
+        values
+    }
+
+    /// θ − θ̄ and ∇θ of all hinges that are needed.
+    fn angles(&self, x: &[Vector3<f64>]) -> Angles<'_> {
+        let mut angles = Angles {
+            needed: &self.needed,
+            values: self.rest.iter().map(|rest| -rest).collect(),
+            gradients: vec![[0.0; 12]; self.hinges.len()],
+            rows: [0.0; 12 * BLOCK],
+            flagged: 0,
+        };
+        for_each_batch(&self.packed, x, &mut angles);
         angles
     }
 
     /// m = ∂U/∂θ of all hinges.
-    fn moments(&self, angles: &Angles) -> Vec<f64> {
+    fn moments(&self, angles: &Angles<'_>) -> Vec<f64> {
         let mut moments = vec![0.0; self.hinges.len()];
         for &patch in &self.active {
             let patch = &self.patches[patch];
@@ -140,8 +153,8 @@ impl PlateTerm {
         moments
     }
 
-    fn subtract_force(&self, angles: &Angles, moments: &[f64], force: &mut [Vector3<f64>]) {
-        for ((hinge, moment), gradient) in self.hinges.iter().zip(moments).zip(angles.gradients.as_chunks::<12>().0) {
+    fn subtract_force(&self, angles: &Angles<'_>, moments: &[f64], force: &mut [Vector3<f64>]) {
+        for ((hinge, moment), gradient) in self.hinges.iter().zip(moments).zip(&angles.gradients) {
             for (point, &vertex) in hinge.iter().enumerate() {
                 for axis in 0..3 {
                     force[vertex][axis] -= moment * gradient[3 * point + axis];
@@ -181,11 +194,50 @@ impl PlateTerm {
     }
 }
 
-/// θ − θ̄ and ∇θ of all hinges.
-struct Angles {
-    values: Vec<f64>,
-    gradients: Vec<f64>,
+/// θ − θ̄ of each hinge, −θ̄ at first.
+struct Values<'a> {
+    needed: &'a [usize],
+    angles: Vec<f64>,
     flagged: u64,
+}
+
+impl BatchWork<HingeAngle> for Values<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
+        let result = batch.element.value_at::<L>(batch.points);
+        for lane in 0..batch.count {
+            self.angles[self.needed[batch.first + lane]] += result.value.extract(lane);
+        }
+        self.flagged += flagged((result.flags.degenerate | result.flags.kink).bits(), batch.count);
+    }
+}
+
+/// θ − θ̄, −θ̄ at first, and ∇θ of each hinge.
+struct Angles<'a> {
+    needed: &'a [usize],
+    values: Vec<f64>,
+    gradients: Vec<[f64; 12]>,
+    rows: [f64; 12 * BLOCK],
+    flagged: u64,
+}
+
+impl BatchWork<HingeAngle> for Angles<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
+        let result = batch.element.gradient_at::<L>(batch.points);
+        L::F64::store_transposed(result.gradient.as_flattened(), batch.count, &mut self.rows, 12);
+        for lane in 0..batch.count {
+            let hinge = self.needed[batch.first + lane];
+            self.values[hinge] += result.value.extract(lane);
+            self.gradients[hinge].copy_from_slice(&self.rows[12 * lane..][..12]);
+        }
+        self.flagged += flagged((result.flags.degenerate | result.flags.kink).bits(), batch.count);
+    }
+}
+
+/// How many of the first lanes are flagged.
+fn flagged(lanes: u32, count: usize) -> u64 {
+    u64::from((lanes & (u32::MAX >> (32 - count))).count_ones())
 }
 
 impl Patch {
@@ -234,11 +286,11 @@ impl Patch {
     }
 
     /// ∇r: for each vertex, three vectors.
-    fn gradients(&self, gradients: &[f64], rows: &mut Vec<[Vector3<f64>; 3]>) {
+    fn gradients(&self, gradients: &[[f64; 12]], rows: &mut Vec<[Vector3<f64>; 3]>) {
         rows.clear();
         rows.resize(self.vertices.len(), [[0.0; 3]; 3]);
         for angle in &self.angles {
-            let gradient = &gradients[12 * angle.hinge..][..12];
+            let gradient = &gradients[angle.hinge];
             for point in 0..4 {
                 let row = &mut rows[angle.local[point] as usize];
                 for k in 0..3 {
@@ -294,6 +346,14 @@ impl Term for PlateTerm {
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let index = |number: usize| u32::try_from(number).expect("fewer than 2³² vertices and blocks");
+        let mut needed: Vec<usize> =
+            self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(|angle| angle.hinge)).collect();
+        needed.sort_unstable();
+        needed.dedup();
+        let element = HingeAngle::new();
+        self.packed =
+            Packed::from_fn(needed.len(), 4, |_| &element, |number, point| index(self.hinges[needed[number]][point]));
+        self.needed = needed;
         self.hinge_rows = self.hinges.iter().map(|hinge| hinge.map(|vertex| dofs.place(vertex))).collect();
         let slot = |i: usize, j: usize| {
             let rows = dofs.place(i).zip(dofs.place(j));
@@ -320,12 +380,12 @@ impl Term for PlateTerm {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        let angles = self.angles(x);
+        let values = self.values(x);
         let half_square = |&patch: &usize| {
-            let r = self.patches[patch].residual(&angles.values);
+            let r = self.patches[patch].residual(&values.angles);
             0.5 * dot(r, r)
         };
-        Some((self.active.iter().map(half_square).sum(), self.tally(angles.flagged)))
+        Some((self.active.iter().map(half_square).sum(), self.tally(values.flagged)))
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -362,8 +422,7 @@ impl Term for PlateTerm {
     fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
         let angles = self.angles(state.x);
         let is_finite = |patch: &Patch| {
-            let finite =
-                |angle: &Angle| angles.gradients[12 * angle.hinge..][..12].iter().all(|number| number.is_finite());
+            let finite = |angle: &Angle| angles.gradients[angle.hinge].iter().all(|number| number.is_finite());
             patch.residual(&angles.values).iter().all(|number| number.is_finite()) && patch.angles.iter().all(finite)
         };
         self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))

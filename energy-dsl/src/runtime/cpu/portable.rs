@@ -1,7 +1,6 @@
-//! Registers as arrays, for any processor. The loops are short and branch-free: compilers turn them into the target's
-//! vector instructions (SSE2, NEON).
+//! Registers as arrays, for any processor: lane by lane without loops or branches, which compilers turn into the target's vector
+//! instructions (SSE2, NEON), and soon.
 
-use std::array;
 use std::ops::{BitAnd, BitOr, Not};
 
 use super::lanes::Lanes;
@@ -21,24 +20,17 @@ pub struct F64x2([f64; 2]);
 pub struct F32x4([f32; 4]);
 
 macro_rules! array_register {
-    ($register:ident, $mask:ident, $float:ident, $bits:ident, $lanes:literal, $elementary:ident) => {
-        /// All bits of a lane where it holds, none elsewhere.
+    ($register:ident, $mask:ident, $float:ident, $lanes:literal, [$($i:literal)*], $elementary:ident) => {
+        /// Where it holds.
         #[derive(Clone, Copy, Debug)]
-        pub struct $mask([$bits; $lanes]);
-
-        impl $mask {
-            #[inline(always)]
-            fn from_fn(holds: impl Fn(usize) -> bool) -> Self {
-                Self(array::from_fn(|i| $bits::from(holds(i)).wrapping_neg()))
-            }
-        }
+        pub struct $mask([bool; $lanes]);
 
         impl BitAnd for $mask {
             type Output = Self;
 
             #[inline(always)]
             fn bitand(self, other: Self) -> Self {
-                Self(array::from_fn(|i| self.0[i] & other.0[i]))
+                Self([$(self.0[$i] & other.0[$i]),*])
             }
         }
 
@@ -47,7 +39,7 @@ macro_rules! array_register {
 
             #[inline(always)]
             fn bitor(self, other: Self) -> Self {
-                Self(array::from_fn(|i| self.0[i] | other.0[i]))
+                Self([$(self.0[$i] | other.0[$i]),*])
             }
         }
 
@@ -56,37 +48,22 @@ macro_rules! array_register {
 
             #[inline(always)]
             fn not(self) -> Self {
-                Self(self.0.map(|bits| !bits))
+                Self([$(!self.0[$i]),*])
             }
         }
 
         impl Mask for $mask {
             #[inline(always)]
             fn none() -> Self {
-                Self([0; $lanes])
+                Self([false; $lanes])
             }
             #[inline(always)]
             fn bits(self) -> u32 {
-                (0..$lanes).map(|i| u32::from(self.0[i] != 0) << i).sum()
+                0 $(| u32::from(self.0[$i]) << $i)*
             }
             #[inline(always)]
             fn from_bits(bits: u32) -> Self {
-                Self(array::from_fn(|i| if bits >> i & 1 != 0 { !0 } else { 0 }))
-            }
-        }
-
-        impl $register {
-            #[inline(always)]
-            fn map(a: Self, f: impl Fn($float) -> $float) -> Self {
-                Self(a.0.map(f))
-            }
-            #[inline(always)]
-            fn zip(a: Self, b: Self, f: impl Fn($float, $float) -> $float) -> Self {
-                Self(array::from_fn(|i| f(a.0[i], b.0[i])))
-            }
-            #[inline(always)]
-            fn zip_bits(a: Self, b: Self, f: impl Fn($bits, $bits) -> $bits) -> Self {
-                Self::zip(a, b, |a, b| $float::from_bits(f(a.to_bits(), b.to_bits())))
+                Self([$(bits >> $i & 1 != 0),*])
             }
         }
 
@@ -105,105 +82,106 @@ macro_rules! array_register {
             }
             #[inline(always)]
             fn load(values: &[$float]) -> Self {
-                Self(array::from_fn(|i| values[i]))
+                let values = &values[..$lanes];
+                Self([$(values[$i]),*])
             }
             #[inline(always)]
             fn store(self, values: &mut [$float]) {
-                values[..$lanes].copy_from_slice(&self.0);
+                let values = &mut values[..$lanes];
+                $(values[$i] = self.0[$i];)*
             }
             #[inline(always)]
-            fn from_fn(value: impl FnMut(usize) -> $float) -> Self {
-                Self(array::from_fn(value))
+            fn from_fn(mut value: impl FnMut(usize) -> $float) -> Self {
+                Self([$(value($i)),*])
             }
             #[inline(always)]
             fn add(a: Self, b: Self) -> Self {
-                Self::zip(a, b, |a, b| a + b)
+                Self([$(a.0[$i] + b.0[$i]),*])
             }
             #[inline(always)]
             fn sub(a: Self, b: Self) -> Self {
-                Self::zip(a, b, |a, b| a - b)
+                Self([$(a.0[$i] - b.0[$i]),*])
             }
             #[inline(always)]
             fn mul(a: Self, b: Self) -> Self {
-                Self::zip(a, b, |a, b| a * b)
+                Self([$(a.0[$i] * b.0[$i]),*])
             }
             #[inline(always)]
             fn div(a: Self, b: Self) -> Self {
-                Self::zip(a, b, |a, b| a / b)
+                Self([$(a.0[$i] / b.0[$i]),*])
             }
             #[inline(always)]
             fn sqrt(a: Self) -> Self {
-                Self::map(a, $float::sqrt)
+                Self([$(a.0[$i].sqrt()),*])
             }
             #[inline(always)]
             fn fused(a: Self, b: Self, c: Self) -> Self {
-                Self(array::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i])))
+                Self([$(a.0[$i].mul_add(b.0[$i], c.0[$i])),*])
             }
             #[inline(always)]
             fn min(a: Self, b: Self) -> Self {
-                Self::zip(a, b, |a, b| if a < b { a } else { b })
+                Self([$(if a.0[$i] < b.0[$i] { a.0[$i] } else { b.0[$i] }),*])
             }
             #[inline(always)]
             fn max(a: Self, b: Self) -> Self {
-                Self::zip(a, b, |a, b| if a > b { a } else { b })
+                Self([$(if a.0[$i] > b.0[$i] { a.0[$i] } else { b.0[$i] }),*])
             }
             #[inline(always)]
             fn less(a: Self, b: Self) -> $mask {
-                $mask::from_fn(|i| a.0[i] < b.0[i])
+                $mask([$(a.0[$i] < b.0[$i]),*])
             }
             #[inline(always)]
             fn less_or_equal(a: Self, b: Self) -> $mask {
-                $mask::from_fn(|i| a.0[i] <= b.0[i])
+                $mask([$(a.0[$i] <= b.0[$i]),*])
             }
             #[inline(always)]
             fn equal(a: Self, b: Self) -> $mask {
-                $mask::from_fn(|i| a.0[i] == b.0[i])
+                $mask([$(a.0[$i] == b.0[$i]),*])
             }
             #[inline(always)]
             fn select(mask: $mask, yes: Self, no: Self) -> Self {
-                let pick = |i: usize| (mask.0[i] & yes.0[i].to_bits()) | (!mask.0[i] & no.0[i].to_bits());
-                Self(array::from_fn(|i| $float::from_bits(pick(i))))
+                Self([$(if mask.0[$i] { yes.0[$i] } else { no.0[$i] }),*])
             }
             #[inline(always)]
             fn and(a: Self, b: Self) -> Self {
-                Self::zip_bits(a, b, |a, b| a & b)
+                Self([$($float::from_bits(a.0[$i].to_bits() & b.0[$i].to_bits())),*])
             }
             #[inline(always)]
             fn or(a: Self, b: Self) -> Self {
-                Self::zip_bits(a, b, |a, b| a | b)
+                Self([$($float::from_bits(a.0[$i].to_bits() | b.0[$i].to_bits())),*])
             }
             #[inline(always)]
             fn xor(a: Self, b: Self) -> Self {
-                Self::zip_bits(a, b, |a, b| a ^ b)
+                Self([$($float::from_bits(a.0[$i].to_bits() ^ b.0[$i].to_bits())),*])
             }
             #[inline(always)]
             fn add_bits(a: Self, b: Self) -> Self {
-                Self::zip_bits(a, b, $bits::wrapping_add)
+                Self([$($float::from_bits(a.0[$i].to_bits().wrapping_add(b.0[$i].to_bits()))),*])
             }
             #[inline(always)]
             fn sub_bits(a: Self, b: Self) -> Self {
-                Self::zip_bits(a, b, $bits::wrapping_sub)
+                Self([$($float::from_bits(a.0[$i].to_bits().wrapping_sub(b.0[$i].to_bits()))),*])
             }
             $elementary!();
         }
     };
 }
 
-array_register!(F64x2, Mask64x2, f64, u64, 2, elementary_of_doubles);
-array_register!(F32x4, Mask32x4, f32, u32, 4, elementary_of_singles);
+array_register!(F64x2, Mask64x2, f64, 2, [0 1], elementary_of_doubles);
+array_register!(F32x4, Mask32x4, f32, 4, [0 1 2 3], elementary_of_singles);
 
 impl DoubleRegister for F64x2 {
     #[inline(always)]
     fn low_bits_to_exponent(a: Self) -> Self {
-        Self::map(a, Double::low_bits_to_exponent)
+        Self([a.0[0].low_bits_to_exponent(), a.0[1].low_bits_to_exponent()])
     }
     #[inline(always)]
     fn exponent_to_low_bits(a: Self) -> Self {
-        Self::map(a, Double::exponent_to_low_bits)
+        Self([a.0[0].exponent_to_low_bits(), a.0[1].exponent_to_low_bits()])
     }
     #[inline(always)]
     fn bit_1_to_sign(a: Self) -> Self {
-        Self::map(a, Double::bit_1_to_sign)
+        Self([a.0[0].bit_1_to_sign(), a.0[1].bit_1_to_sign()])
     }
 }
 
@@ -212,11 +190,11 @@ impl SingleRegister for F32x4 {
 
     #[inline(always)]
     fn widen(a: Self) -> [F64x2; 2] {
-        let [a, b, c, d] = a.0.map(f64::from);
-        [F64x2([a, b]), F64x2([c, d])]
+        let [a, b, c, d] = a.0;
+        [F64x2([f64::from(a), f64::from(b)]), F64x2([f64::from(c), f64::from(d)])]
     }
     #[inline(always)]
     fn narrow([F64x2([a, b]), F64x2([c, d])]: [F64x2; 2]) -> Self {
-        Self([a, b, c, d].map(|value| value as f32))
+        Self([a as f32, b as f32, c as f32, d as f32])
     }
 }

@@ -5,6 +5,7 @@ use super::lanes::Lanes;
 use super::{Kernel, Level};
 use crate::runtime::elementary::{Binary, Unary};
 use crate::runtime::real::{Mask, Number};
+use crate::runtime::unbounded::{Precautions, Routine, Unbounded};
 
 /// A floating-point number that lanes are made of, with the bit patterns that work on it needs.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
@@ -41,10 +42,14 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     fn power_of_two(exponent: i32) -> Self;
     /// From where to where [`crate::Number::is_moderate`] holds.
     fn moderate_bounds(degree: u8) -> (Self, Self);
+    /// A routine in this precision.
+    fn precautions<const INPUTS: usize, const OUTPUTS: usize>(
+        of: &Precautions<INPUTS, OUTPUTS>,
+    ) -> Routine<Unbounded<Self>, INPUTS, OUTPUTS>;
 }
 
 macro_rules! scalar {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal, $span:literal, $reach:literal) => {
+    ($float:ident, $bits:ident, $precision:ident, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal, $span:literal, $reach:literal) => {
         impl Scalar for $float {
             const SIGN: Self = -0.0;
             const MAGNITUDE: Self = $float::from_bits($bits::MAX >> 1);
@@ -80,13 +85,18 @@ macro_rules! scalar {
                 let power = |exponent: $bits| $float::from_bits(exponent << $mantissa_bits);
                 (power($bias - limit), power($bias + limit))
             }
+            fn precautions<const INPUTS: usize, const OUTPUTS: usize>(
+                of: &Precautions<INPUTS, OUTPUTS>,
+            ) -> Routine<Unbounded<Self>, INPUTS, OUTPUTS> {
+                of.$precision
+            }
         }
     };
 }
 
 // Products of two significands, with all their bits, and a third number shifted by the reach, are normal numbers.
-scalar!(f64, u64, 52, 1023, 134_217_729.0, 80, 340_282_366_920_938_463_463_374_607_431_768_211_456.0, 500);
-scalar!(f32, u32, 23, 127, 4097.0, 12, 16.0, 95);
+scalar!(f64, u64, double, 52, 1023, 134_217_729.0, 80, 340_282_366_920_938_463_463_374_607_431_768_211_456.0, 500);
+scalar!(f32, u32, single, 23, 127, 4097.0, 12, 16.0, 95);
 
 /// A register of numbers. Where it needs features of the processor, it is used in kernels run at [`Self::Level`] only.
 pub trait Register: Copy {
