@@ -5,7 +5,11 @@
 use std::fmt::Debug;
 
 use energy_dsl::{Block, PackedPotential, Vector3};
-use energy_elements::{HairBend, HookeSpring, QuadraticHinge, StVK};
+use energy_elements::{
+    AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, DistanceBarrier, FlatBending, HairBend,
+    HookeSpring, NeoHookean, PowerLaw, QuadraticHinge, SquaredDistanceBarrier, StVK, StableNeoHookean,
+    StableNeoHookeanLog,
+};
 use energy_solve::{Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -96,13 +100,29 @@ proptest! {
 
     #[test]
     fn membranes(x in points::<3>(), size in 0.5..2.0_f64) {
-        let rest = StVK::new([0.0, 0.0], [size, 0.0], [0.3, size], 1.0, 2.0).unwrap();
-        check(&[rest; COUNT], &x)?;
+        let (u0, u1, u2) = ([0.0, 0.0], [size, 0.0], [0.3, size]);
+        check(&[StVK::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
+        check(&[AsRigidAsPossible::new(u0, u1, u2, 1.0).unwrap(); COUNT], &x)?;
+        check(&[StableNeoHookean::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
+        check(&[StableNeoHookeanLog::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
+        check(&[NeoHookean::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
+        check(&[BaraffWitkinStretch::new(u0, u1, u2, 1.0, 1.1, 0.9).unwrap(); COUNT], &x)?;
+        check(&[BaraffWitkinShear::new(u0, u1, u2, 1.0).unwrap(); COUNT], &x)?;
+    }
+
+    #[test]
+    fn barriers_and_powers(x in points::<2>(), near in 0.1..3.0_f64) {
+        check(&[DistanceBarrier { κ: 2.0, dhat: near }; COUNT], &x)?;
+        check(&[SquaredDistanceBarrier { κ: 2.0, dhat: near }; COUNT], &x)?;
+        check(&[PowerLaw { α: near }; COUNT], &x)?;
     }
 
     #[test]
     fn hinges(x in points::<4>(), angle in -2.0..2.0_f64) {
         check(&[QuadraticHinge { k: 1.5, θ0: angle }; COUNT], &x)?;
+        check(&[BridsonBending { K_prime: 1.5, θ0: angle }; COUNT], &x)?;
+        let flat = FlatBending::new([0.5, 1.0, 0.0], [0.4, -0.9, 0.0], [0.0; 3], [1.0, 0.0, 0.0], 2.0).unwrap();
+        check(&[flat; COUNT], &x)?;
     }
 }
 

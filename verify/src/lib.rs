@@ -17,6 +17,7 @@
 
 mod atomic_file;
 pub mod audit;
+pub mod bench;
 mod blocks;
 pub mod dual;
 mod eigenvalues;

@@ -86,6 +86,14 @@ enum Command {
         #[arg(short, long)]
         output: Option<PathBuf>,
     },
+    /// Time every way to a Hessian on one element of each family, and measure its error against multi-precision.
+    Bench {
+        /// Elements; all that are timed if none is named.
+        names: Vec<String>,
+        /// Also write `bench.md`, `bench.csv` and a plot of each element to this folder.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
+    },
     /// Feed the compiler of the language with edited inputs of a corpus; exit status 1 on a panic, or an input that takes more than 20
     /// seconds, which is added to the corpus.
     Fuzz {
@@ -201,6 +209,20 @@ fn run(command: Command) -> anyhow::Result<bool> {
             let failed = tracks.iter().filter(|track| !track.passed()).count();
             println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
             Ok(failed == 0 && policy.iter().all(|line| line.passed != Some(false)))
+        }
+        Command::Bench { names, output } => {
+            let list = verify::bench::bench(&names).map_err(anyhow::Error::msg)?;
+            let table = verify::bench::markdown(&list);
+            print!("{table}");
+            if let Some(folder) = output {
+                std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+                write_text(Some(&folder.join("bench.md")), || table)?;
+                write_text(Some(&folder.join("bench.csv")), || verify::bench::csv(&list))?;
+                for (file, svg) in verify::bench::plots(&list) {
+                    write_text(Some(&folder.join(file)), || svg)?;
+                }
+            }
+            Ok(true)
         }
         Command::Fuzz { target, minutes, seed, corpus } => {
             let time = std::time::Duration::try_from_secs_f64(60.0 * minutes).context("--minutes")?;

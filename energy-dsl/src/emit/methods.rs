@@ -95,14 +95,22 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 .collect();
             let field_types = method.field_types.iter().rev();
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
-            // In all lanes, while they are at the level; those that need more are replaced.
+            // Lanes are computed before it is known whether they suffice, while they are at the level: those that need more are
+            // replaced afterwards. A scalar is not.
             let select = quote! {
                 let ordinary = self.#is_ordinary::<L>(#(#names),*);
-                let here = self.#if_ordinary::<L>(#(#names),*);
+                if T::WIDE {
+                    let here = self.#if_ordinary::<L>(#(#names),*);
+                    if ::energy_dsl::Mask::all(ordinary) {
+                        return here;
+                    }
+                    let (#(#fields),*) = self.#in_general(#(#names,)* ordinary, ::core::option::Option::Some((#(here.#fields),*)));
+                    return ::energy_dsl::#result { #(#fields),* };
+                }
                 if ::energy_dsl::Mask::all(ordinary) {
-                    here
+                    self.#if_ordinary::<L>(#(#names),*)
                 } else {
-                    let (#(#fields),*) = self.#in_general(#(#names,)* ordinary, (#(here.#fields),*));
+                    let (#(#fields),*) = self.#in_general(#(#names,)* ordinary, ::core::option::Option::None);
                     ::energy_dsl::#result { #(#fields),* }
                 }
             };
@@ -123,13 +131,13 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 /// With all precautions, in numbers whose exponents do not end; lanes that need none stay as they are.
                 #[cold]
                 #[inline(never)]
-                fn #in_general(#arguments, ordinary: T::Mask, (#(#fields),*): #parts) -> #parts {
+                fn #in_general(#arguments, ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
                     #code
-                    let here = ::energy_dsl::#result { #(#fields),* };
                     let (numbers, flags) =
                         ::energy_dsl::with_care::<WithCare, T, #numbers>(&[#(#inputs),*], !ordinary);
                     let mut general = ::energy_dsl::#result { #outputs flags };
-                    if T::WIDE {
+                    if let ::core::option::Option::Some((#(#fields),*)) = here {
+                        let here = ::energy_dsl::#result { #(#fields),* };
                         general = ::energy_dsl::Choose::choose(ordinary, &here, &general);
                     }
                     (#(general.#fields),*)

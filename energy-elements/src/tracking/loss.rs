@@ -10,11 +10,11 @@ energy! {
     }
 
     /// Tukey's loss of one number, ρ = c²/6 (1 − (1 − (y/c)²)³) for |y| ≤ c, else c²/6: beyond c a row has no pull at all. Its weight
-    /// ρ′/y is (1 − (y/c)²)².
+    /// ρ′/y is (1 − (y/c)²)². (Multiplied out: small losses would cancel in 1 − (1 − s)³.)
     #[audit]
     #[even]
     pub residual TukeyLoss(y: Scalar; c: Scalar) {
         let s = min((y / c)^2, 1);
-        c^2 / 6 * (1 - (1 - s)^3)
+        c^2 / 6 * s * (3 - s * (3 - s))
     }
 }

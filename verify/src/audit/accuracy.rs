@@ -70,3 +70,64 @@ fn dimension(rest: &[Field]) -> Option<usize> {
     let dimension = rest.first()?.size;
     ((2..=3).contains(&dimension) && rest.iter().all(|field| field.size == dimension)).then_some(dimension)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Target;
+    use super::super::auditor::Auditor;
+    use super::*;
+    use crate::multiprecision::truth_of_ordinary;
+    use crate::sample::Sampler;
+
+    const SINGLE_ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
+
+    fn single(numbers: &[f64]) -> Vec<f32> {
+        numbers.iter().map(|&x| x as f32).collect()
+    }
+
+    /// The blocks of an element in single precision.
+    fn in_single_precision(entry: &energy_elements::CatalogueEntry, sample: &Sample) -> Vec<(&'static str, Vec<f64>)> {
+        let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| single(list));
+        let [parameters, rest, positions, velocities] = lists.each_ref().map(Vec::as_slice);
+        let outputs = (entry.evaluate_f32)(&energy_dsl::Inputs { parameters, rest, positions, velocities }).unwrap();
+        let doubles = |numbers: Vec<f32>| numbers.into_iter().map(f64::from).collect();
+        outputs.blocks.into_iter().map(|(name, numbers)| (name, doubles(numbers))).collect()
+    }
+
+    /// Every element within 8 u·max(1, κ) of single precision's u, against the truth at inputs that are single-precision numbers.
+    #[test]
+    fn elements_are_as_accurate_in_single_precision() {
+        let mut beyond = Vec::new();
+        for entry in energy_elements::catalogue() {
+            let declaration = entry.declaration;
+            let subject = Target::of_catalogue(entry).subject().unwrap();
+            let auditor = Auditor::new(&subject);
+            let mut sampler = Sampler::new(declaration, 5);
+            for _ in 0..6 {
+                let Sample { parameters, rest, positions, velocities } = sampler.sample();
+                let rounded = |numbers: Vec<f64>| single(&numbers).into_iter().map(f64::from).collect::<Vec<_>>();
+                let [parameters, rest, positions, velocities] = [parameters, rest, positions, velocities].map(rounded);
+                let sample = Sample { parameters, rest, positions, velocities };
+                let answer = subject.answer(&sample).unwrap();
+                let got = in_single_precision(entry, &sample);
+                for truth in truth_of_ordinary(declaration, &subject.formula, &sample, 12) {
+                    let name = truth.block.name;
+                    let numbers = &got.iter().find(|(found, _)| *found == name.name()).unwrap().1;
+                    let error = truth.block.numbers.iter().zip(numbers).map(|(t, &g)| t.error_of(g)).fold(0.0, worse);
+                    let natural = auditor.natural_size(&sample, &answer, name);
+                    let largest = truth.largest();
+                    let scale = if largest > SINGLE_ROUNDOFF * natural { largest } else { natural };
+                    let kappa = amplification(&subject, &sample, &answer, name).max(1.0);
+                    let error = if error == 0.0 { 0.0 } else { error / scale / SINGLE_ROUNDOFF / kappa };
+                    if error.is_nan() || error > 8.0 {
+                        beyond.push(format!(
+                            "{} {name}: {error:.1} u·κ, κ = {kappa:.1}, at {sample:?}",
+                            declaration.name
+                        ));
+                    }
+                }
+            }
+        }
+        assert!(beyond.is_empty(), "{}", beyond.join("\n"));
+    }
+}

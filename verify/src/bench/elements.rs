@@ -1,0 +1,59 @@
+//! The elements that are timed: one of each family, each by every method.
+
+use energy_dsl::{Real, Vector3};
+use energy_elements::{
+    AsRigidAsPossible, BridsonBending, Distance, DistanceBarrier, FlatBending, HairBend, HingeAngle, HookeSpring,
+    NeoHookean, StVK, StableNeoHookeanLog,
+};
+
+use super::methods::{Measured, Methods};
+use crate::dual::Hyper;
+use crate::sample::Sample;
+
+use super::complex::Complex;
+
+/// An element by all methods.
+pub(super) type Bench = fn(&Methods<'_>) -> Vec<Measured>;
+
+fn converted<T: Real>(numbers: &[f64]) -> Vec<T> {
+    numbers.iter().map(|&x| T::from_f64(x)).collect()
+}
+
+fn plane<T: Real>(rest: &[T], point: usize) -> [T; 2] {
+    [rest[2 * point], rest[2 * point + 1]]
+}
+
+fn space<T: Real>(rest: &[T], point: usize) -> Vector3<T> {
+    [rest[3 * point], rest[3 * point + 1], rest[3 * point + 2]]
+}
+
+macro_rules! benches {
+    ($($element:ident, |$parameters:ident, $rest:ident| $make:expr;)*) => {
+        /// By name.
+        pub(super) const ELEMENTS: &[(&str, Bench)] = &[$((stringify!($element), |methods| {
+            fn make<T: Real>(sample: &Sample) -> $element<T> {
+                let ($parameters, $rest): (Vec<T>, Vec<T>) = (converted(&sample.parameters), converted(&sample.rest));
+                let _ = &$rest;
+                let _ = &$parameters;
+                $make
+            }
+            methods.all(&make::<f64>, &make::<f32>, &make::<Complex>, &make::<Hyper>)
+        })),*];
+    };
+}
+
+const POSITIVE: &str = "samples have rest shapes of positive area";
+
+benches! {
+    Distance, |p, r| Distance::new();
+    HookeSpring, |p, r| HookeSpring::new(p[0], p[1]);
+    DistanceBarrier, |p, r| DistanceBarrier::new(p[0], p[1]);
+    HairBend, |p, r| HairBend::new(p[0]);
+    HingeAngle, |p, r| HingeAngle::new();
+    BridsonBending, |p, r| BridsonBending::new(p[0], p[1]);
+    FlatBending, |p, r| FlatBending::new(space(&r, 0), space(&r, 1), space(&r, 2), space(&r, 3), p[0]).expect(POSITIVE);
+    StVK, |p, r| StVK::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
+    AsRigidAsPossible, |p, r| AsRigidAsPossible::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0]).expect(POSITIVE);
+    StableNeoHookeanLog, |p, r| StableNeoHookeanLog::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
+    NeoHookean, |p, r| NeoHookean::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
+}

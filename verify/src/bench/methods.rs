@@ -1,0 +1,237 @@
+//! The methods: each makes the whole Hessian of an element, all from the same generated code but for multi-precision.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use energy_dsl::{
+    Array, Batch, BatchWork, Block, Level, Packed, PackedPotential, Potential, Real, Vector3, for_each_batch,
+    triangle_index,
+};
+use serde::Serialize;
+
+use super::complex::Complex;
+use crate::audit::Subject;
+use crate::blocks::BlockName;
+use crate::dual::Hyper;
+use crate::geometry::longest_distance;
+use crate::multiprecision::{TrueBlock, truth, worse};
+use crate::sample::Sample;
+
+/// Digits of the truth.
+const DIGITS: usize = 30;
+/// Elements in a batch over lanes.
+const MANY: usize = 1024;
+
+/// A method's run time and error for one element.
+#[derive(Clone, Debug, Serialize)]
+pub struct Measured {
+    /// The element.
+    pub element: &'static str,
+    /// The method.
+    pub method: &'static str,
+    /// For one Hessian.
+    pub nanoseconds: f64,
+    /// The largest error over all inputs, relative to the largest entry.
+    pub error: f64,
+}
+
+/// What all methods of one element have in common.
+pub(super) struct Methods<'a> {
+    pub(super) subject: &'a Subject,
+    pub(super) samples: &'a [Sample],
+    truths: Vec<TrueBlock>,
+}
+
+type Make<'a, E> = &'a dyn Fn(&Sample) -> E;
+
+impl<'a> Methods<'a> {
+    pub(super) fn new(subject: &'a Subject, samples: &'a [Sample]) -> Self {
+        let truths = samples.iter().map(|sample| hessian(subject, sample)).collect();
+        Self { subject, samples, truths }
+    }
+
+    /// Every method, from least to most exact.
+    pub(super) fn all<D, S, C, H>(
+        &self,
+        double: Make<'_, D>,
+        single: Make<'_, S>,
+        complex: Make<'_, C>,
+        hyper: Make<'_, H>,
+    ) -> Vec<Measured>
+    where
+        D: PackedPotential<f64>,
+        S: Potential<f32>,
+        C: Potential<Complex>,
+        H: Potential<Hyper>,
+    {
+        let doubles: Vec<(D, D::Points)> = self.samples.iter().map(|s| (double(s), points(s))).collect();
+        let singles: Vec<(S, S::Points)> = self.samples.iter().map(|s| (single(s), points(s))).collect();
+        let complexes: Vec<(C, C::Points)> = self.samples.iter().map(|s| (complex(s), points(s))).collect();
+        let hypers: Vec<(H, H::Points)> = self.samples.iter().map(|s| (hyper(s), points(s))).collect();
+        let sizes: Vec<f64> = self.samples.iter().map(|s| longest_distance(&s.positions).unwrap_or(1.0)).collect();
+        let differences = |method, stencil: &[(f64, f64)], exponent: f64| {
+            let step = |i: usize| sizes[i] * f64::EPSILON.powf(exponent);
+            self.measure(method, |i| by_differences(&doubles[i], stencil, step(i)))
+        };
+        let mut list = vec![
+            differences("forward differences", &[(0.0, -1.0), (1.0, 1.0)], 0.5),
+            differences("central differences", &[(-1.0, -0.5), (1.0, 0.5)], 1.0 / 3.0),
+            differences(
+                "Richardson's differences",
+                &[(-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)],
+                0.2,
+            ),
+            self.measure("complex step", |i| by_complex_step(&complexes[i])),
+            self.measure("num-dual", |i| by_hyper_dual(&hypers[i])),
+        ];
+        let timed = self.time(|i| discard(singles[i].0.hessian(black_box(&singles[i].1)).hessian));
+        let error = self.error(|i| full(singles[i].0.hessian(&singles[i].1).hessian.as_ref(), f64::from));
+        list.push(self.measured("generated, f32", timed, error));
+        let timed = self.time(|i| discard(doubles[i].0.hessian(black_box(&doubles[i].1)).hessian));
+        let error = self.error(|i| full(doubles[i].0.hessian(&doubles[i].1).hessian.as_ref(), |x| x));
+        list.push(self.measured("generated, f64", timed, error));
+        // The same bits as the scalar where products and sums fuse alike.
+        list.push(self.measured("generated, f64 lanes", time_lanes(&doubles), error));
+        let timed = self.time(|i| discard(hessian(self.subject, &self.samples[i])));
+        list.push(self.measured("multi-precision, 30 digits", timed, 1e-30));
+        list
+    }
+
+    fn measured(&self, method: &'static str, nanoseconds: f64, error: f64) -> Measured {
+        Measured { element: self.subject.declaration.name, method, nanoseconds, error }
+    }
+
+    fn measure(&self, method: &'static str, run: impl Fn(usize) -> Vec<f64>) -> Measured {
+        let error = self.error(&run);
+        self.measured(method, self.time(|i| discard(run(i))), error)
+    }
+
+    /// Nanoseconds of one run, the least of some rounds over all inputs.
+    fn time(&self, run: impl Fn(usize)) -> f64 {
+        let count = self.samples.len();
+        least(count, || (0..count).for_each(&run))
+    }
+
+    fn error(&self, run: impl Fn(usize) -> Vec<f64>) -> f64 {
+        let of = |(i, truth): (usize, &TrueBlock)| {
+            let error = truth.block.numbers.iter().zip(run(i)).map(|(t, got)| t.error_of(got)).fold(0.0, worse);
+            error / truth.largest()
+        };
+        self.truths.iter().enumerate().map(of).fold(0.0, worse)
+    }
+}
+
+/// Makes a result, and does not read it.
+#[inline(always)]
+fn discard<T>(result: T) {
+    let _ = black_box(result);
+}
+
+/// Nanoseconds of one of the `count` things that a round does, in the fastest round.
+fn least(count: usize, round: impl Fn()) -> f64 {
+    const FOR: Duration = Duration::from_millis(60);
+    let start = Instant::now();
+    let mut best = f64::INFINITY;
+    while start.elapsed() < FOR || best.is_infinite() {
+        // Short rounds are repeated: the clock itself takes time.
+        let mut repeats = 0_u32;
+        let round_start = Instant::now();
+        while repeats < 1 || round_start.elapsed() < Duration::from_millis(2) {
+            round();
+            repeats += 1;
+        }
+        let taken = round_start.elapsed().as_secs_f64() / f64::from(repeats);
+        best = best.min(1e9 * taken / count as f64);
+    }
+    best
+}
+
+fn hessian(subject: &Subject, sample: &Sample) -> TrueBlock {
+    let blocks = truth(subject.declaration, &subject.formula, sample, DIGITS);
+    blocks.into_iter().find(|truth| truth.block.name == BlockName::Hessian).expect("energies have Hessians")
+}
+
+fn points<T: Real, P: Array<Vector3<T>>>(sample: &Sample) -> P {
+    P::from_fn(|point| std::array::from_fn(|axis| T::from_f64(sample.positions[3 * point + axis])))
+}
+
+/// A triangle of blocks as the full matrix.
+fn full<T: Copy>(triangle: &[Block<T>], number: impl Fn(T) -> f64) -> Vec<f64> {
+    let points = (1..).find(|n| n * (n + 1) / 2 == triangle.len()).expect("a triangle");
+    let entries = (0..9 * points * points).map(|entry| (entry / (3 * points), entry % (3 * points)));
+    entries
+        .map(|(row, column)| {
+            let (row, column) = if row / 3 <= column / 3 { (row, column) } else { (column, row) };
+            number(triangle[triangle_index(points, row / 3, column / 3)][row % 3][column % 3])
+        })
+        .collect()
+}
+
+/// Differences of the gradient: Σ weight · g(x + offset · h) / h.
+fn by_differences<E: Potential<f64>>((element, x): &(E, E::Points), stencil: &[(f64, f64)], h: f64) -> Vec<f64> {
+    let n = 3 * E::Points::LEN;
+    let mut matrix = vec![0.0; n * n];
+    let here = element.gradient(x).gradient;
+    for column in 0..n {
+        for &(offset, weight) in stencil {
+            let mut moved = *x;
+            moved.as_mut()[column / 3][column % 3] += offset * h;
+            let at = if offset == 0.0 { here } else { element.gradient(&moved).gradient };
+            for (row, g) in at.as_ref().as_flattened().iter().enumerate() {
+                matrix[row * n + column] += weight * g / h;
+            }
+        }
+    }
+    matrix
+}
+
+/// Im ∇U(x + i h e)/h.
+fn by_complex_step<E: Potential<Complex>>((element, x): &(E, E::Points)) -> Vec<f64> {
+    const H: f64 = 1e-100;
+    let n = 3 * E::Points::LEN;
+    let mut matrix = vec![0.0; n * n];
+    for column in 0..n {
+        let mut moved = *x;
+        moved.as_mut()[column / 3][column % 3].im = H;
+        for (row, g) in element.gradient(&moved).gradient.as_ref().as_flattened().iter().enumerate() {
+            matrix[row * n + column] = g.im / H;
+        }
+    }
+    matrix
+}
+
+/// One hyper-dual value for each pair of coordinates.
+fn by_hyper_dual<E: Potential<Hyper>>((element, x): &(E, E::Points)) -> Vec<f64> {
+    let n = 3 * E::Points::LEN;
+    let mut matrix = vec![0.0; n * n];
+    for row in 0..n {
+        for column in row..n {
+            let mut moved = *x;
+            for i in [row, column] {
+                let coordinate = &mut moved.as_mut()[i / 3][i % 3];
+                *coordinate = Hyper::variable(coordinate.0.re, i == row, i == column);
+            }
+            let entry = element.value(&moved).value.0.eps1eps2;
+            (matrix[row * n + column], matrix[column * n + row]) = (entry, entry);
+        }
+    }
+    matrix
+}
+
+/// Batches of Hessians that nobody reads.
+struct Discarded;
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Discarded {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        black_box(&batch.element.hessian_at::<L>(batch.points));
+    }
+}
+
+fn time_lanes<E: PackedPotential<f64>>(elements: &[(E, E::Points)]) -> f64 {
+    let n = E::Points::LEN;
+    let own = |element: usize| &elements[element % elements.len()];
+    let packed = Packed::from_fn(MANY, n, |element| &own(element).0, |element, point| (n * element + point) as u32);
+    let positions: Vec<Vector3<f64>> = (0..MANY).flat_map(|element| own(element).1.as_ref().to_vec()).collect();
+    least(MANY, || for_each_batch(black_box(&packed), &positions, &mut Discarded))
+}

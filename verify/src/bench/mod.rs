@@ -1,0 +1,125 @@
+//! Run time against error: what a Hessian costs, and how exact it is, by every way of getting one.
+
+mod complex;
+mod elements;
+mod methods;
+
+use std::fmt::Write as _;
+
+pub use self::methods::Measured;
+use self::methods::Methods;
+use crate::audit::Target;
+use crate::plot::{Curve, logarithmic};
+use crate::sample::{Sample, Sampler};
+
+/// Inputs of each element.
+const INPUTS: usize = 8;
+
+/// The elements that [`bench`] knows.
+#[must_use]
+pub fn names() -> Vec<&'static str> {
+    elements::ELEMENTS.iter().map(|(name, _)| *name).collect()
+}
+
+/// Times every method on the elements with these names, all of them for an empty list.
+///
+/// # Errors
+/// The first name that is not among [`names`].
+pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
+    if let Some(unknown) = wanted.iter().find(|name| !names().contains(&name.as_str())) {
+        return Err(format!("{unknown} is not timed; {} are", names().join(", ")));
+    }
+    let mut list = Vec::new();
+    for (name, run) in elements::ELEMENTS {
+        if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
+            continue;
+        }
+        let entry = energy_elements::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
+        let subject = Target::of_catalogue(entry).subject()?;
+        let mut sampler = Sampler::new(subject.declaration, 3);
+        let samples: Vec<Sample> = (0..INPUTS).map(|_| in_single_precision(sampler.sample())).collect();
+        list.extend(run(&Methods::new(&subject, &samples)));
+    }
+    Ok(list)
+}
+
+/// Inputs that both precisions hold exactly.
+fn in_single_precision(sample: Sample) -> Sample {
+    let rounded = |numbers: Vec<f64>| numbers.into_iter().map(|x| f64::from(x as f32)).collect();
+    Sample {
+        parameters: rounded(sample.parameters),
+        rest: rounded(sample.rest),
+        positions: rounded(sample.positions),
+        velocities: rounded(sample.velocities),
+    }
+}
+
+/// A Markdown table: a row to each method, a column to each element.
+#[must_use]
+pub fn markdown(list: &[Measured]) -> String {
+    let mut text = String::from("| element | method | ns | error |\n|---|---|---:|---:|\n");
+    for Measured { element, method, nanoseconds, error } in list {
+        let _ = writeln!(text, "| {element} | {method} | {} | {error:.1e} |", rounded(*nanoseconds));
+    }
+    text
+}
+
+fn rounded(nanoseconds: f64) -> String {
+    if nanoseconds < 100.0 { format!("{nanoseconds:.1}") } else { format!("{nanoseconds:.0}") }
+}
+
+/// The same as comma-separated values.
+#[must_use]
+pub fn csv(list: &[Measured]) -> String {
+    let mut text = String::from("element,method,nanoseconds,error\n");
+    for Measured { element, method, nanoseconds, error } in list {
+        let _ = writeln!(text, "{element},\"{method}\",{nanoseconds:.2},{error:.3e}");
+    }
+    text
+}
+
+/// A plot to each element, and one of all, with the names of their files.
+#[must_use]
+pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
+    let of = |name: &str| list.iter().filter(|m| m.element == name).cloned().collect::<Vec<_>>();
+    let mut groups: Vec<(String, Vec<Measured>)> =
+        names().into_iter().map(|name| (name.to_owned(), of(name))).filter(|(_, list)| !list.is_empty()).collect();
+    groups.push(("all".into(), list.to_vec()));
+    groups
+        .into_iter()
+        .filter_map(|(name, list)| {
+            let mut curves: Vec<Curve> = Vec::new();
+            for m in &list {
+                // What is exact lies at the foot of the plot.
+                let point = (m.nanoseconds, m.error.max(1e-18));
+                match curves.iter_mut().find(|curve| curve.name == m.method) {
+                    Some(curve) => curve.points.push(point),
+                    None => curves.push(Curve { name: m.method.into(), points: vec![point], joined: false }),
+                }
+            }
+            let title = format!("Hessian of {}", if name == "all" { "each element" } else { &name });
+            let axes = ("run time, ns", "error relative to the largest entry");
+            Some((format!("{name}.svg"), logarithmic(&title, axes, &curves, (760, 480))?))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Not how fast, but how exact each method is, and that the errors rank as they should.
+    #[test]
+    fn methods_agree_to_their_own_accuracy() {
+        let list = bench(&["HairBend".into()]).unwrap();
+        let error = |method: &str| list.iter().find(|m| m.method == method).unwrap().error;
+        assert!((1e-12..1e-4).contains(&error("forward differences")));
+        assert!(error("central differences") < error("forward differences"));
+        assert!(error("Richardson's differences") < error("central differences"));
+        assert!(error("complex step") < 1e-13 && error("num-dual") < 1e-11);
+        assert!((1e-9..2e-5).contains(&error("generated, f32")) && error("generated, f64") < 1e-14);
+        assert!(list.iter().all(|m| m.nanoseconds > 0.1));
+        assert!(plots(&list).len() == 2 && markdown(&list).lines().count() == 2 + list.len());
+        assert!(bench(&["Nothing".into()]).unwrap_err().contains("HairBend"));
+    }
+}
