@@ -25,7 +25,7 @@ fn numbers(seed: u64) -> impl FnMut() -> f64 {
 /// Points of ordinary elements; of every fifth, coincident ones, and of every seventh, tiny ones.
 fn points<const N: usize>() -> Vec<Vector3<f64>> {
     let mut draw = numbers(7);
-    let mut element = |number: usize| -> [Vector3<f64>; N] {
+    let element = |number: usize| -> [Vector3<f64>; N] {
         let size = if number % 7 == 6 { 1e-160 } else { 1.0 };
         let mut own = std::array::from_fn(|_| std::array::from_fn(|_| size * draw()));
         if number % 5 == 4 {
@@ -33,7 +33,7 @@ fn points<const N: usize>() -> Vec<Vector3<f64>> {
         }
         own
     };
-    (0..COUNT).flat_map(|number| element(number)).collect()
+    (0..COUNT).flat_map(element).collect()
 }
 
 fn potential<E, const N: usize>(element: E)
@@ -47,7 +47,7 @@ where
     let mut triangles = vec![0.0; COUNT * triangle];
     let mut wide =
         Hessians { energies: &mut energies, gradients: &mut gradients, triangles: &mut triangles, flagged: Vec::new() };
-    for_each_batch(&Packed::new(&vec![element; COUNT], &stencils), &x, &mut wide);
+    for_each_batch(&Packed::new(&[element; COUNT], &stencils), &x, &mut wide);
     let flagged = wide.flagged;
     let name = E::DECLARATION.name;
     for (number, own) in x.chunks(N).enumerate() {
