@@ -1,4 +1,4 @@
-use energy_dsl::{Block, Vector3};
+use energy_dsl::{Block, Number, Vector3};
 use nalgebra::Matrix3;
 
 use crate::matrix::BlockMatrix;
@@ -52,4 +52,24 @@ pub(crate) fn is_positive_definite(block: &Block<f64>) -> bool {
     let [[a, ..], [b, c, _], [d, e, f]] = *block;
     let (c, e, f) = (c - b * (b / a), e - b * (d / a), f - d * (d / a));
     a > 0.0 && c > 0.0 && f - e * (e / c) > 0.0
+}
+
+/// The inverse of a positive definite block, of which the upper triangle is read; `None` if it is not.
+#[inline(always)]
+pub(crate) fn inverse_of_definite(block: &Block<f64>) -> Option<Block<f64>> {
+    // The determinant is cubic in the entries: bring them near 1 so that light or soft vertices do not underflow.
+    let scale = block[0][0].max(block[1][1]).max(block[2][2]).power_of_two_scale();
+    let [[a, b, c], [_, d, e], [_, _, f]] = *block;
+    let [a, b, c, d, e, f] = [a * scale, b * scale, c * scale, d * scale, e * scale, f * scale];
+    // The cofactors; Sylvester's criterion is on a, on that of f, and on the determinant.
+    let [aa, bb, cc] = [d * f - e * e, c * e - b * f, b * e - c * d];
+    let [dd, ee, ff] = [a * f - c * c, b * c - a * e, a * d - b * b];
+    let determinant = a * aa + b * bb + c * cc;
+    let factor = scale / determinant;
+    if !(a > 0.0 && ff > 0.0 && determinant > 0.0 && factor.is_finite()) {
+        return None;
+    }
+    let [aa, bb, cc] = [aa * factor, bb * factor, cc * factor];
+    let [dd, ee, ff] = [dd * factor, ee * factor, ff * factor];
+    Some([[aa, bb, cc], [bb, dd, ee], [cc, ee, ff]])
 }

@@ -82,6 +82,18 @@ impl Pattern {
         self.diagonal[row] as usize
     }
 
+    /// The places of the blocks above the diagonal in a row, for a pattern of upper triangles.
+    #[inline(always)]
+    pub(crate) fn above(&self, row: usize) -> std::ops::Range<usize> {
+        self.diagonal[row] as usize + 1..self.row_start[row + 1] as usize
+    }
+
+    /// The columns of all blocks, by place.
+    #[inline(always)]
+    pub(crate) fn columns(&self) -> &[u32] {
+        &self.columns
+    }
+
     /// The places and columns of a row's blocks.
     #[inline]
     pub fn row(&self, row: usize) -> impl ExactSizeIterator<Item = (usize, usize)> {

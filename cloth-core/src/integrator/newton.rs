@@ -2,8 +2,8 @@ use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, IncompleteCholesky, LinearisationOptions, SolveOptions, State, Term,
-    Weights, conjugate_gradients, dot,
+    BlockMatrix, Curvature, EvaluationError, IncompleteCholesky, LinearisationOptions, RoundedMatrix, SolveOptions,
+    State, Term, Weights, conjugate_gradients, dot,
 };
 
 use super::{Integrator, StepError, StepReport};
@@ -48,6 +48,7 @@ impl Default for NewtonOptions {
 #[derive(Clone, Debug)]
 struct Memory {
     matrix: BlockMatrix,
+    rounded: RoundedMatrix,
     factor: IncompleteCholesky,
 }
 
@@ -192,11 +193,13 @@ impl Integrator for Newton {
         if let Some((term, _)) = body.system.terms().find(|(term, _)| !fits(*term)) {
             return Err(StepError::NotSymmetric { term: term.name().to_owned() });
         }
-        let Memory { mut matrix, mut factor } = match self.memory.take() {
+        let Memory { mut matrix, mut rounded, mut factor } = match self.memory.take() {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
             _ => {
                 let matrix = body.system.matrix();
-                Memory { factor: IncompleteCholesky::new(matrix.pattern()), matrix }
+                let (rounded, factor) =
+                    (RoundedMatrix::new(matrix.pattern()), IncompleteCholesky::new(matrix.pattern()));
+                Memory { matrix, rounded, factor }
             }
         };
         let free = body.system.dofs().free().to_vec();
@@ -231,7 +234,13 @@ impl Integrator for Newton {
             let started = Instant::now();
             let linear = SolveOptions { relative_tolerance: self.options.linear_tolerance, ..SolveOptions::default() };
             let mut direction = vec![[0.0; 3]; down.len()];
-            let solved = conjugate_gradients(&matrix, &factor, &down, &mut direction, &linear);
+            rounded.round(&matrix);
+            let mut solved = conjugate_gradients(&rounded, &factor, &down, &mut direction, &linear);
+            if !solved.converged() {
+                // Rounding made the stiffest of matrices indefinite.
+                direction.fill([0.0; 3]);
+                solved = conjugate_gradients(&matrix, &factor, &down, &mut direction, &linear);
+            }
             step.report.phases.solve += started.elapsed();
             step.report.solves += 1;
             step.report.iterations += solved.iterations as u64;
@@ -259,7 +268,7 @@ impl Integrator for Newton {
         let v = step.velocities(&x);
         let report = step.report;
         (body.x, body.v) = (x, v);
-        self.memory = Some(Memory { matrix, factor });
+        self.memory = Some(Memory { matrix, rounded, factor });
         Ok(report)
     }
 

@@ -15,7 +15,7 @@ use crate::sample::{Sample, Sampler};
 /// Inputs of each element.
 const INPUTS: usize = 8;
 
-/// The elements that [`bench`] knows.
+/// The elements that [`bench()`] knows.
 #[must_use]
 pub fn names() -> Vec<&'static str> {
     elements::ELEMENTS.iter().map(|(name, _)| *name).collect()
