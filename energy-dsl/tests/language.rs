@@ -181,3 +181,10 @@ fn hostile_texts_are_refused_without_panic() {
         }
     }
 }
+
+#[test]
+fn constants_that_are_infinite_are_written() {
+    let source = "energy A(p, q: Point) { dot(p - q, p - q) * (1 / (1 - 1)) }";
+    let code = energy_dsl::compile(source.parse().unwrap()).to_string().replace(' ', "");
+    assert!(code.contains("f64::INFINITY"), "{code}");
+}

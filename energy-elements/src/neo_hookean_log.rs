@@ -51,7 +51,7 @@ energy! {
     /// Neo-Hookean membrane on a triangle: A (μ/2 (I − 2) − μ ln J + λ/2 ln² J), I = tr FᵀF, J = ‖w_u × w_v‖ (Bonet and Wood, *Nonlinear
     /// Continuum Mechanics for Finite Element Analysis*, §6.4, in two dimensions). λ and μ are per length, as for `StVK`. Infinite where the
     /// triangle has no area: no step of a solver that lowers the energy turns it over. I − 2 − 2 ln J is formed as
-    /// (s₁ − s₂)² + 2 (j − ln(1 + j)), j = J − 1, neither of which cancels near rest.
+    /// (s₁ − s₂)² + 2 (j − ln(1 + j)), j = J − 1, neither of which cancels near rest; above J = 2 as it stands.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
@@ -72,14 +72,17 @@ energy! {
         let area = norm(cross(a, b));
         let j = (area - d) / d;
         let J = area / d;
-        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
-        let square = ddot(F, F) / d2 + 2 * J;
+        // I, (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        let I = ddot(F, F) / d2;
+        let square = I + 2 * J;
         let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
         // ln J, near rest from j, and j − ln J.
         let is_near = abs(j) < 0.25;
         let near = x_minus_log1p_near_0(j);
         let l = if is_near { j - near } else { log(J) };
         let excess = if is_near { near } else { j - log(J) };
-        d / 4 * (μ * (anisotropy / square + 2 * excess) + λ * l^2)
+        // Far from rest 2J would cancel between the two.
+        let distortion = if j > 1 { I - 2 - 2 * l } else { anisotropy / square + 2 * excess };
+        d / 4 * (μ * distortion + λ * l^2)
     }
 }

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use proc_macro2::{Ident, Literal, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 
 use crate::graph::{Graph, Input, NodeId, Op};
 
@@ -143,7 +143,15 @@ impl<'a> Schedule<'a> {
         };
         match self.graph.fused(node) {
             Op::Constant(bits) => {
-                let literal = Literal::f64_suffixed(f64::from_bits(bits).abs());
+                let magnitude = f64::from_bits(bits).abs();
+                // 1/0 and 0/0 of constants are no literals.
+                let literal = if magnitude.is_finite() {
+                    Literal::f64_suffixed(magnitude).into_token_stream()
+                } else if magnitude.is_nan() {
+                    quote!(::core::primitive::f64::NAN)
+                } else {
+                    quote!(::core::primitive::f64::INFINITY)
+                };
                 let sign = if f64::from_bits(bits) < 0.0 { quote!(-) } else { quote!() };
                 quote!(T::from_f64(#sign #literal))
             }

@@ -69,7 +69,8 @@ pub trait Number:
 
     /// One lane (of which a scalar has one, number 0).
     fn unbounded(&self, lane: usize) -> Self::Unbounded;
-    /// Replaces one lane by the number nearest to `value`.
+    /// Replaces one lane by the number nearest to `value`; by a very large one where that is too large for the type, though not
+    /// infinite.
     fn set_lane(&mut self, lane: usize, value: Self::Unbounded);
 
     /// The number nearest to a double.
@@ -168,7 +169,7 @@ macro_rules! number_for_float {
             }
             #[inline]
             fn set_lane(&mut self, _lane: usize, value: Self::Unbounded) {
-                *self = value.to_scalar();
+                *self = value.saturated();
             }
             #[inline(always)]
             fn from_f64(value: f64) -> Self {

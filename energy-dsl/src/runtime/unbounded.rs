@@ -81,6 +81,17 @@ impl<S: Scalar> Unbounded<S> {
         }
     }
 
+    /// [`Self::to_scalar`] for results: where a number is too large for the type, though not infinite, a power of two that is far beyond
+    /// any other result, and that a few more such can be added to or subtracted from without making no number.
+    pub(crate) fn saturated(self) -> S {
+        let rounded = self.to_scalar();
+        if rounded.abs() < S::INFINITY || !self.is_plain() {
+            return rounded;
+        }
+        let large = S::power_of_two(S::LAST - 8);
+        if S::default() < self.significand { large } else { -large }
+    }
+
     /// Whether the number has a place in the type, normal or 0.
     fn fits(self) -> bool {
         let (_, exponent) = self.split();
@@ -465,6 +476,16 @@ mod tests {
         assert!(!flags.any() && f64::is_nan(results[1].to_scalar()));
         settle(&[one, one], &mut results, &mut flags);
         assert!(flags.degenerate && results.map(Unbounded::to_scalar) == [1.0, 0.0]);
+    }
+
+    #[test]
+    fn results_too_large_are_large_and_infinite_ones_infinite() {
+        let large = (of(1e200) * of(1e200)).saturated();
+        assert!(large > 1e305 && large + 4.0 * large - large > large);
+        assert_eq!((of(-1e200) * of(1e200)).saturated(), -large);
+        assert_eq!((of(1.0) / of(0.0)).saturated(), f64::INFINITY);
+        assert_eq!(of(3.5).saturated(), 3.5);
+        assert!((of(1e30_f32) * of(1e30)).saturated() >= f32::MAX / 1024.0);
     }
 
     #[test]
