@@ -12,7 +12,8 @@ mod symplectic_euler;
 mod trapezoid;
 mod verlet;
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use energy_solve::{EvaluationError, StopReason};
 
@@ -35,17 +36,35 @@ pub trait Integrator: std::fmt::Debug {
     /// What it is called in scenes.
     fn name(&self) -> &'static str;
 
-    /// Advances the body by `dt`, in s. On an error the body is left as it was.
+    /// Advances the body by `dt`, in s: free vertices as forces will, pinned ones by `dt` times their velocities. On an error the body is left
+    /// as it was.
     ///
     /// # Errors
     /// When the step cannot be completed with finite numbers.
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError>;
+
+    /// What it remembers of earlier steps, to go on with later.
+    fn memory(&self) -> IntegratorMemory {
+        IntegratorMemory::default()
+    }
+
+    /// Goes on with what another one remembered.
+    fn restore(&mut self, _memory: IntegratorMemory) {}
 
     /// An estimate of the largest stable step, in s, at the body's state; `None` when any step is stable.
     ///
     /// # Errors
     /// When the body's forces are not finite.
     fn stable_step(&self, body: &mut Body) -> Result<Option<f64>, EvaluationError>;
+}
+
+/// What integrators remember of earlier steps beyond what can be had again from the body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct IntegratorMemory {
+    /// Of [`Bdf2`].
+    pub(crate) last_step: Option<bdf2::History>,
+    /// Of [`Adaptive`]: halvings of the step, and successes since the last change.
+    pub(crate) adaptive: [u32; 2],
 }
 
 /// What a step took.
@@ -149,7 +168,7 @@ pub enum StepError {
 }
 
 /// The schemes on offer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// Linearised implicit Euler, one linear solve per step. The default.
@@ -232,9 +251,17 @@ fn place(body: &mut Body, u: &[Vector3<f64>], dt: f64, velocities: &[Vector3<f64
     if let Some(place) = positions.iter().position(|p| p.iter().any(|coordinate| !coordinate.is_finite())) {
         return Err(StepError::NonFinite { vertex: free[place], position: positions[place] });
     }
-    for (place, &vertex) in free.iter().enumerate() {
+    // Those that are pinned go as they are told.
+    body.x = moved_by_velocities(body, dt);
+    for (place, &vertex) in body.system.dofs().free().iter().enumerate() {
         body.x[vertex] = positions[place];
         body.v[vertex] = velocities[place];
     }
     Ok(())
+}
+
+/// x + h v.
+fn moved_by_velocities(body: &Body, dt: f64) -> Vec<Vector3<f64>> {
+    let moved = |(x, v): (&Vector3<f64>, &Vector3<f64>)| std::array::from_fn(|axis| x[axis] + dt * v[axis]);
+    body.x.iter().zip(&body.v).map(moved).collect()
 }
