@@ -50,8 +50,8 @@ struct Open {
     powers: Vec<f64>,
     /// Forces of potentials on pinned vertices that move, and where they were.
     pins: Vec<(usize, Vector3<f64>, Vector3<f64>)>,
-    /// What obstacles did by moving at the start of the step, in J.
-    lifted: f64,
+    /// Of obstacles that move, in W.
+    obstacles: f64,
 }
 
 impl Entry {
@@ -82,7 +82,7 @@ impl Ledger {
     ///
     /// # Errors
     /// When an energy is not finite.
-    pub fn new(body: &mut Body, time: f64) -> Result<Self, EvaluationError> {
+    pub fn new(body: &Body, time: f64) -> Result<Self, EvaluationError> {
         let names = |keep: fn(&dyn Term) -> bool| -> Vec<String> {
             let kept = body.system.terms().filter(|(term, _)| keep(*term));
             kept.map(|(term, _)| term.name().to_owned()).collect()
@@ -114,7 +114,7 @@ impl Ledger {
     }
 
     /// Potentials, kinetic energy and momenta now; the work so far is that of the last entry.
-    fn entry(&self, body: &mut Body, time: f64) -> Result<Entry, EvaluationError> {
+    fn entry(&self, body: &Body, time: f64) -> Result<Entry, EvaluationError> {
         let potential = potentials(body)?;
         let last = self.entries.last();
         Ok(Entry {
@@ -129,18 +129,14 @@ impl Ledger {
         })
     }
 
-    /// Called once obstacles and pins know where the step leads.
-    pub(crate) fn begin(&mut self, body: &mut Body) -> Result<(), EvaluationError> {
-        let before: f64 = self.entries.last().map_or(0.0, |last| last.potential.iter().sum());
-        let lifted = potentials(body)?.iter().sum::<f64>() - before;
-        let pulls = pulls(body);
-        let pins = pulls.into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
-        self.open = Open { powers: powers(body), pins, lifted };
-        Ok(())
+    /// Called once all terms know that the step begins; `obstacles` is the power of those that move, in W.
+    pub(crate) fn begin(&mut self, body: &Body, obstacles: f64) {
+        let pins = pulls(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
+        self.open = Open { powers: powers(body), pins, obstacles };
     }
 
     /// Enters the step.
-    pub(crate) fn end(&mut self, body: &mut Body, time: f64, dt: f64) -> Result<(), EvaluationError> {
+    pub(crate) fn end(&mut self, body: &Body, obstacles: f64, time: f64, dt: f64) -> Result<(), EvaluationError> {
         let mut entry = self.entry(body, time)?;
         for ((work, before), after) in entry.work.iter_mut().zip(&self.open.powers).zip(powers(body)) {
             *work += 0.5 * dt * (before + after);
@@ -149,7 +145,7 @@ impl Ledger {
             let part = |axis: usize| 0.5 * (before[axis] + after[axis]) * (body.x[*vertex][axis] - from[axis]);
             entry.pins -= (0..3).map(part).sum::<f64>();
         }
-        entry.obstacles += self.open.lifted;
+        entry.obstacles += 0.5 * dt * (self.open.obstacles + obstacles);
         self.entries.push(entry);
         Ok(())
     }

@@ -14,6 +14,7 @@ use cloth_core::fabric::MEASURED;
 use cloth_core::output::OutputFolder;
 use cloth_core::progress::Progress;
 use cloth_core::run::{Ending, Run, RunError};
+use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
 use cloth_core::{Simulation, demo, materials, report, scene, trajectory_error};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -47,6 +48,12 @@ enum Command {
         /// Save the state each time after this many steps, for `cloth resume`.
         #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
         checkpoint: Option<u64>,
+        /// Makes every fabric of the elements that this file declares, read at run time: slower than those built in.
+        #[arg(long, value_name = "FILE.energy")]
+        material: Option<PathBuf>,
+        /// Their parameters, as in `k=20,nu=0.3`, in the units of the declaration.
+        #[arg(long, requires = "material", value_delimiter = ',', value_parser = parameter)]
+        parameters: Vec<(String, f64)>,
     },
     /// Goes on with a run that was interrupted, from its last checkpoint: the result is the same bit by bit.
     Resume {
@@ -123,6 +130,12 @@ fn ratio(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.abs() < 1.0).ok_or_else(|| "it is a number between −1 and 1".to_owned())
 }
 
+fn parameter(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or_else(|| "it is a name and a number, as in k=20".to_owned())?;
+    let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    Ok((name.trim().to_owned(), value.ok_or_else(|| format!("what {name} is must be a number"))?))
+}
+
 fn cloth_named(name: &str) -> Result<Cloth, String> {
     Cloth::ALL.into_iter().find(|cloth| cloth.name() == name).ok_or_else(|| "it is soft or cotton".to_owned())
 }
@@ -147,10 +160,14 @@ fn main() -> Result<ExitCode> {
         Command::Demo { output } => {
             let scene = demo::scene()?;
             print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
-            return run(Run::of_text(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &output, true, None)?);
+            return run(Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &output, true, None)?);
         }
-        Command::Run { scene, output, overwrite, checkpoint } => {
-            let new = Run::new(&scene, &output, overwrite, checkpoint);
+        Command::Run { scene, output, overwrite, checkpoint, material, parameters } => {
+            let mut text = Scene::text(&scene)?;
+            if let Some(file) = material {
+                text = scene::with_material(&text, &file, &parameters);
+            }
+            let new = Run::new(text, &scene, &output, overwrite, checkpoint);
             return run(new.map_err(|error| match error {
                 RunError::Simulation(unfit) => anyhow::Error::new(unfit).context(scene.display().to_string()),
                 located => located.into(),

@@ -98,20 +98,12 @@ impl Record {
 }
 
 impl Run {
-    /// A run of a scene file. Everything that can be wrong with it is found before the folder is touched.
+    /// A run of the text of a scene file, whose path is for messages and for relative paths in it. Everything that can be wrong with it is found
+    /// before the folder is touched. `every` is the number of steps from one checkpoint to the next, if there are to be any.
     ///
     /// # Errors
     /// When the scene is unfit or the folder cannot be written to.
-    pub fn new(path: &Path, output: &Path, overwrite: bool, every: Option<u64>) -> Result<Self, RunError> {
-        let text = Scene::text(path)?;
-        Self::of_text(text, path, output, overwrite, every)
-    }
-
-    /// A run of the text of a scene file, whose path is for messages and for relative paths in it.
-    ///
-    /// # Errors
-    /// When the scene is unfit or the folder cannot be written to.
-    pub fn of_text(
+    pub fn new(
         text: String,
         path: &Path,
         output: &Path,

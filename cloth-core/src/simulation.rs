@@ -177,7 +177,7 @@ impl Simulation {
     /// When an energy is not finite.
     pub fn keep_ledger(&mut self) -> Result<(), EvaluationError> {
         let time = self.time();
-        self.ledger = Some(Ledger::new(&mut self.body, time)?);
+        self.ledger = Some(Ledger::new(&self.body, time)?);
         Ok(())
     }
 
@@ -205,12 +205,18 @@ impl Simulation {
         let begin = StepStart { time, dt: self.dt, state: State { x: &body.x, v: &body.v } };
         let system = &mut body.system;
         system.begin_step(begin).map_err(StepError::from).map_err(failed)?;
+        let obstacles = &self.obstacles;
+        let lifting = |body: &Body, at_end: bool| -> f64 {
+            let one = |obstacle: &Obstacle| obstacle.power([time, time + self.dt], at_end, &body.masses, &body.x);
+            obstacles.iter().map(one).sum()
+        };
         if let Some(ledger) = ledger {
-            ledger.begin(body).map_err(StepError::from).map_err(failed)?;
+            ledger.begin(body, lifting(body, false));
         }
         let report = self.integrator.step(body, self.dt).map_err(failed)?;
         if let Some(ledger) = ledger {
-            ledger.end(body, step as f64 * self.dt, self.dt).map_err(StepError::from).map_err(failed)?;
+            let entered = ledger.end(body, lifting(body, true), step as f64 * self.dt, self.dt);
+            entered.map_err(StepError::from).map_err(failed)?;
         }
         self.summary.steps = step;
         self.summary.solves += report.solves;

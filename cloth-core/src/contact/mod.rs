@@ -8,15 +8,17 @@ mod friction;
 mod solid;
 mod term;
 
+use energy_dsl::Vector3;
 use energy_solve::Term;
 
 pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
 
 use crate::dissipation_term::DissipativeTerm;
+use crate::mesh::dot;
 use crate::motion::{Motion, Pose};
 use friction::FrictionLaw;
 use solid::Solid;
-use term::ContactTerm;
+use term::{ContactTerm, Touch, surface_velocity, touches};
 
 /// One of the solids.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +98,28 @@ impl Obstacle {
             AnySolid::Capsule(solid) => self.terms_with(solid, masses),
             AnySolid::Box(solid) => self.terms_with(solid, masses),
         }
+    }
+
+    /// The power of its contact as it moves over a step from one time to another, in W: at the step's start or at its end, with vertices at x.
+    pub(crate) fn power(&self, step: [f64; 2], at_end: bool, masses: &[f64], x: &[Vector3<f64>]) -> f64 {
+        if !self.motion.as_ref().is_some_and(|motion| motion.moves(step[0], step[1])) {
+            return 0.0;
+        }
+        match self.at(step[usize::from(at_end)]) {
+            AnySolid::HalfSpace(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Ball(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Box(solid) => self.power_of(solid, step, at_end, masses, x),
+        }
+    }
+
+    fn power_of(&self, solid: impl Solid, step: [f64; 2], at_end: bool, masses: &[f64], x: &[Vector3<f64>]) -> f64 {
+        let stiffness: Vec<f64> = masses.iter().map(|mass| self.stiffness * mass).collect();
+        let power = |touch: &Touch| {
+            let velocity = surface_velocity(self.motion.as_ref(), step, x[touch.vertex], at_end);
+            touch.force * dot(touch.normal, velocity)
+        };
+        touches(&solid, self.thickness, &stiffness, x).iter().map(power).sum()
     }
 
     fn terms_with(&self, solid: impl Solid, masses: &[f64]) -> Vec<Box<dyn Term>> {

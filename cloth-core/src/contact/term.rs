@@ -180,12 +180,13 @@ pub(super) fn touches<S: Solid>(solid: &S, thickness: f64, stiffness: &[f64], x:
     near.filter_map(touch).collect()
 }
 
-/// Where a solid that moves takes a point of it over a step, in m/s.
-pub(super) fn surface_velocity(motion: Option<&Motion>, start: &StepStart<'_>, x: Vector3<f64>) -> Vector3<f64> {
-    let Some(motion) = motion.filter(|motion| motion.moves(start.time, start.time + start.dt)) else {
+/// Where a solid takes a point of it over a step, in m/s: a point where it is at the step's start, or at its end.
+pub(super) fn surface_velocity(motion: Option<&Motion>, step: [f64; 2], x: Vector3<f64>, at_end: bool) -> Vector3<f64> {
+    let [from, to] = step;
+    let Some(motion) = motion.filter(|motion| motion.moves(from, to)) else {
         return [0.0; 3];
     };
-    let [before, after]: [Pose; 2] = [start.time, start.time + start.dt].map(|time| motion.pose(time));
-    let there = after.applied(before.undone(x));
-    std::array::from_fn(|axis| (there[axis] - x[axis]) / start.dt)
+    let [before, after]: [Pose; 2] = step.map(|time| motion.pose(time));
+    let [start, end] = if at_end { [before.applied(after.undone(x)), x] } else { [x, after.applied(before.undone(x))] };
+    std::array::from_fn(|axis| (end[axis] - start[axis]) / (to - from))
 }

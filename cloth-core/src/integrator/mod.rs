@@ -209,16 +209,48 @@ impl Scheme {
     /// The integrator.
     #[must_use]
     pub fn integrator(self) -> Box<dyn Integrator> {
+        self.with_tolerances(Tolerances::default())
+    }
+
+    /// The integrator with other tolerances, where it has some.
+    #[must_use]
+    pub fn with_tolerances(self, tolerances: Tolerances) -> Box<dyn Integrator> {
+        let (first, second) = (tolerances.of(NewtonOptions::default()), tolerances.of(second_order_tolerances()));
         match self {
             Self::ImplicitEuler => Box::new(ImplicitEuler::default()),
-            Self::Newton => Box::new(Newton::default()),
-            Self::Bdf2 => Box::new(Bdf2::default()),
-            Self::ImplicitMidpoint => Box::new(ImplicitMidpoint::default()),
-            Self::Trapezoid => Box::new(Trapezoid::default()),
+            Self::Newton => Box::new(Newton::with_options(first)),
+            Self::Bdf2 => Box::new(Bdf2::with_options(second)),
+            Self::ImplicitMidpoint => Box::new(ImplicitMidpoint::with_options(second)),
+            Self::Trapezoid => Box::new(Trapezoid::with_options(second)),
             Self::SymplecticEuler => Box::new(SymplecticEuler),
             Self::Verlet => Box::new(Verlet::default()),
             Self::ExplicitEuler => Box::new(ExplicitEuler::default()),
             Self::ExplicitEulerAsPrinted => Box::new(ExplicitEuler::as_printed()),
+        }
+    }
+}
+
+/// How exactly Newton's method solves a step. What is not given keeps the integrator's default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Tolerances {
+    /// Done when an iteration changes no velocity by more, in m/s. Default 1e-4 for `newton`, 1e-7 for schemes of second order.
+    #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
+    pub velocity: Option<f64>,
+    /// The residual of each linear system relative to its right-hand side. Default 0.1 for `newton`, 1e-3 for schemes of second order.
+    #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
+    pub linear: Option<f64>,
+    /// A step fails after this many iterations. Default 100.
+    pub iterations: Option<usize>,
+}
+
+impl Tolerances {
+    fn of(self, default: NewtonOptions) -> NewtonOptions {
+        NewtonOptions {
+            velocity_tolerance: self.velocity.unwrap_or(default.velocity_tolerance),
+            linear_tolerance: self.linear.unwrap_or(default.linear_tolerance),
+            iteration_limit: self.iterations.unwrap_or(default.iteration_limit),
+            ..default
         }
     }
 }

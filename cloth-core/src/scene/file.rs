@@ -5,7 +5,7 @@ use super::garment::{Garment, Mesh, Placement};
 use super::numbers::{finite_triple, non_negative, positive};
 use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam};
 use crate::fabric::Fabric;
-use crate::integrator::Scheme;
+use crate::integrator::{Scheme, Tolerances};
 use crate::wind::Wind;
 
 /// The version of scene files that this program reads.
@@ -52,6 +52,9 @@ pub(super) struct File {
     /// `explicit-euler-as-printed`.
     #[serde(default)]
     integrator: Scheme,
+    /// How exactly Newton's method solves a step, for the integrators that use it. Default each integrator's own.
+    #[serde(default)]
+    tolerances: Tolerances,
     /// Whether a step that fails is tried again with half its size, and so on. Default false.
     #[serde(default)]
     adaptive: bool,
@@ -117,6 +120,7 @@ impl TryFrom<File> for Scene {
             gravity: file.gravity,
             drag: file.drag,
             integrator: file.integrator,
+            tolerances: file.tolerances,
             adaptive: file.adaptive,
             dt: file.dt,
             duration: file.duration,

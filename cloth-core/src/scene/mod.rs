@@ -8,6 +8,7 @@ mod hair;
 pub(crate) mod numbers;
 mod obstacle;
 mod output;
+mod own_material;
 mod parts;
 mod pins;
 mod schema;
@@ -22,13 +23,14 @@ pub use garment::{Garment, Mesh, MeshSourceError, Placement, Shape, Turn};
 pub use hair::Hair;
 pub use obstacle::ObstacleDescription;
 pub use output::OutputChoice;
+pub use own_material::with_material;
 pub use parts::{Model, ModelError, MovingPin, Part, PartKind, UnknownPart};
 pub use pins::{Pin, PinBox, PinChoice, PinError};
 pub use schema::schema;
 pub use seam::{Seam, SeamError};
 
 use crate::fabric::Material;
-use crate::integrator::{Adaptive, Integrator, Scheme};
+use crate::integrator::{Adaptive, Integrator, Scheme, Tolerances};
 use crate::wind::Wind;
 
 /// A scene.
@@ -53,6 +55,8 @@ pub struct Scene {
     pub drag: f64,
     /// How time advances.
     pub integrator: Scheme,
+    /// How exactly Newton's method solves a step.
+    pub tolerances: Tolerances,
     /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`].
     pub adaptive: bool,
     /// Time step h, in s.
@@ -102,7 +106,7 @@ impl Scene {
     /// The integrator.
     #[must_use]
     pub fn stepper(&self) -> Box<dyn Integrator> {
-        let scheme = self.integrator.integrator();
+        let scheme = self.integrator.with_tolerances(self.tolerances);
         if self.adaptive { Box::new(Adaptive::new(scheme)) } else { scheme }
     }
 

@@ -15,6 +15,10 @@ pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64
     checked(deserializer, |number| number.is_finite() && number > 0.0, "a finite number above 0")
 }
 
+pub(crate) fn some_positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    positive(deserializer).map(Some)
+}
+
 pub(crate) fn non_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |number| number.is_finite() && number >= 0.0, "a finite number, 0 or above")
 }
