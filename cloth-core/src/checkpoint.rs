@@ -18,6 +18,8 @@ const KEYWORD: &str = "cloth-checkpoint";
 /// Everything that the motion from here depends on, and what was done so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedState {
+    /// The CRC-32 of the masses of all vertices, which tells meshes apart.
+    pub masses_checksum: u32,
     /// Steps done.
     pub steps: u64,
     /// Positions, in m.
@@ -57,7 +59,8 @@ impl From<Counts> for SavedCounts {
 
 impl From<SavedCounts> for Counts {
     fn from(SavedCounts(rows): SavedCounts) -> Self {
-        let tally = |[evaluated, skipped, flagged, projected]: [u64; 4]| Tally { evaluated, skipped, flagged, projected };
+        let tally =
+            |[evaluated, skipped, flagged, projected]: [u64; 4]| Tally { evaluated, skipped, flagged, projected };
         let [value, gradient, hessian] = rows.map(tally);
         Self { value, gradient, hessian }
     }
@@ -128,7 +131,9 @@ pub enum CheckpointError {
         version: u32,
     },
     /// It does not fit the scene.
-    #[error("the checkpoint is of another scene: {found} vertices or other terms, where the scene has {expected} vertices. Did a mesh file change?")]
+    #[error(
+        "the checkpoint is of another scene: its {found} vertices are not the {expected} that the scene has now. Did a mesh or material file change?"
+    )]
     OtherScene {
         /// Vertices of the scene.
         expected: usize,

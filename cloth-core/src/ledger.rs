@@ -260,9 +260,10 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
         for (number, (name, values)) in curves.iter().enumerate() {
             let colour = Palette99::pick(number).to_rgba();
             let points = times.iter().copied().zip(values.iter().copied());
-            chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?.label(name).legend(
-                move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)),
-            );
+            chart
+                .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+                .label(name)
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)));
         }
         chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
         area.present()?;

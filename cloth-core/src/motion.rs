@@ -174,8 +174,11 @@ mod tests {
     #[test]
     fn between_keys_it_is_linear_and_outside_it_rests() {
         let key = |time, angle| Key { time, angle, translate: [time, 0.0, 0.0] };
-        let motion =
-            Motion { axis: [0.0, 0.0, 1.0], centre: [0.0; 3], keys: vec![key(1.0, 0.0), key(2.0, 90.0), key(4.0, 0.0)] };
+        let motion = Motion {
+            axis: [0.0, 0.0, 1.0],
+            centre: [0.0; 3],
+            keys: vec![key(1.0, 0.0), key(2.0, 90.0), key(4.0, 0.0)],
+        };
         assert_eq!(motion.key(3.0), Key { time: 3.0, angle: 45.0, translate: [3.0, 0.0, 0.0] });
         assert_eq!(motion.key(0.0), Key { time: 0.0, ..key(1.0, 0.0) });
         assert!(!motion.moves(0.0, 1.0) && motion.moves(0.5, 1.5) && !motion.moves(4.0, 9.0));

@@ -46,7 +46,9 @@ impl Progress {
                 match receiver.recv_timeout(PATIENCE.max(FACTOR * mean)) {
                     Ok(step) => (last, ended, count) = (step, Instant::now(), count + 1),
                     Err(RecvTimeoutError::Disconnected) => return,
-                    Err(RecvTimeoutError::Timeout) => shown.suspend(|| eprintln!("{}", stuck(last, ended.elapsed(), mean))),
+                    Err(RecvTimeoutError::Timeout) => {
+                        shown.suspend(|| eprintln!("{}", stuck(last, ended.elapsed(), mean)))
+                    }
                 }
             }
         });

@@ -94,9 +94,9 @@ fn audited(record: &Record) -> Vec<Verdict> {
     elements.sort_unstable();
     elements.dedup();
     let own = own_targets(record);
-    let target = |name: &str| match energy_elements::find(name) {
-        Some(entry) => Some(Target::of_catalogue(entry)),
-        None => own.iter().find(|target| target.name() == name).cloned(),
+    let target = |name: &str| {
+        let declared = own.iter().find(|target| target.name() == name).cloned();
+        declared.or_else(|| energy_elements::find(name).map(Target::of_catalogue))
     };
     let verdict = |name: &str| match target(name) {
         Some(target) => judged(name, &audit_all(&[target], None, Options::default())),
@@ -217,7 +217,8 @@ fn evaluated(summary: &Summary) -> String {
             escaped(&term.element)
         )
     });
-    let left_out: String = summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();
+    let left_out: String =
+        summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();
     format!(
         "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th><th>gradient</th><th>skipped</th>\
          <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th></tr>\n{}</table>\n{left_out}",

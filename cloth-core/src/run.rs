@@ -133,8 +133,7 @@ impl Run {
         let mut simulation = Simulation::new(&scene)?;
         simulation.restore(state)?;
         let vertices = simulation.body().x.len();
-        let frames =
-            FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
+        let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
         let folder = OutputFolder::reopen(output)?;
         Ok(Self { scene, text, path, folder, simulation, frames, every: Some(every) })
     }
@@ -150,7 +149,11 @@ impl Run {
     ///
     /// # Errors
     /// When a step fails or a file cannot be written.
-    pub fn go(&mut self, stop: &AtomicBool, mut tell: impl FnMut(&Simulation, &StepReport)) -> Result<Ending, RunError> {
+    pub fn go(
+        &mut self,
+        stop: &AtomicBool,
+        mut tell: impl FnMut(&Simulation, &StepReport),
+    ) -> Result<Ending, RunError> {
         while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
             let report = match self.simulation.step() {
                 Ok(report) => report,

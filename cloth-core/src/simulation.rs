@@ -64,11 +64,13 @@ impl Simulation {
     pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
         let model = Model::new(scene)?;
         let strands = model.strands().collect();
-        let Model { parts, x, v, masses, triangles, pinned, moving, motions, terms, left_out, obstacles } = model;
+        let Model { parts, x, v, masses, triangles, pinned, moving, motions, terms, left_out, warnings, obstacles } =
+            model;
         let system = System::new(terms, &pinned)?;
         let mut body = Body { v, x, masses, system };
         let integrator = scene.stepper();
-        let mut summary = Summary { left_out, integrator: integrator.name().to_owned(), ..Summary::default() };
+        let mut summary =
+            Summary { left_out, warnings, integrator: integrator.name().to_owned(), ..Summary::default() };
         summary.vertices = pinned.len();
         summary.pinned = pinned.iter().filter(|&&pinned| pinned).count();
         summary.triangles = triangles.len();
@@ -275,6 +277,7 @@ impl Simulation {
             sum
         };
         SavedState {
+            masses_checksum: masses_checksum(&self.body),
             steps: self.summary.steps,
             x: self.body.x.clone(),
             v: self.body.v.clone(),
@@ -286,7 +289,15 @@ impl Simulation {
             rejected: self.summary.rejected,
             stepping_time: self.summary.stepping_time,
             phases: self.summary.phases,
-            counts: self.body.system.terms().map(|(_, counts)| counts).enumerate().map(counts).map(Into::into).collect(),
+            counts: self
+                .body
+                .system
+                .terms()
+                .map(|(_, counts)| counts)
+                .enumerate()
+                .map(counts)
+                .map(Into::into)
+                .collect(),
         }
     }
 
@@ -297,7 +308,8 @@ impl Simulation {
     pub fn restore(&mut self, saved: SavedState) -> Result<(), CheckpointError> {
         let (expected, found) = (self.body.x.len(), saved.x.len());
         let terms = self.body.system.terms().count();
-        if expected != found || saved.v.len() != expected || saved.counts.len() != terms {
+        let fits = expected == found && saved.v.len() == expected && saved.counts.len() == terms;
+        if !fits || saved.masses_checksum != masses_checksum(&self.body) {
             return Err(CheckpointError::OtherScene { expected, found });
         }
         (self.body.x, self.body.v) = (saved.x, saved.v);
@@ -334,6 +346,11 @@ fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
         }
     }
     total
+}
+
+fn masses_checksum(body: &Body) -> u32 {
+    let bytes: Vec<u8> = body.masses.iter().flat_map(|mass| mass.to_le_bytes()).collect();
+    crc32fast::hash(&bytes)
 }
 
 /// Warnings of vertices that start inside a solid: they will be thrown out of it.

@@ -101,7 +101,8 @@ impl fmt::Display for Summary {
 fn routines(counts: &Counts) -> String {
     let one = |name: &str, tally: &Tally| {
         let flagged = if tally.flagged > 0 { format!(", {} flagged", tally.flagged) } else { String::new() };
-        (tally.evaluated + tally.skipped > 0).then(|| format!("{name} {} ({}{flagged})", tally.evaluated, tally.skipped))
+        (tally.evaluated + tally.skipped > 0)
+            .then(|| format!("{name} {} ({}{flagged})", tally.evaluated, tally.skipped))
     };
     let all = [("value", &counts.value), ("first", &counts.gradient), ("second", &counts.hessian)];
     all.iter().filter_map(|(name, tally)| one(name, tally)).collect::<Vec<_>>().join(" · ")

@@ -220,7 +220,8 @@ fn a_creased_mesh_is_at_rest_in_its_own_shape() {
     let springs = SpringNetwork::of_mesh(&Topology::of(&mesh));
     let nothing = Surroundings { gravity: [0.0; 3], drag: 0.0 };
     for fabric in [STVK, PRINTED, SPRINGS] {
-        let garment = terms(&scene("dt = 1.0\nduration = 1.0", fabric).garments[0].fabric, &mesh, &springs, &nothing).unwrap();
+        let garment =
+            terms(&scene("dt = 1.0\nduration = 1.0", fabric).garments[0].fabric, &mesh, &springs, &nothing).unwrap();
         let mut system = System::new(garment.terms, &[false; 4]).unwrap();
         let force = system.forces(State { x: mesh.vertices(), v: &[[0.0; 3]; 4] }).unwrap();
         assert!(force.iter().flatten().all(|component| component.abs() < 1e-15), "{force:?}");

@@ -7,8 +7,8 @@ energy! {
     /// Rayleigh's dissipation function: its gradient is minus the force.
     #[audit]
     pub energy SlidingFriction(u: Point; n: Vec3[1], w: Vec3[m], λ: Scalar[N], ε: Scalar[m]) {
-        let s = u - w;
-        let q = norm_squared(s - dot(n, s) * n);
+        // ‖t‖, without the cancellation of u − w − (n·(u − w)) n.
+        let q = norm_squared(cross(n, u - w));
         λ * q / (sqrt(q + ε^2) + ε)
     }
 }

@@ -48,9 +48,8 @@ impl<S: Solid> ContactTerm<S> {
     /// The free vertices within reach, with their elements and places.
     fn near<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (usize, usize, S::Contact)> + 'a {
         let within = |&(vertex, _): &(usize, usize)| self.now.signed_distance(x[vertex]) < self.thickness;
-        let element = |(vertex, slot): (usize, usize)| {
-            (vertex, slot, self.now.contact(self.stiffness[vertex], self.thickness))
-        };
+        let element =
+            |(vertex, slot): (usize, usize)| (vertex, slot, self.now.contact(self.stiffness[vertex], self.thickness));
         self.free.iter().copied().filter(within).map(element)
     }
 

@@ -9,9 +9,7 @@ use serde::Deserialize;
 
 use super::Bending;
 use super::interpreted_term::InterpretedTerm;
-use crate::mesh::{
-    MaterialTriangle, Topology, TriangleMesh, lumped_masses, norm, rest_angle, subtract,
-};
+use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, norm, rest_angle, subtract};
 
 /// Elements declared in a `.energy` file of the user's own. Each energy in it acts on every vertex, edge, triangle or hinge, as it has one, two, three
 /// or four points; of a hinge the first two are the apexes and the others the shared edge. They are interpreted, which is slower than
@@ -138,8 +136,8 @@ impl Declared {
 
     fn read(&self) -> Result<Vec<Interpreted>, DeclaredError> {
         let path = || self.path.clone();
-        let text = std::fs::read_to_string(&self.path)
-            .map_err(|source| DeclaredError::Unreadable { path: path(), source })?;
+        let text =
+            std::fs::read_to_string(&self.path).map_err(|source| DeclaredError::Unreadable { path: path(), source })?;
         let all = Interpreted::from_file(&text, &self.path.display().to_string())
             .map_err(|errors| DeclaredError::Text { diagnostics: errors.to_string() })?;
         let known: Vec<String> = all.iter().map(|element| element.declaration().name.to_owned()).collect();
@@ -156,15 +154,13 @@ impl Declared {
 
     fn term(&self, element: Interpreted, ground: &Ground<'_>) -> Result<InterpretedTerm, DeclaredError> {
         let declaration = element.declaration();
-        let unfit = |what: String| {
-            DeclaredError::Unfit { path: self.path.clone(), element: declaration.name.to_owned(), what }
-        };
+        let unfit =
+            |what: String| DeclaredError::Unfit { path: self.path.clone(), element: declaration.name.to_owned(), what };
         if declaration.kind != Kind::Energy {
             return Err(unfit(format!("a {}", declaration.kind.keyword())));
         }
-        let places = places(declaration.points.len(), ground).ok_or_else(|| {
-            unfit(format!("an energy of {} points", declaration.points.len()))
-        })?;
+        let places = places(declaration.points.len(), ground)
+            .ok_or_else(|| unfit(format!("an energy of {} points", declaration.points.len())))?;
         let inputs = places.iter().map(|place| self.inputs(declaration, place, ground, &unfit));
         let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
         let stencils = places.iter().flat_map(|place| place.vertices.iter().map(|vertex| ground.first + vertex));
@@ -253,7 +249,7 @@ fn places(points: usize, ground: &Ground<'_>) -> Option<Vec<Place>> {
 
 impl Declared {
     /// The same with its file sought from a folder.
-    pub(crate) fn from_folder(&mut self, folder: &Path) {
+    pub(crate) fn seek_in(&mut self, folder: &Path) {
         self.path = folder.join(&self.path);
     }
 }

@@ -149,8 +149,10 @@ impl Term for InterpretedTerm {
         for (place, &number) in self.active.iter().enumerate() {
             let (groups, flag) = self.run("hessian", number, x);
             self.push(number, &groups[1], sum.force);
-            let mut triangle: Vec<Block<f64>> =
-                groups[2].chunks_exact(9).map(|block| std::array::from_fn(|i| std::array::from_fn(|j| block[3 * i + j]))).collect();
+            let mut triangle: Vec<Block<f64>> = groups[2]
+                .chunks_exact(9)
+                .map(|block| std::array::from_fn(|i| std::array::from_fn(|j| block[3 * i + j])))
+                .collect();
             if sum.curvature != Curvature::Exact {
                 projected += u64::from(change_dense(&mut triangle, self.arity, sum.curvature));
             }

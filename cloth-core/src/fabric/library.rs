@@ -51,7 +51,9 @@ mod tests {
             panic!("no plate")
         };
         assert!(
-            denim.contains("density = 0.324") && scene.garments[0].fabric.density == 0.324 && (warp - 64.196_457e-6).abs() < 1e-15
+            denim.contains("density = 0.324")
+                && scene.garments[0].fabric.density == 0.324
+                && (warp - 64.196_457e-6).abs() < 1e-15
         );
         assert!(scene.adaptive);
     }

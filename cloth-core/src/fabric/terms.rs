@@ -7,6 +7,7 @@ use energy_elements::{
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
 use super::declared::{Declared, DeclaredError, Ground};
+use super::interpreted_term::InterpretedTerm;
 use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::mesh::{
@@ -83,6 +84,8 @@ pub struct Garment {
     pub terms: Vec<Box<dyn Term>>,
     /// What was left out because its stiffness is zero, or there is nothing for it to act on.
     pub left_out: Vec<String>,
+    /// What should be known about it.
+    pub warnings: Vec<String>,
     place: Place,
 }
 
@@ -111,7 +114,7 @@ pub fn terms_at(
     place: Place,
 ) -> Result<Garment, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
-    let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new(), place };
+    let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place };
     let cloth = Laid { mesh, triangles: laid(mesh, fabric)?, warp: fabric.warp };
     // λ and μ of small strains, for damping.
     let (stiffness, bending) = match &fabric.material {
@@ -289,6 +292,10 @@ impl Garment {
         let Place { first, prefix } = &self.place;
         let (mesh, triangles) = (cloth.mesh, cloth.triangles.as_slice());
         let terms = declared.terms(&Ground { mesh, triangles, density, first: *first, prefix })?;
+        let slow = |term: &InterpretedTerm| {
+            format!("{} is interpreted, ten to a hundred times slower than an element that is built in", term.name())
+        };
+        self.warnings.extend(terms.iter().map(slow));
         self.terms.extend(terms.into_iter().map(|term| -> Box<dyn Term> { Box::new(term) }));
         Ok(())
     }

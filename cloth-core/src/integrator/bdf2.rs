@@ -3,7 +3,9 @@ use energy_solve::EvaluationError;
 use serde::{Deserialize, Serialize};
 
 use super::substep::{Substep, start_from};
-use super::{ImplicitMidpoint, Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities};
+use super::{
+    ImplicitMidpoint, Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities,
+};
 use crate::body::Body;
 
 /// The backward differentiation formula of two steps (Curtiss and Hirschfelder 1952): with y = (x, v) and y₋ that of the step before,

@@ -56,8 +56,7 @@ impl Topology {
                 *sides.entry([start.min(end), start.max(end)]).or_insert(0) += 1;
             }
         }
-        let mut vertices: Vec<usize> =
-            self.edges.iter().filter(|edge| sides[*edge] == 1).flatten().copied().collect();
+        let mut vertices: Vec<usize> = self.edges.iter().filter(|edge| sides[*edge] == 1).flatten().copied().collect();
         vertices.sort_unstable();
         vertices.dedup();
         vertices

@@ -157,10 +157,7 @@ impl File {
         (self.accessor(&bytes, corners.len(), ComponentType::U32, Type::Scalar, None), mode)
     }
 
-    fn attributes(
-        &mut self,
-        shape: &Shape,
-    ) -> BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>> {
+    fn attributes(&mut self, shape: &Shape) -> BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>> {
         let mut attributes = BTreeMap::from([(Valid(Semantic::Positions), self.vectors(&shape.positions))]);
         if !shape.normals.is_empty() {
             attributes.insert(Valid(Semantic::Normals), self.vectors(&shape.normals));
@@ -169,8 +166,7 @@ impl File {
     }
 
     fn morph(&mut self, shape: &Shape, rest: &Shape) -> MorphTarget {
-        let normals =
-            (!rest.normals.is_empty()).then(|| self.vectors(&differences(&shape.normals, &rest.normals)));
+        let normals = (!rest.normals.is_empty()).then(|| self.vectors(&differences(&shape.normals, &rest.normals)));
         let positions = Some(self.vectors(&differences(&shape.positions, &rest.positions)));
         MorphTarget { positions, normals, tangents: None }
     }

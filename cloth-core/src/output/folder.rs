@@ -139,9 +139,9 @@ impl OutputFolder {
         for entry in std::fs::read_dir(self.frames())? {
             let path = entry?.path();
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            let number = ["obj", "ply", "png"].iter().find_map(|extension| {
-                name.strip_prefix("cloth_")?.strip_suffix(extension)?.strip_suffix('.')
-            });
+            let number = ["obj", "ply", "png"]
+                .iter()
+                .find_map(|extension| name.strip_prefix("cloth_")?.strip_suffix(extension)?.strip_suffix('.'));
             if number.is_some_and(|number| number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit())) {
                 frames.push(path);
             }

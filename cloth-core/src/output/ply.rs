@@ -16,7 +16,9 @@ pub fn ply_bytes(positions: &[Vector3<f64>], velocities: &[Vector3<f64>], triang
     for property in ["x", "y", "z", "vx", "vy", "vz"] {
         file.extend(format!("property float {property}\n").into_bytes());
     }
-    file.extend(format!("element face {}\nproperty list uchar int vertex_indices\nend_header\n", triangles.len()).into_bytes());
+    file.extend(
+        format!("element face {}\nproperty list uchar int vertex_indices\nend_header\n", triangles.len()).into_bytes(),
+    );
     for (x, v) in positions.iter().zip(velocities) {
         file.extend(x.iter().chain(v).flat_map(|number| (*number as f32).to_le_bytes()));
     }

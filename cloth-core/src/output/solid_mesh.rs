@@ -78,15 +78,16 @@ fn capsule(solid: &Capsule) -> SolidMesh {
     let axis = if norm(way) > 0.0 { way.map(|component| component / norm(way)) } else { [0.0, 0.0, 1.0] };
     let [u, v] = across(axis);
     let half = AROUND / 4;
-    // Rows from the pole at a to that at b, the equator twice.
+    // Rows from the pole at a to that at b, the equator twice where the halves are apart.
+    let apart = usize::from(a != b);
     let point = |row: usize, column: usize| -> Vector3<f64> {
-        let (end, step) = if row <= half { (a, row) } else { (b, row - 1) };
+        let (end, step) = if row <= half { (a, row) } else { (b, row - apart) };
         let latitude = PI * step as f64 / (2 * half) as f64 - FRAC_PI_2;
         let (sine, cosine) = (TAU * column as f64 / AROUND as f64).sin_cos();
         let (up, out) = latitude.sin_cos();
         std::array::from_fn(|i| end[i] + solid.radius * (up * axis[i] + out * (cosine * u[i] + sine * v[i])))
     };
-    grid(2 * half + 2, AROUND + 1, point)
+    grid(2 * half + 1 + apart, AROUND + 1, point)
 }
 
 /// The six faces of a cube, each point pushed out on a ball of the radius and then to its corner of the box.

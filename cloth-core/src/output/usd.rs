@@ -12,7 +12,9 @@ pub fn usd_text(tracks: &[Track<'_>], frames_per_second: f64) -> String {
     let mut file = Usd { text: String::new(), names: Vec::new() };
     file.line(format_args!("#usda 1.0\n(\n    defaultPrim = \"scene\"\n    metersPerUnit = 1\n    upAxis = \"Z\""));
     file.line(format_args!("    startTimeCode = 0\n    endTimeCode = {}", frames.saturating_sub(1)));
-    file.line(format_args!("    timeCodesPerSecond = {frames_per_second}\n    framesPerSecond = {frames_per_second}\n)\n"));
+    file.line(format_args!(
+        "    timeCodesPerSecond = {frames_per_second}\n    framesPerSecond = {frames_per_second}\n)\n"
+    ));
     file.line(format_args!("def Xform \"scene\"\n{{"));
     tracks.iter().for_each(|track| file.add(track));
     file.line(format_args!("}}"));
@@ -36,7 +38,9 @@ impl Usd {
         match track.joined {
             Joined::Triangles(triangles) => {
                 self.line(format_args!("    def Mesh \"{name}\"\n    {{"));
-                self.line(format_args!("        uniform token subdivisionScheme = \"none\"\n        uniform bool doubleSided = 1"));
+                self.line(format_args!(
+                    "        uniform token subdivisionScheme = \"none\"\n        uniform bool doubleSided = 1"
+                ));
                 let counts = vec!["3"; triangles.len()].join(", ");
                 self.line(format_args!("        int[] faceVertexCounts = [{counts}]"));
                 let corners: Vec<String> = triangles.iter().flatten().map(usize::to_string).collect();
@@ -47,7 +51,9 @@ impl Usd {
                 self.line(format_args!("        uniform token type = \"linear\""));
                 let counts: Vec<String> = strands.iter().map(|strand| strand.len().to_string()).collect();
                 self.line(format_args!("        int[] curveVertexCounts = [{}]", counts.join(", ")));
-                self.line(format_args!("        float[] widths = [0.001] (\n            interpolation = \"constant\"\n        )"));
+                self.line(format_args!(
+                    "        float[] widths = [0.001] (\n            interpolation = \"constant\"\n        )"
+                ));
             }
         }
         self.line(format_args!("        color3f[] primvars:displayColor = [({red}, {green}, {blue})]"));
@@ -114,7 +120,13 @@ mod tests {
             frames: vec![&points[..], &points[..]],
         };
         let text = usd_text(&[track("left sleeve"), track("left-sleeve"), track("1st")], 25.0);
-        for part in ["\"left_sleeve\"", "\"left_sleeve_2\"", "\"_1st\"", "endTimeCode = 1", "1: [(0, 0, 0), (1, 0, 0), (0, 1, 0.5)],"] {
+        for part in [
+            "\"left_sleeve\"",
+            "\"left_sleeve_2\"",
+            "\"_1st\"",
+            "endTimeCode = 1",
+            "1: [(0, 0, 0), (1, 0, 0), (0, 1, 0.5)],",
+        ] {
             assert!(text.contains(part), "{part}: {text}");
         }
         assert_eq!(text.matches('{').count(), text.matches('}').count());

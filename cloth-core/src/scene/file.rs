@@ -108,7 +108,9 @@ impl TryFrom<File> for Scene {
             (None, None) => {}
         }
         if garments.is_empty() && file.hair.is_empty() {
-            return Err("there is nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned());
+            return Err(
+                "there is nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned()
+            );
         }
         Ok(Self {
             garments,

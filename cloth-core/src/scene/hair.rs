@@ -76,6 +76,8 @@ impl Hair {
     pub fn masses(&self) -> Vec<f64> {
         let segment = self.density * self.length / self.segments as f64;
         let end = |joint: usize| joint.is_multiple_of(self.segments);
-        (0..self.count).flat_map(|_| (0..=self.segments).map(|j| if end(j) { 0.5 * segment } else { segment })).collect()
+        (0..self.count)
+            .flat_map(|_| (0..=self.segments).map(|j| if end(j) { 0.5 * segment } else { segment }))
+            .collect()
     }
 }

@@ -97,7 +97,7 @@ impl Scene {
         scene.folder = path.parent().map(Path::to_owned).unwrap_or_default();
         for garment in &mut scene.garments {
             if let Material::File(declared) = &mut garment.fabric.material {
-                declared.from_folder(&scene.folder);
+                declared.seek_in(&scene.folder);
             }
         }
         Ok(scene)

@@ -153,9 +153,7 @@ impl TryFrom<Keys> for ObstacleDescription {
             ShapeKeys::Capsule(CapsuleKeys { from, to, .. }) if from == to => {
                 return Err("the ends of a capsule must differ; for a ball say `sphere`".to_owned());
             }
-            ShapeKeys::Block(BoxKeys { size, rounding, .. })
-                if size.iter().any(|edge| 0.5 * edge <= rounding) =>
-            {
+            ShapeKeys::Block(BoxKeys { size, rounding, .. }) if size.iter().any(|edge| 0.5 * edge <= rounding) => {
                 return Err(format!("a box of {size:?} m cannot be rounded by {rounding} m: that is half an edge"));
             }
             _ => {}

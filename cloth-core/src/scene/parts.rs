@@ -71,6 +71,8 @@ pub struct Model {
     pub terms: Vec<Box<dyn Term>>,
     /// What was left out because its stiffness is zero, or there is nothing for it to act on.
     pub left_out: Vec<String>,
+    /// What should be known about it.
+    pub warnings: Vec<String>,
     /// Solids.
     pub obstacles: Vec<Obstacle>,
 }
@@ -147,6 +149,7 @@ impl Model {
             motions: Vec::new(),
             terms: Vec::new(),
             left_out: Vec::new(),
+            warnings: Vec::new(),
             obstacles: Vec::new(),
         };
         let several = scene.garments.len() + scene.hair.len() > 1;
@@ -196,6 +199,7 @@ impl Builder<'_> {
         model.masses.extend(laid.masses);
         model.terms.extend(laid.terms);
         model.left_out.extend(laid.left_out);
+        model.warnings.extend(laid.warnings);
         model.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
         model.x.extend(start);
         model.v.extend(velocities);
