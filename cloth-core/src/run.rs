@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
 use serde::{Deserialize, Serialize};
 
@@ -255,11 +254,5 @@ impl Run {
     #[must_use]
     pub fn leaves_checkpoints(&self) -> bool {
         self.every.is_some()
-    }
-
-    /// The frames so far, in m.
-    #[must_use]
-    pub fn frames(&self) -> &[Vec<Vector3<f64>>] {
-        self.frames.frames()
     }
 }

@@ -7,7 +7,7 @@ use energy_solve::{EvaluationError, State, StepStart, System, SystemError};
 use crate::body::Body;
 use crate::checkpoint::{CheckpointError, SavedState};
 use crate::contact::Obstacle;
-use crate::integrator::{Integrator, Phases, StepError, StepReport};
+use crate::integrator::{Integrator, StepError, StepReport};
 use crate::ledger::Ledger;
 use crate::motion::Motion;
 use crate::scene::{Model, ModelError, MovingPin, Part, PartKind, Scene};
@@ -328,12 +328,6 @@ impl Simulation {
         let body = &mut self.body;
         let last = StepStart { time, dt: self.dt, state: State { x: &body.x, v: &body.v } };
         body.system.begin_step(last).map_err(|source| CheckpointError::Unfit { source })
-    }
-
-    /// Time spent by phase; of integrators that solve by Newton's method only.
-    #[must_use]
-    pub fn phases(&self) -> Phases {
-        self.summary.phases
     }
 }
 

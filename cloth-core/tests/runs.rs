@@ -255,8 +255,7 @@ fn usd_ply_and_obj_hold_the_same_frames() {
     };
     let from_usd = numbers(line.split_once(':').unwrap().1);
     let obj = String::from_utf8(read(&out, "frames/cloth_0015.obj")).unwrap();
-    let from_obj: Vec<f64> =
-        obj.lines().filter_map(|line| line.strip_prefix("v ")).flat_map(|rest| numbers(rest)).collect();
+    let from_obj: Vec<f64> = obj.lines().filter_map(|line| line.strip_prefix("v ")).flat_map(&numbers).collect();
     let ply = read(&out, "frames/cloth_0015.ply");
     let end = ply.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     let single = |at: usize| f64::from(f32::from_le_bytes(ply[end + at..end + at + 4].try_into().unwrap()));
