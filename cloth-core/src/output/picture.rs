@@ -16,7 +16,7 @@ use crate::mesh::{cross, dot, norm, subtract};
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
 /// How wide hair is drawn, in pixels before averaging.
-const STRAND: f64 = 4.5;
+const STRAND: f64 = 3.0;
 
 /// A picture that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +26,7 @@ pub struct PictureError(String);
 const WIDTH: u32 = 1200;
 const HEIGHT: u32 = 1000;
 /// Drawn this many times larger and averaged: triangles without smoothed edges leave no seams between them.
-const OVERSAMPLING: u32 = 3;
+const OVERSAMPLING: u32 = 2;
 /// From the cloth to the eye and to the lamp.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
 const LAMP: Vector3<f64> = [-0.25, -0.45, 1.0];
@@ -171,7 +171,7 @@ fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<
 
 /// Drawn small and enlarged, which makes it soft.
 fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], triangles: &[[usize; 3]]) {
-    const COARSENESS: u32 = 30;
+    const COARSENESS: u32 = 20;
     let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
     let mut outline = PathBuilder::new();
     for corners in triangles {
@@ -188,7 +188,7 @@ fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], tr
     let paint = Paint { shader: Shader::SolidColor(ink), ..Paint::default() };
     let shrink = 1.0 / COARSENESS as f32;
     small.fill_path(&path, &paint, FillRule::Winding, Transform::from_scale(shrink, shrink), None);
-    let soft = PixmapPaint { quality: FilterQuality::Bicubic, ..PixmapPaint::default() };
+    let soft = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
     let enlarge = Transform::from_scale(COARSENESS as f32, COARSENESS as f32);
     canvas.draw_pixmap(0, 0, small.as_ref(), &soft, enlarge, None);
 }

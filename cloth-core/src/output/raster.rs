@@ -38,16 +38,21 @@ impl Canvas {
         };
         let (columns, rows) = (range(0, self.pixels.width()), range(1, self.pixels.height()));
         let width = self.pixels.width() as usize;
+        // The weight of the corner across from p → q, and how it changes from column to column.
         let weight = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
             ((q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])) / area
         };
+        let steps = [(b, c), (c, a), (a, b)].map(|(p, q)| (p[1] - q[1]) / area);
         let near = corners.map(|corner| 1.0 / corner.depth);
         let data = self.pixels.data_mut();
         for row in rows.0..rows.1 {
+            let first = [columns.0 as f64 + 0.5, row as f64 + 0.5];
+            let starts = [weight(b, c, first), weight(c, a, first), weight(a, b, first)];
             for column in columns.0..columns.1 {
-                let at = [column as f64 + 0.5, row as f64 + 0.5];
-                let parts = [weight(b, c, at), weight(c, a, at), weight(a, b, at)];
-                if parts.iter().any(|part| *part < 0.0) {
+                let way = (column - columns.0) as f64;
+                let parts: [f64; 3] = std::array::from_fn(|i| starts[i] + way * steps[i]);
+                // Neighbours overlap by less than is seen, so that rounding leaves no gap between them.
+                if parts.iter().any(|part| *part < -1e-9) {
                     continue;
                 }
                 let nearness: f64 = parts.iter().zip(near).map(|(part, near)| part * near).sum();
