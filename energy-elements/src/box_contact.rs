@@ -16,7 +16,9 @@ energy! {
         let q2 = abs(dot(e2, s)) - h.y;
         let q3 = abs(dot(e3, s)) - h.z;
         let deepest = max(q1, q2, q3);
-        let outside = norm(vector(max(q1, 0), max(q2, 0), max(q3, 0)));
+        // Inside, a vector that does not vanish: its norm has derivatives, though they are not used.
+        let o1 = if deepest > 0 { max(q1, 0) } else { deepest };
+        let outside = norm(vector(o1, max(q2, 0), max(q3, 0)));
         let d = if deepest > 0 { outside } else { deepest };
         k / (3 * δ) * max(δ + r - d, 0)^3
     }

@@ -87,7 +87,12 @@ fn capsule(solid: &Capsule) -> SolidMesh {
         let (up, out) = latitude.sin_cos();
         std::array::from_fn(|i| end[i] + solid.radius * (up * axis[i] + out * (cosine * u[i] + sine * v[i])))
     };
-    grid(2 * half + 1 + apart, AROUND + 1, point)
+    let mut mesh = grid(2 * half + 1 + apart, AROUND + 1, point);
+    // The last column is the first again: joined, so that shading runs on across it.
+    for corner in mesh.triangles.as_flattened_mut() {
+        *corner -= if *corner % (AROUND + 1) == AROUND { AROUND } else { 0 };
+    }
+    mesh
 }
 
 /// The six faces of a cube, each point pushed out on a ball of the radius and then to its corner of the box.
