@@ -6,11 +6,11 @@ use energy_solve::{State, System};
 pub struct Body {
     /// Positions, in m.
     pub x: Vec<Vector3<f64>>,
-    /// Velocities, in m/s; zero for pinned vertices.
+    /// Velocities, in m/s; of pinned vertices those with which they are moved.
     pub v: Vec<Vector3<f64>>,
     /// Masses, in kg.
     pub masses: Vec<f64>,
-    /// The forces on it. Its pinned vertices never move.
+    /// The forces on it. Its pinned vertices do not yield to them.
     pub system: System,
 }
 
@@ -21,20 +21,20 @@ impl Body {
         State { x: &self.x, v: &self.v }
     }
 
-    /// ½ Σ m v², in J.
+    /// ½ Σ m v² of the free vertices, in J.
     #[must_use]
     pub fn kinetic_energy(&self) -> f64 {
         let square = |v: &Vector3<f64>| v.iter().map(|component| component * component).sum::<f64>();
-        self.masses.iter().zip(&self.v).map(|(mass, v)| 0.5 * mass * square(v)).sum()
+        self.system.dofs().free().iter().map(|&vertex| 0.5 * self.masses[vertex] * square(&self.v[vertex])).sum()
     }
 
-    /// Σ m v, in kg m/s.
+    /// Σ m v of the free vertices, in kg m/s.
     #[must_use]
     pub fn momentum(&self) -> Vector3<f64> {
         self.sum(|_, v| v)
     }
 
-    /// Σ m x × v about the origin, in kg m²/s.
+    /// Σ m x × v of the free vertices about the origin, in kg m²/s.
     #[must_use]
     pub fn angular_momentum(&self) -> Vector3<f64> {
         self.sum(crate::mesh::cross)
@@ -42,10 +42,10 @@ impl Body {
 
     fn sum(&self, of: impl Fn(Vector3<f64>, Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
         let mut total = [0.0; 3];
-        for ((mass, x), v) in self.masses.iter().zip(&self.x).zip(&self.v) {
-            let part = of(*x, *v);
+        for &vertex in self.system.dofs().free() {
+            let part = of(self.x[vertex], self.v[vertex]);
             for axis in 0..3 {
-                total[axis] += mass * part[axis];
+                total[axis] += self.masses[vertex] * part[axis];
             }
         }
         total

@@ -34,19 +34,29 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod dissipation_term;
+mod frame_store;
 mod simulation;
 mod summary;
 
 pub mod bench;
+pub mod checkpoint;
+pub mod contact;
 pub mod demo;
 pub mod fabric;
 pub mod integrator;
+pub mod ledger;
 pub mod materials;
 pub mod mesh;
+pub mod motion;
 pub mod output;
+pub mod progress;
+pub mod report;
+pub mod run;
 pub mod scene;
 pub mod trajectory_error;
 pub mod validate;
+pub mod wind;
 
 pub use body::Body;
 pub use simulation::{Simulation, SimulationError};

@@ -4,16 +4,19 @@
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use cloth_core::bench::{self, Cloth};
 use cloth_core::fabric::MEASURED;
-use cloth_core::output::{OutputFolder, animation_glb, obj_text, picture_png};
+use cloth_core::output::OutputFolder;
+use cloth_core::progress::Progress;
+use cloth_core::run::{Ending, Run, RunError};
 use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
-use cloth_core::{Simulation, demo, materials, trajectory_error};
-use energy_dsl::Vector3;
+use cloth_core::{Simulation, demo, materials, report, scene, trajectory_error};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Cloth simulated with audited derivatives.
@@ -42,7 +45,28 @@ enum Command {
         /// Replace the files of an earlier run.
         #[arg(long)]
         overwrite: bool,
+        /// Save the state each time after this many steps, for `cloth resume`.
+        #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
+        checkpoint: Option<u64>,
+        /// Makes every fabric of the elements that this file declares, read at run time: slower than those built in.
+        #[arg(long, value_name = "FILE.energy")]
+        material: Option<PathBuf>,
+        /// Their parameters, as in `k=20,nu=0.3`, in the units of the declaration.
+        #[arg(long, requires = "material", value_delimiter = ',', value_parser = parameter)]
+        parameters: Vec<(String, f64)>,
     },
+    /// Goes on with a run that was interrupted, from its last checkpoint: the result is the same bit by bit.
+    Resume {
+        /// The folder of the run.
+        folder: PathBuf,
+    },
+    /// Makes one page, report.html, of a finished run: pictures, energies, times, what was evaluated, and the audit of its elements.
+    Report {
+        /// The folder of the run.
+        folder: PathBuf,
+    },
+    /// Prints the JSON schema of scene files, for editors.
+    Schema,
     /// Lists the declared elements: formula, parameters with units, operations per routine.
     Materials,
     /// Compares with known answers: what theory says exactly about strips, sheets and motions. Exit status 1 when one is missed.
@@ -106,6 +130,12 @@ fn ratio(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.abs() < 1.0).ok_or_else(|| "it is a number between −1 and 1".to_owned())
 }
 
+fn parameter(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or_else(|| "it is a name and a number, as in k=20".to_owned())?;
+    let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    Ok((name.trim().to_owned(), value.ok_or_else(|| format!("what {name} is must be a number"))?))
+}
+
 fn cloth_named(name: &str) -> Result<Cloth, String> {
     Cloth::ALL.into_iter().find(|cloth| cloth.name() == name).ok_or_else(|| "it is soft or cotton".to_owned())
 }
@@ -125,22 +155,27 @@ fn validate(ask: impl FnOnce(&mut dyn FnMut(&Finding)) -> Result<(), ValidateErr
     Ok(())
 }
 
-fn main() -> Result<()> {
+fn main() -> Result<ExitCode> {
     match Arguments::parse().command {
         Command::Demo { output } => {
-            let folder = OutputFolder::open(&output, true)?;
             let scene = demo::scene()?;
-            let simulation = Simulation::new(&scene)?;
-            print(&format!("{}\n", demo::audit_materials(&simulation)?))?;
-            run(simulation, &scene, &folder)
+            print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
+            return run(Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &output, true, None)?);
         }
-        Command::Run { scene, output, overwrite } => {
-            let file = scene;
-            let scene = Scene::read(&file)?;
-            let simulation = Simulation::new(&scene).with_context(|| file.display().to_string())?;
-            let folder = OutputFolder::open(&output, overwrite)?;
-            run(simulation, &scene, &folder)
+        Command::Run { scene, output, overwrite, checkpoint, material, parameters } => {
+            let mut text = Scene::text(&scene)?;
+            if let Some(file) = material {
+                text = scene::with_material(&text, &file, &parameters);
+            }
+            let new = Run::new(text, &scene, &output, overwrite, checkpoint);
+            return run(new.map_err(|error| match error {
+                RunError::Simulation(unfit) => anyhow::Error::new(unfit).context(scene.display().to_string()),
+                located => located.into(),
+            })?);
         }
+        Command::Resume { folder } => return run(Run::resume(&folder)?),
+        Command::Report { folder } => print(&format!("wrote {}\n", report::write_report(&folder)?.display())),
+        Command::Schema => print(&format!("{:#}\n", scene::schema())),
         Command::Materials => print(&materials::listing()),
         Command::Validate { questions, quick, gamma, nu, aspect, mesh, orientation, segments } => {
             let own = gamma.is_some()
@@ -150,7 +185,8 @@ fn main() -> Result<()> {
                 || orientation.is_some()
                 || segments.is_some();
             if !own {
-                return validate(|tell| validate::ask(&questions, quick, tell).map(|_| ()));
+                validate(|tell| validate::ask(&questions, quick, tell).map(|_| ()))?;
+                return Ok(ExitCode::SUCCESS);
             }
             let (poisson_ratio, aspect) = (nu.unwrap_or(0.0), aspect.unwrap_or(0.1));
             let (mesh, orientation) = (mesh.unwrap_or(MeshKind::Diagonal), orientation.unwrap_or(0.0));
@@ -188,6 +224,7 @@ fn main() -> Result<()> {
             print(&format!("{}\n", bench::table(&runs)))
         }
     }
+    .map(|()| ExitCode::SUCCESS)
 }
 
 /// Compares the integrators, prints the table, and writes it.
@@ -208,39 +245,38 @@ fn compare(cloth: Cloth, output: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Simulates to the end and writes everything.
-fn run(mut simulation: Simulation, scene: &Scene, folder: &OutputFolder) -> Result<()> {
-    simulation.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let per_frame = scene.steps_per_frame();
-    let progress = progress_bar(simulation.steps());
-    let triangles = simulation.mesh().triangles().to_vec();
-    let mut frames: Vec<Vec<Vector3<f64>>> = Vec::new();
-    loop {
-        if simulation.steps_done().is_multiple_of(per_frame) {
-            folder.write_frame(frames.len(), &obj_text(&simulation.body().x, &triangles))?;
-            frames.push(simulation.body().x.clone());
-        }
-        if simulation.is_finished() {
-            break;
-        }
-        simulation.step()?;
-        progress.inc(1);
+/// Simulates to the end or until interrupted, and says what was written.
+fn run(mut run: Run) -> Result<ExitCode> {
+    run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    let interrupted = interruption()?;
+    let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
+    let ended = run.go(interrupted, |simulation, report| progress.step(simulation.steps_done(), report));
+    progress.finish();
+    let Ending { summary, files, frames, finished } = ended?;
+    let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    let folder = run.folder().path();
+    print(&format!("{summary}\n\n{files}wrote {frames} frames to {}\n", folder.join(OutputFolder::FRAMES).display()))?;
+    if finished {
+        return Ok(ExitCode::SUCCESS);
     }
-    progress.finish_and_clear();
+    let resume = match run.leaves_checkpoints() {
+        true => format!("go on with `cloth resume {}`", folder.display()),
+        false => "with --checkpoint it could be resumed".to_owned(),
+    };
+    eprintln!("stopped after step {} of {}; {resume}", summary.steps, run.simulation().steps());
+    Ok(ExitCode::from(130))
+}
 
-    let animation = animation_glb(&frames, &triangles, per_frame as f64 * scene.dt)?;
-    let summary = simulation.summary()?.to_string();
-    let written = [
-        folder.write(OutputFolder::PICTURE, &picture_png(&simulation.body().x, &triangles)?)?,
-        folder.write(OutputFolder::ANIMATION, &animation)?,
-        folder.write(OutputFolder::SUMMARY, format!("{summary}\n").as_bytes())?,
-    ];
-    let files: String = written.iter().map(|path| format!("wrote {}\n", path.display())).collect();
-    print(&format!(
-        "{summary}\n\n{files}wrote {} frames to {}\n",
-        frames.len(),
-        folder.path().join(OutputFolder::FRAMES).display()
-    ))
+/// Set by Ctrl-C; a second one ends the program at once.
+fn interruption() -> Result<&'static AtomicBool> {
+    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+    ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("cannot listen for Ctrl-C")?;
+    Ok(&INTERRUPTED)
 }
 
 /// Prints to standard output. A reader that has seen enough (`| head`) is no error.

@@ -3,9 +3,10 @@ use std::time::Duration;
 
 use energy_dsl::Vector3;
 use energy_solve::{Counts, Tally};
+use serde::{Deserialize, Serialize};
 
 /// What a simulation did, and where it ended. Its `Display` is a report for people.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Vertices.
     pub vertices: usize,
@@ -14,7 +15,7 @@ pub struct Summary {
     /// Triangles.
     pub triangles: usize,
     /// The integrator.
-    pub integrator: &'static str,
+    pub integrator: String,
     /// Time step, in s.
     pub dt: f64,
     /// Steps done.
@@ -25,6 +26,10 @@ pub struct Summary {
     pub iterations: u64,
     /// Steps solved again with projected curvature; see [`crate::integrator::ImplicitEuler`].
     pub projected: u64,
+    /// Steps rejected and tried again with a smaller size; see [`crate::integrator::Adaptive`].
+    pub rejected: u64,
+    /// Time spent by phase; of integrators that solve by Newton's method only.
+    pub phases: crate::integrator::Phases,
     /// Time spent in steps.
     pub stepping_time: Duration,
     /// The terms.
@@ -44,15 +49,16 @@ pub struct Summary {
 }
 
 /// What one term did, and its energy at the end.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TermSummary {
     /// Its name.
     pub name: String,
     /// The declared element it is made of.
-    pub element: &'static str,
+    pub element: String,
     /// Its energy in J; `None` for a force law.
     pub energy: Option<f64>,
     /// What was evaluated and skipped.
+    #[serde(with = "crate::checkpoint::saved_counts")]
     pub counts: Counts,
 }
 
@@ -67,6 +73,9 @@ impl fmt::Display for Summary {
             let mean = self.iterations as f64 / self.solves as f64;
             writeln!(f, "{} linear solves, {} iterations ({mean:.1} each)", self.solves, self.iterations)?;
             writeln!(f, "{} steps solved again with projected curvature", self.projected)?;
+        }
+        if self.rejected > 0 {
+            writeln!(f, "{} steps rejected and tried again with a smaller size", self.rejected)?;
         }
         writeln!(f)?;
         writeln!(f, "{:<20} {:<20} {:>12}   evaluated (skipped) per routine", "term", "element", "energy, J")?;
@@ -92,7 +101,8 @@ impl fmt::Display for Summary {
 fn routines(counts: &Counts) -> String {
     let one = |name: &str, tally: &Tally| {
         let flagged = if tally.flagged > 0 { format!(", {} flagged", tally.flagged) } else { String::new() };
-        (tally.evaluated > 0).then(|| format!("{name} {} ({}{flagged})", tally.evaluated, tally.skipped))
+        (tally.evaluated + tally.skipped > 0)
+            .then(|| format!("{name} {} ({}{flagged})", tally.evaluated, tally.skipped))
     };
     let all = [("value", &counts.value), ("first", &counts.gradient), ("second", &counts.hessian)];
     all.iter().filter_map(|(name, tally)| one(name, tally)).collect::<Vec<_>>().join(" · ")

@@ -147,7 +147,34 @@ impl Interpreted {
         Ok(Outputs { blocks, repeats, flags })
     }
 
-    fn precomputed<T: Number>(&self, inputs: &Inputs<'_, T>) -> Result<Vec<T>, RestError> {
+    /// One routine alone (`value`, `gradient`, `hessian`, …), from what [`Self::precomputed`] made of the rest shape: its numbers by group, a
+    /// Hessian as its triangle of blocks, and whether a condition was met. `None` where the kind has no such routine.
+    ///
+    /// ```
+    /// use energy_dsl::{Inputs, Interpreted};
+    ///
+    /// let pull = Interpreted::from_source("energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }").unwrap().remove(0);
+    /// let inputs = Inputs { parameters: &[2.0], rest: &[], positions: &[3.0, 0.0, 4.0, 0.0, 0.0, 0.0], velocities: &[] };
+    /// let rest = pull.precomputed(&inputs).unwrap();
+    /// assert_eq!(pull.routine("value", &inputs, &rest).unwrap().0, [[25.0]]);
+    /// ```
+    #[must_use]
+    pub fn routine<T: Number>(
+        &self,
+        name: &str,
+        inputs: &Inputs<'_, T>,
+        precomputed: &[T],
+    ) -> Option<(Vec<Vec<T>>, Flags<T>)> {
+        let routine = self.routines.iter().find(|routine| routine.name == name)?;
+        let Results { groups, flags } = routine.run(inputs, precomputed);
+        Some((groups, flags))
+    }
+
+    /// What the rest shape alone determines, for [`Self::routine`].
+    ///
+    /// # Errors
+    /// When the rest shape is degenerate.
+    pub fn precomputed<T: Number>(&self, inputs: &Inputs<'_, T>) -> Result<Vec<T>, RestError> {
         let (mut groups, degenerate) = self.rest.run(inputs, &[]);
         let numbers = groups.remove(0);
         // Neither infinite nor NaN.

@@ -71,6 +71,8 @@ pub use mathml::mathml;
 #[cfg(feature = "compiler")]
 pub use mutation::{Fault, Mutation};
 #[cfg(feature = "compiler")]
+pub use syntax::canonical as canonical_name;
+#[cfg(feature = "compiler")]
 pub use textbook::Textbook;
 
 /// Compiles declarations to Rust: the whole of what `energy!` does. Errors become `compile_error!` at their places, beside

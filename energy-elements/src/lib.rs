@@ -25,11 +25,13 @@ macro_rules! elements {
 
 elements! {
     arap: AsRigidAsPossible;
+    box_contact: BoxContact;
     bridson_bending: BridsonBending;
     bridson_force: BridsonForce;
     bridson_force_damped: BridsonForceDamped;
     bw_shear: BaraffWitkinShear;
     bw_stretch: BaraffWitkinStretch;
+    capsule_contact: CapsuleContact;
     distance: Distance;
     distance_squared: DistanceSquared;
     flat_bending: FlatBending;
@@ -45,9 +47,12 @@ elements! {
     ipc_barrier_squared: SquaredDistanceBarrier;
     neo_hookean_log: NeoHookean, StableNeoHookeanLog;
     orthotropic_stvk: OrthotropicStVK;
+    plane_contact: PlaneContact;
     plate_bending: PlateBending;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
+    sliding_friction: SlidingFriction;
+    sphere_contact: SphereContact;
     spring: Spring;
     stable_neo_hookean: StableNeoHookean;
     strain_rate_damping: StrainRateDamping;
@@ -57,6 +62,7 @@ elements! {
         FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane, SkeletonPlane,
         SkeletonPoint, TukeyLoss, TwistMotion;
     viscous_drag: ViscousDrag;
+    wind_drag: WindDrag;
     zero_length_spring: ZeroLengthSpring;
 }
 

@@ -62,7 +62,7 @@ pub use bicgstab::bicgstab;
 pub use block_jacobi::BlockJacobi;
 pub use conjugate_gradients::conjugate_gradients;
 pub use counts::{Counts, Tally};
-pub use curvature::Curvature;
+pub use curvature::{Curvature, change_dense};
 pub use dofs::DofMap;
 pub use force_term::ForceTerm;
 pub use gauss_newton::{GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, Outcome, TermCost};
@@ -79,5 +79,5 @@ pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm,
 pub use rounded_matrix::RoundedMatrix;
 pub use solve::{SolveOptions, SolveReport, StopReason};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
-pub use term::{Character, Linearisation, Quantity, State, Stencils, Term, Weights};
+pub use term::{Character, Linearisation, Quantity, State, Stencils, StepStart, Term, Weights};
 pub use vector::dot;

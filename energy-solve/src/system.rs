@@ -7,7 +7,7 @@ use crate::curvature::Curvature;
 use crate::dofs::DofMap;
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage, index};
-use crate::term::{Character, Linearisation, Quantity, State, Term, Weights};
+use crate::term::{Character, Linearisation, Quantity, State, StepStart, Term, Weights};
 
 /// Terms that do not fit the vertices.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -204,22 +204,38 @@ impl System {
         Ok(energies)
     }
 
-    /// −v·(f(x, v) − f(x, 0)), in W: what damping takes out of the motion. Terms without it are not evaluated.
+    /// Tells every term that a step begins; see [`Term::begin_step`].
     ///
     /// # Errors
     /// When the state is incomplete or not finite.
-    pub fn dissipated_power(&mut self, state: State<'_>) -> Result<f64, EvaluationError> {
+    pub fn begin_step(&mut self, start: StepStart<'_>) -> Result<(), EvaluationError> {
+        self.check(start.state)?;
+        self.terms.iter_mut().for_each(|counted| counted.term.begin_step(start));
+        Ok(())
+    }
+
+    /// Rayleigh's dissipation function R(x, v), in W: f(x, v) − f(x, 0) = −∂R/∂v. Of drag in proportion to velocity it is half the power
+    /// that is taken out of the motion. Terms without it are not evaluated.
+    ///
+    /// # Errors
+    /// When the state is incomplete or not finite.
+    pub fn dissipation(&mut self, state: State<'_>) -> Result<f64, EvaluationError> {
         self.check(state)?;
-        let mut power = 0.0;
+        let mut sum = 0.0;
         for Counted { term, counts } in self.terms.iter_mut().filter(|c| c.term.character().velocity_dependent) {
+            if let Some((dissipation, tally)) = term.dissipation(state) {
+                sum += dissipation;
+                counts.value += tally;
+                continue;
+            }
             let still = vec![[0.0; 3]; state.v.len()];
             for (v, sign) in [(state.v, -1.0), (still.as_slice(), 1.0)] {
                 let mut force = still.clone();
                 counts.gradient += term.add_force(State { x: state.x, v }, &mut force);
-                power += sign * crate::vector::dot(&force, state.v);
+                sum += 0.5 * sign * crate::vector::dot(&force, state.v);
             }
         }
-        Ok(power)
+        Ok(sum)
     }
 
     /// f(x, v), in N, of all vertices. Pinned ones get the force of the elements they share with free ones.

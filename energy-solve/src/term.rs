@@ -27,6 +27,17 @@ pub struct State<'a> {
     pub v: &'a [Vector3<f64>],
 }
 
+/// Where a step starts.
+#[derive(Clone, Copy, Debug)]
+pub struct StepStart<'a> {
+    /// When, in s.
+    pub time: f64,
+    /// Its size, in s.
+    pub dt: f64,
+    /// Positions and velocities then.
+    pub state: State<'a>,
+}
+
 /// The vertices of a term's elements, `arity` to an element.
 #[derive(Clone, Copy, Debug)]
 pub struct Stencils<'a> {
@@ -105,6 +116,13 @@ pub trait Term: std::fmt::Debug {
     fn stencils(&self) -> Stencils<'_>;
     /// Finds out which elements have a free vertex, and where their blocks are stored.
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern);
+    /// Called before each step: what a term holds fixed over a step (the normal force of friction, where an obstacle is) it takes from here.
+    fn begin_step(&mut self, _start: StepStart<'_>) {}
+    /// Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v, of a force that does not grow in proportion to velocity.
+    /// `None`, for one that does: then R is half the power that it takes.
+    fn dissipation(&self, _state: State<'_>) -> Option<(f64, Tally)> {
+        None
+    }
     /// Whether it has an energy.
     fn has_energy(&self) -> bool;
     /// Σ U; `None` for a force law.

@@ -1,17 +1,19 @@
+use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::Declared;
 use super::plate::Rigidity;
 use crate::scene::numbers::{finite_triple, non_negative, poisson_ratio, positive, positive_pair};
 
 /// A fabric.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fabric {
     /// Mass per area σ, in kg/m².
     #[serde(deserialize_with = "positive")]
     pub density: f64,
     /// What resists stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`, `stable-neo-hookean-log`,
-    /// `arap`, `baraff-witkin` or `orthotropic-stvk`.
+    /// `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of the user's own.
     pub material: Material,
     /// The direction of the warp in the rest shape, projected on each triangle. Default [1, 0, 0].
     #[serde(default = "first_axis", deserialize_with = "finite_triple")]
@@ -37,7 +39,7 @@ fn first_axis() -> [f64; 3] {
 }
 
 /// Strain limiting of triangles: A k/3 (o_u³ + o_v³), o the stretch of warp and weft beyond the limit.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StrainLimit {
     /// The stretch beyond which it acts, over the length at rest; above 1.
@@ -50,7 +52,7 @@ pub struct StrainLimit {
 
 /// Damping in proportion to stiffness (Rayleigh), by forces that take no part in rigid motions. Needs the integrator `implicit-euler` or an
 /// explicit one.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rayleigh {
     /// β of the membrane, in s. Its viscosities are β λ and β μ. Default 0.
@@ -62,7 +64,7 @@ pub struct Rayleigh {
 }
 
 /// What resists stretching and bending.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Material {
     /// Springs between vertices.
@@ -81,10 +83,12 @@ pub enum Material {
     BaraffWitkin(BaraffWitkin),
     /// Woven St. Venant–Kirchhoff triangles from what strips along warp, weft and the bias show in a tensile test.
     OrthotropicStvk(Woven),
+    /// Elements declared in a `.energy` file of the user's own.
+    File(Declared),
 }
 
 /// As-rigid-as-possible triangles.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arap {
     /// μ, in N/m: the tension per width over the strain of a narrow strip.
@@ -97,7 +101,7 @@ pub struct Arap {
 
 /// A (½ K_s ((‖w_u‖ − b_u)² + (‖w_v‖ − b_v)²) + ½ K_h (w_u·w_v)²), w_u and w_v what became of unit vectors along warp and weft. The source's
 /// condition functions carry the area A, so that its constants are these over A.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BaraffWitkin {
     /// K_s, in N/m.
@@ -119,7 +123,7 @@ fn ones() -> [f64; 2] {
 }
 
 /// Woven cloth by its strips: the tension per width over the strain, in N/m, for small strains.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Woven {
     /// Of a strip along the warp, in N/m.
@@ -141,7 +145,7 @@ pub struct Woven {
 
 /// Springs of rest length L = ‖x̄_P − x̄_Q‖ with energy ½ K (‖x_P − x_Q‖ − L)². Their stiffness is per spring: it does not
 /// scale with the mesh. A zero leaves the springs out.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MassSpring {
     /// K of the springs along warp and weft, in N/m.
@@ -159,7 +163,7 @@ pub struct MassSpring {
 }
 
 /// Triangles in plane stress, μ = Y h/(2(1+ν)), λ = Y h ν/(1−ν²), with hinges between them.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Membrane {
     /// Young's modulus times thickness Y h, in N/m.
@@ -188,7 +192,7 @@ impl Membrane {
 }
 
 /// What resists bending at the hinge of two triangles with shared edge E and normals N₁, N₂ (twice their areas).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Bending {
     /// Nothing.

@@ -1,13 +1,16 @@
 //! What a cloth is made of: which declared elements act on which vertices, with what parameters.
 
+mod declared;
 mod description;
+mod interpreted_term;
 mod library;
 pub mod plate;
 mod terms;
 
+pub use declared::{Declared, DeclaredError};
 pub use description::{
     Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Rayleigh, StrainLimit, Woven,
 };
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
-pub use terms::{FabricError, Garment, Surroundings, terms};
+pub use terms::{FabricError, Garment, Place, Surroundings, terms, terms_at};

@@ -1,4 +1,4 @@
-use energy_dsl::{ForceLaw, PackedPotential, RestError, Vector3};
+use energy_dsl::{Element, ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, BridsonForce, BridsonForceDamped,
     FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
@@ -6,6 +6,8 @@ use energy_elements::{
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
+use super::declared::{Declared, DeclaredError, Ground};
+use super::interpreted_term::InterpretedTerm;
 use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::mesh::{
@@ -41,6 +43,9 @@ pub enum FabricError {
     /// The directions of the threads.
     #[error(transparent)]
     Threads(#[from] ThreadError),
+    /// Elements of a file.
+    #[error(transparent)]
+    Declared(#[from] DeclaredError),
     /// A limit that is met at rest.
     #[error("strain_limit.stretch must be above 1, the length at rest; it is {stretch}")]
     Limit {
@@ -61,6 +66,15 @@ pub struct Surroundings {
     pub drag: f64,
 }
 
+/// Where a mesh stands among others.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The number of its first vertex.
+    pub first: usize,
+    /// What its terms' names start with.
+    pub prefix: String,
+}
+
 /// The terms of a fabric on a mesh.
 #[derive(Debug)]
 pub struct Garment {
@@ -70,6 +84,9 @@ pub struct Garment {
     pub terms: Vec<Box<dyn Term>>,
     /// What was left out because its stiffness is zero, or there is nothing for it to act on.
     pub left_out: Vec<String>,
+    /// What should be known about it.
+    pub warnings: Vec<String>,
+    place: Place,
 }
 
 /// Lays a fabric on a mesh. `springs` is used by mass–spring fabrics only.
@@ -82,8 +99,22 @@ pub fn terms(
     springs: &SpringNetwork,
     surroundings: &Surroundings,
 ) -> Result<Garment, FabricError> {
+    terms_at(fabric, mesh, springs, surroundings, Place::default())
+}
+
+/// Lays a fabric on a mesh that is one of several.
+///
+/// # Errors
+/// When an element refuses its rest shape.
+pub fn terms_at(
+    fabric: &Fabric,
+    mesh: &TriangleMesh,
+    springs: &SpringNetwork,
+    surroundings: &Surroundings,
+    place: Place,
+) -> Result<Garment, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
-    let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new() };
+    let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place };
     let cloth = Laid { mesh, triangles: laid(mesh, fabric)?, warp: fabric.warp };
     // λ and μ of small strains, for damping.
     let (stiffness, bending) = match &fabric.material {
@@ -132,6 +163,10 @@ pub fn terms(
             })?;
             ((c_uv, c_ss), Some(&material.bending))
         }
+        Material::File(declared) => {
+            garment.add_declared(declared, &cloth, fabric.density)?;
+            ((0.0, 0.0), Some(&declared.bending))
+        }
     };
     if let Some(limit) = &fabric.strain_limit {
         garment.add_strain_limit(limit, &cloth)?;
@@ -155,7 +190,7 @@ struct Laid<'a> {
 
 /// Every triangle in the plane: along warp and weft, where that matters.
 fn laid(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, ThreadError> {
-    let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_));
+    let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::File(_));
     let all = 0..mesh.triangles().len();
     if !woven && fabric.strain_limit.is_none() {
         return Ok(all.map(|triangle| material_triangle(mesh.corners(triangle))).collect());
@@ -164,7 +199,7 @@ fn laid(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, T
     all.map(|triangle| thread_triangle(mesh.corners(triangle), warp).ok_or(ThreadError { triangle, warp })).collect()
 }
 
-fn area([a, b, c]: MaterialTriangle) -> f64 {
+pub(super) fn area([a, b, c]: MaterialTriangle) -> f64 {
     0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 }
 
@@ -215,7 +250,7 @@ impl Garment {
                 self.add_potential(name, pairs, lengths.map(|length| HookeSpring::new(stiffness, length)).collect())?;
             } else {
                 let damped = lengths.map(|length| Spring::new(length, stiffness, damping)).collect();
-                let list = ElementList::new(name, damped, pairs)?;
+                let list = self.list(name, damped, pairs)?;
                 self.terms.push(Box::new(ForceTerm::new(list).with_energy()));
             }
         }
@@ -251,6 +286,18 @@ impl Garment {
     {
         self.add_membrane("membrane", mu == 0.0, cloth, |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
         Ok((lambda, mu))
+    }
+
+    fn add_declared(&mut self, declared: &Declared, cloth: &Laid<'_>, density: f64) -> Result<(), FabricError> {
+        let Place { first, prefix } = &self.place;
+        let (mesh, triangles) = (cloth.mesh, cloth.triangles.as_slice());
+        let terms = declared.terms(&Ground { mesh, triangles, density, first: *first, prefix })?;
+        let slow = |term: &InterpretedTerm| {
+            format!("{} is interpreted, ten to a hundred times slower than an element that is built in", term.name())
+        };
+        self.warnings.extend(terms.iter().map(slow));
+        self.terms.extend(terms.into_iter().map(|term| -> Box<dyn Term> { Box::new(term) }));
+        Ok(())
     }
 
     fn add_strain_limit(&mut self, limit: &StrainLimit, cloth: &Laid<'_>) -> Result<(), FabricError> {
@@ -290,9 +337,9 @@ impl Garment {
         let mesh = cloth.mesh;
         if let Bending::Plate(rigidity) = bending {
             let is_zero = rigidity_along_grid(bending)? == 0.0;
-            let plate = PlateTerm::new("bending", mesh, rigidity, cloth.warp)?;
+            let plate = PlateTerm::new(format!("{}bending", self.place.prefix), mesh, rigidity, cloth.warp)?;
             if !self.leave_out("bending", is_zero, plate.triangles()) {
-                self.terms.push(Box::new(plate));
+                self.terms.push(Box::new(plate.on_vertices_from(self.place.first)));
             }
             return Ok(());
         }
@@ -356,7 +403,7 @@ impl Garment {
     where
         E: PackedPotential<f64> + std::fmt::Debug + 'static,
     {
-        self.terms.push(Box::new(PotentialTerm::new(ElementList::new(name, elements, stencils)?)));
+        self.terms.push(Box::new(PotentialTerm::new(self.list(name, elements, stencils)?)));
         Ok(())
     }
 
@@ -369,15 +416,27 @@ impl Garment {
     where
         E: ForceLaw<f64> + std::fmt::Debug + 'static,
     {
-        self.terms.push(Box::new(ForceTerm::new(ElementList::new(name, elements, stencils)?)));
+        self.terms.push(Box::new(ForceTerm::new(self.list(name, elements, stencils)?)));
         Ok(())
+    }
+
+    /// A list of elements on vertices of the mesh.
+    fn list<E: Element, const N: usize>(
+        &self,
+        name: &str,
+        elements: Vec<E>,
+        stencils: &[[usize; N]],
+    ) -> Result<ElementList<E>, ListError> {
+        let Place { first, prefix } = &self.place;
+        let stencils: Vec<[usize; N]> = stencils.iter().map(|stencil| stencil.map(|vertex| first + vertex)).collect();
+        ElementList::new(format!("{prefix}{name}"), elements, &stencils)
     }
 
     /// Whether a term acts on nothing or with nothing; notes it if so.
     fn leave_out(&mut self, name: &str, is_zero: bool, elements: usize) -> bool {
         match (is_zero, elements) {
-            (true, _) => self.left_out.push(format!("{name}: zero")),
-            (false, 0) => self.left_out.push(format!("{name}: nothing to act on")),
+            (true, _) => self.left_out.push(format!("{}{name}: zero", self.place.prefix)),
+            (false, 0) => self.left_out.push(format!("{}{name}: nothing to act on", self.place.prefix)),
             (false, _) => return false,
         }
         true

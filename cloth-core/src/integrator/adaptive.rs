@@ -1,7 +1,7 @@
 use energy_solve::EvaluationError;
 
 use super::substep::Substep;
-use super::{Integrator, StepError, StepReport};
+use super::{Integrator, IntegratorMemory, StepError, StepReport};
 use crate::body::Body;
 
 /// Another scheme with a step of its own choice: a step that fails is rejected and tried again at half its size; after
@@ -92,6 +92,15 @@ impl Integrator for Adaptive {
             }
         }
         Ok(report)
+    }
+
+    fn memory(&self) -> IntegratorMemory {
+        IntegratorMemory { adaptive: [self.halvings, self.successes], ..self.inner.memory() }
+    }
+
+    fn restore(&mut self, memory: IntegratorMemory) {
+        [self.halvings, self.successes] = memory.adaptive;
+        self.inner.restore(memory);
     }
 
     /// None: it finds its own.

@@ -1,8 +1,11 @@
 use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
+use serde::{Deserialize, Serialize};
 
 use super::substep::{Substep, start_from};
-use super::{ImplicitMidpoint, Integrator, Newton, NewtonOptions, StepError, StepReport};
+use super::{
+    ImplicitMidpoint, Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities,
+};
 use crate::body::Body;
 
 /// The backward differentiation formula of two steps (Curtiss and Hirschfelder 1952): with y = (x, v) and y₋ that of the step before,
@@ -20,11 +23,19 @@ pub struct Bdf2 {
 }
 
 /// The last step.
-#[derive(Clone, Debug)]
-struct History {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct History {
     dt: f64,
     before: Substep,
     after: Substep,
+}
+
+impl History {
+    /// Whether the free vertices are where they were after that step.
+    fn leads_to(&self, body: &Body) -> bool {
+        let same = |&vertex: &usize| self.after.x[vertex] == body.x[vertex] && self.after.v[vertex] == body.v[vertex];
+        body.system.dofs().free().iter().all(same)
+    }
 }
 
 impl Default for Bdf2 {
@@ -49,17 +60,30 @@ impl Integrator for Bdf2 {
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
         let here = Substep::of(body);
         let report = match self.history.take() {
-            Some(history) if history.dt == dt && history.after == here => {
-                let from = Substep {
+            Some(history) if history.dt == dt && history.leads_to(body) => {
+                let mut from = Substep {
                     x: extrapolated(&here.x, &history.before.x),
                     v: extrapolated(&here.v, &history.before.v),
                 };
+                // Those that are pinned go as they are told: two thirds of the step are yet to come.
+                let third = moved_by_velocities(body, dt / 3.0);
+                for vertex in (0..third.len()).filter(|&vertex| body.system.dofs().place(vertex).is_none()) {
+                    (from.x[vertex], from.v[vertex]) = (third[vertex], here.v[vertex]);
+                }
                 start_from(body, &here, &from, &mut self.newton, 2.0 / 3.0 * dt)?
             }
             _ => self.first.step(body, dt)?,
         };
         self.history = Some(History { dt, before: here, after: Substep::of(body) });
         Ok(report)
+    }
+
+    fn memory(&self) -> IntegratorMemory {
+        IntegratorMemory { last_step: self.history.clone(), ..IntegratorMemory::default() }
+    }
+
+    fn restore(&mut self, memory: IntegratorMemory) {
+        self.history = memory.last_step;
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

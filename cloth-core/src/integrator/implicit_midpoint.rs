@@ -36,7 +36,7 @@ impl Integrator for ImplicitMidpoint {
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
         let start = Substep::of(body);
         let report = start_from(body, &start, &start, &mut self.newton, 0.5 * dt)?;
-        for &vertex in body.system.dofs().free() {
+        for vertex in 0..body.x.len() {
             for axis in 0..3 {
                 body.x[vertex][axis] = 2.0 * body.x[vertex][axis] - start.x[vertex][axis];
                 body.v[vertex][axis] = 2.0 * body.v[vertex][axis] - start.v[vertex][axis];

@@ -12,7 +12,8 @@ mod symplectic_euler;
 mod trapezoid;
 mod verlet;
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use energy_solve::{EvaluationError, StopReason};
 
@@ -35,17 +36,35 @@ pub trait Integrator: std::fmt::Debug {
     /// What it is called in scenes.
     fn name(&self) -> &'static str;
 
-    /// Advances the body by `dt`, in s. On an error the body is left as it was.
+    /// Advances the body by `dt`, in s: free vertices as forces will, pinned ones by `dt` times their velocities. On an error the body is left
+    /// as it was.
     ///
     /// # Errors
     /// When the step cannot be completed with finite numbers.
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError>;
+
+    /// What it remembers of earlier steps, to go on with later.
+    fn memory(&self) -> IntegratorMemory {
+        IntegratorMemory::default()
+    }
+
+    /// Goes on with what another one remembered.
+    fn restore(&mut self, _memory: IntegratorMemory) {}
 
     /// An estimate of the largest stable step, in s, at the body's state; `None` when any step is stable.
     ///
     /// # Errors
     /// When the body's forces are not finite.
     fn stable_step(&self, body: &mut Body) -> Result<Option<f64>, EvaluationError>;
+}
+
+/// What integrators remember of earlier steps beyond what can be had again from the body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct IntegratorMemory {
+    /// Of [`Bdf2`].
+    pub(crate) last_step: Option<bdf2::History>,
+    /// Of [`Adaptive`]: halvings of the step, and successes since the last change.
+    pub(crate) adaptive: [u32; 2],
 }
 
 /// What a step took.
@@ -149,7 +168,7 @@ pub enum StepError {
 }
 
 /// The schemes on offer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// Linearised implicit Euler, one linear solve per step. The default.
@@ -190,16 +209,48 @@ impl Scheme {
     /// The integrator.
     #[must_use]
     pub fn integrator(self) -> Box<dyn Integrator> {
+        self.with_tolerances(Tolerances::default())
+    }
+
+    /// The integrator with other tolerances, where it has some.
+    #[must_use]
+    pub fn with_tolerances(self, tolerances: Tolerances) -> Box<dyn Integrator> {
+        let (first, second) = (tolerances.of(NewtonOptions::default()), tolerances.of(second_order_tolerances()));
         match self {
             Self::ImplicitEuler => Box::new(ImplicitEuler::default()),
-            Self::Newton => Box::new(Newton::default()),
-            Self::Bdf2 => Box::new(Bdf2::default()),
-            Self::ImplicitMidpoint => Box::new(ImplicitMidpoint::default()),
-            Self::Trapezoid => Box::new(Trapezoid::default()),
+            Self::Newton => Box::new(Newton::with_options(first)),
+            Self::Bdf2 => Box::new(Bdf2::with_options(second)),
+            Self::ImplicitMidpoint => Box::new(ImplicitMidpoint::with_options(second)),
+            Self::Trapezoid => Box::new(Trapezoid::with_options(second)),
             Self::SymplecticEuler => Box::new(SymplecticEuler),
             Self::Verlet => Box::new(Verlet::default()),
             Self::ExplicitEuler => Box::new(ExplicitEuler::default()),
             Self::ExplicitEulerAsPrinted => Box::new(ExplicitEuler::as_printed()),
+        }
+    }
+}
+
+/// How exactly Newton's method solves a step. What is not given keeps the integrator's default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Tolerances {
+    /// Done when an iteration changes no velocity by more, in m/s. Default 1e-4 for `newton`, 1e-7 for schemes of second order.
+    #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
+    pub velocity: Option<f64>,
+    /// The residual of each linear system relative to its right-hand side. Default 0.1 for `newton`, 1e-3 for schemes of second order.
+    #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
+    pub linear: Option<f64>,
+    /// A step fails after this many iterations. Default 100.
+    pub iterations: Option<usize>,
+}
+
+impl Tolerances {
+    fn of(self, default: NewtonOptions) -> NewtonOptions {
+        NewtonOptions {
+            velocity_tolerance: self.velocity.unwrap_or(default.velocity_tolerance),
+            linear_tolerance: self.linear.unwrap_or(default.linear_tolerance),
+            iteration_limit: self.iterations.unwrap_or(default.iteration_limit),
+            ..default
         }
     }
 }
@@ -232,9 +283,17 @@ fn place(body: &mut Body, u: &[Vector3<f64>], dt: f64, velocities: &[Vector3<f64
     if let Some(place) = positions.iter().position(|p| p.iter().any(|coordinate| !coordinate.is_finite())) {
         return Err(StepError::NonFinite { vertex: free[place], position: positions[place] });
     }
-    for (place, &vertex) in free.iter().enumerate() {
+    // Those that are pinned go as they are told.
+    body.x = moved_by_velocities(body, dt);
+    for (place, &vertex) in body.system.dofs().free().iter().enumerate() {
         body.x[vertex] = positions[place];
         body.v[vertex] = velocities[place];
     }
     Ok(())
+}
+
+/// x + h v.
+fn moved_by_velocities(body: &Body, dt: f64) -> Vec<Vector3<f64>> {
+    let moved = |(x, v): (&Vector3<f64>, &Vector3<f64>)| std::array::from_fn(|axis| x[axis] + dt * v[axis]);
+    body.x.iter().zip(&body.v).map(moved).collect()
 }

@@ -5,15 +5,16 @@ use energy_solve::{
     BlockMatrix, Curvature, EvaluationError, IncompleteCholesky, LinearisationOptions, RoundedMatrix, SolveOptions,
     State, Term, Weights, conjugate_gradients, dot,
 };
+use serde::{Deserialize, Serialize};
 
-use super::{Integrator, StepError, StepReport};
+use super::{Integrator, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
 /// Implicit Euler by Newton's method on the incremental potential (Gast, Schroeder, Stomakhin, Jiang and Teran 2015)
 ///
-/// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + ½ h P(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
+/// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + h R(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
 ///
-/// P the power that linear damping takes. Each element's Hessian is made positive semi-definite, so that every step of Newton's method
+/// R the dissipation function of damping: half the power that linear damping takes. Each element's Hessian is made positive semi-definite, so that every step of Newton's method
 /// leads downhill; it is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
 ///
 /// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along
@@ -53,7 +54,7 @@ struct Memory {
 }
 
 /// How long the parts of a step took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Phases {
     /// Gradients, Hessians and assembly.
     pub assembly: Duration,
@@ -130,9 +131,9 @@ impl Step<'_> {
         }
         if self.body.system.character().velocity_dependent {
             let v = self.velocities(x);
-            let power = self.body.system.dissipated_power(State { x, v: &v })?;
-            sum += 0.5 * self.dt.powi(3) * power;
-            size += 0.5 * self.dt.powi(3) * power.abs();
+            let dissipation = self.body.system.dissipation(State { x, v: &v })?;
+            sum += self.dt.powi(3) * dissipation;
+            size += self.dt.powi(3) * dissipation.abs();
         }
         self.report.phases.line_search += started.elapsed();
         Ok((sum, size))
@@ -204,17 +205,13 @@ impl Integrator for Newton {
         };
         let free = body.system.dofs().free().to_vec();
         let start = body.x.clone();
-        let mut inertial = start.clone();
-        for &vertex in &free {
-            for axis in 0..3 {
-                inertial[vertex][axis] += dt * body.v[vertex][axis];
-            }
-        }
+        // Pinned vertices end there: they move as they are told.
+        let inertial = moved_by_velocities(body, dt);
         let mut step = Step { body, dt, free, start, inertial, report: StepReport::default() };
         let mut x = step.inertial.clone();
         let mut energy = step.energy(&x)?;
         if !energy.0.is_finite() {
-            x.clone_from(&step.start);
+            step.free.iter().for_each(|&vertex| x[vertex] = step.start[vertex]);
             energy = step.energy(&x)?;
         }
         let (mut converged, mut change) = (false, f64::INFINITY);

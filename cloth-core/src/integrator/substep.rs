@@ -1,13 +1,14 @@
 //! Implicit Euler from another state than the body's: what the midpoint rule, the trapezoidal rule and BDF2 come down to.
 
 use energy_dsl::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::{Integrator, Newton, StepError, StepReport};
 use crate::body::Body;
 
 /// Where implicit Euler starts from.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Substep {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Substep {
     /// X, in m.
     pub x: Vec<Vector3<f64>>,
     /// V, in m/s.

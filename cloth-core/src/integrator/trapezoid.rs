@@ -1,8 +1,7 @@
-use energy_dsl::Vector3;
 use energy_solve::{EvaluationError, State};
 
 use super::substep::{Substep, start_from};
-use super::{Integrator, Newton, NewtonOptions, StepError, StepReport};
+use super::{Integrator, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
 /// The trapezoidal rule, which is Newmark's method of average acceleration (β = ¼, γ = ½; Newmark 1959):
@@ -39,11 +38,10 @@ impl Integrator for Trapezoid {
         let half = 0.5 * dt;
         let before = Substep::of(body);
         let force = body.system.forces(State { x: &body.x, v: &body.v })?;
-        let mut from = before.clone();
+        let mut from = Substep { x: moved_by_velocities(body, half), v: before.v.clone() };
         for &vertex in body.system.dofs().free() {
-            let v: Vector3<f64> = body.v[vertex];
-            from.x[vertex] = std::array::from_fn(|axis| body.x[vertex][axis] + half * v[axis]);
-            from.v[vertex] = std::array::from_fn(|axis| v[axis] + half / body.masses[vertex] * force[vertex][axis]);
+            let kick = half / body.masses[vertex];
+            from.v[vertex] = std::array::from_fn(|axis| body.v[vertex][axis] + kick * force[vertex][axis]);
         }
         start_from(body, &before, &from, &mut self.newton, half)
     }

@@ -1,14 +1,18 @@
 //! Triangle meshes: reading, building, validation and topology.
 
+mod disc;
 mod obj;
 mod rest;
 mod sheet;
+mod strip;
 mod topology;
 mod triangle_mesh;
 
+pub use disc::Disc;
 pub use obj::{ObjError, read_obj};
 pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle};
 pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};
+pub use strip::Strip;
 pub use topology::{Hinge, SpringNetwork, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
 

@@ -1,12 +1,13 @@
 use std::f64::consts::TAU;
 
 use energy_dsl::Vector3;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{MeshError, TriangleMesh};
 
 /// How the cells of a sheet are cut into triangles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Diagonals {
     /// Every diagonal runs along (+, +).
@@ -17,7 +18,7 @@ pub enum Diagonals {
 }
 
 /// How a sheet lies at the start. It is centred on the origin either way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Plane {
     /// In z = 0, the front upwards.
@@ -28,7 +29,7 @@ pub enum Plane {
 }
 
 /// A rectangular sheet, built in.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sheet {
     /// Cells along its two directions.
@@ -50,7 +51,7 @@ pub struct Sheet {
 
 /// Regular folds across the first direction, out of the sheet's plane, at the start. The shape at rest stays flat, and no cell is
 /// stretched: the sheet becomes narrower instead.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pleats {
     /// How many.

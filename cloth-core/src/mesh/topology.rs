@@ -46,6 +46,23 @@ impl Topology {
     }
 }
 
+impl Topology {
+    /// The vertices on the edge of the mesh, ascending.
+    #[must_use]
+    pub fn boundary(&self, mesh: &TriangleMesh) -> Vec<usize> {
+        let mut sides = BTreeMap::new();
+        for &[a, b, c] in mesh.triangles() {
+            for [start, end] in [[a, b], [b, c], [c, a]] {
+                *sides.entry([start.min(end), start.max(end)]).or_insert(0) += 1;
+            }
+        }
+        let mut vertices: Vec<usize> = self.edges.iter().filter(|edge| sides[*edge] == 1).flatten().copied().collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    }
+}
+
 /// A triangle along an edge, which it runs through from the first to the second end.
 struct Side {
     triangle: usize,

@@ -87,6 +87,15 @@ impl TriangleMesh {
         Ok(Self { vertices, triangles })
     }
 
+    /// The same, this many times as large.
+    ///
+    /// # Errors
+    /// When it becomes so large or small that it is no cloth any more.
+    pub fn scaled(self, factor: f64) -> Result<Self, MeshError> {
+        let larger = |vertex: Vector3<f64>| vertex.map(|coordinate| factor * coordinate);
+        Self::new(self.vertices.into_iter().map(larger).collect(), self.triangles)
+    }
+
     /// Rest positions, in m.
     #[must_use]
     pub fn vertices(&self) -> &[Vector3<f64>] {

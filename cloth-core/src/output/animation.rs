@@ -8,6 +8,7 @@ use gltf_json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf_json::validation::{Checked::Valid, USize64};
 use gltf_json::{Accessor, Animation, Buffer, Index, Material, Mesh, Node, Root, Scene};
 
+use super::track::{Joined, Track};
 use super::vertex_normals;
 
 /// An animation that cannot be encoded.
@@ -24,54 +25,57 @@ pub enum AnimationError {
     Json(#[from] gltf_json::Error),
 }
 
-/// The frames as one binary glTF 2.0 file (`.glb`), which common viewers play: the first frame is the mesh, each later one a
-/// morph target, and the animation moves the weight from one to the next. `frame_time` is in s. glTF's y points up: (x, y, z)
-/// becomes (x, z, −y).
+/// An animation as one binary glTF 2.0 file (`.glb`), which common viewers play: of each thing that moves the first frame is the mesh, each later
+/// one a morph target, and the animation moves the weight from one to the next. `frame_time` is in s. glTF's y points up: (x, y, z) becomes
+/// (x, z, −y).
 ///
 /// # Errors
 /// When the file would be too large or its JSON part cannot be written.
-pub fn animation_glb(
-    frames: &[Vec<Vector3<f64>>],
-    triangles: &[[usize; 3]],
-    frame_time: f64,
-) -> Result<Vec<u8>, AnimationError> {
+pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, AnimationError> {
     let mut file = File::default();
-    let indices: Vec<u8> = triangles.iter().flatten().flat_map(|&corner| (corner as u32).to_le_bytes()).collect();
-    let indices = file.accessor(&indices, 3 * triangles.len(), ComponentType::U32, Type::Scalar, None);
-
-    let shapes: Vec<Shape> = frames.iter().map(|frame| Shape::of(frame, triangles)).collect();
-    let Some((rest, later)) = shapes.split_first() else {
-        return file.finish();
-    };
-    let attributes = BTreeMap::from([
-        (Valid(Semantic::Positions), file.vectors(&rest.positions)),
-        (Valid(Semantic::Normals), file.vectors(&rest.normals)),
-    ]);
-    let morph = |file: &mut File, shape: &Shape| MorphTarget {
-        positions: Some(file.vectors(&differences(&shape.positions, &rest.positions))),
-        normals: Some(file.vectors(&differences(&shape.normals, &rest.normals))),
-        tangents: None,
-    };
-    let targets: Vec<MorphTarget> = later.iter().map(|shape| morph(&mut file, shape)).collect();
-    let node = file.cloth(attributes, indices, targets);
-    if !later.is_empty() {
-        file.animate(node, later.len(), frame_time);
+    let mut nodes = Vec::new();
+    let mut moving = Vec::new();
+    for track in tracks {
+        let Some((&rest, later)) = track.frames.split_first() else { continue };
+        let (indices, mode) = file.indices(&track.joined);
+        let triangles = if let Joined::Triangles(triangles) = track.joined { triangles } else { &[] };
+        let first = Shape::of(rest, triangles);
+        let attributes = file.attributes(&first);
+        let targets: Vec<MorphTarget> =
+            later.iter().map(|frame| file.morph(&Shape::of(frame, triangles), &first)).collect();
+        let node = file.thing(track, Parts { attributes, indices, mode, targets });
+        if !later.is_empty() {
+            moving.push((node, later.len()));
+        }
+        nodes.push(node);
+    }
+    let (extensions, extras) = (None, Default::default());
+    file.root.scene = Some(file.root.push(Scene { nodes, name: None, extensions, extras }));
+    if !moving.is_empty() {
+        file.animate(&moving, frame_time);
     }
     file.finish()
 }
 
+/// What a mesh is put together from.
+struct Parts {
+    attributes: BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>>,
+    indices: Index<Accessor>,
+    mode: Mode,
+    targets: Vec<MorphTarget>,
+}
+
 struct Shape {
     positions: Vec<[f32; 3]>,
+    /// Empty where there are no triangles.
     normals: Vec<[f32; 3]>,
 }
 
 impl Shape {
     fn of(frame: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Self {
         let upright = |p: &Vector3<f64>| [p[0] as f32, p[2] as f32, -p[1] as f32];
-        Self {
-            positions: frame.iter().map(upright).collect(),
-            normals: vertex_normals(frame, triangles).iter().map(upright).collect(),
-        }
+        let normals = if triangles.is_empty() { Vec::new() } else { vertex_normals(frame, triangles) };
+        Self { positions: frame.iter().map(upright).collect(), normals: normals.iter().map(upright).collect() }
     }
 }
 
@@ -139,63 +143,83 @@ impl File {
         })
     }
 
-    fn cloth(
-        &mut self,
-        attributes: BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>>,
-        indices: Index<Accessor>,
-        targets: Vec<MorphTarget>,
-    ) -> Index<Node> {
+    fn indices(&mut self, joined: &Joined<'_>) -> (Index<Accessor>, Mode) {
+        let (corners, mode): (Vec<usize>, Mode) = match joined {
+            Joined::Triangles(triangles) => (triangles.as_flattened().to_vec(), Mode::Triangles),
+            Joined::Strands(strands) => {
+                let segments = |strand: &std::ops::Range<usize>| {
+                    (strand.start..strand.end.saturating_sub(1)).flat_map(|at| [at, at + 1])
+                };
+                (strands.iter().flat_map(segments).collect(), Mode::Lines)
+            }
+        };
+        let bytes: Vec<u8> = corners.iter().flat_map(|&corner| (corner as u32).to_le_bytes()).collect();
+        (self.accessor(&bytes, corners.len(), ComponentType::U32, Type::Scalar, None), mode)
+    }
+
+    fn attributes(&mut self, shape: &Shape) -> BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>> {
+        let mut attributes = BTreeMap::from([(Valid(Semantic::Positions), self.vectors(&shape.positions))]);
+        if !shape.normals.is_empty() {
+            attributes.insert(Valid(Semantic::Normals), self.vectors(&shape.normals));
+        }
+        attributes
+    }
+
+    fn morph(&mut self, shape: &Shape, rest: &Shape) -> MorphTarget {
+        let normals = (!rest.normals.is_empty()).then(|| self.vectors(&differences(&shape.normals, &rest.normals)));
+        let positions = Some(self.vectors(&differences(&shape.positions, &rest.positions)));
+        MorphTarget { positions, normals, tangents: None }
+    }
+
+    fn thing(&mut self, track: &Track<'_>, parts: Parts) -> Index<Node> {
+        let [red, green, blue] = track.colour;
         let mut material = Material { double_sided: true, ..Material::default() };
-        material.pbr_metallic_roughness.base_color_factor.0 = [0.16, 0.34, 0.52, 1.0];
+        material.pbr_metallic_roughness.base_color_factor.0 = [red, green, blue, 1.0];
         material.pbr_metallic_roughness.metallic_factor.0 = 0.0;
         material.pbr_metallic_roughness.roughness_factor.0 = 0.85;
         let material = self.root.push(material);
+        let Parts { attributes, indices, mode, targets } = parts;
         let weights = (!targets.is_empty()).then(|| vec![0.0; targets.len()]);
         let mesh = self.root.push(Mesh {
             primitives: vec![Primitive {
                 attributes,
                 indices: Some(indices),
                 material: Some(material),
-                mode: Valid(Mode::Triangles),
+                mode: Valid(mode),
                 targets: (!targets.is_empty()).then_some(targets),
                 extensions: None,
                 extras: Default::default(),
             }],
             weights,
-            name: Some("cloth".into()),
+            name: Some(track.name.to_owned()),
             extensions: None,
             extras: Default::default(),
         });
-        let node = self.root.push(Node { mesh: Some(mesh), name: Some("cloth".into()), ..Node::default() });
-        let scene =
-            self.root.push(Scene { nodes: vec![node], name: None, extensions: None, extras: Default::default() });
-        self.root.scene = Some(scene);
-        node
+        self.root.push(Node { mesh: Some(mesh), name: Some(track.name.to_owned()), ..Node::default() })
     }
 
     /// At frame f the weight of target f − 1 is 1, and of all others 0.
-    fn animate(&mut self, node: Index<Node>, targets: usize, frame_time: f64) {
-        let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 * frame_time) as f32).collect();
-        let weight = |frame: usize, target: usize| if frame == target + 1 { 1.0 } else { 0.0 };
-        let weights: Vec<f32> =
-            (0..=targets).flat_map(|frame| (0..targets).map(move |target| weight(frame, target))).collect();
-        let sampler = Sampler {
-            input: self.scalars(&times),
-            interpolation: Valid(Interpolation::Linear),
-            output: self.scalars(&weights),
-            extensions: None,
-            extras: Default::default(),
-        };
-        let target =
-            Target { node, path: Valid(Property::MorphTargetWeights), extensions: None, extras: Default::default() };
-        let channel = Channel { sampler: Index::new(0), target, extensions: None, extras: Default::default() };
-        self.root.push(Animation {
-            channels: vec![channel],
-            samplers: vec![sampler],
-            name: Some("motion".into()),
-            extensions: None,
-            extras: Default::default(),
-        });
+    fn animate(&mut self, moving: &[(Index<Node>, usize)], frame_time: f64) {
+        let (mut channels, mut samplers) = (Vec::new(), Vec::new());
+        for &(node, targets) in moving {
+            let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 * frame_time) as f32).collect();
+            let weight = |frame: usize, target: usize| if frame == target + 1 { 1.0 } else { 0.0 };
+            let weights: Vec<f32> =
+                (0..=targets).flat_map(|frame| (0..targets).map(move |target| weight(frame, target))).collect();
+            let (extensions, extras) = (None, Default::default());
+            let target = Target { node, path: Valid(Property::MorphTargetWeights), extensions, extras };
+            let sampler = Index::new(u32::try_from(samplers.len()).expect("few things move"));
+            channels.push(Channel { sampler, target, extensions: None, extras: Default::default() });
+            samplers.push(Sampler {
+                input: self.scalars(&times),
+                interpolation: Valid(Interpolation::Linear),
+                output: self.scalars(&weights),
+                extensions: None,
+                extras: Default::default(),
+            });
+        }
+        let name = Some("motion".into());
+        self.root.push(Animation { channels, samplers, name, extensions: None, extras: Default::default() });
     }
 
     /// The two chunks of a `.glb` file behind its header.

@@ -1,12 +1,13 @@
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use energy_dsl::Vector3;
 
 use super::vertex_normals;
 
-/// A frame as OBJ text: vertices in m, to 9 digits, with normals.
+/// A frame as OBJ text: vertices in m, to 9 digits, with normals; strands of hair as lines.
 #[must_use]
-pub fn obj_text(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> String {
+pub fn obj_text(positions: &[Vector3<f64>], triangles: &[[usize; 3]], strands: &[Range<usize>]) -> String {
     let mut text = String::with_capacity(80 * positions.len() + 32 * triangles.len());
     let mut line = |arguments: std::fmt::Arguments<'_>| {
         text.write_fmt(arguments).expect("writing to a string succeeds");
@@ -20,6 +21,10 @@ pub fn obj_text(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> String 
     for corners in triangles {
         let [a, b, c] = corners.map(|corner| corner + 1);
         line(format_args!("f {a}//{a} {b}//{b} {c}//{c}\n"));
+    }
+    for strand in strands {
+        let joints: Vec<String> = strand.clone().map(|vertex| (vertex + 1).to_string()).collect();
+        line(format_args!("l {}\n", joints.join(" ")));
     }
     text
 }

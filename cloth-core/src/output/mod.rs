@@ -1,15 +1,26 @@
-//! Files: OBJ frames, an animated glTF file, a picture.
+//! Files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
 
 mod animation;
 mod folder;
 mod frame;
 mod picture;
+mod ply;
 mod projection;
+mod raster;
+mod show;
+mod solid_mesh;
+mod track;
+mod usd;
 
 pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
 pub use frame::obj_text;
-pub use picture::{PictureError, picture_png};
+pub use picture::{PictureError, View, picture_png};
+pub use ply::ply_bytes;
+pub use show::Show;
+pub use solid_mesh::SolidMesh;
+pub use track::{Joined, Track};
+pub use usd::usd_text;
 
 use energy_dsl::Vector3;
 

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use energy_dsl::Vector3;
 use tiny_skia::{
     Color, FillRule, FilterQuality, GradientStop, LinearGradient, Paint, PathBuilder, Pixmap, PixmapPaint, Point, Rect,
@@ -5,8 +7,16 @@ use tiny_skia::{
 };
 
 use super::projection::Camera;
+use super::raster::{Canvas, Corner};
+use super::solid_mesh::SolidMesh;
 use super::vertex_normals;
 use crate::mesh::{cross, dot, norm, subtract};
+
+/// Of solids and of hair.
+const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
+const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
+/// How wide hair is drawn, in pixels before averaging.
+const STRAND: f64 = 3.0;
 
 /// A picture that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
@@ -16,64 +26,110 @@ pub struct PictureError(String);
 const WIDTH: u32 = 1200;
 const HEIGHT: u32 = 1000;
 /// Drawn this many times larger and averaged: triangles without smoothed edges leave no seams between them.
-const OVERSAMPLING: u32 = 3;
+const OVERSAMPLING: u32 = 2;
 /// From the cloth to the eye and to the lamp.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
 const LAMP: Vector3<f64> = [-0.25, -0.45, 1.0];
 /// Darkest and brightest colour of the front and of the back.
-const FRONT: [[f32; 3]; 2] = [[0.03, 0.10, 0.19], [0.40, 0.66, 0.86]];
-const BACK: [[f32; 3]; 2] = [[0.20, 0.08, 0.05], [0.94, 0.66, 0.46]];
+const FRONT: Colours = [[0.03, 0.10, 0.19], [0.40, 0.66, 0.86]];
+const BACK: Colours = [[0.20, 0.08, 0.05], [0.94, 0.66, 0.46]];
 
-/// A shaded picture of a cloth as PNG: both sides lit, each in its own colour, with its shadow on the floor below. z is up.
+/// What is shown in a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Where the vertices are, in m.
+    pub positions: &'a [Vector3<f64>],
+    /// Cloth.
+    pub triangles: &'a [[usize; 3]],
+    /// Hair, each strand as its vertices.
+    pub strands: &'a [Range<usize>],
+    /// Solids.
+    pub solids: &'a [SolidMesh],
+    /// The height of the floor, in m; a little below everything if there is none.
+    pub floor: Option<f64>,
+    /// Points that are to be in the picture, too, in m: those of other frames.
+    pub framed: &'a [Vector3<f64>],
+}
+
+/// A shaded picture of cloth, hair and solids as PNG: both sides of cloth are lit, each in its own colour, with shadows on the floor below. z is up.
 ///
 /// # Errors
 /// When the picture cannot be encoded.
-pub fn picture_png(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Result<Vec<u8>, PictureError> {
+pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     let [width, height] = [WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING];
-    let mut canvas = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
-    let shadow = shadow_points(positions);
-    let everything: Vec<Vector3<f64>> = positions.iter().chain(&shadow).copied().collect();
-    let camera = Camera::framing(&everything, VIEW, [f64::from(width), f64::from(height)], 0.86);
-    draw_background(&mut canvas);
-    draw_shadow(&mut canvas, &camera, &shadow, triangles);
-    for face in faces(positions, triangles, &camera) {
-        face.draw(&mut canvas);
+    let mut background = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
+    let solids = view.solids.iter().flat_map(|solid| &solid.vertices);
+    let everything: Vec<Vector3<f64>> = view.positions.iter().chain(solids).copied().collect();
+    let shadow = shadow_points(&everything, view.floor);
+    let framed: Vec<Vector3<f64>> = everything.iter().chain(&shadow).chain(view.framed).copied().collect();
+    let camera = Camera::framing(&framed, VIEW, [f64::from(width), f64::from(height)], 0.86);
+    draw_background(&mut background);
+    draw_shadow(&mut background, &camera, &shadow, &all_triangles(view));
+    let mut canvas = Canvas::new(background);
+    for solid in view.solids {
+        draw_surface(&mut canvas, &camera, &solid.vertices, &solid.triangles, &SOLID, &SOLID);
     }
-    let small = averaged(&canvas).ok_or_else(|| PictureError("no memory".into()))?;
+    draw_surface(&mut canvas, &camera, view.positions, view.triangles, &FRONT, &BACK);
+    for strand in view.strands {
+        draw_strand(&mut canvas, &camera, &view.positions[strand.clone()]);
+    }
+    let small = averaged(&canvas.pixels).ok_or_else(|| PictureError("no memory".into()))?;
     small.encode_png().map_err(|error| PictureError(error.to_string()))
 }
 
-/// A triangle as seen: corners in pixels, brightness at each, the colours it lies between.
-struct Face {
-    depth: f64,
-    corners: [[f64; 2]; 3],
-    brightness: [f64; 3],
-    colours: &'static [[f32; 3]; 2],
+/// The triangles of cloth and solids on one numbering of vertices.
+fn all_triangles(view: &View<'_>) -> Vec<[usize; 3]> {
+    let mut all = view.triangles.to_vec();
+    let mut first = view.positions.len();
+    for solid in view.solids {
+        all.extend(solid.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+        first += solid.vertices.len();
+    }
+    all
 }
 
-/// The triangles, the farthest first.
-fn faces(positions: &[Vector3<f64>], triangles: &[[usize; 3]], camera: &Camera) -> Vec<Face> {
+type Colours = [[f32; 3]; 2];
+
+fn draw_surface(
+    canvas: &mut Canvas,
+    camera: &Camera,
+    positions: &[Vector3<f64>],
+    triangles: &[[usize; 3]],
+    front: &Colours,
+    back: &Colours,
+) {
     let normals = vertex_normals(positions, triangles);
     let lamp = LAMP.map(|component| component / norm(LAMP));
-    let face = |corners: &[usize; 3]| {
+    for corners in triangles {
         let [a, b, c] = corners.map(|corner| positions[corner]);
         let is_front = dot(cross(subtract(b, a), subtract(c, a)), camera.towards_eye(a)) >= 0.0;
-        let side = if is_front { 1.0 } else { -1.0 };
-        let brightness = corners.map(|corner| {
+        let (side, colours) = if is_front { (1.0, front) } else { (-1.0, back) };
+        canvas.triangle(corners.map(|corner| {
             let normal = normals[corner].map(|component| side * component);
-            shade(normal, lamp, camera.towards_eye(positions[corner]))
+            let (place, depth) = camera.project(positions[corner]);
+            let brightness = shade(normal, lamp, camera.towards_eye(positions[corner]));
+            Corner { place, depth, colour: mixed(colours, brightness) }
+        }));
+    }
+}
+
+/// Brighter where it lies across the light.
+fn draw_strand(canvas: &mut Canvas, camera: &Camera, points: &[Vector3<f64>]) {
+    let lamp = LAMP.map(|component| component / norm(LAMP));
+    for pair in points.windows(2) {
+        let way = subtract(pair[1], pair[0]);
+        let along = dot(way, lamp) / norm(way).max(f64::MIN_POSITIVE);
+        let colour = mixed(&HAIR, 0.15 + 0.85 * (1.0 - along * along).max(0.0).sqrt());
+        let [from, to] = [pair[0], pair[1]].map(|point| {
+            let (place, depth) = camera.project(point);
+            Corner { place, depth, colour }
         });
-        let seen = corners.map(|corner| camera.project(positions[corner]));
-        Face {
-            depth: seen.iter().map(|(_, depth)| depth).sum(),
-            corners: seen.map(|(image, _)| image),
-            brightness,
-            colours: if is_front { &FRONT } else { &BACK },
-        }
-    };
-    let mut faces: Vec<Face> = triangles.iter().map(face).collect();
-    faces.sort_by(|a, b| b.depth.total_cmp(&a.depth));
-    faces
+        canvas.line(from, to, STRAND);
+    }
+}
+
+fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {
+    std::array::from_fn(|channel| dark[channel] + brightness as f32 * (bright[channel] - dark[channel]))
 }
 
 /// Lamp, a weaker light from the eye, sky, and a sheen where the cloth turns away.
@@ -82,43 +138,6 @@ fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>) -> f64 {
     let sheen = 0.16 * (1.0 - facing).powi(3);
     let sky = 0.12 * (0.5 + 0.5 * normal[2]);
     (0.06 + 0.72 * dot(normal, lamp).max(0.0) + 0.22 * facing * facing + sky + sheen).min(1.0)
-}
-
-impl Face {
-    fn draw(&self, canvas: &mut Pixmap) {
-        let Some(path) = polygon(&self.corners) else { return };
-        let paint = Paint { shader: self.shader(), anti_alias: false, ..Paint::default() };
-        canvas.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
-    }
-
-    /// Brightness is linear over a triangle, which is what a linear gradient along its slope paints.
-    fn shader(&self) -> Shader<'static> {
-        let [p, q, r] = self.corners;
-        let [i, j, k] = self.brightness;
-        let (u, v) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
-        let area = u[0] * v[1] - u[1] * v[0];
-        let slope = [((j - i) * v[1] - (k - i) * u[1]) / area, ((k - i) * u[0] - (j - i) * v[0]) / area];
-        let steepness = slope[0] * slope[0] + slope[1] * slope[1];
-        let (low, high) = (i.min(j).min(k), i.max(j).max(k));
-        let at = |brightness: f64| {
-            let way = (brightness - i) / steepness;
-            point([p[0] + way * slope[0], p[1] + way * slope[1]])
-        };
-        let stops = || vec![GradientStop::new(0.0, self.colour(low)), GradientStop::new(1.0, self.colour(high))];
-        let gradient = (high - low > 1e-4 && steepness.is_finite() && steepness > 0.0)
-            .then(|| LinearGradient::new(at(low), at(high), stops(), SpreadMode::Pad, Transform::identity()))
-            .flatten();
-        gradient.unwrap_or_else(|| Shader::SolidColor(self.colour((i + j + k) / 3.0)))
-    }
-
-    fn colour(&self, brightness: f64) -> Color {
-        let [dark, bright] = self.colours;
-        let mix = |channel: usize| {
-            let amount = brightness as f32;
-            (dark[channel] + amount * (bright[channel] - dark[channel])).clamp(0.0, 1.0)
-        };
-        Color::from_rgba(mix(0), mix(1), mix(2), 1.0).unwrap_or(Color::BLACK)
-    }
 }
 
 fn draw_background(canvas: &mut Pixmap) {
@@ -138,11 +157,11 @@ fn draw_background(canvas: &mut Pixmap) {
     }
 }
 
-/// The points' shadows on a floor a little below the lowest.
-fn shadow_points(positions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+/// The points' shadows on the floor.
+fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<f64>> {
     let range = |pick: fn(f64, f64) -> f64, start| positions.iter().map(|p| p[2]).fold(start, pick);
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
-    let floor = low - 0.08 * (high - low);
+    let floor = floor.unwrap_or(low - 0.08 * (high - low));
     let cast = |p: &Vector3<f64>| {
         let way = (p[2] - floor) / LAMP[2];
         [p[0] - way * LAMP[0], p[1] - way * LAMP[1], floor]
@@ -152,7 +171,7 @@ fn shadow_points(positions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 
 /// Drawn small and enlarged, which makes it soft.
 fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], triangles: &[[usize; 3]]) {
-    const COARSENESS: u32 = 30;
+    const COARSENESS: u32 = 20;
     let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
     let mut outline = PathBuilder::new();
     for corners in triangles {
@@ -169,27 +188,17 @@ fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], tr
     let paint = Paint { shader: Shader::SolidColor(ink), ..Paint::default() };
     let shrink = 1.0 / COARSENESS as f32;
     small.fill_path(&path, &paint, FillRule::Winding, Transform::from_scale(shrink, shrink), None);
-    let soft = PixmapPaint { quality: FilterQuality::Bicubic, ..PixmapPaint::default() };
+    let soft = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
     let enlarge = Transform::from_scale(COARSENESS as f32, COARSENESS as f32);
     canvas.draw_pixmap(0, 0, small.as_ref(), &soft, enlarge, None);
 }
 
-fn polygon(corners: &[[f64; 2]]) -> Option<tiny_skia::Path> {
-    let mut path = PathBuilder::new();
-    append_polygon(&mut path, corners);
-    path.finish()
-}
-
 fn append_polygon(path: &mut PathBuilder, corners: &[[f64; 2]]) {
     for (index, corner) in corners.iter().enumerate() {
-        let Point { x, y } = point(*corner);
+        let [x, y] = corner.map(|coordinate| coordinate as f32);
         if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
     }
     path.close();
-}
-
-fn point([x, y]: [f64; 2]) -> Point {
-    Point::from_xy(x as f32, y as f32)
 }
 
 /// The picture at its final size, each pixel the mean of those drawn for it.

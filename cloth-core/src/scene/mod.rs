@@ -1,95 +1,74 @@
 //! Scene files: what to simulate, in TOML. Every key is a field below, with its unit; unknown keys are refused.
 
 mod error;
+mod fabric_choice;
+mod file;
+mod garment;
+mod hair;
 pub(crate) mod numbers;
+mod obstacle;
+mod output;
+mod own_material;
+mod parts;
 mod pins;
+mod schema;
+mod seam;
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 pub use error::SceneError;
-pub use pins::{Pin, PinError, pinned_vertices};
+pub use garment::{Garment, Mesh, MeshSourceError, Placement, Shape, Turn};
+pub use hair::Hair;
+pub use obstacle::ObstacleDescription;
+pub use output::OutputChoice;
+pub use own_material::with_material;
+pub use parts::{Model, ModelError, MovingPin, Part, PartKind, UnknownPart};
+pub use pins::{Pin, PinBox, PinChoice, PinError};
+pub use schema::schema;
+pub use seam::{Seam, SeamError};
 
-use crate::fabric::Fabric;
-use crate::integrator::{Adaptive, Integrator, Scheme};
-use crate::mesh::{MeshError, ObjError, PleatsError, Sheet, SpringNetwork, Topology, TriangleMesh, read_obj};
-use numbers::{finite_triple, non_negative, positive};
+use crate::fabric::Material;
+use crate::integrator::{Adaptive, Integrator, Scheme, Tolerances};
+use crate::wind::Wind;
 
 /// A scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "file::File")]
 pub struct Scene {
-    /// The cloth's shape: the table `sheet` or `obj`.
-    pub mesh: Mesh,
-    /// What it is made of.
-    pub fabric: Fabric,
-    /// Vertices that never move. Default none.
-    #[serde(default)]
+    /// Pieces of cloth.
+    pub garments: Vec<Garment>,
+    /// Strands of hair.
+    pub hair: Vec<Hair>,
+    /// Stitches between garments.
+    pub seams: Vec<Seam>,
+    /// Vertices that do not move, or move as they are told.
     pub pins: Vec<Pin>,
-    /// Acceleration of gravity, in m/s². Default [0, 0, −9.81].
-    #[serde(default = "standard_gravity", deserialize_with = "finite_triple")]
+    /// Solids that keep cloth out.
+    pub obstacles: Vec<ObstacleDescription>,
+    /// Wind.
+    pub wind: Option<Wind>,
+    /// Acceleration of gravity, in m/s².
     pub gravity: [f64; 3],
-    /// Drag per mass, in 1/s: the force −drag m v on every vertex. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    /// Drag per mass, in 1/s: the force −drag m v on every vertex.
     pub drag: f64,
-    /// `implicit-euler` (the default), `newton`, `bdf2`, `implicit-midpoint`, `trapezoid`, `symplectic-euler`, `verlet`, `explicit-euler` or
-    /// `explicit-euler-as-printed`.
-    #[serde(default)]
+    /// How time advances.
     pub integrator: Scheme,
-    /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`]. Default false.
-    #[serde(default)]
+    /// How exactly Newton's method solves a step.
+    pub tolerances: Tolerances,
+    /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`].
     pub adaptive: bool,
     /// Time step h, in s.
-    #[serde(deserialize_with = "positive")]
     pub dt: f64,
     /// Time to simulate, in s; rounded to whole steps.
-    #[serde(deserialize_with = "non_negative")]
     pub duration: f64,
-    /// Frames written per simulated second, rounded to whole steps per frame. Default 25.
-    #[serde(default = "frame_rate", deserialize_with = "positive")]
+    /// Frames written per simulated second, rounded to whole steps per frame.
     pub frames_per_second: f64,
+    /// Which files are written.
+    pub output: OutputChoice,
     /// The folder that relative paths start from: that of the scene file.
-    #[serde(skip)]
     pub folder: PathBuf,
-}
-
-/// The cloth's shape at rest and at the start.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Mesh {
-    /// The built-in sheet.
-    Sheet(Sheet),
-    /// An OBJ file, with lengths in m.
-    Obj {
-        /// Its path, from the scene file's folder.
-        path: PathBuf,
-    },
-}
-
-/// A mesh that cannot be had.
-#[derive(Debug, thiserror::Error)]
-pub enum MeshSourceError {
-    /// The OBJ file.
-    #[error(transparent)]
-    Obj(#[from] ObjError),
-    /// The sheet.
-    #[error("mesh.sheet: {0}")]
-    Sheet(#[from] MeshError),
-    /// Its folds.
-    #[error("mesh.sheet.pleats: {0}")]
-    Pleats(#[from] PleatsError),
-}
-
-/// The shape of a cloth.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shape {
-    /// At rest.
-    pub mesh: TriangleMesh,
-    /// The vertices at the start, in m.
-    pub start: Vec<[f64; 3]>,
-    /// The pairs of vertices that springs would join.
-    pub springs: SpringNetwork,
 }
 
 impl Scene {
@@ -98,9 +77,15 @@ impl Scene {
     /// # Errors
     /// When the file cannot be read or a key is unknown, missing or has an impossible value.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
-        Self::parse(&text, path)
+        Self::parse(&Self::text(path)?, path)
+    }
+
+    /// The text of a scene file.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn text(path: &Path) -> Result<String, SceneError> {
+        std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
     }
 
     /// Reads a scene from text. The path is for messages, and its folder is where relative paths start.
@@ -110,30 +95,18 @@ impl Scene {
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::invalid(path, text, &error))?;
         scene.folder = path.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(scene)
-    }
-
-    /// The cloth's shape.
-    ///
-    /// # Errors
-    /// When the file cannot be read or the mesh is unfit.
-    pub fn shape(&self) -> Result<Shape, MeshSourceError> {
-        match &self.mesh {
-            Mesh::Sheet(sheet) => {
-                Ok(Shape { mesh: sheet.mesh()?, start: sheet.start()?, springs: SpringNetwork::of_sheet(sheet) })
-            }
-            Mesh::Obj { path } => {
-                let mesh = read_obj(&self.folder.join(path))?;
-                let springs = SpringNetwork::of_mesh(&Topology::of(&mesh));
-                Ok(Shape { start: mesh.vertices().to_vec(), mesh, springs })
+        for garment in &mut scene.garments {
+            if let Material::File(declared) = &mut garment.fabric.material {
+                declared.seek_in(&scene.folder);
             }
         }
+        Ok(scene)
     }
 
     /// The integrator.
     #[must_use]
     pub fn stepper(&self) -> Box<dyn Integrator> {
-        let scheme = self.integrator.integrator();
+        let scheme = self.integrator.with_tolerances(self.tolerances);
         if self.adaptive { Box::new(Adaptive::new(scheme)) } else { scheme }
     }
 
@@ -148,12 +121,4 @@ impl Scene {
     pub fn steps_per_frame(&self) -> u64 {
         ((1.0 / (self.frames_per_second * self.dt)).round() as u64).max(1)
     }
-}
-
-fn standard_gravity() -> [f64; 3] {
-    [0.0, 0.0, -9.81]
-}
-
-fn frame_rate() -> f64 {
-    25.0
 }

@@ -15,8 +15,47 @@ pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64
     checked(deserializer, |number| number.is_finite() && number > 0.0, "a finite number above 0")
 }
 
+pub(crate) fn some_positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    positive(deserializer).map(Some)
+}
+
 pub(crate) fn non_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |number| number.is_finite() && number >= 0.0, "a finite number, 0 or above")
+}
+
+pub(crate) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, f64::is_finite, "a finite number")
+}
+
+pub(crate) fn nonzero_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+    let numbers = finite_triple(deserializer)?;
+    // Its square must be a number above 0, too.
+    let square: f64 = numbers.iter().map(|number| number * number).sum();
+    if square.is_normal() {
+        Ok(numbers)
+    } else {
+        Err(D::Error::custom(format!("{numbers:?} must be a direction: not all zero, nor beyond 1e±150")))
+    }
+}
+
+pub(crate) fn positive_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+    let numbers = <[f64; 3]>::deserialize(deserializer)?;
+    if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
+        Ok(numbers)
+    } else {
+        Err(D::Error::custom(format!("{numbers:?} must hold finite numbers above 0 only")))
+    }
+}
+
+/// A number of parts, at least `LEAST` and not absurd.
+pub(crate) fn count<'de, const LEAST: usize, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    const MOST: usize = 4096;
+    let count = usize::deserialize(deserializer)?;
+    if (LEAST..=MOST).contains(&count) {
+        Ok(count)
+    } else {
+        Err(D::Error::custom(format!("{count} must be between {LEAST} and {MOST}")))
+    }
 }
 
 pub(crate) fn poisson_ratio<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {

@@ -7,7 +7,7 @@ use crate::vector::transposed;
 /// Changes the eigenvalues of the symmetric matrix whose triangle of blocks is given: the way of elements with more coordinates
 /// than lanes are used for, and the measure of all others. Returns whether there was a change; a matrix that is not finite
 /// stays as it is.
-pub(crate) fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {
+pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {
     if !triangle.iter().flatten().flatten().all(|entry| entry.is_finite()) {
         return false;
     }

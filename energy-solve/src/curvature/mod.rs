@@ -13,7 +13,7 @@ mod radial;
 use energy_dsl::{Kernel, Lane, Level, LevelName, Mask, dispatch_at};
 
 pub(crate) use definite::is_semi_definite;
-pub(crate) use dense::change_dense;
+pub use dense::change_dense;
 pub(crate) use orthonormal::Orthonormal;
 
 /// What becomes of negative eigenvalues of the elements' Hessians. Force laws have no Hessian and are used as they are.

@@ -1,9 +1,10 @@
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::scene::numbers::{non_negative, poisson_ratio, positive};
 
 /// How stiff a plate is against bending.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Rigidity {
     /// Alike in all directions: D = E h³/(12 (1 − ν²)).

@@ -108,6 +108,15 @@ impl PlateTerm {
         })
     }
 
+    /// The same on the vertices from `first` on, where the mesh is one of several.
+    #[must_use]
+    pub fn on_vertices_from(mut self, first: usize) -> Self {
+        self.hinges.iter_mut().flatten().for_each(|vertex| *vertex += first);
+        self.patches.iter_mut().flat_map(|patch| &mut patch.vertices).for_each(|vertex| *vertex += first);
+        self.stencils.iter_mut().for_each(|vertex| *vertex += first);
+        self
+    }
+
     /// The number of triangles that resist bending.
     #[must_use]
     pub fn triangles(&self) -> usize {

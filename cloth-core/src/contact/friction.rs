@@ -1,0 +1,39 @@
+use energy_dsl::Vector3;
+use energy_elements::SlidingFriction;
+use energy_solve::StepStart;
+
+use super::solid::Solid;
+use super::term::{surface_velocity, touches};
+use crate::dissipation_term::DissipationLaw;
+use crate::motion::Motion;
+
+/// Coulomb's friction on one solid, by [`SlidingFriction`]. Normals and normal forces are those at the start of a step, so that the friction of a
+/// step has a potential (lagged, as in Li et al. 2020, §5.5).
+#[derive(Debug)]
+pub(super) struct FrictionLaw<S> {
+    pub solid: S,
+    pub motion: Option<Motion>,
+    pub thickness: f64,
+    /// k of each vertex, in N/m.
+    pub stiffness: Vec<f64>,
+    /// μ.
+    pub coefficient: f64,
+    /// The sliding, in m/s, at which friction is μ/√2 times the normal force.
+    pub sticking: f64,
+}
+
+impl<S: Solid> DissipationLaw for FrictionLaw<S> {
+    type Element = SlidingFriction;
+
+    fn elements(&self, start: &StepStart<'_>) -> Vec<(usize, SlidingFriction)> {
+        let x = start.state.x;
+        let now = self.motion.as_ref().map_or(self.solid, |motion| self.solid.moved(&motion.pose(start.time)));
+        let step = [start.time, start.time + start.dt];
+        let element = |vertex: usize, normal: Vector3<f64>, force: f64| {
+            let carried = surface_velocity(self.motion.as_ref(), step, x[vertex], false);
+            SlidingFriction::new(normal, carried, self.coefficient * force, self.sticking)
+        };
+        let touches = touches(&now, self.thickness, &self.stiffness, x);
+        touches.iter().map(|touch| (touch.vertex, element(touch.vertex, touch.normal, touch.force))).collect()
+    }
+}

@@ -1,0 +1,138 @@
+//! Contact with solids: a potential of the signed distance within a thickness, and friction.
+//!
+//! Each shape has a declared element of its own, on its exact signed distance, rather than all one on the plane through the closest point: so a
+//! contact's energy is a function of the position alone, Newton's line search and the balance of energy see the same function as its forces, and
+//! the curvature of the surface is in the Hessian. Vertices touch, not the triangles between them; cloth does not touch cloth.
+
+mod friction;
+mod solid;
+mod term;
+
+use energy_dsl::Vector3;
+use energy_solve::Term;
+
+pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
+
+use crate::dissipation_term::DissipativeTerm;
+use crate::mesh::dot;
+use crate::motion::{Motion, Pose};
+use friction::FrictionLaw;
+use solid::Solid;
+use term::{ContactTerm, Touch, surface_velocity, touches};
+
+/// One of the solids.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnySolid {
+    /// A half-space.
+    HalfSpace(HalfSpace),
+    /// A ball.
+    Ball(Ball),
+    /// A capsule.
+    Capsule(Capsule),
+    /// A box.
+    Box(RoundedBox),
+}
+
+impl AnySolid {
+    /// The solid after a rigid motion.
+    #[must_use]
+    pub fn moved(&self, pose: &Pose) -> Self {
+        match self {
+            Self::HalfSpace(solid) => Self::HalfSpace(solid.moved(pose)),
+            Self::Ball(solid) => Self::Ball(solid.moved(pose)),
+            Self::Capsule(solid) => Self::Capsule(solid.moved(pose)),
+            Self::Box(solid) => Self::Box(solid.moved(pose)),
+        }
+    }
+
+    /// The distance of a point from the surface, in m; negative inside.
+    ///
+    /// ```
+    /// use cloth_core::contact::{AnySolid, Ball};
+    /// let ball = AnySolid::Ball(Ball { centre: [0.0; 3], radius: 2.0 });
+    /// assert_eq!(ball.signed_distance([0.0, 5.0, 0.0]), 3.0);
+    /// ```
+    #[must_use]
+    pub fn signed_distance(&self, x: [f64; 3]) -> f64 {
+        match self {
+            Self::HalfSpace(solid) => solid.signed_distance(x),
+            Self::Ball(solid) => solid.signed_distance(x),
+            Self::Capsule(solid) => solid.signed_distance(x),
+            Self::Box(solid) => solid.signed_distance(x),
+        }
+    }
+}
+
+/// A solid in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Obstacle {
+    /// What it is called.
+    pub name: String,
+    /// Its shape at rest.
+    pub solid: AnySolid,
+    /// How it moves.
+    pub motion: Option<Motion>,
+    /// Cloth is pushed away within this distance, in m.
+    pub thickness: f64,
+    /// k over the mass of a vertex, in 1/s².
+    pub stiffness: f64,
+    /// The coefficient of friction.
+    pub friction: f64,
+    /// The sliding at which friction is 1/√2 of its full size, in m/s.
+    pub sticking: f64,
+}
+
+impl Obstacle {
+    /// The solid at a time, in s.
+    #[must_use]
+    pub fn at(&self, time: f64) -> AnySolid {
+        self.motion.as_ref().map_or(self.solid, |motion| self.solid.moved(&motion.pose(time)))
+    }
+
+    /// The terms of contact and friction with vertices of these masses, in kg.
+    #[must_use]
+    pub fn terms(&self, masses: &[f64]) -> Vec<Box<dyn Term>> {
+        match self.solid {
+            AnySolid::HalfSpace(solid) => self.terms_with(solid, masses),
+            AnySolid::Ball(solid) => self.terms_with(solid, masses),
+            AnySolid::Capsule(solid) => self.terms_with(solid, masses),
+            AnySolid::Box(solid) => self.terms_with(solid, masses),
+        }
+    }
+
+    /// The power of its contact as it moves over a step from one time to another, in W: at the step's start or at its end, with vertices at x.
+    pub(crate) fn power(&self, step: [f64; 2], at_end: bool, masses: &[f64], x: &[Vector3<f64>]) -> f64 {
+        if !self.motion.as_ref().is_some_and(|motion| motion.moves(step[0], step[1])) {
+            return 0.0;
+        }
+        match self.at(step[usize::from(at_end)]) {
+            AnySolid::HalfSpace(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Ball(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Box(solid) => self.power_of(solid, step, at_end, masses, x),
+        }
+    }
+
+    fn power_of(&self, solid: impl Solid, step: [f64; 2], at_end: bool, masses: &[f64], x: &[Vector3<f64>]) -> f64 {
+        let stiffness: Vec<f64> = masses.iter().map(|mass| self.stiffness * mass).collect();
+        let power = |touch: &Touch| {
+            let velocity = surface_velocity(self.motion.as_ref(), step, x[touch.vertex], at_end);
+            touch.force * dot(touch.normal, velocity)
+        };
+        touches(&solid, self.thickness, &stiffness, x).iter().map(power).sum()
+    }
+
+    fn terms_with(&self, solid: impl Solid, masses: &[f64]) -> Vec<Box<dyn Term>> {
+        let stiffness: Vec<f64> = masses.iter().map(|mass| self.stiffness * mass).collect();
+        let (motion, thickness) = (self.motion.clone(), self.thickness);
+        let contact = ContactTerm::new(self.name.clone(), solid, motion.clone(), thickness, stiffness.clone(), 0.0);
+        let mut terms: Vec<Box<dyn Term>> = vec![Box::new(contact)];
+        if self.friction > 0.0 {
+            let (coefficient, sticking) = (self.friction, self.sticking);
+            let law = FrictionLaw { solid, motion, thickness, stiffness, coefficient, sticking };
+            let each: Vec<[usize; 1]> = (0..masses.len()).map(|vertex| [vertex]).collect();
+            terms.push(Box::new(DissipativeTerm::new(format!("{}: friction", self.name), law, &each)));
+        }
+        terms
+    }
+}

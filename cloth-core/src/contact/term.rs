@@ -1,0 +1,191 @@
+use energy_dsl::{Block, Declaration, Element, Potential, Vector3};
+use energy_solve::{
+    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term,
+};
+
+use super::solid::Solid;
+use crate::mesh::{dot, norm};
+use crate::motion::{Motion, Pose};
+
+/// Contact of all vertices with one solid. Only vertices nearer than the thickness are evaluated; the others count as skipped. Each adds
+/// to its own diagonal block only, so that the matrix keeps its pattern whatever touches.
+#[derive(Debug)]
+pub(super) struct ContactTerm<S> {
+    name: String,
+    /// At the start, and now.
+    solid: S,
+    now: S,
+    motion: Option<Motion>,
+    thickness: f64,
+    /// k of each vertex, in N/m.
+    stiffness: Vec<f64>,
+    stencils: Vec<usize>,
+    /// The free vertices and where their diagonal blocks are stored.
+    free: Vec<(usize, usize)>,
+}
+
+impl<S: Solid> ContactTerm<S> {
+    pub(super) fn new(
+        name: String,
+        solid: S,
+        motion: Option<Motion>,
+        thickness: f64,
+        stiffness: Vec<f64>,
+        time: f64,
+    ) -> Self {
+        let stencils = (0..stiffness.len()).collect();
+        let mut term = Self { name, solid, now: solid, motion, thickness, stiffness, stencils, free: Vec::new() };
+        term.move_to(time);
+        term
+    }
+
+    fn move_to(&mut self, time: f64) {
+        if let Some(motion) = &self.motion {
+            self.now = self.solid.moved(&motion.pose(time));
+        }
+    }
+
+    /// The free vertices within reach, with their elements and places.
+    fn near<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (usize, usize, S::Contact)> + 'a {
+        let within = |&(vertex, _): &(usize, usize)| self.now.signed_distance(x[vertex]) < self.thickness;
+        let element =
+            |(vertex, slot): (usize, usize)| (vertex, slot, self.now.contact(self.stiffness[vertex], self.thickness));
+        self.free.iter().copied().filter(within).map(element)
+    }
+
+    fn tally(&self, evaluated: u64, flagged: u64) -> Tally {
+        Tally { evaluated, skipped: self.stencils.len() as u64 - evaluated, flagged, projected: 0 }
+    }
+}
+
+impl<S: Solid> Term for ContactTerm<S> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        <S::Contact as Element>::DECLARATION
+    }
+
+    fn character(&self) -> Character {
+        Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true }
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils { arity: 1, vertices: &self.stencils }
+    }
+
+    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        self.free = dofs.free().iter().enumerate().map(|(row, &vertex)| (vertex, pattern.diagonal(row))).collect();
+    }
+
+    /// The solid is where it will be at the end of the step.
+    fn begin_step(&mut self, start: StepStart<'_>) {
+        self.move_to(start.time + start.dt);
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        let (mut sum, mut evaluated, mut flagged) = (0.0, 0, 0);
+        for (vertex, _, element) in self.near(x) {
+            let result = element.value(&[x[vertex]]);
+            sum += result.value;
+            evaluated += 1;
+            flagged += u64::from(result.flags.any());
+        }
+        Some((sum, self.tally(evaluated, flagged)))
+    }
+
+    fn add_force(&self, State { x, .. }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        let (mut evaluated, mut flagged) = (0, 0);
+        for (vertex, _, element) in self.near(x) {
+            let result = element.gradient(&[x[vertex]]);
+            (0..3).for_each(|axis| force[vertex][axis] -= result.gradient[0][axis]);
+            evaluated += 1;
+            flagged += u64::from(result.flags.any());
+        }
+        self.tally(evaluated, flagged)
+    }
+
+    fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let (mut evaluated, mut flagged, mut projected) = (0, 0, 0);
+        for (vertex, slot, element) in self.near(x) {
+            let result = element.hessian(&[x[vertex]]);
+            let (gradient, mut hessian) = (result.gradient[0], result.hessian.as_ref()[0]);
+            if sum.curvature != Curvature::Exact {
+                hessian = along(gradient, &hessian);
+                projected += 1;
+            }
+            for i in 0..3 {
+                sum.force[vertex][i] -= gradient[i];
+                for j in 0..3 {
+                    sum.matrix[slot][i][j] -= sum.weights.position * hessian[i][j];
+                }
+                if let Some(product) = &mut sum.stiffness_times_velocity {
+                    product[vertex][i] -= dot(hessian[i], v[vertex]);
+                }
+            }
+            evaluated += 1;
+            flagged += u64::from(result.flags.any());
+        }
+        Tally { projected, ..self.tally(evaluated, flagged) }
+    }
+
+    fn find_non_finite(&self, quantity: Quantity, State { x, .. }: State<'_>) -> Option<usize> {
+        let is_finite = |(vertex, _, element): &(usize, usize, S::Contact)| {
+            let result = element.gradient(&[x[*vertex]]);
+            match quantity {
+                Quantity::Energy => result.value.is_finite(),
+                Quantity::Force => result.gradient.as_flattened().iter().all(|number| number.is_finite()),
+            }
+        };
+        self.near(x).find(|near| !is_finite(near)).map(|(vertex, ..)| vertex)
+    }
+}
+
+/// The part of the Hessian along the gradient. The penalty falls as the distance grows and the solids are convex, so that across the gradient,
+/// where their surfaces curve away, no curvature is positive: this is the nearest positive semi-definite matrix.
+fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
+    let size = norm(gradient);
+    if size == 0.0 {
+        return [[0.0; 3]; 3];
+    }
+    let n = gradient.map(|component| component / size);
+    let curvature = dot(n, hessian.map(|row| dot(row, n))).max(0.0);
+    std::array::from_fn(|i| std::array::from_fn(|j| curvature * n[i] * n[j]))
+}
+
+/// What friction needs to know of a contact.
+pub(super) struct Touch {
+    /// The vertex.
+    pub vertex: usize,
+    /// The unit normal out of the solid.
+    pub normal: Vector3<f64>,
+    /// The normal force, in N.
+    pub force: f64,
+}
+
+/// Everything that touches a solid.
+pub(super) fn touches<S: Solid>(solid: &S, thickness: f64, stiffness: &[f64], x: &[Vector3<f64>]) -> Vec<Touch> {
+    let near = (0..x.len()).filter(|&vertex| solid.signed_distance(x[vertex]) < thickness);
+    let touch = |vertex: usize| {
+        let gradient = solid.contact(stiffness[vertex], thickness).gradient(&[x[vertex]]).gradient[0];
+        let force = norm(gradient);
+        (force > 0.0).then(|| Touch { vertex, normal: gradient.map(|component| -component / force), force })
+    };
+    near.filter_map(touch).collect()
+}
+
+/// Where a solid takes a point of it over a step, in m/s: a point where it is at the step's start, or at its end.
+pub(super) fn surface_velocity(motion: Option<&Motion>, step: [f64; 2], x: Vector3<f64>, at_end: bool) -> Vector3<f64> {
+    let [from, to] = step;
+    let Some(motion) = motion.filter(|motion| motion.moves(from, to)) else {
+        return [0.0; 3];
+    };
+    let [before, after]: [Pose; 2] = step.map(|time| motion.pose(time));
+    let [start, end] = if at_end { [before.applied(after.undone(x)), x] } else { [x, after.applied(before.undone(x))] };
+    std::array::from_fn(|axis| (end[axis] - start[axis]) / (to - from))
+}

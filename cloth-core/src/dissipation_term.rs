@@ -1,0 +1,158 @@
+//! Forces that resist velocities in other ways than in proportion, from declared dissipation functions.
+
+use energy_dsl::{Array, Declaration, Element, Potential, Vector3, triangle_index};
+use energy_solve::{
+    Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Storage, Tally, Term,
+};
+
+/// Which elements act over a step: everything but velocities is held as it was at its start.
+pub(crate) trait DissipationLaw: std::fmt::Debug {
+    /// Rayleigh's dissipation function, convex, declared as an energy of the displacements in a unit of time.
+    type Element: Potential<f64> + std::fmt::Debug;
+    /// The elements that act, each with the number of its stencil, ascending.
+    fn elements(&self, start: &StepStart<'_>) -> Vec<(usize, Self::Element)>;
+}
+
+/// The force −∂R/∂v of dissipation functions R.
+#[derive(Debug)]
+pub(crate) struct DissipativeTerm<L: DissipationLaw> {
+    name: String,
+    law: L,
+    stencils: Vec<usize>,
+    arity: usize,
+    /// By stencil, pair of points (i, j), i ≤ j: where their block is stored, that of (j, i) where all are stored.
+    slots: Vec<[usize; 2]>,
+    /// Whether the block of a pair is stored turned.
+    turned: Vec<bool>,
+    is_free: Vec<bool>,
+    acting: Vec<(usize, L::Element)>,
+}
+
+impl<L: DissipationLaw> DissipativeTerm<L> {
+    /// A law on stencils of as many vertices as its element has points. Nothing acts before the first step begins.
+    pub(crate) fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
+        let (stencils, acting) = (stencils.concat(), Vec::new());
+        Self { name, law, stencils, arity: N, slots: Vec::new(), turned: Vec::new(), is_free: Vec::new(), acting }
+    }
+
+    fn stencil(&self, number: usize) -> &[usize] {
+        &self.stencils[number * self.arity..][..self.arity]
+    }
+
+    fn velocities(&self, number: usize, v: &[Vector3<f64>]) -> <L::Element as Potential<f64>>::Points {
+        let stencil = self.stencil(number);
+        Array::from_fn(|point| v[stencil[point]])
+    }
+
+    fn tally(&self, flagged: u64) -> Tally {
+        let evaluated = self.acting.len() as u64;
+        Tally { evaluated, skipped: self.is_free.len() as u64 - evaluated, flagged, projected: 0 }
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<L> {
+        let n = self.arity;
+        (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
+    }
+}
+
+impl<L: DissipationLaw> Term for DissipativeTerm<L> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        <L::Element as Element>::DECLARATION
+    }
+
+    fn character(&self) -> Character {
+        Character { symmetric: true, velocity_dependent: true, quadratic: false, curved: true }
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils { arity: self.arity, vertices: &self.stencils }
+    }
+
+    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        self.acting.clear();
+        (self.slots, self.turned, self.is_free) = (Vec::new(), Vec::new(), Vec::new());
+        for stencil in self.stencils.chunks_exact(self.arity) {
+            self.is_free.push(stencil.iter().any(|&vertex| dofs.place(vertex).is_some()));
+            for (i, j) in self.pairs() {
+                let rows = dofs.place(stencil[i]).zip(dofs.place(stencil[j]));
+                let (slot, turned) =
+                    rows.and_then(|(row, column)| pattern.place(row, column)).unwrap_or((pattern.nowhere(), false));
+                let mirrored = rows.filter(|_| pattern.storage() == Storage::Whole && i != j);
+                let mirror = mirrored.and_then(|(row, column)| pattern.place(column, row));
+                self.slots.push([slot, mirror.map_or(pattern.nowhere(), |(slot, _)| slot)]);
+                self.turned.push(turned);
+            }
+        }
+    }
+
+    fn begin_step(&mut self, start: StepStart<'_>) {
+        self.acting = self.law.elements(&start);
+        self.acting.retain(|(number, _)| self.is_free[*number]);
+    }
+
+    fn dissipation(&self, State { v, .. }: State<'_>) -> Option<(f64, Tally)> {
+        let (mut sum, mut flagged) = (0.0, 0);
+        for (number, element) in &self.acting {
+            let result = element.value(&self.velocities(*number, v));
+            sum += result.value;
+            flagged += u64::from(result.flags.any());
+        }
+        Some((sum, self.tally(flagged)))
+    }
+
+    fn has_energy(&self) -> bool {
+        false
+    }
+
+    fn energy(&self, _: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        None
+    }
+
+    fn add_force(&self, State { v, .. }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        let mut flagged = 0;
+        for (number, element) in &self.acting {
+            let result = element.gradient(&self.velocities(*number, v));
+            for (&vertex, gradient) in self.stencil(*number).iter().zip(result.gradient.as_ref()) {
+                (0..3).for_each(|axis| force[vertex][axis] -= gradient[axis]);
+            }
+            flagged += u64::from(result.flags.any());
+        }
+        self.tally(flagged)
+    }
+
+    fn add_linearisation(&self, State { v, .. }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let (mut flagged, pairs) = (0, self.arity * (self.arity + 1) / 2);
+        for (number, element) in &self.acting {
+            let result = element.hessian(&self.velocities(*number, v));
+            for (&vertex, gradient) in self.stencil(*number).iter().zip(result.gradient.as_ref()) {
+                (0..3).for_each(|axis| sum.force[vertex][axis] -= gradient[axis]);
+            }
+            for (pair, (i, j)) in self.pairs().enumerate() {
+                let block = &result.hessian.as_ref()[triangle_index(self.arity, i, j)];
+                let at = number * pairs + pair;
+                let ([slot, mirror], turned) = (self.slots[at], self.turned[at]);
+                for row in 0..3 {
+                    for column in 0..3 {
+                        let (entry, other) = (block[row][column], block[column][row]);
+                        sum.matrix[slot][row][column] -= sum.weights.velocity * if turned { other } else { entry };
+                        sum.matrix[mirror][row][column] -= sum.weights.velocity * other;
+                    }
+                }
+            }
+            flagged += u64::from(result.flags.any());
+        }
+        self.tally(flagged)
+    }
+
+    fn find_non_finite(&self, _: Quantity, State { v, .. }: State<'_>) -> Option<usize> {
+        let is_finite = |(number, element): &(usize, L::Element)| {
+            let result = element.gradient(&self.velocities(*number, v));
+            result.gradient.as_ref().as_flattened().iter().all(|component| component.is_finite())
+        };
+        self.acting.iter().find(|acting| !is_finite(acting)).map(|(number, _)| *number)
+    }
+}

@@ -1,0 +1,190 @@
+use energy_dsl::{Block, Declaration, Flags, Inputs, Interpreted, Mask, RestError, Vector3, triangle_index};
+use energy_solve::{
+    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage, Tally, Term, change_dense,
+};
+
+/// Elements of a declaration that was read at run time. Their compiled routines are interpreted, operation by operation: some ten to a hundred times
+/// slower than generated code, with the same results to rounding.
+#[derive(Debug)]
+pub(crate) struct InterpretedTerm {
+    name: String,
+    element: Interpreted,
+    stencils: Vec<usize>,
+    arity: usize,
+    bound: Vec<Bound>,
+    /// The elements with a free vertex.
+    active: Vec<usize>,
+    /// By active element and pair of points (i, j), i ≤ j: where its block is stored, whether turned, and where its mirror image is.
+    slots: Vec<(usize, bool, usize)>,
+}
+
+/// One element's own numbers.
+#[derive(Debug)]
+struct Bound {
+    parameters: Vec<f64>,
+    rest: Vec<f64>,
+    precomputed: Vec<f64>,
+}
+
+/// What a routine returns: its numbers by group, and whether a condition was met.
+type Results = (Vec<Vec<f64>>, bool);
+
+impl InterpretedTerm {
+    /// Elements on stencils of as many vertices as the declaration has points, each with its parameters and rest shape, flattened.
+    ///
+    /// # Errors
+    /// The first element that refuses its rest shape.
+    pub(crate) fn new(
+        name: String,
+        element: Interpreted,
+        stencils: Vec<usize>,
+        inputs: Vec<(Vec<f64>, Vec<f64>)>,
+    ) -> Result<Self, (usize, RestError)> {
+        let bind = |(number, (parameters, rest)): (usize, (Vec<f64>, Vec<f64>))| {
+            let at = Inputs { parameters: &parameters, rest: &rest, positions: &[], velocities: &[] };
+            let precomputed = element.precomputed(&at).map_err(|error| (number, error))?;
+            Ok(Bound { parameters, rest, precomputed })
+        };
+        let bound = inputs.into_iter().enumerate().map(bind).collect::<Result<Vec<_>, _>>()?;
+        let arity = element.declaration().points.len();
+        Ok(Self { name, element, stencils, arity, bound, active: Vec::new(), slots: Vec::new() })
+    }
+
+    fn stencil(&self, number: usize) -> &[usize] {
+        &self.stencils[number * self.arity..][..self.arity]
+    }
+
+    fn run(&self, routine: &str, number: usize, x: &[Vector3<f64>]) -> Results {
+        let positions: Vec<f64> = self.stencil(number).iter().flat_map(|&vertex| x[vertex]).collect();
+        let Bound { parameters, rest, precomputed } = &self.bound[number];
+        let inputs = Inputs { parameters, rest, positions: &positions, velocities: &[] };
+        let (groups, Flags { degenerate, kink }) =
+            self.element.routine(routine, &inputs, precomputed).expect("energies have this routine");
+        (groups, degenerate.any() || kink.any())
+    }
+
+    fn tally(&self, flagged: u64, projected: u64) -> Tally {
+        let evaluated = self.active.len() as u64;
+        Tally { evaluated, skipped: self.bound.len() as u64 - evaluated, flagged, projected }
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let n = self.arity;
+        (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
+    }
+
+    /// Subtracts an element's gradient.
+    fn push(&self, number: usize, gradient: &[f64], force: &mut [Vector3<f64>]) {
+        for (point, &vertex) in self.stencil(number).iter().enumerate() {
+            (0..3).for_each(|axis| force[vertex][axis] -= gradient[3 * point + axis]);
+        }
+    }
+}
+
+impl Term for InterpretedTerm {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        self.element.declaration()
+    }
+
+    fn character(&self) -> Character {
+        let Declaration { quadratic, curved, .. } = *self.element.declaration();
+        Character { symmetric: true, velocity_dependent: false, quadratic, curved }
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils { arity: self.arity, vertices: &self.stencils }
+    }
+
+    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        let is_free = |stencil: &[usize]| stencil.iter().any(|&vertex| dofs.place(vertex).is_some());
+        self.active = (0..self.bound.len()).filter(|&number| is_free(self.stencil(number))).collect();
+        let place = |p: usize, q: usize| {
+            let (row, column) = dofs.place(p).zip(dofs.place(q))?;
+            pattern.place(row, column)
+        };
+        let nowhere = (pattern.nowhere(), false);
+        let mut slots = Vec::new();
+        for &number in &self.active {
+            let stencil = self.stencil(number);
+            for (i, j) in self.pairs().filter(|_| self.character().curved) {
+                let (slot, turned) = place(stencil[i], stencil[j]).unwrap_or(nowhere);
+                let mirrored = pattern.storage() == Storage::Whole && i != j;
+                let mirror = if mirrored { place(stencil[j], stencil[i]).unwrap_or(nowhere).0 } else { nowhere.0 };
+                slots.push((slot, turned, mirror));
+            }
+        }
+        self.slots = slots;
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        let (mut sum, mut flagged) = (0.0, 0);
+        for &number in &self.active {
+            let (groups, flag) = self.run("value", number, x);
+            sum += groups[0][0];
+            flagged += u64::from(flag);
+        }
+        Some((sum, self.tally(flagged, 0)))
+    }
+
+    fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        let mut flagged = 0;
+        for &number in &self.active {
+            let (groups, flag) = self.run("gradient", number, state.x);
+            self.push(number, &groups[1], force);
+            flagged += u64::from(flag);
+        }
+        self.tally(flagged, 0)
+    }
+
+    fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let (mut flagged, mut projected, pairs) = (0, 0, self.arity * (self.arity + 1) / 2);
+        for (place, &number) in self.active.iter().enumerate() {
+            let (groups, flag) = self.run("hessian", number, x);
+            self.push(number, &groups[1], sum.force);
+            let mut triangle: Vec<Block<f64>> = groups[2]
+                .chunks_exact(9)
+                .map(|block| std::array::from_fn(|i| std::array::from_fn(|j| block[3 * i + j])))
+                .collect();
+            if sum.curvature != Curvature::Exact {
+                projected += u64::from(change_dense(&mut triangle, self.arity, sum.curvature));
+            }
+            for (pair, (i, j)) in self.pairs().enumerate() {
+                let block = &triangle[triangle_index(self.arity, i, j)];
+                let (slot, turned, mirror) = self.slots[place * pairs + pair];
+                let (p, q) = (self.stencil(number)[i], self.stencil(number)[j]);
+                for row in 0..3 {
+                    for column in 0..3 {
+                        let (entry, other) = (block[row][column], block[column][row]);
+                        sum.matrix[slot][row][column] -= sum.weights.position * if turned { other } else { entry };
+                        sum.matrix[mirror][row][column] -= sum.weights.position * other;
+                        if let Some(product) = &mut sum.stiffness_times_velocity {
+                            product[p][row] -= entry * v[q][column];
+                            if i != j {
+                                product[q][row] -= other * v[p][column];
+                            }
+                        }
+                    }
+                }
+            }
+            flagged += u64::from(flag);
+        }
+        self.tally(flagged, projected)
+    }
+
+    fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize> {
+        let is_finite = |number: &&usize| {
+            let (groups, _) = self.run("gradient", **number, state.x);
+            let group = if quantity == Quantity::Energy { &groups[0] } else { &groups[1] };
+            group.iter().all(|number| number.is_finite())
+        };
+        self.active.iter().find(|number| !is_finite(number)).copied()
+    }
+}

@@ -1,0 +1,75 @@
+//! The frames of a run: in memory, and beside a checkpoint in a file that only grows.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use energy_dsl::Vector3;
+
+use crate::checkpoint::CheckpointError;
+use crate::output::OutputError;
+
+/// Frames, each the positions of all vertices; in the file as double precision, little-endian, one after the other.
+#[derive(Debug)]
+pub(crate) struct FrameStore {
+    frames: Vec<Vec<Vector3<f64>>>,
+    file: Option<(PathBuf, File)>,
+    checksum: crc32fast::Hasher,
+}
+
+impl FrameStore {
+    /// An empty store, with that file if there is to be one.
+    pub(crate) fn new(path: Option<PathBuf>) -> Result<Self, OutputError> {
+        let open = |path: PathBuf| match File::create(&path) {
+            Ok(file) => Ok((path, file)),
+            Err(source) => Err(OutputError::File { path, source }),
+        };
+        Ok(Self { frames: Vec::new(), file: path.map(open).transpose()?, checksum: crc32fast::Hasher::new() })
+    }
+
+    /// The first frames of a file; what follows them was written after the checkpoint and is dropped.
+    pub(crate) fn reopen(path: &Path, count: usize, vertices: usize, checksum: u32) -> Result<Self, CheckpointError> {
+        let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let size = 24 * vertices;
+        let damaged = |reason: &str| CheckpointError::Damaged { path: path.to_owned(), reason: reason.to_owned() };
+        let kept = bytes.get(..count * size).ok_or_else(|| damaged("it is cut short"))?;
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(kept);
+        if hasher.clone().finalize() != checksum {
+            return Err(damaged("its checksum does not match"));
+        }
+        let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|byte| bytes[byte]));
+        let point = |bytes: &[u8]| -> Vector3<f64> { std::array::from_fn(|axis| number(&bytes[8 * axis..])) };
+        let frames = (0..count).map(|frame| kept[frame * size..][..size].chunks_exact(24).map(point).collect());
+        let frames = frames.collect();
+        let file = OpenOptions::new().append(true).open(path).map_err(unreadable)?;
+        file.set_len((count * size) as u64).map_err(unreadable)?;
+        Ok(Self { frames, file: Some((path.to_owned(), file)), checksum: hasher })
+    }
+
+    pub(crate) fn frames(&self) -> &[Vec<Vector3<f64>>] {
+        &self.frames
+    }
+
+    /// The CRC-32 of all frames.
+    pub(crate) fn checksum(&self) -> u32 {
+        self.checksum.clone().finalize()
+    }
+
+    pub(crate) fn add(&mut self, frame: Vec<Vector3<f64>>) -> Result<(), OutputError> {
+        if let Some((path, file)) = &mut self.file {
+            let bytes: Vec<u8> = frame.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
+            file.write_all(&bytes).map_err(|source| OutputError::File { path: path.clone(), source })?;
+            self.checksum.update(&bytes);
+        }
+        self.frames.push(frame);
+        Ok(())
+    }
+
+    /// Makes sure that what was added is on the disk.
+    pub(crate) fn sync(&self) -> Result<(), OutputError> {
+        let Some((path, file)) = &self.file else { return Ok(()) };
+        file.sync_data().map_err(|source| OutputError::File { path: path.clone(), source })
+    }
+}

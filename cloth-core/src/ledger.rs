@@ -1,0 +1,324 @@
+//! Where energy comes from and goes to, step by step.
+
+use std::fmt::Write as _;
+
+use energy_dsl::Vector3;
+use energy_solve::{EvaluationError, State, Term};
+use plotters::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::body::Body;
+
+/// Energies, work and momenta at the start and after each step.
+///
+/// Energy is what free vertices have in their motion, and what the terms have as potential. What enters or leaves is the work of everything else:
+/// of each force that is no gradient (drag, damping, friction, wind), of pins that move, and of obstacles that move. Work is the integral of power by
+/// the trapezoidal rule over each step. What is left, [`Entry::unaccounted`], is the error of the integrator.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ledger {
+    potentials: Vec<String>,
+    works: Vec<String>,
+    entries: Vec<Entry>,
+    #[serde(skip)]
+    open: Open,
+}
+
+/// One line of the ledger.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// When, in s.
+    pub time: f64,
+    /// ½ Σ m v², in J.
+    pub kinetic: f64,
+    /// Of each term that has one, in J.
+    pub potential: Vec<f64>,
+    /// Done so far by each force that is no gradient, in J; negative where it dissipates.
+    pub work: Vec<f64>,
+    /// Done so far by pins that move, in J.
+    pub pins: f64,
+    /// Done so far by obstacles that move, in J.
+    pub obstacles: f64,
+    /// Σ m v, in kg m/s.
+    pub momentum: Vector3<f64>,
+    /// Σ m x × v about the origin, in kg m²/s.
+    pub angular_momentum: Vector3<f64>,
+}
+
+/// A step that has begun.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Open {
+    powers: Vec<f64>,
+    /// Forces of potentials on pinned vertices that move, and where they were.
+    pins: Vec<(usize, Vector3<f64>, Vector3<f64>)>,
+    /// Of obstacles that move, in W.
+    obstacles: f64,
+}
+
+impl Entry {
+    /// Kinetic and potential energy, in J.
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        self.kinetic + self.potential.iter().sum::<f64>()
+    }
+
+    /// All work so far, in J.
+    #[must_use]
+    pub fn total_work(&self) -> f64 {
+        self.work.iter().sum::<f64>() + self.pins + self.obstacles
+    }
+
+    /// The energy since the first entry that no work accounts for, in J.
+    #[must_use]
+    pub fn unaccounted(&self, first: &Self) -> f64 {
+        self.energy() - first.energy() - (self.total_work() - first.total_work())
+    }
+}
+
+impl Ledger {
+    /// The part of the largest energy exchanged that may be unaccounted for before there is a warning.
+    pub const TOLERANCE: f64 = 0.02;
+
+    /// A ledger whose first entry is the body as it is.
+    ///
+    /// # Errors
+    /// When an energy is not finite.
+    pub fn new(body: &Body, time: f64) -> Result<Self, EvaluationError> {
+        let names = |keep: fn(&dyn Term) -> bool| -> Vec<String> {
+            let kept = body.system.terms().filter(|(term, _)| keep(*term));
+            kept.map(|(term, _)| term.name().to_owned()).collect()
+        };
+        let (potentials, works) = (names(|term| term.has_energy()), names(works));
+        let nothing = vec![0.0; works.len()];
+        let mut ledger = Self { potentials, works, entries: Vec::new(), open: Open::default() };
+        let first = Entry { work: nothing, ..ledger.entry(body, time)? };
+        ledger.entries.push(first);
+        Ok(ledger)
+    }
+
+    /// The entries: the start, then each step.
+    #[must_use]
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The names of the terms with potentials.
+    #[must_use]
+    pub fn potentials(&self) -> &[String] {
+        &self.potentials
+    }
+
+    /// The names of the forces that do work.
+    #[must_use]
+    pub fn works(&self) -> &[String] {
+        &self.works
+    }
+
+    /// Potentials, kinetic energy and momenta now; the work so far is that of the last entry.
+    fn entry(&self, body: &Body, time: f64) -> Result<Entry, EvaluationError> {
+        let potential = potentials(body)?;
+        let last = self.entries.last();
+        Ok(Entry {
+            time,
+            kinetic: body.kinetic_energy(),
+            potential,
+            work: last.map_or_else(Vec::new, |last| last.work.clone()),
+            pins: last.map_or(0.0, |last| last.pins),
+            obstacles: last.map_or(0.0, |last| last.obstacles),
+            momentum: body.momentum(),
+            angular_momentum: body.angular_momentum(),
+        })
+    }
+
+    /// Called once all terms know that the step begins; `obstacles` is the power of those that move, in W.
+    pub(crate) fn begin(&mut self, body: &Body, obstacles: f64) {
+        let pins = pulls(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
+        self.open = Open { powers: powers(body), pins, obstacles };
+    }
+
+    /// Enters the step.
+    pub(crate) fn end(&mut self, body: &Body, obstacles: f64, time: f64, dt: f64) -> Result<(), EvaluationError> {
+        let mut entry = self.entry(body, time)?;
+        for ((work, before), after) in entry.work.iter_mut().zip(&self.open.powers).zip(powers(body)) {
+            *work += 0.5 * dt * (before + after);
+        }
+        for ((vertex, before, from), (_, after)) in self.open.pins.iter().zip(pulls(body)) {
+            let part = |axis: usize| 0.5 * (before[axis] + after[axis]) * (body.x[*vertex][axis] - from[axis]);
+            entry.pins -= (0..3).map(part).sum::<f64>();
+        }
+        entry.obstacles += 0.5 * dt * (self.open.obstacles + obstacles);
+        self.entries.push(entry);
+        Ok(())
+    }
+
+    /// The largest energy that was exchanged, in J: the most that kinetic energy, potentials and work changed since the start, added up without signs.
+    #[must_use]
+    pub fn exchanged(&self) -> f64 {
+        let first = &self.entries[0];
+        let changes = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(a, b)| (a - b).abs()).sum::<f64>();
+        let size = |entry: &Entry| {
+            let moved = (entry.kinetic - first.kinetic).abs() + first.kinetic;
+            let driven = (entry.pins - first.pins).abs() + (entry.obstacles - first.obstacles).abs();
+            moved + driven + changes(&entry.potential, &first.potential) + changes(&entry.work, &first.work)
+        };
+        self.entries.iter().map(size).fold(0.0, f64::max)
+    }
+
+    /// The largest energy that was unaccounted for, in J.
+    #[must_use]
+    pub fn largest_unaccounted(&self) -> f64 {
+        self.entries.iter().map(|entry| entry.unaccounted(&self.entries[0]).abs()).fold(0.0, f64::max)
+    }
+
+    /// A warning when the balance does not close although the integrator should keep it: when more than [`Ledger::TOLERANCE`] of the largest energy
+    /// exchanged is unaccounted for. Other integrators dissipate by themselves.
+    #[must_use]
+    pub fn imbalance(&self, integrator: &str) -> Option<String> {
+        let conserving = ["implicit-midpoint", "trapezoid", "verlet", "symplectic-euler"].contains(&integrator);
+        let (lost, all) = (self.largest_unaccounted(), self.exchanged());
+        (conserving && lost > Self::TOLERANCE * all).then(|| {
+            format!(
+                "the balance of energy does not close: {lost:.3e} J of {all:.3e} J exchanged are unaccounted for, more than {} %, \
+                 although {integrator} should keep it. Try a smaller dt",
+                100.0 * Self::TOLERANCE
+            )
+        })
+    }
+
+    /// As a table of comma-separated values, one line for each entry.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let mut text = "time [s],kinetic [J]".to_owned();
+        let mut line = |arguments: std::fmt::Arguments<'_>| {
+            text.write_fmt(arguments).expect("writing to a string succeeds");
+        };
+        let quoted = |name: &str| name.replace(['"', ',', '\n'], " ");
+        self.potentials.iter().for_each(|name| line(format_args!(",potential {} [J]", quoted(name))));
+        self.works.iter().for_each(|name| line(format_args!(",work {} [J]", quoted(name))));
+        line(format_args!(",work pins [J],work obstacles [J],energy [J],unaccounted [J]"));
+        line(format_args!(",Px [kg m/s],Py [kg m/s],Pz [kg m/s],Lx [kg m^2/s],Ly [kg m^2/s],Lz [kg m^2/s]\n"));
+        for entry in &self.entries {
+            let numbers = [entry.time, entry.kinetic].into_iter().chain(entry.potential.iter().copied());
+            let numbers = numbers.chain(entry.work.iter().copied()).chain([entry.pins, entry.obstacles]);
+            let numbers = numbers.chain([entry.energy(), entry.unaccounted(&self.entries[0])]);
+            let numbers = numbers.chain(entry.momentum).chain(entry.angular_momentum);
+            let row: Vec<String> = numbers.map(|number| format!("{number:e}")).collect();
+            line(format_args!("{}\n", row.join(",")));
+        }
+        text
+    }
+
+    /// As a plot over time.
+    ///
+    /// # Errors
+    /// When it cannot be drawn.
+    pub fn svg(&self) -> Result<String, String> {
+        let first = &self.entries[0];
+        let mut curves: Vec<(String, Vec<f64>)> = Vec::new();
+        let mut add = |name: &str, value: &dyn Fn(&Entry) -> f64| {
+            let values: Vec<f64> = self.entries.iter().map(value).collect();
+            if values.iter().any(|value| *value != 0.0) {
+                curves.push((name.to_owned(), values));
+            }
+        };
+        add("kinetic", &|entry| entry.kinetic);
+        for (place, name) in self.potentials.iter().enumerate() {
+            add(name, &|entry| entry.potential[place] - first.potential[place]);
+        }
+        for (place, name) in self.works.iter().enumerate() {
+            add(&format!("work of {name}"), &|entry| entry.work[place] - first.work[place]);
+        }
+        add("work of pins", &|entry| entry.pins - first.pins);
+        add("work of obstacles", &|entry| entry.obstacles - first.obstacles);
+        add("unaccounted", &|entry| entry.unaccounted(first));
+        let times: Vec<f64> = self.entries.iter().map(|entry| entry.time).collect();
+        plot(&times, &curves).map_err(|error| error.to_string())
+    }
+}
+
+/// Lines over time with their names.
+fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn std::error::Error>> {
+    let all = || curves.iter().flat_map(|(_, values)| values).copied();
+    let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
+    let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
+    let end = times.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    let mut text = String::new();
+    {
+        let area = SVGBackend::with_string(&mut text, (900, 520)).into_drawing_area();
+        area.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&area)
+            .margin(14)
+            .x_label_area_size(42)
+            .y_label_area_size(74)
+            .build_cartesian_2d(times.first().copied().unwrap_or(0.0)..end, low - margin..high + margin)?;
+        chart
+            .configure_mesh()
+            .light_line_style(BLACK.mix(0.05))
+            .x_desc("time, s")
+            .y_desc("energy since the start, J")
+            .y_label_formatter(&|value| format!("{value:.3e}"))
+            .draw()?;
+        for (number, (name, values)) in curves.iter().enumerate() {
+            let colour = Palette99::pick(number).to_rgba();
+            let points = times.iter().copied().zip(values.iter().copied());
+            chart
+                .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+                .label(name)
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)));
+        }
+        chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
+        area.present()?;
+    }
+    Ok(text)
+}
+
+/// Whether a term does work that is no change of its potential.
+fn works(term: &dyn Term) -> bool {
+    !term.has_energy() || term.character().velocity_dependent
+}
+
+/// The energy of each term that has one.
+fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
+    let energy = |term: &dyn Term| term.energy(&body.x).map(|(energy, _)| energy);
+    let all: Vec<f64> = body.system.terms().filter_map(|(term, _)| energy(term)).collect();
+    match all.iter().all(|energy| energy.is_finite()) {
+        true => Ok(all),
+        false => Err(EvaluationError::NonFiniteSum { what: energy_solve::Quantity::Energy }),
+    }
+}
+
+/// The power of each force that is no gradient on the free vertices, in W.
+fn powers(body: &Body) -> Vec<f64> {
+    let still = vec![[0.0; 3]; body.v.len()];
+    let power = |term: &dyn Term| {
+        let mut force = still.clone();
+        term.add_force(body.state(), &mut force);
+        let mut power = dot_of_free(body, &force);
+        if term.has_energy() {
+            force.clone_from(&still);
+            term.add_force(State { x: &body.x, v: &still }, &mut force);
+            power -= dot_of_free(body, &force);
+        }
+        power
+    };
+    body.system.terms().filter(|(term, _)| works(*term)).map(|(term, _)| power(term)).collect()
+}
+
+fn dot_of_free(body: &Body, force: &[Vector3<f64>]) -> f64 {
+    let one = |&vertex: &usize| crate::mesh::dot(force[vertex], body.v[vertex]);
+    body.system.dofs().free().iter().map(one).sum()
+}
+
+/// The forces of potentials on pinned vertices that move, in N.
+fn pulls(body: &Body) -> Vec<(usize, Vector3<f64>)> {
+    let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
+    let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
+    if moving.is_empty() {
+        return Vec::new();
+    }
+    let still = vec![[0.0; 3]; body.v.len()];
+    let mut force = still.clone();
+    for (term, _) in body.system.terms().filter(|(term, _)| term.has_energy()) {
+        term.add_force(State { x: &body.x, v: &still }, &mut force);
+    }
+    moving.into_iter().map(|vertex| (vertex, force[vertex])).collect()
+}

@@ -1,0 +1,42 @@
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{Diagonals, Plane, Sheet};
+
+/// A narrow sheet along the first axis, built in: cells that are nearly square, their diagonals alternating.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Strip {
+    /// Its length along the first axis, in m.
+    #[serde(deserialize_with = "crate::scene::numbers::positive")]
+    pub length: f64,
+    /// Its width, in m.
+    #[serde(deserialize_with = "crate::scene::numbers::positive")]
+    pub width: f64,
+    /// Cells along its length.
+    #[serde(deserialize_with = "crate::scene::numbers::count::<1, _>")]
+    pub segments: usize,
+    /// `horizontal` (the default) or `vertical`.
+    #[serde(default)]
+    pub plane: Plane,
+}
+
+impl Strip {
+    /// The sheet that it is.
+    ///
+    /// ```
+    /// let strip = cloth_core::mesh::Strip { length: 1.0, width: 0.1, segments: 40, plane: Default::default() };
+    /// assert_eq!(strip.sheet().cells, [40, 4]);
+    /// ```
+    #[must_use]
+    pub fn sheet(&self) -> Sheet {
+        let across = (self.segments as f64 * self.width / self.length).round().clamp(1.0, 4096.0) as usize;
+        Sheet {
+            cells: [self.segments, across],
+            size: [self.length, self.width],
+            diagonals: Diagonals::Alternating,
+            plane: self.plane,
+            pleats: None,
+        }
+    }
+}

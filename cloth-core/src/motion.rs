@@ -1,0 +1,186 @@
+//! Rigid motions in time, by keyframes.
+
+use energy_dsl::Vector3;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::mesh::{cross, dot, norm, subtract};
+use crate::scene::numbers::{finite_triple, nonzero_triple, number};
+
+/// A rigid motion, linear in time from key to key; before the first key and after the last it stands still. A point x goes to
+/// c + R (x − c) + t, with the centre c, the turn R about the axis and the shift t.
+///
+/// ```
+/// use cloth_core::motion::{Key, Motion};
+///
+/// let quarter = Key { time: 1.0, angle: 90.0, translate: [0.0, 0.0, 2.0] };
+/// let motion = Motion { axis: [0.0, 0.0, 1.0], centre: [1.0, 0.0, 0.0], keys: vec![Key::default(), quarter] };
+/// let [x, y, z] = motion.pose(7.0).applied([2.0, 0.0, 0.0]);
+/// assert!((x - 1.0).abs() < 1e-15 && (y - 1.0).abs() < 1e-15 && z == 2.0);
+/// assert_eq!(motion.pose(0.5).applied([1.0, 0.0, 0.0]), [1.0, 0.0, 1.0]);
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// The direction that it turns about, right-handed. Default [0, 0, 1].
+    #[serde(default = "third_axis", deserialize_with = "nonzero_triple")]
+    pub axis: [f64; 3],
+    /// A point of the axis, in m. Default the origin.
+    #[serde(default, deserialize_with = "finite_triple")]
+    pub centre: [f64; 3],
+    /// Where it is when; times must grow.
+    #[serde(deserialize_with = "keys")]
+    pub keys: Vec<Key>,
+}
+
+/// Where a motion is at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Key {
+    /// When, in s.
+    #[serde(deserialize_with = "number")]
+    pub time: f64,
+    /// How far it has turned, in degrees. Default 0.
+    #[serde(default, deserialize_with = "number")]
+    pub angle: f64,
+    /// How far it has shifted, in m. Default not at all.
+    #[serde(default, deserialize_with = "finite_triple")]
+    pub translate: [f64; 3],
+}
+
+/// A rigid map x ↦ R x + t.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    rotation: [Vector3<f64>; 3],
+    shift: Vector3<f64>,
+}
+
+fn third_axis() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
+}
+
+fn keys<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<Key>, D::Error> {
+    let keys = Vec::<Key>::deserialize(deserializer)?;
+    if keys.is_empty() {
+        return Err(serde::de::Error::custom("a motion needs at least one key, as in { time = 0.0, angle = 0.0 }"));
+    }
+    match keys.windows(2).position(|pair| pair[0].time >= pair[1].time) {
+        Some(at) => Err(serde::de::Error::custom(format!(
+            "the times of keys must grow: key {} is at {} s, the next at {} s",
+            at,
+            keys[at].time,
+            keys[at + 1].time
+        ))),
+        None => Ok(keys),
+    }
+}
+
+impl Motion {
+    /// Where it is at a time, in s.
+    #[must_use]
+    pub fn pose(&self, time: f64) -> Pose {
+        let Key { angle, translate, .. } = self.key(time);
+        Pose::turned(self.axis, angle, self.centre).shifted(translate)
+    }
+
+    /// Whether it is somewhere else at another time of this span, in s.
+    #[must_use]
+    pub fn moves(&self, from: f64, to: f64) -> bool {
+        self.key(from) != Key { time: from, ..self.key(to) }
+    }
+
+    /// The key that stands for a time.
+    fn key(&self, time: f64) -> Key {
+        let after = self.keys.partition_point(|key| key.time <= time);
+        match (after.checked_sub(1).map(|before| self.keys[before]), self.keys.get(after)) {
+            (Some(a), Some(b)) => {
+                let way = (time - a.time) / (b.time - a.time);
+                let between = |from: f64, to: f64| from + way * (to - from);
+                let translate = std::array::from_fn(|axis| between(a.translate[axis], b.translate[axis]));
+                Key { time, angle: between(a.angle, b.angle), translate }
+            }
+            (Some(only), None) => Key { time, ..only },
+            (None, Some(first)) => Key { time, ..*first },
+            (None, None) => Key { time, ..Key::default() },
+        }
+    }
+}
+
+impl Pose {
+    /// Where nothing moves.
+    pub const REST: Self = Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift: [0.0; 3] };
+
+    /// A turn by an angle in degrees about an axis through a point, right-handed (Rodrigues). Quarter turns are exact to rounding.
+    #[must_use]
+    pub fn turned(axis: Vector3<f64>, degrees: f64, centre: Vector3<f64>) -> Self {
+        if degrees == 0.0 {
+            return Self::REST;
+        }
+        let n = axis.map(|component| component / norm(axis));
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let column = |unit: Vector3<f64>| -> Vector3<f64> {
+            let (across, along) = (cross(n, unit), dot(n, unit));
+            std::array::from_fn(|i| cosine * unit[i] + sine * across[i] + (1.0 - cosine) * along * n[i])
+        };
+        let columns = Self::REST.rotation.map(column);
+        let rotation = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+        let turned = Self { rotation, shift: [0.0; 3] };
+        Self { rotation, shift: subtract(centre, turned.applied(centre)) }
+    }
+
+    /// The same, then a shift.
+    #[must_use]
+    pub fn shifted(mut self, by: Vector3<f64>) -> Self {
+        (0..3).for_each(|axis| self.shift[axis] += by[axis]);
+        self
+    }
+
+    /// Where a point goes.
+    #[must_use]
+    pub fn applied(&self, point: Vector3<f64>) -> Vector3<f64> {
+        std::array::from_fn(|i| dot(self.rotation[i], point) + self.shift[i])
+    }
+
+    /// What becomes of a direction.
+    #[must_use]
+    pub fn turned_direction(&self, direction: Vector3<f64>) -> Vector3<f64> {
+        self.rotation.map(|row| dot(row, direction))
+    }
+
+    /// Where a point comes from.
+    #[must_use]
+    pub fn undone(&self, point: Vector3<f64>) -> Vector3<f64> {
+        let way = subtract(point, self.shift);
+        std::array::from_fn(|j| (0..3).map(|i| self.rotation[i][j] * way[i]).sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_undo_themselves_and_keep_distances() {
+        let pose = Pose::turned([1.0, 2.0, -0.5], 77.0, [0.3, 0.2, 0.1]).shifted([1.0, -2.0, 3.0]);
+        let (p, q) = ([0.4, -0.7, 1.1], [1.4, 0.7, -0.1]);
+        let there = pose.applied(p);
+        let back = pose.undone(there);
+        assert!(norm(subtract(back, p)) < 1e-14, "{back:?}");
+        let apart = norm(subtract(there, pose.applied(q)));
+        assert!((apart - norm(subtract(p, q))).abs() < 1e-14);
+        assert!(norm(subtract(pose.turned_direction(subtract(q, p)), subtract(pose.applied(q), there))) < 1e-14);
+    }
+
+    #[test]
+    fn between_keys_it_is_linear_and_outside_it_rests() {
+        let key = |time, angle| Key { time, angle, translate: [time, 0.0, 0.0] };
+        let motion = Motion {
+            axis: [0.0, 0.0, 1.0],
+            centre: [0.0; 3],
+            keys: vec![key(1.0, 0.0), key(2.0, 90.0), key(4.0, 0.0)],
+        };
+        assert_eq!(motion.key(3.0), Key { time: 3.0, angle: 45.0, translate: [3.0, 0.0, 0.0] });
+        assert_eq!(motion.key(0.0), Key { time: 0.0, ..key(1.0, 0.0) });
+        assert!(!motion.moves(0.0, 1.0) && motion.moves(0.5, 1.5) && !motion.moves(4.0, 9.0));
+    }
+}

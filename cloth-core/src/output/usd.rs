@@ -1,0 +1,134 @@
+use std::fmt::Write as _;
+
+use energy_dsl::Vector3;
+
+use super::track::{Joined, Track};
+
+/// An animation as USD text (`.usda`): a mesh for each garment and solid, curves for hair, with a time sample of the points for each frame. Lengths
+/// are in m, z is up, and frame n has time code n.
+#[must_use]
+pub fn usd_text(tracks: &[Track<'_>], frames_per_second: f64) -> String {
+    let frames = tracks.iter().map(|track| track.frames.len()).max().unwrap_or(1);
+    let mut file = Usd { text: String::new(), names: Vec::new() };
+    file.line(format_args!("#usda 1.0\n(\n    defaultPrim = \"scene\"\n    metersPerUnit = 1\n    upAxis = \"Z\""));
+    file.line(format_args!("    startTimeCode = 0\n    endTimeCode = {}", frames.saturating_sub(1)));
+    file.line(format_args!(
+        "    timeCodesPerSecond = {frames_per_second}\n    framesPerSecond = {frames_per_second}\n)\n"
+    ));
+    file.line(format_args!("def Xform \"scene\"\n{{"));
+    tracks.iter().for_each(|track| file.add(track));
+    file.line(format_args!("}}"));
+    file.text
+}
+
+struct Usd {
+    text: String,
+    names: Vec<String>,
+}
+
+impl Usd {
+    fn line(&mut self, arguments: std::fmt::Arguments<'_>) {
+        self.text.write_fmt(arguments).expect("writing to a string succeeds");
+        self.text.push('\n');
+    }
+
+    fn add(&mut self, track: &Track<'_>) {
+        let name = self.identifier(track.name);
+        let [red, green, blue] = track.colour;
+        match track.joined {
+            Joined::Triangles(triangles) => {
+                self.line(format_args!("    def Mesh \"{name}\"\n    {{"));
+                self.line(format_args!(
+                    "        uniform token subdivisionScheme = \"none\"\n        uniform bool doubleSided = 1"
+                ));
+                let counts = vec!["3"; triangles.len()].join(", ");
+                self.line(format_args!("        int[] faceVertexCounts = [{counts}]"));
+                let corners: Vec<String> = triangles.iter().flatten().map(usize::to_string).collect();
+                self.line(format_args!("        int[] faceVertexIndices = [{}]", corners.join(", ")));
+            }
+            Joined::Strands(strands) => {
+                self.line(format_args!("    def BasisCurves \"{name}\"\n    {{"));
+                self.line(format_args!("        uniform token type = \"linear\""));
+                let counts: Vec<String> = strands.iter().map(|strand| strand.len().to_string()).collect();
+                self.line(format_args!("        int[] curveVertexCounts = [{}]", counts.join(", ")));
+                self.line(format_args!(
+                    "        float[] widths = [0.001] (\n            interpolation = \"constant\"\n        )"
+                ));
+            }
+        }
+        self.line(format_args!("        color3f[] primvars:displayColor = [({red}, {green}, {blue})]"));
+        self.points(&track.frames);
+        self.line(format_args!("    }}"));
+    }
+
+    fn points(&mut self, frames: &[&[Vector3<f64>]]) {
+        let bounds = |points: &[Vector3<f64>]| {
+            let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
+                std::array::from_fn(|axis| points.iter().map(|p| p[axis]).fold(start, pick))
+            };
+            tuples(&[bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY)])
+        };
+        if let [only] = frames {
+            self.line(format_args!("        float3[] extent = [{}]", bounds(only)));
+            self.line(format_args!("        point3f[] points = [{}]", tuples(only)));
+            return;
+        }
+        for (attribute, values) in
+            [("float3[] extent", &bounds as &dyn Fn(&[Vector3<f64>]) -> String), ("point3f[] points", &tuples)]
+        {
+            self.line(format_args!("        {attribute}.timeSamples = {{"));
+            for (number, frame) in frames.iter().enumerate() {
+                self.line(format_args!("            {number}: [{}],", values(frame)));
+            }
+            self.line(format_args!("        }}"));
+        }
+    }
+
+    /// A name as USD allows it: letters, digits and underscores, not a digit first, and no name twice.
+    fn identifier(&mut self, name: &str) -> String {
+        let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let plain = if plain.starts_with(|c: char| c.is_ascii_alphabetic()) { plain } else { format!("_{plain}") };
+        let mut unused = plain.clone();
+        let mut number = 1;
+        while self.names.contains(&unused) {
+            number += 1;
+            unused = format!("{plain}_{number}");
+        }
+        self.names.push(unused.clone());
+        unused
+    }
+}
+
+/// Points are single precision in USD; more digits would be lost.
+fn tuples(points: &[Vector3<f64>]) -> String {
+    let one = |p: &Vector3<f64>| format!("({}, {}, {})", p[0] as f32, p[1] as f32, p[2] as f32);
+    points.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_made_fit_and_different() {
+        let triangles = [[0, 1, 2]];
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]];
+        let track = |name| Track {
+            name,
+            colour: [0.5; 3],
+            joined: Joined::Triangles(&triangles),
+            frames: vec![&points[..], &points[..]],
+        };
+        let text = usd_text(&[track("left sleeve"), track("left-sleeve"), track("1st")], 25.0);
+        for part in [
+            "\"left_sleeve\"",
+            "\"left_sleeve_2\"",
+            "\"_1st\"",
+            "endTimeCode = 1",
+            "1: [(0, 0, 0), (1, 0, 0), (0, 1, 0.5)],",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert_eq!(text.matches('{').count(), text.matches('}').count());
+    }
+}

@@ -1,0 +1,105 @@
+//! What people see while a run is under way: how far it is, how long it will take, and whether it is stuck.
+
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::integrator::StepReport;
+
+/// A progress line on standard error, hidden where that is no terminal, and a watch that warns when no step ends for long: for 20 s and for 20 times as
+/// long as steps took so far.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    steps: Option<Sender<u64>>,
+    watch: Option<JoinHandle<()>>,
+    recent: Recent,
+}
+
+/// Means over the last steps or so.
+#[derive(Clone, Copy, Debug, Default)]
+struct Recent {
+    solves: f64,
+    iterations: f64,
+}
+
+/// No shorter silence is worth a warning.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// How many times as long as others a step must take.
+const FACTOR: u32 = 20;
+
+impl Progress {
+    /// Of that many steps, some of which are done.
+    #[must_use]
+    pub fn new(steps: u64, done: u64) -> Self {
+        let style = ProgressStyle::with_template("{wide_bar} step {pos}/{len}, {eta} left{msg}");
+        let bar = ProgressBar::new(steps).with_style(style.expect("the template is valid")).with_position(done);
+        bar.reset_eta();
+        let (sender, receiver) = channel::<u64>();
+        let shown = bar.clone();
+        let watch = std::thread::spawn(move || {
+            let (start, mut last, mut ended, mut count) = (Instant::now(), done, Instant::now(), 0);
+            loop {
+                let mean = ended.duration_since(start) / count.max(1);
+                match receiver.recv_timeout(PATIENCE.max(FACTOR * mean)) {
+                    Ok(step) => (last, ended, count) = (step, Instant::now(), count + 1),
+                    Err(RecvTimeoutError::Disconnected) => return,
+                    Err(RecvTimeoutError::Timeout) => {
+                        shown.suspend(|| eprintln!("{}", stuck(last, ended.elapsed(), mean)))
+                    }
+                }
+            }
+        });
+        Self { bar, steps: Some(sender), watch: Some(watch), recent: Recent::default() }
+    }
+
+    /// A step ended.
+    pub fn step(&mut self, step: u64, report: &StepReport) {
+        let blend = |mean: &mut f64, new: u64| *mean += (new as f64 - *mean) / 8.0;
+        blend(&mut self.recent.solves, report.solves);
+        blend(&mut self.recent.iterations, report.iterations);
+        if self.recent.solves > 0.0 {
+            let Recent { solves, iterations } = self.recent;
+            self.bar.set_message(format!(", {solves:.1} solves of {:.0} iterations a step", iterations / solves));
+        }
+        self.bar.set_position(step);
+        // The watch listens until this goes.
+        let _ = self.steps.as_ref().map(|steps| steps.send(step));
+    }
+
+    /// Takes the line away.
+    pub fn finish(mut self) {
+        self.bar.finish_and_clear();
+        drop(self.steps.take());
+        if let Some(watch) = self.watch.take() {
+            let _ = watch.join();
+        }
+    }
+}
+
+/// The warning.
+fn stuck(last: u64, silent: Duration, mean: Duration) -> String {
+    format!(
+        "warning: the step after {last} has taken {:.0} s so far, others took {:.2} s: it may be stuck. Interrupt with Ctrl-C; a smaller dt or \
+         `adaptive = true` may help",
+        silent.as_secs_f64(),
+        mean.as_secs_f64()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_warning_says_which_step_and_for_how_long() {
+        let text = stuck(41, Duration::from_secs(30), Duration::from_millis(250));
+        assert!(text.contains("after 41 has taken 30 s so far, others took 0.25 s"), "{text}");
+        // The watch ends with the progress.
+        let mut progress = Progress::new(10, 3);
+        progress.step(4, &StepReport::default());
+        progress.finish();
+    }
+}

@@ -1,0 +1,240 @@
+//! A page on a finished run: pictures, energies, times, what was evaluated, and the audit of what it was made of.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use energy_solve::Tally;
+use verify::audit::{Check, Options, Report, Target, audit_all, describe_failure};
+
+use crate::fabric::Material;
+use crate::output::{OutputError, OutputFolder};
+use crate::run::Record;
+use crate::scene::Scene;
+use crate::summary::Summary;
+
+/// A folder of which no page can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// Something is not there.
+    #[error("cannot read {}; is this the folder of a finished run?", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// What the run says of itself cannot be understood.
+    #[error("{} is damaged: {source}", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// It was written by a newer program.
+    #[error("{} has version {version}, but this program reads version {}; use the newer program", .path.display(), Record::VERSION)]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: u32,
+    },
+    /// The page cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// Makes `report.html` from the files of a finished run, one page without anything from elsewhere; returns its path. Everything that the run was made of
+/// is audited again.
+///
+/// # Errors
+/// When a file is missing, damaged or newer than this program, or the page cannot be written.
+pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
+    let path = folder.join(OutputFolder::RECORD);
+    let bytes = read(&path)?;
+    let damaged = |source| ReportError::Damaged { path: path.clone(), source };
+    let version = serde_json::from_slice::<Version>(&bytes).map_err(damaged)?.version;
+    if version > Record::VERSION {
+        return Err(ReportError::Newer { path, version });
+    }
+    let record: Record = serde_json::from_slice(&bytes).map_err(damaged)?;
+    let picture = optional(&folder.join(OutputFolder::PICTURE))?;
+    let plot = optional(&folder.join(OutputFolder::LEDGER_PLOT))?;
+    let audit = audited(&record);
+    let page = page(&record, picture.as_deref(), plot.as_deref(), &audit);
+    Ok(OutputFolder::reopen(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
+}
+
+/// The part of a record that says how to read the rest.
+#[derive(serde::Deserialize)]
+struct Version {
+    version: u32,
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
+    std::fs::read(path).map_err(|source| ReportError::Unreadable { path: path.to_owned(), source })
+}
+
+/// A file that the scene may have done without.
+fn optional(path: &Path) -> Result<Option<Vec<u8>>, ReportError> {
+    if path.exists() { read(path).map(Some) } else { Ok(None) }
+}
+
+/// What the audit says of one element.
+struct Verdict {
+    element: String,
+    passed: bool,
+    text: String,
+}
+
+fn audited(record: &Record) -> Vec<Verdict> {
+    let mut elements: Vec<&str> = record.summary.terms.iter().map(|term| term.element.as_str()).collect();
+    elements.sort_unstable();
+    elements.dedup();
+    let own = own_targets(record);
+    let target = |name: &str| {
+        let declared = own.iter().find(|target| target.name() == name).cloned();
+        declared.or_else(|| energy_elements::find(name).map(Target::of_catalogue))
+    };
+    let verdict = |name: &str| match target(name) {
+        Some(target) => judged(name, &audit_all(&[target], None, Options::default())),
+        None => {
+            let text = "its declaration is no longer where the scene had it".to_owned();
+            Verdict { element: name.to_owned(), passed: false, text }
+        }
+    };
+    elements.into_iter().map(verdict).collect()
+}
+
+fn judged(name: &str, report: &Report) -> Verdict {
+    let worst = |check: Check| {
+        let lines = report.lines.iter().filter(|line| line.check == check);
+        lines.map(|line| line.worst).reduce(f64::max).map_or("–".into(), |worst| format!("{worst:.0e}"))
+    };
+    let failures: Vec<String> = report.failures().map(describe_failure).collect();
+    let refused = report.refused.iter().map(|(_, reason)| reason.clone());
+    let all: Vec<String> = failures.into_iter().chain(refused).collect();
+    let text = match &all[..] {
+        [] => format!(
+            "{} checks; worst relative error {} by dual numbers, {} by finite differences",
+            report.lines.len(),
+            worst(Check::DualNumbers),
+            worst(Check::FiniteDifferences)
+        ),
+        failures => failures.join("; "),
+    };
+    Verdict { element: name.to_owned(), passed: all.is_empty(), text }
+}
+
+/// The declarations of the scene's own files.
+fn own_targets(record: &Record) -> Vec<Target> {
+    let Ok(scene) = Scene::parse(&record.scene, &record.path) else { return Vec::new() };
+    let files = scene.garments.iter().filter_map(|garment| match &garment.fabric.material {
+        Material::File(declared) => Some(declared.path.clone()),
+        _ => None,
+    });
+    files.filter_map(|file| Target::of_file(&file).ok()).flatten().collect()
+}
+
+fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[Verdict]) -> String {
+    let mut page = String::new();
+    let mut add = |arguments: std::fmt::Arguments<'_>| {
+        page.write_fmt(arguments).expect("writing to a string succeeds");
+        page.push('\n');
+    };
+    let title = escaped(&record.path.file_name().unwrap_or_default().to_string_lossy());
+    add(format_args!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>"));
+    add(format_args!("<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>"));
+    let Summary { vertices, pinned, triangles, integrator, dt, steps, .. } = &record.summary;
+    add(format_args!(
+        "<p>{vertices} vertices ({pinned} pinned), {triangles} triangles; {steps} steps of {dt} s by {}; {} frames.{}</p>",
+        escaped(integrator),
+        record.frames,
+        if record.finished { "" } else { " <b>Stopped before its end.</b>" }
+    ));
+    for warning in &record.summary.warnings {
+        add(format_args!("<p class=\"bad\">{}</p>", escaped(warning)));
+    }
+    if let Some(picture) = picture {
+        let data = STANDARD.encode(picture);
+        add(format_args!("<img alt=\"The last frame\" src=\"data:image/png;base64,{data}\">"));
+    }
+    if let Some(plot) = plot {
+        add(format_args!("<h2>Energy</h2>\n{}", String::from_utf8_lossy(plot)));
+    }
+    add(format_args!("<h2>Time</h2>\n{}", times(&record.summary)));
+    add(format_args!("<h2>Evaluated and skipped</h2>\n{}", evaluated(&record.summary)));
+    add(format_args!("<h2>Audit of the elements</h2>\n{}", verdicts(audit)));
+    add(format_args!("<h2>At the end</h2>\n<pre>{}</pre>", escaped(&record.summary.to_string())));
+    add(format_args!("<h2>Scene</h2>\n<pre>{}</pre>\n</body>\n</html>", escaped(&record.scene)));
+    page
+}
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}\
+img,svg{max-width:100%;height:auto}table{border-collapse:collapse}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:right}\
+td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;padding:1rem;overflow:auto;font-size:13px}\
+.good{color:#176617}.bad{color:#a01818}";
+
+fn times(summary: &Summary) -> String {
+    let total = summary.stepping_time.as_secs_f64();
+    let phases = summary.phases;
+    let named = [
+        ("assembly", phases.assembly),
+        ("factorisation", phases.factorisation),
+        ("linear solves", phases.solve),
+        ("line search", phases.line_search),
+    ];
+    let known: f64 = named.iter().map(|(_, time)| time.as_secs_f64()).sum();
+    let all = named.map(|(name, time)| (name, time.as_secs_f64())).into_iter().chain([("other", total - known)]);
+    let per_step = 1e3 / summary.steps.max(1) as f64;
+    let row = |name: &str, seconds: f64| {
+        let part = 100.0 * seconds / total.max(f64::MIN_POSITIVE);
+        format!("<tr><td>{name}</td><td>{seconds:.3}</td><td>{:.3}</td><td>{part:.1}</td></tr>\n", seconds * per_step)
+    };
+    let rows: String = all.map(|(name, seconds)| row(name, seconds)).chain([row("<b>all</b>", total)]).collect();
+    let mean = summary.iterations as f64 / summary.solves.max(1) as f64;
+    format!(
+        "<table><tr><th>phase</th><th>s</th><th>ms per step</th><th>%</th></tr>\n{rows}</table>\n\
+         <p>{} linear solves, {mean:.1} iterations each; {} steps solved again with projected curvature; {} rejected.</p>",
+        summary.solves, summary.projected, summary.rejected
+    )
+}
+
+fn evaluated(summary: &Summary) -> String {
+    let cells = |tally: &Tally| format!("<td>{}</td><td>{}</td>", tally.evaluated, tally.skipped);
+    let rows = summary.terms.iter().map(|term| {
+        let energy = term.energy.map_or("–".to_owned(), |energy| format!("{energy:.4e}"));
+        let counts = [&term.counts.value, &term.counts.gradient, &term.counts.hessian].map(cells).concat();
+        let (flagged, projected) = (
+            term.counts.value.flagged + term.counts.gradient.flagged + term.counts.hessian.flagged,
+            term.counts.hessian.projected,
+        );
+        format!(
+            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}<td>{flagged}</td><td>{projected}</td></tr>\n",
+            escaped(&term.name),
+            escaped(&term.element)
+        )
+    });
+    let left_out: String =
+        summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();
+    format!(
+        "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th><th>gradient</th><th>skipped</th>\
+         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th></tr>\n{}</table>\n{left_out}",
+        rows.collect::<String>()
+    )
+}
+
+fn verdicts(audit: &[Verdict]) -> String {
+    let row = |verdict: &Verdict| {
+        let (class, word) = if verdict.passed { ("good", "passed") } else { ("bad", "failed") };
+        let (element, text) = (escaped(&verdict.element), escaped(&verdict.text));
+        format!("<tr><td>{element}</td><td class=\"text {class}\">{word}</td><td class=\"text\">{text}</td></tr>\n")
+    };
+    format!("<table>{}</table>", audit.iter().map(row).collect::<String>())
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

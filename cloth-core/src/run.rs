@@ -1,0 +1,258 @@
+//! A run from start to end: steps, frames, checkpoints, and the files that it leaves.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use energy_solve::EvaluationError;
+use serde::{Deserialize, Serialize};
+
+use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::frame_store::FrameStore;
+use crate::integrator::StepReport;
+use crate::output::{
+    AnimationError, OutputError, OutputFolder, PictureError, Show, animation_glb, obj_text, ply_bytes, usd_text,
+};
+use crate::scene::{Scene, SceneError};
+use crate::simulation::{Simulation, SimulationError};
+use crate::summary::Summary;
+
+/// A run that cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Setting up, or a step.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A file.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The animation.
+    #[error(transparent)]
+    Animation(#[from] AnimationError),
+    /// A picture.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The plot of the ledger.
+    #[error("cannot draw the ledger: {0}")]
+    Plot(String),
+    /// What is left at the end.
+    #[error("after the last step: {0}")]
+    Evaluation(#[from] EvaluationError),
+    /// Numbers that JSON cannot hold.
+    #[error("cannot save the state: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// A scene on its way.
+#[derive(Debug)]
+pub struct Run {
+    scene: Scene,
+    text: String,
+    path: PathBuf,
+    folder: OutputFolder,
+    simulation: Simulation,
+    frames: FrameStore,
+    /// Steps from one checkpoint to the next.
+    every: Option<u64>,
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub struct Ending {
+    /// What was done.
+    pub summary: Summary,
+    /// The files that were written.
+    pub files: Vec<PathBuf>,
+    /// Frames written.
+    pub frames: usize,
+    /// Whether all steps were done.
+    pub finished: bool,
+}
+
+/// What a finished run says of itself, in `run.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// The version of this record.
+    pub version: u32,
+    /// The text of the scene file.
+    pub scene: String,
+    /// Its path.
+    pub path: PathBuf,
+    /// Whether all steps were done.
+    pub finished: bool,
+    /// Frames written.
+    pub frames: usize,
+    /// What was done.
+    pub summary: Summary,
+}
+
+impl Record {
+    /// The version of records that this program writes.
+    pub const VERSION: u32 = 1;
+}
+
+impl Run {
+    /// A run of the text of a scene file, whose path is for messages and for relative paths in it. Everything that can be wrong with it is found
+    /// before the folder is touched. `every` is the number of steps from one checkpoint to the next, if there are to be any.
+    ///
+    /// # Errors
+    /// When the scene is unfit or the folder cannot be written to.
+    pub fn new(
+        text: String,
+        path: &Path,
+        output: &Path,
+        overwrite: bool,
+        every: Option<u64>,
+    ) -> Result<Self, RunError> {
+        let scene = Scene::parse(&text, path)?;
+        let mut simulation = Simulation::new(&scene)?;
+        if scene.output.ledger {
+            simulation.keep_ledger()?;
+        }
+        let folder = OutputFolder::open(output, overwrite)?;
+        let frames = FrameStore::new(every.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES)))?;
+        let mut run = Self { scene, text, path: path.to_owned(), folder, simulation, frames, every };
+        run.add_frame()?;
+        Ok(run)
+    }
+
+    /// Goes on from the checkpoint in a folder.
+    ///
+    /// # Errors
+    /// When there is none, it is damaged, newer than this program, or no longer fits the scene.
+    pub fn resume(output: &Path) -> Result<Self, RunError> {
+        let file = output.join(OutputFolder::CHECKPOINT);
+        let Checkpoint { scene: text, path, every, frames, frames_checksum, state } = Checkpoint::read(&file)?;
+        let scene = Scene::parse(&text, &path)?;
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.restore(state)?;
+        let vertices = simulation.body().x.len();
+        let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
+        let folder = OutputFolder::reopen(output)?;
+        Ok(Self { scene, text, path, folder, simulation, frames, every: Some(every) })
+    }
+
+    /// The simulation.
+    #[must_use]
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Steps to the end, or until `stop` is set: then after the step that is under way. Whatever happens, the files of what was done are written.
+    /// `tell` hears of each step.
+    ///
+    /// # Errors
+    /// When a step fails or a file cannot be written.
+    pub fn go(
+        &mut self,
+        stop: &AtomicBool,
+        mut tell: impl FnMut(&Simulation, &StepReport),
+    ) -> Result<Ending, RunError> {
+        while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
+            let report = match self.simulation.step() {
+                Ok(report) => report,
+                Err(error) => {
+                    self.finish()?;
+                    return Err(error.into());
+                }
+            };
+            tell(&self.simulation, &report);
+            let done = self.simulation.steps_done();
+            if done.is_multiple_of(self.scene.steps_per_frame()) {
+                self.add_frame()?;
+            }
+            if self.every.is_some_and(|every| done.is_multiple_of(every)) {
+                self.save()?;
+            }
+        }
+        if self.every.is_some() && !self.simulation.is_finished() {
+            self.save()?;
+        }
+        self.finish()
+    }
+
+    fn add_frame(&mut self) -> Result<(), RunError> {
+        let (body, number) = (self.simulation.body(), self.frames.frames().len());
+        let triangles = self.simulation.triangles();
+        if self.scene.output.obj {
+            let text = obj_text(&body.x, triangles, self.simulation.strands());
+            self.folder.write_frame(number, "obj", text.as_bytes())?;
+        }
+        if self.scene.output.ply {
+            self.folder.write_frame(number, "ply", &ply_bytes(&body.x, &body.v, triangles))?;
+        }
+        self.frames.add(body.x.clone())?;
+        Ok(())
+    }
+
+    fn save(&mut self) -> Result<(), RunError> {
+        self.frames.sync()?;
+        let checkpoint = Checkpoint {
+            scene: self.text.clone(),
+            path: std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone()),
+            every: self.every.unwrap_or(u64::MAX),
+            frames: self.frames.frames().len(),
+            frames_checksum: self.frames.checksum(),
+            state: self.simulation.save(),
+        };
+        self.folder.write(OutputFolder::CHECKPOINT, &checkpoint.to_bytes()?)?;
+        Ok(())
+    }
+
+    /// Writes everything that is made of the whole run.
+    fn finish(&mut self) -> Result<Ending, RunError> {
+        let summary = self.simulation.summary()?;
+        let (wanted, frames) = (self.scene.output, self.frames.frames());
+        let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
+        let show = Show::new(&self.simulation, frames, frame_time);
+        let mut files = Vec::new();
+        let mut write = |name: &str, contents: &[u8]| -> Result<(), RunError> {
+            files.push(self.folder.write(name, contents)?);
+            Ok(())
+        };
+        if wanted.picture {
+            let body = self.simulation.body();
+            write(OutputFolder::PICTURE, &show.picture(&body.x, self.simulation.time(), false)?)?;
+        }
+        if wanted.gltf {
+            write(OutputFolder::ANIMATION, &animation_glb(&show.tracks(), frame_time)?)?;
+        }
+        if wanted.usd {
+            write(OutputFolder::USD, usd_text(&show.tracks(), 1.0 / frame_time).as_bytes())?;
+        }
+        if let Some(ledger) = self.simulation.ledger() {
+            write(OutputFolder::LEDGER, ledger.csv().as_bytes())?;
+            write(OutputFolder::LEDGER_PLOT, ledger.svg().map_err(RunError::Plot)?.as_bytes())?;
+        }
+        if wanted.png {
+            for (number, frame) in frames.iter().enumerate() {
+                let picture = show.picture(frame, number as f64 * frame_time, true)?;
+                self.folder.write_frame(number, "png", &picture)?;
+            }
+        }
+        let finished = self.simulation.is_finished();
+        write(OutputFolder::SUMMARY, format!("{summary}\n").as_bytes())?;
+        let (scene, path) = (self.text.clone(), self.path.clone());
+        let (version, frames) = (Record::VERSION, frames.len());
+        let record = Record { version, scene, path, finished, frames, summary: summary.clone() };
+        write(OutputFolder::RECORD, &serde_json::to_vec_pretty(&record)?)?;
+        Ok(Ending { summary, files, frames, finished })
+    }
+
+    /// The folder of its files.
+    #[must_use]
+    pub fn folder(&self) -> &OutputFolder {
+        &self.folder
+    }
+
+    /// Whether it leaves checkpoints to resume from.
+    #[must_use]
+    pub fn leaves_checkpoints(&self) -> bool {
+        self.every.is_some()
+    }
+}

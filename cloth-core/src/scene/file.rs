@@ -1,0 +1,134 @@
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::garment::{Garment, Mesh, Placement};
+use super::numbers::{finite_triple, non_negative, positive};
+use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam};
+use crate::fabric::Fabric;
+use crate::integrator::{Scheme, Tolerances};
+use crate::wind::Wind;
+
+/// The version of scene files that this program reads.
+const VERSION: u32 = 1;
+
+/// What a scene file may say.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "A scene of `cloth run`")]
+pub(super) struct File {
+    /// The version of the format: 1, the default.
+    #[serde(default = "newest")]
+    version: u32,
+    /// The shape of the only garment, beside `fabric`; for several say `[[garment]]`.
+    mesh: Option<Mesh>,
+    /// What the only garment is made of: a table, or the name of a measured fabric.
+    #[serde(default, deserialize_with = "some_fabric")]
+    #[schemars(with = "Option<super::fabric_choice::FabricChoice>")]
+    fabric: Option<Fabric>,
+    /// Pieces of cloth.
+    #[serde(default)]
+    garment: Vec<Garment>,
+    /// Strands of hair.
+    #[serde(default)]
+    hair: Vec<Hair>,
+    /// Stitches between garments. Default none.
+    #[serde(default)]
+    seams: Vec<Seam>,
+    /// Vertices that do not move, or move as they are told. Default none.
+    #[serde(default)]
+    pins: Vec<Pin>,
+    /// Solids that keep cloth out. Default none.
+    #[serde(default)]
+    obstacles: Vec<ObstacleDescription>,
+    /// Wind. Default none.
+    wind: Option<Wind>,
+    /// Acceleration of gravity, in m/s². Default [0, 0, −9.81].
+    #[serde(default = "standard_gravity", deserialize_with = "finite_triple")]
+    gravity: [f64; 3],
+    /// Drag per mass, in 1/s: the force −drag m v on every vertex. Default 0.
+    #[serde(default, deserialize_with = "non_negative")]
+    drag: f64,
+    /// `implicit-euler` (the default), `newton`, `bdf2`, `implicit-midpoint`, `trapezoid`, `symplectic-euler`, `verlet`, `explicit-euler` or
+    /// `explicit-euler-as-printed`.
+    #[serde(default)]
+    integrator: Scheme,
+    /// How exactly Newton's method solves a step, for the integrators that use it. Default each integrator's own.
+    #[serde(default)]
+    tolerances: Tolerances,
+    /// Whether a step that fails is tried again with half its size, and so on. Default false.
+    #[serde(default)]
+    adaptive: bool,
+    /// Time step h, in s.
+    #[serde(deserialize_with = "positive")]
+    dt: f64,
+    /// Time to simulate, in s; rounded to whole steps.
+    #[serde(deserialize_with = "non_negative")]
+    duration: f64,
+    /// Frames written per simulated second, rounded to whole steps per frame. Default 25.
+    #[serde(default = "frame_rate", deserialize_with = "positive")]
+    frames_per_second: f64,
+    /// Which files are written.
+    #[serde(default)]
+    output: OutputChoice,
+}
+
+fn newest() -> u32 {
+    VERSION
+}
+
+fn standard_gravity() -> [f64; 3] {
+    [0.0, 0.0, -9.81]
+}
+
+fn frame_rate() -> f64 {
+    25.0
+}
+
+fn some_fabric<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Fabric>, D::Error> {
+    super::fabric_choice::fabric(deserializer).map(Some)
+}
+
+impl TryFrom<File> for Scene {
+    type Error = String;
+
+    fn try_from(file: File) -> Result<Self, String> {
+        if file.version != VERSION {
+            let found = file.version;
+            return Err(format!("the scene has version {found}, but this program reads version {VERSION}"));
+        }
+        let mut garments = file.garment;
+        match (file.mesh, file.fabric) {
+            (Some(mesh), Some(fabric)) => {
+                let placement = Placement::default();
+                let only = Garment { name: None, mesh, fabric, placement, velocity: [0.0; 3], spin: [0.0; 3] };
+                garments.insert(0, only);
+            }
+            (Some(_), None) => return Err("missing field `fabric`: what the mesh is made of".to_owned()),
+            (None, Some(_)) => return Err("missing field `mesh`: the shape of the fabric".to_owned()),
+            (None, None) => {}
+        }
+        if garments.is_empty() && file.hair.is_empty() {
+            return Err(
+                "there is nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned()
+            );
+        }
+        Ok(Self {
+            garments,
+            hair: file.hair,
+            seams: file.seams,
+            pins: file.pins,
+            obstacles: file.obstacles,
+            wind: file.wind,
+            gravity: file.gravity,
+            drag: file.drag,
+            integrator: file.integrator,
+            tolerances: file.tolerances,
+            adaptive: file.adaptive,
+            dt: file.dt,
+            duration: file.duration,
+            frames_per_second: file.frames_per_second,
+            output: file.output,
+            folder: std::path::PathBuf::new(),
+        })
+    }
+}

@@ -1,0 +1,403 @@
+//! Runs from outside: interruption, checkpoints, files for other programs, reports, materials read at run time.
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+const SCENE: &str = r#"dt = 0.01
+duration = 0.3
+frames_per_second = 50
+integrator = "newton"
+drag = 0.5
+
+[[garment]]
+name = "cloth"
+placement = { translate = [0.0, 0.0, 0.12] }
+[garment.mesh.sheet]
+cells = [8, 8]
+size = [0.5, 0.5]
+[garment.fabric]
+density = 0.2
+[garment.fabric.material.stvk]
+stretch_stiffness = 40.0
+poisson_ratio = 0.3
+bending.flat.stiffness = 1e-5
+
+[[hair]]
+name = "fringe"
+count = 2
+segments = 5
+length = 0.1
+root = [0.0, -0.2, 0.0]
+density = 1e-4
+stretch_stiffness = 5.0
+bend_stiffness = 1e-7
+
+[[pins]]
+nearest = [0.25, 0.25, 0.12]
+motion = { keys = [{ time = 0.0 }, { time = 0.2, translate = [0.0, 0.0, 0.1] }] }
+
+[[obstacles]]
+sphere = { radius = 0.1 }
+friction = 0.3
+
+[wind]
+velocity = [1.0, 0.5, 0.0]
+"#;
+
+fn cloth(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_cloth")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn with_scene(text: &str) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    folder
+}
+
+fn succeeds(arguments: &[&str], folder: &Path) -> String {
+    let output = cloth(arguments, folder);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(arguments: &[&str], folder: &Path) -> String {
+    let output = cloth(arguments, folder);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    message
+}
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// Everything but the times that steps took.
+const REPEATABLE: [&str; 8] = [
+    "cloth.png",
+    "cloth.glb",
+    "cloth.usda",
+    "ledger.csv",
+    "ledger.svg",
+    "frames/cloth_0000.obj",
+    "frames/cloth_0007.obj",
+    "frames/cloth_0015.obj",
+];
+
+/// A run that was killed after its first checkpoint.
+fn stopped_at_half(scene: &str) -> TempDir {
+    let folder = with_scene(scene);
+    let mut child = started(&["run", "scene.toml", "-o", "half", "--checkpoint", "4"], folder.path());
+    // Once there is a checkpoint it is killed without notice.
+    let (start, checkpoint) = (Instant::now(), folder.path().join("half/checkpoint"));
+    while !checkpoint.exists() {
+        assert!(start.elapsed() < Duration::from_secs(120), "no checkpoint was written");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    folder
+}
+
+fn started(arguments: &[&str], folder: &Path) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_cloth"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+#[test]
+fn a_resumed_run_is_the_same_bit_by_bit() {
+    for (integrator, adaptive) in
+        [("newton", true), ("bdf2", false), ("implicit-euler", false), ("implicit-midpoint", true)]
+    {
+        let scene =
+            SCENE.replace("integrator = \"newton\"", &format!("integrator = \"{integrator}\"\nadaptive = {adaptive}"));
+        let folder = stopped_at_half(&scene);
+        succeeds(&["run", "scene.toml", "-o", "whole"], folder.path());
+        let text = succeeds(&["resume", "half"], folder.path());
+        assert!(text.contains("30 steps"), "{text}");
+        for name in REPEATABLE {
+            let [whole, half] = ["whole", "half"].map(|run| read(&folder.path().join(run), name));
+            assert!(whole == half, "{integrator}: {name} differs");
+        }
+    }
+}
+
+#[test]
+fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
+    let folder = with_scene(&SCENE.replace("duration = 0.3", "duration = 0.1"));
+    let path = folder.path();
+    succeeds(&["run", "scene.toml", "-o", "out", "--checkpoint", "5"], path);
+    let checkpoint = path.join("out/checkpoint");
+    let good = std::fs::read(&checkpoint).unwrap();
+    let with = |bytes: &[u8]| {
+        std::fs::write(&checkpoint, bytes).unwrap();
+        refused(&["resume", "out"], path)
+    };
+    let mut flipped = good.clone();
+    *flipped.last_mut().unwrap() ^= 1;
+    assert!(with(&flipped).contains("is damaged: its checksum does not match"));
+    assert!(with(&good[..good.len() / 2]).contains("is damaged: it is cut short"));
+    let newer = String::from_utf8(good.clone()).unwrap().replacen("cloth-checkpoint 1 ", "cloth-checkpoint 2 ", 1);
+    assert!(with(newer.as_bytes()).contains("has version 2, but this program reads version 1"));
+    assert!(with(b"something else\n").contains("is no checkpoint"));
+    std::fs::write(&checkpoint, &good).unwrap();
+    let frames = path.join("out/checkpoint.frames");
+    let bytes = std::fs::read(&frames).unwrap();
+    std::fs::write(&frames, &bytes[..bytes.len() - 30]).unwrap();
+    assert!(refused(&["resume", "out"], path).contains("checkpoint.frames is damaged: it is cut short"));
+    std::fs::write(&frames, &bytes).unwrap();
+    succeeds(&["resume", "out"], path);
+    // A mesh that is no longer the same.
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+    std::fs::write(path.join("shape.obj"), square).unwrap();
+    let sheet = "[garment.mesh.sheet]\ncells = [8, 8]\nsize = [0.5, 0.5]\n";
+    let text = SCENE.replace("duration = 0.3", "duration = 0.05").replace(sheet, "mesh.obj.path = \"shape.obj\"\n");
+    std::fs::write(path.join("obj.toml"), text).unwrap();
+    succeeds(&["run", "obj.toml", "-o", "obj", "--checkpoint", "2"], path);
+    std::fs::write(path.join("shape.obj"), square.replace("1 1 0", "1 2 0")).unwrap();
+    assert!(refused(&["resume", "obj"], path).contains("Did a mesh or material file change?"));
+    assert!(refused(&["resume", "elsewhere"], path).contains("was the run started with --checkpoint?"));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_all_files_and_can_be_resumed() {
+    let folder = with_scene(
+        &SCENE
+            .replace("duration = 0.3", "duration = 1000.0")
+            .replace("frames_per_second = 50", "frames_per_second = 4"),
+    );
+    let child = started(&["run", "scene.toml", "-o", "out", "--checkpoint", "3"], folder.path());
+    let start = Instant::now();
+    while !folder.path().join("out/checkpoint").exists() {
+        assert!(start.elapsed() < Duration::from_secs(120), "no checkpoint was written");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert!(message.contains("of 100000; go on with `cloth resume out`"), "{message}");
+    let out = folder.path().join("out");
+    assert!(read(&out, "cloth.png").starts_with(b"\x89PNG") && read(&out, "cloth.glb").starts_with(b"glTF"));
+    let record: serde_json::Value = serde_json::from_slice(&read(&out, "run.json")).unwrap();
+    assert_eq!(record["finished"], false);
+    assert!(std::fs::read_dir(&out).unwrap().all(|e| e.unwrap().path().extension().is_none_or(|end| end != "part")));
+}
+
+#[test]
+fn a_folder_that_disappears_is_a_clear_error() {
+    let folder = with_scene(&SCENE.replace("duration = 0.3", "duration = 100.0"));
+    let child = started(&["run", "scene.toml", "-o", "out"], folder.path());
+    let start = Instant::now();
+    while !folder.path().join("out/frames/cloth_0003.obj").exists() {
+        assert!(start.elapsed() < Duration::from_secs(120), "no frame was written");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::fs::rename(folder.path().join("out"), folder.path().join("moved")).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("cannot write out/frames/cloth_") && message.contains("No such file"), "{message}");
+    let frame = String::from_utf8(read(&folder.path().join("moved"), "frames/cloth_0003.obj")).unwrap();
+    assert_eq!(frame.lines().filter(|line| line.starts_with("v ")).count(), 81 + 12);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_clear_error_and_leaves_no_part_of_a_file() {
+    let folder = with_scene(SCENE);
+    let frames = folder.path().join("out/frames");
+    std::fs::create_dir_all(&frames).unwrap();
+    // Writing to this device fails as on a full disk.
+    std::os::unix::fs::symlink("/dev/full", frames.join("cloth_0002.obj.part")).unwrap();
+    let message = refused(&["run", "scene.toml", "-o", "out"], folder.path());
+    assert!(
+        message.contains("cannot write out/frames/cloth_0002.obj") && message.contains("No space left"),
+        "{message}"
+    );
+    assert!(frames.join("cloth_0001.obj").exists() && !frames.join("cloth_0002.obj").exists());
+}
+
+#[test]
+fn usd_ply_and_obj_hold_the_same_frames() {
+    let folder = with_scene(&format!("{SCENE}[output]\nply = true\n"));
+    succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
+    let out = folder.path().join("out");
+    let usd = String::from_utf8(read(&out, "cloth.usda")).unwrap();
+    for part in [
+        "#usda 1.0\n",
+        "metersPerUnit = 1\n",
+        "upAxis = \"Z\"\n",
+        "timeCodesPerSecond = 50\n",
+        "endTimeCode = 15\n",
+        "def Mesh \"cloth\"",
+        "def BasisCurves \"fringe\"",
+        "def Mesh \"sphere_0\"",
+    ] {
+        assert!(usd.contains(part), "{part}");
+    }
+    // The points of the cloth in frame 15, in all three formats.
+    let mesh = usd.split("def Mesh \"cloth\"").nth(1).unwrap();
+    let samples = mesh.split("points.timeSamples = {").nth(1).unwrap().split('}').next().unwrap();
+    let line = samples.lines().find(|line| line.trim_start().starts_with("15: [")).unwrap();
+    let numbers = |text: &str| -> Vec<f64> {
+        let words = text.split(|c: char| "[](), ".contains(c)).filter(|word| !word.is_empty());
+        words.map(|word| word.parse().unwrap_or_else(|_| panic!("{word}"))).collect()
+    };
+    let from_usd = numbers(line.split_once(':').unwrap().1);
+    let obj = String::from_utf8(read(&out, "frames/cloth_0015.obj")).unwrap();
+    let from_obj: Vec<f64> = obj.lines().filter_map(|line| line.strip_prefix("v ")).flat_map(&numbers).collect();
+    let ply = read(&out, "frames/cloth_0015.ply");
+    let end = ply.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+    let single = |at: usize| f64::from(f32::from_le_bytes(ply[end + at..end + at + 4].try_into().unwrap()));
+    assert_eq!((from_usd.len(), from_obj.len()), (3 * 81, 3 * 93));
+    for (place, coordinate) in from_usd.iter().enumerate() {
+        let from_ply = single(24 * (place / 3) + 4 * (place % 3));
+        assert!((coordinate - from_obj[place]).abs() < 1e-6 && (coordinate - from_ply).abs() < 1e-6);
+    }
+    assert!(obj.lines().filter(|line| line.starts_with("l ")).count() == 2);
+    let triangles = mesh.split("faceVertexIndices = [").nth(1).unwrap().split(']').next().unwrap();
+    assert_eq!(numbers(triangles).len(), 3 * 128);
+}
+
+#[test]
+fn what_is_wanted_is_written_and_nothing_else() {
+    let none = "[output]\npng = true\npicture = false\ngltf = false\nusd = false\nobj = false\nledger = false\n";
+    let folder = with_scene(&format!("{}{none}", SCENE.replace("duration = 0.3", "duration = 0.02")));
+    succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
+    let mut names: Vec<String> = std::fs::read_dir(folder.path().join("out"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["frames", "run.json", "summary.txt"]);
+    assert!(read(&folder.path().join("out"), "frames/cloth_0001.png").starts_with(b"\x89PNG"));
+    assert_eq!(std::fs::read_dir(folder.path().join("out/frames")).unwrap().count(), 2);
+}
+
+/// Reads the USD file with Pixar's own library where Python has it.
+#[test]
+fn pixars_library_reads_the_usd_file_where_it_is_installed() {
+    let script = "from pxr import Usd, UsdGeom\n\
+                  stage = Usd.Stage.Open('out/cloth.usda')\n\
+                  mesh = UsdGeom.Mesh(stage.GetPrimAtPath('/scene/cloth'))\n\
+                  points = mesh.GetPointsAttr()\n\
+                  print(len(points.GetTimeSamples()), len(points.Get(15)), UsdGeom.GetStageUpAxis(stage))";
+    let available = Command::new("python3").args(["-c", "import pxr"]).output();
+    if !available.is_ok_and(|output| output.status.success()) {
+        eprintln!("left out: Python has no module pxr");
+        return;
+    }
+    let folder = with_scene(SCENE);
+    succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
+    let output = Command::new("python3").args(["-c", script]).current_dir(folder.path()).output().unwrap();
+    assert_eq!(
+        String::from_utf8(output.stdout).unwrap().trim(),
+        "16 81 Z",
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+#[test]
+fn a_report_is_one_page_without_anything_from_elsewhere() {
+    let folder = with_scene(SCENE);
+    succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
+    let text = succeeds(&["report", "out"], folder.path());
+    assert!(text.contains("wrote out/report.html"), "{text}");
+    let page = String::from_utf8(read(&folder.path().join("out"), "report.html")).unwrap();
+    for part in
+        ["data:image/png;base64,", "<svg", "WindDrag", "SlidingFriction", "line search", "cloth: membrane", "passed"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("<script") && !page.contains("src=\"http") && !page.contains("href="), "it loads something");
+    assert!(!page.contains(">failed<"), "an element failed its audit");
+    assert!(refused(&["report", "nowhere"], folder.path()).contains("is this the folder of a finished run?"));
+}
+
+#[test]
+fn the_schema_knows_every_key_with_its_unit() {
+    let schema: serde_json::Value = serde_json::from_str(&succeeds(&["schema"], Path::new("."))).unwrap();
+    let properties = schema["properties"].as_object().unwrap();
+    for key in ["version", "garment", "hair", "seams", "pins", "obstacles", "wind", "output", "dt", "mesh", "fabric"] {
+        assert!(properties.contains_key(key), "{key}");
+    }
+    assert!(properties["dt"]["description"].as_str().unwrap().ends_with("in s."));
+    assert_eq!(schema["additionalProperties"], false);
+}
+
+const OWN: &str = r#"
+/// The membrane of the library, as a file of one's own.
+energy OwnMembrane(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
+    rest {
+        let D_m = columns(u1 - u0, u2 - u0);
+        let s = power_of_two(det(D_m));
+        let B = adjugate(D_m) * s;
+        let d = (det(D_m) * s)^2;
+        let per_d = 1 / (2 * d);
+        let A = det(D_m) / 2;
+    }
+    let F = columns(x1 - x0, x2 - x0) * B;
+    let E = per_d * (transpose(F) * F - d * identity(2));
+    A * (μ * ddot(E, E) + λ / 2 * trace(E)^2)
+}
+"#;
+
+#[test]
+fn a_material_from_a_file_moves_as_the_same_formula_built_in() {
+    let folder = with_scene(SCENE);
+    let lame = |y: f64, nu: f64| (y * nu / (1.0 - nu * nu), y / (2.0 * (1.0 + nu)));
+    let (lambda, mu) = lame(40.0, 0.3);
+    let own = format!(
+        "[garment.fabric.material.file]\npath = \"own.energy\"\nparameters = {{ lambda = {lambda}, \"μ\" = {mu} }}"
+    );
+    let text = SCENE.replace("[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3", &own);
+    assert_ne!(text, SCENE);
+    std::fs::write(folder.path().join("own.toml"), &text).unwrap();
+    std::fs::write(folder.path().join("own.energy"), OWN).unwrap();
+    succeeds(&["run", "scene.toml", "-o", "built"], folder.path());
+    let told = succeeds(&["run", "own.toml", "-o", "own"], folder.path());
+    assert!(told.contains("OwnMembrane"), "{told}");
+    let points = |run: &str| -> Vec<f64> {
+        let obj = String::from_utf8(read(&folder.path().join(run), "frames/cloth_0015.obj")).unwrap();
+        let rows = obj.lines().filter_map(|line| line.strip_prefix("v ").map(str::to_owned)).collect::<Vec<_>>();
+        rows.iter().flat_map(|row| row.split(' ').map(|word| word.parse().unwrap()).collect::<Vec<f64>>()).collect()
+    };
+    for (own, built) in points("own").iter().zip(points("built")) {
+        assert!((own - built).abs() < 1e-7, "{own} {built}");
+    }
+    let page = succeeds(&["report", "own"], folder.path());
+    assert!(page.contains("report.html"));
+    // The same by --material, which replaces what the scene says.
+    let parameter = format!("lambda={lambda},mu={mu}");
+    succeeds(
+        &["run", "scene.toml", "-o", "replaced", "--material", "own.energy", "--parameters", &parameter],
+        folder.path(),
+    );
+    assert_eq!(points("replaced").len(), points("own").len());
+    let expect = |text: &str, energy: &str, parts: &[&str]| {
+        std::fs::write(folder.path().join("bad.toml"), text).unwrap();
+        std::fs::write(folder.path().join("own.energy"), energy).unwrap();
+        let message = refused(&["run", "bad.toml", "-o", "bad"], folder.path());
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    };
+    expect(&text.replace("lambda = ", "lamda = "), OWN, &["no element has a parameter `lamda`"]);
+    expect(&text.replace(&format!("lambda = {lambda}, "), ""), OWN, &["OwnMembrane needs the parameter `λ` [N/m]"]);
+    expect(&text, &OWN.replace("trace(E)", "trac(E)"), &["own.energy", "trac"]);
+    expect(&text.replace("own.energy", "none.energy"), OWN, &["cannot read none.energy"]);
+    expect(
+        &text,
+        "force F(_x: Point, v: Velocity; λ, μ: Scalar[N s/m]) { -(λ + μ) * v }",
+        &["F is a force; a material is made of energies"],
+    );
+}

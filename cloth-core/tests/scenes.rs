@@ -1,0 +1,267 @@
+//! Scenes of several parts: contact, friction, wind, pins that move, seams, hair, and the ledger's balance.
+
+use cloth_core::Simulation;
+use cloth_core::scene::Scene;
+
+const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+                    bending.flat.stiffness = 1e-5\n";
+
+fn started(text: &str) -> Simulation {
+    let scene = Scene::parse(text, "test.toml".as_ref()).unwrap_or_else(|error| panic!("{error}"));
+    let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    simulation.keep_ledger().unwrap();
+    simulation
+}
+
+fn finished(text: &str) -> Simulation {
+    let mut simulation = started(text);
+    while !simulation.is_finished() {
+        simulation.step().unwrap_or_else(|error| panic!("{error}"));
+    }
+    simulation
+}
+
+fn refused(text: &str) -> String {
+    match Scene::parse(text, "test.toml".as_ref()) {
+        Ok(scene) => Simulation::new(&scene).unwrap_err().to_string(),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn sheet(head: &str, cells: usize, size: f64) -> String {
+    format!("{head}\n[[garment]]\nmesh.sheet = {{ cells = [{cells}, {cells}], size = [{size}, {size}] }}\n{SOFT}")
+}
+
+/// A sheet that lies on the plane z = 0 under gravity of a slope.
+fn slope(friction: f64, integrator: &str) -> Simulation {
+    let (sine, cosine) = 0.4_f64.sin_cos();
+    let gravity = [9.81 * sine, 0.0, -9.81 * cosine];
+    let head = format!("dt = 0.005\nduration = 0.5\nintegrator = \"{integrator}\"\ngravity = {gravity:?}");
+    let lying = format!("{}placement.translate = [0.0, 0.0, 0.0049]\n", "");
+    let text = sheet(&head, 4, 0.2).replace("[garment.fabric]\n", &format!("{lying}[garment.fabric]\n"));
+    finished(&format!("{text}[[obstacles]]\nplane = {{}}\nfriction = {friction}\n"))
+}
+
+#[test]
+fn cloth_on_a_slope_sticks_below_the_angle_of_friction_and_slides_above_it_as_coulomb_says() {
+    for integrator in ["newton", "implicit-euler"] {
+        let mean = |simulation: &Simulation| {
+            simulation.body().v.iter().map(|v| v[0]).sum::<f64>() / simulation.body().v.len() as f64
+        };
+        // tan 0.4 = 0.4228.
+        let held = slope(0.6, integrator);
+        assert!(mean(&held) < 2e-3, "{integrator}: it creeps with {} m/s", mean(&held));
+        let sliding = slope(0.2, integrator);
+        let (sine, cosine) = 0.4_f64.sin_cos();
+        let expected = 9.81 * (sine - 0.2 * cosine) * 0.5;
+        assert!((mean(&sliding) / expected - 1.0).abs() < 0.03, "{integrator}: {} of {expected}", mean(&sliding));
+        let free = slope(0.0, integrator);
+        assert!((mean(&free) / (9.81 * sine * 0.5) - 1.0).abs() < 0.01, "{integrator}: {}", mean(&free));
+    }
+}
+
+#[test]
+fn nothing_ends_inside_an_obstacle_and_what_is_far_is_skipped() {
+    let obstacles = [
+        "sphere = { radius = 0.2, centre = [0.0, 0.0, -0.25] }",
+        "capsule = { from = [-0.1, 0.0, -0.2], to = [0.1, 0.0, -0.2], radius = 0.15 }",
+        "box = { centre = [0.0, 0.0, -0.2], size = [0.3, 0.3, 0.3], rounding = 0.03, rotate = { axis = [0.0, 0.0, 1.0], angle = 30.0 } }",
+        "plane = { point = [0.0, 0.0, -0.1], normal = [0.2, 0.0, 1.0] }",
+    ];
+    for obstacle in obstacles {
+        let head = "dt = 0.01\nduration = 0.5\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\ndrag = 0.5";
+        let text = format!("{}[[obstacles]]\n{obstacle}\nfriction = 0.3\n", sheet(head, 16, 0.5));
+        let mut simulation = finished(&text);
+        let solid = simulation.obstacles()[0].at(0.0);
+        let deepest = simulation.body().x.iter().map(|&x| solid.signed_distance(x)).fold(f64::INFINITY, f64::min);
+        assert!(deepest > 0.0 && deepest < 0.005, "{obstacle}: {deepest}");
+        let summary = simulation.summary().unwrap();
+        let contact = summary.terms.iter().find(|term| term.element.ends_with("Contact")).unwrap();
+        assert!(contact.counts.hessian.evaluated > 0, "{contact:?}");
+        assert!(contact.counts.hessian.skipped > 0, "{contact:?}");
+    }
+}
+
+#[test]
+fn a_level_sheet_falls_as_fast_as_the_air_lets_it() {
+    let undamped = "stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\nbending.flat.stiffness = 1e-5\n";
+    let springs = "mass-spring]\nstructural = 40.0\nshear = 20.0\nbending = 1.0\ndamping = 0.01\n";
+    // Damped springs make the matrix one that is not symmetric.
+    for (integrator, fabric) in [
+        ("newton", undamped),
+        ("implicit-euler", undamped),
+        ("implicit-euler", springs),
+        ("implicit-midpoint", undamped),
+    ] {
+        let head = format!("dt = 0.01\nduration = 2.0\nintegrator = \"{integrator}\"");
+        let garment = sheet(&head, 3, 0.3).replace(undamped, fabric);
+        let text = format!("{garment}[wind]\nvelocity = [0.0, 0.0, 0.5]\n");
+        let simulation = finished(&text);
+        // σ g = ½ ρ C u², u beyond the rising air.
+        let speed = (2.0_f64 * 0.2 * 9.81 / (1.2 * 1.2)).sqrt() - 0.5;
+        for v in &simulation.body().v {
+            assert!((v[2] / -speed - 1.0).abs() < 0.01, "{integrator}: {} of {speed}", v[2]);
+        }
+    }
+}
+
+#[test]
+fn pins_go_where_they_are_told_whatever_the_integrator() {
+    let keys = "keys = [{ time = 0.0 }, { time = 0.1, angle = 90.0, translate = [0.0, 0.0, 0.3] }]";
+    for integrator in
+        ["implicit-euler", "newton", "bdf2", "implicit-midpoint", "trapezoid", "symplectic-euler", "verlet"]
+    {
+        let head = format!("dt = 0.002\nduration = 0.12\nintegrator = \"{integrator}\"");
+        let pin = format!("[[pins]]\nnearest = [0.1, 0.1, 0.0]\n[pins.motion]\n{keys}\n");
+        let simulation = finished(&format!("{}{pin}", sheet(&head, 2, 0.2)));
+        let x = simulation.body().x[8];
+        let expected = [-0.1, 0.1, 0.3];
+        assert!((0..3).all(|axis| (x[axis] - expected[axis]).abs() < 1e-12), "{integrator}: {x:?}");
+        assert!(simulation.body().x[0] != [-0.1, -0.1, 0.0]);
+    }
+}
+
+#[test]
+fn the_ledger_closes_for_integrators_that_keep_energy() {
+    let head =
+        |integrator: &str, dt: f64| format!("dt = {dt}\nduration = 0.3\nintegrator = \"{integrator}\"\ndrag = 1.0");
+    let rest = "[[pins]]\nbox = { min = [-1.0, 0.099, -1.0], max = [1.0, 0.101, 1.0] }\n[pins.motion]\n\
+                keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.0, 0.15] }]\n[wind]\nvelocity = [0.0, 2.0, 1.0]\n";
+    let balance = |integrator: &str, dt: f64| {
+        let mut simulation = finished(&format!("{}{rest}", sheet(&head(integrator, dt), 4, 0.2)));
+        let ledger = simulation.ledger().unwrap().clone();
+        let last = ledger.entries().last().unwrap();
+        assert_eq!(ledger.works(), ["drag", "wind"]);
+        assert!(last.pins > 1e-3 && last.work[0] < 0.0, "{last:?}");
+        assert_eq!(ledger.csv().lines().count(), ledger.entries().len() + 1);
+        (ledger.largest_unaccounted() / ledger.exchanged(), simulation.summary().unwrap().warnings)
+    };
+    let (coarse, _) = balance("implicit-midpoint", 2e-3);
+    let (fine, warnings) = balance("implicit-midpoint", 1e-3);
+    assert!(fine < 0.01 && warnings.is_empty(), "{fine} {warnings:?}");
+    assert!(fine < 0.5 * coarse, "{coarse} {fine}");
+    // Implicit Euler loses more, and nobody expects better.
+    let (lost, warnings) = balance("newton", 2e-3);
+    assert!(lost > fine && warnings.is_empty(), "{lost}");
+}
+
+#[test]
+fn obstacles_that_move_do_work_and_carry_cloth_along() {
+    let head = "dt = 0.005\nduration = 0.6\nintegrator = \"newton\"";
+    let lying = sheet(head, 4, 0.2)
+        .replace("[garment.fabric]\n", "placement.translate = [0.0, 0.0, 0.0049]\n[garment.fabric]\n");
+    let motion = "keys = [{ time = 0.0 }, { time = 0.6, translate = [0.18, 0.0, 0.12] }]";
+    let simulation =
+        finished(&format!("{lying}[[obstacles]]\nplane = {{}}\nfriction = 1.0\n[obstacles.motion]\n{motion}\n"));
+    let (weight, last) = (0.2 * 0.04 * 9.81, simulation.ledger().unwrap().entries().last().unwrap());
+    let carried = simulation.body().x.iter().map(|x| x[0]).sum::<f64>() / 25.0;
+    assert!((carried - 0.18).abs() < 0.02, "{carried}");
+    assert!((last.obstacles / (weight * 0.12) - 1.0).abs() < 0.1, "{} of {}", last.obstacles, weight * 0.12);
+}
+
+#[test]
+fn seams_pull_garments_together_without_moving_them_as_a_whole() {
+    let head = "dt = 0.005\nduration = 1.5\nintegrator = \"newton\"\ngravity = [0.0, 0.0, 0.0]\ndrag = 2.0";
+    let piece = |name: &str, x: f64| {
+        format!(
+            "[[garment]]\nname = \"{name}\"\nplacement.translate = [{x}, 0.0, 0.0]\n\
+             mesh.sheet = {{ cells = [3, 3], size = [0.3, 0.3] }}\n{SOFT}"
+        )
+    };
+    let seam = "[[seams]]\ngarments = [\"left\", \"right\"]\nwithin = 0.05\nstiffness = 5.0\ndamping = 0.01\n";
+    let text = format!("{head}\n{}{}{seam}", piece("left", -0.17), piece("right", 0.17));
+    let text = text.replace("newton", "implicit-euler");
+    let simulation = finished(&text);
+    let x = &simulation.body().x;
+    for row in 0..4 {
+        let (p, q) = (x[4 * row + 3], x[16 + 4 * row]);
+        let apart: f64 = (0..3).map(|axis| (p[axis] - q[axis]).powi(2)).sum::<f64>().sqrt();
+        assert!(apart < 2e-3, "row {row}: {apart}");
+    }
+    let middle = x.iter().map(|x| x[0]).sum::<f64>() / 32.0;
+    assert!(middle.abs() < 1e-4, "{middle}");
+    let message = refused(&text.replace("\"right\"]", "\"rihgt\"]"));
+    assert!(message.contains("seams[0]") && message.contains("called `rihgt`; there are left, right"), "{message}");
+    let message = refused(&text.replace("within = 0.05", "within = 0.01"));
+    assert!(message.contains("the nearest are 4.000e-2 m apart"), "{message}");
+}
+
+#[test]
+fn hair_bends_under_its_weight_as_a_beam_does() {
+    let text = "dt = 0.01\nduration = 4.0\nintegrator = \"newton\"\ndrag = 6.0\n[[hair]]\ncount = 2\nsegments = 40\nlength = 0.1\n\
+                last_root = [0.0, 0.1, 0.0]\ndirection = [1.0, 0.0, 0.0]\ndensity = 1e-4\nstretch_stiffness = 50.0\nbend_stiffness = 4e-6\n";
+    let simulation = finished(text);
+    assert_eq!(simulation.body().x.len(), 82);
+    // The clamp ends half-way between the two vertices that are held.
+    let length: f64 = 0.1 - 0.5 * 0.1 / 40.0;
+    let exact = 1e-4 * 9.81 * length.powi(4) / (8.0 * 4e-6);
+    for strand in simulation.strands() {
+        let tip = -simulation.body().x[strand.end - 1][2];
+        assert!((tip / exact - 1.0).abs() < 0.02, "{tip} of {exact}");
+    }
+}
+
+#[test]
+fn garments_fall_together_from_where_they_are_placed() {
+    let text = format!(
+        "dt = 0.01\nduration = 0.1\ngravity = [0.0, 0.0, 0.0]\n[[garment]]\nfabric = \"denim\"\nmesh.disc = {{ radius = 1.0, rings = 3 }}\n\
+         placement = {{ scale = 0.5, rotate = {{ axis = [1.0, 0.0, 0.0], angle = 90.0 }}, translate = [1.0, 2.0, 3.0] }}\n\
+         velocity = [0.0, 0.5, 0.0]\n[[garment]]\nmesh.strip = {{ length = 0.4, width = 0.1, segments = 8 }}\n{SOFT}"
+    );
+    let simulation = finished(&text);
+    let first = &simulation.body().x[..37];
+    let (top, middle) = (first.iter().map(|p| p[2]).fold(0.0, f64::max), first[0]);
+    assert!(
+        (top - (3.0 + 0.5 * 80.0_f64.to_radians().sin())).abs() < 1e-3 && (middle[1] - 2.05).abs() < 1e-9,
+        "{top} {middle:?}"
+    );
+    assert!(simulation.body().x[37..].iter().all(|p| p[2] == 0.0));
+}
+
+#[test]
+fn scenes_that_contradict_themselves_are_refused_with_the_remedy() {
+    let good = sheet("dt = 0.01\nduration = 0.1", 2, 0.2);
+    let expect = |text: &str, parts: &[&str]| {
+        let message = refused(text);
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    };
+    expect(&format!("version = 2\n{good}"), &["has version 2, but this program reads version 1"]);
+    expect("dt = 0.01\nduration = 0.1\n", &["nothing to simulate", "[[garment]]"]);
+    expect(&format!("{good}[[pins]]\nvertex = 0\nall = true\n"), &["test.toml:11:1", "exactly one of `vertex`"]);
+    expect(&format!("{good}[[pins]]\nvertex = 0\nof = \"coat\"\n"), &["pins[0]", "called `coat`; there are garment 0"]);
+    expect(&format!("{good}[[obstacles]]\nfriction = 0.1\n"), &["test.toml:11:1", "exactly one of `plane`"]);
+    expect(
+        &format!("{good}[[obstacles]]\nsphere = {{ raduis = 1.0 }}\n"),
+        &["test.toml:12:", "did you mean `radius`?"],
+    );
+    expect(
+        &format!("{good}[[obstacles]]\nbox = {{ size = [1.0, 1.0, 0.1], rounding = 0.1 }}\n"),
+        &["cannot be rounded by 0.1"],
+    );
+    let fabric = format!(
+        "fabric = \"demin\"\n{}",
+        good.split("[garment.fabric]").next().unwrap().replace("[[garment]]\n", "[[garment]]\nfabric = \"demin\"\n")
+    );
+    expect(fabric.split_once('\n').unwrap().1, &["unknown variant `demin`", "did you mean `denim`?"]);
+    let keys = "[pins.motion]\nkeys = [{ time = 1.0 }, { time = 0.5 }]\n";
+    expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must grow"]);
+    let twice = "[[pins]]\nvertex = 0\n[[pins]]\nall = true\nmotion = { keys = [{ time = 0.0, angle = 5.0 }] }\n";
+    expect(&format!("{good}{twice}"), &["pins[1]: vertex 0 is held by another pin"]);
+    expect(&format!("{good}[wind]\nvelocity = [1.0, 0.0, inf]\n"), &["test.toml:12:12", "finite numbers only"]);
+}
+
+#[test]
+fn the_scenes_of_the_gallery_are_sound() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            let scene = Scene::read(&path).unwrap_or_else(|error| panic!("{error}"));
+            let simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            assert!(simulation.warnings().is_empty(), "{}: {:?}", path.display(), simulation.warnings());
+            count += 1;
+        }
+    }
+    assert!(count >= 9, "{count}");
+}
