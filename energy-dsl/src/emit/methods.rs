@@ -115,7 +115,8 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 }
             };
             let guard = mask(program, routines, general.ordinary);
-            let WithCare { inputs, outputs, numbers, code } = with_care(method, name, program, routines, general);
+            let WithCare { inputs, outputs, numbers, summed, code } =
+                with_care(method, name, program, routines, general);
             let general = quote! {
                 /// Where `_if_ordinary` suffices.
                 #[inline(always)]
@@ -134,7 +135,7 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 fn #in_general(#arguments, ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
                     #code
                     let (numbers, flags) =
-                        ::energy_dsl::with_care::<WithCare, T, #numbers>(&[#(#inputs),*], !ordinary);
+                        ::energy_dsl::with_care::<WithCare, T, #numbers>(&[#(#inputs),*], !ordinary, #summed);
                     let mut general = ::energy_dsl::#result { #outputs flags };
                     if let ::core::option::Option::Some((#(#fields),*)) = here {
                         let here = ::energy_dsl::#result { #(#fields),* };
@@ -168,6 +169,8 @@ struct WithCare {
     outputs: TokenStream,
     /// How many numbers it reads and returns.
     numbers: TokenStream,
+    /// From which number on results are added to each other.
+    summed: usize,
     code: TokenStream,
 }
 
@@ -224,7 +227,10 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
             }
         }
     };
-    WithCare { inputs, outputs, numbers: quote!(#reads, #returns), code }
+    // Derivatives by several difference vectors are summed up to those by points.
+    let is_summed = method.routine == "reduced_hessian" && routines.vectors.len() > 1;
+    let summed = if is_summed { general.groups[0].len() } else { returns };
+    WithCare { inputs, outputs, numbers: quote!(#reads, #returns), summed, code }
 }
 
 /// Statements, then a mask.

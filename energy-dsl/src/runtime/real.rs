@@ -69,8 +69,7 @@ pub trait Number:
 
     /// One lane (of which a scalar has one, number 0).
     fn unbounded(&self, lane: usize) -> Self::Unbounded;
-    /// Replaces one lane by the number nearest to `value`; by a very large one where that is too large for the type, though not
-    /// infinite.
+    /// Replaces one lane by the number nearest to `value`.
     fn set_lane(&mut self, lane: usize, value: Self::Unbounded);
 
     /// The number nearest to a double.
@@ -136,6 +135,12 @@ pub trait Number:
     fn equal(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// The number itself. Of [`Number::Unbounded`] numbers, one that is too large for the bounded type though not infinite becomes
+    /// a large one instead, that a few more such can be added to or subtracted from: sums of what overflows are then numbers.
+    #[must_use]
+    fn saturated(self) -> Self {
+        self
+    }
     /// Runs a routine with all precautions over this type.
     #[doc(hidden)]
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
@@ -169,7 +174,7 @@ macro_rules! number_for_float {
             }
             #[inline]
             fn set_lane(&mut self, _lane: usize, value: Self::Unbounded) {
-                *self = value.saturated();
+                *self = value.to_scalar();
             }
             #[inline(always)]
             fn from_f64(value: f64) -> Self {

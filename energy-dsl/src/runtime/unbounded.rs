@@ -81,17 +81,6 @@ impl<S: Scalar> Unbounded<S> {
         }
     }
 
-    /// [`Self::to_scalar`] for results: where a number is too large for the type, though not infinite, a power of two that is far beyond
-    /// any other result, and that a few more such can be added to or subtracted from without making no number.
-    pub(crate) fn saturated(self) -> S {
-        let rounded = self.to_scalar();
-        if rounded.abs() < S::INFINITY || !self.is_plain() {
-            return rounded;
-        }
-        let large = S::power_of_two(S::LAST - 8);
-        if S::default() < self.significand { large } else { -large }
-    }
-
     /// Whether the number has a place in the type, normal or 0.
     fn fits(self) -> bool {
         let (_, exponent) = self.split();
@@ -313,6 +302,13 @@ impl<S: Scalar> Number for Unbounded<S> {
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
+    fn saturated(self) -> Self {
+        if !self.is_plain() || self.to_scalar().abs() < S::INFINITY {
+            return self;
+        }
+        let large = S::power_of_two(S::LAST - 8);
+        Self::of(if S::default() < self.significand { large } else { -large })
+    }
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Self; INPUTS],
     ) -> ([Self; OUTPUTS], Flags<Self>) {
@@ -359,7 +355,7 @@ impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
 }
 
 /// Runs a routine with all precautions in the lanes where `extraordinary` holds; the others are 0. Scalar and lanes give the same
-/// bits, for it is one code that runs.
+/// bits, for it is one code that runs. Outputs from number `summed` on will be added to each other: they are [`Number::saturated`].
 #[doc(hidden)]
 #[cold]
 #[inline(never)]
@@ -367,6 +363,7 @@ impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
 pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
     inputs: &[T; INPUTS],
     extraordinary: T::Mask,
+    summed: usize,
 ) -> ([T; OUTPUTS], Flags<T>) {
     let mut outputs = [T::from_f64(0.0); OUTPUTS];
     let (mut degenerate, mut kink) = (0, 0);
@@ -377,8 +374,8 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
         let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
         let (mut results, mut flags) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(&own);
         settle(&own, &mut results, &mut flags);
-        for (output, result) in outputs.iter_mut().zip(results) {
-            output.set_lane(lane, result);
+        for (number, (output, result)) in outputs.iter_mut().zip(results).enumerate() {
+            output.set_lane(lane, if number < summed { result } else { result.saturated() });
         }
         degenerate |= u32::from(flags.degenerate.any()) << lane;
         kink |= u32::from(flags.kink.any()) << lane;
@@ -480,12 +477,12 @@ mod tests {
 
     #[test]
     fn results_too_large_are_large_and_infinite_ones_infinite() {
-        let large = (of(1e200) * of(1e200)).saturated();
+        let large = (of(1e200) * of(1e200)).saturated().to_scalar();
         assert!(large > 1e305 && large + 4.0 * large - large > large);
-        assert_eq!((of(-1e200) * of(1e200)).saturated(), -large);
-        assert_eq!((of(1.0) / of(0.0)).saturated(), f64::INFINITY);
-        assert_eq!(of(3.5).saturated(), 3.5);
-        assert!((of(1e30_f32) * of(1e30)).saturated() >= f32::MAX / 1024.0);
+        assert_eq!((of(-1e200) * of(1e200)).saturated().to_scalar(), -large);
+        assert_eq!((of(1.0) / of(0.0)).saturated().to_scalar(), f64::INFINITY);
+        assert_eq!(of(3.5).saturated().to_scalar(), 3.5);
+        assert!((of(1e30_f32) * of(1e30)).saturated().to_scalar() >= f32::MAX / 1024.0);
     }
 
     #[test]

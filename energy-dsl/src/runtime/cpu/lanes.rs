@@ -93,7 +93,7 @@ impl<R: Register> Number for Lanes<R> {
         Unbounded::of(self.extract(lane))
     }
     fn set_lane(&mut self, lane: usize, value: Self::Unbounded) {
-        let (old, new) = (*self, value.saturated());
+        let (old, new) = (*self, value.to_scalar());
         *self = Self::from_fn(|at| if at == lane { new } else { old.extract(at) });
     }
     #[inline(always)]
