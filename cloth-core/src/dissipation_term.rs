@@ -1,8 +1,8 @@
 //! Forces that resist velocities in other ways than in proportion, from declared dissipation functions.
 
-use energy_dsl::{Array, Declaration, Element, Potential, Vector3, triangle_index};
+use energy_dsl::{Array, Declaration, Element, Potential, Vector3};
 use energy_solve::{
-    Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Storage, Tally, Term,
+    Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term, TrianglePlaces,
 };
 
 /// Which elements act over a step: everything but velocities is held as it was at its start.
@@ -20,10 +20,7 @@ pub(crate) struct DissipativeTerm<L: DissipationLaw> {
     law: L,
     stencils: Vec<usize>,
     arity: usize,
-    /// By stencil, pair of points (i, j), i ≤ j: where their block is stored, that of (j, i) where all are stored.
-    slots: Vec<[usize; 2]>,
-    /// Whether the block of a pair is stored turned.
-    turned: Vec<bool>,
+    places: TrianglePlaces,
     is_free: Vec<bool>,
     acting: Vec<(usize, L::Element)>,
 }
@@ -32,7 +29,7 @@ impl<L: DissipationLaw> DissipativeTerm<L> {
     /// A law on stencils of as many vertices as its element has points. Nothing acts before the first step begins.
     pub(crate) fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
         let (stencils, acting) = (stencils.concat(), Vec::new());
-        Self { name, law, stencils, arity: N, slots: Vec::new(), turned: Vec::new(), is_free: Vec::new(), acting }
+        Self { name, law, stencils, arity: N, places: TrianglePlaces::default(), is_free: Vec::new(), acting }
     }
 
     fn stencil(&self, number: usize) -> &[usize] {
@@ -47,11 +44,6 @@ impl<L: DissipationLaw> DissipativeTerm<L> {
     fn tally(&self, flagged: u64) -> Tally {
         let evaluated = self.acting.len() as u64;
         Tally { evaluated, skipped: self.is_free.len() as u64 - evaluated, flagged, projected: 0 }
-    }
-
-    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<L> {
-        let n = self.arity;
-        (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
     }
 }
 
@@ -73,20 +65,10 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        let is_free = |stencil: &[usize]| stencil.iter().any(|&vertex| dofs.place(vertex).is_some());
         self.acting.clear();
-        (self.slots, self.turned, self.is_free) = (Vec::new(), Vec::new(), Vec::new());
-        for stencil in self.stencils.chunks_exact(self.arity) {
-            self.is_free.push(stencil.iter().any(|&vertex| dofs.place(vertex).is_some()));
-            for (i, j) in self.pairs() {
-                let rows = dofs.place(stencil[i]).zip(dofs.place(stencil[j]));
-                let (slot, turned) =
-                    rows.and_then(|(row, column)| pattern.place(row, column)).unwrap_or((pattern.nowhere(), false));
-                let mirrored = rows.filter(|_| pattern.storage() == Storage::Whole && i != j);
-                let mirror = mirrored.and_then(|(row, column)| pattern.place(column, row));
-                self.slots.push([slot, mirror.map_or(pattern.nowhere(), |(slot, _)| slot)]);
-                self.turned.push(turned);
-            }
-        }
+        self.is_free = self.stencils().iter().map(is_free).collect();
+        self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);
     }
 
     fn begin_step(&mut self, start: StepStart<'_>) {
@@ -125,24 +107,13 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
     }
 
     fn add_linearisation(&self, State { v, .. }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
-        let (mut flagged, pairs) = (0, self.arity * (self.arity + 1) / 2);
+        let mut flagged = 0;
         for (number, element) in &self.acting {
             let result = element.hessian(&self.velocities(*number, v));
             for (&vertex, gradient) in self.stencil(*number).iter().zip(result.gradient.as_ref()) {
                 (0..3).for_each(|axis| sum.force[vertex][axis] -= gradient[axis]);
             }
-            for (pair, (i, j)) in self.pairs().enumerate() {
-                let block = &result.hessian.as_ref()[triangle_index(self.arity, i, j)];
-                let at = number * pairs + pair;
-                let ([slot, mirror], turned) = (self.slots[at], self.turned[at]);
-                for row in 0..3 {
-                    for column in 0..3 {
-                        let (entry, other) = (block[row][column], block[column][row]);
-                        sum.matrix[slot][row][column] -= sum.weights.velocity * if turned { other } else { entry };
-                        sum.matrix[mirror][row][column] -= sum.weights.velocity * other;
-                    }
-                }
-            }
+            self.places.add(*number, -sum.weights.velocity, result.hessian.as_ref(), sum.matrix);
             flagged += u64::from(result.flags.any());
         }
         self.tally(flagged)

@@ -155,8 +155,15 @@ fn validate(ask: impl FnOnce(&mut dyn FnMut(&Finding)) -> Result<(), ValidateErr
     Ok(())
 }
 
-fn main() -> Result<ExitCode> {
-    match Arguments::parse().command {
+fn main() -> ExitCode {
+    obey(Arguments::parse().command).unwrap_or_else(|error| {
+        eprintln!("error: {}", verify::message(&error));
+        ExitCode::FAILURE
+    })
+}
+
+fn obey(command: Command) -> Result<ExitCode> {
+    match command {
         Command::Demo { output } => {
             let scene = demo::scene()?;
             print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;

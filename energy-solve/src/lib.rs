@@ -56,6 +56,7 @@ mod rounded_matrix;
 mod solve;
 mod system;
 mod term;
+mod triangle_places;
 mod vector;
 
 pub use bicgstab::bicgstab;
@@ -80,4 +81,5 @@ pub use rounded_matrix::RoundedMatrix;
 pub use solve::{SolveOptions, SolveReport, StopReason};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use term::{Character, Linearisation, Quantity, State, Stencils, StepStart, Term, Weights};
+pub use triangle_places::TrianglePlaces;
 pub use vector::dot;

@@ -4,6 +4,8 @@
 
 mod cli;
 
+use std::process::ExitCode;
+
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
@@ -27,8 +29,18 @@ enum Command {
     Evaluate(cli::evaluate::Evaluate),
 }
 
-fn main() -> Result<()> {
-    match Arguments::parse().command {
+fn main() -> ExitCode {
+    match obey(Arguments::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", verify::message(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn obey(command: Command) -> Result<()> {
+    match command {
         Command::Demo(demo) => demo.run(),
         Command::Render(render) => render.run(),
         Command::Track(track) => track.run().map(drop),

@@ -26,6 +26,7 @@ mod formula;
 pub mod fuzz;
 mod geometry;
 mod listings;
+mod message;
 pub mod multiprecision;
 mod plot;
 pub mod reference;
@@ -36,6 +37,7 @@ pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
 pub use listings::listings;
+pub use message::message;
 pub use sample::Sample;
 
 /// Audits an element in a test: `assert_derivatives!(MyMaterial)`, or with `samples = 200` random inputs. See

@@ -3,7 +3,7 @@ use serde::Deserialize;
 
 use super::Declared;
 use super::plate::Rigidity;
-use crate::scene::numbers::{finite_triple, non_negative, poisson_ratio, positive, positive_pair};
+use crate::scene::numbers::{all_positive, finite_triple, non_negative, poisson_ratio, positive};
 
 /// A fabric.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -111,7 +111,7 @@ pub struct BaraffWitkin {
     #[serde(deserialize_with = "non_negative")]
     pub shear: f64,
     /// b_u and b_v. Default 1: at rest as drawn.
-    #[serde(default = "ones", deserialize_with = "positive_pair")]
+    #[serde(default = "ones", deserialize_with = "all_positive")]
     pub rest_stretch: [f64; 2],
     /// What resists bending. Default nothing.
     #[serde(default)]

@@ -1,6 +1,7 @@
 use energy_dsl::{Block, Declaration, Flags, Inputs, Interpreted, Mask, RestError, Vector3, triangle_index};
 use energy_solve::{
-    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage, Tally, Term, change_dense,
+    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, TrianglePlaces,
+    change_dense,
 };
 
 /// Elements of a declaration that was read at run time. Their compiled routines are interpreted, operation by operation: some ten to a hundred times
@@ -14,8 +15,7 @@ pub(crate) struct InterpretedTerm {
     bound: Vec<Bound>,
     /// The elements with a free vertex.
     active: Vec<usize>,
-    /// By active element and pair of points (i, j), i ≤ j: where its block is stored, whether turned, and where its mirror image is.
-    slots: Vec<(usize, bool, usize)>,
+    places: TrianglePlaces,
 }
 
 /// One element's own numbers.
@@ -47,7 +47,7 @@ impl InterpretedTerm {
         };
         let bound = inputs.into_iter().enumerate().map(bind).collect::<Result<Vec<_>, _>>()?;
         let arity = element.declaration().points.len();
-        Ok(Self { name, element, stencils, arity, bound, active: Vec::new(), slots: Vec::new() })
+        Ok(Self { name, element, stencils, arity, bound, active: Vec::new(), places: TrianglePlaces::default() })
     }
 
     fn stencil(&self, number: usize) -> &[usize] {
@@ -68,15 +68,30 @@ impl InterpretedTerm {
         Tally { evaluated, skipped: self.bound.len() as u64 - evaluated, flagged, projected }
     }
 
-    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let n = self.arity;
-        (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
-    }
-
     /// Subtracts an element's gradient.
     fn push(&self, number: usize, gradient: &[f64], force: &mut [Vector3<f64>]) {
         for (point, &vertex) in self.stencil(number).iter().enumerate() {
             (0..3).for_each(|axis| force[vertex][axis] -= gradient[3 * point + axis]);
+        }
+    }
+
+    /// Subtracts ∇²U v of an element.
+    fn subtract_product(
+        &self,
+        number: usize,
+        triangle: &[Block<f64>],
+        v: &[Vector3<f64>],
+        product: &mut [Vector3<f64>],
+    ) {
+        let stencil = self.stencil(number);
+        for (i, &p) in stencil.iter().enumerate() {
+            for (j, &q) in stencil.iter().enumerate() {
+                let block = &triangle[triangle_index(self.arity, i.min(j), i.max(j))];
+                for row in 0..3 {
+                    let entry = |column: usize| if i <= j { block[row][column] } else { block[column][row] };
+                    product[p][row] -= (0..3).map(|column| entry(column) * v[q][column]).sum::<f64>();
+                }
+            }
         }
     }
 }
@@ -102,22 +117,9 @@ impl Term for InterpretedTerm {
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
         let is_free = |stencil: &[usize]| stencil.iter().any(|&vertex| dofs.place(vertex).is_some());
         self.active = (0..self.bound.len()).filter(|&number| is_free(self.stencil(number))).collect();
-        let place = |p: usize, q: usize| {
-            let (row, column) = dofs.place(p).zip(dofs.place(q))?;
-            pattern.place(row, column)
-        };
-        let nowhere = (pattern.nowhere(), false);
-        let mut slots = Vec::new();
-        for &number in &self.active {
-            let stencil = self.stencil(number);
-            for (i, j) in self.pairs().filter(|_| self.character().curved) {
-                let (slot, turned) = place(stencil[i], stencil[j]).unwrap_or(nowhere);
-                let mirrored = pattern.storage() == Storage::Whole && i != j;
-                let mirror = if mirrored { place(stencil[j], stencil[i]).unwrap_or(nowhere).0 } else { nowhere.0 };
-                slots.push((slot, turned, mirror));
-            }
+        if self.character().curved {
+            self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);
         }
-        self.slots = slots;
     }
 
     fn has_energy(&self) -> bool {
@@ -145,8 +147,8 @@ impl Term for InterpretedTerm {
     }
 
     fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
-        let (mut flagged, mut projected, pairs) = (0, 0, self.arity * (self.arity + 1) / 2);
-        for (place, &number) in self.active.iter().enumerate() {
+        let (mut flagged, mut projected) = (0, 0);
+        for &number in &self.active {
             let (groups, flag) = self.run("hessian", number, x);
             self.push(number, &groups[1], sum.force);
             let mut triangle: Vec<Block<f64>> = groups[2]
@@ -156,23 +158,9 @@ impl Term for InterpretedTerm {
             if sum.curvature != Curvature::Exact {
                 projected += u64::from(change_dense(&mut triangle, self.arity, sum.curvature));
             }
-            for (pair, (i, j)) in self.pairs().enumerate() {
-                let block = &triangle[triangle_index(self.arity, i, j)];
-                let (slot, turned, mirror) = self.slots[place * pairs + pair];
-                let (p, q) = (self.stencil(number)[i], self.stencil(number)[j]);
-                for row in 0..3 {
-                    for column in 0..3 {
-                        let (entry, other) = (block[row][column], block[column][row]);
-                        sum.matrix[slot][row][column] -= sum.weights.position * if turned { other } else { entry };
-                        sum.matrix[mirror][row][column] -= sum.weights.position * other;
-                        if let Some(product) = &mut sum.stiffness_times_velocity {
-                            product[p][row] -= entry * v[q][column];
-                            if i != j {
-                                product[q][row] -= other * v[p][column];
-                            }
-                        }
-                    }
-                }
+            self.places.add(number, -sum.weights.position, &triangle, sum.matrix);
+            if let Some(product) = &mut sum.stiffness_times_velocity {
+                self.subtract_product(number, &triangle, v, product);
             }
             flagged += u64::from(flag);
         }

@@ -13,4 +13,4 @@ pub use description::{
 };
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
-pub use terms::{FabricError, Garment, Place, Surroundings, terms, terms_at};
+pub use terms::{FabricError, Garment, Place, Surroundings, hair_terms, terms, terms_at};

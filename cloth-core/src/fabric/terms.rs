@@ -1,8 +1,8 @@
 use energy_dsl::{Element, ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, BridsonForce, BridsonForceDamped,
-    FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
-    StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
+    FlatBending, Gravity, HairBend, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK,
+    StableNeoHookean, StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
@@ -14,6 +14,7 @@ use crate::mesh::{
     Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm,
     rest_angle, subtract, thread_triangle,
 };
+use crate::scene::Hair;
 
 /// A fabric that cannot be laid on a mesh.
 #[derive(Debug, thiserror::Error)]
@@ -75,7 +76,7 @@ pub struct Place {
     pub prefix: String,
 }
 
-/// The terms of a fabric on a mesh.
+/// The terms of a fabric on a mesh, or of hair.
 #[derive(Debug)]
 pub struct Garment {
     /// The mass of each vertex, in kg.
@@ -87,6 +88,29 @@ pub struct Garment {
     /// What should be known about it.
     pub warnings: Vec<String>,
     place: Place,
+}
+
+/// Lays hair, whose strands stand one after the other.
+///
+/// # Errors
+/// When there are more vertices than indices.
+pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, place: Place) -> Result<Garment, FabricError> {
+    let mut garment = Garment::new(hair.masses(), place);
+    let starts = || (0..hair.count).map(|strand| strand * (hair.segments + 1));
+    let segments: Vec<[usize; 2]> =
+        starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();
+    let bends: Vec<[usize; 3]> =
+        starts().flat_map(|start| (start..start + hair.segments - 1).map(|at| [at, at + 1, at + 2])).collect();
+    let length = hair.length / hair.segments as f64;
+    let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
+    garment.add_potential("hair stretch", &segments, springs)?;
+    if !garment.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
+        // k/2 (1 − cos φ) is k φ²/4, and a rod's energy over a segment is B φ²/(2 l).
+        let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
+        garment.add_potential("hair bending", &bends, bending)?;
+    }
+    garment.add_surroundings(surroundings)?;
+    Ok(garment)
 }
 
 /// Lays a fabric on a mesh. `springs` is used by mass–spring fabrics only.
@@ -114,7 +138,7 @@ pub fn terms_at(
     place: Place,
 ) -> Result<Garment, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
-    let mut garment = Garment { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place };
+    let mut garment = Garment::new(masses, place);
     let cloth = Laid { mesh, triangles: laid(mesh, fabric)?, warp: fabric.warp };
     // λ and μ of small strains, for damping.
     let (stiffness, bending) = match &fabric.material {
@@ -227,6 +251,10 @@ fn stable_neo_hookean_log(
 }
 
 impl Garment {
+    fn new(masses: Vec<f64>, place: Place) -> Self {
+        Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place }
+    }
+
     fn add_springs(
         &mut self,
         material: &MassSpring,

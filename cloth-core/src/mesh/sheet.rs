@@ -36,7 +36,7 @@ pub struct Sheet {
     #[serde(deserialize_with = "crate::scene::numbers::cell_counts")]
     pub cells: [usize; 2],
     /// Lengths along its two directions, in m.
-    #[serde(deserialize_with = "crate::scene::numbers::positive_pair")]
+    #[serde(deserialize_with = "crate::scene::numbers::all_positive")]
     pub size: [f64; 2],
     /// `regular` (the default) or `alternating`.
     #[serde(default)]

@@ -38,15 +38,6 @@ pub(crate) fn nonzero_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Resu
     }
 }
 
-pub(crate) fn positive_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
-    let numbers = <[f64; 3]>::deserialize(deserializer)?;
-    if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
-        Ok(numbers)
-    } else {
-        Err(D::Error::custom(format!("{numbers:?} must hold finite numbers above 0 only")))
-    }
-}
-
 /// A number of parts, at least `LEAST` and not absurd.
 pub(crate) fn count<'de, const LEAST: usize, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     const MOST: usize = 4096;
@@ -62,22 +53,32 @@ pub(crate) fn poisson_ratio<'de, D: Deserializer<'de>>(deserializer: D) -> Resul
     checked(deserializer, |number| number > -1.0 && number < 1.0, "between −1 and 1, both excluded")
 }
 
-pub(crate) fn finite_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
-    let numbers = <[f64; 3]>::deserialize(deserializer)?;
-    if numbers.iter().all(|number| number.is_finite()) {
+fn all<'de, const N: usize, D: Deserializer<'de>>(
+    deserializer: D,
+    fits: impl Fn(f64) -> bool,
+    range: &str,
+) -> Result<[f64; N], D::Error>
+where
+    [f64; N]: Deserialize<'de>,
+{
+    let numbers = <[f64; N]>::deserialize(deserializer)?;
+    if numbers.iter().all(|&number| fits(number)) {
         Ok(numbers)
     } else {
-        Err(D::Error::custom(format!("{numbers:?} must hold finite numbers only")))
+        Err(D::Error::custom(format!("{numbers:?} must hold {range} only")))
     }
 }
 
-pub(crate) fn positive_pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 2], D::Error> {
-    let numbers = <[f64; 2]>::deserialize(deserializer)?;
-    if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
-        Ok(numbers)
-    } else {
-        Err(D::Error::custom(format!("{numbers:?} must hold finite numbers above 0 only")))
-    }
+pub(crate) fn finite_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+    all(deserializer, f64::is_finite, "finite numbers")
+}
+
+/// N numbers, each above 0.
+pub(crate) fn all_positive<'de, const N: usize, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; N], D::Error>
+where
+    [f64; N]: Deserialize<'de>,
+{
+    all(deserializer, |number| number.is_finite() && number > 0.0, "finite numbers above 0")
 }
 
 pub(crate) fn cell_counts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[usize; 2], D::Error> {

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::Turn;
-use super::numbers::{finite_triple, non_negative, nonzero_triple, positive, positive_triple};
+use super::numbers::{all_positive, finite_triple, non_negative, nonzero_triple, positive};
 use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, Obstacle, RoundedBox};
 use crate::mesh::norm;
 use crate::motion::{Motion, Pose};
@@ -108,7 +108,7 @@ struct BoxKeys {
     #[serde(default, deserialize_with = "finite_triple")]
     centre: [f64; 3],
     /// Its edges, in m.
-    #[serde(deserialize_with = "positive_triple")]
+    #[serde(deserialize_with = "all_positive")]
     size: [f64; 3],
     /// A turn about its centre. Default none.
     #[serde(default)]

@@ -4,14 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use energy_dsl::Vector3;
-use energy_elements::{Gravity, HairBend, HookeSpring, ViscousDrag, ZeroLengthSpring};
+use energy_elements::ZeroLengthSpring;
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
 use super::seam::Side;
 use super::{Garment, Hair, MeshSourceError, Pin, PinError, Scene, SeamError, Shape};
 use crate::contact::Obstacle;
 use crate::fabric::{self, FabricError, Place, Surroundings};
-use crate::mesh::{SpringNetwork, Topology, TriangleMesh};
+use crate::mesh::{Topology, TriangleMesh};
 use crate::motion::Motion;
 
 /// A garment or hair of a scene.
@@ -192,14 +192,9 @@ impl Builder<'_> {
         let mesh_error = |source| ModelError::Mesh { part: part.clone(), source };
         let Shape { mesh, start, velocities, springs } = garment.shape(&self.scene.folder).map_err(mesh_error)?;
         let first = self.model.x.len();
-        let place = Place { first, prefix: if self.several { format!("{part}: ") } else { String::new() } };
-        let laid = self.lay(garment, &mesh, &springs, place);
-        let laid = laid.map_err(|source| ModelError::Fabric { part: part.clone(), source })?;
+        let laid = fabric::terms_at(&garment.fabric, &mesh, &springs, &self.surroundings(), self.place(first, &part));
+        self.add_laid(laid.map_err(|source| ModelError::Fabric { part: part.clone(), source })?);
         let model = &mut self.model;
-        model.masses.extend(laid.masses);
-        model.terms.extend(laid.terms);
-        model.left_out.extend(laid.left_out);
-        model.warnings.extend(laid.warnings);
         model.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
         model.x.extend(start);
         model.v.extend(velocities);
@@ -208,56 +203,29 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn lay(
-        &self,
-        garment: &Garment,
-        mesh: &TriangleMesh,
-        springs: &SpringNetwork,
-        place: Place,
-    ) -> Result<fabric::Garment, FabricError> {
-        fabric::terms_at(&garment.fabric, mesh, springs, &self.surroundings(), place)
+    fn add_hair(&mut self, number: usize, hair: &Hair) -> Result<(), ModelError> {
+        let part = hair.name.clone().unwrap_or_else(|| format!("hair {number}"));
+        let laid = fabric::hair_terms(hair, &self.surroundings(), self.place(self.model.x.len(), &part));
+        self.add_laid(laid.map_err(|source| ModelError::Fabric { part: part.clone(), source })?);
+        let vertices = hair.vertices();
+        let count = vertices.len();
+        self.model.v.extend(vec![[0.0; 3]; count]);
+        self.model.x.extend(vertices);
+        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
+        Ok(())
     }
 
-    fn add_hair(&mut self, number: usize, hair: &Hair) -> Result<(), ModelError> {
-        let name = hair.name.clone().unwrap_or_else(|| format!("hair {number}"));
-        let (first, joints, masses) = (self.model.x.len(), hair.segments + 1, hair.masses());
-        let prefix = if self.several { format!("{name}: ") } else { String::new() };
-        let starts = || (0..hair.count).map(|strand| first + strand * joints);
-        let segments: Vec<[usize; 2]> =
-            starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();
-        let bends: Vec<[usize; 3]> =
-            starts().flat_map(|start| (start..start + hair.segments - 1).map(|at| [at, at + 1, at + 2])).collect();
-        let length = hair.length / hair.segments as f64;
-        let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
-        let list = ElementList::new(format!("{prefix}hair stretch"), springs, &segments)?;
-        self.model.terms.push(Box::new(PotentialTerm::new(list)));
-        if hair.bend_stiffness > 0.0 {
-            // k/2 (1 − cos φ) is k φ²/4, and a rod's energy over a segment is B φ²/(2 l).
-            let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
-            let list = ElementList::new(format!("{prefix}hair bending"), bending, &bends)?;
-            self.model.terms.push(Box::new(PotentialTerm::new(list)));
-        } else {
-            self.model.left_out.push(format!("{prefix}hair bending: zero"));
-        }
-        let each: Vec<[usize; 1]> = (first..first + masses.len()).map(|vertex| [vertex]).collect();
-        let Surroundings { gravity, drag } = self.surroundings();
-        if gravity != [0.0; 3] {
-            let weights = masses.iter().map(|&mass| Gravity::new(mass, gravity)).collect();
-            let list = ElementList::new(format!("{prefix}gravity"), weights, &each)?;
-            self.model.terms.push(Box::new(PotentialTerm::new(list)));
-        }
-        if drag > 0.0 {
-            let drags = masses.iter().map(|&mass| ViscousDrag::new(drag * mass)).collect();
-            let list = ElementList::new(format!("{prefix}drag"), drags, &each)?;
-            self.model.terms.push(Box::new(ForceTerm::new(list)));
-        }
-        let vertices = hair.vertices();
-        self.model.masses.extend(masses);
-        self.model.v.extend(vec![[0.0; 3]; vertices.len()]);
-        let count = vertices.len();
-        self.model.x.extend(vertices);
-        self.add_part(name, count, PartKind::Hair { joints });
-        Ok(())
+    /// Where a part stands, and how the names of its terms start.
+    fn place(&self, first: usize, part: &str) -> Place {
+        Place { first, prefix: if self.several { format!("{part}: ") } else { String::new() } }
+    }
+
+    fn add_laid(&mut self, laid: fabric::Garment) {
+        let model = &mut self.model;
+        model.masses.extend(laid.masses);
+        model.terms.extend(laid.terms);
+        model.left_out.extend(laid.left_out);
+        model.warnings.extend(laid.warnings);
     }
 
     fn check_names(&self) -> Result<(), ModelError> {

@@ -1,0 +1,20 @@
+/// An error and its causes on one line. Many errors say their cause themselves: what was just said is not said again.
+///
+/// ```
+/// use anyhow::Context;
+/// let cause = anyhow::anyhow!("no such file");
+/// let error = Err::<(), _>(cause).context("cloth.obj: no such file").context("hang.toml").unwrap_err();
+/// assert_eq!(verify::message(&error), "hang.toml: cloth.obj: no such file");
+/// ```
+#[must_use]
+pub fn message(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if text.is_empty() {
+            text = cause;
+        } else if !text.ends_with(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
