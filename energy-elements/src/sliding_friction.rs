@@ -7,8 +7,9 @@ energy! {
     /// Rayleigh's dissipation function: its gradient is minus the force.
     #[audit]
     pub energy SlidingFriction(u: Point; n: Vec3[1], w: Vec3[m], λ: Scalar[N], ε: Scalar[m]) {
-        // ‖t‖, without the cancellation of u − w − (n·(u − w)) n.
-        let q = norm_squared(cross(n, u - w));
-        λ * q / (sqrt(q + ε^2) + ε)
+        // t/ε: of the order of one where the law bends, at every scale; n × (u − w) has the length of t without the cancellation
+        // of u − w − (n·(u − w)) n.
+        let q = norm_squared(cross(n, u - w) / ε);
+        λ * ε * q / (sqrt(q + 1) + 1)
     }
 }
