@@ -156,6 +156,8 @@ fn validate(ask: impl FnOnce(&mut dyn FnMut(&Finding)) -> Result<(), ValidateErr
 }
 
 fn main() -> ExitCode {
+    // A reader that has seen enough (`| head`) ends the program, without a panic.
+    sigpipe::reset();
     obey(Arguments::parse().command).unwrap_or_else(|error| {
         eprintln!("error: {}", verify::message(&error));
         ExitCode::FAILURE

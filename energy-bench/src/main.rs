@@ -46,6 +46,8 @@ fn at_least_one(text: &str) -> Result<usize, String> {
 }
 
 fn main() -> anyhow::Result<()> {
+    // A reader that has seen enough (`| head`) ends the program, without a panic.
+    sigpipe::reset();
     let arguments = Arguments::parse();
     for key in &arguments.kernels {
         anyhow::ensure!(KEYS.contains(&key.as_str()), "there is no kernel `{key}`; there are {}", KEYS.join(", "));

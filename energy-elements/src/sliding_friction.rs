@@ -7,9 +7,10 @@ energy! {
     /// Rayleigh's dissipation function: its gradient is minus the force.
     #[audit]
     pub energy SlidingFriction(u: Point; n: Vec3[1], w: Vec3[m], λ: Scalar[N], ε: Scalar[m]) {
-        // t/ε: of the order of one where the law bends, at every scale; n × (u − w) has the length of t without the cancellation
-        // of u − w − (n·(u − w)) n.
-        let q = norm_squared(cross(n, u - w) / ε);
-        λ * ε * q / (sqrt(q + 1) + 1)
+        // n × (u − w) has the length of t without the cancellation of u − w − (n·(u − w)) n.
+        let t = cross(n, u - w);
+        // √(‖t‖² + ε²) as a length: no scale of velocities is too large or too small for its derivatives.
+        let s = norm(vector(t.x, t.y, t.z, ε));
+        λ * norm_squared(t) / (s + ε)
     }
 }

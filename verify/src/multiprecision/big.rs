@@ -2,11 +2,9 @@ use std::cell::Cell;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use dashu_float::FBig;
-use dashu_float::round::mode::HalfEven;
 use energy_dsl::{Level, Number};
 
-type Float = FBig<HalfEven, 2>;
+use super::Float;
 
 thread_local! {
     /// Bits of the numbers that are made on this thread: [`Number::from_f64`] has no other way to know.
@@ -40,13 +38,13 @@ impl Big {
     /// Whether it is exactly zero.
     #[must_use]
     pub fn is_zero(&self) -> bool {
-        self.0.as_ref().is_some_and(|x| x.repr().significand().is_zero())
+        self.0.as_ref().is_some_and(Float::is_zero)
     }
 
     /// The nearest double: infinite or zero beyond their range, NaN where undefined.
     #[must_use]
     pub fn to_f64(&self) -> f64 {
-        self.0.as_ref().map_or(f64::NAN, |x| x.to_f64().value())
+        self.0.as_ref().map_or(f64::NAN, Float::to_f64)
     }
 
     /// |got − self| with a relative error of a roundoff; NaN for a NaN, or where undefined. An infinite number is right where no
@@ -67,8 +65,7 @@ impl Big {
         if self.is_zero() {
             return "0".into();
         }
-        let decimal = x.clone().with_base_and_precision::<10>(digits).value();
-        format!("{decimal:e}")
+        x.to_decimal(digits)
     }
 
     /// The larger magnitude; an undefined one is larger than any.
@@ -82,17 +79,13 @@ impl Big {
 
     /// Whether |self| ≤ |other| · 2^exponent; false where either is undefined.
     pub(super) fn is_within(&self, other: &Self, exponent: i64) -> bool {
-        let (Some(a), Some(b)) = (&self.0, &other.0) else { return false };
-        if self.is_zero() {
-            return true;
-        }
-        let exponent = isize::try_from(exponent).unwrap_or(isize::MIN);
-        a.clone().max(-a.clone()) <= b.clone().max(-b.clone()) << exponent
+        let (Some(a), Some(b)) = (self.clone().abs().0, other.clone().abs().0) else { return false };
+        a.is_zero() || a <= b.shifted(exponent)
     }
 
     fn of(value: Float) -> Self {
-        // Infinite is what dashu calls 1/0 and the like; to go on with it would panic.
-        Self(value.repr().is_finite().then_some(value))
+        // Infinite is what 1/0 and the like may be called; to go on with it would panic, or mean nothing.
+        Self(value.is_finite().then_some(value))
     }
 
     fn unary(self, work: impl FnOnce(Float) -> Option<Float>) -> Self {
@@ -112,12 +105,7 @@ impl Big {
 }
 
 fn float(value: f64) -> Float {
-    let exact = Float::try_from(value).unwrap_or(Float::ZERO);
-    exact.with_precision(PRECISION.get().max(53)).value()
-}
-
-fn is_zero(x: &Float) -> bool {
-    x.repr().significand().is_zero()
+    Float::from_f64(value, PRECISION.get())
 }
 
 fn pi() -> Float {
@@ -148,7 +136,7 @@ impl Mul for Big {
 impl Div for Big {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        self.binary(other, |a, b| (!is_zero(&b)).then(|| a / b))
+        self.binary(other, |a, b| (!b.is_zero()).then(|| a / b))
     }
 }
 
@@ -175,10 +163,10 @@ impl Number for Big {
         Self(value.is_finite().then(|| float(value)))
     }
     fn sqrt(self) -> Self {
-        self.unary(|a| if is_zero(&a) { Some(a) } else { (a > Float::ZERO).then(|| a.sqrt()) })
+        self.unary(|a| if a.is_zero() { Some(a) } else { a.is_positive().then(|| a.sqrt()) })
     }
     fn abs(self) -> Self {
-        self.unary(|a| Some(if a < Float::ZERO { -a } else { a }))
+        self.unary(|a| Some(if a.is_positive() || a.is_zero() { a } else { -a }))
     }
     fn min(self, other: Self) -> Self {
         self.binary(other, |a, b| Some(if b < a { b } else { a }))
@@ -187,45 +175,45 @@ impl Number for Big {
         self.binary(other, |a, b| Some(if b > a { b } else { a }))
     }
     fn sin<L: Level>(self) -> Self {
-        self.unary(|a| Some(if is_zero(&a) { a } else { a.sin() }))
+        self.unary(|a| Some(if a.is_zero() { a } else { a.sin() }))
     }
     fn cos<L: Level>(self) -> Self {
-        self.unary(|a| Some(if is_zero(&a) { float(1.0) } else { a.cos() }))
+        self.unary(|a| Some(if a.is_zero() { float(1.0) } else { a.cos() }))
     }
     fn exp<L: Level>(self) -> Self {
         // Beyond this, far outside the range of doubles, digits would cost memory without end.
         const LARGEST: f64 = 1e6;
-        self.unary(|a| match a.to_f64().value() {
+        self.unary(|a| match a.to_f64() {
             x if x > LARGEST => None,
             x if x < -LARGEST => Some(float(0.0)),
-            _ if is_zero(&a) => Some(float(1.0)),
+            _ if a.is_zero() => Some(float(1.0)),
             _ => Some(a.exp()),
         })
     }
     fn ln<L: Level>(self) -> Self {
-        self.unary(|a| (a > Float::ZERO).then(|| a.ln()))
+        self.unary(|a| a.is_positive().then(|| a.ln()))
     }
     fn atan2<L: Level>(self, x: Self) -> Self {
-        self.binary(x, |y, x| match (is_zero(&y), is_zero(&x)) {
+        self.binary(x, |y, x| match (y.is_zero(), x.is_zero()) {
             (true, true) => None,
-            (true, false) => Some(if x > Float::ZERO { float(0.0) } else { pi() }),
+            (true, false) => Some(if x.is_positive() { float(0.0) } else { pi() }),
             _ => Some(y.atan2(&x)),
         })
     }
     fn powf<L: Level>(self, exponent: Self) -> Self {
         self.binary(exponent, |a, e| {
-            let whole = e.to_int().value();
-            let is_whole = Float::from(whole.clone()) == e;
-            if is_zero(&e) {
+            let whole = e.to_f64() as i32;
+            let is_whole = float(f64::from(whole)) == e;
+            if e.is_zero() {
                 return Some(float(1.0));
             }
-            if is_zero(&a) {
-                return (e > Float::ZERO).then_some(a);
+            if a.is_zero() {
+                return e.is_positive().then_some(a);
             }
-            if is_whole && e.to_f64().value().abs() < 1e6 {
+            if is_whole && whole.abs() < 1_000_000 {
                 return Some(a.powi(whole));
             }
-            (a > Float::ZERO).then(|| a.powf(&e))
+            a.is_positive().then(|| a.powf(&e))
         })
     }
     fn sum_error(self, _other: Self) -> Self {

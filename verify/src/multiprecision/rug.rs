@@ -1,0 +1,130 @@
+//! Multi-precision numbers by rug, that is by GNU MPFR: what dashu computes, by code that has nothing in common with it.
+
+use std::cmp::Ordering;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use rug::ops::Pow;
+
+/// A binary number of any precision.
+#[derive(Clone, Debug, PartialEq, PartialOrd)]
+pub(super) struct Float(rug::Float);
+
+impl Float {
+    /// An exact double, with that many bits for what is computed from it. Zero for what is no number.
+    pub(super) fn from_f64(value: f64, bits: usize) -> Self {
+        Self(rug::Float::with_val(precision(bits), if value.is_finite() { value } else { 0.0 }))
+    }
+
+    pub(super) fn pi(bits: usize) -> Self {
+        Self(rug::Float::with_val(precision(bits), rug::float::Constant::Pi))
+    }
+
+    pub(super) fn to_f64(&self) -> f64 {
+        self.0.to_f64()
+    }
+
+    /// With so many digits, as in `-1.25e-3`.
+    pub(super) fn to_decimal(&self, digits: usize) -> String {
+        let text = self.0.to_string_radix(10, Some(digits));
+        if text.contains('e') { text } else { format!("{:.digits$e}", self.0) }
+    }
+
+    pub(super) fn is_zero(&self) -> bool {
+        self.0.is_zero()
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.0.is_finite()
+    }
+
+    pub(super) fn is_positive(&self) -> bool {
+        self.0.cmp0() == Some(Ordering::Greater)
+    }
+
+    /// x · 2^exponent.
+    pub(super) fn shifted(self, exponent: i64) -> Self {
+        Self(self.0 << i32::try_from(exponent).unwrap_or(i32::MIN))
+    }
+
+    pub(super) fn sqrt(self) -> Self {
+        Self(self.0.sqrt())
+    }
+
+    pub(super) fn sin(self) -> Self {
+        Self(self.0.sin())
+    }
+
+    pub(super) fn cos(self) -> Self {
+        Self(self.0.cos())
+    }
+
+    pub(super) fn exp(self) -> Self {
+        Self(self.0.exp())
+    }
+
+    pub(super) fn ln(self) -> Self {
+        Self(self.0.ln())
+    }
+
+    pub(super) fn atan2(self, x: &Self) -> Self {
+        Self(self.0.atan2(&x.0))
+    }
+
+    /// The power of a positive number.
+    pub(super) fn powf(self, exponent: &Self) -> Self {
+        Self(self.0.pow(&exponent.0))
+    }
+
+    /// The power with a whole exponent of a number that is not zero.
+    pub(super) fn powi(self, exponent: i32) -> Self {
+        Self(self.0.pow(exponent))
+    }
+
+    /// `work` of two numbers, as exact as the more exact of them.
+    fn of_both(self, other: Self, work: impl FnOnce(rug::Float, rug::Float) -> rug::Float) -> Self {
+        let mut left = self.0;
+        if left.prec() < other.0.prec() {
+            left.set_prec(other.0.prec());
+        }
+        Self(work(left, other.0))
+    }
+}
+
+fn precision(bits: usize) -> u32 {
+    u32::try_from(bits.max(53)).expect("a number that fits into memory")
+}
+
+impl Add for Float {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        self.of_both(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Float {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self.of_both(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Float {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        self.of_both(other, |a, b| a * b)
+    }
+}
+
+impl Div for Float {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        self.of_both(other, |a, b| a / b)
+    }
+}
+
+impl Neg for Float {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
