@@ -115,7 +115,8 @@ impl<'a> Methods<'a> {
     fn error(&self, run: impl Fn(usize) -> Vec<f64>) -> f64 {
         let of = |(i, truth): (usize, &TrueBlock)| {
             let error = truth.block.numbers.iter().zip(run(i)).map(|(t, got)| t.error_of(got)).fold(0.0, worse);
-            error / truth.largest()
+            // A Hessian of zeros (a barrier out of reach) has no size to compare with.
+            if error == 0.0 { 0.0 } else { error / truth.largest() }
         };
         self.truths.iter().enumerate().map(of).fold(0.0, worse)
     }

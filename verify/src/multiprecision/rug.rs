@@ -25,8 +25,11 @@ impl Float {
 
     /// With so many digits, as in `-1.25e-3`.
     pub(super) fn to_decimal(&self, digits: usize) -> String {
-        let text = self.0.to_string_radix(10, Some(digits));
-        if text.contains('e') { text } else { format!("{:.digits$e}", self.0) }
+        let text = format!("{:.digits$e}", self.0);
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let mantissa =
+            if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
+        format!("{mantissa}e{exponent}")
     }
 
     pub(super) fn is_zero(&self) -> bool {
