@@ -120,7 +120,9 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
             let result = self.list.elements()[element].jacobians(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), sum.force);
             let by_position = result.by_position.as_ref();
-            self.add_blocks(number, sum.weights.position, by_position, sum.matrix);
+            if E::DECLARATION.curved {
+                self.add_blocks(number, sum.weights.position, by_position, sum.matrix);
+            }
             if E::DECLARATION.velocity_dependent {
                 self.add_blocks(number, sum.weights.velocity, result.by_velocity.as_ref(), sum.matrix);
             }

@@ -9,7 +9,8 @@
 //!   terms are symmetric), with the elements' Hessians as they are or made positive semi-definite ([`Curvature`]), and (∂f/∂x) v.
 //!
 //! Pinned vertices are removed from the matrix, not penalised; elements with pinned vertices only are never evaluated. What
-//! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix.
+//! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix, and
+//! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time.
 //!
 //! Potentials are evaluated many elements at once. Everything is deterministic: sums run in the order of terms and elements.
 //!
@@ -53,7 +54,6 @@ mod potential_term;
 mod preconditioner;
 mod residual_term;
 mod rounded_block;
-mod rounded_matrix;
 mod solve;
 mod system;
 mod term;
@@ -71,7 +71,7 @@ pub use gauss_newton::{GaussNewton, GaussNewtonError, GaussNewtonOptions, Iterat
 pub use incomplete_cholesky::IncompleteCholesky;
 pub use list::{ElementList, ListError};
 pub use loss::Loss;
-pub use matrix::{BlockMatrix, Multiply};
+pub use matrix::BlockMatrix;
 pub use normal_matrix::{CouplingError, Couplings, NormalMatrix, NormalPattern};
 pub use normal_solver::{NormalSolution, NormalSolver, NormalSolverKind, SolverError};
 pub use over_relaxation::{OverRelaxation, Precision};
@@ -79,7 +79,6 @@ pub use pattern::{Pattern, Storage};
 pub use potential_term::PotentialTerm;
 pub use preconditioner::{Preconditioner, SingularBlock};
 pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm, TermSum};
-pub use rounded_matrix::RoundedMatrix;
 pub use solve::{SolveOptions, SolveReport, StopReason};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use term::{Character, Linearisation, Quantity, State, Stencils, StepStart, Term, Weights};

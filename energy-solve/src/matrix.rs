@@ -5,12 +5,6 @@ use energy_dsl::{Block, Vector3};
 use crate::pattern::{Pattern, Storage};
 use crate::vector::{block_times, transposed, transposed_times};
 
-/// What can be multiplied by a vector.
-pub trait Multiply {
-    /// y ← A x.
-    fn multiply(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]);
-}
-
 /// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle.
 #[derive(Clone, Debug)]
 pub struct BlockMatrix {
@@ -136,12 +130,6 @@ impl BlockMatrix {
             }
             add(&mut y[row], sum);
         }
-    }
-}
-
-impl Multiply for BlockMatrix {
-    fn multiply(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
-        BlockMatrix::multiply(self, x, y);
     }
 }
 

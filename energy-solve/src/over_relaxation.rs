@@ -116,17 +116,19 @@ impl<T: Precision> Kernel for Scaling<'_, T> {
             inverses[row] = inverse_factor(self.matrix.diagonal(row)).ok_or(row)?;
         }
         let values = self.matrix.values();
+        let (by_columns, by_rows) = (columns.as_chunks_mut::<9>().0, rows.as_chunks_mut::<9>().0);
         for row in 0..pattern.rows() {
+            let own = inverses[row];
             for place in pattern.above(row) {
                 let other = &inverses[pattern.columns()[place] as usize];
-                let scaled = scaled_block::<L>(&inverses[row], &values[place], other);
+                let block = scaled_block::<L>(&own, &values[place], other);
                 // Before it there are as many blocks on the diagonal as rows, and its own.
-                let first = 9 * (place - row - 1);
+                let (by_columns, by_rows) = (&mut by_columns[place - row - 1], &mut by_rows[place - row - 1]);
                 for i in 0..3 {
                     for j in 0..3 {
-                        let entry = T::from_f64(scaled[i][j]);
-                        rows[first + 3 * i + j] = entry;
-                        columns[first + 3 * j + i] = entry;
+                        let entry = T::from_f64(block[i][j]);
+                        by_rows[3 * i + j] = entry;
+                        by_columns[3 * j + i] = entry;
                     }
                 }
             }
@@ -192,16 +194,17 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
         let Vectors { residual, direction, back, forth, solution } = vectors;
         let sweeps = Sweeps { pattern, columns, rows };
         // Of the order of one, whatever the unit: single precision has less range than doubles.
-        let scaled = start(inverses, self.b, residual);
+        let scale = start(inverses, self.b, residual);
         solution.fill([T::from_f64(0.0); 4]);
-        sweeps.forward::<L>(residual);
+        direction.fill([T::from_f64(0.0); 4]);
+        sweeps.forward::<L>(residual, direction);
         let mut rho = square(residual);
         let initial = rho;
         let target = self.options.relative_tolerance.powi(2) * initial;
         let mut conjugate = 0.0;
         let mut iterations = 0;
         let stopped = loop {
-            if !rho.is_finite() || !scaled.is_finite() {
+            if !rho.is_finite() || !scale.is_finite() {
                 break StopReason::NonFinite;
             }
             if rho <= target {
@@ -210,9 +213,8 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
             if iterations == self.options.iteration_limit {
                 break StopReason::IterationLimit;
             }
-            let along = sweeps.backward::<L>(residual, conjugate, direction, back, forth);
-            sweeps.forward::<L>(forth);
-            let curvature = along + product(direction, forth);
+            let curvature = sweeps.backward::<L>(residual, conjugate, direction, back, forth)
+                + sweeps.forward::<L>(forth, direction);
             if curvature <= 0.0 {
                 break StopReason::IndefiniteCurvature;
             }
@@ -222,11 +224,11 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
             iterations += 1;
         };
         for row in 0..self.x.len() {
-            let [u, v, w, _] = solution[row].map(|component| Into::<f64>::into(component) * scaled);
+            let [u, v, w, _] = solution[row].map(|component| Into::<f64>::into(component) * scale);
             let [[a, ..], [b, c, _], [d, e, f]] = inverses[row];
             self.x[row] = [a * u + b * v + d * w, c * v + e * w, f * w];
         }
-        let [initial_residual, final_residual] = [initial, rho].map(|square| square.sqrt() * scaled);
+        let [initial_residual, final_residual] = [initial, rho].map(|square| square.sqrt() * scale);
         SolveReport { iterations, initial_residual, final_residual, stopped }
     }
 }
@@ -276,44 +278,55 @@ impl<T: Precision> Sweeps<'_, T> {
         let (conjugate, rest) = (T::from_f64(conjugate), T::from_f64(RELAXATION - 2.0));
         let mut along = [0.0; 4];
         for row in (0..p.len()).rev() {
-            let mut direction = [T::from_f64(0.0); 4];
+            let (residual, mut direction) = (r[row], p[row]);
             for lane in 0..4 {
-                direction[lane] = p[row][lane].mul_add::<L>(conjugate, r[row][lane]);
+                direction[lane] = direction[lane].mul_add::<L>(conjugate, residual[lane]);
             }
             p[row] = direction;
             let mut sums = [direction, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
-            for place in self.pattern.above(row) {
+            // The nearest row, computed just before, comes last: the others do not have to wait for it.
+            for place in self.pattern.above(row).rev() {
                 let block = &self.columns[9 * (place - row - 1)..][..9 + SLACK];
                 subtract_product::<T, L>(&mut sums, block, &t[self.pattern.columns()[place] as usize]);
             }
-            let mut back = [T::from_f64(0.0); 4];
-            let mut start = [T::from_f64(0.0); 4];
+            let back = total(&sums);
+            let mut start = direction;
             for lane in 0..4 {
-                back[lane] = sums[0][lane] + (sums[1][lane] + sums[2][lane]);
                 start[lane] = back[lane].mul_add::<L>(rest, direction[lane]);
-                along[lane] += in_doubles(direction[lane], back[lane]);
             }
+            add_products(&mut along, &direction, &back);
             (t[row], w[row]) = (back, start);
         }
-        along[0] + along[1] + along[2]
+        of_three(along)
     }
 
-    /// w ← (I + L̃)⁻¹ w.
+    /// w ← (I + L̃)⁻¹ w. Returns p · w.
     #[inline(always)]
-    fn forward<L: Level>(&self, w: &mut [Wide<T>]) {
+    fn forward<L: Level>(&self, w: &mut [Wide<T>], p: &[Wide<T>]) -> f64 {
+        let mut along = [0.0; 4];
         for row in 0..w.len() {
             let here = w[row];
+            add_products(&mut along, &p[row], &here);
             for place in self.pattern.above(row) {
                 let block = &self.rows[9 * (place - row - 1)..][..9 + SLACK];
-                let vector = &mut w[self.pattern.columns()[place] as usize];
-                let mut sums = [*vector, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
+                let other = &mut w[self.pattern.columns()[place] as usize];
+                let mut sums = [*other, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
                 subtract_product::<T, L>(&mut sums, block, &here);
-                for lane in 0..4 {
-                    vector[lane] = sums[0][lane] + (sums[1][lane] + sums[2][lane]);
-                }
+                *other = total(&sums);
             }
         }
+        of_three(along)
     }
+}
+
+/// The sum of three partial sums, which do not wait for each other.
+#[inline(always)]
+fn total<T: Precision>(sums: &[Wide<T>; 3]) -> Wide<T> {
+    let mut total = sums[0];
+    for lane in 0..4 {
+        total[lane] = sums[0][lane] + (sums[1][lane] + sums[2][lane]);
+    }
+    total
 }
 
 /// Subtracts B v from the sum of three, B stored column by column (and followed by one more number).
@@ -337,38 +350,44 @@ fn advance<T: Precision, L: Level>(
     r: &mut [Wide<T>],
 ) -> f64 {
     let step = T::from_f64(step);
-    let mut square = [0.0; 4];
+    let mut squares = [0.0; 4];
     for row in 0..r.len() {
+        let (t, s, mut solution, mut rest) = (t[row], s[row], x[row], r[row]);
         for lane in 0..4 {
-            x[row][lane] = t[row][lane].mul_add::<L>(step, x[row][lane]);
-            let rest = (t[row][lane] + s[row][lane]).mul_add::<L>(-step, r[row][lane]);
-            r[row][lane] = rest;
-            square[lane] += in_doubles(rest, rest);
+            solution[lane] = t[lane].mul_add::<L>(step, solution[lane]);
         }
+        for lane in 0..4 {
+            rest[lane] = (t[lane] + s[lane]).mul_add::<L>(-step, rest[lane]);
+        }
+        add_products(&mut squares, &rest, &rest);
+        (x[row], r[row]) = (solution, rest);
     }
-    square[0] + square[1] + square[2]
+    of_three(squares)
 }
 
-/// a · b, of the first three lanes.
-#[inline(always)]
-fn product<T: Precision>(a: &[Wide<T>], b: &[Wide<T>]) -> f64 {
-    let mut sums = [0.0; 4];
-    for row in 0..a.len() {
-        for lane in 0..4 {
-            sums[lane] += in_doubles(a[row][lane], b[row][lane]);
-        }
-    }
-    sums[0] + sums[1] + sums[2]
-}
-
+/// a · a.
 #[inline(always)]
 fn square<T: Precision>(a: &[Wide<T>]) -> f64 {
-    product(a, a)
+    let mut squares = [0.0; 4];
+    for vector in a {
+        add_products(&mut squares, vector, vector);
+    }
+    of_three(squares)
 }
 
-/// A product, in doubles.
+/// The sum of the first three of four sums.
 #[inline(always)]
-fn in_doubles<T: Precision>(a: T, b: T) -> f64 {
-    let (a, b): (f64, f64) = (a.into(), b.into());
-    a * b
+fn of_three(sums: [f64; 4]) -> f64 {
+    // What is added up for nothing costs nothing, but without it compilers take registers apart.
+    let [x, y, z, _] = std::hint::black_box(sums);
+    x + y + z
+}
+
+/// Adds products of components, in doubles.
+#[inline(always)]
+fn add_products<T: Precision>(sums: &mut [f64; 4], a: &Wide<T>, b: &Wide<T>) {
+    for lane in 0..4 {
+        let product: f64 = (a[lane] * b[lane]).into();
+        sums[lane] += product;
+    }
 }

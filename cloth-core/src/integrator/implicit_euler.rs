@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockJacobi, BlockMatrix, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State,
-    StopReason, Weights, bicgstab, conjugate_gradients,
+    BlockJacobi, BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, SolveOptions,
+    SolveReport, State, StopReason, Weights, bicgstab,
 };
 
 use super::{Integrator, StepError, StepReport, advance};
@@ -11,8 +11,8 @@ use crate::body::Body;
 ///
 /// (M − h ∂f/∂v − h² ∂f/∂x) Δv = h (f + h (∂f/∂x) v),  v' = v + Δv,  x' = x + h v',
 ///
-/// with all of ∂f/∂x and ∂f/∂v. First order and dissipative. Conjugate gradients solve it when every term's Jacobians are symmetric,
-/// else BiCGSTAB.
+/// with all of ∂f/∂x and ∂f/∂v. First order and dissipative. Conjugate gradients with over-relaxation ([`OverRelaxation`]) solve it when every
+/// term's Jacobians are symmetric, else BiCGSTAB.
 ///
 /// Compressed elements can make the matrix indefinite, and then its solution may run uphill. When conjugate gradients meet
 /// such curvature, the step is solved again with each element's Hessian projected to positive semi-definite on both
@@ -21,7 +21,15 @@ use crate::body::Body;
 #[derive(Clone, Debug, Default)]
 pub struct ImplicitEuler {
     options: Options,
-    matrix: Option<BlockMatrix>,
+    memory: Option<Memory>,
+}
+
+/// What stays from one step to the next.
+#[derive(Clone, Debug)]
+struct Memory {
+    matrix: BlockMatrix,
+    /// For symmetric matrices.
+    solver: Option<OverRelaxation<f64>>,
 }
 
 /// How exactly the linear systems are solved.
@@ -39,7 +47,7 @@ impl ImplicitEuler {
     /// With other tolerances for the linear systems.
     #[must_use]
     pub fn with_options(options: SolveOptions) -> Self {
-        Self { options: Options(options), matrix: None }
+        Self { options: Options(options), memory: None }
     }
 
     fn solve(
@@ -47,7 +55,7 @@ impl ImplicitEuler {
         body: &mut Body,
         dt: f64,
         curvature: Curvature,
-        matrix: &mut BlockMatrix,
+        Memory { matrix, solver }: &mut Memory,
     ) -> Result<Solution, StepError> {
         let state = State { x: &body.x, v: &body.v };
         let weights = Weights { position: -dt * dt, velocity: -dt };
@@ -62,10 +70,21 @@ impl ImplicitEuler {
             let (force, change) = (linear.force[vertex], linear.stiffness_times_velocity[vertex]);
             right.push(std::array::from_fn(|axis| dt * (force[axis] + dt * change[axis])));
         }
-        let preconditioner = BlockJacobi::new(matrix)?;
         let mut delta = vec![[0.0; 3]; free.len()];
-        let solver = if body.system.character().symmetric { conjugate_gradients } else { bicgstab };
-        let report = solver(matrix, &preconditioner, &right, &mut delta, &self.options.0);
+        let report = match solver {
+            None => bicgstab(matrix, &BlockJacobi::new(matrix)?, &right, &mut delta, &self.options.0),
+            Some(solver) => match solver.scale(matrix) {
+                Ok(()) => solver.solve(&right, &mut delta, &self.options.0),
+                // A block on the diagonal already proves what a direction would.
+                Err(_) if curvature == Curvature::Exact => SolveReport {
+                    iterations: 0,
+                    initial_residual: 0.0,
+                    final_residual: 0.0,
+                    stopped: StopReason::IndefiniteCurvature,
+                },
+                Err(singular) => return Err(singular.into()),
+            },
+        };
         Ok(Solution { delta, right, report })
     }
 
@@ -102,27 +121,32 @@ impl Integrator for ImplicitEuler {
     }
 
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
-        let mut matrix = match self.matrix.take() {
-            Some(matrix) if body.system.owns(&matrix) => matrix,
-            _ => body.system.matrix(),
+        let mut memory = match self.memory.take() {
+            Some(memory) if body.system.owns(&memory.matrix) => memory,
+            _ => {
+                let matrix = body.system.matrix();
+                let symmetric = body.system.character().symmetric;
+                let solver = symmetric.then(|| OverRelaxation::new(matrix.pattern()));
+                Memory { matrix, solver }
+            }
         };
-        let mut solution = self.solve(body, dt, Curvature::Exact, &mut matrix)?;
+        let mut solution = self.solve(body, dt, Curvature::Exact, &mut memory)?;
         let mut step = StepReport { solves: 1, iterations: solution.report.iterations as u64, ..StepReport::default() };
         if solution.report.stopped == StopReason::IndefiniteCurvature {
-            solution = self.solve(body, dt, Curvature::Clamped, &mut matrix)?;
+            solution = self.solve(body, dt, Curvature::Clamped, &mut memory)?;
             step.solves += 1;
             step.iterations += solution.report.iterations as u64;
             step.projected = true;
         }
         let free = body.system.dofs().free();
         if !solution.report.converged() {
-            return Err(self.failure(&solution, &matrix, free));
+            return Err(self.failure(&solution, &memory.matrix, free));
         }
         let changed = |(&vertex, delta): (&usize, &Vector3<f64>)| -> Vector3<f64> {
             std::array::from_fn(|axis| body.v[vertex][axis] + delta[axis])
         };
         let velocities: Vec<Vector3<f64>> = free.iter().zip(&solution.delta).map(changed).collect();
-        self.matrix = Some(matrix);
+        self.memory = Some(memory);
         advance(body, &velocities, dt)?;
         Ok(step)
     }
