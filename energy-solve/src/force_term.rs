@@ -71,8 +71,8 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     }
 
     fn character(&self) -> Character {
-        let Declaration { symmetric, velocity_dependent, curved, .. } = *E::DECLARATION;
-        Character { symmetric, velocity_dependent, quadratic: false, curved: curved || velocity_dependent }
+        let Declaration { symmetric, velocity_dependent, quadratic, curved, .. } = *E::DECLARATION;
+        Character { symmetric, velocity_dependent, quadratic, curved: curved || velocity_dependent }
     }
 
     fn stencils(&self) -> Stencils<'_> {

@@ -26,12 +26,9 @@ impl BlockMatrix {
         self.values.fill([[0.0; 3]; 3]);
     }
 
-    /// Sets the blocks to `scale` times others of the same pattern.
-    pub(crate) fn set_scaled(&mut self, scale: f64, blocks: &[Block<f64>]) {
-        let (to, from) = (self.values.as_flattened_mut().as_flattened_mut(), blocks.as_flattened().as_flattened());
-        for (entry, other) in to.iter_mut().zip(from) {
-            *entry = scale * other;
-        }
+    /// Sets the blocks to others of the same pattern.
+    pub(crate) fn set(&mut self, blocks: &[Block<f64>]) {
+        self.values.copy_from_slice(blocks);
     }
 
     /// The pattern.

@@ -109,9 +109,10 @@ pub struct System {
     constant: Option<Constant>,
 }
 
-/// ∂f/∂x of the quadratic terms.
+/// α ∂f/∂x + β ∂f/∂v of the quadratic terms.
 #[derive(Debug)]
 struct Constant {
+    weights: Weights,
     curvature: Curvature,
     blocks: Vec<Block<f64>>,
 }
@@ -275,9 +276,7 @@ impl System {
         // For the product every term is evaluated anyway.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
         if with_constant {
-            self.find_constant(state, curvature);
-            let constant = self.constant.as_ref().expect("it was found");
-            matrix.set_scaled(weights.position, &constant.blocks);
+            matrix.set(self.constant_blocks(state, weights, curvature));
         } else {
             matrix.clear();
         }
@@ -302,23 +301,27 @@ impl System {
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
-    /// Evaluates the Hessians of the quadratic terms, once.
-    fn find_constant(&mut self, state: State<'_>, curvature: Curvature) {
-        if self.constant.as_ref().is_some_and(|constant| constant.curvature == curvature) {
-            return;
-        }
-        let mut blocks = vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1];
+    /// The Jacobians of the quadratic terms, evaluated when the weights are others than last time: once for all steps of one size.
+    fn constant_blocks(&mut self, state: State<'_>, weights: Weights, curvature: Curvature) -> &[Block<f64>] {
+        let mut constant = match self.constant.take() {
+            Some(constant) if (constant.weights, constant.curvature) == (weights, curvature) => {
+                return &self.constant.insert(constant).blocks;
+            }
+            Some(before) => Constant { weights, curvature, ..before },
+            None => Constant { weights, curvature, blocks: vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1] },
+        };
+        constant.blocks.fill([[0.0; 3]; 3]);
         let mut sum = Linearisation {
-            weights: Weights { position: 1.0, velocity: 0.0 },
+            weights,
             curvature,
-            matrix: &mut blocks,
+            matrix: &mut constant.blocks,
             force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
             stiffness_times_velocity: None,
         };
         for Counted { term, counts } in self.terms.iter_mut().filter(|counted| is_constant(&*counted.term)) {
             counts.hessian += term.add_linearisation(state, &mut sum);
         }
-        self.constant = Some(Constant { curvature, blocks });
+        &self.constant.insert(constant).blocks
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {

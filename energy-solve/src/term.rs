@@ -12,7 +12,7 @@ pub struct Character {
     pub symmetric: bool,
     /// f depends on velocities.
     pub velocity_dependent: bool,
-    /// ∂f/∂x is the same at all positions: it is computed only once.
+    /// ∂f/∂x and ∂f/∂v are the same at all positions and velocities: they are computed once for all steps of one size.
     pub quadratic: bool,
     /// f depends on positions or velocities at all; gravity does not, and has no Jacobians to assemble.
     pub curved: bool,

@@ -78,7 +78,10 @@ pub(crate) fn character(program: &Program, routines: &Routines) -> Character {
     };
     let constant = |nodes: &Vec<NodeId>| nodes.iter().all(|&entry| !routines.graph.varies(entry));
     Character {
-        quadratic: group("hessian", 2).is_some_and(constant),
+        quadratic: match (by_position, by_velocity) {
+            (None, None) => group("hessian", 2).is_some_and(constant),
+            jacobians => [jacobians.0, jacobians.1].into_iter().flatten().all(constant),
+        },
         curved: varies(group("hessian", 2).or(by_position)),
         velocity_dependent: varies(by_velocity),
         symmetric: [by_position, by_velocity].into_iter().flatten().all(mirrored),

@@ -136,8 +136,8 @@ pub struct Declaration {
     pub translation_invariant: bool,
     /// Whether the second derivatives of the energy, or those of the force by position, are not all identically zero: gravity's are.
     pub curved: bool,
-    /// Whether the second derivatives of the energy are the same at all positions: its Hessian need be computed only once. Not said
-    /// of force laws.
+    /// Whether the second derivatives of the energy, or those of the force by position and velocity, are the same at all positions
+    /// and velocities: they need be computed only once.
     pub quadratic: bool,
     /// Whether the force depends on velocities.
     pub velocity_dependent: bool,

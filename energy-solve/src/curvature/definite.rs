@@ -10,28 +10,40 @@ const TOLERANCE: f64 = 64.0 * f64::EPSILON;
 /// divisions, a small part of finding eigenvalues.
 #[inline(always)]
 pub(crate) fn is_semi_definite<V: Lane<f64>>(upper: &[V], n: usize) -> V::Mask {
+    match n {
+        3 => is_definite_enough::<V, 3>(upper),
+        4 => is_definite_enough::<V, 4>(upper),
+        6 => is_definite_enough::<V, 6>(upper),
+        9 => is_definite_enough::<V, 9>(upper),
+        _ => is_definite_enough::<V, MOST>(upper),
+    }
+}
+
+#[inline(always)]
+fn is_definite_enough<V: Lane<f64>, const N: usize>(upper: &[V]) -> V::Mask {
     let zero = V::splat(0.0);
-    let mut a = [zero; MOST * (MOST + 1) / 2];
-    a[..upper.len()].copy_from_slice(upper);
+    let mut a = [[zero; N]; N];
     let mut largest = zero;
-    for i in 0..n {
-        largest = largest.max(a[upper_index(n, i, i)].abs());
+    for i in 0..N {
+        for j in i..N {
+            a[i][j] = upper[upper_index(N, i, j)];
+        }
+        largest = largest.max(a[i][i].abs());
     }
     // So that the zero matrix passes.
     let shift = (largest * V::splat(TOLERANCE)).max(V::splat(f64::MIN_POSITIVE));
     let mut definite = !V::Mask::none();
-    for k in 0..n {
-        let pivot = a[upper_index(n, k, k)] + shift;
+    for k in 0..N {
+        let pivot = a[k][k] + shift;
         definite = definite & zero.less(pivot);
         if !definite.any() {
             return definite;
         }
         let inverse = V::splat(1.0) / pivot;
-        for i in k + 1..n {
-            let factor = a[upper_index(n, k, i)] * inverse;
-            for j in i..n {
-                let place = upper_index(n, i, j);
-                a[place] = a[place] - factor * a[upper_index(n, k, j)];
+        for i in k + 1..N {
+            let factor = a[k][i] * inverse;
+            for j in i..N {
+                a[i][j] = a[i][j] - factor * a[k][j];
             }
         }
     }

@@ -3,37 +3,40 @@
 
 use energy_dsl::{Lane, Mask};
 
-use super::{Curvature, MOST, Square};
+use super::{Curvature, Square};
 
 /// Sweeps converge quadratically: six or seven do for 12×12 matrices.
 const MOST_SWEEPS: usize = 16;
 
 /// By how much a matrix changes when its eigenvalues do, and in which lanes; leaves it diagonal.
 #[inline(always)]
-pub(super) fn difference<V: Lane<f64>>(a: &mut Square<V>, n: usize, curvature: Curvature) -> (Square<V>, V::Mask) {
+pub(super) fn difference<V: Lane<f64>, const N: usize>(
+    a: &mut Square<V, N>,
+    curvature: Curvature,
+) -> (Square<V, N>, V::Mask) {
     let zero = V::splat(0.0);
-    let mut vectors = [[zero; MOST]; MOST];
-    for i in 0..n {
+    let mut vectors = [[zero; N]; N];
+    for i in 0..N {
         vectors[i][i] = V::splat(1.0);
     }
-    diagonalise(a, &mut vectors, n);
-    let mut difference = [[zero; MOST]; MOST];
+    diagonalise(a, &mut vectors);
+    let mut difference = [[zero; N]; N];
     let mut changed = V::Mask::none();
-    for k in 0..n {
+    for k in 0..N {
         let change = curvature.change(a[k][k]);
         let changes = zero.less(change);
         if !changes.any() {
             continue;
         }
         changed = changed | changes;
-        for i in 0..n {
+        for i in 0..N {
             let scaled = change * vectors[i][k];
-            for j in i..n {
+            for j in i..N {
                 difference[i][j] = difference[i][j] + scaled * vectors[j][k];
             }
         }
     }
-    for i in 0..n {
+    for i in 0..N {
         for j in 0..i {
             difference[i][j] = difference[j][i];
         }
@@ -43,19 +46,19 @@ pub(super) fn difference<V: Lane<f64>>(a: &mut Square<V>, n: usize, curvature: C
 
 /// Rotates a symmetric matrix until it is diagonal; the columns of `vectors` are turned along.
 #[inline(always)]
-fn diagonalise<V: Lane<f64>>(a: &mut Square<V>, vectors: &mut Square<V>, n: usize) {
+fn diagonalise<V: Lane<f64>, const N: usize>(a: &mut Square<V, N>, vectors: &mut Square<V, N>) {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
     let mut squares = zero;
-    for i in 0..n {
-        for j in 0..n {
+    for i in 0..N {
+        for j in 0..N {
             squares = squares + a[i][j] * a[i][j];
         }
     }
     let negligible = squares * V::splat(f64::EPSILON * f64::EPSILON / 16.0);
     for _ in 0..MOST_SWEEPS {
         let mut turned = V::Mask::none();
-        for p in 0..n {
-            for q in p + 1..n {
+        for p in 0..N {
+            for q in p + 1..N {
                 let off = a[p][q];
                 let turn = negligible.less(off * off);
                 if !turn.any() {
@@ -75,7 +78,7 @@ fn diagonalise<V: Lane<f64>>(a: &mut Square<V>, vectors: &mut Square<V>, n: usiz
                 a[q][q] = a[q][q] + shift;
                 a[p][q] = V::select(turn, zero, off);
                 a[q][p] = a[p][q];
-                for k in 0..n {
+                for k in 0..N {
                     if k != p && k != q {
                         let (g, h) = (a[k][p], a[k][q]);
                         a[k][p] = g - sine * (h + g * half);

@@ -46,8 +46,8 @@ impl Curvature {
 /// The most coordinates for which lanes are used.
 pub(crate) const MOST: usize = 12;
 
-/// A square matrix over lanes; only the first rows and columns are used.
-type Square<V> = [[V; MOST]; MOST];
+/// A square matrix over lanes.
+type Square<V, const N: usize> = [[V; N]; N];
 
 /// The place of entry (i, j), i ≤ j, in the upper triangle of an n×n matrix, row by row.
 #[inline(always)]
@@ -154,14 +154,19 @@ fn change<V: Lane<f64>>(
         }
         _ => {}
     }
-    changed | change_rest(upper, n, curvature, orthonormal, open)
+    changed
+        | match n {
+            3 => change_rest::<V, 3>(upper, curvature, orthonormal, open),
+            6 => change_rest::<V, 6>(upper, curvature, orthonormal, open),
+            9 => change_rest::<V, 9>(upper, curvature, orthonormal, open),
+            _ => change_rest::<V, MOST>(upper, curvature, orthonormal, open),
+        }
 }
 
 /// [`change`] without knowledge of any structure.
 #[inline(always)]
-fn change_rest<V: Lane<f64>>(
+fn change_rest<V: Lane<f64>, const N: usize>(
     upper: &mut [V],
-    n: usize,
     curvature: Curvature,
     orthonormal: &Orthonormal,
     open: V::Mask,
@@ -169,23 +174,23 @@ fn change_rest<V: Lane<f64>>(
     if !open.any() {
         return open;
     }
-    let (mut a, scale) = scaled_square(upper, n);
-    orthonormal.make_orthonormal(&mut a, n);
-    let (mut difference, changed) = jacobi::difference(&mut a, n, curvature);
+    let (mut a, scale) = scaled_square::<V, N>(upper);
+    orthonormal.make_orthonormal(&mut a);
+    let (mut difference, changed) = jacobi::difference(&mut a, curvature);
     let changed = changed & open;
-    orthonormal.make_differences(&mut difference, n);
-    add_to(upper, &difference, n, scale, changed);
+    orthonormal.make_differences(&mut difference);
+    add_to(upper, &difference, scale, changed);
     changed
 }
 
 /// The whole matrix, its entries brought near 1 by a power of two so that their squares neither overflow nor vanish; and the power.
 #[inline(always)]
-fn scaled_square<V: Lane<f64>>(upper: &[V], n: usize) -> (Square<V>, V) {
+fn scaled_square<V: Lane<f64>, const N: usize>(upper: &[V]) -> (Square<V, N>, V) {
     let scale = largest_of(upper).power_of_two_scale();
-    let mut a = [[V::splat(0.0); MOST]; MOST];
-    for i in 0..n {
-        for j in i..n {
-            let entry = upper[upper_index(n, i, j)] * scale;
+    let mut a = [[V::splat(0.0); N]; N];
+    for i in 0..N {
+        for j in i..N {
+            let entry = upper[upper_index(N, i, j)] * scale;
             a[i][j] = entry;
             a[j][i] = entry;
         }
@@ -195,11 +200,11 @@ fn scaled_square<V: Lane<f64>>(upper: &[V], n: usize) -> (Square<V>, V) {
 
 /// Adds a scaled difference where it is wanted.
 #[inline(always)]
-fn add_to<V: Lane<f64>>(upper: &mut [V], difference: &Square<V>, n: usize, scale: V, wanted: V::Mask) {
+fn add_to<V: Lane<f64>, const N: usize>(upper: &mut [V], difference: &Square<V, N>, scale: V, wanted: V::Mask) {
     let unscale = V::splat(1.0) / scale;
-    for i in 0..n {
-        for j in i..n {
-            let entry = &mut upper[upper_index(n, i, j)];
+    for i in 0..N {
+        for j in i..N {
+            let entry = &mut upper[upper_index(N, i, j)];
             *entry = V::select(wanted, *entry + difference[i][j] * unscale, *entry);
         }
     }

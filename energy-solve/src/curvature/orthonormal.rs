@@ -54,28 +54,28 @@ impl Orthonormal {
 
     /// H ← Lᵀ H L, for a symmetric H.
     #[inline(always)]
-    pub(super) fn make_orthonormal<V: Lane<f64>>(&self, h: &mut Square<V>, n: usize) {
-        self.congruent(&self.lower, h, n);
+    pub(super) fn make_orthonormal<V: Lane<f64>, const N: usize>(&self, h: &mut Square<V, N>) {
+        self.congruent(&self.lower, h);
     }
 
     /// H ← L⁻ᵀ H L⁻¹, for a symmetric H.
     #[inline(always)]
-    pub(super) fn make_differences<V: Lane<f64>>(&self, h: &mut Square<V>, n: usize) {
-        self.congruent(&self.inverse, h, n);
+    pub(super) fn make_differences<V: Lane<f64>, const N: usize>(&self, h: &mut Square<V, N>) {
+        self.congruent(&self.inverse, h);
     }
 
     /// H ← Tᵀ H T.
     #[inline(always)]
-    fn congruent<V: Lane<f64>>(&self, t: &[[f64; VECTORS]; VECTORS], h: &mut Square<V>, n: usize) {
-        if n == 3 {
+    fn congruent<V: Lane<f64>, const N: usize>(&self, t: &[[f64; VECTORS]; VECTORS], h: &mut Square<V, N>) {
+        if N == 3 {
             return; // one vector is only longer or shorter
         }
         // Twice H ← (H T)ᵀ.
         for _ in 0..2 {
             let old = *h;
-            for row in 0..n {
-                let turned = columns_times(t, &old[row], n);
-                for column in 0..n {
+            for row in 0..N {
+                let turned = columns_times(t, &old[row]);
+                for column in 0..N {
                     h[column][row] = turned[column];
                 }
             }
@@ -85,10 +85,10 @@ impl Orthonormal {
 
 /// (T ⊗ 1₃)ᵀ z, for a lower triangle T.
 #[inline(always)]
-fn columns_times<V: Lane<f64>>(t: &[[f64; VECTORS]; VECTORS], z: &[V; MOST], n: usize) -> [V; MOST] {
-    let mut product = [V::splat(0.0); MOST];
-    for vector in 0..n / 3 {
-        for k in vector..n / 3 {
+fn columns_times<V: Lane<f64>, const N: usize>(t: &[[f64; VECTORS]; VECTORS], z: &[V; N]) -> [V; N] {
+    let mut product = [V::splat(0.0); N];
+    for vector in 0..N / 3 {
+        for k in vector..N / 3 {
             for axis in 0..3 {
                 let place = 3 * vector + axis;
                 product[place] = product[place] + V::splat(t[k][vector]) * z[3 * k + axis];

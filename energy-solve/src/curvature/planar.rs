@@ -1,7 +1,7 @@
 use energy_dsl::{Lane, Mask};
 
 use super::definite::is_semi_definite;
-use super::{Curvature, MOST, Orthonormal, Square, add_to, jacobi, scaled_square, upper_index};
+use super::{Curvature, Orthonormal, Square, add_to, jacobi, scaled_square, upper_index};
 
 /// How large the entries may be that should vanish, relative to the largest.
 const TOLERANCE: f64 = 1e-10;
@@ -31,8 +31,8 @@ pub(super) fn change<V: Lane<f64>>(
     let [t, _, n] = frame;
     frame[1] = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
 
-    let (mut a, scale) = scaled_square(upper, 6);
-    orthonormal.make_orthonormal(&mut a, 6);
+    let (mut a, scale) = scaled_square::<V, 6>(upper);
+    orthonormal.make_orthonormal(&mut a);
     turn(&mut a, &frame);
     let mut planar = open & spans;
     let tolerance = V::splat(TOLERANCE);
@@ -46,21 +46,21 @@ pub(super) fn change<V: Lane<f64>>(
     }
 
     let zero = V::splat(0.0);
-    let mut difference = [[zero; MOST]; MOST];
-    let mut out = [[zero; MOST]; MOST];
+    let mut difference = [[zero; 6]; 6];
+    let mut out = [[zero; 2]; 2];
     for (i, row) in [2, 5].into_iter().enumerate() {
         for (j, column) in [2, 5].into_iter().enumerate() {
             out[i][j] = a[row][column];
         }
     }
-    let (part, mut changed) = jacobi::difference(&mut out, 2, curvature);
+    let (part, mut changed) = jacobi::difference(&mut out, curvature);
     for (i, row) in [2, 5].into_iter().enumerate() {
         for (j, column) in [2, 5].into_iter().enumerate() {
             difference[row][column] = part[i][j];
         }
     }
 
-    let mut within = [[zero; MOST]; MOST];
+    let mut within = [[zero; 4]; 4];
     let mut within_upper = [zero; 10];
     for i in 0..4 {
         for j in 0..4 {
@@ -72,7 +72,7 @@ pub(super) fn change<V: Lane<f64>>(
     }
     let indefinite = planar & !is_semi_definite(&within_upper, 4);
     if indefinite.any() {
-        let (part, also) = jacobi::difference(&mut within, 4, curvature);
+        let (part, also) = jacobi::difference(&mut within, curvature);
         changed = changed | (also & indefinite);
         for i in 0..4 {
             for j in 0..4 {
@@ -88,8 +88,8 @@ pub(super) fn change<V: Lane<f64>>(
             [frame[0][2], frame[1][2], frame[2][2]],
         ];
         turn(&mut difference, &back);
-        orthonormal.make_differences(&mut difference, 6);
-        add_to(upper, &difference, 6, scale, changed);
+        orthonormal.make_differences(&mut difference);
+        add_to(upper, &difference, scale, changed);
     }
     (planar, changed)
 }
@@ -104,7 +104,7 @@ fn square<V: Lane<f64>>(a: [V; 3]) -> V {
 
 /// A ← R A Rᵀ for a symmetric A, R acting on both vectors alike.
 #[inline(always)]
-fn turn<V: Lane<f64>>(a: &mut Square<V>, r: &[[V; 3]; 3]) {
+fn turn<V: Lane<f64>>(a: &mut Square<V, 6>, r: &[[V; 3]; 3]) {
     // Twice A ← (R A)ᵀ.
     for _ in 0..2 {
         let old = *a;
