@@ -125,6 +125,8 @@ pub struct Measured {
     pub time: Duration,
     /// The lowest point at the end, in m.
     pub lowest: f64,
+    /// The most memory that the program held up to the end, in bytes, where the system tells.
+    pub peak_memory: Option<u64>,
 }
 
 /// Runs a cloth for `seconds` of its time, calling `progress` after every step.
@@ -149,7 +151,15 @@ pub fn measure(cloth: Cloth, cells: usize, seconds: f64, mut progress: impl FnMu
     }
     let time = started.elapsed();
     let lowest = body.x.iter().fold(f64::INFINITY, |lowest, x| lowest.min(x[2]));
-    Ok(Measured { cloth, vertices, steps, report, set_up, time, lowest })
+    Ok(Measured { cloth, vertices, steps, report, set_up, time, lowest, peak_memory: peak_memory() })
+}
+
+/// What Linux calls the high-water mark of the resident set.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024 * kilobytes)
 }
 
 /// The runs as a table, with the growth of the time of a step from mesh to mesh.
@@ -168,6 +178,7 @@ pub fn table(runs: &[Measured]) -> Table {
         "solve",
         "line search",
         "set-up ms",
+        "peak MB",
         "lowest m",
         "growth",
     ]);
@@ -192,6 +203,7 @@ pub fn table(runs: &[Measured]) -> Table {
             share(solve),
             share(line_search),
             format!("{:.0}", milliseconds(run.set_up)),
+            run.peak_memory.map_or("–".to_owned(), |bytes| format!("{:.0}", bytes as f64 / 1e6)),
             format!("{:.4}", run.lowest),
             growth,
         ]);
