@@ -51,11 +51,13 @@ pub mod mesh;
 pub mod motion;
 pub mod output;
 pub mod progress;
+pub mod record;
 pub mod report;
 pub mod run;
 pub mod scene;
 pub mod trajectory_error;
 pub mod validate;
+pub mod view;
 pub mod wind;
 
 pub use body::Body;

@@ -10,36 +10,23 @@ use verify::audit::{Check, Options, Report, Target, audit_all, describe_failure}
 
 use crate::fabric::Material;
 use crate::output::{OutputError, OutputFolder};
-use crate::run::Record;
+use crate::record::{Record, RecordError};
 use crate::scene::Scene;
 use crate::summary::Summary;
 
 /// A folder of which no page can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// Something is not there.
-    #[error("cannot read {}; is this the folder of a finished run?", .path.display())]
+    /// What the run says of itself.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A picture or plot is there but cannot be read.
+    #[error("cannot read {}", .path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
-    },
-    /// What the run says of itself cannot be understood.
-    #[error("{} is damaged: {source}", .path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
-    /// It was written by a newer program.
-    #[error("{} has version {version}, but this program reads version {}; use the newer program", .path.display(), Record::VERSION)]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        version: u32,
     },
     /// The page cannot be written.
     #[error(transparent)]
@@ -52,25 +39,12 @@ pub enum ReportError {
 /// # Errors
 /// When a file is missing, damaged or newer than this program, or the page cannot be written.
 pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
-    let path = folder.join(OutputFolder::RECORD);
-    let bytes = read(&path)?;
-    let damaged = |source| ReportError::Damaged { path: path.clone(), source };
-    let version = serde_json::from_slice::<Version>(&bytes).map_err(damaged)?.version;
-    if version > Record::VERSION {
-        return Err(ReportError::Newer { path, version });
-    }
-    let record: Record = serde_json::from_slice(&bytes).map_err(damaged)?;
+    let record = Record::read(folder)?;
     let picture = optional(&folder.join(OutputFolder::PICTURE))?;
     let plot = optional(&folder.join(OutputFolder::LEDGER_PLOT))?;
     let audit = audited(&record);
     let page = page(&record, picture.as_deref(), plot.as_deref(), &audit);
     Ok(OutputFolder::reopen(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
-}
-
-/// The part of a record that says how to read the rest.
-#[derive(serde::Deserialize)]
-struct Version {
-    version: u32,
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
