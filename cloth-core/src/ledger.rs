@@ -252,6 +252,7 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
             .build_cartesian_2d(times.first().copied().unwrap_or(0.0)..end, low - margin..high + margin)?;
         chart
             .configure_mesh()
+            .max_light_lines(2)
             .light_line_style(BLACK.mix(0.05))
             .x_desc("time, s")
             .y_desc("energy since the start, J")

@@ -34,6 +34,8 @@
 #![forbid(unsafe_code)]
 
 mod body;
+#[cfg(doctest)]
+mod book;
 mod dissipation_term;
 mod frame_store;
 mod simulation;

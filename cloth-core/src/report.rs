@@ -146,8 +146,9 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
     page
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}\
-img,svg{max-width:100%;height:auto}table{border-collapse:collapse}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:right}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
+img,svg{max-width:100%;height:auto}table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
+td,th{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:right}td:not(.text){white-space:nowrap}\
 td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;padding:1rem;overflow:auto;font-size:13px}\
 .good{color:#176617}.bad{color:#a01818}";
 
