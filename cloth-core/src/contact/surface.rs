@@ -316,6 +316,19 @@ mod tests {
             prop_assert!((alone - radius - distance).abs() < 1e-12, "{alone} {distance} {feature:?}");
         }
 
+        /// Where edges are sharp, the normal of a face beside them tells the wrong side.
+        #[test]
+        fn sharp_edges_and_corners_have_an_inside(x in -0.5..1.5_f64, y in -0.3..0.3_f64, z in -0.3..1.3_f64) {
+            let vertices: Vec<Vector3<f64>> = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.4, 0.0, 1.0]];
+            let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+            let wedge = Surface::new(TriangleMesh::new(vertices, triangles).unwrap(), 0.0).unwrap();
+            let height = |triangle: usize| dot(wedge.face_normals[triangle], subtract([x, y, z], wedge.mesh.corners(triangle)[0]));
+            // Convex: inside is below all planes.
+            let highest = (0..4).map(height).fold(f64::NEG_INFINITY, f64::max);
+            let distance = wedge.nearest([x, y, z]).distance;
+            prop_assert_eq!(distance > 0.0, highest > 0.0, "{} {}", distance, highest);
+        }
+
         /// Every triangle looked at.
         #[test]
         fn the_hierarchy_finds_what_brute_force_finds(points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 9..60), x in prop::array::uniform3(-2.0..2.0_f64)) {
