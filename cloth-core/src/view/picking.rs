@@ -103,12 +103,13 @@ mod tests {
     fn hair_is_picked_within_a_few_pixels_unless_cloth_hides_it() {
         let camera = Orbit { target: [0.0; 3], distance: 10.0, azimuth: -std::f64::consts::FRAC_PI_2, elevation: 0.0 };
         let mut positions = vec![[0.0, 0.0, 0.0], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0]];
+        let strand = 0..3;
         let [x, y] = camera.project(positions[1], SIZE).unwrap().pixel;
-        let hair = pick(&camera, [x + 5.0, y], SIZE, &positions, &[], &[0..3]);
+        let hair = pick(&camera, [x + 5.0, y], SIZE, &positions, &[], std::slice::from_ref(&strand));
         assert_eq!(hair.map(|picked| picked.vertex), Some(1));
-        assert_eq!(pick(&camera, [x + 9.0, y], SIZE, &positions, &[], &[0..3]), None);
+        assert_eq!(pick(&camera, [x + 9.0, y], SIZE, &positions, &[], std::slice::from_ref(&strand)), None);
         positions.extend([[-3.0, -1.0, -3.0], [3.0, -1.0, -3.0], [0.0, -1.0, 5.0]]);
-        let hidden = pick(&camera, [x, y], SIZE, &positions, &[[3, 4, 5]], &[0..3]).unwrap();
+        let hidden = pick(&camera, [x, y], SIZE, &positions, &[[3, 4, 5]], std::slice::from_ref(&strand)).unwrap();
         assert!(hidden.vertex >= 3, "{hidden:?}");
     }
 }
