@@ -91,8 +91,14 @@ fn what_cannot_be_shown_is_a_clear_error() {
     } else {
         "cargo build --release -p cloth-core --features view"
     }));
-    #[cfg(feature = "view")]
-    assert!(refused(&["view", "scene.toml"], path).contains("no display"));
+    #[cfg(all(feature = "view", target_os = "linux"))]
+    {
+        assert!(refused(&["view", "scene.toml"], path).contains("no display"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cloth"));
+        command.args(["view", "scene.toml"]).current_dir(path).env("DISPLAY", ":nobody").env_remove("WAYLAND_DISPLAY");
+        let message = String::from_utf8(command.output().unwrap().stderr).unwrap();
+        assert!(message.contains("cannot open a window: ") && !message.contains("panicked"), "{message}");
+    }
     let shot = |shown: &str, more: &[&str]| refused(&[&["view", shown, "--screenshot", "x.png"], more].concat(), path);
     assert!(shot("nothing.toml", &[]).contains("cannot read the scene nothing.toml"));
     std::fs::create_dir(path.join("empty")).unwrap();

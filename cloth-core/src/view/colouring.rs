@@ -1,3 +1,4 @@
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use clap::ValueEnum;
@@ -138,14 +139,19 @@ pub fn stored_energies(simulation: &Simulation, x: &[Vector3<f64>]) -> Vec<f64> 
     for (term, _) in body.system.terms().filter(|(term, _)| term.stencils().arity > 1) {
         let stencils = term.stencils();
         for (number, energy) in term.element_energies(x).unwrap_or_default() {
-            // Stencils of unequal size are filled up by repeating a vertex.
-            let mut vertices = stencils.stencil(number).to_vec();
-            vertices.sort_unstable();
-            vertices.dedup();
-            vertices.iter().for_each(|&vertex| energies[vertex] += energy / vertices.len() as f64);
+            for (vertex, share) in shares(stencils.stencil(number), energy) {
+                energies[vertex] += share;
+            }
         }
     }
     energies.iter().zip(&body.masses).map(|(energy, mass)| energy / mass).collect()
+}
+
+/// An element's energy divided evenly among its vertices. Stencils of unequal size are filled up by repeating a vertex, which counts once.
+fn shares(stencil: &[usize], energy: f64) -> impl Iterator<Item = (usize, f64)> {
+    let vertices: BTreeSet<usize> = stencil.iter().copied().collect();
+    let share = energy / vertices.len() as f64;
+    vertices.into_iter().map(move |vertex| (vertex, share))
 }
 
 #[cfg(test)]
@@ -199,6 +205,11 @@ mod tests {
                 .sum();
             assert!(stored > 0.0 && (shown / stored - 1.0).abs() < 1e-12, "{shown} {stored}");
         }
+    }
+
+    #[test]
+    fn a_vertex_that_fills_up_a_stencil_counts_once() {
+        assert_eq!(shares(&[3, 5, 3, 3], 1.0).collect::<Vec<_>>(), [(3, 0.5), (5, 0.5)]);
     }
 
     #[test]

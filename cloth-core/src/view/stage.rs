@@ -58,6 +58,12 @@ pub enum ViewError {
         "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, or write a picture with --screenshot FILE"
     )]
     NoDisplay,
+    /// The engine cannot open one.
+    #[error("cannot open a window: {reason}; write a picture with --screenshot FILE")]
+    NoWindow {
+        /// What the engine says.
+        reason: String,
+    },
     /// The picture.
     #[error(transparent)]
     Picture(#[from] crate::output::PictureError),

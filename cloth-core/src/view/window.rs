@@ -38,12 +38,24 @@ pub fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result
     if cfg!(target_os = "linux") && !is_there("DISPLAY") && !is_there("WAYLAND_DISPLAY") {
         return Err(ViewError::NoDisplay);
     }
-    kiss3d::pollster::block_on(show(viewer, &format!("cloth: {}", path.display())));
+    let window = window(&format!("cloth: {}", path.display()))?;
+    kiss3d::pollster::block_on(show(viewer, window));
     Ok(())
 }
 
-async fn show(mut viewer: Viewer, title: &str) {
-    let mut window = Window::new_with_size(title, 1200, 900).await;
+/// A window. The engine panics where the display cannot be reached or nothing can draw; that is an error like others.
+fn window(title: &str) -> Result<Window, ViewError> {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| ()));
+    let opened = std::panic::catch_unwind(|| kiss3d::pollster::block_on(Window::new_with_size(title, 1200, 900)));
+    std::panic::set_hook(hook);
+    opened.map_err(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+        ViewError::NoWindow { reason: text.unwrap_or("the engine does not say why").to_owned() }
+    })
+}
+
+async fn show(mut viewer: Viewer, mut window: Window) {
     window.set_background_color(BACKGROUND);
     window.set_ambient(0.35);
     window.rebind_close_key(Some(Key::Escape));
