@@ -266,7 +266,9 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
                 .label(name)
                 .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)));
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
+        let mut labels = chart.configure_series_labels();
+        let labels = labels.position(SeriesLabelPosition::UpperRight);
+        labels.background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
         area.present()?;
     }
     Ok(text)
