@@ -252,6 +252,7 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
             .build_cartesian_2d(times.first().copied().unwrap_or(0.0)..end, low - margin..high + margin)?;
         chart
             .configure_mesh()
+            .max_light_lines(2)
             .light_line_style(BLACK.mix(0.05))
             .x_desc("time, s")
             .y_desc("energy since the start, J")
@@ -265,7 +266,9 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
                 .label(name)
                 .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)));
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
+        let mut labels = chart.configure_series_labels();
+        let labels = labels.position(SeriesLabelPosition::UpperRight);
+        labels.background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
         area.present()?;
     }
     Ok(text)

@@ -34,6 +34,8 @@
 #![forbid(unsafe_code)]
 
 mod body;
+#[cfg(doctest)]
+mod book;
 mod dissipation_term;
 mod frame_store;
 mod simulation;
@@ -51,11 +53,13 @@ pub mod mesh;
 pub mod motion;
 pub mod output;
 pub mod progress;
+pub mod record;
 pub mod report;
 pub mod run;
 pub mod scene;
 pub mod trajectory_error;
 pub mod validate;
+pub mod view;
 pub mod wind;
 
 pub use body::Body;

@@ -16,6 +16,7 @@ use cloth_core::progress::Progress;
 use cloth_core::run::{Ending, Run, RunError};
 use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
+use cloth_core::view::{self, Colouring, Moment, Screenshot};
 use cloth_core::{Simulation, demo, materials, report, scene, trajectory_error};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -64,6 +65,26 @@ enum Command {
     Report {
         /// The folder of the run.
         folder: PathBuf,
+    },
+    /// Shows a scene while it is simulated, or plays a finished run, in a window (a build with `--features view`); `--screenshot` needs neither.
+    View {
+        /// The scene file, or the folder of a run.
+        shown: PathBuf,
+        /// What colours show; the key c changes it.
+        #[arg(long, value_enum, default_value_t)]
+        colours: Colouring,
+        /// Draws the edges of triangles; the key w changes it.
+        #[arg(long)]
+        wireframe: bool,
+        /// Writes a picture to this PNG file instead of opening a window.
+        #[arg(long, value_name = "FILE.png")]
+        screenshot: Option<PathBuf>,
+        /// With --screenshot: this frame, from 0, rather than the last.
+        #[arg(long, requires = "screenshot", conflicts_with = "time")]
+        frame: Option<usize>,
+        /// With --screenshot: this time, in s.
+        #[arg(long, requires = "screenshot", value_parser = not_negative)]
+        time: Option<f64>,
     },
     /// Prints the JSON schema of scene files, for editors.
     Schema,
@@ -126,6 +147,13 @@ fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "it is a number above 0".to_owned())
 }
 
+fn not_negative(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x >= 0.0)
+        .ok_or_else(|| "it is a number, 0 or above".to_owned())
+}
+
 fn ratio(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.abs() < 1.0).ok_or_else(|| "it is a number between −1 and 1".to_owned())
 }
@@ -184,6 +212,20 @@ fn obey(command: Command) -> Result<ExitCode> {
         }
         Command::Resume { folder } => return run(Run::resume(&folder)?),
         Command::Report { folder } => print(&format!("wrote {}\n", report::write_report(&folder)?.display())),
+        Command::View { shown, colours, wireframe, screenshot: Some(file), frame, time } => {
+            let moment = match (frame, time) {
+                (Some(frame), _) => Moment::Frame(frame),
+                (None, Some(time)) => Moment::Time(time),
+                (None, None) => Moment::End,
+            };
+            let progress = ProgressBar::new_spinner();
+            let shot = view::screenshot(&shown, moment, colours, wireframe, || progress.inc(1));
+            progress.finish_and_clear();
+            let Screenshot { png, time, legend } = shot?;
+            verify::write_whole(&file, &png).with_context(|| format!("cannot write {}", file.display()))?;
+            print(&format!("wrote {}: t = {time:.4} s, {legend}\n", file.display()))
+        }
+        Command::View { shown, colours, wireframe, screenshot: None, .. } => open_window(&shown, colours, wireframe),
         Command::Schema => print(&format!("{:#}\n", scene::schema())),
         Command::Materials => print(&materials::listing()),
         Command::Validate { questions, quick, gamma, nu, aspect, mesh, orientation, segments } => {
@@ -234,6 +276,20 @@ fn obey(command: Command) -> Result<ExitCode> {
         }
     }
     .map(|()| ExitCode::SUCCESS)
+}
+
+#[cfg(feature = "view")]
+fn open_window(shown: &Path, colours: Colouring, wireframe: bool) -> Result<()> {
+    Ok(view::open_window(shown, colours, wireframe)?)
+}
+
+/// The window's engine is left out of a plain build.
+#[cfg(not(feature = "view"))]
+fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
+    anyhow::bail!(
+        "this build has no window; make one that has with `cargo build --release -p cloth-core --features view`, or write a picture with \
+         --screenshot FILE.png"
+    )
 }
 
 /// Compares the integrators, prints the table, and writes it.

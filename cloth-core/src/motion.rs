@@ -135,6 +135,15 @@ impl Pose {
         self
     }
 
+    /// This, then another.
+    #[must_use]
+    pub fn then(&self, next: &Self) -> Self {
+        let column = |j: usize| next.turned_direction(std::array::from_fn(|i| self.rotation[i][j]));
+        let columns = [0, 1, 2].map(column);
+        let rotation = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+        Self { rotation, shift: next.applied(self.shift) }
+    }
+
     /// Where a point goes.
     #[must_use]
     pub fn applied(&self, point: Vector3<f64>) -> Vector3<f64> {

@@ -1,6 +1,6 @@
 //! What people see while a run is under way: how far it is, how long it will take, and whether it is stuck.
 
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -40,17 +40,7 @@ impl Progress {
         let (sender, receiver) = channel::<u64>();
         let shown = bar.clone();
         let watch = std::thread::spawn(move || {
-            let (start, mut last, mut ended, mut count) = (Instant::now(), done, Instant::now(), 0);
-            loop {
-                let mean = ended.duration_since(start) / count.max(1);
-                match receiver.recv_timeout(PATIENCE.max(FACTOR * mean)) {
-                    Ok(step) => (last, ended, count) = (step, Instant::now(), count + 1),
-                    Err(RecvTimeoutError::Disconnected) => return,
-                    Err(RecvTimeoutError::Timeout) => {
-                        shown.suspend(|| eprintln!("{}", stuck(last, ended.elapsed(), mean)))
-                    }
-                }
-            }
+            watch(&receiver, done, PATIENCE, |warning| shown.suspend(|| eprintln!("{warning}")));
         });
         Self { bar, steps: Some(sender), watch: Some(watch), recent: Recent::default() }
     }
@@ -79,6 +69,19 @@ impl Progress {
     }
 }
 
+/// Listens to the steps that end until there will be no more, and warns when none does for that long and for [`FACTOR`] times as long as others took.
+fn watch(steps: &Receiver<u64>, done: u64, patience: Duration, mut warn: impl FnMut(String)) {
+    let (start, mut last, mut ended, mut count) = (Instant::now(), done, Instant::now(), 0);
+    loop {
+        let mean = ended.duration_since(start) / count.max(1);
+        match steps.recv_timeout(patience.max(FACTOR * mean)) {
+            Ok(step) => (last, ended, count) = (step, Instant::now(), count + 1),
+            Err(RecvTimeoutError::Disconnected) => return,
+            Err(RecvTimeoutError::Timeout) => warn(stuck(last, ended.elapsed(), mean)),
+        }
+    }
+}
+
 /// The warning.
 fn stuck(last: u64, silent: Duration, mean: Duration) -> String {
     format!(
@@ -101,5 +104,23 @@ mod tests {
         let mut progress = Progress::new(10, 3);
         progress.step(4, &StepReport::default());
         progress.finish();
+    }
+
+    #[test]
+    fn a_step_that_does_not_end_is_reported_while_steps_that_do_are_not() {
+        let (steps, ended) = channel();
+        let (warn, warnings) = channel();
+        let watching = std::thread::spawn(move || {
+            watch(&ended, 7, Duration::from_millis(100), |warning| warn.send(warning).expect("somebody listens"));
+        });
+        for step in 8..12 {
+            steps.send(step).unwrap();
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert!(warnings.try_recv().is_err(), "all is well");
+        let warning = warnings.recv_timeout(Duration::from_secs(60)).unwrap();
+        assert!(warning.contains("the step after 11 has taken"), "{warning}");
+        drop(steps);
+        watching.join().unwrap();
     }
 }

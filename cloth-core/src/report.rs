@@ -10,36 +10,23 @@ use verify::audit::{Check, Options, Report, Target, audit_all, describe_failure}
 
 use crate::fabric::Material;
 use crate::output::{OutputError, OutputFolder};
-use crate::run::Record;
+use crate::record::{Record, RecordError};
 use crate::scene::Scene;
 use crate::summary::Summary;
 
 /// A folder of which no page can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// Something is not there.
-    #[error("cannot read {}; is this the folder of a finished run?", .path.display())]
+    /// What the run says of itself.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A picture or plot is there but cannot be read.
+    #[error("cannot read {}", .path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
-    },
-    /// What the run says of itself cannot be understood.
-    #[error("{} is damaged: {source}", .path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
-    /// It was written by a newer program.
-    #[error("{} has version {version}, but this program reads version {}; use the newer program", .path.display(), Record::VERSION)]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        version: u32,
     },
     /// The page cannot be written.
     #[error(transparent)]
@@ -52,25 +39,12 @@ pub enum ReportError {
 /// # Errors
 /// When a file is missing, damaged or newer than this program, or the page cannot be written.
 pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
-    let path = folder.join(OutputFolder::RECORD);
-    let bytes = read(&path)?;
-    let damaged = |source| ReportError::Damaged { path: path.clone(), source };
-    let version = serde_json::from_slice::<Version>(&bytes).map_err(damaged)?.version;
-    if version > Record::VERSION {
-        return Err(ReportError::Newer { path, version });
-    }
-    let record: Record = serde_json::from_slice(&bytes).map_err(damaged)?;
+    let record = Record::read(folder)?;
     let picture = optional(&folder.join(OutputFolder::PICTURE))?;
     let plot = optional(&folder.join(OutputFolder::LEDGER_PLOT))?;
     let audit = audited(&record);
     let page = page(&record, picture.as_deref(), plot.as_deref(), &audit);
     Ok(OutputFolder::reopen(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
-}
-
-/// The part of a record that says how to read the rest.
-#[derive(serde::Deserialize)]
-struct Version {
-    version: u32,
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
@@ -172,8 +146,9 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
     page
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}\
-img,svg{max-width:100%;height:auto}table{border-collapse:collapse}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:right}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
+img,svg{max-width:100%;height:auto}table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
+td,th{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:right}td:not(.text){white-space:nowrap}\
 td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;padding:1rem;overflow:auto;font-size:13px}\
 .good{color:#176617}.bad{color:#a01818}";
 

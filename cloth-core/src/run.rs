@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use energy_solve::EvaluationError;
-use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::frame_store::FrameStore;
@@ -12,6 +11,7 @@ use crate::integrator::StepReport;
 use crate::output::{
     AnimationError, OutputError, OutputFolder, PictureError, Show, animation_glb, obj_text, ply_bytes, usd_text,
 };
+use crate::record::Record;
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 use crate::summary::Summary;
@@ -72,28 +72,6 @@ pub struct Ending {
     pub frames: usize,
     /// Whether all steps were done.
     pub finished: bool,
-}
-
-/// What a finished run says of itself, in `run.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
-    /// The version of this record.
-    pub version: u32,
-    /// The text of the scene file.
-    pub scene: String,
-    /// Its path.
-    pub path: PathBuf,
-    /// Whether all steps were done.
-    pub finished: bool,
-    /// Frames written.
-    pub frames: usize,
-    /// What was done.
-    pub summary: Summary,
-}
-
-impl Record {
-    /// The version of records that this program writes.
-    pub const VERSION: u32 = 1;
 }
 
 impl Run {
@@ -194,7 +172,7 @@ impl Run {
         self.frames.sync()?;
         let checkpoint = Checkpoint {
             scene: self.text.clone(),
-            path: std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone()),
+            path: self.absolute_path(),
             every: self.every.unwrap_or(u64::MAX),
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),
@@ -237,11 +215,16 @@ impl Run {
         }
         let finished = self.simulation.is_finished();
         write(OutputFolder::SUMMARY, format!("{summary}\n").as_bytes())?;
-        let (scene, path) = (self.text.clone(), self.path.clone());
+        let (scene, path) = (self.text.clone(), self.absolute_path());
         let (version, frames) = (Record::VERSION, frames.len());
         let record = Record { version, scene, path, finished, frames, summary: summary.clone() };
         write(OutputFolder::RECORD, &serde_json::to_vec_pretty(&record)?)?;
         Ok(Ending { summary, files, frames, finished })
+    }
+
+    /// That of the scene file, which relative paths in it start from: the run may be read from elsewhere.
+    fn absolute_path(&self) -> PathBuf {
+        std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone())
     }
 
     /// The folder of its files.

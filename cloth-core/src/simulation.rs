@@ -62,7 +62,11 @@ impl Simulation {
     /// # Errors
     /// When a mesh, a pin, a seam or a fabric is unfit.
     pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
-        let model = Model::new(scene)?;
+        Self::of(scene, Model::new(scene)?)
+    }
+
+    /// Sets up what a scene was made into.
+    pub(crate) fn of(scene: &Scene, model: Model) -> Result<Self, SimulationError> {
         let strands = model.strands().collect();
         let Model { parts, x, v, masses, triangles, pinned, moving, motions, terms, left_out, warnings, obstacles } =
             model;

@@ -146,6 +146,25 @@ fn the_ledger_closes_for_integrators_that_keep_energy() {
 }
 
 #[test]
+fn a_balance_that_should_close_but_does_not_is_warned_of() {
+    // A pull within a step and a half.
+    let head = "dt = 0.02\nduration = 0.3\nintegrator = \"implicit-midpoint\"";
+    let pin = "[[pins]]\nbox = { min = [-1.0, 0.099, -1.0], max = [1.0, 0.101, 1.0] }\n[pins.motion]\n\
+               keys = [{ time = 0.0 }, { time = 0.03, translate = [0.0, 0.02, 0.02] }]\n";
+    let warnings = finished(&format!("{}{pin}", sheet(head, 4, 0.2))).summary().unwrap().warnings;
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(warnings[0].contains("the balance of energy does not close"), "{warnings:?}");
+    assert!(warnings[0].contains("although implicit-midpoint should keep it. Try a smaller dt"), "{warnings:?}");
+}
+
+#[test]
+fn what_starts_inside_an_obstacle_is_warned_of() {
+    let text = sheet("dt = 0.01\nduration = 0.1", 4, 0.2);
+    let simulation = started(&format!("{text}[[obstacles]]\nname = \"ball\"\nsphere = {{ radius = 0.06 }}\n"));
+    assert_eq!(simulation.warnings(), ["5 vertices start inside ball; they will be thrown out of it"]);
+}
+
+#[test]
 fn obstacles_that_move_do_work_and_carry_cloth_along() {
     let head = "dt = 0.005\nduration = 0.6\nintegrator = \"newton\"";
     let lying = sheet(head, 4, 0.2)

@@ -102,6 +102,10 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
         self.energy.is_some().then(|| (sum, self.tally(flagged)))
     }
 
+    fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
+        self.active.iter().map(|&number| Some((number, self.value(number, x)?.value))).collect()
+    }
+
     fn add_force(&self, State { x, v }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
         let mut flagged = 0;
         for &element in &self.active {

@@ -89,6 +89,11 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
         Some((values.sums.iter().sum(), self.tally(values.flagged)))
     }
 
+    fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
+        let value = |number: usize| self.list.elements()[number].value(&points_of(self.list.stencil(number), x)).value;
+        Some(self.active.iter().map(|&number| (number, value(number))).collect())
+    }
+
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
         let mut gradients = Gradients { force, rows: vec![0.0; 3 * self.list.arity() * BLOCK], flagged: 0 };
         for_each_batch(&self.packed, state.x, &mut gradients);

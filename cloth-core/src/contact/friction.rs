@@ -27,7 +27,10 @@ impl<S: Solid> DissipationLaw for FrictionLaw<S> {
 
     fn elements(&self, start: &StepStart<'_>) -> Vec<(usize, SlidingFriction)> {
         let x = start.state.x;
-        let now = self.motion.as_ref().map_or(self.solid, |motion| self.solid.moved(&motion.pose(start.time)));
+        let now = self
+            .motion
+            .as_ref()
+            .map_or_else(|| self.solid.clone(), |motion| self.solid.moved(&motion.pose(start.time)));
         let step = [start.time, start.time + start.dt];
         let element = |vertex: usize, normal: Vector3<f64>, force: f64| {
             let carried = surface_velocity(self.motion.as_ref(), step, x[vertex], false);

@@ -2,26 +2,33 @@
 //!
 //! Each shape has a declared element of its own, on its exact signed distance, rather than all one on the plane through the closest point: so a
 //! contact's energy is a function of the position alone, Newton's line search and the balance of energy see the same function as its forces, and
-//! the curvature of the surface is in the Hessian. Vertices touch, not the triangles between them; cloth does not touch cloth.
+//! the curvature of the surface is in the Hessian. Of a mesh the nearest face, edge or corner is a plane, a capsule or a sphere without radius. Vertices
+//! touch, not the triangles between them; cloth does not touch cloth.
 
 mod friction;
+mod hierarchy;
+mod mesh_solid;
 mod solid;
+mod surface;
 mod term;
 
 use energy_dsl::Vector3;
 use energy_solve::Term;
 
+pub use mesh_solid::MeshSolid;
 pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
+pub use surface::{Feature, Nearest, Surface, SurfaceError};
 
 use crate::dissipation_term::DissipativeTerm;
 use crate::mesh::dot;
 use crate::motion::{Motion, Pose};
 use friction::FrictionLaw;
+use mesh_solid::{Corners, Edges, Faces};
 use solid::Solid;
 use term::{ContactTerm, Touch, surface_velocity, touches};
 
 /// One of the solids.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum AnySolid {
     /// A half-space.
     HalfSpace(HalfSpace),
@@ -31,6 +38,8 @@ pub enum AnySolid {
     Capsule(Capsule),
     /// A box.
     Box(RoundedBox),
+    /// A surface of triangles.
+    Mesh(MeshSolid),
 }
 
 impl AnySolid {
@@ -42,6 +51,7 @@ impl AnySolid {
             Self::Ball(solid) => Self::Ball(solid.moved(pose)),
             Self::Capsule(solid) => Self::Capsule(solid.moved(pose)),
             Self::Box(solid) => Self::Box(solid.moved(pose)),
+            Self::Mesh(solid) => Self::Mesh(solid.moved(pose)),
         }
     }
 
@@ -59,6 +69,7 @@ impl AnySolid {
             Self::Ball(solid) => solid.signed_distance(x),
             Self::Capsule(solid) => solid.signed_distance(x),
             Self::Box(solid) => solid.signed_distance(x),
+            Self::Mesh(solid) => solid.nearest(x).distance,
         }
     }
 }
@@ -86,17 +97,23 @@ impl Obstacle {
     /// The solid at a time, in s.
     #[must_use]
     pub fn at(&self, time: f64) -> AnySolid {
-        self.motion.as_ref().map_or(self.solid, |motion| self.solid.moved(&motion.pose(time)))
+        self.motion.as_ref().map_or_else(|| self.solid.clone(), |motion| self.solid.moved(&motion.pose(time)))
     }
 
     /// The terms of contact and friction with vertices of these masses, in kg.
     #[must_use]
     pub fn terms(&self, masses: &[f64]) -> Vec<Box<dyn Term>> {
-        match self.solid {
-            AnySolid::HalfSpace(solid) => self.terms_with(solid, masses),
-            AnySolid::Ball(solid) => self.terms_with(solid, masses),
-            AnySolid::Capsule(solid) => self.terms_with(solid, masses),
-            AnySolid::Box(solid) => self.terms_with(solid, masses),
+        match &self.solid {
+            AnySolid::HalfSpace(solid) => self.terms_with("", *solid, masses),
+            AnySolid::Ball(solid) => self.terms_with("", *solid, masses),
+            AnySolid::Capsule(solid) => self.terms_with("", *solid, masses),
+            AnySolid::Box(solid) => self.terms_with("", *solid, masses),
+            AnySolid::Mesh(solid) => {
+                let mut terms = self.terms_with(": faces", Faces(solid.clone()), masses);
+                terms.extend(self.terms_with(": edges", Edges(solid.clone()), masses));
+                terms.extend(self.terms_with(": corners", Corners(solid.clone()), masses));
+                terms
+            }
         }
     }
 
@@ -110,6 +127,11 @@ impl Obstacle {
             AnySolid::Ball(solid) => self.power_of(solid, step, at_end, masses, x),
             AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, masses, x),
             AnySolid::Box(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::Mesh(solid) => {
+                self.power_of(Faces(solid.clone()), step, at_end, masses, x)
+                    + self.power_of(Edges(solid.clone()), step, at_end, masses, x)
+                    + self.power_of(Corners(solid), step, at_end, masses, x)
+            }
         }
     }
 
@@ -122,16 +144,17 @@ impl Obstacle {
         touches(&solid, self.thickness, &stiffness, x).iter().map(power).sum()
     }
 
-    fn terms_with(&self, solid: impl Solid, masses: &[f64]) -> Vec<Box<dyn Term>> {
+    fn terms_with(&self, part: &str, solid: impl Solid, masses: &[f64]) -> Vec<Box<dyn Term>> {
         let stiffness: Vec<f64> = masses.iter().map(|mass| self.stiffness * mass).collect();
         let (motion, thickness) = (self.motion.clone(), self.thickness);
-        let contact = ContactTerm::new(self.name.clone(), solid, motion.clone(), thickness, stiffness.clone(), 0.0);
+        let name = format!("{}{part}", self.name);
+        let contact = ContactTerm::new(name.clone(), solid.clone(), motion.clone(), thickness, stiffness.clone(), 0.0);
         let mut terms: Vec<Box<dyn Term>> = vec![Box::new(contact)];
         if self.friction > 0.0 {
             let (coefficient, sticking) = (self.friction, self.sticking);
             let law = FrictionLaw { solid, motion, thickness, stiffness, coefficient, sticking };
             let each: Vec<[usize; 1]> = (0..masses.len()).map(|vertex| [vertex]).collect();
-            terms.push(Box::new(DissipativeTerm::new(format!("{}: friction", self.name), law, &each)));
+            terms.push(Box::new(DissipativeTerm::new(format!("{name}: friction"), law, &each)));
         }
         terms
     }

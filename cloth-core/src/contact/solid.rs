@@ -7,15 +7,15 @@ use crate::mesh::{dot, norm, subtract};
 use crate::motion::Pose;
 
 /// A solid that keeps cloth out.
-pub(super) trait Solid: Copy + std::fmt::Debug + 'static {
+pub(super) trait Solid: Clone + std::fmt::Debug + 'static {
     /// The declared element.
     type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
     /// The solid after a rigid motion.
     fn moved(&self, pose: &Pose) -> Self;
     /// The distance of a point from the surface, in m; negative inside.
     fn signed_distance(&self, x: Vector3<f64>) -> f64;
-    /// The element of a point with stiffness k (N/m) within the thickness δ (m).
-    fn contact(&self, k: f64, thickness: f64) -> Self::Contact;
+    /// The element of a point with stiffness k (N/m) within the thickness δ (m); `None` where the point is not this solid's to push.
+    fn contact(&self, x: Vector3<f64>, k: f64, thickness: f64) -> Option<Self::Contact>;
 }
 
 /// A half-space, below a plane.
@@ -69,8 +69,8 @@ impl Solid for HalfSpace {
         dot(self.normal, subtract(x, self.point))
     }
 
-    fn contact(&self, k: f64, thickness: f64) -> PlaneContact {
-        PlaneContact::new(self.point, self.normal, k, thickness)
+    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<PlaneContact> {
+        Some(PlaneContact::new(self.point, self.normal, k, thickness))
     }
 }
 
@@ -85,8 +85,8 @@ impl Solid for Ball {
         norm(subtract(x, self.centre)) - self.radius
     }
 
-    fn contact(&self, k: f64, thickness: f64) -> SphereContact {
-        SphereContact::new(self.centre, self.radius, k, thickness)
+    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<SphereContact> {
+        Some(SphereContact::new(self.centre, self.radius, k, thickness))
     }
 }
 
@@ -104,9 +104,9 @@ impl Solid for Capsule {
         norm(std::array::from_fn(|axis| way[axis] - along * edge[axis])) - self.radius
     }
 
-    fn contact(&self, k: f64, thickness: f64) -> CapsuleContact {
+    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<CapsuleContact> {
         let [a, b] = self.ends;
-        CapsuleContact::new(a, b, self.radius, k, thickness)
+        Some(CapsuleContact::new(a, b, self.radius, k, thickness))
     }
 }
 
@@ -125,9 +125,9 @@ impl Solid for RoundedBox {
         distance - self.radius
     }
 
-    fn contact(&self, k: f64, thickness: f64) -> BoxContact {
+    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<BoxContact> {
         let [e1, e2, e3] = self.axes;
-        BoxContact::new(self.centre, e1, e2, e3, self.half, self.radius, k, thickness)
+        Some(BoxContact::new(self.centre, e1, e2, e3, self.half, self.radius, k, thickness))
     }
 }
 
@@ -139,10 +139,11 @@ mod tests {
     fn agrees(solid: impl Solid, x: Vector3<f64>, distance: f64) {
         let pose = Pose::turned([0.3, -1.0, 0.5], 40.0, [0.1; 3]).shifted([0.5, 0.2, -0.1]);
         let (k, thickness) = (3.0, 0.5);
-        for (solid, x) in [(solid, x), (solid.moved(&pose), pose.applied(x))] {
+        let moved = solid.moved(&pose);
+        for (solid, x) in [(solid, x), (moved, pose.applied(x))] {
             let signed = solid.signed_distance(x);
             assert!((signed - distance).abs() < 1e-12, "{signed}, not {distance}");
-            let push = solid.contact(k, thickness).gradient(&[x]).gradient[0].map(|component| -component);
+            let push = solid.contact(x, k, thickness).unwrap().gradient(&[x]).gradient[0].map(|component| -component);
             let size = k * (thickness - distance).max(0.0).powi(2) / thickness;
             assert!((norm(push) - size).abs() < 1e-12, "{push:?}");
             if size > 0.0 {

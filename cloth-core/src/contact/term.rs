@@ -34,7 +34,8 @@ impl<S: Solid> ContactTerm<S> {
         time: f64,
     ) -> Self {
         let stencils = (0..stiffness.len()).collect();
-        let mut term = Self { name, solid, now: solid, motion, thickness, stiffness, stencils, free: Vec::new() };
+        let now = solid.clone();
+        let mut term = Self { name, solid, now, motion, thickness, stiffness, stencils, free: Vec::new() };
         term.move_to(time);
         term
     }
@@ -48,9 +49,10 @@ impl<S: Solid> ContactTerm<S> {
     /// The free vertices within reach, with their elements and places.
     fn near<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (usize, usize, S::Contact)> + 'a {
         let within = |&(vertex, _): &(usize, usize)| self.now.signed_distance(x[vertex]) < self.thickness;
-        let element =
-            |(vertex, slot): (usize, usize)| (vertex, slot, self.now.contact(self.stiffness[vertex], self.thickness));
-        self.free.iter().copied().filter(within).map(element)
+        let element = |(vertex, slot): (usize, usize)| {
+            Some((vertex, slot, self.now.contact(x[vertex], self.stiffness[vertex], self.thickness)?))
+        };
+        self.free.iter().copied().filter(within).filter_map(element)
     }
 
     fn tally(&self, evaluated: u64, flagged: u64) -> Tally {
@@ -146,8 +148,8 @@ impl<S: Solid> Term for ContactTerm<S> {
     }
 }
 
-/// The part of the Hessian along the gradient. The penalty falls as the distance grows and the solids are convex, so that across the gradient,
-/// where their surfaces curve away, no curvature is positive: this is the nearest positive semi-definite matrix.
+/// The part of the Hessian along the gradient. The penalty falls as the distance grows and no feature of a solid curves towards the point, so that across
+/// the gradient no curvature is positive: this is the nearest positive semi-definite matrix.
 fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
     let size = norm(gradient);
     if size == 0.0 {
@@ -172,7 +174,7 @@ pub(super) struct Touch {
 pub(super) fn touches<S: Solid>(solid: &S, thickness: f64, stiffness: &[f64], x: &[Vector3<f64>]) -> Vec<Touch> {
     let near = (0..x.len()).filter(|&vertex| solid.signed_distance(x[vertex]) < thickness);
     let touch = |vertex: usize| {
-        let gradient = solid.contact(stiffness[vertex], thickness).gradient(&[x[vertex]]).gradient[0];
+        let gradient = solid.contact(x[vertex], stiffness[vertex], thickness)?.gradient(&[x[vertex]]).gradient[0];
         let force = norm(gradient);
         (force > 0.0).then(|| Touch { vertex, normal: gradient.map(|component| -component / force), force })
     };

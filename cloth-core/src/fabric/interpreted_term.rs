@@ -136,6 +136,10 @@ impl Term for InterpretedTerm {
         Some((sum, self.tally(flagged, 0)))
     }
 
+    fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
+        Some(self.active.iter().map(|&number| (number, self.run("value", number, x).0[0][0])).collect())
+    }
+
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
         let mut flagged = 0;
         for &number in &self.active {

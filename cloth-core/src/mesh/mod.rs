@@ -10,7 +10,7 @@ mod triangle_mesh;
 
 pub use disc::Disc;
 pub use obj::{ObjError, read_obj};
-pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle};
+pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle, vertex_angles};
 pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};
 pub use strip::Strip;
 pub use topology::{Hinge, SpringNetwork, Topology};

@@ -68,6 +68,21 @@ pub fn rest_angle(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
     (dot(cross(n1, n2), edge) / norm(edge)).atan2(dot(n1, n2))
 }
 
+/// The angles of a triangle at its corners, in radians.
+///
+/// ```
+/// let [a, b, c] = cloth_core::mesh::vertex_angles([[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
+/// assert!((a - 2.0 * b).abs() < 1e-15 && b == c);
+/// ```
+#[must_use]
+pub fn vertex_angles(corners: [Vector3<f64>; 3]) -> [f64; 3] {
+    std::array::from_fn(|corner| {
+        let [here, next, last] = [0, 1, 2].map(|step| corners[(corner + step) % 3]);
+        let (first, second) = (subtract(next, here), subtract(last, here));
+        norm(cross(first, second)).atan2(dot(first, second))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,12 +3,13 @@ use std::collections::BTreeMap;
 use energy_dsl::Vector3;
 
 use super::{cross, norm, subtract};
+use crate::motion::Pose;
 
-/// What makes vertices and triangles unfit to be a cloth. Vertices and triangles are numbered from 0.
+/// What makes vertices and triangles unfit to be a cloth or an obstacle. Vertices and triangles are numbered from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// There is nothing to simulate.
-    #[error("the mesh has {vertices} vertices and {triangles} triangles; a cloth needs at least one triangle")]
+    #[error("the mesh has {vertices} vertices and {triangles} triangles; at least one triangle is needed")]
     Empty {
         /// Vertices given.
         vertices: usize,
@@ -42,7 +43,7 @@ pub enum MeshError {
         corners: [usize; 3],
     },
     /// More than two triangles meet along an edge.
-    #[error("edge {}–{} is shared by {} triangles {triangles:?}; a cloth has at most two along an edge", .edge[0], .edge[1], .triangles.len())]
+    #[error("edge {}–{} is shared by {} triangles {triangles:?}; a surface has at most two along an edge", .edge[0], .edge[1], .triangles.len())]
     NonManifoldEdge {
         /// Its ends.
         edge: [usize; 2],
@@ -94,6 +95,12 @@ impl TriangleMesh {
     pub fn scaled(self, factor: f64) -> Result<Self, MeshError> {
         let larger = |vertex: Vector3<f64>| vertex.map(|coordinate| factor * coordinate);
         Self::new(self.vertices.into_iter().map(larger).collect(), self.triangles)
+    }
+
+    /// The same, somewhere else.
+    #[must_use]
+    pub fn moved(self, pose: &Pose) -> Self {
+        Self { vertices: self.vertices.iter().map(|&vertex| pose.applied(vertex)).collect(), ..self }
     }
 
     /// Rest positions, in m.

@@ -15,7 +15,7 @@ mod usd;
 pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
 pub use frame::obj_text;
-pub use picture::{PictureError, View, picture_png};
+pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
 pub use show::Show;
 pub use solid_mesh::SolidMesh;

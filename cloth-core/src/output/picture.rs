@@ -15,7 +15,8 @@ use crate::mesh::{cross, dot, norm, subtract};
 /// Of solids and of hair.
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
-/// How wide hair is drawn, in pixels before averaging.
+const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
+/// How wide hair and edges are drawn, in pixels before averaging.
 const STRAND: f64 = 3.0;
 
 /// A picture that cannot be encoded.
@@ -49,6 +50,17 @@ pub struct View<'a> {
     pub floor: Option<f64>,
     /// Points that are to be in the picture, too, in m: those of other frames.
     pub framed: &'a [Vector3<f64>],
+    /// How cloth and hair are drawn.
+    pub look: Look<'a>,
+}
+
+/// How cloth and hair are drawn.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Look<'a> {
+    /// The colour of each vertex, red, green and blue from 0 to 1; without, each side of cloth and hair have their own.
+    pub colours: Option<&'a Vec<[f32; 3]>>,
+    /// Whether the edges of triangles are drawn.
+    pub wireframe: bool,
 }
 
 /// A shaded picture of cloth, hair and solids as PNG: both sides of cloth are lit, each in its own colour, with shadows on the floor below. z is up.
@@ -67,11 +79,19 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     draw_shadow(&mut background, &camera, &shadow, &all_triangles(view));
     let mut canvas = Canvas::new(background);
     for solid in view.solids {
-        draw_surface(&mut canvas, &camera, &solid.vertices, &solid.triangles, &SOLID, &SOLID);
+        draw_surface(&mut canvas, &camera, &solid.vertices, &solid.triangles, |front, _| {
+            [SOLID; 2][usize::from(front)]
+        });
     }
-    draw_surface(&mut canvas, &camera, view.positions, view.triangles, &FRONT, &BACK);
+    let own = |vertex: usize| view.look.colours.and_then(|colours| colours.get(vertex)).map(lit);
+    draw_surface(&mut canvas, &camera, view.positions, view.triangles, |front, vertex| {
+        own(vertex).unwrap_or(if front { FRONT } else { BACK })
+    });
+    if view.look.wireframe {
+        draw_edges(&mut canvas, &camera, view.positions, view.triangles);
+    }
     for strand in view.strands {
-        draw_strand(&mut canvas, &camera, &view.positions[strand.clone()]);
+        draw_strand(&mut canvas, &camera, view.positions, strand.clone(), |vertex| own(vertex).unwrap_or(HAIR));
     }
     let small = averaged(&canvas.pixels).ok_or_else(|| PictureError("no memory".into()))?;
     small.encode_png().map_err(|error| PictureError(error.to_string()))
@@ -95,37 +115,60 @@ fn draw_surface(
     camera: &Camera,
     positions: &[Vector3<f64>],
     triangles: &[[usize; 3]],
-    front: &Colours,
-    back: &Colours,
+    colours: impl Fn(bool, usize) -> Colours,
 ) {
     let normals = vertex_normals(positions, triangles);
     let lamp = LAMP.map(|component| component / norm(LAMP));
     for corners in triangles {
         let [a, b, c] = corners.map(|corner| positions[corner]);
         let is_front = dot(cross(subtract(b, a), subtract(c, a)), camera.towards_eye(a)) >= 0.0;
-        let (side, colours) = if is_front { (1.0, front) } else { (-1.0, back) };
+        let side = if is_front { 1.0 } else { -1.0 };
         canvas.triangle(corners.map(|corner| {
             let normal = normals[corner].map(|component| side * component);
             let (place, depth) = camera.project(positions[corner]);
             let brightness = shade(normal, lamp, camera.towards_eye(positions[corner]));
-            Corner { place, depth, colour: mixed(colours, brightness) }
+            Corner { place, depth, colour: mixed(&colours(is_front, corner), brightness) }
         }));
     }
 }
 
 /// Brighter where it lies across the light.
-fn draw_strand(canvas: &mut Canvas, camera: &Camera, points: &[Vector3<f64>]) {
+fn draw_strand(
+    canvas: &mut Canvas,
+    camera: &Camera,
+    positions: &[Vector3<f64>],
+    strand: Range<usize>,
+    colours: impl Fn(usize) -> Colours,
+) {
     let lamp = LAMP.map(|component| component / norm(LAMP));
-    for pair in points.windows(2) {
-        let way = subtract(pair[1], pair[0]);
+    for end in strand.skip(1) {
+        let way = subtract(positions[end], positions[end - 1]);
         let along = dot(way, lamp) / norm(way).max(f64::MIN_POSITIVE);
-        let colour = mixed(&HAIR, 0.15 + 0.85 * (1.0 - along * along).max(0.0).sqrt());
-        let [from, to] = [pair[0], pair[1]].map(|point| {
-            let (place, depth) = camera.project(point);
-            Corner { place, depth, colour }
+        let brightness = 0.15 + 0.85 * (1.0 - along * along).max(0.0).sqrt();
+        let [from, to] = [end - 1, end].map(|vertex| {
+            let (place, depth) = camera.project(positions[vertex]);
+            Corner { place, depth, colour: mixed(&colours(vertex), brightness) }
         });
         canvas.line(from, to, STRAND);
     }
+}
+
+/// The edges of triangles, a little nearer than they are so that they lie on top.
+fn draw_edges(canvas: &mut Canvas, camera: &Camera, positions: &[Vector3<f64>], triangles: &[[usize; 3]]) {
+    let corner = |vertex: usize| {
+        let (place, depth) = camera.project(positions[vertex]);
+        Corner { place, depth: 0.999 * depth, colour: EDGE }
+    };
+    for &[a, b, c] in triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            canvas.line(corner(from), corner(to), STRAND);
+        }
+    }
+}
+
+/// A colour in the shade and in the light.
+fn lit(colour: &[f32; 3]) -> Colours {
+    [colour.map(|channel| 0.35 * channel), *colour]
 }
 
 fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {

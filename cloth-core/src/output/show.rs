@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 
 use super::track::{Joined, Track};
-use super::{PictureError, SolidMesh, View, picture_png};
+use super::{Look, PictureError, SolidMesh, View, picture_png};
 use crate::contact::AnySolid;
 use crate::scene::PartKind;
 use crate::simulation::Simulation;
@@ -87,6 +87,20 @@ impl<'a> Show<'a> {
     /// # Errors
     /// When it cannot be encoded.
     pub fn picture(&self, positions: &[Vector3<f64>], time: f64, sequence: bool) -> Result<Vec<u8>, PictureError> {
+        self.picture_with(positions, time, sequence, &Look::default())
+    }
+
+    /// The same in other colours or with edges.
+    ///
+    /// # Errors
+    /// When it cannot be encoded.
+    pub fn picture_with(
+        &self,
+        positions: &[Vector3<f64>],
+        time: f64,
+        sequence: bool,
+        look: &Look<'_>,
+    ) -> Result<Vec<u8>, PictureError> {
         let (mut floor, mut solids) = (None, Vec::new());
         for obstacle in self.simulation.obstacles() {
             match obstacle.at(time) {
@@ -108,6 +122,7 @@ impl<'a> Show<'a> {
             solids: &solids,
             floor,
             framed: &framed,
+            look: *look,
         })
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use energy_dsl::Vector3;
 
-use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, RoundedBox};
+use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, RoundedBox};
 use crate::mesh::{cross, norm, subtract};
 
 /// The surface of a solid as vertices and triangles.
@@ -32,6 +32,7 @@ impl SolidMesh {
             AnySolid::Ball(Ball { centre, radius }) => capsule(&Capsule { ends: [*centre; 2], radius: *radius }),
             AnySolid::Capsule(solid) => capsule(solid),
             AnySolid::Box(solid) => rounded_box(solid),
+            AnySolid::Mesh(solid) => surface(solid),
         }
     }
 }
@@ -93,6 +94,19 @@ fn capsule(solid: &Capsule) -> SolidMesh {
         *corner -= if *corner % (AROUND + 1) == AROUND { AROUND } else { 0 };
     }
     mesh
+}
+
+/// The triangles themselves, moved out by the rounding; of a shell the side that its triangles show.
+fn surface(solid: &MeshSolid) -> SolidMesh {
+    let (mesh, radius) = (solid.surface().mesh(), solid.surface().radius());
+    let normals = super::vertex_normals(mesh.vertices(), mesh.triangles());
+    let moved = |(p, n): (&Vector3<f64>, Vector3<f64>)| -> Vector3<f64> {
+        solid.placed(std::array::from_fn(|axis| p[axis] + radius * n[axis]))
+    };
+    SolidMesh {
+        vertices: mesh.vertices().iter().zip(normals).map(moved).collect(),
+        triangles: mesh.triangles().to_vec(),
+    }
 }
 
 /// The six faces of a cube, each point pushed out on a ball of the radius and then to its corner of the box.

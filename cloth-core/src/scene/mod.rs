@@ -21,7 +21,7 @@ use serde::Deserialize;
 pub use error::SceneError;
 pub use garment::{Garment, Mesh, MeshSourceError, Placement, Shape, Turn};
 pub use hair::Hair;
-pub use obstacle::ObstacleDescription;
+pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::OutputChoice;
 pub use own_material::with_material;
 pub use parts::{Model, ModelError, MovingPin, Part, PartKind, UnknownPart};

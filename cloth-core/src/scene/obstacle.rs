@@ -1,13 +1,15 @@
+use std::path::{Path, PathBuf};
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::garment::Turn;
+use super::garment::{Placement, Turn};
 use super::numbers::{all_positive, finite_triple, non_negative, nonzero_triple, positive};
-use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, Obstacle, RoundedBox};
-use crate::mesh::norm;
+use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError};
+use crate::mesh::{MeshError, ObjError, norm, read_obj};
 use crate::motion::{Motion, Pose};
 
-/// A solid that keeps cloth out: exactly one of `plane`, `sphere`, `capsule` and `box`.
+/// A solid that keeps cloth out: exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys")]
 #[schemars(with = "Keys")]
@@ -29,6 +31,8 @@ struct Keys {
     /// A box.
     #[serde(rename = "box")]
     block: Option<BoxKeys>,
+    /// A surface of triangles.
+    mesh: Option<MeshKeys>,
     /// What the ledger calls it. Default the shape's name and its number from 0.
     name: Option<String>,
     /// The coefficient of friction. Default 0.
@@ -57,12 +61,13 @@ struct Common {
     motion: Option<Motion>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum ShapeKeys {
     Plane(PlaneKeys),
     Sphere(SphereKeys),
     Capsule(CapsuleKeys),
     Block(BoxKeys),
+    Mesh(MeshKeys),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -118,6 +123,50 @@ struct BoxKeys {
     rounding: f64,
 }
 
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MeshKeys {
+    /// An OBJ file, with lengths in m, from the scene file's folder. Corners run anticlockwise seen from outside; a surface with a rim is a shell.
+    path: PathBuf,
+    /// Where it is at the start. Default as in the file.
+    #[serde(default)]
+    placement: Placement,
+    /// All points within this distance of the surface are of the solid, too, in m; needed where the surface has a rim. Default 0.
+    #[serde(default, deserialize_with = "non_negative")]
+    rounding: f64,
+}
+
+/// A mesh that is no obstacle.
+#[derive(Debug, thiserror::Error)]
+pub enum ObstacleError {
+    /// The OBJ file.
+    #[error("{name}: {source}")]
+    Obj {
+        /// The obstacle.
+        name: String,
+        /// What is wrong.
+        source: ObjError,
+    },
+    /// Its size.
+    #[error("{name}: {source}")]
+    Scaled {
+        /// The obstacle.
+        name: String,
+        /// What is wrong.
+        source: MeshError,
+    },
+    /// How its triangles are turned.
+    #[error("{name}: {}: {source}", .path.display())]
+    Surface {
+        /// The obstacle.
+        name: String,
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: SurfaceError,
+    },
+}
+
 fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
 }
@@ -138,22 +187,23 @@ impl TryFrom<Keys> for ObstacleDescription {
     type Error = String;
 
     fn try_from(keys: Keys) -> Result<Self, String> {
-        let Keys { plane, sphere, capsule, block, name, friction, sticking, thickness, stiffness, motion } = keys;
+        let Keys { plane, sphere, capsule, block, mesh, name, friction, sticking, thickness, stiffness, motion } = keys;
         let shapes = [
             plane.map(ShapeKeys::Plane),
             sphere.map(ShapeKeys::Sphere),
             capsule.map(ShapeKeys::Capsule),
             block.map(ShapeKeys::Block),
+            mesh.map(ShapeKeys::Mesh),
         ];
-        let given: Vec<ShapeKeys> = shapes.into_iter().flatten().collect();
-        let [shape] = given[..] else {
-            return Err("an obstacle is exactly one of `plane`, `sphere`, `capsule` and `box`".to_owned());
+        let mut given = shapes.into_iter().flatten();
+        let (Some(shape), None) = (given.next(), given.next()) else {
+            return Err("an obstacle is exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`".to_owned());
         };
-        match shape {
+        match &shape {
             ShapeKeys::Capsule(CapsuleKeys { from, to, .. }) if from == to => {
                 return Err("the ends of a capsule must differ; for a ball say `sphere`".to_owned());
             }
-            ShapeKeys::Block(BoxKeys { size, rounding, .. }) if size.iter().any(|edge| 0.5 * edge <= rounding) => {
+            ShapeKeys::Block(BoxKeys { size, rounding, .. }) if size.iter().any(|edge| 0.5 * edge <= *rounding) => {
                 return Err(format!("a box of {size:?} m cannot be rounded by {rounding} m: that is half an edge"));
             }
             _ => {}
@@ -163,10 +213,13 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
-    /// The obstacle, of this number among those of the scene.
-    #[must_use]
-    pub fn obstacle(&self, number: usize) -> Obstacle {
-        let (shape, solid) = match self.shape {
+    /// The obstacle, of this number among those of the scene. Relative paths start from `folder`.
+    ///
+    /// # Errors
+    /// When the file of a mesh cannot be read or is no surface of a solid.
+    pub fn obstacle(&self, number: usize, folder: &Path) -> Result<Obstacle, ObstacleError> {
+        let named = |shape: &str| self.rest.name.clone().unwrap_or_else(|| format!("{shape} {number}"));
+        let (shape, solid) = match self.shape.clone() {
             ShapeKeys::Plane(PlaneKeys { point, normal }) => {
                 let normal = normal.map(|component| component / norm(normal));
                 ("plane", AnySolid::HalfSpace(HalfSpace { point, normal }))
@@ -181,9 +234,26 @@ impl ObstacleDescription {
                 let half = size.map(|edge| 0.5 * edge - rounding);
                 ("box", AnySolid::Box(RoundedBox { centre, axes, half, radius: rounding }))
             }
+            ShapeKeys::Mesh(keys) => ("mesh", AnySolid::Mesh(keys.solid(&named("mesh"), folder)?)),
         };
-        let Common { name, friction, sticking, thickness, stiffness, motion } = self.rest.clone();
-        let name = name.unwrap_or_else(|| format!("{shape} {number}"));
-        Obstacle { name, solid, motion, thickness, stiffness, friction, sticking }
+        let Common { friction, sticking, thickness, stiffness, motion, .. } = self.rest.clone();
+        Ok(Obstacle { name: named(shape), solid, motion, thickness, stiffness, friction, sticking })
+    }
+}
+
+impl MeshKeys {
+    fn solid(&self, name: &str, folder: &Path) -> Result<MeshSolid, ObstacleError> {
+        let (name, path) = (name.to_owned(), folder.join(&self.path));
+        let mesh = match read_obj(&path) {
+            Ok(mesh) => mesh,
+            Err(source) => return Err(ObstacleError::Obj { name, source }),
+        };
+        let placed = mesh.scaled(self.placement.scale).map(|mesh| mesh.moved(&self.placement.pose()));
+        let placed = match placed {
+            Ok(placed) => placed,
+            Err(source) => return Err(ObstacleError::Scaled { name, source }),
+        };
+        let surface = Surface::new(placed, self.rounding);
+        surface.map(MeshSolid::new).map_err(|source| ObstacleError::Surface { name, path, source })
     }
 }

@@ -8,7 +8,7 @@ use energy_elements::ZeroLengthSpring;
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
 use super::seam::Side;
-use super::{Garment, Hair, MeshSourceError, Pin, PinError, Scene, SeamError, Shape};
+use super::{Garment, Hair, MeshSourceError, ObstacleError, Pin, PinError, Scene, SeamError, Shape};
 use crate::contact::Obstacle;
 use crate::fabric::{self, FabricError, Place, Surroundings};
 use crate::mesh::{Topology, TriangleMesh};
@@ -118,6 +118,9 @@ pub enum ModelError {
     /// A seam.
     #[error(transparent)]
     Seam(#[from] SeamError),
+    /// The mesh of an obstacle.
+    #[error(transparent)]
+    Obstacle(#[from] ObstacleError),
     /// Hair or stitches that do not fit.
     #[error(transparent)]
     List(#[from] ListError),
@@ -162,7 +165,7 @@ impl Model {
         }
         builder.check_names()?;
         builder.add_seams()?;
-        builder.add_surroundings();
+        builder.add_surroundings()?;
         builder.pin()?;
         Ok(builder.model)
     }
@@ -269,7 +272,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn add_surroundings(&mut self) {
+    fn add_surroundings(&mut self) -> Result<(), ObstacleError> {
         let model = &mut self.model;
         if let Some(wind) = &self.scene.wind {
             if model.triangles.is_empty() {
@@ -278,10 +281,13 @@ impl Builder<'_> {
                 model.terms.push(wind.term(&model.triangles));
             }
         }
-        model.obstacles = self.scene.obstacles.iter().enumerate().map(|(number, one)| one.obstacle(number)).collect();
+        let obstacles = self.scene.obstacles.iter().enumerate();
+        let obstacles = obstacles.map(|(number, one)| one.obstacle(number, &self.scene.folder));
+        model.obstacles = obstacles.collect::<Result<_, _>>()?;
         for obstacle in &model.obstacles {
             model.terms.extend(obstacle.terms(&model.masses));
         }
+        Ok(())
     }
 
     fn pin(&mut self) -> Result<(), ModelError> {

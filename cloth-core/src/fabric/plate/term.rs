@@ -136,6 +136,15 @@ impl PlateTerm {
         values
     }
 
+    /// ½ ‖r‖² of each patch with a free vertex.
+    fn half_squares<'a>(&'a self, values: &'a Values<'_>) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let half_square = |patch: usize| {
+            let r = self.patches[patch].residual(&values.angles);
+            0.5 * dot(r, r)
+        };
+        self.active.iter().map(move |&patch| (patch, half_square(patch)))
+    }
+
     /// θ − θ̄ and ∇θ of all hinges that are needed.
     fn angles(&self, x: &[Vector3<f64>]) -> Angles<'_> {
         let mut angles = Angles {
@@ -390,11 +399,11 @@ impl Term for PlateTerm {
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let values = self.values(x);
-        let half_square = |&patch: &usize| {
-            let r = self.patches[patch].residual(&values.angles);
-            0.5 * dot(r, r)
-        };
-        Some((self.active.iter().map(half_square).sum(), self.tally(values.flagged)))
+        Some((self.half_squares(&values).map(|(_, energy)| energy).sum(), self.tally(values.flagged)))
+    }
+
+    fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
+        Some(self.half_squares(&self.values(x)).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {

@@ -1,0 +1,134 @@
+use std::cell::Cell;
+use std::rc::Rc;
+
+use energy_dsl::{Declaration, Element, Potential, Vector3};
+use energy_elements::ZeroLengthSpring;
+use energy_solve::{Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term};
+
+use crate::mesh::dot;
+
+/// A hand: a soft pin that holds one vertex while the mouse does, by the declared [`ZeroLengthSpring`] to where the mouse is.
+#[derive(Clone, Debug)]
+pub(super) struct Grip {
+    held: Rc<Cell<Option<Held>>>,
+    spring: ZeroLengthSpring,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    vertex: usize,
+    target: Vector3<f64>,
+}
+
+impl Grip {
+    /// How far the spring stretches under the weight of everything, in m.
+    const STRETCH: f64 = 0.02;
+
+    /// One that can carry all these masses, in kg.
+    pub(super) fn carrying(masses: &[f64]) -> Self {
+        let stiffness = 9.81 * masses.iter().sum::<f64>() / Self::STRETCH;
+        Self { held: Rc::default(), spring: ZeroLengthSpring::new(stiffness, 0.0) }
+    }
+
+    /// Holds a vertex there.
+    pub(super) fn hold(&self, vertex: usize, target: Vector3<f64>) {
+        self.held.set(Some(Held { vertex, target }));
+    }
+
+    /// The vertex that is held.
+    pub(super) fn vertex(&self) -> Option<usize> {
+        self.held.get().map(|held| held.vertex)
+    }
+
+    pub(super) fn let_go(&self) {
+        self.held.set(None);
+    }
+
+    /// Its force on that many vertices.
+    pub(super) fn term(&self, vertices: usize) -> Box<dyn Term> {
+        Box::new(GripTerm { grip: self.clone(), stencils: (0..vertices).collect(), slots: vec![None; vertices] })
+    }
+}
+
+/// Any vertex may be held; the blocks are on the diagonal, so that the pattern of the matrix never changes.
+#[derive(Debug)]
+struct GripTerm {
+    grip: Grip,
+    stencils: Vec<usize>,
+    /// Where the diagonal block of each vertex is stored; `None` where it is pinned.
+    slots: Vec<Option<usize>>,
+}
+
+impl GripTerm {
+    /// What is held and free, with its block's place.
+    fn held(&self) -> Option<(Held, usize)> {
+        let held = self.grip.held.get()?;
+        Some((held, (*self.slots.get(held.vertex)?)?))
+    }
+
+    fn tally(&self) -> Tally {
+        let evaluated = u64::from(self.held().is_some());
+        Tally { evaluated, skipped: self.stencils.len() as u64 - evaluated, flagged: 0, projected: 0 }
+    }
+}
+
+impl Term for GripTerm {
+    fn name(&self) -> &str {
+        "mouse"
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        <ZeroLengthSpring as Element>::DECLARATION
+    }
+
+    fn character(&self) -> Character {
+        Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true }
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils { arity: 1, vertices: &self.stencils }
+    }
+
+    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        self.slots = self.stencils.iter().map(|&vertex| dofs.place(vertex).map(|row| pattern.diagonal(row))).collect();
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        let value = |(held, _): (Held, usize)| self.grip.spring.value(&[x[held.vertex], held.target]).value;
+        Some((self.held().map_or(0.0, value), self.tally()))
+    }
+
+    fn add_force(&self, State { x, .. }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        if let Some((Held { vertex, target }, _)) = self.held() {
+            let gradient = self.grip.spring.gradient(&[x[vertex], target]).gradient[0];
+            (0..3).for_each(|axis| force[vertex][axis] -= gradient[axis]);
+        }
+        self.tally()
+    }
+
+    /// A spring without rest length has no negative curvature to take away.
+    fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        if let Some((Held { vertex, target }, slot)) = self.held() {
+            let result = self.grip.spring.hessian(&[x[vertex], target]);
+            let block = result.hessian.as_ref()[0];
+            for i in 0..3 {
+                sum.force[vertex][i] -= result.gradient[0][i];
+                (0..3).for_each(|j| sum.matrix[slot][i][j] -= sum.weights.position * block[i][j]);
+                if let Some(product) = &mut sum.stiffness_times_velocity {
+                    product[vertex][i] -= dot(block[i], v[vertex]);
+                }
+            }
+        }
+        self.tally()
+    }
+
+    fn find_non_finite(&self, _quantity: Quantity, State { x, .. }: State<'_>) -> Option<usize> {
+        let (held, _) = self.held()?;
+        let value = self.grip.spring.value(&[x[held.vertex], held.target]).value;
+        (!value.is_finite()).then_some(held.vertex)
+    }
+}

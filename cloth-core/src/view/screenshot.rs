@@ -1,0 +1,39 @@
+use std::path::Path;
+
+use super::colouring::{Colouring, colour, upper_end};
+use super::stage::{Moment, Stage, ViewError};
+use crate::output::{Look, Show};
+
+/// A picture of one moment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Screenshot {
+    /// As PNG.
+    pub png: Vec<u8>,
+    /// The time shown, in s.
+    pub time: f64,
+    /// What the colours mean.
+    pub legend: String,
+}
+
+/// A picture of a scene, simulated up to there, or of a finished run, drawn without any display. `tell` hears of each step.
+///
+/// # Errors
+/// When it cannot be opened or simulated, or the run has no such frame.
+pub fn screenshot(
+    path: &Path,
+    moment: Moment,
+    colouring: Colouring,
+    wireframe: bool,
+    tell: impl FnMut(),
+) -> Result<Screenshot, ViewError> {
+    let mut stage = Stage::open(path)?;
+    stage.go_to(moment, tell)?;
+    let values = stage.values(colouring);
+    let most = upper_end(&values);
+    let colours: Vec<[f32; 3]> = values.iter().map(|&value| colour(value, most)).collect();
+    let look = Look { colours: (colouring != Colouring::Plain).then_some(&colours), wireframe };
+    let frames = [stage.positions().to_vec()];
+    let show = Show::new(stage.simulation(), &frames, stage.frame_time());
+    let png = show.picture_with(stage.positions(), stage.time(), false, &look)?;
+    Ok(Screenshot { png, time: stage.time(), legend: colouring.legend(most) })
+}

@@ -1,0 +1,461 @@
+use std::path::{Path, PathBuf};
+
+use energy_dsl::Vector3;
+
+use super::colouring::{Colouring, RestShape, stored_energies};
+use super::grip::Grip;
+use crate::mesh::{norm, subtract};
+use crate::output::OutputFolder;
+use crate::record::{Record, RecordError};
+use crate::scene::{Model, ModelError, Scene, SceneError};
+use crate::simulation::{Simulation, SimulationError};
+
+/// Something that cannot be viewed.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Its parts.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Setting up, or a step.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// What a run says of itself.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A frame.
+    #[error("cannot read {}; frames are shown from OBJ files: was the run made with `output.obj = false`?", .path.display())]
+    Frame {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A frame that is not of this scene.
+    #[error("{} is damaged: it has {found} vertices, the scene {expected}", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Vertices that can be read in it.
+        found: usize,
+        /// Vertices of the scene.
+        expected: usize,
+    },
+    /// A frame or time that was not simulated.
+    #[error("the run has frames 0 to {last}, up to {end:.4} s; {asked} is not among them")]
+    NoSuchFrame {
+        /// What was asked for.
+        asked: String,
+        /// The last frame.
+        last: usize,
+        /// Its time, in s.
+        end: f64,
+    },
+    /// A window needs a screen.
+    #[error(
+        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, or write a picture with --screenshot FILE"
+    )]
+    NoDisplay,
+    /// The engine cannot open one.
+    #[error("cannot open a window: {reason}; write a picture with --screenshot FILE")]
+    NoWindow {
+        /// What the engine says.
+        reason: String,
+    },
+    /// The picture.
+    #[error(transparent)]
+    Picture(#[from] crate::output::PictureError),
+}
+
+/// A moment of what is viewed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Moment {
+    /// A frame, from 0.
+    Frame(usize),
+    /// A time, in s: the last frame or step that is not after it.
+    Time(f64),
+    /// The last frame of a run; the end of a scene.
+    End,
+}
+
+/// A cloth on show: a scene that is simulated while it is watched, or the frames of a finished run.
+#[derive(Debug)]
+pub struct Stage {
+    scene: Scene,
+    simulation: Simulation,
+    rest: RestShape,
+    act: Act,
+    playing: bool,
+    /// Time that passed but was not shown yet, in s.
+    due: f64,
+}
+
+#[derive(Debug)]
+enum Act {
+    Live { grip: Grip },
+    Recorded { frames: Vec<Vec<Vector3<f64>>>, now: usize },
+}
+
+impl Stage {
+    /// Opens a scene file, to be simulated, or the folder of a finished run, to be played; it plays at once.
+    ///
+    /// # Errors
+    /// When the scene is unfit, or the folder is not that of a finished run with frames.
+    pub fn open(path: &Path) -> Result<Self, ViewError> {
+        if path.is_dir() { Self::recorded(path) } else { Self::live(Scene::read(path)?) }
+    }
+
+    fn live(scene: Scene) -> Result<Self, ViewError> {
+        let mut model = Model::new(&scene)?;
+        let grip = Grip::carrying(&model.masses);
+        model.terms.push(grip.term(model.masses.len()));
+        let simulation = Simulation::of(&scene, model)?;
+        let rest = RestShape::of(&simulation);
+        Ok(Self { scene, simulation, rest, act: Act::Live { grip }, playing: true, due: 0.0 })
+    }
+
+    fn recorded(folder: &Path) -> Result<Self, ViewError> {
+        let record = Record::read(folder)?;
+        let scene = Scene::parse(&record.scene, &record.path)?;
+        let simulation = Simulation::new(&scene)?;
+        let vertices = simulation.body().x.len();
+        let frames = (0..record.frames).map(|number| read_frame(folder, number, vertices));
+        let frames = frames.collect::<Result<Vec<_>, _>>()?;
+        let rest = RestShape::of(&simulation);
+        Ok(Self { scene, simulation, rest, act: Act::Recorded { frames, now: 0 }, playing: true, due: 0.0 })
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// What the vertices belong to; of a recorded run at its start.
+    #[must_use]
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Whether it is simulated while it is watched.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        matches!(self.act, Act::Live { .. })
+    }
+
+    /// The time shown, in s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        match &self.act {
+            Act::Live { .. } => self.simulation.time(),
+            Act::Recorded { now, .. } => *now as f64 * self.frame_time(),
+        }
+    }
+
+    /// From one frame to the next, in s.
+    #[must_use]
+    pub fn frame_time(&self) -> f64 {
+        self.scene.steps_per_frame() as f64 * self.scene.dt
+    }
+
+    /// From one thing shown to the next: a step, or a frame of a run; in s.
+    fn interval(&self) -> f64 {
+        if self.is_live() { self.scene.dt } else { self.frame_time() }
+    }
+
+    /// Where the vertices are, in m.
+    #[must_use]
+    pub fn positions(&self) -> &[Vector3<f64>] {
+        match &self.act {
+            Act::Live { .. } => &self.simulation.body().x,
+            Act::Recorded { frames, now } => frames.get(*now).unwrap_or(&self.simulation.body().x),
+        }
+    }
+
+    /// The number that a colour shows at each vertex; 0 where colours are plain.
+    #[must_use]
+    pub fn values(&self, colouring: Colouring) -> Vec<f64> {
+        let x = self.positions();
+        match colouring {
+            Colouring::Plain => vec![0.0; x.len()],
+            Colouring::Strain => self.rest.strains(x),
+            Colouring::Energy => stored_energies(&self.simulation, x),
+            Colouring::Speed => match &self.act {
+                Act::Recorded { frames, now } if *now > 0 => {
+                    let moved = frames[*now - 1].iter().zip(x).map(|(before, after)| norm(subtract(*after, *before)));
+                    moved.map(|way| way / self.frame_time()).collect()
+                }
+                _ => self.simulation.body().v.iter().map(|&v| norm(v)).collect(),
+            },
+        }
+    }
+
+    /// Whether time passes.
+    #[must_use]
+    pub fn is_playing(&self) -> bool {
+        self.playing
+    }
+
+    /// Stops or goes on.
+    pub fn toggle(&mut self) {
+        self.playing = !self.playing;
+        self.due = 0.0;
+    }
+
+    /// From the start again.
+    ///
+    /// # Errors
+    /// When the scene has become unfit, as when a file of it changed.
+    pub fn restart(&mut self) -> Result<(), ViewError> {
+        let playing = self.playing;
+        match &mut self.act {
+            Act::Live { .. } => *self = Self::live(self.scene.clone())?,
+            Act::Recorded { now, .. } => *now = 0,
+        }
+        (self.playing, self.due) = (playing, 0.0);
+        Ok(())
+    }
+
+    /// One step, or one frame of a run, further; then it pauses. At the end of a run it stays.
+    ///
+    /// # Errors
+    /// When the step fails; the cloth is then left as it was.
+    pub fn step(&mut self) -> Result<(), ViewError> {
+        self.playing = false;
+        self.forward()
+    }
+
+    /// One frame of a run back; what is simulated cannot go back.
+    pub fn step_back(&mut self) {
+        self.playing = false;
+        if let Act::Recorded { now, .. } = &mut self.act {
+            *now = now.saturating_sub(1);
+        }
+    }
+
+    fn forward(&mut self) -> Result<(), ViewError> {
+        match &mut self.act {
+            Act::Live { .. } => self.simulation.step().map(|_| ()).map_err(|error| {
+                // What failed once would fail again.
+                self.playing = false;
+                error.into()
+            }),
+            Act::Recorded { frames, now } => {
+                *now = (*now + 1).min(frames.len().saturating_sub(1));
+                Ok(())
+            }
+        }
+    }
+
+    /// Lets time pass, in s: as many steps or frames as are due, unless `is_late` says that it is time to draw; then what was missed is dropped, and the
+    /// motion is slower than it would be. A run begins again after its end.
+    ///
+    /// # Errors
+    /// When a step fails; then it pauses.
+    pub fn advance(&mut self, seconds: f64, mut is_late: impl FnMut() -> bool) -> Result<(), ViewError> {
+        if !self.playing {
+            return Ok(());
+        }
+        self.due += seconds;
+        let interval = self.interval();
+        while self.due >= interval {
+            self.due -= interval;
+            match &mut self.act {
+                Act::Recorded { frames, now } if *now + 1 >= frames.len() => *now = 0,
+                _ => self.forward()?,
+            }
+            if is_late() {
+                self.due = 0.0;
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes to a moment without showing what is between; then it pauses.
+    ///
+    /// # Errors
+    /// When a step fails, or a run has no such frame.
+    pub fn go_to(&mut self, moment: Moment, mut tell: impl FnMut()) -> Result<(), ViewError> {
+        self.playing = false;
+        let rounded = |time: f64, interval: f64| (time / interval + 1e-9).floor().max(0.0);
+        let frame_time = self.frame_time();
+        if let Act::Recorded { frames, now } = &mut self.act {
+            let last = frames.len().saturating_sub(1);
+            let (frame, asked) = match moment {
+                Moment::Frame(frame) => (frame, format!("frame {frame}")),
+                Moment::Time(time) => (rounded(time, frame_time) as usize, format!("{time} s")),
+                Moment::End => (last, String::new()),
+            };
+            if frame > last {
+                return Err(ViewError::NoSuchFrame { asked, last, end: last as f64 * frame_time });
+            }
+            *now = frame;
+            return Ok(());
+        }
+        let steps = match moment {
+            Moment::Frame(frame) => frame as u64 * self.scene.steps_per_frame(),
+            Moment::Time(time) => rounded(time, self.scene.dt) as u64,
+            Moment::End => self.scene.steps(),
+        };
+        while self.simulation.steps_done() < steps {
+            self.simulation.step()?;
+            tell();
+        }
+        Ok(())
+    }
+
+    /// Holds a vertex there, in m, by a soft spring; whether it can be held: it is simulated and not pinned.
+    pub fn hold(&mut self, vertex: usize, target: Vector3<f64>) -> bool {
+        let free = self.simulation.body().system.dofs().place(vertex).is_some();
+        match &self.act {
+            Act::Live { grip } if free => {
+                grip.hold(vertex, target);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// The vertex that is held.
+    #[must_use]
+    pub fn held(&self) -> Option<usize> {
+        match &self.act {
+            Act::Live { grip } => grip.vertex(),
+            Act::Recorded { .. } => None,
+        }
+    }
+
+    /// Lets go of what is held.
+    pub fn let_go(&mut self) {
+        if let Act::Live { grip } = &self.act {
+            grip.let_go();
+        }
+    }
+}
+
+/// The vertices of a frame that `cloth run` wrote.
+fn read_frame(folder: &Path, number: usize, expected: usize) -> Result<Vec<Vector3<f64>>, ViewError> {
+    let path = folder.join(OutputFolder::FRAMES).join(format!("cloth_{number:04}.obj"));
+    let text = std::fs::read_to_string(&path).map_err(|source| ViewError::Frame { path: path.clone(), source })?;
+    let vertex = |line: &str| -> Option<Vector3<f64>> {
+        let mut numbers = line.strip_prefix("v ")?.split(' ').map_while(|word| word.parse().ok());
+        Some([numbers.next()?, numbers.next()?, numbers.next()?])
+    };
+    let vertices: Vec<Vector3<f64>> = text.lines().filter_map(vertex).collect();
+    let found = vertices.len();
+    if found == expected { Ok(vertices) } else { Err(ViewError::Damaged { path, found, expected }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = r#"
+        dt = 0.01
+        duration = 0.2
+        frames_per_second = 50
+        integrator = "newton"
+        [mesh.sheet]
+        cells = [4, 4]
+        size = [0.4, 0.4]
+        [fabric]
+        density = 0.2
+        [fabric.material.stvk]
+        stretch_stiffness = 40.0
+        poisson_ratio = 0.3
+        [[pins]]
+        vertex = 0
+    "#;
+
+    fn stage() -> Stage {
+        Stage::live(Scene::parse(SCENE, "s.toml".as_ref()).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn time_passes_only_while_it_plays_and_no_faster_than_it_can() {
+        let mut stage = stage();
+        stage.advance(0.035, || false).unwrap();
+        assert_eq!(stage.simulation.steps_done(), 3);
+        stage.advance(0.006, || false).unwrap();
+        assert_eq!(stage.simulation.steps_done(), 4, "what was left over counts");
+        stage.advance(10.0, || true).unwrap();
+        assert_eq!(stage.simulation.steps_done(), 5, "one step when there is no time");
+        stage.toggle();
+        stage.advance(1.0, || false).unwrap();
+        assert_eq!(stage.simulation.steps_done(), 5);
+        stage.step().unwrap();
+        assert!((stage.time() - 0.06).abs() < 1e-12 && !stage.is_playing());
+        stage.step_back();
+        assert_eq!(stage.simulation.steps_done(), 6);
+        stage.restart().unwrap();
+        assert!(stage.time() == 0.0 && !stage.is_playing());
+    }
+
+    #[test]
+    fn what_is_held_follows_the_mouse_and_falls_when_let_go() {
+        let mut stage = stage();
+        let target = [0.15, 0.15, 0.1];
+        assert!(stage.hold(24, target) && stage.held() == Some(24));
+        stage.go_to(Moment::Time(1.0), || ()).unwrap();
+        let apart = norm(subtract(stage.positions()[24], target));
+        assert!(apart < 0.02, "{apart}");
+        stage.let_go();
+        assert_eq!(stage.held(), None);
+        stage.go_to(Moment::Time(1.2), || ()).unwrap();
+        assert!(stage.positions()[24][2] < 0.05, "{:?}", stage.positions()[24]);
+        assert!(!stage.hold(0, target), "a pinned vertex stays");
+        assert_eq!(stage.held(), None);
+    }
+
+    #[test]
+    fn unheld_it_moves_as_the_run_does() {
+        let (mut stage, scene) = (stage(), Scene::parse(SCENE, "s.toml".as_ref()).unwrap());
+        let mut plain = Simulation::new(&scene).unwrap();
+        stage.go_to(Moment::End, || ()).unwrap();
+        while !plain.is_finished() {
+            plain.step().unwrap();
+        }
+        assert_eq!(stage.positions(), plain.body().x);
+        let (strains, speeds) = (stage.values(Colouring::Strain), stage.values(Colouring::Speed));
+        assert!(strains.iter().all(|strain| *strain >= 0.0) && strains.iter().any(|strain| *strain > 1e-6));
+        assert!(speeds[0] == 0.0 && speeds[24] > 0.1);
+        assert!(stage.values(Colouring::Energy).iter().any(|energy| *energy > 0.0));
+    }
+
+    #[test]
+    fn a_run_is_played_from_its_frames() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let mut run = crate::run::Run::new(SCENE.to_owned(), "s.toml".as_ref(), folder.path(), false, None).unwrap();
+        run.go(&std::sync::atomic::AtomicBool::new(false), |_, _| ()).unwrap();
+        let mut stage = Stage::open(folder.path()).unwrap();
+        assert!(!stage.is_live() && stage.time() == 0.0 && !stage.hold(24, [0.0; 3]));
+        stage.advance(0.05, || false).unwrap();
+        assert!((stage.time() - 0.04).abs() < 1e-12);
+        stage.go_to(Moment::End, || ()).unwrap();
+        let apart = subtract(stage.positions()[24], run.simulation().body().x[24]);
+        assert!(norm(apart) < 1e-8 && (stage.time() - 0.2).abs() < 1e-12);
+        let (shown, exact) = (stage.values(Colouring::Speed)[24], norm(run.simulation().body().v[24]));
+        assert!((shown / exact - 1.0).abs() < 0.1, "{shown} {exact}");
+        stage.step().unwrap();
+        assert!((stage.time() - 0.2).abs() < 1e-12, "stays at the end");
+        stage.step_back();
+        assert!((stage.time() - 0.18).abs() < 1e-12);
+        stage.toggle();
+        stage.advance(0.041, || false).unwrap();
+        assert_eq!(stage.time(), 0.0, "begins again");
+        let message = stage.go_to(Moment::Frame(11), || ()).unwrap_err().to_string();
+        assert!(message.contains("frames 0 to 10, up to 0.2000 s; frame 11 is not"), "{message}");
+        stage.go_to(Moment::Time(0.05), || ()).unwrap();
+        assert!((stage.time() - 0.04).abs() < 1e-12);
+
+        let frame = folder.path().join("frames/cloth_0003.obj");
+        std::fs::write(&frame, "v 0 0 0\nv 1 0\n").unwrap();
+        let message = Stage::open(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("it has 1 vertices, the scene 25"), "{message}");
+        std::fs::remove_file(&frame).unwrap();
+        assert!(Stage::open(folder.path()).unwrap_err().to_string().contains("output.obj"));
+        assert!(Stage::open(&folder.path().join("frames")).unwrap_err().to_string().contains("finished run?"));
+    }
+}
