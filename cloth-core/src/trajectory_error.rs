@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::time::Instant;
 
 use energy_solve::EvaluationError;
-use plotters::prelude::*;
+use verify::plot::{Curve, logarithmic};
 
 use crate::bench::{self, BenchError, Cloth};
 use crate::integrator::{Scheme, StepError};
@@ -123,6 +123,7 @@ pub fn markdown(runs: &[Run]) -> String {
     let mut text = "| integrator | dt, ms | time, ms | error, mm | order |\n|---|---:|---:|---:|---:|\n".to_owned();
     for run in runs {
         let error = match run.error {
+            Ok(error) if error < 1e-6 => format!("{:.1e}", 1e3 * error),
             Ok(error) if error < LOST => format!("{:.4}", 1e3 * error),
             Ok(_) => "unstable".to_owned(),
             Err(_) => "failed".to_owned(),
@@ -139,45 +140,16 @@ pub fn markdown(runs: &[Run]) -> String {
 /// # Errors
 /// When there is nothing to draw.
 pub fn svg(runs: &[Run]) -> Result<String, String> {
-    let points: Vec<(&'static str, f64, f64)> = runs
-        .iter()
-        .filter_map(|run| Some((run.integrator, run.wall.max(1e-9), *run.error.as_ref().ok()?)))
-        .filter(|(_, _, error)| *error > 0.0 && *error < LOST)
-        .collect();
-    if points.is_empty() {
-        return Err("no run came near the reference".into());
+    let mut curves: Vec<Curve> = Vec::new();
+    for run in runs {
+        let Some(&error) = run.error.as_ref().ok().filter(|error| **error < LOST) else { continue };
+        let point = (run.wall, error);
+        match curves.iter_mut().find(|curve| curve.name == run.integrator) {
+            Some(curve) => curve.points.push(point),
+            None => curves.push(Curve { name: run.integrator.to_owned(), points: vec![point], joined: true }),
+        }
     }
-    let mut text = String::new();
-    draw(&mut text, &points).map_err(|error| error.to_string())?;
-    Ok(text)
-}
-
-fn draw(text: &mut String, points: &[(&'static str, f64, f64)]) -> Result<(), Box<dyn std::error::Error>> {
-    let range = |of: fn(&(&'static str, f64, f64)) -> f64| {
-        let (low, high) =
-            points.iter().map(of).fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
-        (0.7 * low..1.4 * high).log_scale()
-    };
-    let area = SVGBackend::with_string(text, (800, 500)).into_drawing_area();
-    area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&area)
-        .caption("time against error", ("sans-serif", 18))
-        .margin(12)
-        .x_label_area_size(36)
-        .y_label_area_size(64)
-        .build_cartesian_2d(range(|point| point.1), range(|point| point.2))?;
-    chart.configure_mesh().x_desc("time, s").y_desc("error, m").light_line_style(WHITE).draw()?;
-    let mut names: Vec<&'static str> = points.iter().map(|point| point.0).collect();
-    names.dedup();
-    for (number, name) in names.into_iter().enumerate() {
-        let colour = Palette99::pick(number).to_rgba();
-        let line = points.iter().filter(|point| point.0 == name).map(|point| (point.1, point.2));
-        chart
-            .draw_series(LineSeries::new(line, colour.stroke_width(2)))?
-            .label(name)
-            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(2)));
-    }
-    chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK).draw()?;
-    area.present()?;
-    Ok(())
+    let axes = ("time, s", "error, m");
+    logarithmic("time against error of the trajectory", axes, &curves, (800, 500))
+        .ok_or("no run came near the reference".into())
 }

@@ -64,7 +64,9 @@ impl Case {
             x.iter_mut().for_each(|p| p[1] = -p[1].abs());
         }
         let mut pinned = vec![false; x.len()];
-        [sheet.vertex(0, CELLS), sheet.vertex(CELLS, CELLS)].map(|corner| pinned[corner] = true);
+        for corner in [0, CELLS] {
+            pinned[sheet.vertex(corner, CELLS)] = true;
+        }
         let system = System::new(garment.terms, &pinned).unwrap();
         Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system }
     }

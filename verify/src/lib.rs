@@ -28,7 +28,7 @@ mod geometry;
 mod listings;
 mod message;
 pub mod multiprecision;
-mod plot;
+pub mod plot;
 pub mod reference;
 mod sample;
 pub mod stress;

@@ -1,22 +1,23 @@
 //! Plots as SVG.
 
+use std::ops::Range;
+
 use plotters::prelude::*;
 
 /// A named curve, or cloud of points.
-pub(crate) struct Curve {
-    pub(crate) name: String,
-    pub(crate) points: Vec<(f64, f64)>,
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// What the legend calls it.
+    pub name: String,
+    /// Across, up.
+    pub points: Vec<(f64, f64)>,
     /// Whether its points are joined.
-    pub(crate) joined: bool,
+    pub joined: bool,
 }
 
-/// Curves over logarithmic axes; points that are not positive and finite are left out. Nothing without a point.
-pub(crate) fn logarithmic(
-    title: &str,
-    (across, up): (&str, &str),
-    curves: &[Curve],
-    size: (u32, u32),
-) -> Option<String> {
+/// Curves over logarithmic axes, as SVG; points that are not positive and finite are left out. Nothing without a point.
+#[must_use]
+pub fn logarithmic(title: &str, (across, up): (&str, &str), curves: &[Curve], size: (u32, u32)) -> Option<String> {
     // Logarithms on linear axes: these have labels at any range, down to 1e-300.
     let logarithms = |curve: &Curve| -> Vec<(f64, f64)> {
         let shown = curve.points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
@@ -42,15 +43,15 @@ pub(crate) fn logarithmic(
             .y_label_area_size(58)
             .build_cartesian_2d(range(|p| p.0), range(|p| p.1))
             .ok()?;
-        let exponent = |x: &f64| format!("1e{x:.0}");
+        let power = |x: &f64| format!("{:.0e}", 10_f64.powf(*x));
         chart
             .configure_mesh()
             .x_desc(across)
             .y_desc(up)
             .x_labels(8)
             .y_labels(8)
-            .x_label_formatter(&exponent)
-            .y_label_formatter(&exponent)
+            .x_label_formatter(&power)
+            .y_label_formatter(&power)
             .light_line_style(WHITE)
             .draw()
             .ok()?;
@@ -69,6 +70,7 @@ pub(crate) fn logarithmic(
         if curves.len() > 1 {
             chart
                 .configure_series_labels()
+                .position(emptiest_corner(&all, range(|p| p.0), range(|p| p.1)))
                 .background_style(WHITE.mix(0.8))
                 .border_style(BLACK.mix(0.3))
                 .draw()
@@ -77,6 +79,23 @@ pub(crate) fn logarithmic(
         root.present().ok()?;
     }
     Some(text)
+}
+
+/// Where a legend hides the fewest points.
+fn emptiest_corner(points: &[(f64, f64)], across: Range<f64>, up: Range<f64>) -> SeriesLabelPosition {
+    let part = |x: f64, range: &Range<f64>| (x - range.start) / (range.end - range.start);
+    let corners = [
+        (SeriesLabelPosition::UpperRight, 1.0, 1.0),
+        (SeriesLabelPosition::UpperLeft, 0.0, 1.0),
+        (SeriesLabelPosition::LowerLeft, 0.0, 0.0),
+        (SeriesLabelPosition::LowerRight, 1.0, 0.0),
+    ];
+    let hidden = |x: f64, y: f64| {
+        let near = |p: &&(f64, f64)| (part(p.0, &across) - x).abs() < 0.35 && (part(p.1, &up) - y).abs() < 0.45;
+        points.iter().filter(near).count()
+    };
+    let [first, ..] = &corners;
+    corners.iter().min_by_key(|(_, x, y)| hidden(*x, *y)).unwrap_or(first).0.clone()
 }
 
 #[cfg(test)]
