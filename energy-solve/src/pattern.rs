@@ -69,6 +69,14 @@ impl Pattern {
         self.columns[start..end].binary_search(&index(column)).ok().map(|offset| (start + offset, flipped))
     }
 
+    /// Whether eliminating row after row couples rows that are not coupled here. A chain in order does not fill in, a sheet does.
+    #[must_use]
+    pub fn fills_in(&self) -> bool {
+        let coupled = |i: usize, j: usize| i == j || self.place(i, j).is_some();
+        let later = |row: usize| self.row(row).map(|(_, column)| column).filter(move |&column| column > row);
+        (0..self.rows()).any(|row| later(row).any(|i| later(row).any(|j| i < j && !coupled(i, j))))
+    }
+
     /// The place of blocks that are not part of the matrix, those of pinned vertices: after all others.
     #[must_use]
     pub fn nowhere(&self) -> usize {

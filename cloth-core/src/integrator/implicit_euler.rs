@@ -1,9 +1,10 @@
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockJacobi, BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, SolveOptions,
-    SolveReport, State, StopReason, Weights, bicgstab,
+    BlockJacobi, BlockMatrix, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State,
+    StopReason, Weights, bicgstab,
 };
 
+use super::linear_solver::LinearSolver;
 use super::{Integrator, StepError, StepReport, advance};
 use crate::body::Body;
 
@@ -11,8 +12,8 @@ use crate::body::Body;
 ///
 /// (M − h ∂f/∂v − h² ∂f/∂x) Δv = h (f + h (∂f/∂x) v),  v' = v + Δv,  x' = x + h v',
 ///
-/// with all of ∂f/∂x and ∂f/∂v. First order and dissipative. Conjugate gradients with over-relaxation ([`OverRelaxation`]) solve it when every
-/// term's Jacobians are symmetric, else BiCGSTAB.
+/// with all of ∂f/∂x and ∂f/∂v. First order and dissipative. Conjugate gradients solve it when every term's Jacobians are symmetric,
+/// else BiCGSTAB.
 ///
 /// Compressed elements can make the matrix indefinite, and then its solution may run uphill. When conjugate gradients meet
 /// such curvature, the step is solved again with each element's Hessian projected to positive semi-definite on both
@@ -29,7 +30,7 @@ pub struct ImplicitEuler {
 struct Memory {
     matrix: BlockMatrix,
     /// For symmetric matrices.
-    solver: Option<OverRelaxation<f64>>,
+    solver: Option<LinearSolver<f64>>,
 }
 
 /// How exactly the linear systems are solved.
@@ -73,8 +74,8 @@ impl ImplicitEuler {
         let mut delta = vec![[0.0; 3]; free.len()];
         let report = match solver {
             None => bicgstab(matrix, &BlockJacobi::new(matrix)?, &right, &mut delta, &self.options.0),
-            Some(solver) => match solver.scale(matrix) {
-                Ok(()) => solver.solve(&right, &mut delta, &self.options.0),
+            Some(solver) => match solver.prepare(matrix) {
+                Ok(()) => solver.solve(matrix, &right, &mut delta, &self.options.0),
                 // A block on the diagonal already proves what a direction would.
                 Err(_) if curvature == Curvature::Exact => SolveReport {
                     iterations: 0,
@@ -126,7 +127,7 @@ impl Integrator for ImplicitEuler {
             _ => {
                 let matrix = body.system.matrix();
                 let symmetric = body.system.character().symmetric;
-                let solver = symmetric.then(|| OverRelaxation::new(matrix.pattern()));
+                let solver = symmetric.then(|| LinearSolver::new(&matrix));
                 Memory { matrix, solver }
             }
         };

@@ -5,6 +5,7 @@ mod bdf2;
 mod explicit_euler;
 mod implicit_euler;
 mod implicit_midpoint;
+mod linear_solver;
 mod newton;
 mod stability;
 mod substep;

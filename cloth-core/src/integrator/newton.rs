@@ -7,6 +7,7 @@ use energy_solve::{
 };
 use serde::{Deserialize, Serialize};
 
+use super::linear_solver::LinearSolver;
 use super::{Integrator, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
@@ -49,7 +50,7 @@ impl Default for NewtonOptions {
 #[derive(Clone, Debug)]
 struct Memory {
     matrix: BlockMatrix,
-    solver: OverRelaxation<f32>,
+    solver: LinearSolver<f32>,
 }
 
 /// How long the parts of a step took.
@@ -197,7 +198,7 @@ impl Integrator for Newton {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
             _ => {
                 let matrix = body.system.matrix();
-                let solver = OverRelaxation::new(matrix.pattern());
+                let solver = LinearSolver::new(&matrix);
                 Memory { matrix, solver }
             }
         };
@@ -223,13 +224,13 @@ impl Integrator for Newton {
                 break;
             }
             let started = Instant::now();
-            solver.scale(&matrix)?;
+            solver.prepare(&matrix)?;
             step.report.phases.factorisation += started.elapsed();
 
             let started = Instant::now();
             let linear = SolveOptions { relative_tolerance: self.options.linear_tolerance, ..SolveOptions::default() };
             let mut direction = vec![[0.0; 3]; down.len()];
-            let mut solved = solver.solve(&down, &mut direction, &linear);
+            let mut solved = solver.solve(&matrix, &down, &mut direction, &linear);
             if !solved.converged() {
                 // Single precision made the stiffest of matrices indefinite.
                 let mut exact = OverRelaxation::<f64>::new(matrix.pattern());

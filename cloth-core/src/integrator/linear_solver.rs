@@ -1,0 +1,52 @@
+use energy_dsl::Vector3;
+use energy_solve::{
+    BlockMatrix, IncompleteCholesky, OverRelaxation, Precision, SingularBlock, SolveOptions, SolveReport,
+    conjugate_gradients,
+};
+
+/// What solves the symmetric systems of an integrator, chosen once for a pattern.
+#[derive(Clone, Debug)]
+pub(super) enum LinearSolver<T> {
+    /// Sheets: nothing to factor, little to read.
+    Relaxed(OverRelaxation<T>),
+    /// Strands of hair, and whatever else is eliminated vertex by vertex without new couplings: there the incomplete factorisation is
+    /// complete, and relaxation would carry news from one end to the other by a few vertices an iteration.
+    Factored(Box<IncompleteCholesky>),
+}
+
+impl<T: Precision> LinearSolver<T> {
+    /// For matrices of the pattern of this one.
+    pub(super) fn new(matrix: &BlockMatrix) -> Self {
+        let pattern = matrix.pattern();
+        if pattern.fills_in() {
+            Self::Relaxed(OverRelaxation::new(pattern))
+        } else {
+            Self::Factored(Box::new(IncompleteCholesky::new(pattern)))
+        }
+    }
+
+    /// Takes over a matrix.
+    pub(super) fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), SingularBlock> {
+        match self {
+            Self::Relaxed(relaxed) => relaxed.scale(matrix),
+            Self::Factored(factor) => factor.factor(matrix),
+        }
+    }
+
+    /// Solves A x = b from x = 0, A the matrix that was prepared.
+    pub(super) fn solve(
+        &mut self,
+        matrix: &BlockMatrix,
+        b: &[Vector3<f64>],
+        x: &mut [Vector3<f64>],
+        options: &SolveOptions,
+    ) -> SolveReport {
+        match self {
+            Self::Relaxed(relaxed) => relaxed.solve(b, x, options),
+            Self::Factored(factor) => {
+                x.fill([0.0; 3]);
+                conjugate_gradients(matrix, &**factor, b, x, options)
+            }
+        }
+    }
+}
