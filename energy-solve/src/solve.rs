@@ -61,6 +61,13 @@ pub struct SolveReport {
 }
 
 impl SolveReport {
+    /// Of a matrix that shows to be indefinite before it is multiplied by anything.
+    #[must_use]
+    pub fn indefinite() -> Self {
+        let stopped = StopReason::IndefiniteCurvature;
+        Self { iterations: 0, initial_residual: 0.0, final_residual: 0.0, stopped }
+    }
+
     /// Whether the tolerance was met.
     #[must_use]
     pub fn converged(&self) -> bool {

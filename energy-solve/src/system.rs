@@ -114,6 +114,8 @@ pub struct System {
 struct Constant {
     weights: Weights,
     curvature: Curvature,
+    /// Whether some element's curvature had to be changed; where none had, they serve for any treatment.
+    projected: bool,
     blocks: Vec<Block<f64>>,
 }
 
@@ -301,27 +303,50 @@ impl System {
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
-    /// The Jacobians of the quadratic terms, evaluated when the weights are others than last time: once for all steps of one size.
+    /// The Jacobians of the quadratic terms: evaluated once for all steps of one size, and again only if their curvature must be changed
+    /// where it was not, or the other way round.
     fn constant_blocks(&mut self, state: State<'_>, weights: Weights, curvature: Curvature) -> &[Block<f64>] {
-        let mut constant = match self.constant.take() {
-            Some(constant) if (constant.weights, constant.curvature) == (weights, curvature) => {
-                return &self.constant.insert(constant).blocks;
+        let known = self.constant.take();
+        let serves = |it: &Constant| it.weights == weights && (!it.projected || it.curvature == curvature);
+        let constant = match known {
+            Some(known) if serves(&known) => known,
+            other => {
+                let blocks = other.map_or_else(|| vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1], |it| it.blocks);
+                // What need not be changed is found by changing it.
+                let changed = self.evaluate_constant(state, weights, Curvature::Clamped, blocks);
+                if serves(&changed) {
+                    changed
+                } else {
+                    let as_wanted = self.evaluate_constant(state, weights, curvature, changed.blocks);
+                    Constant { projected: true, ..as_wanted }
+                }
             }
-            Some(before) => Constant { weights, curvature, ..before },
-            None => Constant { weights, curvature, blocks: vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1] },
         };
-        constant.blocks.fill([[0.0; 3]; 3]);
+        &self.constant.insert(constant).blocks
+    }
+
+    fn evaluate_constant(
+        &mut self,
+        state: State<'_>,
+        weights: Weights,
+        curvature: Curvature,
+        mut blocks: Vec<Block<f64>>,
+    ) -> Constant {
+        blocks.fill([[0.0; 3]; 3]);
         let mut sum = Linearisation {
             weights,
             curvature,
-            matrix: &mut constant.blocks,
+            matrix: &mut blocks,
             force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
             stiffness_times_velocity: None,
         };
+        let mut projected = false;
         for Counted { term, counts } in self.terms.iter_mut().filter(|counted| is_constant(&*counted.term)) {
-            counts.hessian += term.add_linearisation(state, &mut sum);
+            let tally = term.add_linearisation(state, &mut sum);
+            projected |= tally.projected > 0;
+            counts.hessian += tally;
         }
-        &self.constant.insert(constant).blocks
+        Constant { weights, curvature, projected, blocks }
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {

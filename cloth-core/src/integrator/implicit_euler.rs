@@ -77,12 +77,7 @@ impl ImplicitEuler {
             Some(solver) => match solver.prepare(matrix) {
                 Ok(()) => solver.solve(matrix, &right, &mut delta, &self.options.0),
                 // A block on the diagonal already proves what a direction would.
-                Err(_) if curvature == Curvature::Exact => SolveReport {
-                    iterations: 0,
-                    initial_residual: 0.0,
-                    final_residual: 0.0,
-                    stopped: StopReason::IndefiniteCurvature,
-                },
+                Err(_) if curvature == Curvature::Exact => SolveReport::indefinite(),
                 Err(singular) => return Err(singular.into()),
             },
         };

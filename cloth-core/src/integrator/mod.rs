@@ -75,7 +75,7 @@ pub struct StepReport {
     pub solves: u64,
     /// Iterations of the linear solver.
     pub iterations: u64,
-    /// Whether it was solved again with projected curvature; see [`ImplicitEuler`].
+    /// Whether exact curvature turned out to be negative, and was projected; see [`ImplicitEuler`].
     pub projected: bool,
     /// How often a step of Newton's method was halved.
     pub halvings: u64,

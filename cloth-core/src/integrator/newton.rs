@@ -2,8 +2,8 @@ use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, SolveOptions, State, Term, Weights,
-    dot,
+    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, SolveOptions, SolveReport, State,
+    Term, Weights, dot,
 };
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ use crate::body::Body;
 /// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + h R(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
 ///
 /// R the dissipation function of damping: half the power that linear damping takes. Each element's Hessian is made positive semi-definite, so that every step of Newton's method
-/// leads downhill; it is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
+/// leads downhill, until steps shrink fast enough that exact ones may do; it is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
 ///
 /// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along
 /// their length, whose Jacobians are not symmetric, use [`super::ImplicitEuler`].
@@ -75,6 +75,9 @@ impl std::ops::AddAssign for Phases {
     }
 }
 
+/// By how much whole steps of Newton's method shrink from one to the next when a minimum is near. There no curvature is negative, and the Hessians serve
+/// as they are: the method converges faster, and nothing is projected.
+const SHRINKING: f64 = 0.3;
 /// Halvings of a step before it counts as stuck: the last is 2⁻⁴⁰ of the first.
 const HALVINGS: usize = 40;
 /// How much of the decrease that the slope promises must come true (Armijo).
@@ -89,6 +92,9 @@ impl Newton {
         Self { options, memory: None }
     }
 }
+
+/// Where a line search ended, E there, and the part of the direction that was taken.
+type Found = (Vec<Vector3<f64>>, (f64, f64), f64);
 
 /// A step on its way.
 struct Step<'a> {
@@ -143,12 +149,13 @@ impl Step<'_> {
     fn linearise(
         &mut self,
         x: &[Vector3<f64>],
+        curvature: Curvature,
         matrix: &mut BlockMatrix,
     ) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         let started = Instant::now();
         let v = self.velocities(x);
         let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
-        let options = LinearisationOptions { weights, curvature: Curvature::Clamped, stiffness_times_velocity: false };
+        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
         let linear = self.body.system.linearise(State { x, v: &v }, options, matrix)?;
         let mut down = Vec::with_capacity(self.free.len());
         for (row, &vertex) in self.free.iter().enumerate() {
@@ -163,6 +170,63 @@ impl Step<'_> {
         }
         self.report.phases.assembly += started.elapsed();
         Ok(down)
+    }
+
+    /// Solves for the direction. Of a matrix whose curvature is exact and turns out to be negative, as far as that goes: it leads downhill, or is zero.
+    fn direction(
+        &mut self,
+        down: &[Vector3<f64>],
+        curvature: Curvature,
+        Memory { matrix, solver }: &mut Memory,
+        options: &SolveOptions,
+    ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
+        let started = Instant::now();
+        let prepared = solver.prepare(matrix);
+        self.report.phases.factorisation += started.elapsed();
+
+        let started = Instant::now();
+        let mut direction = vec![[0.0; 3]; down.len()];
+        let mut solved = SolveReport::indefinite();
+        if curvature != Curvature::Exact || prepared.is_ok() {
+            prepared?;
+            solved = solver.solve(matrix, down, &mut direction, options);
+        }
+        if curvature != Curvature::Exact && !solved.converged() {
+            // Single precision made the stiffest of matrices indefinite.
+            let mut exact = OverRelaxation::<f64>::new(matrix.pattern());
+            exact.scale(matrix)?;
+            solved = exact.solve(down, &mut direction, options);
+        }
+        self.report.phases.solve += started.elapsed();
+        self.report.solves += 1;
+        self.report.iterations += solved.iterations as u64;
+        self.report.projected |= curvature == Curvature::Exact && !solved.converged();
+        Ok((direction, solved))
+    }
+
+    /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo), with E there and the part of d; `None` if none does.
+    fn line_search(
+        &mut self,
+        x: &[Vector3<f64>],
+        energy: (f64, f64),
+        down: &[Vector3<f64>],
+        direction: &[Vector3<f64>],
+    ) -> Result<Option<Found>, EvaluationError> {
+        let slope = -dot(down, direction);
+        if slope == 0.0 && largest(direction) == 0.0 && largest(down) > 0.0 {
+            return Ok(None);
+        }
+        let mut scale = 1.0;
+        for _ in 0..=HALVINGS {
+            let moved = self.moved(x, scale, direction);
+            let trial = self.energy(&moved)?;
+            if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
+                return Ok(Some((moved, trial, scale)));
+            }
+            scale *= 0.5;
+            self.report.halvings += 1;
+        }
+        Ok(None)
     }
 
     /// x + s d on the free vertices.
@@ -194,7 +258,7 @@ impl Integrator for Newton {
         if let Some((term, _)) = body.system.terms().find(|(term, _)| !fits(*term)) {
             return Err(StepError::NotSymmetric { term: term.name().to_owned() });
         }
-        let Memory { mut matrix, mut solver } = match self.memory.take() {
+        let mut memory = match self.memory.take() {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
             _ => {
                 let matrix = body.system.matrix();
@@ -202,6 +266,7 @@ impl Integrator for Newton {
                 Memory { matrix, solver }
             }
         };
+        let linear = SolveOptions { relative_tolerance: self.options.linear_tolerance, ..SolveOptions::default() };
         let free = body.system.dofs().free().to_vec();
         let start = body.x.clone();
         // Pinned vertices end there: they move as they are told.
@@ -214,57 +279,36 @@ impl Integrator for Newton {
             energy = step.energy(&x)?;
         }
         let (mut converged, mut change) = (false, f64::INFINITY);
+        let (mut curvature, mut exact_may_do) = (Curvature::Clamped, true);
         while !converged {
             if step.report.solves == self.options.iteration_limit as u64 {
                 return Err(StepError::NotConverged { iterations: step.report.solves, change });
             }
-            let down = step.linearise(&x, &mut matrix)?;
+            let down = step.linearise(&x, curvature, &mut memory.matrix)?;
             // One iteration at least: on a fine mesh no vertex weighs much, and not even free fall lacks a large impulse.
             if step.report.solves > 0 && largest(&down) < dt * self.options.impulse_tolerance {
                 break;
             }
-            let started = Instant::now();
-            solver.prepare(&matrix)?;
-            step.report.phases.factorisation += started.elapsed();
-
-            let started = Instant::now();
-            let linear = SolveOptions { relative_tolerance: self.options.linear_tolerance, ..SolveOptions::default() };
-            let mut direction = vec![[0.0; 3]; down.len()];
-            let mut solved = solver.solve(&matrix, &down, &mut direction, &linear);
-            if !solved.converged() {
-                // Single precision made the stiffest of matrices indefinite.
-                let mut exact = OverRelaxation::<f64>::new(matrix.pattern());
-                exact.scale(&matrix)?;
-                solved = exact.solve(&down, &mut direction, &linear);
-            }
-            step.report.phases.solve += started.elapsed();
-            step.report.solves += 1;
-            step.report.iterations += solved.iterations as u64;
-
-            let slope = -dot(&down, &direction);
-            let mut scale = 1.0;
-            let mut halvings = 0;
-            let (moved, lower) = loop {
-                let moved = step.moved(&x, scale, &direction);
-                let trial = step.energy(&moved)?;
-                if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
-                    break (moved, trial);
+            let (direction, solved) = step.direction(&down, curvature, &mut memory, &linear)?;
+            let indefinite = curvature == Curvature::Exact && !solved.converged();
+            let Some((moved, lower, scale)) = step.line_search(&x, energy, &down, &direction)? else {
+                if curvature == Curvature::Exact {
+                    (curvature, exact_may_do) = (Curvature::Clamped, false);
+                    continue;
                 }
-                if halvings == HALVINGS {
-                    return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
-                }
-                scale *= 0.5;
-                halvings += 1;
+                return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
             };
-            step.report.halvings += halvings as u64;
             (x, energy) = (moved, lower);
-            change = scale * largest(&direction) / dt;
-            converged = change < self.options.velocity_tolerance;
+            let before = std::mem::replace(&mut change, scale * largest(&direction) / dt);
+            converged = !indefinite && change < self.options.velocity_tolerance;
+            exact_may_do &= !indefinite;
+            let shrinks = scale == 1.0 && before.is_finite() && change < SHRINKING * before;
+            curvature = if exact_may_do && shrinks { Curvature::Exact } else { Curvature::Clamped };
         }
         let v = step.velocities(&x);
         let report = step.report;
         (body.x, body.v) = (x, v);
-        self.memory = Some(Memory { matrix, solver });
+        self.memory = Some(memory);
         Ok(report)
     }
 
