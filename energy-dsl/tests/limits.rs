@@ -6,6 +6,7 @@ use energy_macros::energy;
 
 energy! {
     energy Log1p(p: Point) { log1p(p.x) }
+    energy Log1pmx(p: Point) { log1pmx(p.x) }
     energy Expm1(p: Point) { expm1(p.x) }
     energy Softplus(p: Point) { softplus(p.x) }
     energy Sinc(p: Point) { sinc(p.x) }
@@ -37,6 +38,9 @@ fn removable_singularities_return_the_limit() {
     assert_eq!((value, first, flag), (1.0, -1.0 / 6.0, false));
     assert!((second - 1.0 / 60.0).abs() < 1e-17);
     assert_eq!(at(&Log1p::new(), 0.0), (0.0, 1.0, -1.0, false));
+    assert_eq!(at(&Log1pmx::new(), 0.0), (0.0, 0.0, -1.0, false));
+    assert_eq!(at(&Log1pmx::new(), 1e-200).0, 0.0);
+    assert_eq!(at(&Log1pmx::new(), 1e-100).0, -5e-201);
     assert_eq!(at(&Expm1::new(), 0.0), (0.0, 1.0, 1.0, false));
 }
 
@@ -47,6 +51,7 @@ fn large_arguments_neither_overflow_nor_vanish() {
     assert_eq!(at(&Expm1::new(), -800.0).0, -1.0);
     assert_eq!(at(&Log1p::new(), f64::INFINITY).0, f64::INFINITY);
     assert_eq!(at(&Log1p::new(), -1.0).0, f64::NEG_INFINITY);
+    assert_eq!(at(&Log1pmx::new(), -1.0).0, f64::NEG_INFINITY);
     assert_eq!(at(&Log1p::new(), 1e300).0, 1e300_f64.ln());
     assert_eq!(at(&Softplus::new(), 1e300), (1e300, 1.0, 0.0, false));
     assert_eq!(at(&Softplus::new(), -800.0), (0.0, 0.0, 0.0, false));

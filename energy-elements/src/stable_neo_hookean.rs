@@ -15,18 +15,22 @@ energy! {
             let s = power_of_two(d);
             let B = adjugate(D_m) * s;
             let d2 = (d * s)^2;
+            let per_d = 1 / d;
+            let per_d2 = 1 / d2;
         }
         let a = x1 - x0;
         let b = x2 - x0;
         let F = columns(a, b) * B;
         let f_u = F * vector(1, 0);
         let f_v = F * vector(0, 1);
-        let area = norm(cross(a, b));
+        let uu = norm_squared(f_u);
+        let vv = norm_squared(f_v);
         // J − 1.
-        let j = (area - d) / d;
+        let area = norm(cross(a, b));
+        let j = (area - d) * per_d;
         // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
-        let square = ddot(F, F) / d2 + 2 * area / d;
-        let anisotropy = (dot(f_u - f_v, f_u + f_v) / d2)^2 + 4 * (dot(f_u, f_v) / d2)^2;
+        let square = (uu + vv) * per_d2 + 2 * area * per_d;
+        let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
         let shape = anisotropy / square;
         d / 4 * (μ * shape + λ * j^2)
     }

@@ -11,6 +11,7 @@ use num_traits::{Signed, ToPrimitive};
 
 energy! {
     energy Log1p(p: Point) { log1p(p.x) }
+    energy Log1pmx(p: Point) { log1pmx(p.x) }
     energy Expm1(p: Point) { expm1(p.x) }
     energy Softplus(p: Point) { softplus(p.x) }
     energy Sinc(p: Point) { sinc(p.x) }
@@ -171,6 +172,10 @@ fn logarithms_and_exponentials() {
     check(&Log1p::new(), &near, [4.0, 2.0, 4.0], |x| {
         let inverse = one() / (one() + x.clone());
         [x.log1p(), inverse.clone(), -(inverse.clone() * inverse)]
+    });
+    check(&Log1pmx::new(), &near, [8.0, 3.0, 4.0], |x| {
+        let inverse = one() / (one() + x.clone());
+        [x.log1p() - x.clone(), -(x * inverse.clone()), -(inverse.clone() * inverse)]
     });
     check(&Expm1::new(), &arguments(30.0, true), [4.0, 1.0, 1.0], |x| [x.expm1(), x.exp(), x.exp()]);
     check(&Softplus::new(), &arguments(30.0, true), [4.0, 3.0, 5.0], |x| {

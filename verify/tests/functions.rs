@@ -94,7 +94,13 @@ energy! {
     #[audit(samples = 50)]
     energy Logarithms(p, q: Point; s: Scalar) {
         let x = dot(p, q);
-        log1p(x^2) * expm1(x / 8) + log(2 + norm(p)) + softplus(s * x) + exp(x / 16) - 1 + log(1 + norm_squared(q))
+        log1p(x^2) * expm1(x / 8) + log(2 + norm(p)) + softplus(s * x) + log1pmx(x^2 / 8) + log1p(x^2, 1 + x^2) * log1pmx(x / 64, 1 + x / 64) + exp(x / 16) - 1 + log(1 + norm_squared(q))
+    }
+
+    #[audit(samples = 50)]
+    energy Areas(p, q, r: Point; s: Scalar) {
+        let area = norm(cross(p - r, q - r));
+        area * norm(p) + (area - s)^2 + sqrt(s + norm(cross(p - r, q)))
     }
 
     #[audit(samples = 50)]

@@ -1,7 +1,8 @@
 //! ln(1 + x), eˣ − 1 and their kin, without cancellation at 0.
 
-use super::elementary::one_scalar;
-use super::{Function, Lowered};
+use super::elementary::{one_scalar, two_scalars};
+use super::sinc::polynomial;
+use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -15,11 +16,19 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
     Function {
         name: "log1p",
-        usage: "log1p(x)",
-        docs: "ln(1 + x), x > −1, without cancellation at 0.",
-        shape: one_scalar,
-        lower: |g, a| Lowered::scalar(log1p(g, a[0].node())),
+        usage: "log1p(x) or log1p(x, u)",
+        docs: "ln(1 + x), x > −1, without cancellation at 0. Where 1 + x has lost digits near −1, u = 1 + x by other means saves them.",
+        shape: with_successor,
+        lower: |g, a| Lowered::scalar(of_successor(g, a, log1p, log1p_of)),
         accuracy: "4 / 2 / 4",
+    },
+    Function {
+        name: "log1pmx",
+        usage: "log1pmx(x) or log1pmx(x, u)",
+        docs: "ln(1 + x) − x, x > −1, without cancellation at 0, where it is −x²/2. u = 1 + x by other means as for log1p.",
+        shape: with_successor,
+        lower: |g, a| Lowered::scalar(of_successor(g, a, log1pmx, log1pmx_of)),
+        accuracy: "8 / 3 / 4",
     },
     Function {
         name: "expm1",
@@ -74,6 +83,93 @@ fn log1p(g: &mut Graph, x: NodeId) -> NodeId {
     let square = g.mul(first, first);
     let second = g.neg(square);
     g.add_rule(Rule::smooth(Primitive::Log1p, vec![x], value, vec![first], vec![second]), &[])
+}
+
+/// x, and 1 + x if it is known by other means.
+fn with_successor(shapes: &[Shape]) -> Result<Shape, String> {
+    if shapes.len() == 2 { two_scalars(shapes) } else { one_scalar(shapes) }
+}
+
+/// A function of x by the way of one argument or of two.
+fn of_successor(
+    g: &mut Graph,
+    arguments: &[Lowered],
+    of_one: fn(&mut Graph, NodeId) -> NodeId,
+    of_two: fn(&mut Graph, NodeId, NodeId) -> NodeId,
+) -> NodeId {
+    match arguments {
+        [x, u] => of_two(g, x.node(), u.node()),
+        _ => of_one(g, arguments[0].node()),
+    }
+}
+
+/// ln u for u = 1 + x, which moves as x does: near 1, where u has lost the digits of x, by a series.
+fn log1p_of(g: &mut Graph, x: NodeId, u: NodeId) -> NodeId {
+    let direct = g.ln(u);
+    if g.form() == Form::Textbook {
+        return direct;
+    }
+    let remainder = log1pmx_near_0(g, x);
+    let series = g.add(x, remainder);
+    let value = near_0(g, x, series, direct);
+    let one = g.constant(1.0);
+    let first = g.div(one, u);
+    let square = g.mul(first, first);
+    let second = g.neg(square);
+    g.add_rule(Rule::smooth(Primitive::Log1p, vec![x], value, vec![first], vec![second]), &[u])
+}
+
+/// ln(1 + x) − x.
+fn log1pmx(g: &mut Graph, x: NodeId) -> NodeId {
+    let (one, logarithm) = (g.constant(1.0), log1p(g, x));
+    let u = g.add(one, x);
+    let direct = g.sub(logarithm, x);
+    log1pmx_rule(g, x, u, direct)
+}
+
+/// ln u − x for u = 1 + x, which moves as x does.
+fn log1pmx_of(g: &mut Graph, x: NodeId, u: NodeId) -> NodeId {
+    let logarithm = g.ln(u);
+    let direct = g.sub(logarithm, x);
+    log1pmx_rule(g, x, u, direct)
+}
+
+/// Near 0 by a series. The derivatives −x/(1 + x) and −1/(1 + x)² cancel nowhere.
+fn log1pmx_rule(g: &mut Graph, x: NodeId, u: NodeId, direct: NodeId) -> NodeId {
+    if g.form() == Form::Textbook {
+        return direct;
+    }
+    let series = log1pmx_near_0(g, x);
+    let value = near_0(g, x, series, direct);
+    let one = g.constant(1.0);
+    let reciprocal = g.div(one, u);
+    let first = g.mul(x, reciprocal);
+    let second = g.mul(reciprocal, reciprocal);
+    let (first, second) = (g.neg(first), g.neg(second));
+    g.add_rule(Rule::smooth(Primitive::Log1pmx, vec![x], value, vec![first], vec![second]), &[u])
+}
+
+/// `series` where |x| < ½.
+fn near_0(g: &mut Graph, x: NodeId, series: NodeId, direct: NodeId) -> NodeId {
+    let (magnitude, half) = (g.abs(x), g.constant(0.5));
+    let near = g.less(magnitude, half);
+    g.select(near, series, direct)
+}
+
+/// With z = x/(2 + x), y = z²: ln(1 + x) = 2 artanh z = 2z (1 + y/3 + y²/5 + …) and x − 2z = x z; what is left is
+/// z (2y (1/3 + y/5 + …) − x).
+fn log1pmx_near_0(g: &mut Graph, x: NodeId) -> NodeId {
+    // Terms until the next is below 2⁻⁵⁶ of the first at the largest y, that of x = −½.
+    const LARGEST: f64 = 1.0 / 9.0;
+    let last = (0..).find(|&k| LARGEST.powi(k + 1) * 3.0 / f64::from(2 * k + 5) < 2.0_f64.powi(-56)).unwrap_or(0);
+    let two = g.constant(2.0);
+    let denominator = g.add(two, x);
+    let z = g.div(x, denominator);
+    let y = g.mul(z, z);
+    let tail = polynomial(g, y, (0..=last).map(|k| 2.0 / f64::from(2 * k + 3)).collect());
+    let product = g.mul(y, tail);
+    let difference = g.sub(product, x);
+    g.mul(z, difference)
 }
 
 /// With u = eˣ rounded, (u − 1) x/ln u for |x| < 1: again the errors undo each other.

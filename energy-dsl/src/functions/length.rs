@@ -4,7 +4,7 @@
 //! P = I − n nᵀ: ∇r = n and ∇²r = P/r, the diagonal of P being the sum of the *other* squares, never 1 − nᵢ².
 
 use super::inner_product::inner_product;
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, parallelogram};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 use crate::runtime::Flag;
 
@@ -134,11 +134,19 @@ fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
     }
     let at = direction(g, d);
     let value = g.div(at.length, at.scale);
+    // By a and b where d = a × b.
     let curvature = g.mul(at.reciprocal, at.scale);
-    let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
-    let first = at.unit.iter().map(|&n| vec![n]).collect();
-    let rule = Rule::factored(Primitive::Norm, d.to_vec(), value, first, second);
-    g.add_rule(rule.flagged(1, Flag::Degenerate, at.zero), &[])
+    let (arguments, (first, second)) = match parallelogram::edges(g, d) {
+        Some(edges) => (edges.concat(), parallelogram::derivatives(g, &edges, &at.unit, curvature)),
+        None => {
+            let first = at.unit.iter().map(|&n| vec![n]).collect();
+            let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
+            (d.to_vec(), (first, second))
+        }
+    };
+    let rule = Rule::factored(Primitive::Norm, arguments, value, first, second);
+    let rule = Rule { vector: Some(d.to_vec()), ..rule.flagged(1, Flag::Degenerate, at.zero) };
+    g.add_rule(rule, d)
 }
 
 fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
@@ -188,11 +196,11 @@ fn unit_parts(g: &mut Graph, d: &[NodeId]) -> Vec<NodeId> {
 /// ‖d‖^α with α a parameter or a constant: gradient g n, Hessian (g/r) (I + (α − 2) n nᵀ), g = α ‖d‖^(α−1). An even constant
 /// power is a polynomial of d·d. At d = 0 both are their limits, or 0 and flagged where there is none.
 pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId) -> Option<NodeId> {
-    let rule = g.rule(base).filter(|r| r.primitive == Primitive::Norm)?;
+    let rule = g.rule(base)?;
+    let (d, length) = (rule.vector.clone()?, rule.value);
     if g.varies(exponent) {
         return None;
     }
-    let (d, length) = (rule.arguments.clone(), rule.value);
     if let Some(power) = g.as_constant(exponent).filter(|power| *power > 0.0 && power % 2.0 == 0.0) {
         let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
         return Some(g.plain_pow(square, half));
@@ -231,11 +239,10 @@ pub(crate) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
 /// with the rounding errors of the edge itself: near rest r − L is exact, and ρ most of the strain. Its half square ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ,
 /// which are right at d = 0 too where L = 0.
 pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: NodeId) -> Option<NodeId> {
-    let rule = g.rule(norm).filter(|r| r.primitive == Primitive::Norm)?;
+    let d = g.rule(norm)?.vector.clone()?;
     if g.varies(rest_length) {
         return None;
     }
-    let d = rule.arguments.clone();
     // A length is not negative, so the largest size is found without its magnitude.
     let largest = largest_magnitude(g, &d);
     let largest = g.max(largest, rest_length);
@@ -250,10 +257,6 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let rounded = g.sub(at.length, length);
     let scaled_value = g.add(rounded, correction);
     let value = g.div(scaled_value, scale);
-
-    let curvature = g.mul(at.reciprocal, scale);
-    let first = at.unit.iter().map(|&n| vec![n]).collect();
-    let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
 
     // C/r, at d = 0 its limit 1 for a spring without rest length, else 0.
     let ratio = g.mul(scaled_value, at.reciprocal);
@@ -278,9 +281,9 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
         .flagged(1, Flag::Degenerate, collapsed);
     let half_square = g.add_rule(half_square, &[rest_length]);
 
-    let mut rule = Rule::factored(Primitive::Elongation, d, value, first, second).flagged(1, Flag::Degenerate, at.zero);
-    rule.half_square = Some(half_square);
-    Some(g.add_rule(rule, &[rest_length]))
+    // By ‖d‖, so that what depends on both gathers their derivatives.
+    let rule = Rule::smooth(Primitive::Elongation, vec![norm], value, vec![one], vec![null]);
+    Some(g.add_rule(Rule { half_square: Some(half_square), ..rule }, &[rest_length]))
 }
 
 /// ‖d‖ (‖d‖ − r) for r, the length of the scaled vector as it was rounded: half of d·d − r² as if in twice the precision,

@@ -213,7 +213,11 @@ fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
         (Shape::Scalar, _) => Lowered { shape: y.shape, parts: g.scaled(x.node(), &y.parts) },
         (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
         // Needle triangles: each component to about one rounding.
-        _ if g.form() == Form::Robust => Lowered::vector(super::angle::accurate_cross(g, &x.parts, &y.parts)),
+        _ if g.form() == Form::Robust => {
+            let components = super::angle::accurate_cross(g, &x.parts, &y.parts);
+            g.note_cross(&components, &x.parts, &y.parts);
+            Lowered::vector(components)
+        }
         _ => Lowered::vector(g.cross(&x.parts, &y.parts)),
     }
 }

@@ -11,6 +11,7 @@ mod length;
 mod linear_algebra;
 mod logic;
 mod loss;
+mod parallelogram;
 mod quaternion;
 mod shape;
 mod sinc;

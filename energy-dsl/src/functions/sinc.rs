@@ -116,7 +116,7 @@ fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
 }
 
 /// Σ cₖ yᵏ by Horner's rule.
-fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -> NodeId {
+pub(super) fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -> NodeId {
     let mut sum = g.constant(coefficients.pop().expect("a polynomial has coefficients"));
     for coefficient in coefficients.into_iter().rev() {
         let (coefficient, product) = (g.constant(coefficient), g.mul(y, sum));

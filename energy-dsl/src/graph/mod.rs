@@ -39,6 +39,8 @@ pub struct Graph {
     rules: Vec<Rule>,
     rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
     assumptions: Vec<Assumption>,
+    /// The factors of cross products, by their components.
+    crosses: HashMap<Vec<NodeId>, [Vec<NodeId>; 2]>,
     /// Nodes that no sum takes along unrounded; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
 }
@@ -56,6 +58,7 @@ impl Graph {
             rules: Vec::new(),
             rule_index: HashMap::new(),
             assumptions: Vec::new(),
+            crosses: HashMap::new(),
             rounded: BTreeSet::new(),
         }
     }
@@ -97,6 +100,16 @@ impl Graph {
             Op::Rule(id) => Some(&self.rules[id as usize]),
             _ => None,
         }
+    }
+
+    /// Notes that `components` are those of a × b.
+    pub(crate) fn note_cross(&mut self, components: &[NodeId], a: &[NodeId], b: &[NodeId]) {
+        self.crosses.insert(components.to_vec(), [a.to_vec(), b.to_vec()]);
+    }
+
+    /// a and b, if `components` are those of a × b.
+    pub(crate) fn cross_factors(&self, components: &[NodeId]) -> Option<&[Vec<NodeId>; 2]> {
+        self.crosses.get(components)
     }
 
     /// The node that computes the value: a rule's own expression, or the node itself.

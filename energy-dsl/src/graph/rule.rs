@@ -53,6 +53,8 @@ pub enum Primitive {
     RootOneMinusCosine,
     /// ln(1 + x).
     Log1p,
+    /// ln(1 + x) − x.
+    Log1pmx,
     /// eˣ − 1.
     Expm1,
     /// ln(1 + eˣ).
@@ -103,6 +105,7 @@ impl Primitive {
             Self::Sinc => "sin x / x",
             Self::RootOneMinusCosine => "√(1 − cosine between vectors)",
             Self::Log1p => "log1p",
+            Self::Log1pmx => "log1pmx",
             Self::Expm1 => "expm1",
             Self::Softplus => "softplus",
             Self::Huber => "Huber loss",
@@ -146,6 +149,8 @@ pub struct Rule {
     pub dihedral: Option<DihedralParts>,
     /// Of an elongation: its rule's square.
     pub half_square: Option<NodeId>,
+    /// Of a length: the vector.
+    pub vector: Option<Vec<NodeId>>,
 }
 
 /// Factors, to be multiplied from left to right: what weighs the product multiplies the first, so that entries that share
@@ -219,6 +224,7 @@ impl Graph {
                 flags,
                 dihedral: None,
                 half_square: None,
+                vector: None,
             },
             &[],
         )
@@ -250,7 +256,17 @@ impl Rule {
         second: Vec<Vec<Product>>,
     ) -> Self {
         let second = Some(second);
-        Self { primitive, arguments, value, first, second, flags: Vec::new(), dihedral: None, half_square: None }
+        Self {
+            primitive,
+            arguments,
+            value,
+            first,
+            second,
+            flags: Vec::new(),
+            dihedral: None,
+            half_square: None,
+            vector: None,
+        }
     }
 
     /// The same with a condition.
