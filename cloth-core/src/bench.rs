@@ -115,6 +115,8 @@ pub struct Measured {
     pub cloth: Cloth,
     /// The number of vertices.
     pub vertices: usize,
+    /// How many threads there could be.
+    pub threads: usize,
     /// Steps done.
     pub steps: u64,
     /// Newton's method's iterations and what they took.
@@ -129,13 +131,20 @@ pub struct Measured {
     pub peak_memory: Option<u64>,
 }
 
-/// Runs a cloth for `seconds` of its time, calling `progress` after every step.
+/// Runs a cloth for `seconds` of its time on at most so many threads, calling `progress` after every step.
 ///
 /// # Errors
 /// When a step fails.
-pub fn measure(cloth: Cloth, cells: usize, seconds: f64, mut progress: impl FnMut()) -> Result<Measured, BenchError> {
+pub fn measure(
+    cloth: Cloth,
+    cells: usize,
+    threads: usize,
+    seconds: f64,
+    mut progress: impl FnMut(),
+) -> Result<Measured, BenchError> {
     let started = Instant::now();
     let mut body = hang(cloth, cells)?;
+    body.system.set_threads(threads);
     // The stop test of the comparison in the literature: absolute, at the scale of this scene.
     let options = NewtonOptions { velocity_tolerance: 1e-3, impulse_tolerance: 1e-6, ..NewtonOptions::default() };
     let mut integrator = Newton::with_options(options);
@@ -151,7 +160,7 @@ pub fn measure(cloth: Cloth, cells: usize, seconds: f64, mut progress: impl FnMu
     }
     let time = started.elapsed();
     let lowest = body.x.iter().fold(f64::INFINITY, |lowest, x| lowest.min(x[2]));
-    Ok(Measured { cloth, vertices, steps, report, set_up, time, lowest, peak_memory: peak_memory() })
+    Ok(Measured { cloth, vertices, threads, steps, report, set_up, time, lowest, peak_memory: peak_memory() })
 }
 
 /// What Linux calls the high-water mark of the resident set.
@@ -170,6 +179,7 @@ pub fn table(runs: &[Measured]) -> Table {
     table.set_header([
         "cloth",
         "vertices",
+        "threads",
         "ms/step",
         "Newton/step",
         "CG/Newton",
@@ -181,20 +191,26 @@ pub fn table(runs: &[Measured]) -> Table {
         "peak MB",
         "lowest m",
         "growth",
+        "of one thread",
     ]);
-    for (place, run) in runs.iter().enumerate() {
+    for run in runs {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let a_step = |run: &Measured| milliseconds(run.time) / run.steps as f64;
         let share = |time: Duration| format!("{:.0} %", 100.0 * time.as_secs_f64() / run.time.as_secs_f64());
         let Phases { assembly, factorisation, solve, line_search } = run.report.phases;
-        let before = place.checked_sub(1).map(|before| &runs[before]).filter(|before| before.cloth == run.cloth);
+        let alike = |other: &&Measured| other.cloth == run.cloth && other.threads == run.threads;
+        let smaller = runs.iter().filter(alike).filter(|other| other.vertices < run.vertices);
+        let before = smaller.max_by_key(|other| other.vertices);
         let growth = before.map_or("–".to_owned(), |before| {
             let (times, sizes) = (a_step(run) / a_step(before), run.vertices as f64 / before.vertices as f64);
             format!("{:.2}", times.ln() / sizes.ln())
         });
+        let same = |other: &&Measured| other.cloth == run.cloth && other.vertices == run.vertices;
+        let alone = runs.iter().filter(same).find(|other| other.threads == 1 && run.threads > 1);
         table.add_row([
             run.cloth.name().to_owned(),
             run.vertices.to_string(),
+            run.threads.to_string(),
             format!("{:.2}", a_step(run)),
             format!("{:.1}", run.report.solves as f64 / run.steps as f64),
             format!("{:.1}", run.report.iterations as f64 / run.report.solves as f64),
@@ -206,6 +222,7 @@ pub fn table(runs: &[Measured]) -> Table {
             run.peak_memory.map_or("–".to_owned(), |bytes| format!("{:.0}", bytes as f64 / 1e6)),
             format!("{:.4}", run.lowest),
             growth,
+            alone.map_or("–".to_owned(), |alone| format!("× {:.2}", a_step(run) / a_step(alone))),
         ]);
     }
     for column in table.column_iter_mut().skip(1) {

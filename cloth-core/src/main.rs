@@ -117,7 +117,7 @@ enum Command {
         #[arg(long, value_parser = clap::value_parser!(u16).range(4..))]
         segments: Option<u16>,
     },
-    /// Times a square metre of cloth hung by two corners, implicit Euler by Newton's method, steps of 10 ms, on one thread.
+    /// Times a square metre of cloth hung by two corners, implicit Euler by Newton's method, steps of 10 ms.
     Bench {
         /// Vertices along each side.
         #[arg(long, value_delimiter = ',', default_values_t = [33, 65, 129], value_parser = clap::value_parser!(u16).range(2..))]
@@ -125,6 +125,9 @@ enum Command {
         /// `soft`, `cotton`; both if none is named.
         #[arg(long, value_delimiter = ',', value_parser = cloth_named)]
         cloth: Vec<Cloth>,
+        /// Numbers of threads. What is computed is the same, to the last bit.
+        #[arg(long, value_delimiter = ',', default_values_t = [1, 2], value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Vec<u16>,
         /// How long is simulated, in s. Default: 1, and 0.3 from 129 vertices a side.
         #[arg(long)]
         seconds: Option<f64>,
@@ -261,18 +264,9 @@ fn obey(command: Command) -> Result<ExitCode> {
             let cloths = if cloth.is_empty() { vec![Cloth::Soft] } else { cloth };
             cloths.into_iter().try_for_each(|cloth| compare(cloth, output.as_deref()))
         }
-        Command::Bench { sizes, cloth, seconds, .. } => {
+        Command::Bench { sizes, cloth, threads, seconds, .. } => {
             let cloths = if cloth.is_empty() { Cloth::ALL.to_vec() } else { cloth };
-            let mut runs = Vec::new();
-            for cloth in cloths {
-                for &size in &sizes {
-                    let seconds = seconds.unwrap_or(if size < 129 { 1.0 } else { 0.3 });
-                    let progress = progress_bar((seconds / 0.01).round() as u64);
-                    runs.push(bench::measure(cloth, usize::from(size) - 1, seconds, || progress.inc(1))?);
-                    progress.finish_and_clear();
-                }
-            }
-            print(&format!("{}\n", bench::table(&runs)))
+            time(&cloths, &threads, &sizes, seconds)
         }
     }
     .map(|()| ExitCode::SUCCESS)
@@ -290,6 +284,23 @@ fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
         "this build has no window; make one that has with `cargo build --release -p cloth-core --features view`, or write a picture with \
          --screenshot FILE.png"
     )
+}
+
+/// Times the benchmark's scene and prints the table.
+fn time(cloths: &[Cloth], threads: &[u16], sizes: &[u16], seconds: Option<f64>) -> Result<()> {
+    let mut runs = Vec::new();
+    for &cloth in cloths {
+        for &threads in threads {
+            for &size in sizes {
+                let seconds = seconds.unwrap_or(if size < 129 { 1.0 } else { 0.3 });
+                let progress = progress_bar((seconds / 0.01).round() as u64);
+                let (cells, threads) = (usize::from(size) - 1, usize::from(threads));
+                runs.push(bench::measure(cloth, cells, threads, seconds, || progress.inc(1))?);
+                progress.finish_and_clear();
+            }
+        }
+    }
+    print(&format!("{}\n", bench::table(&runs)))
 }
 
 /// Compares the integrators, prints the table, and writes it.

@@ -43,7 +43,7 @@ where
                 flagged: Vec::new(),
             };
             let packed = Packed::new(&elements, &stencils);
-            let batches = Batches { elements: &packed, positions: &positions, work: &mut work };
+            let batches = Batches { elements: &packed, range: 0..packed.len(), positions: &positions, work: &mut work };
             dispatch_at(level, batches).expect("the level is available");
             let flagged: Vec<usize> = work.flagged.iter().map(|(element, _)| *element).collect();
             let mut expected_flags = Vec::new();

@@ -12,7 +12,8 @@
 //! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix, and
 //! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time.
 //!
-//! Potentials are evaluated many elements at once. Everything is deterministic: sums run in the order of terms and elements.
+//! Potentials are evaluated many elements at once, and by several threads ([`System::set_threads`], [`OverRelaxation::with_threads`]). Everything is
+//! deterministic: sums run in the order of terms and elements, whatever the number of threads.
 //!
 //! ```
 //! use energy_solve::{BlockJacobi, BlockMatrix, Pattern, SolveOptions, Storage, conjugate_gradients};
@@ -38,6 +39,7 @@ mod block_jacobi;
 mod conjugate_gradients;
 mod counts;
 mod curvature;
+mod division;
 mod dofs;
 mod force_term;
 mod gauss_newton;
@@ -57,6 +59,7 @@ mod rounded_block;
 mod solve;
 mod system;
 mod term;
+mod threads;
 mod triangle_places;
 mod vector;
 
@@ -81,6 +84,6 @@ pub use preconditioner::{Preconditioner, SingularBlock};
 pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm, TermSum};
 pub use solve::{SolveOptions, SolveReport, StopReason};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
-pub use term::{Character, Linearisation, Quantity, State, Stencils, StepStart, Term, Weights};
+pub use term::{Character, Divisible, Linearisation, Quantity, Share, State, Stencils, StepStart, Term, Weights};
 pub use triangle_places::TrianglePlaces;
 pub use vector::dot;

@@ -26,11 +26,6 @@ impl BlockMatrix {
         self.values.fill([[0.0; 3]; 3]);
     }
 
-    /// Sets the blocks to others of the same pattern.
-    pub(crate) fn set(&mut self, blocks: &[Block<f64>]) {
-        self.values.copy_from_slice(blocks);
-    }
-
     /// The pattern.
     #[must_use]
     pub fn pattern(&self) -> &Arc<Pattern> {

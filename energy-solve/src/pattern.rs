@@ -96,6 +96,11 @@ impl Pattern {
         self.diagonal[row] as usize + 1..self.row_start[row + 1] as usize
     }
 
+    /// Where the blocks of a row begin, or, of the row after the last, where they all end.
+    pub(crate) fn first_in(&self, row: usize) -> usize {
+        self.row_start[row] as usize
+    }
+
     /// The columns of all blocks, by place.
     #[inline(always)]
     pub(crate) fn columns(&self) -> &[u32] {

@@ -1,8 +1,9 @@
 use std::fmt::Debug;
+use std::ops::Range;
 
 use energy_dsl::{
     Array, BLOCK, Batch, BatchWork, Block, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
-    ReducedPotential, Vector3, for_each_batch, triangle_index,
+    ReducedPotential, Vector3, for_each_batch_in, triangle_index,
 };
 
 use crate::active::{active_elements, points_of};
@@ -12,7 +13,7 @@ use crate::dofs::DofMap;
 use crate::list::ElementList;
 use crate::pattern::{Pattern, Storage, index};
 use crate::places::Places;
-use crate::term::{Character, Linearisation, Quantity, State, Stencils, Term};
+use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, Stencils, Term};
 
 /// A term with f = −∇U: never dependent on velocity, always with symmetric Jacobians.
 ///
@@ -26,7 +27,12 @@ pub struct PotentialTerm<E> {
     packed: Packed<E>,
     places: Places,
     orthonormal: Option<Orthonormal>,
+    /// The elements that each share needs, in whole packs.
+    shares: Vec<Vec<Range<usize>>>,
 }
+
+/// Elements of a part of the energy.
+const ENERGY_PART: usize = 256 * BLOCK;
 
 impl<E: PackedPotential<f64>> PotentialTerm<E> {
     /// The sum of the potentials of a list. Hessians that the declaration proves zero (gravity's) are never evaluated.
@@ -34,16 +40,110 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
     pub fn new(list: ElementList<E>) -> Self {
         let packed = Packed::from_fn(0, list.arity(), |element| &list.elements()[element], |_, _| 0);
         let orthonormal = Orthonormal::new(E::DECLARATION);
-        Self { list, active: Vec::new(), packed, places: Places::default(), orthonormal }
+        Self { list, active: Vec::new(), packed, places: Places::default(), orthonormal, shares: Vec::new() }
     }
 
     fn tally(&self, flagged: u64) -> Tally {
         let evaluated = self.active.len() as u64;
         Tally { evaluated, skipped: self.list.elements().len() as u64 - evaluated, flagged, projected: 0 }
     }
+
+    /// What a share did. The first answers for all elements.
+    fn tally_of(&self, share: &Share, flagged: u64) -> Tally {
+        if share.number == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
+    }
+
+    /// The packs of elements that have one of these vertices.
+    fn packs_at(&self, vertices: &Range<usize>) -> Vec<Range<usize>> {
+        let mut packs: Vec<Range<usize>> = Vec::new();
+        for (number, pack) in self.active.chunks(BLOCK).enumerate() {
+            if pack.iter().any(|&element| self.list.stencil(element).iter().any(|vertex| vertices.contains(vertex))) {
+                let (start, end) = (number * BLOCK, number * BLOCK + pack.len());
+                match packs.last_mut() {
+                    Some(last) if last.end == start => last.end = end,
+                    _ => packs.push(start..end),
+                }
+            }
+        }
+        packs
+    }
+
+    /// Adds f of consecutive vertices; returns how many elements, of those whose first vertex is one of them, were flagged.
+    fn forces(
+        &self,
+        packs: &[Range<usize>],
+        first_vertex: usize,
+        x: &[Vector3<f64>],
+        force: &mut [Vector3<f64>],
+    ) -> u64 {
+        let rows = vec![0.0; 3 * self.list.arity() * BLOCK];
+        let mut gradients = Gradients { force, first_vertex, rows, flagged: 0 };
+        for pack in packs {
+            for_each_batch_in(&self.packed, pack.clone(), x, &mut gradients);
+        }
+        gradients.flagged
+    }
+
+    /// Adds f and its Jacobians of consecutive vertices and blocks; returns how many elements were flagged, and projected.
+    fn linearisation(
+        &self,
+        packs: &[Range<usize>],
+        (first_vertex, first_block): (usize, usize),
+        state: State<'_>,
+        sum: &mut Linearisation<'_>,
+    ) -> (u64, u64) {
+        let n = self.list.arity();
+        let numbers = 3 * n + 9 * n * (n + 1) / 2;
+        let mut hessians = Hessians {
+            sum,
+            first_vertex,
+            first_block,
+            velocities: state.v,
+            places: &self.places,
+            orthonormal: self.orthonormal.as_ref(),
+            rows: vec![0.0; numbers * BLOCK],
+            numbers: vec![0.0; MOST_NUMBERS * BLOCK],
+            flagged: 0,
+            projected: 0,
+        };
+        for pack in packs {
+            for_each_batch_in(&self.packed, pack.clone(), state.x, &mut hessians);
+        }
+        (hessians.flagged, hessians.projected)
+    }
+
+    /// All elements.
+    fn whole(&self) -> Range<usize> {
+        0..self.active.len()
+    }
 }
 
-impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
+impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PotentialTerm<E> {
+    fn energy_parts(&self) -> usize {
+        self.active.len().div_ceil(ENERGY_PART)
+    }
+
+    fn energy_part(&self, part: usize, x: &[Vector3<f64>]) -> (f64, Tally) {
+        let mut values = Values { sums: [0.0; BLOCK], flagged: 0 };
+        let elements = part * ENERGY_PART..((part + 1) * ENERGY_PART).min(self.active.len());
+        for_each_batch_in(&self.packed, elements, x, &mut values);
+        let flagged = values.flagged;
+        let tally = if part == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } };
+        (values.sums.iter().sum(), tally)
+    }
+
+    fn add_force_of(&self, share: &Share, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        self.tally_of(share, self.forces(&self.shares[share.number], share.vertices.start, state.x, force))
+    }
+
+    fn add_linearisation_of(&self, share: &Share, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let first = (share.vertices.start, share.blocks.start);
+        let (flagged, projected) = self.linearisation(&self.shares[share.number], first, state, sum);
+        Tally { projected, ..self.tally_of(share, flagged) }
+    }
+}
+
+impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
     fn name(&self) -> &str {
         self.list.name()
     }
@@ -79,14 +179,26 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
         }
     }
 
+    fn divide(&mut self, shares: &[Share]) {
+        self.shares = shares.iter().map(|share| self.packs_at(&share.vertices)).collect();
+    }
+
+    fn divisible(&self) -> Option<&dyn Divisible> {
+        Some(self)
+    }
+
     fn has_energy(&self) -> bool {
         true
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        let mut values = Values { sums: [0.0; BLOCK], flagged: 0 };
-        for_each_batch(&self.packed, x, &mut values);
-        Some((values.sums.iter().sum(), self.tally(values.flagged)))
+        let (mut sum, mut tally) = (0.0, self.tally(0));
+        for part in 0..self.energy_parts() {
+            let (energy, of_part) = self.energy_part(part, x);
+            sum += energy;
+            tally.flagged += of_part.flagged;
+        }
+        Some((sum, tally))
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
@@ -95,27 +207,12 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
-        let mut gradients = Gradients { force, rows: vec![0.0; 3 * self.list.arity() * BLOCK], flagged: 0 };
-        for_each_batch(&self.packed, state.x, &mut gradients);
-        self.tally(gradients.flagged)
+        self.tally(self.forces(&[self.whole()], 0, state.x, force))
     }
 
     fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
-        let n = self.list.arity();
-        let numbers = 3 * n + 9 * n * (n + 1) / 2;
-        let mut hessians = Hessians {
-            sum,
-            velocities: state.v,
-            places: &self.places,
-            orthonormal: self.orthonormal.as_ref(),
-            rows: vec![0.0; numbers * BLOCK],
-            numbers: vec![0.0; MOST_NUMBERS * BLOCK],
-            flagged: 0,
-            projected: 0,
-        };
-        for_each_batch(&self.packed, state.x, &mut hessians);
-        let projected = hessians.projected;
-        Tally { projected, ..self.tally(hessians.flagged) }
+        let (flagged, projected) = self.linearisation(&[self.whole()], (0, 0), state, sum);
+        Tally { projected, ..self.tally(flagged) }
     }
 
     fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize> {
@@ -130,10 +227,20 @@ impl<E: PackedPotential<f64> + Debug> Term for PotentialTerm<E> {
     }
 }
 
-/// How many of the first lanes a mask holds in.
+/// In which of the first lanes a mask holds, as bits.
 #[inline(always)]
-fn lanes_in(mask: impl Mask, count: usize) -> u64 {
-    u64::from((mask.bits() & (u32::MAX >> (32 - count))).count_ones())
+fn lanes_in(mask: impl Mask, count: usize) -> u32 {
+    mask.bits() & (u32::MAX >> (32 - count))
+}
+
+/// How many of these lanes belong to elements whose first vertex is one of `count` from `first` on: each element counts for one share.
+#[inline(always)]
+fn count_owned(lanes: u32, vertices: &[u32], first: usize, count: usize) -> u64 {
+    if lanes == 0 {
+        return 0;
+    }
+    let owned = |lane: &usize| (vertices[*lane] as usize).wrapping_sub(first) < count;
+    (0..vertices.len()).filter(|lane| lanes >> lane & 1 == 1).filter(owned).count() as u64
 }
 
 /// Σ U, as one sum for each place in a block, so that it is the same for any number of lanes.
@@ -150,13 +257,14 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Values {
         let sum = L::F64::load_ragged(sums) + result.value;
         sum.store_ragged(sums);
         let flags = result.flags.degenerate | result.flags.kink;
-        self.flagged += lanes_in(flags, batch.count);
+        self.flagged += u64::from(lanes_in(flags, batch.count).count_ones());
     }
 }
 
-/// f ← f − ∇U.
+/// f ← f − ∇U of the vertices from the first on.
 struct Gradients<'a> {
     force: &'a mut [Vector3<f64>],
+    first_vertex: usize,
     rows: Vec<f64>,
     flagged: u64,
 }
@@ -166,35 +274,41 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let result = batch.element.gradient_at::<L>(batch.points);
         let gradient = result.gradient.as_ref();
-        scatter_vectors::<E, L>(&batch, gradient, &mut self.rows, self.force);
-        self.flagged += lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        scatter_vectors::<E, L>(&batch, gradient, &mut self.rows, self.first_vertex, self.force);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        self.flagged += count_owned(flagged, batch.vertices(0), self.first_vertex, self.force.len());
     }
 }
 
-/// Subtracts vectors of the elements' points.
+/// Subtracts vectors of the elements' points from those of the vertices from the first on.
 #[inline(always)]
 fn scatter_vectors<E: PackedPotential<f64>, L: Level>(
     batch: &Batch<'_, E, L::F64>,
     vectors: &[Vector3<L::F64>],
     rows: &mut [f64],
-    all: &mut [Vector3<f64>],
+    first_vertex: usize,
+    sums: &mut [Vector3<f64>],
 ) {
     let stride = 3 * vectors.len();
     L::F64::store_transposed(vectors.as_flattened(), batch.count, rows, stride);
     for lane in 0..batch.count {
         let row = &rows[lane * stride..][..stride];
         for point in 0..vectors.len() {
-            let vector = &mut all[batch.vertices(point)[lane] as usize];
-            for axis in 0..3 {
-                vector[axis] -= row[3 * point + axis];
+            let vertex = (batch.vertices(point)[lane] as usize).wrapping_sub(first_vertex);
+            if let Some(vector) = sums.get_mut(vertex) {
+                for axis in 0..3 {
+                    vector[axis] -= row[3 * point + axis];
+                }
             }
         }
     }
 }
 
-/// f ← f − ∇U and A ← A − α ∇²U.
+/// f ← f − ∇U and A ← A − α ∇²U of the vertices and blocks from the first on.
 struct Hessians<'a, 'b> {
     sum: &'a mut Linearisation<'b>,
+    first_vertex: usize,
+    first_block: usize,
     velocities: &'a [Vector3<f64>],
     places: &'a Places,
     orthonormal: Option<&'a Orthonormal>,
@@ -210,6 +324,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
         let exact = self.sum.curvature == Curvature::Exact;
+        let mut projected = 0;
         if let Some(orthonormal) = self.orthonormal
             && !exact
         {
@@ -217,21 +332,25 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
             let hessian = reduced.hessian.as_mut();
             let open = (!is_semi_definite(hessian, n)).bits() & (u32::MAX >> (32 - batch.count));
             if open != 0 {
-                let changed = self.change_indefinite::<E, L>(orthonormal, hessian, open, batch.points.as_ref());
-                self.projected += u64::from(changed.count_ones());
+                projected = self.change_indefinite::<E, L>(orthonormal, hessian, open, batch.points.as_ref());
             }
         }
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
         if self.orthonormal.is_none() && !exact {
-            self.projected += change_one_by_one(result.hessian.as_mut(), batch.count, self.sum.curvature);
+            projected = change_one_by_one(result.hessian.as_mut(), batch.count, self.sum.curvature);
         }
-        scatter_vectors::<E, L>(&batch, result.gradient.as_ref(), &mut self.rows, self.sum.force);
+        scatter_vectors::<E, L>(&batch, result.gradient.as_ref(), &mut self.rows, self.first_vertex, self.sum.force);
         if let Some(product) = &mut self.sum.stiffness_times_velocity {
-            subtract_product::<E, L>(&batch, result.hessian.as_ref(), self.velocities, &mut self.rows, product);
+            let first_vertex = self.first_vertex;
+            let triangle = result.hessian.as_ref();
+            subtract_product::<E, L>(&batch, triangle, self.velocities, &mut self.rows, first_vertex, product);
         }
         self.turn::<L>(batch.first, result.hessian.as_mut());
         self.scatter::<L>(batch.first, batch.count, result.hessian.as_ref());
-        self.flagged += lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        let (vertices, first, count) = (batch.vertices(0), self.first_vertex, self.sum.force.len());
+        self.flagged += count_owned(flagged, vertices, first, count);
+        self.projected += count_owned(projected, vertices, first, count);
     }
 }
 
@@ -293,11 +412,13 @@ impl Hessians<'_, '_> {
             let slots = self.places.of(first + lane);
             let blocks = self.rows[lane * stride..][..stride].as_chunks::<9>().0;
             for pair in 0..triangle.len() {
-                let block = self.sum.matrix[slots[pair] as usize].as_flattened_mut();
-                add_block::<L>(block, weight, &blocks[pair]);
+                let slot = (slots[pair] as usize).wrapping_sub(self.first_block);
+                if let Some(block) = self.sum.matrix.get_mut(slot) {
+                    add_block::<L>(block.as_flattened_mut(), weight, &blocks[pair]);
+                }
             }
             if slots.len() > triangle.len() {
-                add_mirrored(&slots[triangle.len()..], blocks, weight, self.sum.matrix);
+                add_mirrored(&slots[triangle.len()..], blocks, weight, self.first_block, self.sum.matrix);
             }
         }
     }
@@ -319,13 +440,14 @@ fn add_block<L: Level>(sum: &mut [f64], scale: f64, block: &[f64; 9]) {
 
 /// Adds the blocks below the diagonal, where other terms make the matrix one that is not symmetric.
 #[inline(never)]
-fn add_mirrored(slots: &[u32], triangle: &[[f64; 9]], weight: f64, matrix: &mut [Block<f64>]) {
+fn add_mirrored(slots: &[u32], triangle: &[[f64; 9]], weight: f64, first: usize, matrix: &mut [Block<f64>]) {
     let n = points_of_triangle(triangle.len());
     let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| triangle_index(n, i, j)));
     for (&slot, pair) in slots.iter().zip(pairs) {
+        let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) else { continue };
         for row in 0..3 {
             for column in 0..3 {
-                matrix[slot as usize][row][column] += weight * triangle[pair][3 * column + row];
+                block[row][column] += weight * triangle[pair][3 * column + row];
             }
         }
     }
@@ -353,6 +475,7 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
     triangle: &[[Vector3<L::F64>; 3]],
     velocities: &[Vector3<f64>],
     rows: &mut [f64],
+    first_vertex: usize,
     product: &mut [Vector3<f64>],
 ) {
     let n = batch.points.as_ref().len();
@@ -376,19 +499,19 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
             }
         }
     }
-    scatter_vectors::<E, L>(batch, sums, rows, product);
+    scatter_vectors::<E, L>(batch, sums, rows, first_vertex, product);
 }
 
-/// The way of elements with many coordinates. Returns how many changed.
+/// The way of elements with many coordinates. Returns as bits which changed.
 #[inline(never)]
-fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usize, curvature: Curvature) -> u64 {
+fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usize, curvature: Curvature) -> u32 {
     let points = points_of_triangle(triangle.len());
     let mut changed = 0;
     for lane in 0..count {
         let mut one: Vec<_> =
             triangle.iter().map(|block| block.map(|row| row.map(|entry| entry.extract(lane)))).collect();
         if change_dense(&mut one, points, curvature) {
-            changed += 1;
+            changed |= 1 << lane;
             for (block, new) in triangle.iter_mut().flatten().flatten().zip(one.iter().flatten().flatten()) {
                 let old = *block;
                 *block = V::from_fn(|other| if other == lane { *new } else { old.extract(other) });

@@ -4,10 +4,11 @@ use energy_dsl::{Block, Vector3};
 
 use crate::counts::Counts;
 use crate::curvature::Curvature;
+use crate::division;
 use crate::dofs::DofMap;
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage, index};
-use crate::term::{Character, Linearisation, Quantity, State, StepStart, Term, Weights};
+use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, StepStart, Term, Weights};
 
 /// Terms that do not fit the vertices.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -107,6 +108,8 @@ pub struct System {
     pattern: Arc<Pattern>,
     terms: Vec<Counted>,
     constant: Option<Constant>,
+    threads: usize,
+    shares: Vec<Share>,
 }
 
 /// α ∂f/∂x + β ∂f/∂v of the quadratic terms.
@@ -149,7 +152,30 @@ impl System {
             Counted { term, counts: Counts::default() }
         };
         let terms = terms.into_iter().map(placed).collect();
-        Ok(Self { dofs, pattern, terms, constant: None })
+        let mut system = Self { dofs, pattern, terms, constant: None, threads: 1, shares: Vec::new() };
+        system.set_threads(1);
+        Ok(system)
+    }
+
+    /// From now on sums are divided among at most so many threads, as far as that is worth it. Results are the same, to the last bit, for any number.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.threads = threads.max(1);
+        self.shares = division::shares(&self.dofs, &self.pattern, self.threads);
+        for counted in &mut self.terms {
+            counted.term.divide(&self.shares);
+        }
+    }
+
+    /// How many threads there may be.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// The terms that threads can divide, each with whether its Jacobians are wanted.
+    fn divisible(&self, wanted: impl Fn(&dyn Term) -> bool) -> Vec<Option<(&dyn Divisible, bool)>> {
+        let terms = self.terms.iter().map(|counted| &*counted.term);
+        terms.map(|term| term.divisible().map(|divisible| (divisible, wanted(term)))).collect()
     }
 
     /// Which vertices move.
@@ -193,9 +219,10 @@ impl System {
     /// When positions are missing or not finite, or an energy is not finite.
     pub fn energies(&mut self, x: &[Vector3<f64>]) -> Result<Vec<TermEnergy<'_>>, EvaluationError> {
         self.check_state("position", x)?;
+        let divided = division::energies(&self.divisible(|_| false), self.shares.len(), x);
         let mut energies = Vec::with_capacity(self.terms.len());
-        for Counted { term, counts } in &mut self.terms {
-            let energy = term.energy(x).map(|(energy, tally)| {
+        for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
+            let energy = divided.or_else(|| term.energy(x)).map(|(energy, tally)| {
                 counts.value += tally;
                 energy
             });
@@ -248,8 +275,9 @@ impl System {
     pub fn forces(&mut self, state: State<'_>) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         self.check(state)?;
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        for Counted { term, counts } in &mut self.terms {
-            counts.gradient += term.add_force(state, &mut force);
+        let divided = division::forces(&self.divisible(|_| false), &self.shares, state, &mut force);
+        for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
+            counts.gradient += divided.unwrap_or_else(|| term.add_force(state, &mut force));
         }
         if force.iter().flatten().any(|component| !component.is_finite()) {
             return Err(self.find_non_finite_force(state));
@@ -278,10 +306,10 @@ impl System {
         // For the product every term is evaluated anyway.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
         if with_constant {
-            matrix.set(self.constant_blocks(state, weights, curvature));
-        } else {
-            matrix.clear();
+            self.update_constant(state, weights, curvature);
         }
+        let constant = self.constant.as_ref().filter(|_| with_constant).map(|constant| &constant.blocks[..]);
+        let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
         let mut product = if wanted { force.clone() } else { Vec::new() };
         let mut sum = Linearisation {
             weights,
@@ -290,11 +318,12 @@ impl System {
             force: &mut force,
             stiffness_times_velocity: wanted.then_some(&mut product),
         };
-        for Counted { term, counts } in &mut self.terms {
-            if term.character().curved && !(with_constant && is_constant(&**term)) {
-                counts.hessian += term.add_linearisation(state, &mut sum);
+        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, constant, &mut sum);
+        for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
+            if linear(&**term) {
+                counts.hessian += divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
             } else {
-                counts.gradient += term.add_force(state, sum.force);
+                counts.gradient += divided.unwrap_or_else(|| term.add_force(state, sum.force));
             }
         }
         if force.iter().flatten().any(|component| !component.is_finite()) {
@@ -305,7 +334,7 @@ impl System {
 
     /// The Jacobians of the quadratic terms: evaluated once for all steps of one size, and again only if their curvature must be changed
     /// where it was not, or the other way round.
-    fn constant_blocks(&mut self, state: State<'_>, weights: Weights, curvature: Curvature) -> &[Block<f64>] {
+    fn update_constant(&mut self, state: State<'_>, weights: Weights, curvature: Curvature) {
         let known = self.constant.take();
         let serves = |it: &Constant| it.weights == weights && (!it.projected || it.curvature == curvature);
         let constant = match known {
@@ -322,7 +351,7 @@ impl System {
                 }
             }
         };
-        &self.constant.insert(constant).blocks
+        self.constant = Some(constant);
     }
 
     fn evaluate_constant(

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use energy_dsl::{Block, Declaration, Vector3};
 
 use crate::counts::Tally;
@@ -60,6 +62,30 @@ impl<'a> Stencils<'a> {
     }
 }
 
+/// What one of several threads sums up: consecutive vertices, and the blocks in their rows of the matrix.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Its number among all shares.
+    pub number: usize,
+    /// Its vertices.
+    pub vertices: Range<usize>,
+    /// Its blocks, by [`Pattern::place`].
+    pub blocks: Range<usize>,
+}
+
+/// A term that can be summed up by shares, all at the same time: elements that act across their border are evaluated for both. Every entry is a sum in
+/// the order of the elements, whatever the shares.
+pub trait Divisible: Sync {
+    /// The number of parts that its energy is the sum of, in their order. It depends on the elements alone.
+    fn energy_parts(&self) -> usize;
+    /// One part of the energy.
+    fn energy_part(&self, part: usize, x: &[Vector3<f64>]) -> (f64, Tally);
+    /// Adds f of the vertices of a share.
+    fn add_force_of(&self, share: &Share, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally;
+    /// Adds f and its Jacobians: `sum` holds vertices and blocks of a share.
+    fn add_linearisation_of(&self, share: &Share, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally;
+}
+
 /// The factors α and β of α ∂f/∂x + β ∂f/∂v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
@@ -116,6 +142,12 @@ pub trait Term: std::fmt::Debug {
     fn stencils(&self) -> Stencils<'_>;
     /// Finds out which elements have a free vertex, and where their blocks are stored.
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern);
+    /// Finds out what elements each share needs, if it can be divided. Called after [`Term::place`], and whenever the number of threads changes.
+    fn divide(&mut self, _shares: &[Share]) {}
+    /// Its shares; `None` if one thread has to do it all.
+    fn divisible(&self) -> Option<&dyn Divisible> {
+        None
+    }
     /// Called before each step: what a term holds fixed over a step (the normal force of friction, where an obstacle is) it takes from here.
     fn begin_step(&mut self, _start: StepStart<'_>) {}
     /// Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v, of a force that does not grow in proportion to velocity.

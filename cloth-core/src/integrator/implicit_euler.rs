@@ -122,7 +122,7 @@ impl Integrator for ImplicitEuler {
             _ => {
                 let matrix = body.system.matrix();
                 let symmetric = body.system.character().symmetric;
-                let solver = symmetric.then(|| LinearSolver::new(&matrix));
+                let solver = symmetric.then(|| LinearSolver::new(&matrix, body.system.threads()));
                 Memory { matrix, solver }
             }
         };

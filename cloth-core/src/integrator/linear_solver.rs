@@ -15,11 +15,11 @@ pub(super) enum LinearSolver<T> {
 }
 
 impl<T: Precision> LinearSolver<T> {
-    /// For matrices of the pattern of this one.
-    pub(super) fn new(matrix: &BlockMatrix) -> Self {
+    /// For matrices of the pattern of this one, to be solved by at most so many threads.
+    pub(super) fn new(matrix: &BlockMatrix, threads: usize) -> Self {
         let pattern = matrix.pattern();
         if pattern.fills_in() {
-            Self::Relaxed(OverRelaxation::new(pattern))
+            Self::Relaxed(OverRelaxation::with_threads(pattern, threads))
         } else {
             Self::Factored(Box::new(IncompleteCholesky::new(pattern)))
         }

@@ -193,7 +193,7 @@ impl Step<'_> {
         }
         if curvature != Curvature::Exact && !solved.converged() {
             // Single precision made the stiffest of matrices indefinite.
-            let mut exact = OverRelaxation::<f64>::new(matrix.pattern());
+            let mut exact = OverRelaxation::<f64>::with_threads(matrix.pattern(), self.body.system.threads());
             exact.scale(matrix)?;
             solved = exact.solve(down, &mut direction, options);
         }
@@ -262,7 +262,7 @@ impl Integrator for Newton {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
             _ => {
                 let matrix = body.system.matrix();
-                let solver = LinearSolver::new(&matrix);
+                let solver = LinearSolver::new(&matrix, body.system.threads());
                 Memory { matrix, solver }
             }
         };

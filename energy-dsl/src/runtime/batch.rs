@@ -4,6 +4,7 @@
 //! element, so that they compute, and flag, nothing that it does not, and their results are not written.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use super::array::Array;
 use super::cpu::{Kernel, Lane, Level, dispatch};
@@ -186,7 +187,20 @@ pub fn for_each_batch<E: PackedPotential<f64>>(
     positions: &[Vector3<f64>],
     work: &mut impl BatchWork<E>,
 ) {
-    dispatch(Batches { elements, positions, work });
+    for_each_batch_in(elements, 0..elements.len(), positions, work);
+}
+
+/// Does work with the elements of a range, which begins at a multiple of [`BLOCK`].
+///
+/// # Panics
+/// When a stencil has a point that is not among `positions`, or the range begins elsewhere, or ends after the last element.
+pub fn for_each_batch_in<E: PackedPotential<f64>>(
+    elements: &Packed<E>,
+    range: Range<usize>,
+    positions: &[Vector3<f64>],
+    work: &mut impl BatchWork<E>,
+) {
+    dispatch(Batches { elements, range, positions, work });
 }
 
 /// The kernel of [`for_each_batch`], for those who run it at a level of their choice.
@@ -194,6 +208,8 @@ pub fn for_each_batch<E: PackedPotential<f64>>(
 pub struct Batches<'a, E, W> {
     /// The elements on their stencils.
     pub elements: &'a Packed<E>,
+    /// Which of them, from a multiple of [`BLOCK`] on.
+    pub range: Range<usize>,
     /// All points.
     pub positions: &'a [Vector3<f64>],
     /// What is done.
@@ -205,20 +221,21 @@ impl<E: PackedPotential<f64>, W: BatchWork<E>> Kernel for Batches<'_, E, W> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { elements: packed, positions, work } = self;
+        let Self { elements: packed, range, positions, work } = self;
         let n = <E::Points as Array<Vector3<f64>>>::LEN;
         assert_eq!(packed.points, n, "a stencil has as many points as the element");
         assert!(packed.reach <= positions.len(), "point {} of {}", packed.reach, positions.len());
+        assert!(range.start % BLOCK == 0 && range.end <= packed.elements, "{range:?} of {} elements", packed.elements);
         let lanes = <L::F64 as Lane<f64>>::LANES;
-        let mut first = 0;
-        while first < packed.elements {
+        let mut first = range.start;
+        while first < range.end {
             let (block, offset) = (first / BLOCK, first % BLOCK);
             let element = E::load::<L::F64>(packed.numbers_from(block, offset), BLOCK);
             let mut points = <WidePoints<E, L::F64> as Array<Vector3<L::F64>>>::repeat([L::F64::splat(0.0); 3]);
             for (point, wide) in points.as_mut().iter_mut().enumerate() {
                 *wide = L::F64::gather(positions, &packed.stencils[(block * n + point) * BLOCK + offset..][..lanes]);
             }
-            let count = lanes.min(packed.elements - first);
+            let count = lanes.min(range.end - first);
             let stencils = &packed.stencils[block * n * BLOCK + offset..];
             work.batch::<L>(Batch { first, count, element: &element, points: &points, stencils });
             first += lanes;

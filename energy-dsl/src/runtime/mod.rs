@@ -18,7 +18,7 @@ mod unbounded;
 pub use array::Array;
 pub use batch::{
     BLOCK, Batch, BatchWork, Batches, Hessians, Packed, PackedForce, PackedPotential, PackedResidual, Stored,
-    WidePoints, for_each_batch,
+    WidePoints, for_each_batch, for_each_batch_in,
 };
 #[doc(hidden)]
 pub use call::{

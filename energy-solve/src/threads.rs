@@ -1,0 +1,62 @@
+//! Work divided among threads. What is done does not depend on how many there are; only who does it.
+
+use std::panic::resume_unwind;
+
+/// Does `work` with every item, on at most so many threads, this one among them. The results are in the order of the items.
+pub(crate) fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
+    let each = |items: Vec<I>| items.into_iter().map(&work).collect::<Vec<R>>();
+    in_parts(threads, items, each).into_iter().flatten().collect()
+}
+
+/// Divides the items among at most so many threads, each of which does `work` with its part, all at the same time.
+pub(crate) fn in_parts<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(Vec<I>) -> R + Sync) -> Vec<R> {
+    let mut parts = divided(items, threads).into_iter();
+    let Some(own) = parts.next() else { return Vec::new() };
+    std::thread::scope(|scope| {
+        let work = &work;
+        let others: Vec<_> = parts.map(|part| scope.spawn(move || work(part))).collect();
+        let mut results = vec![work(own)];
+        results.extend(others.into_iter().map(|other| other.join().unwrap_or_else(|panic| resume_unwind(panic))));
+        results
+    })
+}
+
+/// At most so many runs of about the same length, none of them empty.
+fn divided<I>(items: Vec<I>, parts: usize) -> Vec<Vec<I>> {
+    let (count, parts) = (items.len(), parts.clamp(1, items.len().max(1)));
+    let mut items = items.into_iter();
+    let run = |part: usize| items.by_ref().take((part + 1) * count / parts - part * count / parts).collect::<Vec<I>>();
+    (0..parts).map(run).filter(|run| !run.is_empty()).collect()
+}
+
+/// Consecutive parts of a slice with these lengths.
+pub(crate) fn split_mut<T>(mut slice: &mut [T], lengths: impl IntoIterator<Item = usize>) -> Vec<&mut [T]> {
+    let mut parts = Vec::new();
+    for length in lengths {
+        let (part, rest) = slice.split_at_mut(length);
+        parts.push(part);
+        slice = rest;
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_the_order_of_the_items() {
+        for threads in [1, 2, 3, 8] {
+            for count in [0, 1, 2, 7, 20] {
+                let results = for_each(threads, (0..count).collect(), |item: usize| item * item);
+                assert_eq!(results, (0..count).map(|item| item * item).collect::<Vec<_>>(), "{threads} threads");
+            }
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "item 5")]
+    fn a_panic_is_passed_on() {
+        for_each(3, (0..9).collect(), |item: usize| assert!(item != 5, "item {item}"));
+    }
+}
