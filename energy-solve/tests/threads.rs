@@ -8,7 +8,7 @@ use energy_solve::{
 };
 
 /// Cells along each side: enough vertices for three threads.
-const CELLS: usize = 90;
+const CELLS: usize = 140;
 
 fn vertex(i: usize, j: usize) -> usize {
     j * (CELLS + 1) + i

@@ -293,7 +293,7 @@ impl Garment {
         element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
     ) -> Result<(), FabricError>
     where
-        E: PackedPotential<f64> + std::fmt::Debug + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
     {
         if self.leave_out(name, is_zero, cloth.triangles.len()) {
             return Ok(());
@@ -310,7 +310,7 @@ impl Garment {
         element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
     ) -> Result<(f64, f64), FabricError>
     where
-        E: PackedPotential<f64> + std::fmt::Debug + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
     {
         self.add_membrane("membrane", mu == 0.0, cloth, |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
         Ok((lambda, mu))
@@ -429,7 +429,7 @@ impl Garment {
         elements: Vec<E>,
     ) -> Result<(), FabricError>
     where
-        E: PackedPotential<f64> + std::fmt::Debug + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
     {
         self.terms.push(Box::new(PotentialTerm::new(self.list(name, elements, stencils)?)));
         Ok(())

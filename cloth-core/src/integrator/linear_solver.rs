@@ -6,7 +6,7 @@ use energy_solve::{
 
 /// What solves the symmetric systems of an integrator, chosen once for a pattern.
 #[derive(Clone, Debug)]
-pub(super) enum LinearSolver<T> {
+pub(super) enum LinearSolver<T: Precision> {
     /// Sheets: nothing to factor, little to read.
     Relaxed(OverRelaxation<T>),
     /// Strands of hair, and whatever else is eliminated vertex by vertex without new couplings: there the incomplete factorisation is

@@ -24,7 +24,7 @@ impl Precision for f64 {}
 const RELAXATION: f64 = 1.6;
 
 /// Rows of a domain, about. A domain is what one thread at least relaxes on its own, so more of them cost iterations.
-const DOMAIN: usize = 4096;
+const DOMAIN: usize = 8192;
 
 /// Conjugate gradients with the preconditioner of symmetric successive over-relaxation, at the price of conjugate gradients without:
 /// Eisenstat's method (SIAM J. Sci. Stat. Comput. 2, 1981).
