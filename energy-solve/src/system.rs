@@ -294,7 +294,9 @@ impl System {
             if term.character().curved && !(with_constant && is_constant(&**term)) {
                 counts.hessian += term.add_linearisation(state, &mut sum);
             } else {
-                counts.gradient += term.add_force(state, sum.force);
+                let tally = term.add_force(state, sum.force);
+                counts.reused += if term.character().curved { tally.evaluated } else { 0 };
+                counts.gradient += tally;
             }
         }
         if force.iter().flatten().any(|component| !component.is_finite()) {

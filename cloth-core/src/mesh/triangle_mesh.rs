@@ -88,6 +88,11 @@ impl TriangleMesh {
         Ok(Self { vertices, triangles })
     }
 
+    /// What was found valid before.
+    pub(super) fn of_valid(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Self {
+        Self { vertices, triangles }
+    }
+
     /// The same, this many times as large.
     ///
     /// # Errors
