@@ -174,7 +174,8 @@ fn mostly_pinned(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
 /// # Errors
 /// When a scene cannot be simulated, or does not fall asleep.
 pub fn measure(sizes: &Sizes, mut tell: impl FnMut(&Ratio)) -> Result<Vec<Ratio>, SleepBenchError> {
-    let all: [fn(&Sizes) -> Result<Ratio, SleepBenchError>; 3] = [settled, one_of_many, mostly_pinned];
+    type Ask = fn(&Sizes) -> Result<Ratio, SleepBenchError>;
+    let all: [Ask; 3] = [settled, one_of_many, mostly_pinned];
     let told = all.into_iter().map(|ask| ask(sizes).inspect(&mut tell));
     told.collect()
 }

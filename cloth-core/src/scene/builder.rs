@@ -94,7 +94,7 @@ impl<'a> Builder<'a> {
         model.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
         model.x.extend(start);
         model.v.extend(velocities);
-        self.edge.extend(Topology::of(&mesh).boundary(&mesh).iter().map(|vertex| first + vertex));
+        self.edge.extend(Topology::boundary(&mesh).iter().map(|vertex| first + vertex));
         self.springs.push(springs);
         self.add_part(part, mesh.vertices().len(), PartKind::Cloth(mesh));
         Ok(())
