@@ -1,4 +1,5 @@
-use energy_dsl::Vector3;
+use energy_dsl::{Element, Vector3};
+use energy_elements::WindDrag;
 use energy_solve::{State, StepStart, SystemError};
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +44,9 @@ impl Island {
         let (x, v, system) = (of(&model.x), of(&model.v), energy_solve::System::new(terms, &pinned)?);
         let body = Body { x, v, masses, system };
         let stillness = scene.sleep.map(|sleep| Stillness::of(&sleep, &body.x));
-        let in_gusts = scene.wind.as_ref().is_some_and(|wind| !wind.gusts.is_empty());
+        let blown =
+            body.system.terms().any(|(term, _)| term.declaration().name == <WindDrag as Element>::DECLARATION.name);
+        let in_gusts = blown && scene.wind.as_ref().is_some_and(|wind| !wind.gusts.is_empty());
         let (integrator, rest) = (scene.stepper(), Rest::AWAKE);
         let (moving, motions) = (Vec::new(), Vec::new());
         Ok(Self { vertices, labels, body, integrator, moving, motions, in_gusts, stillness, rest })
@@ -132,8 +135,8 @@ impl Island {
 
     /// The power of obstacles that move, at the start of a step or at its end, in W.
     fn lifting(&self, moment: &Moment<'_>, at_end: bool) -> f64 {
-        let (Body { masses, x, .. }, span) = (&self.body, [moment.time, moment.time + moment.dt]);
-        moment.obstacles.iter().map(|obstacle: &Obstacle| obstacle.power(span, at_end, masses, x)).sum()
+        let span = [moment.time, moment.time + moment.dt];
+        moment.obstacles.iter().map(|obstacle: &Obstacle| obstacle.power(span, at_end, &self.body)).sum()
     }
 
     /// Tells its terms where a step starts.
