@@ -197,9 +197,10 @@ fn what_sleeps_sleeps_on_after_an_interruption() {
         let mut resumed = disturbed();
         resumed.restore(serde_json::from_slice(&saved).unwrap()).unwrap();
         for now in interrupted..until {
-            [&mut whole, &mut resumed].map(|simulation| simulation.step().unwrap());
-            assert_eq!(whole.positions(), resumed.positions(), "step {now}");
-            assert_eq!(whole.velocities(), resumed.velocities(), "step {now}");
+            step(&mut whole, 1);
+            step(&mut resumed, 1);
+            assert!(whole.positions() == resumed.positions(), "positions differ after step {now}");
+            assert!(whole.velocities() == resumed.velocities(), "velocities differ after step {now}");
             assert_eq!(awake(&whole), awake(&resumed), "step {now}");
         }
         assert_eq!(whole.ledger(), resumed.ledger());
