@@ -108,7 +108,7 @@ fn conserving(swing: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result
         let tenth = |number: usize| mean(&all[number * steps / 10..(number + 1) * steps / 10]);
         tell(Finding::absolute("long run", case("largest error"), largest, 0.0, limit));
         tell(Finding::absolute("long run", case("drift"), tenth(9) - tenth(0), 0.0, 0.005));
-        tell(Finding::absolute("long run", case("drift, second half"), tenth(9) - tenth(5), 0.0, 0.002));
+        tell(Finding::absolute("long run", case("drift, second half"), tenth(9) - tenth(5), 0.0, 0.1 * limit));
     }
     Ok(())
 }
