@@ -7,11 +7,12 @@ use energy_dsl::Vector3;
 use energy_solve::{Counts, EvaluationError, Tally};
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::{IntegratorMemory, Phases};
+use crate::integrator::Phases;
+use crate::island::SavedIsland;
 use crate::ledger::Ledger;
 
 /// The version of checkpoints that this program writes and reads.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// How a checkpoint starts; then follow its version, the length and the CRC-32 of the rest.
 const KEYWORD: &str = "cloth-checkpoint";
 
@@ -26,8 +27,8 @@ pub struct SavedState {
     pub x: Vec<Vector3<f64>>,
     /// Velocities, in m/s.
     pub v: Vec<Vector3<f64>>,
-    /// What the integrator remembers of earlier steps.
-    pub integrator: IntegratorMemory,
+    /// What integrators remember of earlier steps, and what sleeps.
+    pub islands: Vec<SavedIsland>,
     /// The ledger, if one is kept.
     pub ledger: Option<Ledger>,
     /// Linear systems solved.
@@ -38,15 +39,19 @@ pub struct SavedState {
     pub projected: u64,
     /// Steps rejected and tried again with a smaller size.
     pub rejected: u64,
+    /// Steps slept through, of all islands.
+    pub slept: u64,
     /// Time spent in steps.
     pub stepping_time: Duration,
     /// The same by phase.
     pub phases: Phases,
     /// What each term evaluated.
     pub counts: Vec<SavedCounts>,
+    /// What each term could use again; see [`Counts::reused`].
+    pub reused: Vec<u64>,
 }
 
-/// What a term evaluated: for value, first and second derivatives the numbers evaluated, skipped, flagged and projected.
+/// What a term evaluated, without what it used again: for value, first and second derivatives the numbers evaluated, skipped, flagged and projected.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedCounts([[u64; 4]; 3]);
 
@@ -62,7 +67,7 @@ impl From<SavedCounts> for Counts {
         let tally =
             |[evaluated, skipped, flagged, projected]: [u64; 4]| Tally { evaluated, skipped, flagged, projected };
         let [value, gradient, hessian] = rows.map(tally);
-        Self { value, gradient, hessian }
+        Self { value, gradient, hessian, reused: 0 }
     }
 }
 
@@ -130,6 +135,14 @@ pub enum CheckpointError {
         /// Its version.
         version: u32,
     },
+    /// It was written by an older program.
+    #[error("the checkpoint {} has version {version}, but this program reads version {VERSION}; start the run again", .path.display())]
+    Older {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: u32,
+    },
     /// It does not fit the scene.
     #[error(
         "the checkpoint is of another scene: its {found} vertices are not the {expected} that the scene has now. Did a mesh or material file change?"
@@ -163,7 +176,7 @@ impl Checkpoint {
     /// Reads a checkpoint.
     ///
     /// # Errors
-    /// When it cannot be read, is damaged, or is newer than this program.
+    /// When it cannot be read, is damaged, or was written by another version of this program.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         let file =
             std::fs::read(path).map_err(|source| CheckpointError::Unreadable { path: path.to_owned(), source })?;
@@ -173,7 +186,7 @@ impl Checkpoint {
     /// Reads a checkpoint from the contents of a file; the path is for messages.
     ///
     /// # Errors
-    /// When it is damaged, or newer than this program.
+    /// When it is damaged, or was written by another version of this program.
     pub fn from_bytes(file: &[u8], path: &Path) -> Result<Self, CheckpointError> {
         let path = path.to_owned();
         let end = file.iter().position(|&byte| byte == b'\n').unwrap_or(file.len());
@@ -187,6 +200,9 @@ impl Checkpoint {
             words.next().and_then(|word| word.parse().ok()).ok_or_else(|| damaged("its first line is broken"))?;
         if version > VERSION {
             return Err(CheckpointError::Newer { path, version });
+        }
+        if version < VERSION {
+            return Err(CheckpointError::Older { path, version });
         }
         let (length, checksum) = (words.next(), words.next());
         let body = file.get(end + 1..).unwrap_or_default();

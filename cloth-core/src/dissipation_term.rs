@@ -9,8 +9,8 @@ use energy_solve::{
 pub(crate) trait DissipationLaw: std::fmt::Debug {
     /// Rayleigh's dissipation function, convex, declared as an energy of the displacements in a unit of time.
     type Element: Potential<f64> + std::fmt::Debug;
-    /// The elements that act, each with the number of its stencil, ascending.
-    fn elements(&self, start: &StepStart<'_>) -> Vec<(usize, Self::Element)>;
+    /// The elements that act on a stencil with a free vertex, each with the number of its stencil, ascending.
+    fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, Self::Element)>;
 }
 
 /// The force −∂R/∂v of dissipation functions R.
@@ -72,8 +72,7 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
     }
 
     fn begin_step(&mut self, start: StepStart<'_>) {
-        self.acting = self.law.elements(&start);
-        self.acting.retain(|(number, _)| self.is_free[*number]);
+        self.acting = self.law.elements(&start, &self.is_free);
     }
 
     fn dissipation(&self, State { v, .. }: State<'_>) -> Option<(f64, Tally)> {

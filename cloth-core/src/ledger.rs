@@ -3,28 +3,32 @@
 use std::fmt::Write as _;
 
 use energy_dsl::Vector3;
-use energy_solve::{EvaluationError, State, Term};
+use energy_solve::{EvaluationError, Term};
 use plotters::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::body::Body;
+use crate::account::{Account, works};
+use crate::island::Island;
+use crate::scene::TermLabel;
 
 /// Energies, work and momenta at the start and after each step.
 ///
 /// Energy is what free vertices have in their motion, and what the terms have as potential. What enters or leaves is the work of everything else:
-/// of each force that is no gradient (drag, damping, friction, wind), of pins that move, and of obstacles that move. Work is the integral of power by
-/// the trapezoidal rule over each step. What is left, [`Entry::unaccounted`], is the error of the integrator.
+/// of each force that is no gradient (drag, damping, friction, wind), of pins that move, and of obstacles that move; and what little motion is left where
+/// something falls asleep. Work is the integral of power by the trapezoidal rule over each step. What is left, [`Entry::unaccounted`], is the error of the integrator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     potentials: Vec<String>,
     works: Vec<String>,
     entries: Vec<Entry>,
-    #[serde(skip)]
-    open: Open,
+    /// Of each island.
+    accounts: Vec<Account>,
+    /// Of islands in the step that is under way.
+    changed: Vec<(usize, Account)>,
 }
 
 /// One line of the ledger.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// When, in s.
     pub time: f64,
@@ -38,23 +42,28 @@ pub struct Entry {
     pub pins: f64,
     /// Done so far by obstacles that move, in J.
     pub obstacles: f64,
+    /// Taken so far by falling asleep, in J; negative.
+    pub sleep: f64,
     /// Σ m v, in kg m/s.
     pub momentum: Vector3<f64>,
     /// Σ m x × v about the origin, in kg m²/s.
     pub angular_momentum: Vector3<f64>,
 }
 
-/// A step that has begun.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Open {
-    powers: Vec<f64>,
-    /// Forces of potentials on pinned vertices that move, and where they were.
-    pins: Vec<(usize, Vector3<f64>, Vector3<f64>)>,
-    /// Of obstacles that move, in W.
-    obstacles: f64,
-}
-
 impl Entry {
+    fn add(&mut self, account: &Account) {
+        self.kinetic += account.kinetic;
+        account.potential.iter().for_each(|&(column, energy)| self.potential[column] += energy);
+        account.work.iter().for_each(|&(column, work)| self.work[column] += work);
+        self.pins += account.pins;
+        self.obstacles += account.obstacles;
+        self.sleep += account.sleep;
+        for axis in 0..3 {
+            self.momentum[axis] += account.momentum[axis];
+            self.angular_momentum[axis] += account.angular_momentum[axis];
+        }
+    }
+
     /// Kinetic and potential energy, in J.
     #[must_use]
     pub fn energy(&self) -> f64 {
@@ -64,7 +73,7 @@ impl Entry {
     /// All work so far, in J.
     #[must_use]
     pub fn total_work(&self) -> f64 {
-        self.work.iter().sum::<f64>() + self.pins + self.obstacles
+        self.work.iter().sum::<f64>() + self.pins + self.obstacles + self.sleep
     }
 
     /// The energy since the first entry that no work accounts for, in J.
@@ -78,20 +87,34 @@ impl Ledger {
     /// The part of the largest energy exchanged that may be unaccounted for before there is a warning.
     pub const TOLERANCE: f64 = 0.02;
 
-    /// A ledger whose first entry is the body as it is.
+    /// A ledger whose first entry is the islands as they are; `labels` are the names of their terms.
     ///
     /// # Errors
     /// When an energy is not finite.
-    pub fn new(body: &Body, time: f64) -> Result<Self, EvaluationError> {
-        let names = |keep: fn(&dyn Term) -> bool| -> Vec<String> {
-            let kept = body.system.terms().filter(|(term, _)| keep(*term));
-            kept.map(|(term, _)| term.name().to_owned()).collect()
+    pub(crate) fn new(islands: &[Island], labels: &[TermLabel], time: f64) -> Result<Self, EvaluationError> {
+        // The columns of labels.
+        let columns = |keep: fn(&dyn Term) -> bool| -> Vec<Option<usize>> {
+            let mut kept = vec![false; labels.len()];
+            for island in islands {
+                let terms = island.body().system.terms().zip(island.labels());
+                terms.for_each(|((term, _), &label)| kept[label] |= keep(term));
+            }
+            let mut count = 0..;
+            kept.into_iter().map(|kept| if kept { count.next() } else { None }).collect()
         };
-        let (potentials, works) = (names(|term| term.has_energy()), names(works));
-        let nothing = vec![0.0; works.len()];
-        let mut ledger = Self { potentials, works, entries: Vec::new(), open: Open::default() };
-        let first = Entry { work: nothing, ..ledger.entry(body, time)? };
-        ledger.entries.push(first);
+        let columns = [columns(|term| term.has_energy()), columns(works)];
+        let [potentials, works] = columns.each_ref().map(|columns| {
+            let named = labels.iter().zip(columns).filter(|(_, column)| column.is_some());
+            named.map(|(label, _)| label.name.clone()).collect()
+        });
+        let account = |island: &Island| {
+            let [potentials, works] =
+                columns.each_ref().map(|columns| island.labels().iter().filter_map(|&label| columns[label]).collect());
+            Account::open(island.body(), potentials, works)
+        };
+        let accounts = islands.iter().map(account).collect::<Result<_, _>>()?;
+        let mut ledger = Self { potentials, works, entries: Vec::new(), accounts, changed: Vec::new() };
+        ledger.enter(time);
         Ok(ledger)
     }
 
@@ -113,41 +136,36 @@ impl Ledger {
         &self.works
     }
 
-    /// Potentials, kinetic energy and momenta now; the work so far is that of the last entry.
-    fn entry(&self, body: &Body, time: f64) -> Result<Entry, EvaluationError> {
-        let potential = potentials(body)?;
-        let last = self.entries.last();
-        Ok(Entry {
-            time,
-            kinetic: body.kinetic_energy(),
-            potential,
-            work: last.map_or_else(Vec::new, |last| last.work.clone()),
-            pins: last.map_or(0.0, |last| last.pins),
-            obstacles: last.map_or(0.0, |last| last.obstacles),
-            momentum: body.momentum(),
-            angular_momentum: body.angular_momentum(),
-        })
+    /// What an island has and received before the step that is under way.
+    pub(crate) fn account(&self, island: usize) -> &Account {
+        &self.accounts[island]
     }
 
-    /// Called once all terms know that the step begins; `obstacles` is the power of those that move, in W.
-    pub(crate) fn begin(&mut self, body: &Body, obstacles: f64) {
-        let pins = pulls(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
-        self.open = Open { powers: powers(body), pins, obstacles };
+    /// What an island has and received after it.
+    pub(crate) fn note(&mut self, island: usize, account: Account) {
+        self.changed.push((island, account));
     }
 
-    /// Enters the step.
-    pub(crate) fn end(&mut self, body: &Body, obstacles: f64, time: f64, dt: f64) -> Result<(), EvaluationError> {
-        let mut entry = self.entry(body, time)?;
-        for ((work, before), after) in entry.work.iter_mut().zip(&self.open.powers).zip(powers(body)) {
-            *work += 0.5 * dt * (before + after);
+    /// An island whose step was noted falls asleep.
+    pub(crate) fn note_sleep(&mut self, island: usize) {
+        let last = self.changed.iter_mut().rfind(|(number, _)| *number == island);
+        last.into_iter().for_each(|(_, account)| *account = std::mem::take(account).asleep());
+    }
+
+    /// The step is done: enters it.
+    pub(crate) fn enter(&mut self, time: f64) {
+        for (island, account) in self.changed.drain(..) {
+            self.accounts[island] = account;
         }
-        for ((vertex, before, from), (_, after)) in self.open.pins.iter().zip(pulls(body)) {
-            let part = |axis: usize| 0.5 * (before[axis] + after[axis]) * (body.x[*vertex][axis] - from[axis]);
-            entry.pins -= (0..3).map(part).sum::<f64>();
-        }
-        entry.obstacles += 0.5 * dt * (self.open.obstacles + obstacles);
+        let (potential, work) = (vec![0.0; self.potentials.len()], vec![0.0; self.works.len()]);
+        let mut entry = Entry { time, potential, work, ..Entry::default() };
+        self.accounts.iter().for_each(|account| entry.add(account));
         self.entries.push(entry);
-        Ok(())
+    }
+
+    /// The step failed: as if it had not begun.
+    pub(crate) fn forget(&mut self) {
+        self.changed.clear();
     }
 
     /// The largest energy that was exchanged, in J: the most that kinetic energy, potentials and work changed since the start, added up without signs.
@@ -157,7 +175,8 @@ impl Ledger {
         let changes = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(a, b)| (a - b).abs()).sum::<f64>();
         let size = |entry: &Entry| {
             let moved = (entry.kinetic - first.kinetic).abs() + first.kinetic;
-            let driven = (entry.pins - first.pins).abs() + (entry.obstacles - first.obstacles).abs();
+            let driven =
+                (entry.pins - first.pins).abs() + (entry.obstacles - first.obstacles).abs() + entry.sleep.abs();
             moved + driven + changes(&entry.potential, &first.potential) + changes(&entry.work, &first.work)
         };
         self.entries.iter().map(size).fold(0.0, f64::max)
@@ -194,11 +213,11 @@ impl Ledger {
         let quoted = |name: &str| name.replace(['"', ',', '\n'], " ");
         self.potentials.iter().for_each(|name| line(format_args!(",potential {} [J]", quoted(name))));
         self.works.iter().for_each(|name| line(format_args!(",work {} [J]", quoted(name))));
-        line(format_args!(",work pins [J],work obstacles [J],energy [J],unaccounted [J]"));
+        line(format_args!(",work pins [J],work obstacles [J],work sleep [J],energy [J],unaccounted [J]"));
         line(format_args!(",Px [kg m/s],Py [kg m/s],Pz [kg m/s],Lx [kg m^2/s],Ly [kg m^2/s],Lz [kg m^2/s]\n"));
         for entry in &self.entries {
             let numbers = [entry.time, entry.kinetic].into_iter().chain(entry.potential.iter().copied());
-            let numbers = numbers.chain(entry.work.iter().copied()).chain([entry.pins, entry.obstacles]);
+            let numbers = numbers.chain(entry.work.iter().copied()).chain([entry.pins, entry.obstacles, entry.sleep]);
             let numbers = numbers.chain([entry.energy(), entry.unaccounted(&self.entries[0])]);
             let numbers = numbers.chain(entry.momentum).chain(entry.angular_momentum);
             let row: Vec<String> = numbers.map(|number| format!("{number:e}")).collect();
@@ -229,6 +248,7 @@ impl Ledger {
         }
         add("work of pins", &|entry| entry.pins - first.pins);
         add("work of obstacles", &|entry| entry.obstacles - first.obstacles);
+        add("sleep", &|entry| entry.sleep - first.sleep);
         add("unaccounted", &|entry| entry.unaccounted(first));
         let times: Vec<f64> = self.entries.iter().map(|entry| entry.time).collect();
         plot(&times, &curves).map_err(|error| error.to_string())
@@ -272,56 +292,4 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
         area.present()?;
     }
     Ok(text)
-}
-
-/// Whether a term does work that is no change of its potential.
-fn works(term: &dyn Term) -> bool {
-    !term.has_energy() || term.character().velocity_dependent
-}
-
-/// The energy of each term that has one.
-fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
-    let energy = |term: &dyn Term| term.energy(&body.x).map(|(energy, _)| energy);
-    let all: Vec<f64> = body.system.terms().filter_map(|(term, _)| energy(term)).collect();
-    match all.iter().all(|energy| energy.is_finite()) {
-        true => Ok(all),
-        false => Err(EvaluationError::NonFiniteSum { what: energy_solve::Quantity::Energy }),
-    }
-}
-
-/// The power of each force that is no gradient on the free vertices, in W.
-fn powers(body: &Body) -> Vec<f64> {
-    let still = vec![[0.0; 3]; body.v.len()];
-    let power = |term: &dyn Term| {
-        let mut force = still.clone();
-        term.add_force(body.state(), &mut force);
-        let mut power = dot_of_free(body, &force);
-        if term.has_energy() {
-            force.clone_from(&still);
-            term.add_force(State { x: &body.x, v: &still }, &mut force);
-            power -= dot_of_free(body, &force);
-        }
-        power
-    };
-    body.system.terms().filter(|(term, _)| works(*term)).map(|(term, _)| power(term)).collect()
-}
-
-fn dot_of_free(body: &Body, force: &[Vector3<f64>]) -> f64 {
-    let one = |&vertex: &usize| crate::mesh::dot(force[vertex], body.v[vertex]);
-    body.system.dofs().free().iter().map(one).sum()
-}
-
-/// The forces of potentials on pinned vertices that move, in N.
-fn pulls(body: &Body) -> Vec<(usize, Vector3<f64>)> {
-    let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
-    let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
-    if moving.is_empty() {
-        return Vec::new();
-    }
-    let still = vec![[0.0; 3]; body.v.len()];
-    let mut force = still.clone();
-    for (term, _) in body.system.terms().filter(|(term, _)| term.has_energy()) {
-        term.add_force(State { x: &body.x, v: &still }, &mut force);
-    }
-    moving.into_iter().map(|vertex| (vertex, force[vertex])).collect()
 }

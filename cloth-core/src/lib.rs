@@ -27,21 +27,25 @@
 //! while !simulation.is_finished() {
 //!     simulation.step()?;
 //! }
-//! assert!(simulation.body().x[0][2] < -0.001, "the free corner falls");
+//! assert!(simulation.positions()[0][2] < -0.001, "the free corner falls");
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 
 #![forbid(unsafe_code)]
 
+mod account;
 mod body;
 #[cfg(doctest)]
 mod book;
 mod dissipation_term;
 mod frame_store;
+mod island;
 mod simulation;
+mod sleep;
 mod summary;
 
 pub mod bench;
+pub mod bench_sleep;
 pub mod checkpoint;
 pub mod contact;
 pub mod demo;
@@ -57,11 +61,13 @@ pub mod record;
 pub mod report;
 pub mod run;
 pub mod scene;
+pub mod stats;
 pub mod trajectory_error;
 pub mod validate;
 pub mod view;
 pub mod wind;
 
 pub use body::Body;
+pub use island::{Island, SavedIsland};
 pub use simulation::{Simulation, SimulationError};
 pub use summary::Summary;

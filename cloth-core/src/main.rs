@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use cloth_core::bench::{self, Cloth};
+use cloth_core::bench_sleep::{self, Sizes};
 use cloth_core::fabric::MEASURED;
 use cloth_core::output::OutputFolder;
 use cloth_core::progress::Progress;
@@ -17,7 +18,7 @@ use cloth_core::run::{Ending, Run, RunError};
 use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, Finding, LateralBuckling, MeshKind, ValidateError};
 use cloth_core::view::{self, Colouring, Moment, Screenshot};
-use cloth_core::{Simulation, demo, materials, report, scene, trajectory_error};
+use cloth_core::{Simulation, demo, materials, report, scene, stats, trajectory_error};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Cloth simulated with audited derivatives.
@@ -55,11 +56,17 @@ enum Command {
         /// Their parameters, as in `k=20,nu=0.3`, in the units of the declaration.
         #[arg(long, requires = "material", value_delimiter = ',', value_parser = parameter)]
         parameters: Vec<(String, f64)>,
+        /// Prints at the end what each term evaluated, skipped and used again, what slept, and the time of each phase.
+        #[arg(long)]
+        stats: bool,
     },
     /// Goes on with a run that was interrupted, from its last checkpoint: the result is the same bit by bit.
     Resume {
         /// The folder of the run.
         folder: PathBuf,
+        /// Prints what `cloth run --stats` prints.
+        #[arg(long)]
+        stats: bool,
     },
     /// Makes one page, report.html, of a finished run: pictures, energies, times, what was evaluated, and the audit of its elements.
     Report {
@@ -92,7 +99,7 @@ enum Command {
     Materials,
     /// Compares with known answers: what theory says exactly about strips, sheets and motions. Exit status 1 when one is missed.
     Validate {
-        /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `orders`, `momentum`; all if none is named.
+        /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `orders`, `momentum`, `long-run`; all if none is named.
         #[arg(value_parser = clap::builder::PossibleValuesParser::new(validate::QUESTIONS))]
         questions: Vec<String>,
         /// Coarser meshes and fewer cases: a few seconds.
@@ -134,6 +141,9 @@ enum Command {
         /// Compares integrators instead: time against error of the trajectory, for steps from 16 to 0.5 ms, and the stable ones of explicit methods.
         #[arg(long)]
         error: bool,
+        /// Compares a step of what sleeps or is pinned with one of what moves instead.
+        #[arg(long, conflicts_with = "error")]
+        sleep: bool,
         /// With --error: where the figures go as CSV, Markdown and SVG.
         #[arg(short, long, requires = "error")]
         output: Option<PathBuf>,
@@ -200,20 +210,21 @@ fn obey(command: Command) -> Result<ExitCode> {
         Command::Demo { output } => {
             let scene = demo::scene()?;
             print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
-            return run(Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &output, true, None)?);
+            return run(Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &output, true, None)?, false);
         }
-        Command::Run { scene, output, overwrite, checkpoint, material, parameters } => {
+        Command::Run { scene, output, overwrite, checkpoint, material, parameters, stats } => {
             let mut text = Scene::text(&scene)?;
             if let Some(file) = material {
                 text = scene::with_material(&text, &file, &parameters);
             }
             let new = Run::new(text, &scene, &output, overwrite, checkpoint);
-            return run(new.map_err(|error| match error {
+            let new = new.map_err(|error| match error {
                 RunError::Simulation(unfit) => anyhow::Error::new(unfit).context(scene.display().to_string()),
                 located => located.into(),
-            })?);
+            })?;
+            return run(new, stats);
         }
-        Command::Resume { folder } => return run(Run::resume(&folder)?),
+        Command::Resume { folder, stats } => return run(Run::resume(&folder)?, stats),
         Command::Report { folder } => print(&format!("wrote {}\n", report::write_report(&folder)?.display())),
         Command::View { shown, colours, wireframe, screenshot: Some(file), frame, time } => {
             let moment = match (frame, time) {
@@ -263,6 +274,12 @@ fn obey(command: Command) -> Result<ExitCode> {
         Command::Bench { cloth, error: true, output, .. } => {
             let cloths = if cloth.is_empty() { vec![Cloth::Soft] } else { cloth };
             cloths.into_iter().try_for_each(|cloth| compare(cloth, output.as_deref()))
+        }
+        Command::Bench { sleep: true, .. } => {
+            let progress = ProgressBar::new_spinner();
+            let ratios = bench_sleep::measure(&Sizes::default(), |_| progress.inc(1))?;
+            progress.finish_and_clear();
+            print(&format!("{}\n", bench_sleep::table(&ratios)))
         }
         Command::Bench { sizes, cloth, threads, seconds, .. } => {
             let cloths = if cloth.is_empty() { Cloth::ALL.to_vec() } else { cloth };
@@ -325,7 +342,7 @@ fn compare(cloth: Cloth, output: Option<&Path>) -> Result<()> {
 }
 
 /// Simulates to the end or until interrupted, and says what was written.
-fn run(mut run: Run) -> Result<ExitCode> {
+fn run(mut run: Run, with_stats: bool) -> Result<ExitCode> {
     run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let interrupted = interruption()?;
     let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
@@ -334,7 +351,11 @@ fn run(mut run: Run) -> Result<ExitCode> {
     let Ending { summary, files, frames, finished } = ended?;
     let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
     let folder = run.folder().path();
-    print(&format!("{summary}\n\n{files}wrote {frames} frames to {}\n", folder.join(OutputFolder::FRAMES).display()))?;
+    let tables = if with_stats { format!("{}\n", stats::tables(&summary)) } else { String::new() };
+    print(&format!(
+        "{summary}\n\n{tables}{files}wrote {frames} frames to {}\n",
+        folder.join(OutputFolder::FRAMES).display()
+    ))?;
     if finished {
         return Ok(ExitCode::SUCCESS);
     }

@@ -128,6 +128,7 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
         record.frames,
         if record.finished { "" } else { " <b>Stopped before its end.</b>" }
     ));
+    add(format_args!("<p>{}.</p>", record.summary.sleep()));
     for warning in &record.summary.warnings {
         add(format_args!("<p class=\"bad\">{}</p>", escaped(warning)));
     }
@@ -154,13 +155,7 @@ td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;pad
 
 fn times(summary: &Summary) -> String {
     let total = summary.stepping_time.as_secs_f64();
-    let phases = summary.phases;
-    let named = [
-        ("assembly", phases.assembly),
-        ("factorisation", phases.factorisation),
-        ("linear solves", phases.solve),
-        ("line search", phases.line_search),
-    ];
+    let named = summary.named_phases();
     let known: f64 = named.iter().map(|(_, time)| time.as_secs_f64()).sum();
     let all = named.map(|(name, time)| (name, time.as_secs_f64())).into_iter().chain([("other", total - known)]);
     let per_step = 1e3 / summary.steps.max(1) as f64;
@@ -187,16 +182,17 @@ fn evaluated(summary: &Summary) -> String {
             term.counts.hessian.projected,
         );
         format!(
-            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}<td>{flagged}</td><td>{projected}</td></tr>\n",
+            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}<td>{flagged}</td><td>{projected}</td><td>{}</td></tr>\n",
             escaped(&term.name),
-            escaped(&term.element)
+            escaped(&term.element),
+            term.reused
         )
     });
     let left_out: String =
         summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();
     format!(
         "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th><th>gradient</th><th>skipped</th>\
-         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th></tr>\n{}</table>\n{left_out}",
+         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th><th>reused</th></tr>\n{}</table>\n{left_out}",
         rows.collect::<String>()
     )
 }

@@ -109,7 +109,7 @@ impl Run {
         let scene = Scene::parse(&text, &path)?;
         let mut simulation = Simulation::new(&scene)?;
         simulation.restore(state)?;
-        let vertices = simulation.body().x.len();
+        let vertices = simulation.positions().len();
         let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
         let folder = OutputFolder::reopen(output)?;
         Ok(Self { scene, text, path, folder, simulation, frames, every: Some(every) })
@@ -155,16 +155,16 @@ impl Run {
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
-        let (body, number) = (self.simulation.body(), self.frames.frames().len());
-        let triangles = self.simulation.triangles();
+        let (simulation, number) = (&self.simulation, self.frames.frames().len());
+        let (x, triangles) = (simulation.positions(), simulation.triangles());
         if self.scene.output.obj {
-            let text = obj_text(&body.x, triangles, self.simulation.strands());
+            let text = obj_text(x, triangles, simulation.strands());
             self.folder.write_frame(number, "obj", text.as_bytes())?;
         }
         if self.scene.output.ply {
-            self.folder.write_frame(number, "ply", &ply_bytes(&body.x, &body.v, triangles))?;
+            self.folder.write_frame(number, "ply", &ply_bytes(x, simulation.velocities(), triangles))?;
         }
-        self.frames.add(body.x.clone())?;
+        self.frames.add(x.to_vec())?;
         Ok(())
     }
 
@@ -194,8 +194,8 @@ impl Run {
             Ok(())
         };
         if wanted.picture {
-            let body = self.simulation.body();
-            write(OutputFolder::PICTURE, &show.picture(&body.x, self.simulation.time(), false)?)?;
+            let (x, time) = (self.simulation.positions(), self.simulation.time());
+            write(OutputFolder::PICTURE, &show.picture(x, time, false)?)?;
         }
         if wanted.gltf {
             write(OutputFolder::ANIMATION, &animation_glb(&show.tracks(), frame_time)?)?;
@@ -214,7 +214,8 @@ impl Run {
             }
         }
         let finished = self.simulation.is_finished();
-        write(OutputFolder::SUMMARY, format!("{summary}\n").as_bytes())?;
+        let tables = crate::stats::tables(&summary);
+        write(OutputFolder::SUMMARY, format!("{summary}\n\n{tables}").as_bytes())?;
         let (scene, path) = (self.text.clone(), self.absolute_path());
         let (version, frames) = (Record::VERSION, frames.len());
         let record = Record { version, scene, path, finished, frames, summary: summary.clone() };

@@ -2,16 +2,18 @@ use std::ops::Range;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{EvaluationError, State, StepStart, System, SystemError};
+use energy_solve::{Counts, EvaluationError, State, SystemError, Term};
 
 use crate::body::Body;
 use crate::checkpoint::{CheckpointError, SavedState};
 use crate::contact::Obstacle;
-use crate::integrator::{Integrator, StepError, StepReport};
+use crate::integrator::{StepError, StepReport};
+use crate::island::Island;
 use crate::ledger::Ledger;
 use crate::motion::Motion;
-use crate::scene::{Model, ModelError, MovingPin, Part, PartKind, Scene};
-use crate::summary::Summary;
+use crate::scene::{Model, ModelError, MovingPin, Part, PartKind, Scene, TermLabel};
+use crate::sleep::Moment;
+use crate::summary::{Summary, TermSummary};
 
 /// A scene that cannot be set up or moved on.
 #[derive(Debug, thiserror::Error)]
@@ -37,23 +39,30 @@ pub enum SimulationError {
     },
 }
 
-/// Cloth and hair, an integrator and what they did so far.
+/// Cloth and hair, and what they did so far.
+///
+/// What nothing couples falls into [`Island`]s, each stepped by itself and asleep by itself. Positions and velocities are kept for the whole, too, on the one
+/// numbering that pins, frames and pictures use.
 #[derive(Debug)]
 pub struct Simulation {
     parts: Vec<Part>,
     triangles: Vec<[usize; 3]>,
     strands: Vec<Range<usize>>,
     obstacles: Vec<Obstacle>,
-    moving: Vec<MovingPin>,
     motions: Vec<Motion>,
-    body: Body,
-    integrator: Box<dyn Integrator>,
+    x: Vec<Vector3<f64>>,
+    v: Vec<Vector3<f64>>,
+    masses: Vec<f64>,
+    pinned: Vec<bool>,
+    islands: Vec<Island>,
+    labels: Vec<TermLabel>,
+    may_sleep: bool,
     dt: f64,
     steps: u64,
     summary: Summary,
     ledger: Option<Ledger>,
     /// What the terms did in earlier runs that this one goes on with.
-    earlier: Vec<energy_solve::Counts>,
+    earlier: Vec<Counts>,
 }
 
 impl Simulation {
@@ -66,40 +75,44 @@ impl Simulation {
     }
 
     /// Sets up what a scene was made into.
-    pub(crate) fn of(scene: &Scene, model: Model) -> Result<Self, SimulationError> {
+    pub(crate) fn of(scene: &Scene, mut model: Model) -> Result<Self, SimulationError> {
         let strands = model.strands().collect();
-        let Model { parts, x, v, masses, triangles, pinned, moving, motions, terms, left_out, warnings, obstacles } =
+        let islands = std::mem::take(&mut model.islands).into_iter();
+        let mut islands = islands.map(|island| Island::new(scene, &model, island)).collect::<Result<Vec<_>, _>>()?;
+        share_pins(&mut islands, &model);
+        let Model { parts, x, v, masses, triangles, pinned, motions, labels, left_out, warnings, obstacles, .. } =
             model;
-        let system = System::new(terms, &pinned)?;
-        let mut body = Body { v, x, masses, system };
-        let integrator = scene.stepper();
-        let mut summary =
-            Summary { left_out, warnings, integrator: integrator.name().to_owned(), ..Summary::default() };
+        let mut summary = Summary { left_out, warnings, dt: scene.dt, ..Summary::default() };
+        summary.integrator = scene.stepper().name().to_owned();
         summary.vertices = pinned.len();
         summary.pinned = pinned.iter().filter(|&&pinned| pinned).count();
         summary.triangles = triangles.len();
-        summary.dt = scene.dt;
-        if let Some(limit) = integrator.stable_step(&mut body)?
+        summary.islands = islands.len();
+        let limits = islands.iter_mut().map(Island::stable_step).collect::<Result<Vec<_>, _>>()?;
+        if let Some(limit) = limits.into_iter().flatten().reduce(f64::min)
             && scene.dt > limit
         {
             summary.warnings.push(format!(
                 "dt = {:.3e} s is above {limit:.3e} s, up to which {} is estimated to be stable here; the motion may blow up",
-                scene.dt,
-                integrator.name(),
+                scene.dt, summary.integrator,
             ));
         }
-        let (dt, steps, earlier) = (scene.dt, scene.steps(), Vec::new());
-        let (ledger, inside) = (None, inside_at_start(&obstacles, &body));
-        summary.warnings.extend(inside);
+        summary.warnings.extend(inside_at_start(&obstacles, &islands));
+        let (dt, steps, may_sleep) = (scene.dt, scene.steps(), scene.sleep.is_some());
+        let (ledger, earlier) = (None, vec![Counts::default(); labels.len()]);
         Ok(Self {
             parts,
             triangles,
             strands,
             obstacles,
-            moving,
             motions,
-            body,
-            integrator,
+            x,
+            v,
+            masses,
+            pinned,
+            islands,
+            labels,
+            may_sleep,
             dt,
             steps,
             summary,
@@ -141,10 +154,45 @@ impl Simulation {
         &self.obstacles
     }
 
-    /// The body as it is now.
+    /// Where the vertices are now, in m.
     #[must_use]
-    pub fn body(&self) -> &Body {
-        &self.body
+    pub fn positions(&self) -> &[Vector3<f64>] {
+        &self.x
+    }
+
+    /// Their velocities, in m/s; of pinned vertices those with which they are moved.
+    #[must_use]
+    pub fn velocities(&self) -> &[Vector3<f64>] {
+        &self.v
+    }
+
+    /// Their masses, in kg.
+    #[must_use]
+    pub fn masses(&self) -> &[f64] {
+        &self.masses
+    }
+
+    /// Whether a vertex is pinned.
+    #[must_use]
+    pub fn is_pinned(&self, vertex: usize) -> bool {
+        self.pinned[vertex]
+    }
+
+    /// What moves on its own.
+    #[must_use]
+    pub fn islands(&self) -> &[Island] {
+        &self.islands
+    }
+
+    /// The terms of all islands.
+    pub fn terms(&self) -> impl Iterator<Item = &dyn Term> {
+        self.islands.iter().flat_map(|island| island.body().system.terms().map(|(term, _)| term))
+    }
+
+    /// Wakes the island of a vertex: to be called when something outside the scene begins to act on it, acts otherwise or ceases to.
+    pub fn wake(&mut self, vertex: usize) {
+        let home = self.islands.iter_mut().find(|island| island.vertices().contains(&vertex));
+        home.into_iter().for_each(Island::wake);
     }
 
     /// The time simulated so far, in s.
@@ -182,8 +230,7 @@ impl Simulation {
     /// # Errors
     /// When an energy is not finite.
     pub fn keep_ledger(&mut self) -> Result<(), EvaluationError> {
-        let time = self.time();
-        self.ledger = Some(Ledger::new(&self.body, time)?);
+        self.ledger = Some(Ledger::new(&self.islands, &self.labels, self.time())?);
         Ok(())
     }
 
@@ -200,30 +247,12 @@ impl Simulation {
     pub fn step(&mut self) -> Result<StepReport, SimulationError> {
         let start = Instant::now();
         let step = self.summary.steps + 1;
-        let failed = |source| SimulationError::Step { step, time: step as f64 * self.dt, source };
-        let time = self.time();
-        let (body, ledger) = (&mut self.body, &mut self.ledger);
-        for pin in &self.moving {
-            let target = self.motions[pin.motion].pose(step as f64 * self.dt).applied(pin.drawn);
-            let here = body.x[pin.vertex];
-            body.v[pin.vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / self.dt);
-        }
-        let begin = StepStart { time, dt: self.dt, state: State { x: &body.x, v: &body.v } };
-        let system = &mut body.system;
-        system.begin_step(begin).map_err(StepError::from).map_err(failed)?;
-        let obstacles = &self.obstacles;
-        let lifting = |body: &Body, at_end: bool| -> f64 {
-            let one = |obstacle: &Obstacle| obstacle.power([time, time + self.dt], at_end, &body.masses, &body.x);
-            obstacles.iter().map(one).sum()
-        };
-        if let Some(ledger) = ledger {
-            ledger.begin(body, lifting(body, false));
-        }
-        let report = self.integrator.step(body, self.dt).map_err(failed)?;
-        if let Some(ledger) = ledger {
-            let entered = ledger.end(body, lifting(body, true), step as f64 * self.dt, self.dt);
-            entered.map_err(StepError::from).map_err(failed)?;
-        }
+        let report = self.step_islands(step).map_err(|source| {
+            let Self { islands, x, v, ledger, .. } = self;
+            islands.iter_mut().filter(|island| !island.is_asleep()).for_each(|island| island.gather(x, v));
+            ledger.iter_mut().for_each(Ledger::forget);
+            SimulationError::Step { step, time: step as f64 * self.dt, source }
+        })?;
         self.summary.steps = step;
         self.summary.solves += report.solves;
         self.summary.iterations += report.iterations;
@@ -234,35 +263,80 @@ impl Simulation {
         Ok(report)
     }
 
+    /// Steps the islands that are awake. Only when all have succeeded it is as if anything had happened.
+    fn step_islands(&mut self, step: u64) -> Result<StepReport, StepError> {
+        let Self { islands, x, v, ledger, .. } = self;
+        let moment = Moment::new(step, self.dt, &self.motions, &self.obstacles, self.may_sleep);
+        let (mut report, mut slept) = (StepReport::default(), 0);
+        for (number, island) in islands.iter_mut().enumerate() {
+            if island.sleeps_through(&moment) {
+                slept += 1;
+                continue;
+            }
+            let account = ledger.as_ref().map(|ledger| ledger.account(number));
+            let stepped = island.step(&moment, account).map_err(|error| error.on_vertices(island.vertices()));
+            let (one, account) = stepped?;
+            report += one;
+            ledger.iter_mut().zip(account).for_each(|(ledger, account)| ledger.note(number, account));
+        }
+        for (number, island) in islands.iter_mut().enumerate().filter(|(_, island)| !island.is_asleep()) {
+            if island.may_fall_asleep(&moment) {
+                ledger.iter_mut().for_each(|ledger| ledger.note_sleep(number));
+            }
+            island.scatter(x, v);
+        }
+        ledger.iter_mut().for_each(|ledger| ledger.enter(moment.end));
+        self.summary.slept += slept;
+        Ok(report)
+    }
+
+    /// What was evaluated for each label.
+    fn counts(&self) -> Vec<Counts> {
+        let mut all = self.earlier.clone();
+        for island in &self.islands {
+            for ((_, counts), &label) in island.body().system.terms().zip(island.labels()) {
+                let sum = &mut all[label];
+                sum.value += counts.value;
+                sum.gradient += counts.gradient;
+                sum.hessian += counts.hessian;
+                sum.reused += counts.reused;
+            }
+        }
+        all
+    }
+
     /// What was done so far and the energies, forces and momenta now.
     ///
     /// # Errors
     /// When an energy is not finite.
     pub fn summary(&mut self) -> Result<Summary, EvaluationError> {
-        let body = &mut self.body;
-        let energies = body.system.energies(&body.x)?.into_iter().map(|term| term.energy).collect::<Vec<_>>();
-        let force = body.system.forces(State { x: &body.x, v: &body.v })?;
         let mut summary = self.summary.clone();
-        let all = body.system.terms().zip(energies).enumerate();
-        summary.terms = all
-            .map(|(place, ((term, mut counts), energy))| {
-                if let Some(earlier) = self.earlier.get(place) {
-                    counts.value += earlier.value;
-                    counts.gradient += earlier.gradient;
-                    counts.hessian += earlier.hessian;
-                }
-                crate::summary::TermSummary {
-                    name: term.name().to_owned(),
-                    element: term.declaration().name.to_owned(),
-                    energy,
-                    counts,
-                }
-            })
-            .collect();
-        summary.kinetic_energy = body.kinetic_energy();
-        summary.momentum = body.momentum();
-        summary.angular_momentum = body.angular_momentum();
-        summary.pin_force = pin_force(body, &force);
+        let mut energies: Vec<Option<f64>> = vec![None; self.labels.len()];
+        let mut elements = vec![0; self.labels.len()];
+        let add = |sum: &mut Vector3<f64>, part: Vector3<f64>| (0..3).for_each(|axis| sum[axis] += part[axis]);
+        for island in &mut self.islands {
+            let labels = island.labels().to_vec();
+            let body = island.body_mut();
+            for (&label, term) in labels.iter().zip(body.system.energies(&body.x)?) {
+                energies[label] = term.energy.map(|energy| energies[label].unwrap_or(0.0) + energy).or(energies[label]);
+            }
+            for (&label, (term, _)) in labels.iter().zip(body.system.terms()) {
+                elements[label] += term.stencils().iter().len();
+            }
+            let force = body.system.forces(State { x: &body.x, v: &body.v })?;
+            summary.kinetic_energy += body.kinetic_energy();
+            add(&mut summary.momentum, body.momentum());
+            add(&mut summary.angular_momentum, body.angular_momentum());
+            add(&mut summary.pin_force, pin_force(body, &force));
+            summary.asleep += usize::from(island.is_asleep());
+        }
+        let all = self.counts().into_iter().enumerate();
+        let term = |(number, counts): (usize, Counts)| {
+            let TermLabel { name, element } = self.labels[number].clone();
+            let (element, energy) = (element.to_owned(), energies[number]);
+            TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
+        };
+        summary.terms = all.map(term).collect();
         let judgement = self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator));
         summary.warnings.extend(judgement);
         Ok(summary)
@@ -271,37 +345,22 @@ impl Simulation {
     /// Everything that the motion from here depends on.
     #[must_use]
     pub fn save(&self) -> SavedState {
-        let counts = |(place, counts): (usize, energy_solve::Counts)| {
-            let mut sum = counts;
-            if let Some(earlier) = self.earlier.get(place) {
-                sum.value += earlier.value;
-                sum.gradient += earlier.gradient;
-                sum.hessian += earlier.hessian;
-            }
-            sum
-        };
         SavedState {
-            masses_checksum: masses_checksum(&self.body),
+            masses_checksum: masses_checksum(&self.masses),
             steps: self.summary.steps,
-            x: self.body.x.clone(),
-            v: self.body.v.clone(),
-            integrator: self.integrator.memory(),
+            x: self.x.clone(),
+            v: self.v.clone(),
+            islands: self.islands.iter().map(Island::save).collect(),
             ledger: self.ledger.clone(),
             solves: self.summary.solves,
             iterations: self.summary.iterations,
             projected: self.summary.projected,
             rejected: self.summary.rejected,
+            slept: self.summary.slept,
             stepping_time: self.summary.stepping_time,
             phases: self.summary.phases,
-            counts: self
-                .body
-                .system
-                .terms()
-                .map(|(_, counts)| counts)
-                .enumerate()
-                .map(counts)
-                .map(Into::into)
-                .collect(),
+            reused: self.counts().iter().map(|counts| counts.reused).collect(),
+            counts: self.counts().into_iter().map(Into::into).collect(),
         }
     }
 
@@ -310,28 +369,48 @@ impl Simulation {
     /// # Errors
     /// When the state is of another scene.
     pub fn restore(&mut self, saved: SavedState) -> Result<(), CheckpointError> {
-        let (expected, found) = (self.body.x.len(), saved.x.len());
-        let terms = self.body.system.terms().count();
-        let fits = expected == found && saved.v.len() == expected && saved.counts.len() == terms;
-        if !fits || saved.masses_checksum != masses_checksum(&self.body) {
+        let (expected, found) = (self.x.len(), saved.x.len());
+        let sizes = [saved.v.len(), saved.islands.len(), saved.counts.len(), saved.reused.len()];
+        let terms = self.labels.len();
+        let fits = expected == found && sizes == [expected, self.islands.len(), terms, terms];
+        if !fits || saved.masses_checksum != masses_checksum(&self.masses) {
             return Err(CheckpointError::OtherScene { expected, found });
         }
-        (self.body.x, self.body.v) = (saved.x, saved.v);
-        self.integrator.restore(saved.integrator);
+        (self.x, self.v) = (saved.x, saved.v);
         self.ledger = saved.ledger;
         self.summary.steps = saved.steps;
         self.summary.solves = saved.solves;
         self.summary.iterations = saved.iterations;
         self.summary.projected = saved.projected;
         self.summary.rejected = saved.rejected;
+        self.summary.slept = saved.slept;
         self.summary.stepping_time = saved.stepping_time;
         self.summary.phases = saved.phases;
-        self.earlier = saved.counts.into_iter().map(Into::into).collect();
+        let counts = saved.counts.into_iter().zip(saved.reused);
+        self.earlier = counts.map(|(counts, reused)| Counts { reused, ..counts.into() }).collect();
         // Solids are where they were at the end of the last step.
-        let time = self.time() - self.dt;
-        let body = &mut self.body;
-        let last = StepStart { time, dt: self.dt, state: State { x: &body.x, v: &body.v } };
-        body.system.begin_step(last).map_err(|source| CheckpointError::Unfit { source })
+        let (time, dt) = (self.time() - self.dt, self.dt);
+        for (island, saved) in self.islands.iter_mut().zip(saved.islands) {
+            island.restore(saved);
+            island.gather(&self.x, &self.v);
+            island.begin_step(time, dt).map_err(|source| CheckpointError::Unfit { source })?;
+        }
+        Ok(())
+    }
+}
+
+/// Tells each island which of its pins move.
+fn share_pins(islands: &mut [Island], model: &Model) {
+    if model.moving.is_empty() {
+        return;
+    }
+    let mut homes = vec![(0, 0); model.x.len()];
+    for (number, island) in islands.iter().enumerate() {
+        island.vertices().iter().enumerate().for_each(|(place, &vertex)| homes[vertex] = (number, place));
+    }
+    for pin in &model.moving {
+        let (island, vertex) = homes[pin.vertex];
+        islands[island].move_pin(MovingPin { vertex, ..pin.clone() });
     }
 }
 
@@ -346,17 +425,21 @@ fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
     total
 }
 
-fn masses_checksum(body: &Body) -> u32 {
-    let bytes: Vec<u8> = body.masses.iter().flat_map(|mass| mass.to_le_bytes()).collect();
+fn masses_checksum(masses: &[f64]) -> u32 {
+    let bytes: Vec<u8> = masses.iter().flat_map(|mass| mass.to_le_bytes()).collect();
     crc32fast::hash(&bytes)
 }
 
 /// Warnings of vertices that start inside a solid: they will be thrown out of it.
-fn inside_at_start(obstacles: &[Obstacle], body: &Body) -> Vec<String> {
+fn inside_at_start(obstacles: &[Obstacle], islands: &[Island]) -> Vec<String> {
     let warning = |obstacle: &Obstacle| {
         let solid = obstacle.at(0.0);
-        let inside = body.system.dofs().free().iter().filter(|&&vertex| solid.signed_distance(body.x[vertex]) < 0.0);
-        let count = inside.count();
+        let bodies = islands.iter().map(Island::body);
+        let inside = |body: &&Body| {
+            let free = body.system.dofs().free().iter();
+            free.filter(|&&vertex| solid.signed_distance(body.x[vertex]) < 0.0).count()
+        };
+        let count: usize = bodies.map(|body| inside(&body)).sum();
         let text = format!("{count} vertices start inside {}; they will be thrown out of it", obstacle.name);
         (count > 0).then_some(text)
     };

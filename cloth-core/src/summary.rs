@@ -5,6 +5,8 @@ use energy_dsl::Vector3;
 use energy_solve::{Counts, Tally};
 use serde::{Deserialize, Serialize};
 
+use crate::integrator::Phases;
+
 /// What a simulation did, and where it ended. Its `Display` is a report for people.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
@@ -14,6 +16,15 @@ pub struct Summary {
     pub pinned: usize,
     /// Triangles.
     pub triangles: usize,
+    /// Parts of the whole that nothing couples, each stepped by itself.
+    #[serde(default)]
+    pub islands: usize,
+    /// How many of them sleep.
+    #[serde(default)]
+    pub asleep: usize,
+    /// Steps slept through, of all islands.
+    #[serde(default)]
+    pub slept: u64,
     /// The integrator.
     pub integrator: String,
     /// Time step, in s.
@@ -29,7 +40,7 @@ pub struct Summary {
     /// Steps rejected and tried again with a smaller size; see [`crate::integrator::Adaptive`].
     pub rejected: u64,
     /// Time spent by phase; of integrators that solve by Newton's method only.
-    pub phases: crate::integrator::Phases,
+    pub phases: Phases,
     /// Time spent in steps.
     pub stepping_time: Duration,
     /// The terms.
@@ -55,11 +66,42 @@ pub struct TermSummary {
     pub name: String,
     /// The declared element it is made of.
     pub element: String,
+    /// How many.
+    #[serde(default)]
+    pub elements: usize,
     /// Its energy in J; `None` for a force law.
     pub energy: Option<f64>,
     /// What was evaluated and skipped.
     #[serde(with = "crate::checkpoint::saved_counts")]
     pub counts: Counts,
+    /// Hessians that were not evaluated because they are constant and known.
+    #[serde(default)]
+    pub reused: u64,
+}
+
+impl Summary {
+    /// The phases of a step, in order, with the time that they took.
+    #[must_use]
+    pub fn named_phases(&self) -> [(&'static str, Duration); 4] {
+        let Phases { assembly, factorisation, solve, line_search } = self.phases;
+        [
+            ("assembly", assembly),
+            ("factorisation", factorisation),
+            ("linear solves", solve),
+            ("line search", line_search),
+        ]
+    }
+
+    /// How many islands there are, and what they slept through.
+    #[must_use]
+    pub fn sleep(&self) -> String {
+        let all = self.steps * self.islands as u64;
+        let islands = if self.islands == 1 { "1 island".to_owned() } else { format!("{} islands", self.islands) };
+        match (self.slept, self.asleep) {
+            (0, 0) => islands,
+            (slept, asleep) => format!("{islands}, {asleep} asleep; {slept} of their {all} steps slept through"),
+        }
+    }
 }
 
 impl fmt::Display for Summary {
@@ -67,6 +109,7 @@ impl fmt::Display for Summary {
         writeln!(f, "{} vertices ({} pinned), {} triangles", self.vertices, self.pinned, self.triangles)?;
         let simulated = self.steps as f64 * self.dt;
         writeln!(f, "{}: {} steps of {} s = {simulated:.3} s", self.integrator, self.steps, self.dt)?;
+        writeln!(f, "{}", self.sleep())?;
         let seconds = self.stepping_time.as_secs_f64();
         writeln!(f, "{:.2} s of computing, {:.2} ms per step", seconds, 1e3 * seconds / self.steps.max(1) as f64)?;
         if self.solves > 0 {

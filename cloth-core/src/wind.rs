@@ -96,7 +96,7 @@ struct WindLaw {
 impl DissipationLaw for WindLaw {
     type Element = WindDrag;
 
-    fn elements(&self, start: &StepStart<'_>) -> Vec<(usize, WindDrag)> {
+    fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, WindDrag)> {
         let air = self.wind.at(start.time + 0.5 * start.dt);
         let element = |(number, corners): (usize, &[usize; 3])| {
             let [a, b, c] = corners.map(|corner| start.state.x[corner]);
@@ -110,6 +110,7 @@ impl DissipationLaw for WindLaw {
                 (number, WindDrag::new(normal, air, c_n, c_t))
             })
         };
-        self.triangles.iter().enumerate().filter_map(element).collect()
+        let free = self.triangles.iter().enumerate().filter(|(number, _)| is_free[*number]);
+        free.filter_map(element).collect()
     }
 }

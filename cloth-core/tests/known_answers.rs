@@ -17,6 +17,12 @@ fn integrators_have_their_orders_and_keep_what_they_promise() {
     all_pass(&["orders", "momentum"]);
 }
 
+/// The whole, a hundred thousand steps of each, is `cloth validate long-run`.
+#[test]
+fn energy_does_not_drift_over_many_steps() {
+    all_pass(&["long-run"]);
+}
+
 #[test]
 fn a_short_strip_on_a_random_mesh_bends_as_the_elastica_does() {
     let strip = Cantilever {

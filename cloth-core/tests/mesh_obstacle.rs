@@ -41,9 +41,9 @@ fn drape(scene: &str) -> (f64, f64) {
     while !simulation.is_finished() {
         simulation.step().unwrap();
         let solid = simulation.obstacles()[0].at(simulation.time());
-        deepest = simulation.body().x.iter().map(|&x| solid.signed_distance(x)).fold(deepest, f64::min);
+        deepest = simulation.positions().iter().map(|&x| solid.signed_distance(x)).fold(deepest, f64::min);
     }
-    let x = &simulation.body().x;
+    let x = simulation.positions();
     (deepest, x.iter().map(|p| p[2]).sum::<f64>() / x.len() as f64)
 }
 
@@ -75,7 +75,7 @@ fn friction_holds_on_a_mesh() {
         while !simulation.is_finished() {
             simulation.step().unwrap();
         }
-        let x = &simulation.body().x;
+        let x = simulation.positions();
         x.iter().map(|p| p[0]).sum::<f64>() / x.len() as f64
     };
     let (held, slid) = (ends("friction = 0.8"), ends("friction = 0.0"));

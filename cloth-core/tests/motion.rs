@@ -40,7 +40,7 @@ fn free_fall_is_that_of_a_point_mass() {
             let simulation = finished(&scene(&head, fabric));
             let (n, h) = (50.0, 0.001);
             let drop = 9.81 * h * h * n * (n + 1.0) / 2.0;
-            for (now, rest) in simulation.body().x.iter().zip(simulation.mesh(0).unwrap().vertices()) {
+            for (now, rest) in simulation.positions().iter().zip(simulation.mesh(0).unwrap().vertices()) {
                 // Implicit steps are as exact as their linear solves.
                 let tolerance = if integrator == "symplectic-euler" { 1e-13 } else { 1e-5 * drop };
                 let fell = rest[2] - now[2];
@@ -56,7 +56,7 @@ fn drag_is_taken_at_the_end_of_an_implicit_step() {
     let simulation = finished(&scene("dt = 0.02\nduration = 0.4\ndrag = 5.0", STVK));
     // v' = (v − h g)/(1 + h c), twenty times.
     let speed = 9.81 / 5.0 * (1.0 - (1.0 + 0.02_f64 * 5.0).powi(-20));
-    for v in &simulation.body().v {
+    for v in simulation.velocities() {
         assert!((v[2] + speed).abs() < 1e-4 * speed, "{} {speed}", -v[2]);
     }
 }
@@ -238,7 +238,7 @@ fn schemes_are_of_first_order() {
         let height = |dt: f64| {
             let head = format!("dt = {dt}\nduration = 0.05\nintegrator = \"{integrator}\"");
             let simulation = finished(&scene(&head, &format!("{fabric}{CORNER}")));
-            simulation.body().x[6][2] // the corner across
+            simulation.positions()[6][2] // the corner across
         };
         let heights = [0.002, 0.001, 0.0005].map(height);
         let order = ((heights[0] - heights[1]) / (heights[1] - heights[2])).abs().log2();
@@ -250,7 +250,7 @@ fn schemes_are_of_first_order() {
 fn schemes_and_bending_forms_agree_at_small_steps() {
     let height = |integrator: &str, fabric: &str| {
         let head = format!("dt = 0.0002\nduration = 0.1\nintegrator = \"{integrator}\"");
-        finished(&scene(&head, &format!("{fabric}{CORNER}"))).body().x[6][2]
+        finished(&scene(&head, &format!("{fabric}{CORNER}"))).positions()[6][2]
     };
     let fine = height("symplectic-euler", STVK);
     assert!(fine < -0.02);
@@ -265,18 +265,18 @@ fn a_hanging_cloth_comes_to_rest_with_its_weight_on_the_pins() {
     let pins = "[[pins]]\nbox = { min = [-1.0, 0.249, -1.0], max = [1.0, 1.0, 1.0] }\n";
     let mut simulation = finished(&scene(head, &format!("{SPRINGS}{pins}")));
     let summary = simulation.summary().unwrap();
-    let held: f64 = simulation.body().masses.iter().take(7 * 5).sum(); // all rows but the pinned one
+    let held: f64 = simulation.masses().iter().take(7 * 5).sum(); // all rows but the pinned one
     assert!(summary.kinetic_energy < 1e-8, "{}", summary.kinetic_energy);
     assert!((summary.pin_force[2] + 9.81 * held).abs() < 1e-3 * 9.81 * held, "{:?}", summary.pin_force);
-    assert!(simulation.body().x[0][2] < -0.45);
+    assert!(simulation.positions()[0][2] < -0.45);
 }
 
 #[test]
 fn the_same_scene_gives_the_same_bits() {
     let scene = scene("dt = 0.01\nduration = 0.3", &format!("{STVK}{CORNER}"));
     let (a, b) = (finished(&scene), finished(&scene));
-    assert_eq!(a.body().x, b.body().x);
-    assert_eq!(a.body().v, b.body().v);
+    assert_eq!(a.positions(), b.positions());
+    assert_eq!(a.velocities(), b.velocities());
 }
 
 #[test]
@@ -295,7 +295,7 @@ fn too_large_explicit_steps_are_warned_of_and_stopped() {
         assert!(!simulation.is_finished(), "an unstable run must not end as if nothing were wrong");
     };
     assert!(error.starts_with("step ") && (error.contains("vertex") || error.contains("vertices")), "{error}");
-    assert!(simulation.body().x.iter().flatten().all(|coordinate| coordinate.is_finite()));
+    assert!(simulation.positions().iter().flatten().all(|coordinate| coordinate.is_finite()));
 }
 
 #[test]

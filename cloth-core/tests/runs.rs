@@ -145,8 +145,19 @@ fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
     *flipped.last_mut().unwrap() ^= 1;
     assert!(with(&flipped).contains("is damaged: its checksum does not match"));
     assert!(with(&good[..good.len() / 2]).contains("is damaged: it is cut short"));
-    let newer = String::from_utf8(good.clone()).unwrap().replacen("cloth-checkpoint 1 ", "cloth-checkpoint 2 ", 1);
-    assert!(with(newer.as_bytes()).contains("has version 2, but this program reads version 1"));
+    let of_version = |version: &str| {
+        String::from_utf8(good.clone()).unwrap().replacen(
+            "cloth-checkpoint 2 ",
+            &format!("cloth-checkpoint {version} "),
+            1,
+        )
+    };
+    assert!(
+        with(of_version("3").as_bytes()).contains("has version 3, but this program reads version 2; use the newer")
+    );
+    assert!(
+        with(of_version("1").as_bytes()).contains("has version 1, but this program reads version 2; start the run")
+    );
     assert!(with(b"something else\n").contains("is no checkpoint"));
     std::fs::write(&checkpoint, &good).unwrap();
     let frames = path.join("out/checkpoint.frames");
@@ -319,10 +330,33 @@ fn a_report_is_one_page_without_anything_from_elsewhere() {
 }
 
 #[test]
+fn stats_say_what_each_term_evaluated_and_are_in_the_summary_too() {
+    let folder = with_scene(&SCENE.replace("duration = 0.3", "duration = 0.05"));
+    let plain = succeeds(&["run", "scene.toml", "-o", "plain"], folder.path());
+    assert!(!plain.contains("reused"), "{plain}");
+    let text = succeeds(&["run", "scene.toml", "-o", "out", "--stats"], folder.path());
+    let summary = String::from_utf8(read(&folder.path().join("out"), "summary.txt")).unwrap();
+    for text in [text, summary] {
+        let row = |name: &str| -> Vec<u64> {
+            let row = text.lines().rfind(|line| line.trim_start().starts_with(name));
+            let row = row.unwrap_or_else(|| panic!("{name}: {text}"));
+            row.split_whitespace().filter_map(|word| word.parse().ok()).collect()
+        };
+        // Elements, then evaluated and skipped for values, gradients and Hessians, flagged, projected, used again.
+        let (membrane, bending) = (row("cloth: membrane"), row("cloth: bending"));
+        assert_eq!((membrane.len(), membrane[0], membrane[9], bending[0]), (10, 128, 0, 176));
+        assert!(membrane[5] > 5 * 128 && bending[5] < 2 * 176 && bending[9] > 5 * 176, "{membrane:?} {bending:?}");
+        assert!(text.contains("\n2 islands\n") && text.contains("assembly"), "{text}");
+    }
+}
+
+#[test]
 fn the_schema_knows_every_key_with_its_unit() {
     let schema: serde_json::Value = serde_json::from_str(&succeeds(&["schema"], Path::new("."))).unwrap();
     let properties = schema["properties"].as_object().unwrap();
-    for key in ["version", "garment", "hair", "seams", "pins", "obstacles", "wind", "output", "dt", "mesh", "fabric"] {
+    for key in
+        ["version", "garment", "hair", "seams", "pins", "obstacles", "wind", "output", "sleep", "dt", "mesh", "fabric"]
+    {
         assert!(properties.contains_key(key), "{key}");
     }
     assert!(properties["dt"]["description"].as_str().unwrap().ends_with("in s."));

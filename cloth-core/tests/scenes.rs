@@ -46,7 +46,7 @@ fn slope(friction: f64, integrator: &str) -> Simulation {
 fn cloth_on_a_slope_sticks_below_the_angle_of_friction_and_slides_above_it_as_coulomb_says() {
     for integrator in ["newton", "implicit-euler"] {
         let mean = |simulation: &Simulation| {
-            simulation.body().v.iter().map(|v| v[0]).sum::<f64>() / simulation.body().v.len() as f64
+            simulation.velocities().iter().map(|v| v[0]).sum::<f64>() / simulation.velocities().len() as f64
         };
         // tan 0.4 = 0.4228.
         let held = slope(0.6, integrator);
@@ -73,7 +73,7 @@ fn nothing_ends_inside_an_obstacle_and_what_is_far_is_skipped() {
         let text = format!("{}[[obstacles]]\n{obstacle}\nfriction = 0.3\n", sheet(head, 16, 0.5));
         let mut simulation = finished(&text);
         let solid = simulation.obstacles()[0].at(0.0);
-        let deepest = simulation.body().x.iter().map(|&x| solid.signed_distance(x)).fold(f64::INFINITY, f64::min);
+        let deepest = simulation.positions().iter().map(|&x| solid.signed_distance(x)).fold(f64::INFINITY, f64::min);
         assert!(deepest > 0.0 && deepest < 0.005, "{obstacle}: {deepest}");
         let summary = simulation.summary().unwrap();
         let contact = summary.terms.iter().find(|term| term.element.ends_with("Contact")).unwrap();
@@ -99,7 +99,7 @@ fn a_level_sheet_falls_as_fast_as_the_air_lets_it() {
         let simulation = finished(&text);
         // σ g = ½ ρ C u², u beyond the rising air.
         let speed = (2.0_f64 * 0.2 * 9.81 / (1.2 * 1.2)).sqrt() - 0.5;
-        for v in &simulation.body().v {
+        for v in simulation.velocities() {
             assert!((v[2] / -speed - 1.0).abs() < 0.01, "{integrator}: {} of {speed}", v[2]);
         }
     }
@@ -114,10 +114,10 @@ fn pins_go_where_they_are_told_whatever_the_integrator() {
         let head = format!("dt = 0.002\nduration = 0.12\nintegrator = \"{integrator}\"");
         let pin = format!("[[pins]]\nnearest = [0.1, 0.1, 0.0]\n[pins.motion]\n{keys}\n");
         let simulation = finished(&format!("{}{pin}", sheet(&head, 2, 0.2)));
-        let x = simulation.body().x[8];
+        let x = simulation.positions()[8];
         let expected = [-0.1, 0.1, 0.3];
         assert!((0..3).all(|axis| (x[axis] - expected[axis]).abs() < 1e-12), "{integrator}: {x:?}");
-        assert!(simulation.body().x[0] != [-0.1, -0.1, 0.0]);
+        assert!(simulation.positions()[0] != [-0.1, -0.1, 0.0]);
     }
 }
 
@@ -173,7 +173,7 @@ fn obstacles_that_move_do_work_and_carry_cloth_along() {
     let simulation =
         finished(&format!("{lying}[[obstacles]]\nplane = {{}}\nfriction = 1.0\n[obstacles.motion]\n{motion}\n"));
     let (weight, last) = (0.2 * 0.04 * 9.81, simulation.ledger().unwrap().entries().last().unwrap());
-    let carried = simulation.body().x.iter().map(|x| x[0]).sum::<f64>() / 25.0;
+    let carried = simulation.positions().iter().map(|x| x[0]).sum::<f64>() / 25.0;
     assert!((carried - 0.18).abs() < 0.02, "{carried}");
     assert!((last.obstacles / (weight * 0.12) - 1.0).abs() < 0.1, "{} of {}", last.obstacles, weight * 0.12);
 }
@@ -191,7 +191,7 @@ fn seams_pull_garments_together_without_moving_them_as_a_whole() {
     let text = format!("{head}\n{}{}{seam}", piece("left", -0.17), piece("right", 0.17));
     let text = text.replace("newton", "implicit-euler");
     let simulation = finished(&text);
-    let x = &simulation.body().x;
+    let x = simulation.positions();
     for row in 0..4 {
         let (p, q) = (x[4 * row + 3], x[16 + 4 * row]);
         let apart: f64 = (0..3).map(|axis| (p[axis] - q[axis]).powi(2)).sum::<f64>().sqrt();
@@ -210,12 +210,12 @@ fn hair_bends_under_its_weight_as_a_beam_does() {
     let text = "dt = 0.01\nduration = 4.0\nintegrator = \"newton\"\ndrag = 6.0\n[[hair]]\ncount = 2\nsegments = 40\nlength = 0.1\n\
                 last_root = [0.0, 0.1, 0.0]\ndirection = [1.0, 0.0, 0.0]\ndensity = 1e-4\nstretch_stiffness = 50.0\nbend_stiffness = 4e-6\n";
     let simulation = finished(text);
-    assert_eq!(simulation.body().x.len(), 82);
+    assert_eq!(simulation.positions().len(), 82);
     // The clamp ends half-way between the two vertices that are held.
     let length: f64 = 0.1 - 0.5 * 0.1 / 40.0;
     let exact = 1e-4 * 9.81 * length.powi(4) / (8.0 * 4e-6);
     for strand in simulation.strands() {
-        let tip = -simulation.body().x[strand.end - 1][2];
+        let tip = -simulation.positions()[strand.end - 1][2];
         assert!((tip / exact - 1.0).abs() < 0.02, "{tip} of {exact}");
     }
 }
@@ -228,13 +228,13 @@ fn garments_fall_together_from_where_they_are_placed() {
          velocity = [0.0, 0.5, 0.0]\n[[garment]]\nmesh.strip = {{ length = 0.4, width = 0.1, segments = 8 }}\n{SOFT}"
     );
     let simulation = finished(&text);
-    let first = &simulation.body().x[..37];
+    let first = &simulation.positions()[..37];
     let (top, middle) = (first.iter().map(|p| p[2]).fold(0.0, f64::max), first[0]);
     assert!(
         (top - (3.0 + 0.5 * 80.0_f64.to_radians().sin())).abs() < 1e-3 && (middle[1] - 2.05).abs() < 1e-9,
         "{top} {middle:?}"
     );
-    assert!(simulation.body().x[37..].iter().all(|p| p[2] == 0.0));
+    assert!(simulation.positions()[37..].iter().all(|p| p[2] == 0.0));
 }
 
 #[test]

@@ -32,4 +32,6 @@ pub struct Counts {
     pub gradient: Tally,
     /// Everything up to the Hessian, or the force's Jacobians.
     pub hessian: Tally,
+    /// Hessians that were not evaluated because they are constant and known.
+    pub reused: u64,
 }

@@ -323,7 +323,9 @@ impl System {
             if linear(&**term) {
                 counts.hessian += divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
             } else {
-                counts.gradient += divided.unwrap_or_else(|| term.add_force(state, sum.force));
+                let tally = divided.unwrap_or_else(|| term.add_force(state, sum.force));
+                counts.reused += if term.character().curved { tally.evaluated } else { 0 };
+                counts.gradient += tally;
             }
         }
         if force.iter().flatten().any(|component| !component.is_finite()) {

@@ -25,7 +25,7 @@ pub(super) struct FrictionLaw<S> {
 impl<S: Solid> DissipationLaw for FrictionLaw<S> {
     type Element = SlidingFriction;
 
-    fn elements(&self, start: &StepStart<'_>) -> Vec<(usize, SlidingFriction)> {
+    fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, SlidingFriction)> {
         let x = start.state.x;
         let now = self
             .motion
@@ -36,7 +36,8 @@ impl<S: Solid> DissipationLaw for FrictionLaw<S> {
             let carried = surface_velocity(self.motion.as_ref(), step, x[vertex], false);
             SlidingFriction::new(normal, carried, self.coefficient * force, self.sticking)
         };
-        let touches = touches(&now, self.thickness, &self.stiffness, x);
+        let free = (0..x.len()).filter(|&vertex| is_free[vertex]);
+        let touches = touches(&now, self.thickness, |vertex| self.stiffness[vertex], x, free);
         touches.iter().map(|touch| (touch.vertex, element(touch.vertex, touch.normal, touch.force))).collect()
     }
 }

@@ -12,13 +12,13 @@ mod solid;
 mod surface;
 mod term;
 
-use energy_dsl::Vector3;
 use energy_solve::Term;
 
 pub use mesh_solid::MeshSolid;
 pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
 pub use surface::{Feature, Nearest, Surface, SurfaceError};
 
+use crate::body::Body;
 use crate::dissipation_term::DissipativeTerm;
 use crate::mesh::dot;
 use crate::motion::{Motion, Pose};
@@ -117,31 +117,32 @@ impl Obstacle {
         }
     }
 
-    /// The power of its contact as it moves over a step from one time to another, in W: at the step's start or at its end, with vertices at x.
-    pub(crate) fn power(&self, step: [f64; 2], at_end: bool, masses: &[f64], x: &[Vector3<f64>]) -> f64 {
+    /// The power of its contact with the free vertices of a body as it moves over a step from one time to another, in W: at the step's start or at its end.
+    pub(crate) fn power(&self, step: [f64; 2], at_end: bool, body: &Body) -> f64 {
         if !self.motion.as_ref().is_some_and(|motion| motion.moves(step[0], step[1])) {
             return 0.0;
         }
         match self.at(step[usize::from(at_end)]) {
-            AnySolid::HalfSpace(solid) => self.power_of(solid, step, at_end, masses, x),
-            AnySolid::Ball(solid) => self.power_of(solid, step, at_end, masses, x),
-            AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, masses, x),
-            AnySolid::Box(solid) => self.power_of(solid, step, at_end, masses, x),
+            AnySolid::HalfSpace(solid) => self.power_of(solid, step, at_end, body),
+            AnySolid::Ball(solid) => self.power_of(solid, step, at_end, body),
+            AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, body),
+            AnySolid::Box(solid) => self.power_of(solid, step, at_end, body),
             AnySolid::Mesh(solid) => {
-                self.power_of(Faces(solid.clone()), step, at_end, masses, x)
-                    + self.power_of(Edges(solid.clone()), step, at_end, masses, x)
-                    + self.power_of(Corners(solid), step, at_end, masses, x)
+                self.power_of(Faces(solid.clone()), step, at_end, body)
+                    + self.power_of(Edges(solid.clone()), step, at_end, body)
+                    + self.power_of(Corners(solid), step, at_end, body)
             }
         }
     }
 
-    fn power_of(&self, solid: impl Solid, step: [f64; 2], at_end: bool, masses: &[f64], x: &[Vector3<f64>]) -> f64 {
-        let stiffness: Vec<f64> = masses.iter().map(|mass| self.stiffness * mass).collect();
+    fn power_of(&self, solid: impl Solid, step: [f64; 2], at_end: bool, body: &Body) -> f64 {
+        let stiffness = |vertex: usize| self.stiffness * body.masses[vertex];
         let power = |touch: &Touch| {
-            let velocity = surface_velocity(self.motion.as_ref(), step, x[touch.vertex], at_end);
+            let velocity = surface_velocity(self.motion.as_ref(), step, body.x[touch.vertex], at_end);
             touch.force * dot(touch.normal, velocity)
         };
-        touches(&solid, self.thickness, &stiffness, x).iter().map(power).sum()
+        let free = body.system.dofs().free().iter().copied();
+        touches(&solid, self.thickness, stiffness, &body.x, free).iter().map(power).sum()
     }
 
     fn terms_with(&self, part: &str, solid: impl Solid, masses: &[f64]) -> Vec<Box<dyn Term>> {

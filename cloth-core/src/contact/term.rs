@@ -170,11 +170,17 @@ pub(super) struct Touch {
     pub force: f64,
 }
 
-/// Everything that touches a solid.
-pub(super) fn touches<S: Solid>(solid: &S, thickness: f64, stiffness: &[f64], x: &[Vector3<f64>]) -> Vec<Touch> {
-    let near = (0..x.len()).filter(|&vertex| solid.signed_distance(x[vertex]) < thickness);
+/// Which of these vertices touch a solid.
+pub(super) fn touches<S: Solid>(
+    solid: &S,
+    thickness: f64,
+    stiffness: impl Fn(usize) -> f64,
+    x: &[Vector3<f64>],
+    vertices: impl IntoIterator<Item = usize>,
+) -> Vec<Touch> {
+    let near = vertices.into_iter().filter(|&vertex| solid.signed_distance(x[vertex]) < thickness);
     let touch = |vertex: usize| {
-        let gradient = solid.contact(x[vertex], stiffness[vertex], thickness)?.gradient(&[x[vertex]]).gradient[0];
+        let gradient = solid.contact(x[vertex], stiffness(vertex), thickness)?.gradient(&[x[vertex]]).gradient[0];
         let force = norm(gradient);
         (force > 0.0).then(|| Touch { vertex, normal: gradient.map(|component| -component / force), force })
     };

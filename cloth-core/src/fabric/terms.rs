@@ -452,9 +452,11 @@ impl Garment {
     fn list<E: Element, const N: usize>(
         &self,
         name: &str,
-        elements: Vec<E>,
+        mut elements: Vec<E>,
         stencils: &[[usize; N]],
     ) -> Result<ElementList<E>, ListError> {
+        // They stay for as long as the cloth does.
+        elements.shrink_to_fit();
         let Place { first, prefix } = &self.place;
         let stencils: Vec<[usize; N]> = stencils.iter().map(|stencil| stencil.map(|vertex| first + vertex)).collect();
         ElementList::new(format!("{prefix}{name}"), elements, &stencils)

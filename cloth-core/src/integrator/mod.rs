@@ -168,6 +168,28 @@ pub enum StepError {
     },
 }
 
+impl StepError {
+    /// The same of a body whose vertices have these numbers in the whole.
+    #[must_use]
+    pub(crate) fn on_vertices(self, vertices: &[usize]) -> Self {
+        match self {
+            Self::Evaluation(EvaluationError::NonFiniteState { what, vertex, value }) => {
+                EvaluationError::NonFiniteState { what, vertex: vertices[vertex], value }.into()
+            }
+            Self::Evaluation(EvaluationError::NonFiniteElement { term, element, vertices: stencil, what }) => {
+                let vertices = stencil.iter().map(|&vertex| vertices[vertex]).collect();
+                EvaluationError::NonFiniteElement { term, element, vertices, what }.into()
+            }
+            Self::NotSolved { iterations, stopped, residual, target, vertex } => {
+                Self::NotSolved { iterations, stopped, residual, target, vertex: vertices[vertex] }
+            }
+            Self::NonFinite { vertex, position } => Self::NonFinite { vertex: vertices[vertex], position },
+            Self::Hopeless { dt, reason } => Self::Hopeless { dt, reason: Box::new(reason.on_vertices(vertices)) },
+            other => other,
+        }
+    }
+}
+
 /// The schemes on offer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

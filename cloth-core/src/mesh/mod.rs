@@ -2,6 +2,7 @@
 
 mod disc;
 mod obj;
+mod pieces;
 mod rest;
 mod sheet;
 mod strip;
@@ -10,6 +11,7 @@ mod triangle_mesh;
 
 pub use disc::Disc;
 pub use obj::{ObjError, read_obj};
+pub(crate) use pieces::Groups;
 pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle, vertex_angles};
 pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};
 pub use strip::Strip;

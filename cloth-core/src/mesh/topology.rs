@@ -1,5 +1,3 @@
-use std::collections::BTreeMap;
-
 use super::{Sheet, TriangleMesh};
 
 /// Two triangles that share an edge.
@@ -25,38 +23,27 @@ impl Topology {
     /// The edges and hinges of a mesh.
     #[must_use]
     pub fn of(mesh: &TriangleMesh) -> Self {
-        let mut sides: BTreeMap<[usize; 2], Vec<Side>> = BTreeMap::new();
-        for (triangle, &[a, b, c]) in mesh.triangles().iter().enumerate() {
-            for (start, end, apex) in [(a, b, c), (b, c, a), (c, a, b)] {
-                sides.entry([start.min(end), start.max(end)]).or_default().push(Side {
-                    triangle,
-                    apex,
-                    edge: [start, end],
-                });
-            }
-        }
-        let hinge = |sides: &Vec<Side>| match &sides[..] {
+        let sides = Side::all(mesh);
+        let both_ways = || sides.chunk_by(|a, b| a.ends() == b.ends());
+        let hinge = |sides: &[Side]| match sides {
             [first, second] => Some(Hinge {
                 vertices: [first.apex, second.apex, first.edge[0], first.edge[1]],
                 triangles: [first.triangle, second.triangle],
             }),
             _ => None,
         };
-        Self { hinges: sides.values().filter_map(hinge).collect(), edges: sides.into_keys().collect() }
+        Self {
+            hinges: both_ways().filter_map(hinge).collect(),
+            edges: both_ways().map(|sides| sides[0].ends()).collect(),
+        }
     }
-}
 
-impl Topology {
     /// The vertices on the edge of the mesh, ascending.
     #[must_use]
-    pub fn boundary(&self, mesh: &TriangleMesh) -> Vec<usize> {
-        let mut sides = BTreeMap::new();
-        for &[a, b, c] in mesh.triangles() {
-            for [start, end] in [[a, b], [b, c], [c, a]] {
-                *sides.entry([start.min(end), start.max(end)]).or_insert(0) += 1;
-            }
-        }
-        let mut vertices: Vec<usize> = self.edges.iter().filter(|edge| sides[*edge] == 1).flatten().copied().collect();
+    pub fn boundary(mesh: &TriangleMesh) -> Vec<usize> {
+        let sides = Side::all(mesh);
+        let lonely = sides.chunk_by(|a, b| a.ends() == b.ends()).filter(|sides| sides.len() == 1);
+        let mut vertices: Vec<usize> = lonely.flat_map(|sides| sides[0].edge).collect();
         vertices.sort_unstable();
         vertices.dedup();
         vertices
@@ -68,6 +55,25 @@ struct Side {
     triangle: usize,
     apex: usize,
     edge: [usize; 2],
+}
+
+impl Side {
+    /// Those of all triangles, the ones along an edge one after the other, edges ascending.
+    fn all(mesh: &TriangleMesh) -> Vec<Self> {
+        let of = |(triangle, &[a, b, c]): (usize, &[usize; 3])| {
+            [(a, b, c), (b, c, a), (c, a, b)].map(|(start, end, apex)| Self { triangle, apex, edge: [start, end] })
+        };
+        let mut sides: Vec<Self> = mesh.triangles().iter().enumerate().flat_map(of).collect();
+        // Triangles along an edge keep their order.
+        sides.sort_by_key(Self::ends);
+        sides
+    }
+
+    /// The smaller vertex first.
+    fn ends(&self) -> [usize; 2] {
+        let [start, end] = self.edge;
+        [start.min(end), start.max(end)]
+    }
 }
 
 /// The vertex pairs that a mass-spring fabric joins.

@@ -1,5 +1,3 @@
-use std::collections::BTreeMap;
-
 use energy_dsl::Vector3;
 
 use super::{cross, norm, subtract};
@@ -88,6 +86,11 @@ impl TriangleMesh {
         Ok(Self { vertices, triangles })
     }
 
+    /// What was found valid before.
+    pub(super) fn of_valid(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Self {
+        Self { vertices, triangles }
+    }
+
     /// The same, this many times as large.
     ///
     /// # Errors
@@ -138,14 +141,15 @@ fn check_triangle(triangle: usize, corners: [usize; 3], positions: &[Vector3<f64
 }
 
 fn check_edges(triangles: &[[usize; 3]]) -> Result<(), MeshError> {
-    let mut along: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
-    for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
-        for (start, end) in [(a, b), (b, c), (c, a)] {
-            along.entry([start.min(end), start.max(end)]).or_default().push(triangle);
+    let ends = |a: usize, b: usize| [a.min(b), a.max(b)];
+    let of = |(triangle, &[a, b, c]): (usize, &[usize; 3])| [ends(a, b), ends(b, c), ends(c, a)].map(|e| (e, triangle));
+    let mut along: Vec<([usize; 2], usize)> = triangles.iter().enumerate().flat_map(of).collect();
+    along.sort_unstable();
+    match along.chunk_by(|a, b| a.0 == b.0).find(|along| along.len() > 2) {
+        Some(along) => {
+            let triangles = along.iter().map(|&(_, triangle)| triangle).collect();
+            Err(MeshError::NonManifoldEdge { edge: along[0].0, triangles })
         }
-    }
-    match along.into_iter().find(|(_, triangles)| triangles.len() > 2) {
-        Some((edge, triangles)) => Err(MeshError::NonManifoldEdge { edge, triangles }),
         None => Ok(()),
     }
 }

@@ -3,7 +3,7 @@ use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
 use super::numbers::{finite_triple, non_negative, positive};
-use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam};
+use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
 use crate::fabric::Fabric;
 use crate::integrator::{Scheme, Tolerances};
 use crate::wind::Wind;
@@ -58,6 +58,10 @@ pub(super) struct File {
     /// Whether a step that fails is tried again with half its size, and so on. Default false.
     #[serde(default)]
     adaptive: bool,
+    /// Whether and when what is still falls asleep and costs nothing: `true`, or a table. Default `false`: sleep leaves out what little motion is left.
+    #[serde(default, deserialize_with = "super::sleep::sleep")]
+    #[schemars(with = "super::sleep::SleepChoice")]
+    sleep: Option<Sleep>,
     /// Time step h, in s.
     #[serde(deserialize_with = "positive")]
     dt: f64,
@@ -124,6 +128,7 @@ impl TryFrom<File> for Scene {
             integrator: file.integrator,
             tolerances: file.tolerances,
             adaptive: file.adaptive,
+            sleep: file.sleep,
             dt: file.dt,
             duration: file.duration,
             frames_per_second: file.frames_per_second,

@@ -1,5 +1,6 @@
 //! Scene files: what to simulate, in TOML. Every key is a field below, with its unit; unknown keys are refused.
 
+mod builder;
 mod error;
 mod fabric_choice;
 mod file;
@@ -13,6 +14,7 @@ mod parts;
 mod pins;
 mod schema;
 mod seam;
+mod sleep;
 
 use std::path::{Path, PathBuf};
 
@@ -24,10 +26,11 @@ pub use hair::Hair;
 pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::OutputChoice;
 pub use own_material::with_material;
-pub use parts::{Model, ModelError, MovingPin, Part, PartKind, UnknownPart};
+pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 pub use pins::{Pin, PinBox, PinChoice, PinError};
 pub use schema::schema;
 pub use seam::{Seam, SeamError};
+pub use sleep::Sleep;
 
 use crate::fabric::Material;
 use crate::integrator::{Adaptive, Integrator, Scheme, Tolerances};
@@ -59,6 +62,8 @@ pub struct Scene {
     pub tolerances: Tolerances,
     /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`].
     pub adaptive: bool,
+    /// When what is still falls asleep; `None` for never.
+    pub sleep: Option<Sleep>,
     /// Time step h, in s.
     pub dt: f64,
     /// Time to simulate, in s; rounded to whole steps.

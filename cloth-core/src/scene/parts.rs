@@ -1,17 +1,15 @@
-//! What a scene is made of, put together on one numbering of vertices.
+//! What a scene is made of, on one numbering of vertices.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use energy_dsl::Vector3;
-use energy_elements::ZeroLengthSpring;
-use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
+use energy_solve::{ListError, Term};
 
-use super::seam::Side;
-use super::{Garment, Hair, MeshSourceError, ObstacleError, Pin, PinError, Scene, SeamError, Shape};
+use super::builder::Builder;
+use super::{MeshSourceError, ObstacleError, PinError, Scene, SeamError};
 use crate::contact::Obstacle;
-use crate::fabric::{self, FabricError, Place, Surroundings};
-use crate::mesh::{Topology, TriangleMesh};
+use crate::fabric::FabricError;
+use crate::mesh::TriangleMesh;
 use crate::motion::Motion;
 
 /// A garment or hair of a scene.
@@ -48,8 +46,28 @@ pub struct MovingPin {
     pub motion: usize,
 }
 
+/// Vertices that nothing couples to others, with everything that acts on them.
+#[derive(Debug, Default)]
+pub struct IslandModel {
+    /// Its vertices, by their numbers in the whole.
+    pub vertices: Vec<usize>,
+    /// Everything that acts, on vertices counted within the island.
+    pub terms: Vec<Box<dyn Term>>,
+    /// Which of [`Model::labels`] each term has.
+    pub labels: Vec<usize>,
+}
+
+/// What a term is called, which may act on several islands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TermLabel {
+    /// Its name.
+    pub name: String,
+    /// The declared element it is made of.
+    pub element: &'static str,
+}
+
 /// A scene ready to be simulated.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Model {
     /// Garments, then hair.
     pub parts: Vec<Part>,
@@ -67,8 +85,10 @@ pub struct Model {
     pub moving: Vec<MovingPin>,
     /// How they move.
     pub motions: Vec<Motion>,
-    /// Everything that acts.
-    pub terms: Vec<Box<dyn Term>>,
+    /// What moves on its own.
+    pub islands: Vec<IslandModel>,
+    /// What the terms of the islands are called.
+    pub labels: Vec<TermLabel>,
     /// What was left out because its stiffness is zero, or there is nothing for it to act on.
     pub left_out: Vec<String>,
     /// What should be known about it.
@@ -126,48 +146,13 @@ pub enum ModelError {
     List(#[from] ListError),
 }
 
-/// The model while it grows.
-struct Builder<'a> {
-    scene: &'a Scene,
-    model: Model,
-    /// The vertices on the edges of cloth.
-    edge: Vec<usize>,
-    several: bool,
-}
-
 impl Model {
     /// Puts a scene together.
     ///
     /// # Errors
     /// When a part is unfit, or a name or vertex does not exist.
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
-        let empty = Self {
-            parts: Vec::new(),
-            x: Vec::new(),
-            v: Vec::new(),
-            masses: Vec::new(),
-            triangles: Vec::new(),
-            pinned: Vec::new(),
-            moving: Vec::new(),
-            motions: Vec::new(),
-            terms: Vec::new(),
-            left_out: Vec::new(),
-            warnings: Vec::new(),
-            obstacles: Vec::new(),
-        };
-        let several = scene.garments.len() + scene.hair.len() > 1;
-        let mut builder = Builder { scene, model: empty, edge: Vec::new(), several };
-        for (number, garment) in scene.garments.iter().enumerate() {
-            builder.add_garment(number, garment)?;
-        }
-        for (number, hair) in scene.hair.iter().enumerate() {
-            builder.add_hair(number, hair)?;
-        }
-        builder.check_names()?;
-        builder.add_seams()?;
-        builder.add_surroundings()?;
-        builder.pin()?;
-        Ok(builder.model)
+        Builder::new(scene).model()
     }
 
     /// The strands of hair, each as its vertices.
@@ -177,171 +162,5 @@ impl Model {
             let starts = part.vertices.clone().step_by(joints).filter(move |_| joints < usize::MAX);
             starts.map(move |start| start..start + joints)
         })
-    }
-}
-
-impl Builder<'_> {
-    fn surroundings(&self) -> Surroundings {
-        Surroundings { gravity: self.scene.gravity, drag: self.scene.drag }
-    }
-
-    fn add_part(&mut self, name: String, vertices: usize, kind: PartKind) {
-        let first = self.model.x.len() - vertices;
-        self.model.parts.push(Part { name, vertices: first..first + vertices, kind });
-    }
-
-    fn add_garment(&mut self, number: usize, garment: &Garment) -> Result<(), ModelError> {
-        let part = garment.name.clone().unwrap_or_else(|| format!("garment {number}"));
-        let mesh_error = |source| ModelError::Mesh { part: part.clone(), source };
-        let Shape { mesh, start, velocities, springs } = garment.shape(&self.scene.folder).map_err(mesh_error)?;
-        let first = self.model.x.len();
-        let laid = fabric::terms_at(&garment.fabric, &mesh, &springs, &self.surroundings(), self.place(first, &part));
-        self.add_laid(laid.map_err(|source| ModelError::Fabric { part: part.clone(), source })?);
-        let model = &mut self.model;
-        model.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
-        model.x.extend(start);
-        model.v.extend(velocities);
-        self.edge.extend(Topology::of(&mesh).boundary(&mesh).iter().map(|vertex| first + vertex));
-        self.add_part(part, mesh.vertices().len(), PartKind::Cloth(mesh));
-        Ok(())
-    }
-
-    fn add_hair(&mut self, number: usize, hair: &Hair) -> Result<(), ModelError> {
-        let part = hair.name.clone().unwrap_or_else(|| format!("hair {number}"));
-        let laid = fabric::hair_terms(hair, &self.surroundings(), self.place(self.model.x.len(), &part));
-        self.add_laid(laid.map_err(|source| ModelError::Fabric { part: part.clone(), source })?);
-        let vertices = hair.vertices();
-        let count = vertices.len();
-        self.model.v.extend(vec![[0.0; 3]; count]);
-        self.model.x.extend(vertices);
-        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
-        Ok(())
-    }
-
-    /// Where a part stands, and how the names of its terms start.
-    fn place(&self, first: usize, part: &str) -> Place {
-        Place { first, prefix: if self.several { format!("{part}: ") } else { String::new() } }
-    }
-
-    fn add_laid(&mut self, laid: fabric::Garment) {
-        let model = &mut self.model;
-        model.masses.extend(laid.masses);
-        model.terms.extend(laid.terms);
-        model.left_out.extend(laid.left_out);
-        model.warnings.extend(laid.warnings);
-    }
-
-    fn check_names(&self) -> Result<(), ModelError> {
-        let mut names = BTreeSet::new();
-        match self.model.parts.iter().find(|part| !names.insert(&part.name)) {
-            Some(part) => Err(ModelError::SameName { name: part.name.clone() }),
-            None => Ok(()),
-        }
-    }
-
-    fn part(&self, name: &str) -> Result<&Part, UnknownPart> {
-        let known = || self.model.parts.iter().map(|part| part.name.clone()).collect();
-        let found = self.model.parts.iter().find(|part| part.name == name);
-        found.ok_or_else(|| UnknownPart { name: name.to_owned(), known: known() })
-    }
-
-    /// The vertices on the edge of a range, counted within it.
-    fn edge_within(&self, range: &Range<usize>) -> Vec<usize> {
-        self.edge.iter().filter(|vertex| range.contains(vertex)).map(|vertex| vertex - range.start).collect()
-    }
-
-    fn add_seams(&mut self) -> Result<(), ModelError> {
-        for (seam, description) in self.scene.seams.iter().enumerate() {
-            let [first, second] = &description.garments;
-            let named = |name: &str| self.part(name).map_err(|error| SeamError::Name { seam, error });
-            let ranges = [named(first)?.vertices.clone(), named(second)?.vertices.clone()];
-            let edges = [&ranges[0], &ranges[1]].map(|range| self.edge_within(range));
-            let side = |at: usize| Side { start: &self.model.x[ranges[at].clone()], edge: &edges[at] };
-            let joined = description.joined(seam, [side(0), side(1)])?;
-            let pairs: Vec<[usize; 2]> =
-                joined.iter().map(|[p, q]| [ranges[0].start + p, ranges[1].start + q]).collect();
-            let stitches = vec![ZeroLengthSpring::new(description.stiffness, description.damping); pairs.len()];
-            let list = ElementList::new(format!("seam {seam}"), stitches, &pairs)?;
-            let term: Box<dyn Term> = if description.damping == 0.0 {
-                Box::new(PotentialTerm::new(list))
-            } else {
-                Box::new(ForceTerm::new(list).with_energy())
-            };
-            self.model.terms.push(term);
-        }
-        Ok(())
-    }
-
-    fn add_surroundings(&mut self) -> Result<(), ObstacleError> {
-        let model = &mut self.model;
-        if let Some(wind) = &self.scene.wind {
-            if model.triangles.is_empty() {
-                model.left_out.push("wind: nothing to act on".to_owned());
-            } else {
-                model.terms.push(wind.term(&model.triangles));
-            }
-        }
-        let obstacles = self.scene.obstacles.iter().enumerate();
-        let obstacles = obstacles.map(|(number, one)| one.obstacle(number, &self.scene.folder));
-        model.obstacles = obstacles.collect::<Result<_, _>>()?;
-        for obstacle in &model.obstacles {
-            model.terms.extend(obstacle.terms(&model.masses));
-        }
-        Ok(())
-    }
-
-    fn pin(&mut self) -> Result<(), ModelError> {
-        // The motion of each pinned vertex.
-        let mut held: BTreeMap<usize, Option<usize>> = BTreeMap::new();
-        for (pin, description) in self.scene.pins.iter().enumerate() {
-            let motion = description.motion.as_ref().map(|motion| {
-                self.model.motions.push(motion.clone());
-                self.model.motions.len() - 1
-            });
-            for vertex in self.chosen(pin, description)? {
-                let same = |other: Option<usize>| {
-                    let of = |motion: Option<usize>| motion.map(|number| &self.model.motions[number]);
-                    of(other) == of(motion)
-                };
-                if held.get(&vertex).is_some_and(|&other| !same(other)) {
-                    return Err(PinError::Twice { pin, vertex }.into());
-                }
-                held.entry(vertex).or_insert(motion);
-            }
-        }
-        for vertex in self.roots() {
-            held.entry(vertex).or_insert(None);
-        }
-        let model = &mut self.model;
-        model.pinned = (0..model.x.len()).map(|vertex| held.contains_key(&vertex)).collect();
-        for (vertex, motion) in held {
-            model.v[vertex] = [0.0; 3];
-            if let Some(motion) = motion {
-                let drawn = model.x[vertex];
-                model.moving.push(MovingPin { vertex, drawn, motion });
-                model.x[vertex] = model.motions[motion].pose(0.0).applied(drawn);
-            }
-        }
-        Ok(())
-    }
-
-    fn chosen(&self, pin: usize, description: &Pin) -> Result<Vec<usize>, PinError> {
-        let range = match &description.of {
-            Some(name) => self.part(name).map_err(|error| PinError::Name { pin, error })?.vertices.clone(),
-            None => 0..self.model.x.len(),
-        };
-        let edge = self.edge_within(&range);
-        let chosen = description.chosen(pin, &self.model.x[range.clone()], &edge)?;
-        Ok(chosen.into_iter().map(|vertex| range.start + vertex).collect())
-    }
-
-    /// The first two vertices of each rooted strand: they keep its place and direction.
-    fn roots(&self) -> Vec<usize> {
-        let hairs = self.model.parts.iter().filter(|part| matches!(part.kind, PartKind::Hair { .. }));
-        let rooted = hairs.zip(&self.scene.hair).filter(|(_, hair)| hair.rooted);
-        let roots = |(part, hair): (&Part, &Hair)| {
-            part.vertices.clone().step_by(hair.segments + 1).flat_map(|start| [start, start + 1]).collect::<Vec<_>>()
-        };
-        rooted.flat_map(roots).collect()
     }
 }

@@ -11,6 +11,7 @@ mod elastica;
 mod equilibrium;
 mod hanging_strip;
 mod lateral_buckling;
+mod long_run;
 mod modes;
 mod momentum;
 mod orders;
@@ -114,7 +115,8 @@ pub enum ValidateError {
 }
 
 /// The questions.
-pub const QUESTIONS: [&str; 7] = ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum"];
+pub const QUESTIONS: [&str; 8] =
+    ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "long-run"];
 
 /// Asks the questions named (all, if none is), telling each finding as it is made. `quick` leaves out the finer meshes.
 ///
@@ -122,7 +124,7 @@ pub const QUESTIONS: [&str; 7] = ["cantilever", "buckling", "catenary", "hanging
 /// When a case cannot be set up or solved.
 pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
-    let all: [Ask; 7] = [
+    let all: [Ask; 8] = [
         cantilever::ask,
         lateral_buckling::ask,
         catenary::ask,
@@ -130,6 +132,7 @@ pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Res
         modes::ask,
         orders::ask,
         momentum::ask,
+        long_run::ask,
     ];
     let mut findings = Vec::new();
     for (name, ask) in QUESTIONS.into_iter().zip(all) {

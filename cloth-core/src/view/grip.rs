@@ -6,6 +6,7 @@ use energy_elements::ZeroLengthSpring;
 use energy_solve::{Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term};
 
 use crate::mesh::dot;
+use crate::scene::{IslandModel, TermLabel};
 
 /// A hand: a soft pin that holds one vertex while the mouse does, by the declared [`ZeroLengthSpring`] to where the mouse is.
 #[derive(Clone, Debug)]
@@ -44,26 +45,39 @@ impl Grip {
         self.held.set(None);
     }
 
-    /// Its force on that many vertices.
-    pub(super) fn term(&self, vertices: usize) -> Box<dyn Term> {
-        Box::new(GripTerm { grip: self.clone(), stencils: (0..vertices).collect(), slots: vec![None; vertices] })
+    /// What its terms are called.
+    pub(super) fn label() -> TermLabel {
+        TermLabel { name: NAME.to_owned(), element: <ZeroLengthSpring as Element>::DECLARATION.name }
+    }
+
+    /// Adds its force to those of an island.
+    pub(super) fn hold_on(&self, island: &mut IslandModel, label: usize) {
+        let vertices = island.vertices.clone();
+        let (stencils, slots) = ((0..vertices.len()).collect(), vec![None; vertices.len()]);
+        island.terms.push(Box::new(GripTerm { grip: self.clone(), vertices, stencils, slots }));
+        island.labels.push(label);
     }
 }
+
+const NAME: &str = "mouse";
 
 /// Any vertex may be held; the blocks are on the diagonal, so that the pattern of the matrix never changes.
 #[derive(Debug)]
 struct GripTerm {
     grip: Grip,
+    /// By their numbers in the whole.
+    vertices: Vec<usize>,
     stencils: Vec<usize>,
     /// Where the diagonal block of each vertex is stored; `None` where it is pinned.
     slots: Vec<Option<usize>>,
 }
 
 impl GripTerm {
-    /// What is held and free, with its block's place.
+    /// What is held and free, counted within the island, with its block's place.
     fn held(&self) -> Option<(Held, usize)> {
         let held = self.grip.held.get()?;
-        Some((held, (*self.slots.get(held.vertex)?)?))
+        let vertex = self.vertices.iter().position(|&vertex| vertex == held.vertex)?;
+        Some((Held { vertex, ..held }, self.slots[vertex]?))
     }
 
     fn tally(&self) -> Tally {
@@ -74,7 +88,7 @@ impl GripTerm {
 
 impl Term for GripTerm {
     fn name(&self) -> &str {
-        "mouse"
+        NAME
     }
 
     fn declaration(&self) -> &'static Declaration {

@@ -110,7 +110,10 @@ impl Stage {
     fn live(scene: Scene) -> Result<Self, ViewError> {
         let mut model = Model::new(&scene)?;
         let grip = Grip::carrying(&model.masses);
-        model.terms.push(grip.term(model.masses.len()));
+        for island in &mut model.islands {
+            grip.hold_on(island, model.labels.len());
+        }
+        model.labels.push(Grip::label());
         let simulation = Simulation::of(&scene, model)?;
         let rest = RestShape::of(&simulation);
         Ok(Self { scene, simulation, rest, act: Act::Live { grip }, playing: true, due: 0.0 })
@@ -120,7 +123,7 @@ impl Stage {
         let record = Record::read(folder)?;
         let scene = Scene::parse(&record.scene, &record.path)?;
         let simulation = Simulation::new(&scene)?;
-        let vertices = simulation.body().x.len();
+        let vertices = simulation.positions().len();
         let frames = (0..record.frames).map(|number| read_frame(folder, number, vertices));
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
         let rest = RestShape::of(&simulation);
@@ -169,8 +172,8 @@ impl Stage {
     #[must_use]
     pub fn positions(&self) -> &[Vector3<f64>] {
         match &self.act {
-            Act::Live { .. } => &self.simulation.body().x,
-            Act::Recorded { frames, now } => frames.get(*now).unwrap_or(&self.simulation.body().x),
+            Act::Live { .. } => self.simulation.positions(),
+            Act::Recorded { frames, now } => frames.get(*now).map_or(self.simulation.positions(), Vec::as_slice),
         }
     }
 
@@ -187,7 +190,7 @@ impl Stage {
                     let moved = frames[*now - 1].iter().zip(x).map(|(before, after)| norm(subtract(*after, *before)));
                     moved.map(|way| way / self.frame_time()).collect()
                 }
-                _ => self.simulation.body().v.iter().map(|&v| norm(v)).collect(),
+                _ => self.simulation.velocities().iter().map(|&v| norm(v)).collect(),
             },
         }
     }
@@ -308,10 +311,10 @@ impl Stage {
 
     /// Holds a vertex there, in m, by a soft spring; whether it can be held: it is simulated and not pinned.
     pub fn hold(&mut self, vertex: usize, target: Vector3<f64>) -> bool {
-        let free = self.simulation.body().system.dofs().place(vertex).is_some();
         match &self.act {
-            Act::Live { grip } if free => {
+            Act::Live { grip } if !self.simulation.is_pinned(vertex) => {
                 grip.hold(vertex, target);
+                self.simulation.wake(vertex);
                 true
             }
             _ => false,
@@ -329,8 +332,9 @@ impl Stage {
 
     /// Lets go of what is held.
     pub fn let_go(&mut self) {
-        if let Act::Live { grip } = &self.act {
+        if let (Act::Live { grip }, Some(vertex)) = (&self.act, self.held()) {
             grip.let_go();
+            self.simulation.wake(vertex);
         }
     }
 }
@@ -417,7 +421,7 @@ mod tests {
         while !plain.is_finished() {
             plain.step().unwrap();
         }
-        assert_eq!(stage.positions(), plain.body().x);
+        assert_eq!(stage.positions(), plain.positions());
         let (strains, speeds) = (stage.values(Colouring::Strain), stage.values(Colouring::Speed));
         assert!(strains.iter().all(|strain| *strain >= 0.0) && strains.iter().any(|strain| *strain > 1e-6));
         assert!(speeds[0] == 0.0 && speeds[24] > 0.1);
@@ -434,9 +438,9 @@ mod tests {
         stage.advance(0.05, || false).unwrap();
         assert!((stage.time() - 0.04).abs() < 1e-12);
         stage.go_to(Moment::End, || ()).unwrap();
-        let apart = subtract(stage.positions()[24], run.simulation().body().x[24]);
+        let apart = subtract(stage.positions()[24], run.simulation().positions()[24]);
         assert!(norm(apart) < 1e-8 && (stage.time() - 0.2).abs() < 1e-12);
-        let (shown, exact) = (stage.values(Colouring::Speed)[24], norm(run.simulation().body().v[24]));
+        let (shown, exact) = (stage.values(Colouring::Speed)[24], norm(run.simulation().velocities()[24]));
         assert!((shown / exact - 1.0).abs() < 0.1, "{shown} {exact}");
         stage.step().unwrap();
         assert!((stage.time() - 0.2).abs() < 1e-12, "stays at the end");

@@ -1,0 +1,376 @@
+//! How a scene is put together: shapes first, then what hangs together, then everything that acts.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use energy_elements::ZeroLengthSpring;
+use energy_solve::{ElementList, ForceTerm, PotentialTerm, Term};
+
+use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
+use super::seam::Side;
+use super::{Garment, Hair, ObstacleError, Pin, PinError, Scene, SeamError, Shape};
+use crate::fabric::{self, Place, Surroundings};
+use crate::mesh::{Groups, SpringNetwork, Topology, TriangleMesh};
+
+/// A model while it grows.
+pub(super) struct Builder<'a> {
+    scene: &'a Scene,
+    model: Model,
+    /// The vertices on the edges of cloth.
+    edge: Vec<usize>,
+    several: bool,
+    pieces: Vec<Piece>,
+    /// What springs would join, of each garment.
+    springs: Vec<SpringNetwork>,
+    homes: Vec<Home>,
+}
+
+/// What hangs together of a part without its seams.
+struct Piece {
+    part: usize,
+    /// Its vertices, counted within the part.
+    vertices: Vec<usize>,
+}
+
+/// Where a vertex is: its island, and its place among the vertices of it.
+#[derive(Clone, Copy, Default)]
+struct Home {
+    island: usize,
+    place: usize,
+}
+
+/// Pieces of a garment with fewer vertices are one body: what each costs by itself would be more than what its sleep could save.
+const CRUMB: usize = 64;
+
+impl<'a> Builder<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Self {
+        let several = scene.garments.len() + scene.hair.len() > 1;
+        let (model, edge, pieces) = (Model::default(), Vec::new(), Vec::new());
+        Self { scene, model, edge, several, pieces, springs: Vec::new(), homes: Vec::new() }
+    }
+
+    pub(super) fn model(mut self) -> Result<Model, ModelError> {
+        for (number, garment) in self.scene.garments.iter().enumerate() {
+            self.add_garment(number, garment)?;
+        }
+        for (number, hair) in self.scene.hair.iter().enumerate() {
+            self.add_hair(number, hair);
+        }
+        self.check_names()?;
+        let seams = self.seams()?;
+        self.divide(&seams);
+        self.lay_garments()?;
+        self.lay_hair()?;
+        self.add_seams(&seams)?;
+        self.add_wind();
+        self.add_obstacles()?;
+        self.pin()?;
+        Ok(self.model)
+    }
+
+    fn surroundings(&self) -> Surroundings {
+        Surroundings { gravity: self.scene.gravity, drag: self.scene.drag }
+    }
+
+    /// A part whose vertices were just added, and its pieces.
+    fn add_part(&mut self, name: String, vertices: usize, kind: PartKind) {
+        let (part, first) = (self.model.parts.len(), self.model.x.len() - vertices);
+        let pieces = match &kind {
+            PartKind::Cloth(mesh) => mesh.pieces(CRUMB),
+            // Strands are few vertices each.
+            PartKind::Hair { .. } => vec![(0..vertices).collect()],
+        };
+        self.pieces.extend(pieces.into_iter().map(|vertices| Piece { part, vertices }));
+        self.model.parts.push(Part { name, vertices: first..first + vertices, kind });
+    }
+
+    fn add_garment(&mut self, number: usize, garment: &Garment) -> Result<(), ModelError> {
+        let part = garment.name.clone().unwrap_or_else(|| format!("garment {number}"));
+        let shape = garment.shape(&self.scene.folder);
+        let Shape { mesh, start, velocities, springs } =
+            shape.map_err(|source| ModelError::Mesh { part: part.clone(), source })?;
+        let model = &mut self.model;
+        let first = model.x.len();
+        model.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
+        model.x.extend(start);
+        model.v.extend(velocities);
+        self.edge.extend(Topology::boundary(&mesh).iter().map(|vertex| first + vertex));
+        self.springs.push(springs);
+        self.add_part(part, mesh.vertices().len(), PartKind::Cloth(mesh));
+        Ok(())
+    }
+
+    fn add_hair(&mut self, number: usize, hair: &Hair) {
+        let part = hair.name.clone().unwrap_or_else(|| format!("hair {number}"));
+        let vertices = hair.vertices();
+        let count = vertices.len();
+        self.model.v.extend(vec![[0.0; 3]; count]);
+        self.model.x.extend(vertices);
+        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
+    }
+
+    fn check_names(&self) -> Result<(), ModelError> {
+        let mut names = BTreeSet::new();
+        match self.model.parts.iter().find(|part| !names.insert(&part.name)) {
+            Some(part) => Err(ModelError::SameName { name: part.name.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    fn part(&self, name: &str) -> Result<&Part, UnknownPart> {
+        let known = || self.model.parts.iter().map(|part| part.name.clone()).collect();
+        let found = self.model.parts.iter().find(|part| part.name == name);
+        found.ok_or_else(|| UnknownPart { name: name.to_owned(), known: known() })
+    }
+
+    /// The vertices on the edge of a range, counted within it.
+    fn edge_within(&self, range: &Range<usize>) -> Vec<usize> {
+        self.edge.iter().filter(|vertex| range.contains(vertex)).map(|vertex| vertex - range.start).collect()
+    }
+
+    /// The pairs of vertices that each seam joins.
+    fn seams(&self) -> Result<Vec<Vec<[usize; 2]>>, ModelError> {
+        let joined = |(seam, description): (usize, &super::Seam)| {
+            let [first, second] = &description.garments;
+            let named = |name: &str| self.part(name).map_err(|error| SeamError::Name { seam, error });
+            let ranges = [named(first)?.vertices.clone(), named(second)?.vertices.clone()];
+            let edges = [&ranges[0], &ranges[1]].map(|range| self.edge_within(range));
+            let side = |at: usize| Side { start: &self.model.x[ranges[at].clone()], edge: &edges[at] };
+            let joined = description.joined(seam, [side(0), side(1)])?;
+            Ok(joined.iter().map(|[p, q]| [ranges[0].start + p, ranges[1].start + q]).collect())
+        };
+        self.scene.seams.iter().enumerate().map(joined).collect()
+    }
+
+    /// Makes islands of the pieces: those that seams join are one.
+    fn divide(&mut self, seams: &[Vec<[usize; 2]>]) {
+        let mut piece_of = vec![0; self.model.x.len()];
+        for (number, piece) in self.pieces.iter().enumerate() {
+            let first = self.model.parts[piece.part].vertices.start;
+            piece.vertices.iter().for_each(|vertex| piece_of[first + vertex] = number);
+        }
+        let mut groups = Groups::apart(self.pieces.len());
+        seams.iter().flatten().for_each(|&[p, q]| groups.join(piece_of[p], piece_of[q]));
+        self.homes = vec![Home::default(); self.model.x.len()];
+        for (piece, island) in self.pieces.iter().zip(groups.numbers()) {
+            if island == self.model.islands.len() {
+                self.model.islands.push(IslandModel::default());
+            }
+            let (members, first) =
+                (&mut self.model.islands[island].vertices, self.model.parts[piece.part].vertices.start);
+            for vertex in piece.vertices.iter().map(|vertex| first + vertex) {
+                self.homes[vertex] = Home { island, place: members.len() };
+                members.push(vertex);
+            }
+        }
+    }
+
+    /// Adds a term to an island. If another island has the same one among the labels from `since` on, they are summed up as one.
+    fn add_term(&mut self, island: usize, since: usize, term: Box<dyn Term>) {
+        let (name, element) = (term.name(), term.declaration().name);
+        let labels = &mut self.model.labels;
+        let known = labels[since..].iter().position(|label| label.name == name && label.element == element);
+        let label = known.map_or(labels.len(), |at| since + at);
+        if label == labels.len() {
+            labels.push(TermLabel { name: name.to_owned(), element });
+        }
+        let island = &mut self.model.islands[island];
+        island.labels.push(label);
+        island.terms.push(term);
+    }
+
+    /// Where a piece stands among the vertices of its island, and how the names of its terms start.
+    fn place(&self, piece: &Piece) -> (usize, Place) {
+        let part = &self.model.parts[piece.part];
+        let Home { island, place } = self.homes[part.vertices.start + piece.vertices[0]];
+        let prefix = if self.several { format!("{}: ", part.name) } else { String::new() };
+        (island, Place { first: place, prefix })
+    }
+
+    /// Adds what was laid on a piece; `since` is the number of labels before its part.
+    fn add_laid(&mut self, piece: &Piece, since: usize, laid: fabric::Garment) {
+        let (island, _) = self.place(piece);
+        let first = self.model.parts[piece.part].vertices.start;
+        piece.vertices.iter().zip(laid.masses).for_each(|(vertex, mass)| self.model.masses[first + vertex] = mass);
+        laid.terms.into_iter().for_each(|term| self.add_term(island, since, term));
+        let acts = |reason: &String| {
+            self.model.labels[since..].iter().any(|label| *reason == format!("{}: nothing to act on", label.name))
+        };
+        let left_out: Vec<String> = laid.left_out.into_iter().filter(|reason| !acts(reason)).collect();
+        add_once(&mut self.model.left_out, left_out);
+        add_once(&mut self.model.warnings, laid.warnings);
+    }
+
+    fn lay_garments(&mut self) -> Result<(), ModelError> {
+        self.model.masses = vec![0.0; self.model.x.len()];
+        let springs = std::mem::take(&mut self.springs);
+        for (part, (garment, springs)) in self.scene.garments.iter().zip(&springs).enumerate() {
+            let since = self.model.labels.len();
+            let pieces: Vec<Piece> = self.take_pieces(part);
+            for piece in &pieces {
+                let laid = self.laid(garment, piece, springs, pieces.len() == 1);
+                self.add_laid(piece, since, laid?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The pieces of a part, which come first now.
+    fn take_pieces(&mut self, part: usize) -> Vec<Piece> {
+        let count = self.pieces.iter().take_while(|piece| piece.part == part).count();
+        self.pieces.drain(..count).collect()
+    }
+
+    /// The terms of a garment on one of its pieces, which may be the whole.
+    fn laid(
+        &self,
+        garment: &Garment,
+        piece: &Piece,
+        springs: &SpringNetwork,
+        is_whole: bool,
+    ) -> Result<fabric::Garment, ModelError> {
+        let part = &self.model.parts[piece.part];
+        let PartKind::Cloth(mesh) = &part.kind else { unreachable!("garments come before hair") };
+        let (_, place) = self.place(piece);
+        let lay = |mesh: &TriangleMesh, springs: &SpringNetwork| {
+            fabric::terms_at(&garment.fabric, mesh, springs, &self.surroundings(), place.clone())
+        };
+        let laid = if is_whole {
+            lay(mesh, springs)
+        } else {
+            let (mesh_of_piece, springs_of_piece) = mesh.piece(&piece.vertices, springs);
+            // Errors name triangles: the whole has them by the numbers that users know.
+            lay(&mesh_of_piece, &springs_of_piece).or_else(|error| lay(mesh, springs).and(Err(error)))
+        };
+        laid.map_err(|source| ModelError::Fabric { part: part.name.clone(), source })
+    }
+
+    fn lay_hair(&mut self) -> Result<(), ModelError> {
+        for (number, hair) in self.scene.hair.iter().enumerate() {
+            let (part, since) = (self.scene.garments.len() + number, self.model.labels.len());
+            for piece in self.take_pieces(part) {
+                let laid = fabric::hair_terms(hair, &self.surroundings(), self.place(&piece).1);
+                let name = || self.model.parts[part].name.clone();
+                let laid = laid.map_err(|source| ModelError::Fabric { part: name(), source })?;
+                self.add_laid(&piece, since, laid);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_seams(&mut self, seams: &[Vec<[usize; 2]>]) -> Result<(), ModelError> {
+        for (seam, (description, joined)) in self.scene.seams.iter().zip(seams).enumerate() {
+            // Its pairs may be on several islands, as where a mesh of many pieces is sewn to itself.
+            let mut pairs: BTreeMap<usize, Vec<[usize; 2]>> = BTreeMap::new();
+            for pair in joined.iter().map(|pair| pair.map(|vertex| self.homes[vertex])) {
+                pairs.entry(pair[0].island).or_default().push(pair.map(|home| home.place));
+            }
+            let since = self.model.labels.len();
+            for (island, pairs) in pairs {
+                let stitches = vec![ZeroLengthSpring::new(description.stiffness, description.damping); pairs.len()];
+                let list = ElementList::new(format!("seam {seam}"), stitches, &pairs)?;
+                let term: Box<dyn Term> = if description.damping == 0.0 {
+                    Box::new(PotentialTerm::new(list))
+                } else {
+                    Box::new(ForceTerm::new(list).with_energy())
+                };
+                self.add_term(island, since, term);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_wind(&mut self) {
+        let Some(wind) = &self.scene.wind else { return };
+        if self.model.triangles.is_empty() {
+            self.model.left_out.push("wind: nothing to act on".to_owned());
+        }
+        let since = self.model.labels.len();
+        let mut triangles = vec![Vec::new(); self.model.islands.len()];
+        for corners in &self.model.triangles {
+            triangles[self.homes[corners[0]].island].push(corners.map(|corner| self.homes[corner].place));
+        }
+        for (island, triangles) in triangles.iter().enumerate().filter(|(_, triangles)| !triangles.is_empty()) {
+            self.add_term(island, since, wind.term(triangles));
+        }
+    }
+
+    fn add_obstacles(&mut self) -> Result<(), ObstacleError> {
+        let obstacles = self.scene.obstacles.iter().enumerate();
+        let obstacles = obstacles.map(|(number, one)| one.obstacle(number, &self.scene.folder));
+        let obstacles = obstacles.collect::<Result<Vec<_>, _>>()?;
+        let masses = |island: &IslandModel| island.vertices.iter().map(|&vertex| self.model.masses[vertex]).collect();
+        let masses: Vec<Vec<f64>> = self.model.islands.iter().map(masses).collect();
+        for obstacle in &obstacles {
+            let since = self.model.labels.len();
+            for (island, masses) in masses.iter().enumerate() {
+                obstacle.terms(masses).into_iter().for_each(|term| self.add_term(island, since, term));
+            }
+        }
+        self.model.obstacles = obstacles;
+        Ok(())
+    }
+
+    fn pin(&mut self) -> Result<(), ModelError> {
+        // The motion of each pinned vertex.
+        let mut held: BTreeMap<usize, Option<usize>> = BTreeMap::new();
+        for (pin, description) in self.scene.pins.iter().enumerate() {
+            let motion = description.motion.as_ref().map(|motion| {
+                self.model.motions.push(motion.clone());
+                self.model.motions.len() - 1
+            });
+            for vertex in self.chosen(pin, description)? {
+                let same = |other: Option<usize>| {
+                    let of = |motion: Option<usize>| motion.map(|number| &self.model.motions[number]);
+                    of(other) == of(motion)
+                };
+                if held.get(&vertex).is_some_and(|&other| !same(other)) {
+                    return Err(PinError::Twice { pin, vertex }.into());
+                }
+                held.entry(vertex).or_insert(motion);
+            }
+        }
+        for vertex in self.roots() {
+            held.entry(vertex).or_insert(None);
+        }
+        let model = &mut self.model;
+        model.pinned = (0..model.x.len()).map(|vertex| held.contains_key(&vertex)).collect();
+        for (vertex, motion) in held {
+            model.v[vertex] = [0.0; 3];
+            if let Some(motion) = motion {
+                let drawn = model.x[vertex];
+                model.moving.push(MovingPin { vertex, drawn, motion });
+                model.x[vertex] = model.motions[motion].pose(0.0).applied(drawn);
+            }
+        }
+        Ok(())
+    }
+
+    fn chosen(&self, pin: usize, description: &Pin) -> Result<Vec<usize>, PinError> {
+        let range = match &description.of {
+            Some(name) => self.part(name).map_err(|error| PinError::Name { pin, error })?.vertices.clone(),
+            None => 0..self.model.x.len(),
+        };
+        let edge = self.edge_within(&range);
+        let chosen = description.chosen(pin, &self.model.x[range.clone()], &edge)?;
+        Ok(chosen.into_iter().map(|vertex| range.start + vertex).collect())
+    }
+
+    /// The first two vertices of each rooted strand: they keep its place and direction.
+    fn roots(&self) -> Vec<usize> {
+        let hairs = self.model.parts.iter().filter(|part| matches!(part.kind, PartKind::Hair { .. }));
+        let rooted = hairs.zip(&self.scene.hair).filter(|(_, hair)| hair.rooted);
+        let roots = |(part, hair): (&Part, &Hair)| {
+            part.vertices.clone().step_by(hair.segments + 1).flat_map(|start| [start, start + 1]).collect::<Vec<_>>()
+        };
+        rooted.flat_map(roots).collect()
+    }
+}
+
+fn add_once(all: &mut Vec<String>, more: Vec<String>) {
+    more.into_iter().for_each(|one| {
+        if !all.contains(&one) {
+            all.push(one);
+        }
+    });
+}

@@ -1,0 +1,90 @@
+//! What a run evaluated and what it could leave out, as tables.
+
+use std::fmt::Write as _;
+
+use comfy_table::{CellAlignment, Table, presets};
+use energy_solve::Tally;
+
+use crate::summary::Summary;
+
+/// For each term its elements and, for values, gradients and Hessians, how many were evaluated and skipped (all their vertices are pinned); how many were
+/// flagged or had negative curvature changed, and how many Hessians were known already because they are constant. Then islands, asleep or not, and the
+/// time of each phase, where the integrator tells.
+///
+/// ```
+/// use cloth_core::{Simulation, scene::Scene, stats};
+///
+/// let mut simulation = Simulation::new(&cloth_core::demo::scene()?)?;
+/// simulation.step()?;
+/// let text = stats::tables(&simulation.summary()?);
+/// assert!(text.contains("membrane") && text.contains("1 island"), "{text}");
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+#[must_use]
+pub fn tables(summary: &Summary) -> String {
+    let mut text = format!("{}\n\n{}\n", terms(summary), summary.sleep());
+    if let Some(phases) = phases(summary) {
+        write!(text, "\n{phases}\n").expect("writing to a string succeeds");
+    }
+    text
+}
+
+fn terms(summary: &Summary) -> Table {
+    let mut table = plain([
+        "term",
+        "elements",
+        "value",
+        "skipped",
+        "gradient",
+        "skipped",
+        "Hessian",
+        "skipped",
+        "flagged",
+        "projected",
+        "reused",
+    ]);
+    for term in &summary.terms {
+        let (value, gradient, hessian) = (&term.counts.value, &term.counts.gradient, &term.counts.hessian);
+        let pair = |tally: &Tally| [tally.evaluated, tally.skipped];
+        let flagged = value.flagged + gradient.flagged + hessian.flagged;
+        let numbers = [value, gradient, hessian].into_iter().flat_map(pair);
+        let numbers = numbers.chain([flagged, hessian.projected, term.reused]).map(|number| number.to_string());
+        table.add_row([term.name.clone(), term.elements.to_string()].into_iter().chain(numbers));
+    }
+    aligned(table)
+}
+
+fn phases(summary: &Summary) -> Option<Table> {
+    let phases = summary.named_phases();
+    if phases.iter().all(|(_, time)| time.is_zero()) {
+        return None;
+    }
+    let total = summary.stepping_time;
+    let other = total.saturating_sub(phases.iter().map(|(_, time)| *time).sum());
+    let mut table = plain(["phase", "s", "ms per step", "%"]);
+    for (name, time) in phases.into_iter().chain([("other", other), ("all", total)]) {
+        let seconds = time.as_secs_f64();
+        table.add_row([
+            name.to_owned(),
+            format!("{seconds:.3}"),
+            format!("{:.3}", 1e3 * seconds / summary.steps.max(1) as f64),
+            format!("{:.1}", 100.0 * seconds / total.as_secs_f64().max(f64::MIN_POSITIVE)),
+        ]);
+    }
+    Some(aligned(table))
+}
+
+fn plain<const N: usize>(head: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(head);
+    table
+}
+
+/// Numbers to the right.
+fn aligned(mut table: Table) -> Table {
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
