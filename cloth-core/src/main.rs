@@ -59,6 +59,9 @@ enum Command {
         /// Prints at the end what each term evaluated, skipped and used again, what slept, and the time of each phase.
         #[arg(long)]
         stats: bool,
+        /// At most so many threads, rather than as many as the machine has. What is computed is the same, to the last bit.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Option<u16>,
     },
     /// Goes on with a run that was interrupted, from its last checkpoint: the result is the same bit by bit.
     Resume {
@@ -67,6 +70,9 @@ enum Command {
         /// Prints what `cloth run --stats` prints.
         #[arg(long)]
         stats: bool,
+        /// At most so many threads, rather than as many as the machine has.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Option<u16>,
     },
     /// Makes one page, report.html, of a finished run: pictures, energies, times, what was evaluated, and the audit of its elements.
     Report {
@@ -212,7 +218,7 @@ fn obey(command: Command) -> Result<ExitCode> {
             print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
             return run(Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &output, true, None)?, false);
         }
-        Command::Run { scene, output, overwrite, checkpoint, material, parameters, stats } => {
+        Command::Run { scene, output, overwrite, checkpoint, material, parameters, stats, threads } => {
             let mut text = Scene::text(&scene)?;
             if let Some(file) = material {
                 text = scene::with_material(&text, &file, &parameters);
@@ -222,9 +228,9 @@ fn obey(command: Command) -> Result<ExitCode> {
                 RunError::Simulation(unfit) => anyhow::Error::new(unfit).context(scene.display().to_string()),
                 located => located.into(),
             })?;
-            return run(new, stats);
+            return run(on_threads(new, threads), stats);
         }
-        Command::Resume { folder, stats } => return run(Run::resume(&folder)?, stats),
+        Command::Resume { folder, stats, threads } => return run(on_threads(Run::resume(&folder)?, threads), stats),
         Command::Report { folder } => print(&format!("wrote {}\n", report::write_report(&folder)?.display())),
         Command::View { shown, colours, wireframe, screenshot: Some(file), frame, time } => {
             let moment = match (frame, time) {
@@ -301,6 +307,13 @@ fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
         "this build has no window; make one that has with `cargo build --release -p cloth-core --features view`, or write a picture with \
          --screenshot FILE.png"
     )
+}
+
+fn on_threads(run: Run, threads: Option<u16>) -> Run {
+    match threads {
+        Some(threads) => run.with_threads(usize::from(threads)),
+        None => run,
+    }
 }
 
 /// Times the benchmark's scene and prints the table.

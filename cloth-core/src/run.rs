@@ -99,6 +99,12 @@ impl Run {
         Ok(run)
     }
 
+    /// The same on at most so many threads; see [`Simulation::with_threads`].
+    #[must_use]
+    pub fn with_threads(self, threads: usize) -> Self {
+        Self { simulation: self.simulation.with_threads(threads), ..self }
+    }
+
     /// Goes on from the checkpoint in a folder.
     ///
     /// # Errors

@@ -80,6 +80,8 @@ impl Simulation {
         let islands = std::mem::take(&mut model.islands).into_iter();
         let mut islands = islands.map(|island| Island::new(scene, &model, island)).collect::<Result<Vec<_>, _>>()?;
         share_pins(&mut islands, &model);
+        let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
         let Model { parts, x, v, masses, triangles, pinned, motions, labels, left_out, warnings, obstacles, .. } =
             model;
         let mut summary = Summary { left_out, warnings, dt: scene.dt, ..Summary::default() };
@@ -119,6 +121,14 @@ impl Simulation {
             ledger,
             earlier,
         })
+    }
+
+    /// From now on at most so many threads work on a step, as far as islands are large enough for it; before this is called, as many as the machine has.
+    /// What they compute is the same, to the last bit, for any number.
+    #[must_use]
+    pub fn with_threads(mut self, threads: usize) -> Self {
+        self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
+        self
     }
 
     /// Garments and hair.
