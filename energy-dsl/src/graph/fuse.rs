@@ -37,6 +37,27 @@ impl Graph {
         }
     }
 
+    /// The two products, the subtrahend last, of a sum whose terms are products with opposite signs, unless that difference is there
+    /// already.
+    pub(super) fn opposed_products(&self, a: NodeId, b: NodeId) -> Option<[NodeId; 2]> {
+        let [plus, minus] = match (self.magnitude(a), self.magnitude(b)) {
+            ((x, false), (y, true)) => [x, y],
+            ((x, true), (y, false)) => [y, x],
+            _ => return None,
+        };
+        let known = plus == minus || self.has(Op::Sub(plus, minus)) || self.has(Op::Sub(minus, plus));
+        let products = [plus, minus].into_iter().all(|node| self.product_of(node).is_some());
+        (products && !known).then_some([plus, minus])
+    }
+
+    /// The difference of two products, one of them fused: the younger, so that the opposite difference is the same but for its sign.
+    pub(super) fn fused_difference(&mut self, [plus, minus]: [NodeId; 2]) -> NodeId {
+        let (older, younger) = (plus.min(minus), plus.max(minus));
+        let (x, y) = self.product_of(younger).expect("a product");
+        let difference = self.neg_mul_add(x, y, older);
+        self.signed(difference, younger == plus)
+    }
+
     fn users(&self, node: NodeId) -> u32 {
         self.users[node.0 as usize]
     }

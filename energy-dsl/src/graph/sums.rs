@@ -12,6 +12,15 @@ impl Graph {
         }
     }
 
+    /// sum + term, as derivatives are added up: of a difference of two products one is fused. Those that a formula itself forms
+    /// are not, for they must vanish where the products are equal; see `fuse.rs`.
+    pub fn accumulate(&mut self, sum: NodeId, term: NodeId) -> NodeId {
+        match self.opposed_products(sum, term) {
+            Some(opposed) => self.fused_difference(opposed),
+            None => self.add(sum, term),
+        }
+    }
+
     /// Σ aᵢ bᵢ.
     pub fn dot(&mut self, a: &[NodeId], b: &[NodeId]) -> NodeId {
         let products: Vec<_> = a.iter().zip(b).map(|(&x, &y)| self.mul(x, y)).collect();
@@ -54,7 +63,8 @@ impl Graph {
             };
             terms.push(term);
         }
-        self.sum(terms)
+        let zero = self.constant(0.0);
+        terms.into_iter().fold(zero, |sum, term| self.accumulate(sum, term))
     }
 
     /// Whether each product has a factor 0.
