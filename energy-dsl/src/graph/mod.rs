@@ -41,6 +41,8 @@ pub struct Graph {
     assumptions: Vec<Assumption>,
     /// Nodes that no sum takes along unrounded; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
+    /// Whether powers of two move out of products and sums, to meet and cancel.
+    outward: bool,
 }
 
 impl Graph {
@@ -57,7 +59,13 @@ impl Graph {
             rule_index: HashMap::new(),
             assumptions: Vec::new(),
             rounded: BTreeSet::new(),
+            outward: false,
         }
+    }
+
+    /// Whether powers of two move out of products and sums.
+    pub fn move_outward(&mut self, outward: bool) {
+        self.outward = outward;
     }
 
     /// How functions are lowered into it.
