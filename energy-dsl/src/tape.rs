@@ -254,6 +254,7 @@ fn with_operands(op: Op, mut to: impl FnMut(NodeId) -> NodeId) -> Op {
         Op::FusedMulSub(a, b, c) => Op::FusedMulSub(to(a), to(b), to(c)),
         Op::MulAdd(a, b, c) => Op::MulAdd(to(a), to(b), to(c)),
         Op::MulSub(a, b, c) => Op::MulSub(to(a), to(b), to(c)),
+        Op::NegMulSub(a, b, c) => Op::NegMulSub(to(a), to(b), to(c)),
         Op::NegMulAdd(a, b, c) => Op::NegMulAdd(to(a), to(b), to(c)),
         Op::Select(mask, a, b) => Op::Select(to(mask), to(a), to(b)),
     }

@@ -100,7 +100,9 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
             let minus = g.neg(one);
             of_product_and_sum(g, (a, b), minus, c, 1.0)
         }
-        Op::MulSub(..) => unreachable!("compiler bug: other sums fuse when code is written, not before"),
+        Op::MulSub(..) | Op::NegMulSub(..) => {
+            unreachable!("compiler bug: other sums fuse when code is written, not before")
+        }
         Op::Constant(_)
         | Op::Truth(_)
         | Op::Cautious

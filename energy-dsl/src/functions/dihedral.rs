@@ -219,7 +219,7 @@ fn derivatives(
         }
     }
     for (i, terms) in by_edge.into_iter().enumerate() {
-        first[i] = vec![g.sum(terms), scale];
+        first[i] = vec![g.accumulate(terms[0], terms[1]), scale];
     }
     let scale_squared = g.mul(scale, scale);
     second.iter_mut().flatten().for_each(|product| product.push(scale_squared));

@@ -216,6 +216,11 @@ impl Graph {
         self.signed(product, minus_a != minus_b)
     }
 
+    /// a · b with a sign left before a factor.
+    pub(super) fn signed_product(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Mul(a.min(b), a.max(b)))
+    }
+
     /// The constant and the other factor of a product.
     fn scaled_by_constant(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
         match self.op(node) {

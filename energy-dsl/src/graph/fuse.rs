@@ -10,6 +10,21 @@ impl Graph {
     /// What computes a node where products fuse with sums.
     #[must_use]
     pub fn fused(&self, node: NodeId) -> Op {
+        // A sign of what is added costs nothing either.
+        let unsigned = |c: NodeId| match self.op(self.resolve(c)) {
+            Op::Neg(c) => Some(c),
+            _ => None,
+        };
+        match self.with_product(node) {
+            Op::MulAdd(a, b, c) if let Some(c) = unsigned(c) => Op::MulSub(a, b, c),
+            Op::MulSub(a, b, c) if let Some(c) = unsigned(c) => Op::MulAdd(a, b, c),
+            Op::NegMulAdd(a, b, c) if let Some(c) = unsigned(c) => Op::NegMulSub(a, b, c),
+            Op::NegMulSub(a, b, c) if let Some(c) = unsigned(c) => Op::NegMulAdd(a, b, c),
+            op => op,
+        }
+    }
+
+    fn with_product(&self, node: NodeId) -> Op {
         match self.op(node) {
             op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) => {
                 match (self.product_of(a), self.product_of(b)) {
@@ -28,7 +43,8 @@ impl Graph {
                 }
             }
             // The same rounding with the other sign, at no cost.
-            op @ Op::Neg(a) => match self.fused(a) {
+            op @ Op::Neg(a) => match self.with_product(a) {
+                Op::MulAdd(x, y, z) => Op::NegMulSub(x, y, z),
                 Op::MulSub(x, y, z) => Op::NegMulAdd(x, y, z),
                 Op::NegMulAdd(x, y, z) => Op::MulSub(x, y, z),
                 _ => op,
