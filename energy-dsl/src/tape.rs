@@ -141,6 +141,10 @@ impl Signed {
                 let product = Self::product(g, at(a), at(b)).flipped(true);
                 Self::sum(g, at(c), product)
             }
+            Op::NegMulSub(a, b, c) => {
+                let product = Self::product(g, at(a), at(b));
+                Self::sum(g, product, at(c)).flipped(true)
+            }
             Op::Abs(a) => {
                 let magnitude = g.abs(at(a).node);
                 Self::of(g, magnitude)
