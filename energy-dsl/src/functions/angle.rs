@@ -167,7 +167,8 @@ fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Produ
     let mut parts = Vec::new();
     for own in 0..2 {
         let slope = g.mul(at.per_both, at.per_square[own]);
-        first.extend(turned[own].iter().map(|&turned| vec![slope, turned, at.scales[own]]));
+        let scaled = g.mul(at.scales[own], slope);
+        first.extend(turned[own].iter().map(|&turned| vec![scaled, turned]));
         let curvature = g.mul(kappa, at.per_square[own]);
         let slanting = g.mul(half, curvature);
         let slant: Vec<_> =

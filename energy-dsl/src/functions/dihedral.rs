@@ -198,7 +198,7 @@ fn derivatives(
         let bent = g.add(tau_squared, *aspect);
         let z: Vec<_> = (0..3).map(|i| g.difference_of_products([bent, s[i]], [*tau, per_edge[i]])).collect();
         for i in 0..3 {
-            first[apex + i] = vec![u[i], minus_scale];
+            first[apex + i] = vec![g.mul(minus_scale, u[i])];
             by_edge[i].push(g.mul(*tau, u[i]));
         }
         // Entry (i, j) of u vᵀ + v uᵀ, times what follows.
@@ -219,7 +219,8 @@ fn derivatives(
         }
     }
     for (i, terms) in by_edge.into_iter().enumerate() {
-        first[i] = vec![g.accumulate(terms[0], terms[1]), scale];
+        let sum = g.accumulate(terms[0], terms[1]);
+        first[i] = vec![g.mul(scale, sum)];
     }
     let scale_squared = g.mul(scale, scale);
     second.iter_mut().flatten().for_each(|product| product.push(scale_squared));

@@ -7,6 +7,14 @@ use super::{Graph, NodeId, Op, reachable};
 
 /// `outputs` with their signs moved into factors, where that leaves fewer of them; not a bit changes.
 pub fn with_signs_inside(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
+    // What is made here must not sway which product a sum takes along: other routines have the same sums.
+    let users = g.users.clone();
+    let outputs = moved(g, outputs);
+    g.users[..users.len()].copy_from_slice(&users);
+    outputs
+}
+
+fn moved(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
     let mut open = negative_products(g, outputs);
     let mut instead = BTreeMap::new();
     while let Some(factor) = most_common_factor(&open) {
