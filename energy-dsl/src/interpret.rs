@@ -100,6 +100,7 @@ pub fn apply<T: Number>(
         Op::RootError(a, b) => n(a).root_error::<Baseline>(n(b)),
         Op::MulAdd(a, b, c) => n(a) * n(b) + n(c),
         Op::MulSub(a, b, c) => n(a) * n(b) - n(c),
+        Op::NegMulSub(a, b, c) => -(n(a) * n(b)) - n(c),
         Op::NegMulAdd(a, b, c) => n(c) - n(a) * n(b),
         Op::PowerOfTwoScale(a) => n(a).power_of_two_scale(),
         Op::Select(mask, a, b) => T::select(m(mask), n(a), n(b)),

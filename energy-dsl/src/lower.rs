@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::check::{Program, Source, Typed, TypedKind};
 use crate::diff::{Coordinates, Moving, first_derivatives};
 use crate::functions::{Lowered, Shape};
-use crate::graph::{Form, Graph, Input, NodeId};
+use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
 
 /// A program as a graph.
 #[derive(Clone, Debug)]
@@ -37,9 +37,26 @@ pub fn lower(program: &Program) -> (RestFormula, Formula) {
         outputs.extend(rest.binding(binding).parts);
     }
     let rest = RestFormula { graph: rest.graph, outputs };
-    let mut moving = Lowering::new(program, Form::Robust, Some(slots));
-    let outputs = moving.expression(&program.result).parts;
-    (rest, Formula { graph: moving.graph, outputs })
+    let formula = |outward: bool| {
+        let mut moving = Lowering::new(program, Form::Robust, Some(slots.clone()));
+        moving.graph.move_outward(outward);
+        let outputs = moving.expression(&program.result).parts;
+        moving.graph.move_outward(false);
+        Formula { graph: moving.graph, outputs }
+    };
+    // Outside, powers of two may meet and cancel, or may have to be multiplied in more often.
+    let [inward, outward] = [false, true].map(formula);
+    let formula = if outward.cost() < inward.cost() { outward } else { inward };
+    (rest, formula)
+}
+
+impl Formula {
+    /// What the result costs on the ordinary path.
+    fn cost(&self) -> usize {
+        let mut graph = self.graph.clone();
+        let outputs = ordinary(&mut graph, &self.outputs).map_or_else(|| self.outputs.clone(), |(outputs, _)| outputs);
+        count(&graph, &outputs).cost()
+    }
 }
 
 /// A program as it is printed, nothing differentiated.

@@ -100,6 +100,9 @@ pub(crate) fn faults(op: Op) -> Vec<(Fault, Op)> {
         Op::NegMulAdd(a, b, c) => {
             vec![(FlippedSign, Op::MulAdd(a, b, c)), (DroppedTerm, pass(c)), (SwappedOperands, Op::MulSub(a, b, c))]
         }
+        Op::NegMulSub(a, b, c) => {
+            vec![(FlippedSign, Op::MulSub(a, b, c)), (DroppedTerm, Op::Neg(c)), (WrongOperand, Op::NegMulSub(a, a, c))]
+        }
         Op::Sqrt(a) => vec![(WrongFunction, pass(a))],
         Op::Abs(a) => vec![(WrongFunction, pass(a))],
         Op::Sin(a) => vec![(WrongFunction, Op::Cos(a))],
@@ -143,6 +146,7 @@ fn symbol(op: Op) -> &'static str {
         Op::MulAdd(..) => "a b + c",
         Op::MulSub(..) => "a b − c",
         Op::NegMulAdd(..) => "c − a b",
+        Op::NegMulSub(..) => "−a b − c",
         Op::Sqrt(_) => "√a",
         Op::Abs(_) => "|a|",
         Op::Sin(_) => "sin a",

@@ -141,6 +141,10 @@ impl Signed {
                 let product = Self::product(g, at(a), at(b)).flipped(true);
                 Self::sum(g, at(c), product)
             }
+            Op::NegMulSub(a, b, c) => {
+                let product = Self::product(g, at(a), at(b));
+                Self::sum(g, product, at(c)).flipped(true)
+            }
             Op::Abs(a) => {
                 let magnitude = g.abs(at(a).node);
                 Self::of(g, magnitude)
@@ -254,6 +258,7 @@ fn with_operands(op: Op, mut to: impl FnMut(NodeId) -> NodeId) -> Op {
         Op::FusedMulSub(a, b, c) => Op::FusedMulSub(to(a), to(b), to(c)),
         Op::MulAdd(a, b, c) => Op::MulAdd(to(a), to(b), to(c)),
         Op::MulSub(a, b, c) => Op::MulSub(to(a), to(b), to(c)),
+        Op::NegMulSub(a, b, c) => Op::NegMulSub(to(a), to(b), to(c)),
         Op::NegMulAdd(a, b, c) => Op::NegMulAdd(to(a), to(b), to(c)),
         Op::Select(mask, a, b) => Op::Select(to(mask), to(a), to(b)),
     }

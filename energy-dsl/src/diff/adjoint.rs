@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
-use super::differentiable;
 use super::forward::{Sparse, products, tangents};
 use super::local::local;
+use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
 /// Nodes and what each is weighed by.
@@ -31,11 +31,7 @@ fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second
                 continue;
             }
             let term = g.product(Some(weight), &first);
-            let sum = match adjoints.get(&operand) {
-                Some(&sum) => g.add(sum, term),
-                None => term,
-            };
-            adjoints.insert(operand, sum);
+            accumulate(g, &mut adjoints, operand, term);
         }
     }
     adjoints
@@ -100,11 +96,7 @@ pub(super) fn second_derivatives(
             let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();
             let terms = products(g, &weighted, longer, i == j, n);
             for (place, term) in terms {
-                let sum = match hessian.get(&place) {
-                    Some(&sum) => g.add(sum, term),
-                    None => term,
-                };
-                hessian.insert(place, sum);
+                accumulate(g, &mut hessian, place, term);
             }
         }
     }
@@ -134,36 +126,25 @@ pub(super) fn hessian_vector(
         }
         let Some(&weight) = adjoints.get(&node) else { continue };
         let local = local(g, node, true);
-        let mut add = |g: &mut Graph, operand: NodeId, term: NodeId| {
-            let sum = match turning.get(&operand) {
-                Some(&sum) => g.add(sum, term),
-                None => term,
-            };
-            turning.insert(operand, sum);
-        };
         for (i, j, products_of) in &local.second {
             let (a, b) = (local.operands[*i], local.operands[*j]);
             let factor = g.sum_of_products(Some(weight), products_of);
             if let Some(rate) = rate(&b) {
                 let term = g.mul(factor, rate);
-                add(g, a, term);
+                accumulate(g, &mut turning, a, term);
             }
             if i != j
                 && let Some(rate) = rate(&a)
             {
                 let term = g.mul(factor, rate);
-                add(g, b, term);
+                accumulate(g, &mut turning, b, term);
             }
         }
         if let Some(&own) = turning.get(&node) {
             for (operand, first) in local.operands.into_iter().zip(local.first) {
                 if g.varies(operand) {
                     let term = g.product(Some(own), &first);
-                    let sum = match turning.get(&operand) {
-                        Some(&sum) => g.add(sum, term),
-                        None => term,
-                    };
-                    turning.insert(operand, sum);
+                    accumulate(g, &mut turning, operand, term);
                 }
             }
         }

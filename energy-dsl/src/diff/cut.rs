@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
-use super::differentiable;
 use super::forward::{self, Sparse, combine, tangents};
+use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
 /// ∇U, and the upper triangle of ∇²U by place.
@@ -36,11 +36,7 @@ pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinat
             for &(j, y) in tangents.get(node).unwrap_or(&none) {
                 if i <= j {
                     let term = g.mul(x, y);
-                    let sum = match hessian.get(&(i * n + j)) {
-                        Some(&sum) => g.add(sum, term),
-                        None => term,
-                    };
-                    hessian.insert(i * n + j, sum);
+                    accumulate(g, &mut hessian, i * n + j, term);
                 }
             }
         }

@@ -1,8 +1,8 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
-use super::differentiable;
 use super::local::local;
+use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
 /// Dual parts that are not identically zero, by ascending coordinate.
@@ -14,11 +14,7 @@ pub(super) fn combine(g: &mut Graph, terms: &[(NodeId, &Sparse)]) -> Sparse {
     for &(factor, parts) in terms {
         for &(coordinate, part) in parts {
             let term = g.mul(factor, part);
-            let sum = match sums.get(&coordinate) {
-                Some(&sum) => g.add(sum, term),
-                None => term,
-            };
-            sums.insert(coordinate, sum);
+            accumulate(g, &mut sums, coordinate, term);
         }
     }
     sums.into_iter().filter(|&(_, sum)| !g.is(sum, 0.0)).collect()
@@ -119,13 +115,6 @@ pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Co
 /// The upper triangle of a aᵀ, or of a bᵀ + b aᵀ.
 pub(super) fn products(g: &mut Graph, a: &Sparse, b: &Sparse, same: bool, n: usize) -> Sparse {
     let mut sums: BTreeMap<usize, NodeId> = BTreeMap::new();
-    let mut add = |g: &mut Graph, place: usize, term: NodeId| {
-        let sum = match sums.get(&place) {
-            Some(&sum) => g.add(sum, term),
-            None => term,
-        };
-        sums.insert(place, sum);
-    };
     for &(i, x) in a {
         for &(j, y) in b {
             if same && i > j {
@@ -136,9 +125,9 @@ pub(super) fn products(g: &mut Graph, a: &Sparse, b: &Sparse, same: bool, n: usi
                 (false, std::cmp::Ordering::Equal) => {
                     let two = g.constant(2.0);
                     let doubled = g.mul(two, product);
-                    add(g, i * n + j, doubled);
+                    accumulate(g, &mut sums, i * n + j, doubled);
                 }
-                _ => add(g, i.min(j) * n + i.max(j), product),
+                _ => accumulate(g, &mut sums, i.min(j) * n + i.max(j), product),
             }
         }
     }

@@ -44,8 +44,8 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
             Local::linear(vec![a, b], vec![one, minus])
         }
         Op::Mul(a, b) if a == b => {
-            let slope = g.mul(two, a);
-            Local::unary(a, slope, two)
+            // The weight takes the 2, which squares that are added then share.
+            Local { operands: vec![a], first: vec![vec![two, a]], second: vec![(0, 0, vec![vec![two]])] }
         }
         Op::Mul(a, b) => Local::new(vec![a, b], vec![b, a], vec![(0, 1, one)]),
         Op::Div(a, b) => of_quotient(g, node, a, b),
@@ -100,7 +100,9 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
             let minus = g.neg(one);
             of_product_and_sum(g, (a, b), minus, c, 1.0)
         }
-        Op::MulSub(..) => unreachable!("compiler bug: other sums fuse when code is written, not before"),
+        Op::MulSub(..) | Op::NegMulSub(..) => {
+            unreachable!("compiler bug: other sums fuse when code is written, not before")
+        }
         Op::Constant(_)
         | Op::Truth(_)
         | Op::Cautious

@@ -17,7 +17,7 @@ pub use coordinates::{Coordinates, Moving};
 pub use forward::first_derivatives;
 pub use plan::{Plan, SecondOrder, first_order, hessian_vector, second_order};
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::{Graph, NodeId, Op};
 
@@ -41,4 +41,13 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTre
         }
     }
     seen
+}
+
+/// Adds a term to the sum of a place.
+fn accumulate<P: Ord>(g: &mut Graph, sums: &mut BTreeMap<P, NodeId>, place: P, term: NodeId) {
+    let sum = match sums.get(&place) {
+        Some(&sum) => g.accumulate(sum, term),
+        None => term,
+    };
+    sums.insert(place, sum);
 }

@@ -197,6 +197,10 @@ impl<'a> Schedule<'a> {
                 let (a, b, c) = (p(a), p(b), p(c));
                 quote!((-#a).mul_add::<L>(#b, #c))
             }
+            Op::NegMulSub(a, b, c) => {
+                let (a, b, c) = (p(a), p(b), p(c));
+                quote!((-#a).mul_add::<L>(#b, -#c))
+            }
             Op::Truth(value) => {
                 let not = if value { quote!(!) } else { quote!() };
                 quote!(#not <T::Mask as ::energy_dsl::Mask>::none())

@@ -150,50 +150,49 @@ pub(crate) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
     Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
-/// Derivatives of c by a and b, or of −c. With p = γ (w × a)/‖a‖², q = γ (b × w)/‖b‖²: ∇c = (p, q); ∇²c has the blocks
-/// −c/‖a‖² I − a sᵀ − s aᵀ, s = p/‖a‖² − ½ c a/‖a‖⁴ (likewise for b), and γ (I − a aᵀ/‖a‖²) − p bᵀ/‖b‖².
+/// Derivatives by a and b of c, or of −c with `negative`: κ = ±c and μ = ±γ. With p = ±γ (w × a)/‖a‖², q = ±γ (b × w)/‖b‖²,
+/// a′ = a/‖a‖² and b′ = b/‖b‖² the gradient is (p, q); the second derivatives have the blocks −κ/‖a‖² I − a′ sᵀ − s a′ᵀ,
+/// s = p − ½ κ a′ (likewise for b), and μ (I − a a′ᵀ) − p b′ᵀ. Weighed, p and q are parts of the gradient, which is computed anyway.
 fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
     let half = g.constant(0.5);
-    let turned = [g.fused_cross(&at.cross, &at.a), g.fused_cross(&at.b, &at.cross)];
-    let vectors = [&at.a, &at.b];
-    let signed = |g: &mut Graph, node: NodeId, minus: bool| if minus { g.neg(node) } else { node };
+    let (w, vectors) = (&at.cross, [&at.a, &at.b]);
+    let turned = match negative {
+        false => [g.fused_cross(w, &at.a), g.fused_cross(&at.b, w)],
+        true => [g.fused_cross(&at.a, w), g.fused_cross(w, &at.b)],
+    };
+    let [kappa, mixed] = [at.cosine, at.per_both].map(|node| if negative { g.neg(node) } else { node });
     // Scalars lead the products and vectors follow, so that what weighs a product weighs a scalar.
     let mut first = Vec::new();
-    // Of each vector: γ/‖a‖² with its sign, s, and c/‖a‖².
+    // Of each vector: γ/‖a‖², −a′, s and −κ/‖a‖².
     let mut parts = Vec::new();
     for own in 0..2 {
-        let factor = g.mul(at.per_both, at.per_square[own]);
-        let slope = g.mul(at.scales[own], factor);
-        let slope = signed(g, slope, negative);
-        first.extend(turned[own].iter().map(|&turned| vec![slope, turned]));
-        let curvature = g.mul(at.cosine, at.per_square[own]);
-        let fourth = g.mul(curvature, at.per_square[own]);
-        let fourth = g.mul(half, fourth);
-        let turning = g.mul(factor, at.per_square[own]);
-        let (turning, fourth) = if negative { (turning, fourth) } else { (g.neg(turning), g.neg(fourth)) };
+        let slope = g.mul(at.per_both, at.per_square[own]);
+        let scaled = g.mul(at.scales[own], slope);
+        first.extend(turned[own].iter().map(|&turned| vec![scaled, turned]));
+        let curvature = g.mul(kappa, at.per_square[own]);
+        let slanting = g.mul(half, curvature);
         let slant: Vec<_> =
-            (0..3).map(|i| g.difference_of_products([turning, turned[own][i]], [fourth, vectors[own][i]])).collect();
-        parts.push((factor, slant, signed(g, curvature, !negative)));
+            (0..3).map(|i| g.weighable_difference([slope, turned[own][i]], [slanting, vectors[own][i]])).collect();
+        let minus_per_square = g.neg(at.per_square[own]);
+        parts.push((slope, g.scaled(minus_per_square, vectors[own]), slant, g.neg(curvature)));
     }
-    let along = signed(g, parts[0].0, !negative);
-    let across = g.mul(parts[0].0, at.per_square[1]);
-    let across = signed(g, across, !negative);
-    let mixed = signed(g, at.per_both, negative);
 
     let second = upper(6)
         .map(|(i, j)| {
             let (own, other) = (i / 3, j / 3);
             let (row, column) = (i % 3, j % 3);
             let mut products = if own == other {
-                let (_, slant, curvature) = &parts[own];
-                let mut products = vec![vec![slant[row], vectors[own][column]], vec![slant[column], vectors[own][row]]];
+                let (_, per_square, slant, curvature) = &parts[own];
+                let mut products = vec![vec![slant[row], per_square[column]], vec![slant[column], per_square[row]]];
                 if row == column {
                     products.push(vec![*curvature]);
                 }
                 products
             } else {
-                let mut products =
-                    vec![vec![along, at.a[row], at.a[column]], vec![across, turned[0][row], at.b[column]]];
+                let mut products = vec![
+                    vec![mixed, at.a[row], parts[0].1[column]],
+                    vec![parts[0].0, turned[0][row], parts[1].1[column]],
+                ];
                 if row == column {
                     products.push(vec![mixed]);
                 }

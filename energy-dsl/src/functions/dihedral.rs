@@ -5,7 +5,7 @@
 //! the precision, including what rounding the edges lost, so a nearly flat hinge has a relatively exact angle.
 
 use super::angle::{accurate_cross, exact_cross};
-use super::length::{Direction, common_scale, direction_scaled, upper};
+use super::length::{common_scale, direction_scaled, upper};
 use super::{Function, Lowered, Shape};
 use crate::graph::{DihedralParts, Form, Graph, NodeId, Primitive, Product, Rule};
 use crate::runtime::Flag;
@@ -55,9 +55,9 @@ fn textbook(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeI
 
 /// One triangle of the hinge, in scaled lengths: apex a, normal N = E × a.
 struct Wing {
-    /// ±N/‖N‖², the gradient of the angle by the apex but for −‖E‖.
-    normal: Vec<NodeId>,
-    /// ‖E‖ t/‖N‖², with t = N × E; not as ‖E‖² (a − τ E), which cancels in a needle.
+    /// u = ±‖E‖ N/‖N‖², minus the gradient of the angle by the apex.
+    slope: Vec<NodeId>,
+    /// s = ±t/‖N‖², with t = N × E; not as ‖E‖² (a − τ E), which cancels in a needle.
     tangent: Vec<NodeId>,
     /// τ = a·E/‖E‖², where along the edge the apex stands.
     along: NodeId,
@@ -110,14 +110,15 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
         let reciprocal = g.select(degenerate, null, reciprocal);
         let along = g.dot(apex, &e.scaled);
         let along = g.mul(along, per_edge_squared);
-        let factor = g.mul(e.length, reciprocal);
         let across = g.fused_cross(normal, &e.scaled);
-        let tangent = g.scaled(factor, &across);
-        let reciprocal = if negative { g.neg(reciprocal) } else { reciprocal };
-        Wing { normal: g.scaled(reciprocal, normal), tangent, along, aspect: g.mul(aspect_unit, square) }
+        let tangent = g.scaled(reciprocal, &across);
+        let factor = g.mul(e.length, reciprocal);
+        let factor = if negative { g.neg(factor) } else { factor };
+        Wing { slope: g.scaled(factor, normal), tangent, along, aspect: g.mul(aspect_unit, square) }
     };
     let wings = [wing(g, &n1, false, &a_scaled), wing(g, &n2, true, &b_scaled)];
-    let (first, second) = derivatives(g, &e, &wings);
+    let per_edge = g.scaled(per_edge_squared, &e.scaled);
+    let (first, second) = derivatives(g, scale, &per_edge, &wings);
     let mut rule =
         Rule::factored(Primitive::Dihedral, arguments, value, first, second).flagged(0, Flag::Degenerate, degenerate);
     rule.dihedral = Some(parts);
@@ -176,50 +177,52 @@ fn half_angles(g: &mut Graph, sine: NodeId, cosine: NodeId, degenerate: NodeId) 
     DihedralParts { sine, cosine, sine_half, cosine_half, degenerate }
 }
 
-/// Of each triangle, over (apex, E), with u = ±N/‖N‖², s = ±‖E‖ t/‖N‖², S = s uᵀ + u sᵀ: gradient −‖E‖ (u, −τ u); Hessian S for
-/// the apex, u Êᵀ − τ S between edge and apex, (τ² + ½‖N‖²/‖E‖⁴) S − τ (Ê uᵀ + u Êᵀ) for the edge. Their sum is θ's.
-fn derivatives(g: &mut Graph, edge: &Direction, wings: &[Wing; 2]) -> (Vec<Product>, Vec<Vec<Product>>) {
-    let minus_length = g.mul(edge.length, edge.scale);
-    let minus_length = g.neg(minus_length);
+/// Of each triangle, over (apex, E), with F = E/‖E‖² and S = u sᵀ + s uᵀ: gradient −(u, −τ u); Hessian S for the apex,
+/// u Fᵀ − τ S between edge and apex, u zᵀ + z uᵀ with z = (τ² + ½‖N‖²/‖E‖⁴) s − τ F for the edge. Their sum is θ's. In each
+/// product u leads: weighed it is part of the gradient, which is computed anyway.
+fn derivatives(
+    g: &mut Graph,
+    scale: NodeId,
+    per_edge: &[NodeId],
+    wings: &[Wing; 2],
+) -> (Vec<Product>, Vec<Vec<Product>>) {
+    let minus_scale = g.neg(scale);
     let mut by_edge: [Vec<NodeId>; 3] = Default::default();
     let mut first = vec![Product::new(); 9];
     let mut second = vec![Vec::<Product>::new(); 45];
     let place = |i: usize, j: usize| crate::graph::symmetric_index(9, i, j);
     for (w, wing) in wings.iter().enumerate() {
-        let apex = 3 + 3 * w;
-        let tau = wing.along;
-        let minus_tau = g.neg(tau);
-        let tau_squared = g.mul(tau, tau);
-        let bent = g.add(tau_squared, wing.aspect);
-        let slope = g.scaled(minus_length, &wing.normal);
+        let Wing { slope: u, tangent: s, along: tau, aspect } = wing;
+        let (apex, minus_tau) = (3 + 3 * w, g.neg(*tau));
+        let tau_squared = g.mul(*tau, *tau);
+        let bent = g.add(tau_squared, *aspect);
+        let z: Vec<_> = (0..3).map(|i| g.difference_of_products([bent, s[i]], [*tau, per_edge[i]])).collect();
         for i in 0..3 {
-            first[apex + i] = vec![slope[i]];
-            let term = g.mul(minus_tau, slope[i]);
-            by_edge[i].push(term);
+            first[apex + i] = vec![g.mul(minus_scale, u[i])];
+            by_edge[i].push(g.mul(*tau, u[i]));
         }
-        // Entry (i, j) of S, times what follows.
-        let symmetric = |i: usize, j: usize, more: &[NodeId]| -> [Product; 2] {
-            [(i, j), (j, i)].map(|(i, j)| [&[wing.tangent[i], wing.normal[j]], more].concat())
+        // Entry (i, j) of u vᵀ + v uᵀ, times what follows.
+        let symmetric = |v: &[NodeId], i: usize, j: usize, more: &[NodeId]| -> [Product; 2] {
+            [(i, j), (j, i)].map(|(i, j)| [&[u[i], v[j]], more].concat())
         };
         for (i, j) in upper(3) {
-            second[place(apex + i, apex + j)].extend(symmetric(i, j, &[]));
-            let at = place(i, j);
-            second[at].extend(symmetric(i, j, &[bent]));
-            second[at].extend([(i, j), (j, i)].map(|(i, j)| vec![minus_tau, wing.normal[i], edge.unit[j]]));
+            second[place(apex + i, apex + j)].extend(symmetric(s, i, j, &[]));
+            second[place(i, j)].extend(symmetric(&z, i, j, &[]));
         }
         for i in 0..3 {
             for j in 0..3 {
                 // Row: component i of the edge; column: component j of the apex.
                 let at = place(i, apex + j);
-                second[at].extend(symmetric(i.min(j), i.max(j), &[minus_tau]));
-                second[at].push(vec![wing.normal[i], edge.unit[j]]);
+                second[at].extend(symmetric(s, i.min(j), i.max(j), &[minus_tau]));
+                second[at].push(vec![u[i], per_edge[j]]);
             }
         }
     }
     for (i, terms) in by_edge.into_iter().enumerate() {
-        first[i] = vec![g.sum(terms)];
+        let sum = g.accumulate(terms[0], terms[1]);
+        first[i] = vec![g.mul(scale, sum)];
     }
-    let scale_squared = g.mul(edge.scale, edge.scale);
+    let scale_squared = g.mul(scale, scale);
     second.iter_mut().flatten().for_each(|product| product.push(scale_squared));
     (first, second)
 }

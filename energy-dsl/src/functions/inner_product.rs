@@ -3,36 +3,32 @@
 
 use crate::graph::{Form, Graph, NodeId, Primitive, Product, Rule, symmetric_index};
 
-/// Σ xᵢ yᵢ.
+/// Σ xᵢ yᵢ. Of a vector with itself the primitive is half of it: its derivatives, x and 1, need no factors.
 pub(super) fn inner_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId {
     // One order for x·y and y·x.
     let (x, y) = if y < x { (y, x) } else { (x, y) };
     let value = g.dot(x, y);
+    let square = x == y;
+    // Shared arguments would have to be summed: such products are left to the ordinary rules.
+    let distinct = square || x.iter().all(|part| !y.contains(part));
     let moving = x.len() > 1 && x.iter().chain(y).all(|&part| g.varies(part));
-    if g.form() == Form::Textbook || !moving {
+    if g.form() == Form::Textbook || !moving || !distinct {
         return value;
     }
-    let (n, one, two) = (x.len(), g.constant(1.0), g.constant(2.0));
-    let square = x == y;
+    let (n, one) = (x.len(), g.constant(1.0));
     let arguments: Vec<NodeId> = if square { x.to_vec() } else { [x, y].concat() };
-    let first: Vec<Product> = if square {
-        x.iter().map(|&part| vec![two, part]).collect()
-    } else {
-        y.iter().chain(x).map(|&part| vec![part]).collect()
-    };
+    let slopes = if square { x.to_vec() } else { [y, x].concat() };
+    let first: Vec<Product> = slopes.into_iter().map(|part| vec![part]).collect();
     let m = arguments.len();
     let mut second = vec![Vec::new(); m * (m + 1) / 2];
     for i in 0..n {
-        if square {
-            second[symmetric_index(m, i, i)] = vec![vec![two]];
-        } else {
-            second[symmetric_index(m, i, n + i)] = vec![vec![one]];
-        }
+        second[symmetric_index(m, i, if square { i } else { n + i })] = vec![vec![one]];
     }
-    // Shared arguments would have to be summed: leave such products to the ordinary rules.
-    let distinct = square || x.iter().all(|part| !y.contains(part));
-    if !distinct {
-        return value;
+    if !square {
+        return g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[]);
     }
-    g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[])
+    let (half, two) = (g.constant(0.5), g.constant(2.0));
+    let value = g.mul(half, value);
+    let half_square = g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[]);
+    g.mul(two, half_square)
 }

@@ -180,14 +180,20 @@ fn conjugate(g: &mut Graph, a: &[Lowered]) -> Lowered {
 /// p q = (p₀ q₀ − p·q, p₀ q + q₀ p + p × q).
 fn hamilton(g: &mut Graph, p: &[NodeId], q: &[NodeId]) -> Vec<NodeId> {
     let (real, along) = (g.mul(p[0], q[0]), g.dot(&p[1..], &q[1..]));
-    let turned = g.cross(&p[1..], &q[1..]);
+    let sums: Vec<_> = (1..4).map(|i| g.dot(&[p[0], q[0]], &[q[i], p[i]])).collect();
     let mut product = vec![g.sub(real, along)];
-    for i in 1..4 {
-        let (a, b) = (g.mul(p[0], q[i]), g.mul(q[0], p[i]));
-        let sum = g.add(a, b);
-        product.push(g.add(sum, turned[i - 1]));
-    }
+    product.extend(plus_cross(g, &sums, &p[1..], &q[1..]));
     product
+}
+
+/// s + a × b, product by product, so that each fuses with the sum before it.
+fn plus_cross(g: &mut Graph, s: &[NodeId], a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let (plus, minus) = (g.mul(a[j], b[k]), g.mul(a[k], b[j]));
+        let sum = g.add(s[i], plus);
+        g.sub(sum, minus)
+    })
 }
 
 /// The product of two quaternions, or of two dual quaternions: p q + ε (p q′ + p′ q).
@@ -201,36 +207,29 @@ pub(super) fn product(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
     Lowered { shape: a.shape, parts }
 }
 
-/// v + w t + u × t with q = (w, u), t = 2 u × v.
+/// v + 2 (w t + u × t) with q = (w, u), t = u × v.
 fn rotate(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
-    let two = g.constant(2.0);
-    let across = g.cross(&q[1..], v);
-    let t = g.scaled(two, &across);
-    let (along, turned) = (g.scaled(q[0], &t), g.cross(&q[1..], &t));
-    (0..3)
-        .map(|i| {
-            let sum = g.add(v[i], along[i]);
-            g.add(sum, turned[i])
-        })
-        .collect()
+    let t = if g.form() == Form::Textbook { g.cross(&q[1..], v) } else { g.fused_cross(&q[1..], v) };
+    let (two, along) = (g.constant(2.0), g.scaled(q[0], &t));
+    let half = plus_cross(g, &along, &q[1..], &t);
+    let added = g.scaled(two, &half);
+    v.iter().zip(added).map(|(&v, added)| g.add(v, added)).collect()
 }
 
-/// Turned, and shifted by 2 (w e − w′ u + u × e) with the parts (w, u) and (w′, e).
+/// Turned, and shifted by w e − w′ u + u × e with the real part (w, u) and twice the dual one, (w′, e).
 fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (q, dual) = a[0].parts.split_at(4);
     let turned = rotate(g, q, &a[1].parts);
     let two = g.constant(2.0);
-    let across = g.cross(&q[1..], &dual[1..]);
-    let moved = (0..3)
+    let dual = g.scaled(two, dual);
+    let along: Vec<_> = (0..3)
         .map(|i| {
             let (plus, minus) = (g.mul(q[0], dual[i + 1]), g.mul(dual[0], q[i + 1]));
-            let difference = g.sub(plus, minus);
-            let sum = g.add(difference, across[i]);
-            let shift = g.mul(two, sum);
-            g.add(turned[i], shift)
+            let sum = g.add(turned[i], plus);
+            g.sub(sum, minus)
         })
-        .collect::<Vec<_>>();
-    Lowered::vector(moved)
+        .collect();
+    Lowered::vector(plus_cross(g, &along, &q[1..], &dual[1..]))
 }
 
 fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {

@@ -105,14 +105,13 @@ pub(super) fn assume_at_most_a_quarter_turn(g: &mut Graph, y: NodeId) {
     }
 }
 
-/// cos √y = Σ (−y)ᵏ/(2k)!, until the next term is below 2⁻⁵⁶ at y = `below`.
+/// cos √y = Σ (−y)ᵏ/(2k)! for y ≤ `below`.
 fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
     let coefficient = |k: i32| {
         let factorial: f64 = (1..=2 * k).map(f64::from).product();
         (if k % 2 == 0 { 1.0 } else { -1.0 }) / factorial
     };
-    let last = (0..).find(|&k| coefficient(k).abs() * below.powi(k) < 2.0_f64.powi(-56)).unwrap_or(0);
-    polynomial(g, y, (0..=last).map(coefficient).collect())
+    polynomial(g, y, economised(coefficient, below))
 }
 
 /// Σ cₖ yᵏ by Horner's rule.
@@ -125,6 +124,47 @@ pub(super) fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -
     sum
 }
 
+/// A power series on [0, `below`] as a polynomial of low degree (Lanczos' economisation): the term of highest degree is replaced,
+/// as long as that changes the sum by no more than 2⁻⁵⁶ of its first term, by the lower ones of y² times the Chebyshev polynomial
+/// with the same leading coefficient. The first two terms stay as they are: rounding them anew would cost more than that.
+fn economised(coefficient: impl Fn(i32) -> f64, below: f64) -> Vec<f64> {
+    let budget = coefficient(0).abs() * 2.0_f64.powi(-56);
+    let negligible = |k: i32| coefficient(k).abs() * below.powi(k) < budget * 2.0_f64.powi(-10);
+    let last = (0..).find(|&k| negligible(k)).expect("a series converges");
+    let mut coefficients: Vec<f64> = (0..last).map(&coefficient).collect();
+    let mut error = 0.0;
+    while coefficients.len() > 3 {
+        let degree = coefficients.len() - 3;
+        let chebyshev = shifted_chebyshev(degree, below);
+        let factor = coefficients[degree + 2] / chebyshev[degree];
+        error += factor.abs() * below * below;
+        if error > budget {
+            break;
+        }
+        coefficients[2..].iter_mut().zip(&chebyshev).for_each(|(c, t)| *c -= factor * t);
+        coefficients.pop();
+    }
+    coefficients
+}
+
+/// The coefficients of T_n(2y/b − 1), which on [0, b] stays within ±1.
+fn shifted_chebyshev(n: usize, b: f64) -> Vec<f64> {
+    // T₀ and T₋₁ = T₁, then T_{m+1}(x) = 2x T_m(x) − T_{m−1}(x).
+    let (mut before, mut at) = (vec![-1.0, 2.0 / b], vec![1.0]);
+    for _ in 0..n {
+        let mut next = vec![0.0; at.len() + 1];
+        for (k, &c) in at.iter().enumerate() {
+            next[k] -= 2.0 * c;
+            next[k + 1] += 4.0 / b * c;
+        }
+        for (k, &c) in before.iter().enumerate() {
+            next[k] -= c;
+        }
+        (before, at) = (at, next);
+    }
+    at
+}
+
 /// The series of Sₘ where y < `below`, else `direct`.
 fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -> NodeId {
     let series = series(g, y, below, order);
@@ -133,17 +173,16 @@ fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -
     g.select(near, series, direct)
 }
 
-/// Terms until the next is below 2⁻⁵⁶ of the first at y = `below`.
+/// The series of Sₘ for y ≤ `below`.
 fn series(g: &mut Graph, y: NodeId, below: f64, order: i32) -> NodeId {
     // (−1)ᵏ k!/(k−m)!/(2k+1)!, from k = m on.
-    let coefficient = |k: i32| {
-        let falling: f64 = (k - order + 1..=k).map(f64::from).product();
+    let coefficient = |power: i32| {
+        let k = power + order;
+        let falling: f64 = (power + 1..=k).map(f64::from).product();
         let factorial: f64 = (1..=2 * k + 1).map(f64::from).product();
         (if k % 2 == 0 { 1.0 } else { -1.0 }) * falling / factorial
     };
-    let least = coefficient(order).abs() * 2.0_f64.powi(-56);
-    let last = (order..).find(|&k| coefficient(k).abs() * below.powi(k - order) < least).unwrap_or(order);
-    polynomial(g, y, (order..=last).map(coefficient).collect())
+    polynomial(g, y, economised(coefficient, below))
 }
 
 /// S₁ as a rule of y, so that it can be differentiated.

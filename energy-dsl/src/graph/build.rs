@@ -113,6 +113,12 @@ impl Graph {
             }
             ((x, true), (y, false)) => self.sub(y, x),
             ((x, false), (y, true)) => self.sub(x, y),
+            _ if self.outward
+                && let Some((c, x, y)) = self.common_power_of_two(a, b) =>
+            {
+                let (c, sum) = (self.constant(c), self.add(x, y));
+                self.mul(c, sum)
+            }
             // One order for both, that written first: it decides which product a sum takes along.
             _ if self.index.contains_key(&Op::Add(b, a)) => self.node(Op::Add(b, a)),
             _ => self.node(Op::Add(a, b)),
@@ -147,6 +153,12 @@ impl Graph {
                 self.neg(sum)
             }
             ((x, false), (y, true)) => self.add(x, y),
+            _ if self.outward
+                && let Some((c, x, y)) = self.common_power_of_two(a, b) =>
+            {
+                let (c, difference) = (self.constant(c), self.sub(x, y));
+                self.mul(c, difference)
+            }
             _ => {
                 // The opposite difference may be there already.
                 if let Some(&opposite) = self.index.get(&Op::Sub(b, a)) {
@@ -188,11 +200,11 @@ impl Graph {
             return self.signed(square, minus_a != minus_b);
         }
         // (2ⁿ x)(2ᵐ y) = 2ⁿ⁺ᵐ (x y), exactly.
-        if let (Some((c, x)), Some((d, y))) = (self.scaled_by_constant(a), self.scaled_by_constant(b))
-            && [c, d].into_iter().all(|k| self.as_constant(k).is_some_and(is_power_of_two))
-        {
-            let (constants, product) = (self.mul(c, d), self.mul(x, y));
-            let product = self.mul(constants, product);
+        let ((c, x), (d, y)) = (self.power_of_two_times(a), self.power_of_two_times(b));
+        let outward = self.outward && [(x, a), (y, b)].into_iter().any(|(x, a)| x != a && self.varies(x));
+        if outward && self.as_constant(a).is_none() || x != a && y != b {
+            let (constant, product) = (self.constant(c * d), self.mul(x, y));
+            let product = self.mul(constant, product);
             return self.signed(product, minus_a != minus_b);
         }
         for (scale, scaled) in [(a, b), (b, a)] {
@@ -204,6 +216,11 @@ impl Graph {
         self.signed(product, minus_a != minus_b)
     }
 
+    /// a · b with a sign left before a factor.
+    pub(super) fn signed_product(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Mul(a.min(b), a.max(b)))
+    }
+
     /// The constant and the other factor of a product.
     fn scaled_by_constant(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
         match self.op(node) {
@@ -211,6 +228,19 @@ impl Graph {
             Op::Mul(y, c) if self.as_constant(c).is_some() => Some((c, y)),
             _ => None,
         }
+    }
+
+    /// The power of two that leads a product, and what it multiplies; 1 and the node itself if there is none.
+    fn power_of_two_times(&self, node: NodeId) -> (f64, NodeId) {
+        let scaled = self.scaled_by_constant(node);
+        let scaled = scaled.and_then(|(c, x)| Some((self.as_constant(c).filter(|&c| is_power_of_two(c))?, x)));
+        scaled.unwrap_or((1.0, node))
+    }
+
+    /// The power of two that leads both terms of a sum, and what it multiplies.
+    fn common_power_of_two(&self, a: NodeId, b: NodeId) -> Option<(f64, NodeId, NodeId)> {
+        let ((c, x), (d, y)) = (self.power_of_two_times(a), self.power_of_two_times(b));
+        (c == d && c != 1.0).then_some((c, x, y))
     }
 
     /// x · (c · y) with both constants powers of two.

@@ -34,7 +34,7 @@ pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
                 count.basic += 1;
                 count.error_terms += 1;
             }
-            Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) => count.fused += 1,
+            Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) | Op::NegMulSub(..) => count.fused += 1,
             _ => count.basic += 1,
         }
     }

@@ -10,6 +10,21 @@ impl Graph {
     /// What computes a node where products fuse with sums.
     #[must_use]
     pub fn fused(&self, node: NodeId) -> Op {
+        // A sign of what is added costs nothing either.
+        let unsigned = |c: NodeId| match self.op(self.resolve(c)) {
+            Op::Neg(c) => Some(c),
+            _ => None,
+        };
+        match self.with_product(node) {
+            Op::MulAdd(a, b, c) if let Some(c) = unsigned(c) => Op::MulSub(a, b, c),
+            Op::MulSub(a, b, c) if let Some(c) = unsigned(c) => Op::MulAdd(a, b, c),
+            Op::NegMulAdd(a, b, c) if let Some(c) = unsigned(c) => Op::NegMulSub(a, b, c),
+            Op::NegMulSub(a, b, c) if let Some(c) = unsigned(c) => Op::NegMulAdd(a, b, c),
+            op => op,
+        }
+    }
+
+    fn with_product(&self, node: NodeId) -> Op {
         match self.op(node) {
             op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) => {
                 match (self.product_of(a), self.product_of(b)) {
@@ -28,13 +43,35 @@ impl Graph {
                 }
             }
             // The same rounding with the other sign, at no cost.
-            op @ Op::Neg(a) => match self.fused(a) {
+            op @ Op::Neg(a) => match self.with_product(a) {
+                Op::MulAdd(x, y, z) => Op::NegMulSub(x, y, z),
                 Op::MulSub(x, y, z) => Op::NegMulAdd(x, y, z),
                 Op::NegMulAdd(x, y, z) => Op::MulSub(x, y, z),
                 _ => op,
             },
             op => op,
         }
+    }
+
+    /// The two products, the subtrahend last, of a sum whose terms are products with opposite signs, unless that difference is there
+    /// already.
+    pub(super) fn opposed_products(&self, a: NodeId, b: NodeId) -> Option<[NodeId; 2]> {
+        let [plus, minus] = match (self.magnitude(a), self.magnitude(b)) {
+            ((x, false), (y, true)) => [x, y],
+            ((x, true), (y, false)) => [y, x],
+            _ => return None,
+        };
+        let known = plus == minus || self.has(Op::Sub(plus, minus)) || self.has(Op::Sub(minus, plus));
+        let products = [plus, minus].into_iter().all(|node| self.product_of(node).is_some());
+        (products && !known).then_some([plus, minus])
+    }
+
+    /// The difference of two products, one of them fused: the younger, so that the opposite difference is the same but for its sign.
+    pub(super) fn fused_difference(&mut self, [plus, minus]: [NodeId; 2]) -> NodeId {
+        let (older, younger) = (plus.min(minus), plus.max(minus));
+        let (x, y) = self.product_of(younger).expect("a product");
+        let difference = self.neg_mul_add(x, y, older);
+        self.signed(difference, younger == plus)
     }
 
     fn users(&self, node: NodeId) -> u32 {

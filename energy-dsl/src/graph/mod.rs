@@ -9,14 +9,16 @@ mod node;
 mod ordinary;
 mod rounding;
 mod rule;
+mod signs;
 mod sums;
 
 pub use count::{count, reachable};
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
+pub use signs::with_signs_inside;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// How language functions are lowered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +45,10 @@ pub struct Graph {
     crosses: HashMap<Vec<NodeId>, [Vec<NodeId>; 2]>,
     /// Nodes that no sum takes along unrounded; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
+    /// Differences of products that a weight goes into; see `sums.rs`.
+    weighable: BTreeMap<NodeId, [[NodeId; 2]; 2]>,
+    /// Whether powers of two move out of products and sums, to meet and cancel.
+    outward: bool,
 }
 
 impl Graph {
@@ -60,7 +66,14 @@ impl Graph {
             assumptions: Vec::new(),
             crosses: HashMap::new(),
             rounded: BTreeSet::new(),
+            weighable: BTreeMap::new(),
+            outward: false,
         }
+    }
+
+    /// Whether powers of two move out of products and sums.
+    pub fn move_outward(&mut self, outward: bool) {
+        self.outward = outward;
     }
 
     /// How functions are lowered into it.

@@ -76,6 +76,8 @@ pub enum Op {
     MulSub(NodeId, NodeId, NodeId),
     /// c − a · b.
     NegMulAdd(NodeId, NodeId, NodeId),
+    /// −a · b − c.
+    NegMulSub(NodeId, NodeId, NodeId),
     /// A power of two that brings |a| into [1, 2); zero derivative.
     PowerOfTwoScale(NodeId),
     /// a < b.
@@ -136,7 +138,8 @@ impl Op {
             | Self::FusedMulSub(a, b, c)
             | Self::MulAdd(a, b, c)
             | Self::MulSub(a, b, c)
-            | Self::NegMulAdd(a, b, c) => (3, [a, b, c]),
+            | Self::NegMulAdd(a, b, c)
+            | Self::NegMulSub(a, b, c) => (3, [a, b, c]),
         };
         list.into_iter().take(count)
     }

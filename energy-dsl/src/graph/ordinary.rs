@@ -167,7 +167,9 @@ impl Path {
                 g.neg_mul_add(minus, b, c)
             }
             Op::NegMulAdd(a, b, c) => g.neg_mul_add(d(a), d(b), d(c)),
-            Op::Rule(_) | Op::MulSub(..) => unreachable!("compiler bug: resolved, and not yet fused"),
+            Op::Rule(_) | Op::MulSub(..) | Op::NegMulSub(..) => {
+                unreachable!("compiler bug: resolved, and not yet fused")
+            }
         }
     }
 }

@@ -12,6 +12,15 @@ impl Graph {
         }
     }
 
+    /// sum + term, as derivatives are added up: of a difference of two products one is fused. Those that a formula itself forms
+    /// are not, for they must vanish where the products are equal; see `fuse.rs`.
+    pub fn accumulate(&mut self, sum: NodeId, term: NodeId) -> NodeId {
+        match self.opposed_products(sum, term) {
+            Some(opposed) => self.fused_difference(opposed),
+            None => self.add(sum, term),
+        }
+    }
+
     /// Σ aᵢ bᵢ.
     pub fn dot(&mut self, a: &[NodeId], b: &[NodeId]) -> NodeId {
         let products: Vec<_> = a.iter().zip(b).map(|(&x, &y)| self.mul(x, y)).collect();
@@ -34,8 +43,33 @@ impl Graph {
 
     /// weight · the factors, from left to right.
     pub fn product(&mut self, weight: Option<NodeId>, factors: &[NodeId]) -> NodeId {
-        let one = self.constant(1.0);
-        factors.iter().fold(weight.unwrap_or(one), |product, &factor| self.mul(product, factor))
+        match (weight, factors) {
+            (Some(weight), [first, rest @ ..]) => {
+                let weighed = self.weighed(weight, *first);
+                rest.iter().fold(weighed, |product, &factor| self.mul(product, factor))
+            }
+            _ => {
+                let one = self.constant(1.0);
+                factors.iter().fold(weight.unwrap_or(one), |product, &factor| self.mul(product, factor))
+            }
+        }
+    }
+
+    /// The [difference](Self::difference_of_products) of a scalar times a component and another, as the leading factor of a
+    /// product: what weighs that weighs the two scalars, once for all components.
+    pub fn weighable_difference(&mut self, plus: [NodeId; 2], minus: [NodeId; 2]) -> NodeId {
+        let node = self.difference_of_products(plus, minus);
+        let (unsigned, negative) = self.magnitude(node);
+        self.weighable.entry(unsigned).or_insert(if negative { [minus, plus] } else { [plus, minus] });
+        node
+    }
+
+    fn weighed(&mut self, weight: NodeId, factor: NodeId) -> NodeId {
+        let (unsigned, negative) = self.magnitude(factor);
+        let Some(&[[a, x], [b, y]]) = self.weighable.get(&unsigned) else { return self.mul(weight, factor) };
+        let (a, b) = (self.mul(weight, a), self.mul(weight, b));
+        let difference = self.difference_of_products([a, x], [b, y]);
+        self.signed(difference, negative)
     }
 
     /// weight · Σ products, the weight going into each. Products that follow each other and end in the same factor are added
@@ -54,7 +88,8 @@ impl Graph {
             };
             terms.push(term);
         }
-        self.sum(terms)
+        let zero = self.constant(0.0);
+        terms.into_iter().fold(zero, |sum, term| self.accumulate(sum, term))
     }
 
     /// Whether each product has a factor 0.

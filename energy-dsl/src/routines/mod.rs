@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, second_order};
-use crate::graph::{Form, Graph, Input, NodeId, Op, Primitive, general, ordinary};
+use crate::graph::{Form, Graph, Input, NodeId, Op, Primitive, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, RestFormula, lower};
 use crate::runtime::{Flag, Kind};
 
@@ -45,9 +45,13 @@ impl Routine {
     fn split(self, g: &mut Graph) -> Self {
         let all: Vec<NodeId> = self.reduced.iter().copied().chain(self.outputs()).collect();
         let cautious = general(g, &all);
+        let Some((nodes, ordinary)) = ordinary(g, &all) else {
+            let nodes = with_signs_inside(g, &cautious);
+            return self.with(g, &nodes);
+        };
         let cautious = self.with(g, &cautious);
-        let Some((nodes, ordinary)) = ordinary(g, &all) else { return cautious };
         let general = General { ordinary, groups: cautious.groups, flags: cautious.flags };
+        let nodes = with_signs_inside(g, &nodes);
         Self { general: Some(general), ..self.with(g, &nodes) }
     }
 
