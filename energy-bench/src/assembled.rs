@@ -21,7 +21,7 @@ pub struct Assembled {
 /// The elements of `samples` on vertices.
 pub(crate) fn assembled<E, const N: usize>(samples: &[Sample]) -> Assembled
 where
-    E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + 'static,
+    E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + Sync + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
     // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as elements, a few more than
@@ -44,7 +44,7 @@ where
 
 fn linearise<E>(list: ElementList<E>, positions: Vec<Vector3<f64>>, curvature: Curvature) -> Work
 where
-    E: PackedPotential<f64> + std::fmt::Debug + 'static,
+    E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
 {
     let pinned = vec![false; positions.len()];
     let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &pinned).expect("the vertices exist");
