@@ -117,6 +117,8 @@ pub struct System {
 struct Constant {
     weights: Weights,
     curvature: Curvature,
+    /// What is added on the diagonal beside them, of all vertices; empty for nothing.
+    masses: Vec<f64>,
     /// Whether some element's curvature had to be changed; where none had, they serve for any treatment.
     projected: bool,
     blocks: Vec<Block<f64>>,
@@ -299,14 +301,32 @@ impl System {
         options: LinearisationOptions,
         matrix: &mut BlockMatrix,
     ) -> Result<LinearisedForces, EvaluationError> {
+        self.linearise_with_masses(state, options, &[], matrix)
+    }
+
+    /// The same with the mass of each vertex, in kg, on the diagonal: M + α ∂f/∂x + β ∂f/∂v. Masses are constant, and come with the constant Jacobians.
+    ///
+    /// # Errors
+    /// When the state is incomplete or not finite, or a force is not finite.
+    ///
+    /// # Panics
+    /// When the matrix comes from elsewhere, or there are masses, but not of all vertices.
+    pub fn linearise_with_masses(
+        &mut self,
+        state: State<'_>,
+        options: LinearisationOptions,
+        masses: &[f64],
+        matrix: &mut BlockMatrix,
+    ) -> Result<LinearisedForces, EvaluationError> {
         self.check(state)?;
+        assert!(masses.is_empty() || masses.len() == self.dofs.vertex_count(), "every vertex has a mass, or none");
         assert!(self.owns(matrix), "the matrix must come from the same system");
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
         let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
         // For the product every term is evaluated anyway.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
         if with_constant {
-            self.update_constant(state, weights, curvature);
+            self.update_constant(state, weights, curvature, masses);
         }
         let constant = self.constant.as_ref().filter(|_| with_constant).map(|constant| &constant.blocks[..]);
         let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
@@ -331,24 +351,29 @@ impl System {
         if force.iter().flatten().any(|component| !component.is_finite()) {
             return Err(self.find_non_finite_force(state));
         }
+        if !with_constant {
+            add_masses(&self.dofs, &self.pattern, masses, matrix.values_mut());
+        }
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
     /// The Jacobians of the quadratic terms: evaluated once for all steps of one size, and again only if their curvature must be changed
     /// where it was not, or the other way round.
-    fn update_constant(&mut self, state: State<'_>, weights: Weights, curvature: Curvature) {
+    fn update_constant(&mut self, state: State<'_>, weights: Weights, curvature: Curvature, masses: &[f64]) {
         let known = self.constant.take();
-        let serves = |it: &Constant| it.weights == weights && (!it.projected || it.curvature == curvature);
+        let serves = |it: &Constant| {
+            it.weights == weights && (!it.projected || it.curvature == curvature) && it.masses == masses
+        };
         let constant = match known {
             Some(known) if serves(&known) => known,
             other => {
                 let blocks = other.map_or_else(|| vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1], |it| it.blocks);
                 // What need not be changed is found by changing it.
-                let changed = self.evaluate_constant(state, weights, Curvature::Clamped, blocks);
+                let changed = self.evaluate_constant(state, weights, Curvature::Clamped, masses, blocks);
                 if serves(&changed) {
                     changed
                 } else {
-                    let as_wanted = self.evaluate_constant(state, weights, curvature, changed.blocks);
+                    let as_wanted = self.evaluate_constant(state, weights, curvature, masses, changed.blocks);
                     Constant { projected: true, ..as_wanted }
                 }
             }
@@ -361,9 +386,11 @@ impl System {
         state: State<'_>,
         weights: Weights,
         curvature: Curvature,
+        masses: &[f64],
         mut blocks: Vec<Block<f64>>,
     ) -> Constant {
         blocks.fill([[0.0; 3]; 3]);
+        add_masses(&self.dofs, &self.pattern, masses, &mut blocks);
         let mut sum = Linearisation {
             weights,
             curvature,
@@ -377,7 +404,7 @@ impl System {
             projected |= tally.projected > 0;
             counts.hessian += tally;
         }
-        Constant { weights, curvature, projected, blocks }
+        Constant { weights, curvature, masses: masses.to_vec(), projected, blocks }
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
@@ -399,6 +426,17 @@ impl System {
 
     fn find_non_finite_force(&self, state: State<'_>) -> EvaluationError {
         blame(self.terms.iter().map(|counted| &*counted.term), Quantity::Force, state)
+    }
+}
+
+/// Adds masses of all vertices, if there are any, to the diagonal.
+fn add_masses(dofs: &DofMap, pattern: &Pattern, masses: &[f64], blocks: &mut [Block<f64>]) {
+    let free = if masses.is_empty() { &[] } else { dofs.free() };
+    for (row, &vertex) in free.iter().enumerate() {
+        let diagonal = &mut blocks[pattern.diagonal(row)];
+        for axis in 0..3 {
+            diagonal[axis][axis] += masses[vertex];
+        }
     }
 }
 

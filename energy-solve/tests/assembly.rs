@@ -80,6 +80,38 @@ fn matrix_is_the_derivative_of_the_force() {
 }
 
 #[test]
+fn masses_are_added_on_the_diagonal() {
+    let (x, v) = (positions(), velocities());
+    let state = State { x: &x, v: &v };
+    let masses: Vec<f64> = (0..5).map(|vertex| 0.5 + f64::from(vertex)).collect();
+    let heavier: Vec<f64> = masses.iter().map(|mass| 2.0 * mass).collect();
+    let weights = Weights { position: -1e-2, velocity: -0.1 };
+    let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
+    // Dampers have constant Jacobians, springs have not.
+    let ropes = || System::new(vec![springs()], &[false, false, false, true, false]).unwrap();
+    for mut system in [system(&[3]), ropes()] {
+        let mut bare = system.matrix();
+        let expected = system.linearise(state, options, &mut bare).unwrap();
+        for masses in [&masses, &heavier, &masses] {
+            let mut massive = system.matrix();
+            let found = system.linearise_with_masses(state, options, masses, &mut massive).unwrap();
+            assert_eq!(found, expected);
+            for row in 0..4 {
+                for column in 0..4 {
+                    let (with, without) = (massive.block(row, column), bare.block(row, column));
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            let mass = if (row, i) == (column, j) { masses[system.dofs().free()[row]] } else { 0.0 };
+                            assert!((with[i][j] - without[i][j] - mass).abs() < 1e-12, "block ({row}, {column})");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn force_is_minus_the_derivative_of_the_energy() {
     let mut system = System::new(vec![springs()], &[false; 5]).unwrap();
     let v = vec![[0.0; 3]; 5];

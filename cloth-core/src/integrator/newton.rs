@@ -156,18 +156,15 @@ impl Step<'_> {
         let v = self.velocities(x);
         let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
         let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
-        let linear = self.body.system.linearise(State { x, v: &v }, options, matrix)?;
-        let mut down = Vec::with_capacity(self.free.len());
-        for (row, &vertex) in self.free.iter().enumerate() {
-            let mass = self.body.masses[vertex];
-            let diagonal = matrix.diagonal_mut(row);
-            for axis in 0..3 {
-                diagonal[axis][axis] += mass;
-            }
-            down.push(std::array::from_fn(|axis| {
-                mass * (self.inertial[vertex][axis] - x[vertex][axis]) + self.dt * self.dt * linear.force[vertex][axis]
-            }));
-        }
+        let Body { system, masses, .. } = &mut *self.body;
+        let linear = system.linearise_with_masses(State { x, v: &v }, options, masses, matrix)?;
+        let down = |&vertex: &usize| -> Vector3<f64> {
+            let (away, force) = (self.inertial[vertex], linear.force[vertex]);
+            std::array::from_fn(|axis| {
+                self.body.masses[vertex] * (away[axis] - x[vertex][axis]) + self.dt * self.dt * force[axis]
+            })
+        };
+        let down = self.free.iter().map(down).collect();
         self.report.phases.assembly += started.elapsed();
         Ok(down)
     }
