@@ -21,11 +21,6 @@ impl BlockMatrix {
         Self { pattern, values }
     }
 
-    /// Sets every entry to zero.
-    pub fn clear(&mut self) {
-        self.values.fill([[0.0; 3]; 3]);
-    }
-
     /// The pattern.
     #[must_use]
     pub fn pattern(&self) -> &Arc<Pattern> {

@@ -120,7 +120,8 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
 
 impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PotentialTerm<E> {
     fn energy_parts(&self) -> usize {
-        self.active.len().div_ceil(ENERGY_PART)
+        // One at least, to say what was skipped.
+        self.active.len().div_ceil(ENERGY_PART).max(1)
     }
 
     fn energy_part(&self, part: usize, x: &[Vector3<f64>]) -> (f64, Tally) {
@@ -192,11 +193,11 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        let (mut sum, mut tally) = (0.0, self.tally(0));
+        let (mut sum, mut tally) = (0.0, Tally::default());
         for part in 0..self.energy_parts() {
             let (energy, of_part) = self.energy_part(part, x);
             sum += energy;
-            tally.flagged += of_part.flagged;
+            tally += of_part;
         }
         Some((sum, tally))
     }

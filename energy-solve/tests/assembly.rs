@@ -180,6 +180,14 @@ fn counts_say_what_was_evaluated_and_skipped() {
 }
 
 #[test]
+fn what_is_pinned_altogether_is_counted_as_skipped() {
+    let mut pinned = system(&[0, 1, 2, 3, 4]);
+    assert_eq!(pinned.energies(&positions()).unwrap()[0].energy, Some(0.0));
+    let (_, counts) = pinned.terms().next().unwrap();
+    assert_eq!((counts.value.evaluated, counts.value.skipped), (0, EDGES.len() as u64));
+}
+
+#[test]
 fn projection_leaves_no_negative_curvature() {
     let list = ElementList::new("strut", vec![Spring { stiffness: 1.0, length: 2.0 }], &[[0, 1]]).unwrap();
     let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &[false, true]).unwrap();

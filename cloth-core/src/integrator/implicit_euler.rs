@@ -61,17 +61,13 @@ impl ImplicitEuler {
         let state = State { x: &body.x, v: &body.v };
         let weights = Weights { position: -dt * dt, velocity: -dt };
         let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
-        let linear = body.system.linearise(state, options, matrix)?;
-        let free = body.system.dofs().free();
-        let mut right = Vec::with_capacity(free.len());
-        for (row, &vertex) in free.iter().enumerate() {
-            for axis in 0..3 {
-                matrix.diagonal_mut(row)[axis][axis] += body.masses[vertex];
-            }
+        let linear = body.system.linearise_with_masses(state, options, &body.masses, matrix)?;
+        let right = |&vertex: &usize| -> Vector3<f64> {
             let (force, change) = (linear.force[vertex], linear.stiffness_times_velocity[vertex]);
-            right.push(std::array::from_fn(|axis| dt * (force[axis] + dt * change[axis])));
-        }
-        let mut delta = vec![[0.0; 3]; free.len()];
+            std::array::from_fn(|axis| dt * (force[axis] + dt * change[axis]))
+        };
+        let right: Vec<_> = body.system.dofs().free().iter().map(right).collect();
+        let mut delta = vec![[0.0; 3]; right.len()];
         let report = match solver {
             None => bicgstab(matrix, &BlockJacobi::new(matrix)?, &right, &mut delta, &self.options.0),
             Some(solver) => match solver.prepare(matrix) {

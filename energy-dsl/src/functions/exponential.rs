@@ -87,7 +87,11 @@ fn log1p(g: &mut Graph, x: NodeId) -> NodeId {
 
 /// x, and 1 + x if it is known by other means.
 fn with_successor(shapes: &[Shape]) -> Result<Shape, String> {
-    if shapes.len() == 2 { two_scalars(shapes) } else { one_scalar(shapes) }
+    match shapes.len() {
+        1 => one_scalar(shapes),
+        2 => two_scalars(shapes),
+        count => Err(format!("takes one or two scalars, but there are {count} arguments")),
+    }
 }
 
 /// A function of x by the way of one argument or of two.

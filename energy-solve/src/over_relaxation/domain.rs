@@ -57,15 +57,22 @@ impl<T: Precision> Domain<T> {
     /// Domains of these consecutive rows, which make up the pattern.
     pub(super) fn all(pattern: &Pattern, ranges: &[Range<usize>]) -> Vec<Self> {
         let mut domains: Vec<Self> = ranges.iter().map(|rows| Self::uncoupled(pattern, rows.clone())).collect();
-        for number in 0..ranges.len() {
-            for row in ranges[number].clone() {
-                let outer = domains[number].inner_end[row - ranges[number].start] as usize..pattern.above(row).end;
-                for place in outer {
-                    let column = pattern.columns()[place] as usize;
-                    let other = ranges.partition_point(|range| range.end <= column);
-                    couple(&mut domains, (number, row), (other, column), place);
-                }
+        let outer = outer_blocks(pattern, &domains);
+        for &(_, between) in &outer {
+            for row in between {
+                let (domain, local) = local(ranges, row);
+                domains[domain].border.push(local);
             }
+        }
+        for domain in &mut domains {
+            domain.border.sort_unstable();
+            domain.border.dedup();
+        }
+        for (place, between) in outer {
+            couple(&mut domains, ranges, place, between);
+        }
+        for domain in &mut domains {
+            domain.couplings.sort_by_key(|coupling| coupling.other);
         }
         domains
     }
@@ -101,15 +108,6 @@ impl<T: Precision> Domain<T> {
     /// How many rows others are coupled with.
     pub(super) fn border(&self) -> usize {
         self.border.len()
-    }
-
-    fn on_border(&mut self, row: usize) -> u32 {
-        let row = index(row - self.rows.start);
-        let known = self.border.iter().rposition(|&other| other == row);
-        index(known.unwrap_or_else(|| {
-            self.border.push(row);
-            self.border.len() - 1
-        }))
     }
 
     /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
@@ -282,22 +280,36 @@ impl<T: Precision> Domain<T> {
     }
 }
 
+/// The places of the blocks that couple domains, with their rows and columns.
+fn outer_blocks<T>(pattern: &Pattern, domains: &[Domain<T>]) -> Vec<(usize, [usize; 2])> {
+    let of_row =
+        |row: usize, inner_end: u32| (inner_end as usize..pattern.above(row).end).map(move |place| (row, place));
+    let places = domains.iter().flat_map(|domain| {
+        domain.rows.clone().zip(&domain.inner_end).flat_map(move |(row, &inner_end)| of_row(row, inner_end))
+    });
+    places.map(|(row, place)| (place, [row, pattern.columns()[place] as usize])).collect()
+}
+
+/// The domain of a row, and its number there.
+fn local(ranges: &[Range<usize>], row: usize) -> (usize, u32) {
+    let domain = ranges.partition_point(|range| range.end <= row);
+    (domain, index(row - ranges[domain].start))
+}
+
 /// Notes the block of two rows of different domains, in both.
-fn couple<T: Precision>(
-    domains: &mut [Domain<T>],
-    (number, row): (usize, usize),
-    (other, column): (usize, usize),
-    place: usize,
-) {
-    let borders = [domains[number].on_border(row), domains[other].on_border(column)];
-    let between = [index(row), index(column)];
-    let columns = [[T::from_f64(0.0); 4]; 3];
-    for (of, with, own, border, turned) in
-        [(number, other, row, borders[1], false), (other, number, column, borders[0], true)]
-    {
-        let row = index(own - domains[of].rows.start);
-        let (other, place) = (index(with), index(place));
-        domains[of].couplings.push(Coupling { row, other, border, place, between, turned, columns });
+fn couple<T: Precision>(domains: &mut [Domain<T>], ranges: &[Range<usize>], place: usize, between: [usize; 2]) {
+    let ends = between.map(|row| local(ranges, row));
+    for (own, with, turned) in [(ends[0], ends[1], false), (ends[1], ends[0], true)] {
+        let border = domains[with.0].border.binary_search(&with.1).expect("it is on the border");
+        domains[own.0].couplings.push(Coupling {
+            row: own.1,
+            other: index(with.0),
+            border: index(border),
+            place: index(place),
+            between: between.map(index),
+            turned,
+            columns: [[T::from_f64(0.0); 4]; 3],
+        });
     }
 }
 
