@@ -112,7 +112,7 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
             for (&vertex, gradient) in self.stencil(*number).iter().zip(result.gradient.as_ref()) {
                 (0..3).for_each(|axis| sum.force[vertex][axis] -= gradient[axis]);
             }
-            self.places.add(*number, -sum.weights.velocity, result.hessian.as_ref(), sum.matrix);
+            self.places.add(*number, -sum.weights.velocity, result.hessian.as_ref(), &mut sum.matrix);
             flagged += u64::from(result.flags.any());
         }
         self.tally(flagged)

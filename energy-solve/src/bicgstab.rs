@@ -1,6 +1,7 @@
 use energy_dsl::Vector3;
 
 use crate::matrix::BlockMatrix;
+use crate::precision::Precision;
 use crate::preconditioner::Preconditioner;
 use crate::solve::{SolveOptions, SolveReport, StopReason, norm, residual};
 use crate::vector::{add_scaled, dot};
@@ -8,7 +9,7 @@ use crate::vector::{add_scaled, dot};
 /// Solves A x = b for any invertible A, starting from the given x: BiCGSTAB (van der Vorst 1992) on the left-preconditioned
 /// system D⁻¹A x = D⁻¹b. For force laws, whose Jacobians are not symmetric.
 pub fn bicgstab(
-    matrix: &BlockMatrix,
+    matrix: &BlockMatrix<impl Precision>,
     preconditioner: &impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],

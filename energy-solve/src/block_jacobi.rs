@@ -2,6 +2,7 @@ use energy_dsl::{Block, Number, Vector3};
 use nalgebra::Matrix3;
 
 use crate::matrix::BlockMatrix;
+use crate::precision::{Precision, doubled};
 use crate::preconditioner::{Preconditioner, SingularBlock};
 use crate::vector::block_times;
 
@@ -17,10 +18,10 @@ impl BlockJacobi {
     ///
     /// # Errors
     /// When one of them is singular or not finite.
-    pub fn new(matrix: &BlockMatrix) -> Result<Self, SingularBlock> {
-        let blocks = || (0..matrix.pattern().rows()).map(|row| matrix.diagonal(row));
-        let inverses = blocks().enumerate().map(|(row, block)| inverse(block).ok_or(SingularBlock { row }));
-        let positive_definite = blocks().all(is_positive_definite);
+    pub fn new(matrix: &BlockMatrix<impl Precision>) -> Result<Self, SingularBlock> {
+        let blocks = || (0..matrix.pattern().rows()).map(|row| doubled(matrix.diagonal(row)));
+        let inverses = blocks().enumerate().map(|(row, block)| inverse(&block).ok_or(SingularBlock { row }));
+        let positive_definite = blocks().all(|block| is_positive_definite(&block));
         Ok(Self { inverses: inverses.collect::<Result<_, _>>()?, positive_definite })
     }
 }

@@ -1,6 +1,7 @@
 use energy_dsl::Vector3;
 
 use crate::matrix::BlockMatrix;
+use crate::precision::Precision;
 use crate::preconditioner::Preconditioner;
 use crate::solve::{SolveOptions, SolveReport, StopReason, residual};
 use crate::vector::{add_scaled, dot, scale_and_add};
@@ -10,7 +11,7 @@ use crate::vector::{add_scaled, dot, scale_and_add};
 ///
 /// A direction of non-positive curvature stops it; see [`StopReason::IndefiniteCurvature`].
 pub fn conjugate_gradients(
-    matrix: &BlockMatrix,
+    matrix: &BlockMatrix<impl Precision>,
     preconditioner: &impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],

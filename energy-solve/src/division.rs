@@ -4,9 +4,11 @@
 use energy_dsl::{Block, Vector3};
 
 use crate::counts::Tally;
+use crate::curvature::Curvature;
 use crate::dofs::DofMap;
 use crate::pattern::Pattern;
-use crate::term::{Divisible, Linearisation, Share, State};
+use crate::precision::Precision;
+use crate::term::{Divisible, Linearisation, Share, State, Weights};
 use crate::threads::{for_each, split_mut};
 
 /// Free vertices that are worth a thread of their own.
@@ -63,29 +65,52 @@ pub(crate) fn forces(
     total(tallies)
 }
 
+/// What terms are added to.
+pub(crate) struct Sums<'a, T> {
+    pub(crate) weights: Weights,
+    pub(crate) curvature: Curvature,
+    pub(crate) matrix: &'a mut [Block<T>],
+    pub(crate) force: &'a mut [Vector3<f64>],
+    pub(crate) product: Option<&'a mut [Vector3<f64>]>,
+}
+
+impl<T: Precision> Sums<'_, T> {
+    /// As terms see it.
+    pub(crate) fn linearisation(&mut self) -> Linearisation<'_> {
+        Linearisation {
+            weights: self.weights,
+            curvature: self.curvature,
+            matrix: T::blocks(self.matrix),
+            force: self.force,
+            stiffness_times_velocity: self.product.as_deref_mut(),
+        }
+    }
+}
+
 /// Sets the matrix to the constant blocks or to zero, and adds the forces of the terms, and the Jacobians that are wanted.
-pub(crate) fn linearisations(
+pub(crate) fn linearisations<T: Precision>(
     terms: &Terms<'_>,
     shares: &[Share],
     state: State<'_>,
-    constant: Option<&[Block<f64>]>,
-    sum: &mut Linearisation<'_>,
+    constant: Option<&[Block<T>]>,
+    sums: &mut Sums<'_, T>,
 ) -> Vec<Option<Tally>> {
     let vertices = || shares.iter().map(|share| share.vertices.len());
-    let matrices = split_mut(sum.matrix, shares.iter().map(|share| share.blocks.len()));
-    let forces = split_mut(sum.force, vertices());
-    let products: Vec<Option<&mut [Vector3<f64>]>> = match &mut sum.stiffness_times_velocity {
+    let matrices = split_mut(sums.matrix, shares.iter().map(|share| share.blocks.len()));
+    let forces = split_mut(sums.force, vertices());
+    let products: Vec<Option<&mut [Vector3<f64>]>> = match &mut sums.product {
         Some(product) => split_mut(product, vertices()).into_iter().map(Some).collect(),
         None => shares.iter().map(|_| None).collect(),
     };
-    let (weights, curvature) = (sum.weights, sum.curvature);
+    let (weights, curvature) = (sums.weights, sums.curvature);
     let parts = shares.iter().zip(matrices).zip(forces).zip(products);
     let tallies = for_each(shares.len(), parts.collect(), |(((share, matrix), force), product)| {
         match constant {
             Some(blocks) => matrix.copy_from_slice(&blocks[share.blocks.clone()]),
-            None => matrix.fill([[0.0; 3]; 3]),
+            None => matrix.fill([[T::from_f64(0.0); 3]; 3]),
         }
-        let mut sum = Linearisation { weights, curvature, matrix, force, stiffness_times_velocity: product };
+        let mut sums = Sums { weights, curvature, matrix, force, product };
+        let mut sum = sums.linearisation();
         let mut add = |term: &dyn Divisible, linear: bool| {
             if linear {
                 term.add_linearisation_of(share, state, &mut sum)

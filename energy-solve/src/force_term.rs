@@ -1,6 +1,6 @@
 use std::fmt::{self, Debug};
 
-use energy_dsl::{Block, Declaration, ForceLaw, Potential, Value, Vector3};
+use energy_dsl::{Array, Block, Declaration, ForceLaw, Potential, Value, Vector3};
 
 use crate::active::{active_elements, points_of};
 use crate::counts::Tally;
@@ -8,8 +8,9 @@ use crate::dofs::DofMap;
 use crate::list::ElementList;
 use crate::pattern::Pattern;
 use crate::places::Places;
+use crate::precision::Blocks;
 use crate::term::{Character, Linearisation, Quantity, State, Stencils, Term};
-use crate::vector::{add_scaled_block, block_times};
+use crate::vector::block_times;
 
 /// A method that evaluates an element's energy.
 type ValueOf<E> = fn(&E, &<E as ForceLaw<f64>>::Points) -> Value<f64>;
@@ -88,6 +89,23 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
         }
     }
 
+    fn dissipation(&self, State { x, v }: State<'_>) -> Option<(f64, Tally)> {
+        let (mut sum, mut flagged) = (0.0, 0);
+        for &element in &self.active {
+            let (law, stencil) = (&self.list.elements()[element], self.list.stencil(element));
+            let (points, rates): (E::Points, E::Points) = (points_of(stencil, x), points_of(stencil, v));
+            let still = <E::Points as Array<Vector3<f64>>>::repeat([0.0; 3]);
+            let (moving, still) = (law.force(&points, &rates), law.force(&points, &still));
+            for (point, rate) in rates.as_ref().iter().enumerate() {
+                for axis in 0..3 {
+                    sum += 0.5 * (still.force.as_ref()[point][axis] - moving.force.as_ref()[point][axis]) * rate[axis];
+                }
+            }
+            flagged += u64::from(moving.flags.any());
+        }
+        E::DECLARATION.velocity_dependent.then(|| (sum, self.tally(flagged)))
+    }
+
     fn has_energy(&self) -> bool {
         self.energy.is_some()
     }
@@ -125,10 +143,10 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
             add_vectors(stencil, result.force.as_ref(), sum.force);
             let by_position = result.by_position.as_ref();
             if E::DECLARATION.curved {
-                self.add_blocks(number, sum.weights.position, by_position, sum.matrix);
+                self.add_blocks(number, sum.weights.position, by_position, &mut sum.matrix);
             }
             if E::DECLARATION.velocity_dependent {
-                self.add_blocks(number, sum.weights.velocity, result.by_velocity.as_ref(), sum.matrix);
+                self.add_blocks(number, sum.weights.velocity, result.by_velocity.as_ref(), &mut sum.matrix);
             }
             if let Some(product) = &mut sum.stiffness_times_velocity {
                 for (&(i, j), block) in self.pairs.iter().zip(by_position) {
@@ -155,11 +173,11 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
 impl<E: ForceLaw<f64>> ForceTerm<E> {
     /// Adds an element's blocks to the matrix: of two that are stored as one, the one that is not turned.
-    fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut [Block<f64>]) {
+    fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
         let slots = self.places.of(number);
         for (pair, block) in blocks.iter().enumerate() {
             if self.places.turned(number, pair) & 1 == 0 {
-                add_scaled_block(&mut matrix[slots[pair] as usize], weight, block);
+                matrix.add(slots[pair] as usize, weight, block);
             }
         }
     }

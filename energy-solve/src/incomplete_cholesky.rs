@@ -5,6 +5,7 @@ use energy_dsl::{Block, Kernel, Level, Number, Vector3, dispatch};
 use crate::block_jacobi::{inverse_of_definite, is_positive_definite};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage, index};
+use crate::precision::{Precision, doubled};
 use crate::preconditioner::{Preconditioner, SingularBlock};
 use crate::rounded_block::{Sums, Wide, add_times, narrow, room, store_columns, store_rows, total, widen};
 use crate::vector::add_scaled_block;
@@ -111,9 +112,9 @@ impl IncompleteCholesky {
     ///
     /// # Panics
     /// When the matrix has another pattern.
-    pub fn factor(&mut self, matrix: &BlockMatrix) -> Result<(), SingularBlock> {
+    pub fn factor(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
-        if let Some(row) = (0..self.pattern.rows()).find(|&row| !is_positive_definite(matrix.diagonal(row))) {
+        if let Some(row) = (0..self.pattern.rows()).find(|&row| !is_positive_definite(&doubled(matrix.diagonal(row)))) {
             return Err(SingularBlock { row });
         }
         (self.shift, self.kept) = (0.0, KEPT);
@@ -139,12 +140,12 @@ impl IncompleteCholesky {
 }
 
 /// The factorisation with the shift that is set. Fails with the row whose pivot is not positive definite.
-struct Factorisation<'a> {
+struct Factorisation<'a, M> {
     of: &'a mut IncompleteCholesky,
-    matrix: &'a BlockMatrix,
+    matrix: &'a BlockMatrix<M>,
 }
 
-impl Kernel for Factorisation<'_> {
+impl<M: Precision> Kernel for Factorisation<'_, M> {
     type Output = Result<(), usize>;
 
     #[inline(always)]
@@ -162,13 +163,13 @@ impl Kernel for Factorisation<'_> {
             kept,
         } = self.of;
         upper.clear();
-        upper.extend_from_slice(self.matrix.values());
+        upper.extend(self.matrix.values().iter().map(doubled));
         let mut scaled: Vec<Block<f64>> = Vec::new();
         for row in 0..pattern.rows() {
             let diagonal = pattern.diagonal(row);
             let pivot = &mut upper[diagonal];
             if *shift > 0.0 {
-                add_scaled_block(pivot, *shift, self.matrix.diagonal(row));
+                add_scaled_block(pivot, *shift, &doubled(self.matrix.diagonal(row)));
             }
             let Some(inverse) = inverse_of_definite(pivot) else { return Err(row) };
             store_columns(columns, diagonal, &inverse);

@@ -2,23 +2,27 @@ use std::sync::Arc;
 
 use energy_dsl::{Block, Vector3};
 
+use crate::constant::Constant;
 use crate::pattern::{Pattern, Storage};
+use crate::precision::{Precision, doubled};
 use crate::vector::{block_times, transposed, transposed_times};
 
-/// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle.
+/// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle. Entries are stored in `T`, `f32` or `f64`.
 #[derive(Clone, Debug)]
-pub struct BlockMatrix {
+pub struct BlockMatrix<T = f64> {
     pattern: Arc<Pattern>,
     /// The blocks of the pattern, and one more that takes what belongs nowhere.
-    values: Vec<Block<f64>>,
+    values: Vec<Block<T>>,
+    /// What a system keeps of it from one linearisation to the next.
+    pub(crate) constant: Option<Constant<T>>,
 }
 
-impl BlockMatrix {
+impl<T: Precision> BlockMatrix<T> {
     /// The zero matrix of a pattern.
     #[must_use]
     pub fn zeros(pattern: Arc<Pattern>) -> Self {
-        let values = vec![[[0.0; 3]; 3]; pattern.blocks() + 1];
-        Self { pattern, values }
+        let values = vec![[[T::from_f64(0.0); 3]; 3]; pattern.blocks() + 1];
+        Self { pattern, values, constant: None }
     }
 
     /// The pattern.
@@ -29,41 +33,37 @@ impl BlockMatrix {
 
     /// The diagonal block of a row.
     #[must_use]
-    pub fn diagonal(&self, row: usize) -> &Block<f64> {
+    pub fn diagonal(&self, row: usize) -> &Block<T> {
         &self.values[self.pattern.diagonal(row)]
     }
 
     /// The diagonal block of a row, to be changed.
-    pub fn diagonal_mut(&mut self, row: usize) -> &mut Block<f64> {
+    pub fn diagonal_mut(&mut self, row: usize) -> &mut Block<T> {
         &mut self.values[self.pattern.diagonal(row)]
     }
 
     /// A block; zero where the pattern has none.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> Block<f64> {
-        let place = self.pattern.place(row, column);
-        place.map_or(
-            [[0.0; 3]; 3],
-            |(slot, flipped)| {
-                if flipped { transposed(&self.values[slot]) } else { self.values[slot] }
-            },
-        )
+        let Some((slot, flipped)) = self.pattern.place(row, column) else { return [[0.0; 3]; 3] };
+        let block = doubled(&self.values[slot]);
+        if flipped { transposed(&block) } else { block }
     }
 
     /// The stored blocks in the order of [`Pattern::place`].
     #[must_use]
-    pub fn values(&self) -> &[Block<f64>] {
+    pub fn values(&self) -> &[Block<T>] {
         &self.values[..self.pattern.blocks()]
     }
 
     /// The stored blocks, to be changed.
-    pub fn values_mut(&mut self) -> &mut [Block<f64>] {
+    pub fn values_mut(&mut self) -> &mut [Block<T>] {
         let stored = self.pattern.blocks();
         &mut self.values[..stored]
     }
 
     /// The stored blocks, and the one at [`Pattern::nowhere`].
-    pub(crate) fn values_and_nowhere(&mut self) -> &mut [Block<f64>] {
+    pub(crate) fn values_and_nowhere(&mut self) -> &mut [Block<T>] {
         &mut self.values
     }
 
@@ -75,7 +75,7 @@ impl BlockMatrix {
             for (slot, column) in self.pattern.row(row) {
                 for i in 0..3 {
                     for j in 0..3 {
-                        let size = self.values[slot][i][j].abs();
+                        let size: f64 = self.values[slot][i][j].abs().into();
                         sums[row][i] += size;
                         if self.pattern.storage() == Storage::Upper && row != column {
                             sums[column][j] += size;
@@ -99,7 +99,7 @@ impl BlockMatrix {
         for (row, sum) in y.iter_mut().enumerate() {
             *sum = [0.0; 3];
             for (slot, column) in self.pattern.row(row) {
-                add(sum, block_times(&self.values[slot], &x[column]));
+                add(sum, block_times(&doubled(&self.values[slot]), &x[column]));
             }
         }
     }
@@ -109,11 +109,11 @@ impl BlockMatrix {
         y.fill([0.0; 3]);
         for row in 0..self.pattern.rows() {
             let here = x[row];
-            let mut sum = block_times(self.diagonal(row), &here);
+            let mut sum = block_times(&doubled(self.diagonal(row)), &here);
             for (slot, column) in self.pattern.row(row).skip(1) {
-                let block = &self.values[slot];
-                add(&mut sum, block_times(block, &x[column]));
-                add(&mut y[column], transposed_times(block, &here));
+                let block = doubled(&self.values[slot]);
+                add(&mut sum, block_times(&block, &x[column]));
+                add(&mut y[column], transposed_times(&block, &here));
             }
             add(&mut y[row], sum);
         }

@@ -13,6 +13,7 @@ use crate::dofs::DofMap;
 use crate::list::ElementList;
 use crate::pattern::{Pattern, Storage, index};
 use crate::places::Places;
+use crate::precision::{Blocks, Precision};
 use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, Stencils, Term};
 
 /// A term with f = −∇U: never dependent on velocity, always with symmetric Jacobians.
@@ -408,47 +409,81 @@ impl Hessians<'_, '_> {
     fn scatter<L: Level>(&mut self, first: usize, count: usize, triangle: &[[Vector3<L::F64>; 3]]) {
         let stride = 9 * triangle.len();
         L::F64::store_transposed(triangle.as_flattened().as_flattened(), count, &mut self.rows, stride);
-        let weight = -self.sum.weights.position;
-        for lane in 0..count {
-            let slots = self.places.of(first + lane);
-            let blocks = self.rows[lane * stride..][..stride].as_chunks::<9>().0;
-            for pair in 0..triangle.len() {
+        let rows = Rows {
+            numbers: &self.rows,
+            pairs: triangle.len(),
+            first,
+            count,
+            weight: -self.sum.weights.position,
+            places: self.places,
+            first_block: self.first_block,
+        };
+        match &mut self.sum.matrix {
+            Blocks::Single(matrix) => rows.add_to(matrix),
+            Blocks::Double(matrix) => rows.add_to(matrix),
+        }
+    }
+}
+
+/// The triangles of consecutive elements, one a row.
+struct Rows<'a> {
+    numbers: &'a [f64],
+    /// Blocks of a triangle.
+    pairs: usize,
+    first: usize,
+    count: usize,
+    weight: f64,
+    places: &'a Places,
+    first_block: usize,
+}
+
+impl Rows<'_> {
+    /// Adds them to blocks of the matrix, from the first block on.
+    #[inline(always)]
+    fn add_to<T: Precision>(&self, matrix: &mut [Block<T>]) {
+        let stride = 9 * self.pairs;
+        for lane in 0..self.count {
+            let slots = self.places.of(self.first + lane);
+            let blocks = self.numbers[lane * stride..][..stride].as_chunks::<9>().0;
+            for pair in 0..self.pairs {
                 let slot = (slots[pair] as usize).wrapping_sub(self.first_block);
-                if let Some(block) = self.sum.matrix.get_mut(slot) {
-                    add_block::<L>(block.as_flattened_mut(), weight, &blocks[pair]);
+                if let Some(block) = matrix.get_mut(slot) {
+                    add_block(block, self.weight, &blocks[pair]);
                 }
             }
-            if slots.len() > triangle.len() {
-                add_mirrored(&slots[triangle.len()..], blocks, weight, self.first_block, self.sum.matrix);
+            if slots.len() > self.pairs {
+                add_mirrored(&slots[self.pairs..], blocks, self.weight, self.first_block, matrix);
             }
         }
     }
 }
 
-/// B ← B + s A, as many entries at once as there are lanes.
+/// B ← B + s A.
 #[inline(always)]
-fn add_block<L: Level>(sum: &mut [f64], scale: f64, block: &[f64; 9]) {
-    let lanes = <L::F64 as Lane<f64>>::LANES;
-    let wide = 9 / lanes * lanes;
-    for entry in (0..wide).step_by(lanes) {
-        let place = &mut sum[entry..entry + lanes];
-        (L::F64::load(place) + L::F64::splat(scale) * L::F64::load(&block[entry..])).store(place);
-    }
-    for entry in wide..9 {
-        sum[entry] += scale * block[entry];
+fn add_block<T: Precision>(sum: &mut Block<T>, scale: f64, block: &[f64; 9]) {
+    let sum = sum.as_flattened_mut();
+    for entry in 0..9 {
+        sum[entry] = sum[entry] + T::from_f64(scale * block[entry]);
     }
 }
 
 /// Adds the blocks below the diagonal, where other terms make the matrix one that is not symmetric.
 #[inline(never)]
-fn add_mirrored(slots: &[u32], triangle: &[[f64; 9]], weight: f64, first: usize, matrix: &mut [Block<f64>]) {
+fn add_mirrored<T: Precision>(
+    slots: &[u32],
+    triangle: &[[f64; 9]],
+    weight: f64,
+    first: usize,
+    matrix: &mut [Block<T>],
+) {
     let n = points_of_triangle(triangle.len());
     let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| triangle_index(n, i, j)));
     for (&slot, pair) in slots.iter().zip(pairs) {
         let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) else { continue };
         for row in 0..3 {
             for column in 0..3 {
-                block[row][column] += weight * triangle[pair][3 * column + row];
+                let entry = T::from_f64(weight * triangle[pair][3 * column + row]);
+                block[row][column] = block[row][column] + entry;
             }
         }
     }

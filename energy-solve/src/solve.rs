@@ -1,4 +1,5 @@
 use crate::matrix::BlockMatrix;
+use crate::precision::Precision;
 use crate::vector::dot;
 use energy_dsl::Vector3;
 
@@ -76,7 +77,11 @@ impl SolveReport {
 }
 
 /// b − A x.
-pub(crate) fn residual(matrix: &BlockMatrix, b: &[Vector3<f64>], x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+pub(crate) fn residual(
+    matrix: &BlockMatrix<impl Precision>,
+    b: &[Vector3<f64>],
+    x: &[Vector3<f64>],
+) -> Vec<Vector3<f64>> {
     let mut r = vec![[0.0; 3]; b.len()];
     matrix.multiply(x, &mut r);
     crate::vector::scale_and_add(&mut r, -1.0, b);

@@ -2,12 +2,14 @@ use std::sync::Arc;
 
 use energy_dsl::{Block, Vector3};
 
+use crate::constant::Constant;
 use crate::counts::Counts;
 use crate::curvature::Curvature;
-use crate::division;
+use crate::division::{self, Sums};
 use crate::dofs::DofMap;
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage, index};
+use crate::precision::Precision;
 use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, StepStart, Term, Weights};
 
 /// Terms that do not fit the vertices.
@@ -107,21 +109,8 @@ pub struct System {
     dofs: DofMap,
     pattern: Arc<Pattern>,
     terms: Vec<Counted>,
-    constant: Option<Constant>,
     threads: usize,
     shares: Vec<Share>,
-}
-
-/// α ∂f/∂x + β ∂f/∂v of the quadratic terms.
-#[derive(Debug)]
-struct Constant {
-    weights: Weights,
-    curvature: Curvature,
-    /// What is added on the diagonal beside them, of all vertices; empty for nothing.
-    masses: Vec<f64>,
-    /// Whether some element's curvature had to be changed; where none had, they serve for any treatment.
-    projected: bool,
-    blocks: Vec<Block<f64>>,
 }
 
 /// A term, and what it did.
@@ -154,7 +143,7 @@ impl System {
             Counted { term, counts: Counts::default() }
         };
         let terms = terms.into_iter().map(placed).collect();
-        let mut system = Self { dofs, pattern, terms, constant: None, threads: 1, shares: Vec::new() };
+        let mut system = Self { dofs, pattern, terms, threads: 1, shares: Vec::new() };
         system.set_threads(1);
         Ok(system)
     }
@@ -189,12 +178,18 @@ impl System {
     /// A zero matrix of the free vertices, for [`System::linearise`].
     #[must_use]
     pub fn matrix(&self) -> BlockMatrix {
+        self.matrix_in()
+    }
+
+    /// The same, of numbers of some precision. Single precision takes half the memory, and serves where the solution of a linear system is wanted to a few digits.
+    #[must_use]
+    pub fn matrix_in<T: Precision>(&self) -> BlockMatrix<T> {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
     /// Whether a matrix comes from [`System::matrix`] of this system.
     #[must_use]
-    pub fn owns(&self, matrix: &BlockMatrix) -> bool {
+    pub fn owns<T: Precision>(&self, matrix: &BlockMatrix<T>) -> bool {
         Arc::ptr_eq(matrix.pattern(), &self.pattern)
     }
 
@@ -258,13 +253,6 @@ impl System {
             if let Some((dissipation, tally)) = term.dissipation(state) {
                 sum += dissipation;
                 counts.value += tally;
-                continue;
-            }
-            let still = vec![[0.0; 3]; state.v.len()];
-            for (v, sign) in [(state.v, -1.0), (still.as_slice(), 1.0)] {
-                let mut force = still.clone();
-                counts.gradient += term.add_force(State { x: state.x, v }, &mut force);
-                sum += 0.5 * sign * crate::vector::dot(&force, state.v);
             }
         }
         Ok(sum)
@@ -288,7 +276,7 @@ impl System {
     }
 
     /// Writes α ∂f/∂x + β ∂f/∂v over the free vertices to `matrix` (which must come from [`System::matrix`]) and returns f and
-    /// (∂f/∂x) v of all vertices.
+    /// (∂f/∂x) v of all vertices. With the matrix stays what is constant of it: it is best used again.
     ///
     /// # Errors
     /// When the state is incomplete or not finite, or a force is not finite.
@@ -299,7 +287,7 @@ impl System {
         &mut self,
         state: State<'_>,
         options: LinearisationOptions,
-        matrix: &mut BlockMatrix,
+        matrix: &mut BlockMatrix<impl Precision>,
     ) -> Result<LinearisedForces, EvaluationError> {
         self.linearise_with_masses(state, options, &[], matrix)
     }
@@ -311,12 +299,12 @@ impl System {
     ///
     /// # Panics
     /// When the matrix comes from elsewhere, or there are masses, but not of all vertices.
-    pub fn linearise_with_masses(
+    pub fn linearise_with_masses<T: Precision>(
         &mut self,
         state: State<'_>,
         options: LinearisationOptions,
         masses: &[f64],
-        matrix: &mut BlockMatrix,
+        matrix: &mut BlockMatrix<T>,
     ) -> Result<LinearisedForces, EvaluationError> {
         self.check(state)?;
         assert!(masses.is_empty() || masses.len() == self.dofs.vertex_count(), "every vertex has a mass, or none");
@@ -325,20 +313,16 @@ impl System {
         let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
         // For the product every term is evaluated anyway.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
-        if with_constant {
-            self.update_constant(state, weights, curvature, masses);
-        }
-        let constant = self.constant.as_ref().filter(|_| with_constant).map(|constant| &constant.blocks[..]);
+        let known = matrix.constant.take();
+        let constant = with_constant.then(|| self.constant(known, state, weights, curvature, masses));
+        let blocks = constant.as_ref().map(|constant| &constant.blocks[..]);
         let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
         let mut product = if wanted { force.clone() } else { Vec::new() };
-        let mut sum = Linearisation {
-            weights,
-            curvature,
-            matrix: matrix.values_and_nowhere(),
-            force: &mut force,
-            stiffness_times_velocity: wanted.then_some(&mut product),
-        };
-        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, constant, &mut sum);
+        let product_wanted = wanted.then_some(&mut product[..]);
+        let values = matrix.values_and_nowhere();
+        let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
+        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, blocks, &mut sums);
+        let mut sum = sums.linearisation();
         for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
             if linear(&**term) {
                 counts.hessian += divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
@@ -348,6 +332,7 @@ impl System {
                 counts.gradient += tally;
             }
         }
+        matrix.constant = constant;
         if force.iter().flatten().any(|component| !component.is_finite()) {
             return Err(self.find_non_finite_force(state));
         }
@@ -357,44 +342,43 @@ impl System {
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
-    /// The Jacobians of the quadratic terms: evaluated once for all steps of one size, and again only if their curvature must be changed
-    /// where it was not, or the other way round.
-    fn update_constant(&mut self, state: State<'_>, weights: Weights, curvature: Curvature, masses: &[f64]) {
-        let known = self.constant.take();
-        let serves = |it: &Constant| {
-            it.weights == weights && (!it.projected || it.curvature == curvature) && it.masses == masses
+    /// The masses and the Jacobians of the quadratic terms: those that are known if they serve.
+    fn constant<T: Precision>(
+        &mut self,
+        known: Option<Constant<T>>,
+        state: State<'_>,
+        weights: Weights,
+        curvature: Curvature,
+        masses: &[f64],
+    ) -> Constant<T> {
+        let blocks = match known {
+            Some(known) if known.serves(weights, curvature, masses) => return known,
+            Some(known) => known.blocks,
+            None => vec![[[T::from_f64(0.0); 3]; 3]; self.pattern.blocks() + 1],
         };
-        let constant = match known {
-            Some(known) if serves(&known) => known,
-            other => {
-                let blocks = other.map_or_else(|| vec![[[0.0; 3]; 3]; self.pattern.blocks() + 1], |it| it.blocks);
-                // What need not be changed is found by changing it.
-                let changed = self.evaluate_constant(state, weights, Curvature::Clamped, masses, blocks);
-                if serves(&changed) {
-                    changed
-                } else {
-                    let as_wanted = self.evaluate_constant(state, weights, curvature, masses, changed.blocks);
-                    Constant { projected: true, ..as_wanted }
-                }
-            }
-        };
-        self.constant = Some(constant);
+        // What need not be changed is found by changing it.
+        let changed = self.evaluate_constant(state, weights, Curvature::Clamped, masses, blocks);
+        if changed.serves(weights, curvature, masses) {
+            return changed;
+        }
+        let as_wanted = self.evaluate_constant(state, weights, curvature, masses, changed.blocks);
+        Constant { projected: true, ..as_wanted }
     }
 
-    fn evaluate_constant(
+    fn evaluate_constant<T: Precision>(
         &mut self,
         state: State<'_>,
         weights: Weights,
         curvature: Curvature,
         masses: &[f64],
-        mut blocks: Vec<Block<f64>>,
-    ) -> Constant {
-        blocks.fill([[0.0; 3]; 3]);
+        mut blocks: Vec<Block<T>>,
+    ) -> Constant<T> {
+        blocks.fill([[T::from_f64(0.0); 3]; 3]);
         add_masses(&self.dofs, &self.pattern, masses, &mut blocks);
         let mut sum = Linearisation {
             weights,
             curvature,
-            matrix: &mut blocks,
+            matrix: T::blocks(&mut blocks),
             force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
             stiffness_times_velocity: None,
         };
@@ -430,12 +414,12 @@ impl System {
 }
 
 /// Adds masses of all vertices, if there are any, to the diagonal.
-fn add_masses(dofs: &DofMap, pattern: &Pattern, masses: &[f64], blocks: &mut [Block<f64>]) {
+fn add_masses<T: Precision>(dofs: &DofMap, pattern: &Pattern, masses: &[f64], blocks: &mut [Block<T>]) {
     let free = if masses.is_empty() { &[] } else { dofs.free() };
     for (row, &vertex) in free.iter().enumerate() {
         let diagonal = &mut blocks[pattern.diagonal(row)];
         for axis in 0..3 {
-            diagonal[axis][axis] += masses[vertex];
+            diagonal[axis][axis] = diagonal[axis][axis] + T::from_f64(masses[vertex]);
         }
     }
 }

@@ -1,11 +1,12 @@
 use std::ops::Range;
 
-use energy_dsl::{Block, Declaration, Vector3};
+use energy_dsl::{Declaration, Vector3};
 
 use crate::counts::Tally;
 use crate::curvature::Curvature;
 use crate::dofs::DofMap;
 use crate::pattern::Pattern;
+use crate::precision::Blocks;
 
 /// What a term's force is like, so that what is absent costs nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +104,7 @@ pub struct Linearisation<'a> {
     /// How to treat negative curvature.
     pub curvature: Curvature,
     /// Blocks of α ∂f/∂x + β ∂f/∂v, by [`Pattern::place`], and one more at [`Pattern::nowhere`] for those of pinned vertices.
-    pub matrix: &'a mut [Block<f64>],
+    pub matrix: Blocks<'a>,
     /// f, of all vertices.
     pub force: &'a mut [Vector3<f64>],
     /// (∂f/∂x) v, of all vertices, if it is asked for.
@@ -150,8 +151,8 @@ pub trait Term: std::fmt::Debug {
     }
     /// Called before each step: what a term holds fixed over a step (the normal force of friction, where an obstacle is) it takes from here.
     fn begin_step(&mut self, _start: StepStart<'_>) {}
-    /// Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v, of a force that does not grow in proportion to velocity.
-    /// `None`, for one that does: then R is half the power that it takes.
+    /// Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v: half the power that a force takes that grows in proportion to
+    /// velocity. `None` for a force that does not depend on velocity.
     fn dissipation(&self, _state: State<'_>) -> Option<(f64, Tally)> {
         None
     }

@@ -2,8 +2,9 @@ use energy_dsl::Block;
 
 use crate::dofs::DofMap;
 use crate::pattern::{Pattern, Storage};
+use crate::precision::Blocks;
 use crate::term::Stencils;
-use crate::vector::{add_scaled_block, transposed};
+use crate::vector::transposed;
 
 /// Where the blocks of symmetric elements go, for terms that add them one by one: of each pair of points (i, j), i ≤ j, in the order of
 /// an element's triangle.
@@ -47,13 +48,13 @@ impl TrianglePlaces {
     }
 
     /// Adds `weight` times the triangle of an element to the blocks of a matrix.
-    pub fn add(&self, element: usize, weight: f64, triangle: &[Block<f64>], matrix: &mut [Block<f64>]) {
+    pub fn add(&self, element: usize, weight: f64, triangle: &[Block<f64>], matrix: &mut Blocks<'_>) {
         let places = &self.places[element * self.pairs..][..self.pairs];
         for (&Place { slot, turned, mirror }, block) in places.iter().zip(triangle) {
             let other = transposed(block);
-            add_scaled_block(&mut matrix[slot], weight, if turned { &other } else { block });
+            matrix.add(slot, weight, if turned { &other } else { block });
             if let Some(mirror) = mirror {
-                add_scaled_block(&mut matrix[mirror], weight, &other);
+                matrix.add(mirror, weight, &other);
             }
         }
     }

@@ -92,8 +92,8 @@ fn masses_are_added_on_the_diagonal() {
     for mut system in [system(&[3]), ropes()] {
         let mut bare = system.matrix();
         let expected = system.linearise(state, options, &mut bare).unwrap();
+        let mut massive = system.matrix();
         for masses in [&masses, &heavier, &masses] {
-            let mut massive = system.matrix();
             let found = system.linearise_with_masses(state, options, masses, &mut massive).unwrap();
             assert_eq!(found, expected);
             for row in 0..4 {
@@ -105,6 +105,30 @@ fn masses_are_added_on_the_diagonal() {
                             assert!((with[i][j] - without[i][j] - mass).abs() < 1e-12, "block ({row}, {column})");
                         }
                     }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn single_precision_rounds_the_matrix_and_nothing_else() {
+    let mut system = system(&[3]);
+    let (x, v) = (positions(), velocities());
+    let weights = Weights { position: -1e-2, velocity: -0.1 };
+    let state = State { x: &x, v: &v };
+    for wanted in [true, false] {
+        let options = LinearisationOptions { stiffness_times_velocity: wanted, ..options(weights, Curvature::Exact) };
+        let (mut double, mut single) = (system.matrix(), system.matrix_in::<f32>());
+        let expected = system.linearise_with_masses(state, options, &[0.5; 5], &mut double).unwrap();
+        // Twice: what is constant is kept the first time.
+        for _ in 0..2 {
+            let found = system.linearise_with_masses(state, options, &[0.5; 5], &mut single).unwrap();
+            assert_eq!(found, expected);
+            for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {
+                let (double, single) = (double.block(row, column), single.block(row, column));
+                for (double, single) in double.as_flattened().iter().zip(single.as_flattened()) {
+                    assert!((double - single).abs() <= 2e-7 * double.abs().max(0.1), "{double} {single}");
                 }
             }
         }

@@ -121,11 +121,9 @@ impl<S: Solid> Term for ContactTerm<S> {
                 hessian = along(gradient, &hessian);
                 projected += 1;
             }
+            sum.matrix.add(slot, -sum.weights.position, &hessian);
             for i in 0..3 {
                 sum.force[vertex][i] -= gradient[i];
-                for j in 0..3 {
-                    sum.matrix[slot][i][j] -= sum.weights.position * hessian[i][j];
-                }
                 if let Some(product) = &mut sum.stiffness_times_velocity {
                     product[vertex][i] -= dot(hessian[i], v[vertex]);
                 }

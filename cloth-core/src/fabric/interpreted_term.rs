@@ -162,7 +162,7 @@ impl Term for InterpretedTerm {
             if sum.curvature != Curvature::Exact {
                 projected += u64::from(change_dense(&mut triangle, self.arity, sum.curvature));
             }
-            self.places.add(number, -sum.weights.position, &triangle, sum.matrix);
+            self.places.add(number, -sum.weights.position, &triangle, &mut sum.matrix);
             if let Some(product) = &mut sum.stiffness_times_velocity {
                 self.subtract_product(number, &triangle, v, product);
             }

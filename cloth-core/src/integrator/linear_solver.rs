@@ -16,7 +16,7 @@ pub(super) enum LinearSolver<T: Precision> {
 
 impl<T: Precision> LinearSolver<T> {
     /// For matrices of the pattern of this one, to be solved by at most so many threads.
-    pub(super) fn new(matrix: &BlockMatrix, threads: usize) -> Self {
+    pub(super) fn new(matrix: &BlockMatrix<impl Precision>, threads: usize) -> Self {
         let pattern = matrix.pattern();
         if pattern.fills_in() {
             Self::Relaxed(OverRelaxation::with_threads(pattern, threads))
@@ -26,7 +26,7 @@ impl<T: Precision> LinearSolver<T> {
     }
 
     /// Takes over a matrix.
-    pub(super) fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), SingularBlock> {
+    pub(super) fn prepare(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         match self {
             Self::Relaxed(relaxed) => relaxed.scale(matrix),
             Self::Factored(factor) => factor.factor(matrix),
@@ -36,7 +36,7 @@ impl<T: Precision> LinearSolver<T> {
     /// Solves A x = b from x = 0, A the matrix that was prepared.
     pub(super) fn solve(
         &mut self,
-        matrix: &BlockMatrix,
+        matrix: &BlockMatrix<impl Precision>,
         b: &[Vector3<f64>],
         x: &mut [Vector3<f64>],
         options: &SolveOptions,

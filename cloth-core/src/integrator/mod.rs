@@ -260,7 +260,7 @@ pub struct Tolerances {
     /// Done when an iteration changes no velocity by more, in m/s. Default 1e-4 for `newton`, 1e-7 for schemes of second order.
     #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
     pub velocity: Option<f64>,
-    /// The residual of each linear system relative to its right-hand side. Default 0.03 for `newton`, 1e-3 for schemes of second order.
+    /// The residual of each linear system relative to its right-hand side. Default 0.01 for `newton`, 1e-3 for schemes of second order.
     #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
     pub linear: Option<f64>,
     /// A step fails after this many iterations. Default 100.

@@ -2,8 +2,8 @@ use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, SolveOptions, SolveReport, State,
-    Term, Weights, dot,
+    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, Precision, SolveOptions,
+    SolveReport, State, StopReason, Term, Weights, dot,
 };
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +15,9 @@ use crate::body::Body;
 ///
 /// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + h R(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
 ///
-/// R the dissipation function of damping: half the power that linear damping takes. Each element's Hessian is made positive semi-definite, so that every step of Newton's method
-/// leads downhill, until steps shrink fast enough that exact ones may do; it is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
+/// R the dissipation function of damping: half the power that linear damping takes. Hessians are exact as long as their sum is positive definite and steps
+/// shrink; where not, each element's is made positive semi-definite for the next step (projection on demand, Longva, Löschner, Fernández-Fernández,
+/// Larionov, Ascher and Bender 2023). Every step leads downhill, and is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
 ///
 /// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along
 /// their length, whose Jacobians are not symmetric, use [`super::ImplicitEuler`].
@@ -35,21 +36,21 @@ pub struct NewtonOptions {
     pub impulse_tolerance: f64,
     /// Give up after this many iterations.
     pub iteration_limit: usize,
-    /// Each linear system's residual relative to its right-hand side.
+    /// Each linear system's residual relative to its right-hand side; up to ten times as much where Newton's method is slow anyway.
     pub linear_tolerance: f64,
 }
 
 impl Default for NewtonOptions {
-    /// 10⁻⁴ m/s, whatever the impulse; 100 iterations; linear systems to 0.03, which Newton's method makes up for.
+    /// 10⁻⁴ m/s, whatever the impulse; 100 iterations; linear systems to 0.01, which Newton's method makes up for.
     fn default() -> Self {
-        Self { velocity_tolerance: 1e-4, impulse_tolerance: 0.0, iteration_limit: 100, linear_tolerance: 0.03 }
+        Self { velocity_tolerance: 1e-4, impulse_tolerance: 0.0, iteration_limit: 100, linear_tolerance: 0.01 }
     }
 }
 
 /// What stays from one step to the next.
 #[derive(Clone, Debug)]
 struct Memory {
-    matrix: BlockMatrix,
+    matrix: BlockMatrix<f32>,
     solver: LinearSolver<f32>,
 }
 
@@ -75,9 +76,10 @@ impl std::ops::AddAssign for Phases {
     }
 }
 
-/// By how much whole steps of Newton's method shrink from one to the next when a minimum is near. There no curvature is negative, and the Hessians serve
-/// as they are: the method converges faster, and nothing is projected.
-const SHRINKING: f64 = 0.3;
+/// Linear systems are solved to this part of the square of what the last iteration left of ∇E, …
+const PROGRESS: f64 = 0.9;
+/// … but no more loosely than by this factor: an iteration of conjugate gradients is cheaper than one of Newton's method.
+const LOOSENING: f64 = 10.0;
 /// Halvings of a step before it counts as stuck: the last is 2⁻⁴⁰ of the first.
 const HALVINGS: usize = 40;
 /// How much of the decrease that the slope promises must come true (Armijo).
@@ -91,6 +93,34 @@ impl Newton {
     pub fn with_options(options: NewtonOptions) -> Self {
         Self { options, memory: None }
     }
+
+    /// How exactly to solve for the next direction: as exactly as Newton's method, by its progress since the last, can make use of (Eisenstat and
+    /// Walker 1996, choice 2).
+    fn forcing(&self, gradient: f64, last: Option<Forcing>) -> Forcing {
+        let tightest = self.options.linear_tolerance;
+        let useful = last.map_or(0.0, |last| PROGRESS * (gradient / last.gradient).powi(2));
+        Forcing { gradient, tolerance: useful.min(LOOSENING * tightest).max(tightest) }
+    }
+
+    /// Whether no vertex lacks much of an impulse.
+    fn is_enough(&self, down: &[Vector3<f64>], dt: f64) -> bool {
+        largest(down) < dt * self.options.impulse_tolerance
+    }
+
+    /// What was solved to some part leaves about that part at least. Where that is too much there is no need to look; else forces are looked at before
+    /// Hessians, which may not be needed.
+    fn may_be_enough(&self, last: Forcing, dt: f64) -> bool {
+        last.tolerance * last.gradient < dt * self.options.impulse_tolerance
+    }
+}
+
+/// What a linear system was solved for, and how exactly.
+#[derive(Clone, Copy, Debug)]
+struct Forcing {
+    /// The largest component of ∇E, in kg m.
+    gradient: f64,
+    /// The residual relative to it.
+    tolerance: f64,
 }
 
 /// Where a line search ended, E there, and the part of the direction that was taken.
@@ -146,11 +176,11 @@ impl Step<'_> {
     }
 
     /// The matrix, M − h² ∂f/∂x − h ∂f/∂v, and −∇E = M (x̂ − x) + h² f of the free vertices.
-    fn linearise(
+    fn linearise<T: Precision>(
         &mut self,
         x: &[Vector3<f64>],
         curvature: Curvature,
-        matrix: &mut BlockMatrix,
+        matrix: &mut BlockMatrix<T>,
     ) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         let started = Instant::now();
         let v = self.velocities(x);
@@ -158,25 +188,42 @@ impl Step<'_> {
         let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
         let Body { system, masses, .. } = &mut *self.body;
         let linear = system.linearise_with_masses(State { x, v: &v }, options, masses, matrix)?;
+        let down = self.downhill(x, &linear.force);
+        self.report.phases.assembly += started.elapsed();
+        Ok(down)
+    }
+
+    /// −∇E alone.
+    fn gradient(&mut self, x: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, EvaluationError> {
+        let started = Instant::now();
+        let v = self.velocities(x);
+        let force = self.body.system.forces(State { x, v: &v })?;
+        let down = self.downhill(x, &force);
+        self.report.phases.assembly += started.elapsed();
+        Ok(down)
+    }
+
+    /// M (x̂ − x) + h² f of the free vertices.
+    fn downhill(&self, x: &[Vector3<f64>], force: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let down = |&vertex: &usize| -> Vector3<f64> {
-            let (away, force) = (self.inertial[vertex], linear.force[vertex]);
+            let (away, force) = (self.inertial[vertex], force[vertex]);
             std::array::from_fn(|axis| {
                 self.body.masses[vertex] * (away[axis] - x[vertex][axis]) + self.dt * self.dt * force[axis]
             })
         };
-        let down = self.free.iter().map(down).collect();
-        self.report.phases.assembly += started.elapsed();
-        Ok(down)
+        self.free.iter().map(down).collect()
     }
 
     /// Solves for the direction. Of a matrix whose curvature is exact and turns out to be negative, as far as that goes: it leads downhill, or is zero.
     fn direction(
         &mut self,
+        x: &[Vector3<f64>],
         down: &[Vector3<f64>],
         curvature: Curvature,
         Memory { matrix, solver }: &mut Memory,
-        options: &SolveOptions,
+        relative_tolerance: f64,
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
+        let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
         let started = Instant::now();
         let prepared = solver.prepare(matrix);
         self.report.phases.factorisation += started.elapsed();
@@ -186,13 +233,18 @@ impl Step<'_> {
         let mut solved = SolveReport::indefinite();
         if curvature != Curvature::Exact || prepared.is_ok() {
             prepared?;
-            solved = solver.solve(matrix, down, &mut direction, options);
+            solved = solver.solve(matrix, down, &mut direction, &options);
         }
         if curvature != Curvature::Exact && !solved.converged() {
             // Single precision made the stiffest of matrices indefinite.
-            let mut exact = OverRelaxation::<f64>::with_threads(matrix.pattern(), self.body.system.threads());
-            exact.scale(matrix)?;
-            solved = exact.solve(down, &mut direction, options);
+            let mut precise = self.body.system.matrix();
+            self.linearise(x, curvature, &mut precise)?;
+            let mut solver = OverRelaxation::<f64>::with_threads(precise.pattern(), self.body.system.threads());
+            solver.scale(&precise)?;
+            solved = solver.solve(down, &mut direction, &options);
+        }
+        if solved.stopped == StopReason::NonFinite {
+            direction.fill([0.0; 3]);
         }
         self.report.phases.solve += started.elapsed();
         self.report.solves += 1;
@@ -258,12 +310,11 @@ impl Integrator for Newton {
         let mut memory = match self.memory.take() {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
             _ => {
-                let matrix = body.system.matrix();
+                let matrix = body.system.matrix_in();
                 let solver = LinearSolver::new(&matrix, body.system.threads());
                 Memory { matrix, solver }
             }
         };
-        let linear = SolveOptions { relative_tolerance: self.options.linear_tolerance, ..SolveOptions::default() };
         let free = body.system.dofs().free().to_vec();
         let start = body.x.clone();
         // Pinned vertices end there: they move as they are told.
@@ -276,21 +327,23 @@ impl Integrator for Newton {
             energy = step.energy(&x)?;
         }
         let (mut converged, mut change) = (false, f64::INFINITY);
-        let (mut curvature, mut exact_may_do) = (Curvature::Clamped, true);
+        let (mut curvature, mut last) = (Curvature::Exact, None);
         while !converged {
             if step.report.solves == self.options.iteration_limit as u64 {
                 return Err(StepError::NotConverged { iterations: step.report.solves, change });
             }
-            let down = step.linearise(&x, curvature, &mut memory.matrix)?;
             // One iteration at least: on a fine mesh no vertex weighs much, and not even free fall lacks a large impulse.
-            if step.report.solves > 0 && largest(&down) < dt * self.options.impulse_tolerance {
+            if last.is_some_and(|last| self.may_be_enough(last, dt)) && self.is_enough(&step.gradient(&x)?, dt) {
                 break;
             }
-            let (direction, solved) = step.direction(&down, curvature, &mut memory, &linear)?;
+            let down = step.linearise(&x, curvature, &mut memory.matrix)?;
+            let forcing = self.forcing(largest(&down), last);
+            last = Some(forcing);
+            let (direction, solved) = step.direction(&x, &down, curvature, &mut memory, forcing.tolerance)?;
             let indefinite = curvature == Curvature::Exact && !solved.converged();
             let Some((moved, lower, scale)) = step.line_search(&x, energy, &down, &direction)? else {
                 if curvature == Curvature::Exact {
-                    (curvature, exact_may_do) = (Curvature::Clamped, false);
+                    curvature = Curvature::Clamped;
                     continue;
                 }
                 return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
@@ -298,9 +351,8 @@ impl Integrator for Newton {
             (x, energy) = (moved, lower);
             let before = std::mem::replace(&mut change, scale * largest(&direction) / dt);
             converged = !indefinite && change < self.options.velocity_tolerance;
-            exact_may_do &= !indefinite;
-            let shrinks = scale == 1.0 && before.is_finite() && change < SHRINKING * before;
-            curvature = if exact_may_do && shrinks { Curvature::Exact } else { Curvature::Clamped };
+            let shrinks = scale == 1.0 && change < before;
+            curvature = if shrinks && !indefinite { Curvature::Exact } else { Curvature::Clamped };
         }
         let v = step.velocities(&x);
         let report = step.report;

@@ -129,9 +129,9 @@ impl Term for GripTerm {
         if let Some((Held { vertex, target }, slot)) = self.held() {
             let result = self.grip.spring.hessian(&[x[vertex], target]);
             let block = result.hessian.as_ref()[0];
+            sum.matrix.add(slot, -sum.weights.position, &block);
             for i in 0..3 {
                 sum.force[vertex][i] -= result.gradient[0][i];
-                (0..3).for_each(|j| sum.matrix[slot][i][j] -= sum.weights.position * block[i][j]);
                 if let Some(product) = &mut sum.stiffness_times_velocity {
                     product[vertex][i] -= dot(block[i], v[vertex]);
                 }

@@ -1,12 +1,13 @@
 use std::ops::Range;
 use std::sync::RwLock;
 
-use energy_dsl::{Block, Level, Number, Vector3};
+use energy_dsl::{Block, Level, Vector3};
 
-use super::Precision;
 use super::RELAXATION;
+use super::diagonal::{Inverse, scaled};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, index};
+use crate::precision::Precision;
 
 /// A vector of three in a register of four, with a last component that means nothing.
 pub(super) type Wide<T> = [T; 4];
@@ -112,32 +113,31 @@ impl<T: Precision> Domain<T> {
 
     /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
     #[inline(always)]
-    pub(super) fn scale<L: Level>(&mut self, pattern: &Pattern, inverses: &[Block<f64>], matrix: &BlockMatrix) {
+    pub(super) fn scale<M: Precision, L: Level>(
+        &mut self,
+        pattern: &Pattern,
+        inverses: &[Inverse],
+        matrix: &BlockMatrix<M>,
+    ) {
         let values = matrix.values();
-        let (columns, by_rows) = (self.columns.as_chunks_mut::<9>().0, self.by_rows.as_chunks_mut::<9>().0);
         for (local, row) in self.rows.clone().enumerate() {
-            let own = inverses[row];
+            let own = rounded(&inverses[row]);
             for place in pattern.above(row).start..self.inner_end[local] as usize {
-                let other = &inverses[pattern.columns()[place] as usize];
-                let block = scaled_block::<L>(&own, &values[place], other);
+                let other = rounded(&inverses[pattern.columns()[place] as usize]);
+                let rows = scaled_block::<M, L>(&own, &values[place], &other);
                 // Before it there are as many blocks on the diagonal as rows, and its own.
                 let number = place - row - 1 - self.blocks_before;
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let entry = T::from_f64(block[i][j]);
-                        by_rows[number][3 * i + j] = entry;
-                        columns[number][3 * j + i] = entry;
-                    }
-                }
+                store(&mut self.by_rows[9 * number..][..9 + SLACK], &rows);
+                store(&mut self.columns[9 * number..][..9 + SLACK], &transposed(&rows));
             }
         }
         for coupling in &mut self.couplings {
             let [row, column] = coupling.between.map(|row| &inverses[row as usize]);
-            let block = scaled_block::<L>(row, &values[coupling.place as usize], column);
+            let block = scaled_block::<M, L>(&rounded(row), &values[coupling.place as usize], &rounded(column));
             for i in 0..3 {
                 for j in 0..3 {
                     let entry = if coupling.turned { block[j][i] } else { block[i][j] };
-                    coupling.columns[j][i] = T::from_f64(entry);
+                    coupling.columns[j][i] = T::from_f64(entry.into());
                 }
             }
         }
@@ -148,7 +148,7 @@ impl<T: Precision> Domain<T> {
     pub(super) fn start<L: Level>(
         &mut self,
         pattern: &Pattern,
-        inverses: &[Block<f64>],
+        inverses: &[Inverse],
         b: &[Vector3<f64>],
         scale: f64,
     ) -> f64 {
@@ -271,10 +271,10 @@ impl<T: Precision> Domain<T> {
 
     /// C⁻ᵀ x s.
     #[inline(always)]
-    pub(super) fn finish(&self, inverses: &[Block<f64>], scale: f64, x: &mut [Vector3<f64>]) {
+    pub(super) fn finish(&self, inverses: &[Inverse], scale: f64, x: &mut [Vector3<f64>]) {
         for row in 0..x.len() {
             let [u, v, w, _] = self.solution[row].map(|component| Into::<f64>::into(component) * scale);
-            let [[a, ..], [b, c, _], [d, e, f]] = inverses[row];
+            let [[a, b, d, _], [_, c, e, _], [_, _, f, _]] = inverses[row];
             x[row] = [a * u + b * v + d * w, c * v + e * w, f * w];
         }
     }
@@ -313,51 +313,56 @@ fn couple<T: Precision>(domains: &mut [Domain<T>], ranges: &[Range<usize>], plac
     }
 }
 
-/// C⁻¹ with C Cᵀ = D/ω, C lower triangular; `None` where D is not positive definite.
+/// In the precision of a matrix.
 #[inline(always)]
-pub(super) fn inverse_factor(diagonal: &Block<f64>) -> Option<Block<f64>> {
-    let [[a, ..], [b, d, _], [c, e, f]] = diagonal.map(|row| row.map(|entry| entry / RELAXATION));
-    let first = a.sqrt();
-    let (second_first, third_first) = (b / first, c / first);
-    let second = (d - second_first * second_first).sqrt();
-    let third_second = (e - third_first * second_first) / second;
-    let third = (f - third_first * third_first - third_second * third_second).sqrt();
-    // A negative pivot has no root, a vanishing one no reciprocal.
-    let [x, y, z] = [1.0 / first, 1.0 / second, 1.0 / third];
-    let yx = -second_first * x * y;
-    let zy = -third_second * y * z;
-    let zx = -(third_first * x + third_second * yx) * z;
-    let finite = x.is_finite() && y.is_finite() && z.is_finite() && zx.is_finite();
-    (finite && x > 0.0 && y > 0.0 && z > 0.0).then_some([[x, 0.0, 0.0], [yx, y, 0.0], [zx, zy, z]])
+fn rounded<M: Precision>(inverse: &Inverse) -> [Wide<M>; 3] {
+    let mut rounded = [[M::from_f64(0.0); 4]; 3];
+    for column in 0..3 {
+        for lane in 0..4 {
+            rounded[column][lane] = M::from_f64(inverse[column][lane]);
+        }
+    }
+    rounded
 }
 
-/// C⁻¹ b.
+/// The rows of P B Qᵀ, for lower triangular P and Q given by columns: rows of B Qᵀ are sums of columns of Q, and those of the product sums of these.
 #[inline(always)]
-pub(super) fn scaled(inverse: &Block<f64>, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
-    let [[a, ..], [d, e, _], [f, g, h]] = inverse;
-    [a * u, d * u + e * v, f * u + g * v + h * w]
-}
-
-/// P B Qᵀ for lower triangular P and Q.
-#[inline(always)]
-fn scaled_block<L: Level>(p: &Block<f64>, b: &Block<f64>, q: &Block<f64>) -> Block<f64> {
-    let mut left = [[0.0; 3]; 3];
-    let mut scaled = [[0.0; 3]; 3];
+fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M>, q: &[Wide<M>; 3]) -> [Wide<M>; 3] {
+    let zero = [M::from_f64(0.0); 4];
+    let (mut right, mut scaled) = ([zero; 3], [zero; 3]);
+    for i in 0..3 {
+        for k in 0..3 {
+            for lane in 0..4 {
+                right[i][lane] = q[k][lane].mul_add::<L>(b[i][k], right[i][lane]);
+            }
+        }
+    }
+    let right = whole(right);
     for i in 0..3 {
         for k in 0..=i {
-            for j in 0..3 {
-                left[i][j] = Number::mul_add::<L>(p[i][k], b[k][j], left[i][j]);
+            for lane in 0..4 {
+                scaled[i][lane] = right[k][lane].mul_add::<L>(p[k][i], scaled[i][lane]);
             }
         }
     }
-    for j in 0..3 {
-        for k in 0..=j {
-            for i in 0..3 {
-                scaled[i][j] = Number::mul_add::<L>(left[i][k], q[j][k], scaled[i][j]);
-            }
+    whole(scaled)
+}
+
+#[inline(always)]
+fn transposed<M: Precision>([a, b, c]: &[Wide<M>; 3]) -> [Wide<M>; 3] {
+    let zero = M::from_f64(0.0);
+    [[a[0], b[0], c[0], zero], [a[1], b[1], c[1], zero], [a[2], b[2], c[2], zero]]
+}
+
+/// Writes three numbers of each row, and the fourth, which means nothing, where the next is written after it.
+#[inline(always)]
+fn store<T: Precision, M: Precision>(numbers: &mut [T], rows: &[Wide<M>; 3]) {
+    for row in 0..3 {
+        let place = &mut numbers[3 * row..3 * row + 4];
+        for lane in 0..4 {
+            place[lane] = T::from_f64(rows[row][lane].into());
         }
     }
-    scaled
 }
 
 /// The sum of three partial sums, which do not wait for each other.
@@ -381,11 +386,16 @@ fn subtract_product<T: Precision, L: Level>(sums: &mut [Wide<T>; 3], block: &[T]
     }
 }
 
+/// The same. What is computed for nothing costs nothing, but without this compilers take registers apart that are not needed whole.
+#[inline(always)]
+fn whole<T>(registers: T) -> T {
+    std::hint::black_box(registers)
+}
+
 /// The sum of the first three of four sums.
 #[inline(always)]
 fn of_three(sums: [f64; 4]) -> f64 {
-    // What is added up for nothing costs nothing, but without it compilers take registers apart.
-    let [x, y, z, _] = std::hint::black_box(sums);
+    let [x, y, z, _] = whole(sums);
     x + y + z
 }
 

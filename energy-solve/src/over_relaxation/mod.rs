@@ -1,24 +1,21 @@
+mod diagonal;
 mod domain;
 mod meeting;
 
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-use energy_dsl::{Block, Kernel, Level, Real, Vector3, dispatch};
+use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
-use self::domain::{Domain, Wide, inverse_factor, scaled};
+use self::diagonal::{Inverse, Inversion, scaled};
+use self::domain::{Domain, Wide};
 use self::meeting::{Meeting, Shared};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage};
+use crate::precision::Precision;
 use crate::preconditioner::SingularBlock;
 use crate::solve::{SolveOptions, SolveReport, StopReason};
 use crate::threads::{for_each, in_parts, split_mut};
-
-/// What numbers are stored and computed in: `f32` or `f64`.
-pub trait Precision: Real + Into<f64> + Send + Sync {}
-
-impl Precision for f32 {}
-impl Precision for f64 {}
 
 /// ω. From 1.4 to 1.8 the iterations on sheets of cloth, soft and stiff, fine and coarse, differ by a fifth.
 const RELAXATION: f64 = 1.6;
@@ -49,8 +46,8 @@ const DOMAIN: usize = 8192;
 pub struct OverRelaxation<T> {
     pattern: Arc<Pattern>,
     threads: usize,
-    /// C⁻¹ of each row, lower triangular.
-    inverses: Vec<Block<f64>>,
+    /// C⁻¹ of each row.
+    inverses: Vec<Inverse>,
     domains: Vec<Domain<T>>,
     /// Of each domain t in the rows that others are coupled with.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
@@ -76,7 +73,7 @@ impl<T: Precision> OverRelaxation<T> {
         let domains = Domain::all(pattern, &ranges(pattern.rows()));
         let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.border()]);
         let borders = domains.iter().map(border).collect();
-        let inverses = vec![[[0.0; 3]; 3]; pattern.rows()];
+        let inverses = vec![[[0.0; 4]; 3]; pattern.rows()];
         Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders }
     }
 
@@ -87,7 +84,7 @@ impl<T: Precision> OverRelaxation<T> {
     ///
     /// # Panics
     /// When the matrix has another pattern.
-    pub fn scale(&mut self, matrix: &BlockMatrix) -> Result<(), SingularBlock> {
+    pub fn scale(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { pattern, threads, inverses, domains, .. } = self;
         let rows = || domains.iter().map(|domain| domain.rows.clone());
@@ -148,39 +145,20 @@ fn ranges(rows: usize) -> Vec<Range<usize>> {
     (0..domains).map(|domain| domain * rows / domains..(domain + 1) * rows / domains).collect()
 }
 
-/// C⁻¹ of some rows. Fails with the row whose diagonal block is not positive definite.
-struct Inversion<'a> {
-    rows: Range<usize>,
-    inverses: &'a mut [Block<f64>],
-    matrix: &'a BlockMatrix,
-}
-
-impl Kernel for Inversion<'_> {
-    type Output = Result<(), usize>;
-
-    #[inline(always)]
-    fn run<L: Level>(self) -> Self::Output {
-        for (place, row) in self.rows.enumerate() {
-            self.inverses[place] = inverse_factor(self.matrix.diagonal(row)).ok_or(row)?;
-        }
-        Ok(())
-    }
-}
-
 /// [`Domain::scale`].
-struct Scaling<'a, T> {
+struct Scaling<'a, T, M> {
     domain: &'a mut Domain<T>,
     pattern: &'a Pattern,
-    inverses: &'a [Block<f64>],
-    matrix: &'a BlockMatrix,
+    inverses: &'a [Inverse],
+    matrix: &'a BlockMatrix<M>,
 }
 
-impl<T: Precision> Kernel for Scaling<'_, T> {
+impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        self.domain.scale::<L>(self.pattern, self.inverses, self.matrix);
+        self.domain.scale::<M, L>(self.pattern, self.inverses, self.matrix);
     }
 }
 
@@ -202,7 +180,7 @@ struct Common<'a, T> {
 struct Part<'a, T> {
     number: usize,
     domain: &'a mut Domain<T>,
-    inverses: &'a [Block<f64>],
+    inverses: &'a [Inverse],
     b: &'a [Vector3<f64>],
     x: &'a mut [Vector3<f64>],
 }

@@ -3,7 +3,8 @@ use energy_dsl::{
 };
 use energy_elements::HingeAngle;
 use energy_solve::{
-    Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage, Tally, Term,
+    Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage,
+    Tally, Term,
 };
 
 use super::rigidity::cholesky;
@@ -205,7 +206,8 @@ impl PlateTerm {
                 let both = if pattern.storage() == Storage::Whole && i != j { 2 } else { 1 };
                 for &(row, column, turned) in &places[..both] {
                     let (slot, flipped) = pattern.place(row, column).expect("hinges are within patches");
-                    add_scaled(&mut sum.matrix[slot], sum.weights.position, &block, turned != flipped);
+                    let oriented = if turned != flipped { transposed(&block) } else { block };
+                    sum.matrix.add(slot, sum.weights.position, &oriented);
                 }
             }
         }
@@ -334,12 +336,9 @@ fn add_times(sum: &mut Vector3<f64>, block: &Block<f64>, v: &Vector3<f64>, turne
     }
 }
 
-fn add_scaled(sum: &mut Block<f64>, scale: f64, block: &Block<f64>, turned: bool) {
-    for row in 0..3 {
-        for column in 0..3 {
-            sum[row][column] += scale * if turned { block[column][row] } else { block[row][column] };
-        }
-    }
+/// Bᵀ.
+fn transposed(block: &Block<f64>) -> Block<f64> {
+    std::array::from_fn(|row| std::array::from_fn(|column| block[column][row]))
 }
 
 impl Term for PlateTerm {
@@ -421,7 +420,7 @@ impl Term for PlateTerm {
         for (&patch, places) in self.active.iter().zip(&self.places) {
             let patch = &self.patches[patch];
             patch.gradients(&angles.gradients, &mut rows);
-            add_outer_products(&rows, weight, places, sum.matrix);
+            add_outer_products(&rows, weight, places, &mut sum.matrix);
             if let Some(product) = &mut sum.stiffness_times_velocity {
                 for k in 0..3 {
                     let rate: f64 = patch.vertices.iter().zip(&rows).map(|(&i, row)| dot(row[k], state.v[i])).sum();
@@ -448,7 +447,7 @@ impl Term for PlateTerm {
 }
 
 /// Adds Σ ∇r ∇rᵀ of a patch.
-fn add_outer_products(rows: &[[Vector3<f64>; 3]], weight: f64, places: &PatchPlaces, matrix: &mut [Block<f64>]) {
+fn add_outer_products(rows: &[[Vector3<f64>; 3]], weight: f64, places: &PatchPlaces, matrix: &mut Blocks<'_>) {
     let mut pair = 0;
     let mut mirrored = places.mirrored.iter();
     for i in 0..rows.len() {
@@ -461,11 +460,11 @@ fn add_outer_products(rows: &[[Vector3<f64>; 3]], weight: f64, places: &PatchPla
                     }
                 }
             }
-            add_scaled(&mut matrix[places.slots[pair] as usize], weight, &block, false);
+            matrix.add(places.slots[pair] as usize, weight, &block);
             if i != j
                 && let Some(&slot) = mirrored.next()
             {
-                add_scaled(&mut matrix[slot as usize], weight, &block, true);
+                matrix.add(slot as usize, weight, &transposed(&block));
             }
             pair += 1;
         }
