@@ -2,7 +2,7 @@
 
 use energy_dsl::{Array, Declaration, Element, Potential, Vector3};
 use energy_solve::{
-    Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term, TrianglePlaces,
+    Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term, TrianglePlaces, index,
 };
 
 /// Which elements act over a step: everything but velocities is held as it was at its start.
@@ -18,7 +18,7 @@ pub(crate) trait DissipationLaw: std::fmt::Debug {
 pub(crate) struct DissipativeTerm<L: DissipationLaw> {
     name: String,
     law: L,
-    stencils: Vec<usize>,
+    stencils: Vec<u32>,
     arity: usize,
     places: TrianglePlaces,
     is_free: Vec<bool>,
@@ -28,17 +28,18 @@ pub(crate) struct DissipativeTerm<L: DissipationLaw> {
 impl<L: DissipationLaw> DissipativeTerm<L> {
     /// A law on stencils of as many vertices as its element has points. Nothing acts before the first step begins.
     pub(crate) fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
-        let (stencils, acting) = (stencils.concat(), Vec::new());
+        let stencils = stencils.as_flattened().iter().copied().map(index).collect();
+        let acting = Vec::new();
         Self { name, law, stencils, arity: N, places: TrianglePlaces::default(), is_free: Vec::new(), acting }
     }
 
-    fn stencil(&self, number: usize) -> &[usize] {
+    fn stencil(&self, number: usize) -> &[u32] {
         &self.stencils[number * self.arity..][..self.arity]
     }
 
     fn velocities(&self, number: usize, v: &[Vector3<f64>]) -> <L::Element as Potential<f64>>::Points {
         let stencil = self.stencil(number);
-        Array::from_fn(|point| v[stencil[point]])
+        Array::from_fn(|point| v[stencil[point] as usize])
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -65,7 +66,7 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
-        let is_free = |stencil: &[usize]| stencil.iter().any(|&vertex| dofs.place(vertex).is_some());
+        let is_free = |stencil: &[u32]| stencil.iter().any(|&vertex| dofs.place(vertex as usize).is_some());
         self.acting.clear();
         self.is_free = self.stencils().iter().map(is_free).collect();
         self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);
@@ -98,7 +99,7 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
         for (number, element) in &self.acting {
             let result = element.gradient(&self.velocities(*number, v));
             for (&vertex, gradient) in self.stencil(*number).iter().zip(result.gradient.as_ref()) {
-                (0..3).for_each(|axis| force[vertex][axis] -= gradient[axis]);
+                (0..3).for_each(|axis| force[vertex as usize][axis] -= gradient[axis]);
             }
             flagged += u64::from(result.flags.any());
         }
@@ -110,7 +111,7 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
         for (number, element) in &self.acting {
             let result = element.hessian(&self.velocities(*number, v));
             for (&vertex, gradient) in self.stencil(*number).iter().zip(result.gradient.as_ref()) {
-                (0..3).for_each(|axis| sum.force[vertex][axis] -= gradient[axis]);
+                (0..3).for_each(|axis| sum.force[vertex as usize][axis] -= gradient[axis]);
             }
             self.places.add(*number, -sum.weights.velocity, result.hessian.as_ref(), &mut sum.matrix);
             flagged += u64::from(result.flags.any());

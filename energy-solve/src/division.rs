@@ -3,6 +3,7 @@
 
 use energy_dsl::{Block, Vector3};
 
+use crate::constant::Constant;
 use crate::counts::Tally;
 use crate::curvature::Curvature;
 use crate::dofs::DofMap;
@@ -87,12 +88,12 @@ impl<T: Precision> Sums<'_, T> {
     }
 }
 
-/// Sets the matrix to the constant blocks or to zero, and adds the forces of the terms, and the Jacobians that are wanted.
+/// Sets the matrix to what is constant of it, or to zero, and adds the forces of the terms, and the Jacobians that are wanted.
 pub(crate) fn linearisations<T: Precision>(
     terms: &Terms<'_>,
     shares: &[Share],
     state: State<'_>,
-    constant: Option<&[Block<T>]>,
+    constant: Option<&Constant<T>>,
     sums: &mut Sums<'_, T>,
 ) -> Vec<Option<Tally>> {
     let vertices = || shares.iter().map(|share| share.vertices.len());
@@ -106,7 +107,7 @@ pub(crate) fn linearisations<T: Precision>(
     let parts = shares.iter().zip(matrices).zip(forces).zip(products);
     let tallies = for_each(shares.len(), parts.collect(), |(((share, matrix), force), product)| {
         match constant {
-            Some(blocks) => matrix.copy_from_slice(&blocks[share.blocks.clone()]),
+            Some(constant) => constant.restore(share.blocks.start, matrix),
             None => matrix.fill([[T::from_f64(0.0); 3]; 3]),
         }
         let mut sums = Sums { weights, curvature, matrix, force, product };

@@ -1,9 +1,15 @@
 use energy_dsl::Vector3;
 
+use crate::pattern::index;
+
+/// The place of a vertex that has none.
+const PINNED: u32 = u32::MAX;
+
 /// Which vertices move, and their places in a vector of free vertices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DofMap {
-    place: Vec<Option<usize>>,
+    /// [`PINNED`] for a pinned one.
+    place: Vec<u32>,
     free: Vec<usize>,
 }
 
@@ -12,9 +18,9 @@ impl DofMap {
     #[must_use]
     pub fn new(pinned: &[bool]) -> Self {
         let free: Vec<usize> = (0..pinned.len()).filter(|&vertex| !pinned[vertex]).collect();
-        let mut place = vec![None; pinned.len()];
-        for (index, &vertex) in free.iter().enumerate() {
-            place[vertex] = Some(index);
+        let mut place = vec![PINNED; pinned.len()];
+        for (number, &vertex) in free.iter().enumerate() {
+            place[vertex] = index(number);
         }
         Self { place, free }
     }
@@ -22,7 +28,8 @@ impl DofMap {
     /// The place of a vertex among the free ones; `None` when it is pinned.
     #[must_use]
     pub fn place(&self, vertex: usize) -> Option<usize> {
-        self.place[vertex]
+        let place = self.place[vertex];
+        (place != PINNED).then_some(place as usize)
     }
 
     /// The free vertices in ascending order.

@@ -21,7 +21,7 @@ pub struct ForceTerm<E: ForceLaw<f64>> {
     list: ElementList<E>,
     energy: Option<ValueOf<E>>,
     /// The indices of the elements that are evaluated.
-    active: Vec<usize>,
+    active: Vec<u32>,
     places: Places,
     /// The pairs of points whose blocks are stored.
     pairs: Vec<(usize, usize)>,
@@ -43,6 +43,10 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     {
         self.energy = Some(<E as Potential<f64>>::value);
         self
+    }
+
+    fn active(&self) -> impl Iterator<Item = usize> {
+        self.active.iter().map(|&element| element as usize)
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -91,7 +95,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn dissipation(&self, State { x, v }: State<'_>) -> Option<(f64, Tally)> {
         let (mut sum, mut flagged) = (0.0, 0);
-        for &element in &self.active {
+        for element in self.active() {
             let (law, stencil) = (&self.list.elements()[element], self.list.stencil(element));
             let (points, rates): (E::Points, E::Points) = (points_of(stencil, x), points_of(stencil, v));
             let still = <E::Points as Array<Vector3<f64>>>::repeat([0.0; 3]);
@@ -112,7 +116,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let (mut sum, mut flagged) = (0.0, 0);
-        for &element in &self.active {
+        for element in self.active() {
             let result = self.value(element, x)?;
             sum += result.value;
             flagged += u64::from(result.flags.any());
@@ -121,12 +125,12 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        self.active.iter().map(|&number| Some((number, self.value(number, x)?.value))).collect()
+        self.active().map(|number| Some((number, self.value(number, x)?.value))).collect()
     }
 
     fn add_force(&self, State { x, v }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
         let mut flagged = 0;
-        for &element in &self.active {
+        for element in self.active() {
             let stencil = self.list.stencil(element);
             let result = self.list.elements()[element].force(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), force);
@@ -137,7 +141,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
         let mut flagged = 0;
-        for (number, &element) in self.active.iter().enumerate() {
+        for (number, element) in self.active().enumerate() {
             let stencil = self.list.stencil(element);
             let result = self.list.elements()[element].jacobians(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), sum.force);
@@ -150,7 +154,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
             }
             if let Some(product) = &mut sum.stiffness_times_velocity {
                 for (&(i, j), block) in self.pairs.iter().zip(by_position) {
-                    add_vectors(&stencil[i..=i], &[block_times(block, &v[stencil[j]])], product);
+                    add_vectors(&stencil[i..=i], &[block_times(block, &v[stencil[j] as usize])], product);
                 }
             }
             flagged += u64::from(result.flags.any());
@@ -167,7 +171,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
                 result.force.as_ref().as_flattened().iter().all(|number| number.is_finite())
             }
         };
-        self.active.iter().copied().find(|&element| !is_finite(element))
+        self.active().find(|&element| !is_finite(element))
     }
 }
 
@@ -183,10 +187,10 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     }
 }
 
-fn add_vectors(stencil: &[usize], vectors: &[Vector3<f64>], all: &mut [Vector3<f64>]) {
+fn add_vectors(stencil: &[u32], vectors: &[Vector3<f64>], all: &mut [Vector3<f64>]) {
     for (&vertex, vector) in stencil.iter().zip(vectors) {
         for axis in 0..3 {
-            all[vertex][axis] += vector[axis];
+            all[vertex as usize][axis] += vector[axis];
         }
     }
 }

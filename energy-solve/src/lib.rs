@@ -80,7 +80,7 @@ pub use matrix::BlockMatrix;
 pub use normal_matrix::{CouplingError, Couplings, NormalMatrix, NormalPattern};
 pub use normal_solver::{NormalSolution, NormalSolver, NormalSolverKind, SolverError};
 pub use over_relaxation::OverRelaxation;
-pub use pattern::{Pattern, Storage};
+pub use pattern::{Pattern, Storage, index};
 pub use potential_term::PotentialTerm;
 pub use precision::{Blocks, Precision};
 pub use preconditioner::{Preconditioner, SingularBlock};

@@ -1,5 +1,6 @@
 use energy_dsl::Element;
 
+use crate::pattern::index;
 use crate::term::Stencils;
 
 /// Stencils that do not fit their elements.
@@ -44,7 +45,7 @@ pub enum ListError {
 pub struct ElementList<E> {
     name: String,
     elements: Vec<E>,
-    vertices: Vec<usize>,
+    vertices: Vec<u32>,
     arity: usize,
 }
 
@@ -67,12 +68,17 @@ impl<E: Element> ElementList<E> {
         if elements.len() != stencils.len() {
             return Err(ListError::CountMismatch { list, elements: elements.len(), stencils: stencils.len() });
         }
-        for (index, stencil) in stencils.iter().enumerate() {
+        for (element, stencil) in stencils.iter().enumerate() {
             if let Some(vertex) = repeated(stencil) {
-                return Err(ListError::RepeatedVertex { list, index, vertex });
+                return Err(ListError::RepeatedVertex { list, index: element, vertex });
             }
         }
-        Ok(Self { name: list, elements, vertices: stencils.concat(), arity: N })
+        Ok(Self {
+            name: list,
+            elements,
+            vertices: stencils.as_flattened().iter().copied().map(index).collect(),
+            arity: N,
+        })
     }
 
     /// The list's name.
@@ -87,9 +93,14 @@ impl<E: Element> ElementList<E> {
         &self.elements
     }
 
+    /// The elements, which the list is left without.
+    pub(crate) fn take_elements(&mut self) -> Vec<E> {
+        std::mem::take(&mut self.elements)
+    }
+
     /// The vertices of all elements, `arity` to an element.
     #[must_use]
-    pub fn vertices(&self) -> &[usize] {
+    pub fn vertices(&self) -> &[u32] {
         &self.vertices
     }
 
@@ -107,7 +118,7 @@ impl<E: Element> ElementList<E> {
 
     /// The vertices of one element.
     #[must_use]
-    pub fn stencil(&self, index: usize) -> &[usize] {
+    pub fn stencil(&self, index: usize) -> &[u32] {
         &self.vertices[index * self.arity..][..self.arity]
     }
 }

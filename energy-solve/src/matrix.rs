@@ -13,7 +13,7 @@ pub struct BlockMatrix<T = f64> {
     pattern: Arc<Pattern>,
     /// The blocks of the pattern, and one more that takes what belongs nowhere.
     values: Vec<Block<T>>,
-    /// What a system keeps of it from one linearisation to the next.
+    /// What a system knows to be constant of it; nothing, after others changed it.
     pub(crate) constant: Option<Constant<T>>,
 }
 
@@ -39,6 +39,7 @@ impl<T: Precision> BlockMatrix<T> {
 
     /// The diagonal block of a row, to be changed.
     pub fn diagonal_mut(&mut self, row: usize) -> &mut Block<T> {
+        self.constant = None;
         &mut self.values[self.pattern.diagonal(row)]
     }
 
@@ -58,6 +59,7 @@ impl<T: Precision> BlockMatrix<T> {
 
     /// The stored blocks, to be changed.
     pub fn values_mut(&mut self) -> &mut [Block<T>] {
+        self.constant = None;
         let stored = self.pattern.blocks();
         &mut self.values[..stored]
     }

@@ -26,14 +26,20 @@ impl Pattern {
         let mut couplings: Vec<Vec<u32>> = (0..rows).map(|row| vec![index(row)]).collect();
         for stencil in stencils {
             for &row in stencil {
-                let stored = stencil.iter().filter(|&&column| storage == Storage::Whole || column > row);
-                couplings[row as usize].extend(stored);
+                let known = &mut couplings[row as usize];
+                for &column in stencil.iter().filter(|&&column| storage == Storage::Whole || column > row) {
+                    if !known.contains(&column) {
+                        known.push(column);
+                    }
+                }
             }
         }
-        let mut pattern = Self { storage, row_start: vec![0], columns: Vec::new(), diagonal: Vec::new() };
+        let blocks = couplings.iter().map(Vec::len).sum();
+        let (row_start, columns) = (Vec::with_capacity(rows + 1), Vec::with_capacity(blocks));
+        let mut pattern = Self { storage, row_start, columns, diagonal: Vec::with_capacity(rows) };
+        pattern.row_start.push(0);
         for (row, mut columns) in couplings.into_iter().enumerate() {
             columns.sort_unstable();
-            columns.dedup();
             let before = columns.partition_point(|&column| column < index(row));
             pattern.diagonal.push(index(pattern.columns.len() + before));
             pattern.columns.extend(columns);
@@ -116,7 +122,11 @@ impl Pattern {
     }
 }
 
-/// Indices are stored with 32 bits.
-pub(crate) fn index(number: usize) -> u32 {
+/// A number as indices are stored, with 32 bits.
+///
+/// # Panics
+/// When it has more.
+#[must_use]
+pub fn index(number: usize) -> u32 {
     u32::try_from(number).expect("fewer than 2³² vertices and blocks")
 }

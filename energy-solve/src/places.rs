@@ -18,7 +18,7 @@ pub(crate) struct Places {
 impl Places {
     /// The places of the `active` elements, pairs of points in the order of `pairs`.
     pub(crate) fn new(
-        active: &[usize],
+        active: &[u32],
         stencils: Stencils<'_>,
         pairs: &[(usize, usize)],
         dofs: &DofMap,
@@ -27,9 +27,9 @@ impl Places {
         let mut slots = Vec::with_capacity(active.len() * pairs.len());
         let mut turned = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
         for (number, &element) in active.iter().enumerate() {
-            let stencil = stencils.stencil(element);
+            let stencil = stencils.stencil(element as usize);
             for (pair, &(i, j)) in pairs.iter().enumerate() {
-                let rows = dofs.place(stencil[i]).zip(dofs.place(stencil[j]));
+                let rows = dofs.place(stencil[i] as usize).zip(dofs.place(stencil[j] as usize));
                 let place = rows.and_then(|(row, column)| pattern.place(row, column));
                 let (slot, flipped) = place.unwrap_or((pattern.nowhere(), false));
                 slots.push(index(slot));

@@ -3,7 +3,7 @@ use std::ops::Range;
 
 use energy_dsl::{
     Array, BLOCK, Batch, BatchWork, Block, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
-    ReducedPotential, Vector3, for_each_batch_in, triangle_index,
+    ReducedPotential, Vector3, WidePoints, for_each_batch_in, triangle_index,
 };
 
 use crate::active::{active_elements, points_of};
@@ -11,7 +11,7 @@ use crate::counts::Tally;
 use crate::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::dofs::DofMap;
 use crate::list::ElementList;
-use crate::pattern::{Pattern, Storage, index};
+use crate::pattern::{Pattern, Storage};
 use crate::places::Places;
 use crate::precision::{Blocks, Precision};
 use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, Stencils, Term};
@@ -22,9 +22,12 @@ use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, S
 /// how many there are at once.
 #[derive(Clone, Debug)]
 pub struct PotentialTerm<E> {
+    /// Without its elements, once they are packed.
     list: ElementList<E>,
+    /// How many elements there are.
+    count: usize,
     /// The indices of the elements that are evaluated.
-    active: Vec<usize>,
+    active: Vec<u32>,
     packed: Packed<E>,
     places: Places,
     orthonormal: Option<Orthonormal>,
@@ -40,13 +43,13 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
         let packed = Packed::from_fn(0, list.arity(), |element| &list.elements()[element], |_, _| 0);
-        let orthonormal = Orthonormal::new(E::DECLARATION);
-        Self { list, active: Vec::new(), packed, places: Places::default(), orthonormal, shares: Vec::new() }
+        let (count, orthonormal) = (list.elements().len(), Orthonormal::new(E::DECLARATION));
+        Self { list, count, active: Vec::new(), packed, places: Places::default(), orthonormal, shares: Vec::new() }
     }
 
     fn tally(&self, flagged: u64) -> Tally {
         let evaluated = self.active.len() as u64;
-        Tally { evaluated, skipped: self.list.elements().len() as u64 - evaluated, flagged, projected: 0 }
+        Tally { evaluated, skipped: self.count as u64 - evaluated, flagged, projected: 0 }
     }
 
     /// What a share did. The first answers for all elements.
@@ -54,11 +57,17 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
         if share.number == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
     }
 
+    /// The points of an element that is evaluated, by its number among them.
+    fn points(&self, number: usize, x: &[Vector3<f64>]) -> WidePoints<E, f64> {
+        points_of(self.list.stencil(self.active[number] as usize), x)
+    }
+
     /// The packs of elements that have one of these vertices.
     fn packs_at(&self, vertices: &Range<usize>) -> Vec<Range<usize>> {
         let mut packs: Vec<Range<usize>> = Vec::new();
         for (number, pack) in self.active.chunks(BLOCK).enumerate() {
-            if pack.iter().any(|&element| self.list.stencil(element).iter().any(|vertex| vertices.contains(vertex))) {
+            let inside = |&vertex: &u32| vertices.contains(&(vertex as usize));
+            if pack.iter().any(|&element| self.list.stencil(element as usize).iter().any(inside)) {
                 let (start, end) = (number * BLOCK, number * BLOCK + pack.len());
                 match packs.last_mut() {
                     Some(last) if last.end == start => last.end = end,
@@ -165,13 +174,12 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
         let n = self.list.arity();
+        let elements = self.list.take_elements();
+        assert_eq!(elements.len(), self.count, "{}: a term is placed once", self.list.name());
         self.active = active_elements(self.list.stencils(), dofs);
-        self.packed = Packed::from_fn(
-            self.active.len(),
-            n,
-            |number| &self.list.elements()[self.active[number]],
-            |number, point| index(self.list.stencil(self.active[number])[point]),
-        );
+        let active = |number: usize| self.active[number] as usize;
+        let vertex = |number: usize, point: usize| self.list.stencil(active(number))[point];
+        self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[active(number)], vertex);
         if self.character().curved {
             let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
             if pattern.storage() == Storage::Whole {
@@ -204,8 +212,8 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        let value = |number: usize| self.list.elements()[number].value(&points_of(self.list.stencil(number), x)).value;
-        Some(self.active.iter().map(|&number| (number, value(number))).collect())
+        let value = |number: usize| self.packed.element(number).value(&self.points(number, x)).value;
+        Some(self.active.iter().enumerate().map(|(number, &element)| (element as usize, value(number))).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -218,14 +226,14 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
     }
 
     fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize> {
-        let is_finite = |element: &&usize| {
-            let result = self.list.elements()[**element].gradient(&points_of(self.list.stencil(**element), state.x));
+        let is_finite = |number: usize| {
+            let result = self.packed.element(number).gradient(&self.points(number, state.x));
             match quantity {
                 Quantity::Energy => result.value.is_finite(),
                 Quantity::Force => result.gradient.as_ref().as_flattened().iter().all(|number| number.is_finite()),
             }
         };
-        self.active.iter().find(|element| !is_finite(element)).copied()
+        (0..self.active.len()).find(|&number| !is_finite(number)).map(|number| self.active[number] as usize)
     }
 }
 

@@ -1,8 +1,9 @@
+use std::ops::Range;
 use std::sync::Arc;
 
 use energy_dsl::{Block, Vector3};
 
-use crate::constant::Constant;
+use crate::constant::{Constant, coupled_runs};
 use crate::counts::Counts;
 use crate::curvature::Curvature;
 use crate::division::{self, Sums};
@@ -133,10 +134,12 @@ impl System {
         let symmetric = terms.iter().all(|term| term.character().symmetric);
         let storage = if symmetric { Storage::Upper } else { Storage::Whole };
         let curved = terms.iter().filter(|term| term.character().curved);
-        let coupled: Vec<Vec<u32>> = curved
-            .flat_map(|term| term.stencils().iter().map(|stencil| free_places(stencil, &dofs)).collect::<Vec<_>>())
-            .collect();
-        let stencils = coupled.iter().map(Vec::as_slice);
+        let (mut coupled, mut ends) = (Vec::new(), vec![0]);
+        for stencil in curved.flat_map(|term| term.stencils().iter()) {
+            coupled.extend(stencil.iter().filter_map(|&vertex| dofs.place(vertex as usize)).map(index));
+            ends.push(coupled.len());
+        }
+        let stencils = ends.windows(2).map(|ends| &coupled[ends[0]..ends[1]]);
         let pattern = Arc::new(Pattern::from_stencils(storage, dofs.free().len(), stencils));
         let placed = |mut term: Box<dyn Term>| {
             term.place(&dofs, &pattern);
@@ -313,15 +316,19 @@ impl System {
         let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
         // For the product every term is evaluated anyway.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
+        // Without it the matrix will hold something else.
         let known = matrix.constant.take();
-        let constant = with_constant.then(|| self.constant(known, state, weights, curvature, masses));
-        let blocks = constant.as_ref().map(|constant| &constant.blocks[..]);
+        let constant = with_constant.then(|| match known {
+            Some(known) if known.serves(weights, curvature, masses) => known,
+            known => self.constant(known, state, (weights, curvature), masses, matrix),
+        });
         let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
         let mut product = if wanted { force.clone() } else { Vec::new() };
         let product_wanted = wanted.then_some(&mut product[..]);
         let values = matrix.values_and_nowhere();
         let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
-        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, blocks, &mut sums);
+        let divided =
+            division::linearisations(&self.divisible(linear), &self.shares, state, constant.as_ref(), &mut sums);
         let mut sum = sums.linearisation();
         for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
             if linear(&**term) {
@@ -342,43 +349,42 @@ impl System {
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
-    /// The masses and the Jacobians of the quadratic terms: those that are known if they serve.
+    /// Evaluates the masses and the Jacobians of the quadratic terms.
     fn constant<T: Precision>(
         &mut self,
         known: Option<Constant<T>>,
         state: State<'_>,
-        weights: Weights,
-        curvature: Curvature,
+        (weights, curvature): (Weights, Curvature),
         masses: &[f64],
+        matrix: &mut BlockMatrix<T>,
     ) -> Constant<T> {
-        let blocks = match known {
-            Some(known) if known.serves(weights, curvature, masses) => return known,
-            Some(known) => known.blocks,
-            None => vec![[[T::from_f64(0.0); 3]; 3]; self.pattern.blocks() + 1],
-        };
+        let runs = known.map_or_else(|| self.changing_places(), Constant::into_runs);
         // What need not be changed is found by changing it.
-        let changed = self.evaluate_constant(state, weights, Curvature::Clamped, masses, blocks);
-        if changed.serves(weights, curvature, masses) {
-            return changed;
+        let mut treated = Curvature::Clamped;
+        let projected = self.evaluate_constant(state, weights, treated, masses, matrix);
+        if projected && curvature != treated {
+            treated = curvature;
+            self.evaluate_constant(state, weights, treated, masses, matrix);
         }
-        let as_wanted = self.evaluate_constant(state, weights, curvature, masses, changed.blocks);
-        Constant { projected: true, ..as_wanted }
+        Constant::new((weights, treated), masses, projected, runs, matrix.values())
     }
 
+    /// Writes them to the matrix; returns whether some element's curvature was changed.
     fn evaluate_constant<T: Precision>(
         &mut self,
         state: State<'_>,
         weights: Weights,
         curvature: Curvature,
         masses: &[f64],
-        mut blocks: Vec<Block<T>>,
-    ) -> Constant<T> {
+        matrix: &mut BlockMatrix<T>,
+    ) -> bool {
+        let blocks = matrix.values_and_nowhere();
         blocks.fill([[T::from_f64(0.0); 3]; 3]);
-        add_masses(&self.dofs, &self.pattern, masses, &mut blocks);
+        add_masses(&self.dofs, &self.pattern, masses, blocks);
         let mut sum = Linearisation {
             weights,
             curvature,
-            matrix: T::blocks(&mut blocks),
+            matrix: T::blocks(blocks),
             force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
             stiffness_times_velocity: None,
         };
@@ -388,7 +394,14 @@ impl System {
             projected |= tally.projected > 0;
             counts.hessian += tally;
         }
-        Constant { weights, curvature, masses: masses.to_vec(), projected, blocks }
+        projected
+    }
+
+    /// The blocks to which terms are added that are not constant.
+    fn changing_places(&self) -> Vec<Range<u32>> {
+        let terms = self.terms.iter().map(|counted| &*counted.term);
+        let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
+        coupled_runs(&self.pattern, |vertex| self.dofs.place(vertex as usize), changing.map(Term::stencils))
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
@@ -434,7 +447,7 @@ fn is_constant(term: &dyn Term) -> bool {
 fn blame<'a>(terms: impl Iterator<Item = &'a dyn Term>, what: Quantity, state: State<'_>) -> EvaluationError {
     for term in terms {
         if let Some(element) = term.find_non_finite(what, state) {
-            let vertices = term.stencils().stencil(element).to_vec();
+            let vertices = term.stencils().stencil(element).iter().map(|&vertex| vertex as usize).collect();
             return EvaluationError::NonFiniteElement { term: term.name().to_owned(), element, vertices, what };
         }
     }
@@ -443,13 +456,10 @@ fn blame<'a>(terms: impl Iterator<Item = &'a dyn Term>, what: Quantity, state: S
 
 fn check_range(term: &dyn Term, vertex_count: usize) -> Result<(), SystemError> {
     for (element, stencil) in term.stencils().iter().enumerate() {
-        if let Some(&vertex) = stencil.iter().find(|&&vertex| vertex >= vertex_count) {
-            return Err(SystemError::VertexOutOfRange { term: term.name().to_owned(), element, vertex, vertex_count });
+        if let Some(&vertex) = stencil.iter().find(|&&vertex| vertex as usize >= vertex_count) {
+            let (term, vertex) = (term.name().to_owned(), vertex as usize);
+            return Err(SystemError::VertexOutOfRange { term, element, vertex, vertex_count });
         }
     }
     Ok(())
-}
-
-fn free_places(stencil: &[usize], dofs: &DofMap) -> Vec<u32> {
-    stencil.iter().filter_map(|&vertex| dofs.place(vertex)).map(index).collect()
 }

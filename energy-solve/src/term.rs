@@ -47,18 +47,18 @@ pub struct Stencils<'a> {
     /// Points of an element.
     pub arity: usize,
     /// All stencils one after the other.
-    pub vertices: &'a [usize],
+    pub vertices: &'a [u32],
 }
 
 impl<'a> Stencils<'a> {
     /// The stencils one by one.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = &'a [usize]> {
+    pub fn iter(self) -> impl ExactSizeIterator<Item = &'a [u32]> {
         self.vertices.chunks_exact(self.arity)
     }
 
     /// The vertices of one element.
     #[must_use]
-    pub fn stencil(&self, element: usize) -> &'a [usize] {
+    pub fn stencil(&self, element: usize) -> &'a [u32] {
         &self.vertices[element * self.arity..][..self.arity]
     }
 }

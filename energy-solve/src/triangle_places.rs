@@ -29,8 +29,8 @@ impl TrianglePlaces {
     #[must_use]
     pub fn new(stencils: Stencils<'_>, dofs: &DofMap, pattern: &Pattern) -> Self {
         let n = stencils.arity;
-        let stored = |p: usize, q: usize| {
-            let (row, column) = dofs.place(p).zip(dofs.place(q))?;
+        let stored = |p: u32, q: u32| {
+            let (row, column) = dofs.place(p as usize).zip(dofs.place(q as usize))?;
             pattern.place(row, column)
         };
         let mut places = Vec::new();

@@ -121,8 +121,11 @@ fn single_precision_rounds_the_matrix_and_nothing_else() {
         let options = LinearisationOptions { stiffness_times_velocity: wanted, ..options(weights, Curvature::Exact) };
         let (mut double, mut single) = (system.matrix(), system.matrix_in::<f32>());
         let expected = system.linearise_with_masses(state, options, &[0.5; 5], &mut double).unwrap();
-        // Twice: what is constant is kept the first time.
-        for _ in 0..2 {
+        // What is constant is kept the first time, and evaluated again where the matrix was changed.
+        for time in 0..3 {
+            if time == 2 {
+                single.values_mut().fill([[7.0; 3]; 3]);
+            }
             let found = system.linearise_with_masses(state, options, &[0.5; 5], &mut single).unwrap();
             assert_eq!(found, expected);
             for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {

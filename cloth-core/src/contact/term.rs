@@ -1,6 +1,6 @@
 use energy_dsl::{Block, Declaration, Element, Potential, Vector3};
 use energy_solve::{
-    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term,
+    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term, index,
 };
 
 use super::solid::Solid;
@@ -19,7 +19,7 @@ pub(super) struct ContactTerm<S> {
     thickness: f64,
     /// k of each vertex, in N/m.
     stiffness: Vec<f64>,
-    stencils: Vec<usize>,
+    stencils: Vec<u32>,
     /// The free vertices and where their diagonal blocks are stored.
     free: Vec<(usize, usize)>,
 }
@@ -33,7 +33,7 @@ impl<S: Solid> ContactTerm<S> {
         stiffness: Vec<f64>,
         time: f64,
     ) -> Self {
-        let stencils = (0..stiffness.len()).collect();
+        let stencils = (0..index(stiffness.len())).collect();
         let now = solid.clone();
         let mut term = Self { name, solid, now, motion, thickness, stiffness, stencils, free: Vec::new() };
         term.move_to(time);

@@ -1,7 +1,7 @@
 use energy_dsl::{Block, Declaration, Flags, Inputs, Interpreted, Mask, RestError, Vector3, triangle_index};
 use energy_solve::{
     Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, TrianglePlaces,
-    change_dense,
+    change_dense, index,
 };
 
 /// Elements of a declaration that was read at run time. Their compiled routines are interpreted, operation by operation: some ten to a hundred times
@@ -10,7 +10,7 @@ use energy_solve::{
 pub(crate) struct InterpretedTerm {
     name: String,
     element: Interpreted,
-    stencils: Vec<usize>,
+    stencils: Vec<u32>,
     arity: usize,
     bound: Vec<Bound>,
     /// The elements with a free vertex.
@@ -47,15 +47,16 @@ impl InterpretedTerm {
         };
         let bound = inputs.into_iter().enumerate().map(bind).collect::<Result<Vec<_>, _>>()?;
         let arity = element.declaration().points.len();
+        let stencils = stencils.into_iter().map(index).collect();
         Ok(Self { name, element, stencils, arity, bound, active: Vec::new(), places: TrianglePlaces::default() })
     }
 
-    fn stencil(&self, number: usize) -> &[usize] {
+    fn stencil(&self, number: usize) -> &[u32] {
         &self.stencils[number * self.arity..][..self.arity]
     }
 
     fn run(&self, routine: &str, number: usize, x: &[Vector3<f64>]) -> Results {
-        let positions: Vec<f64> = self.stencil(number).iter().flat_map(|&vertex| x[vertex]).collect();
+        let positions: Vec<f64> = self.stencil(number).iter().flat_map(|&vertex| x[vertex as usize]).collect();
         let Bound { parameters, rest, precomputed } = &self.bound[number];
         let inputs = Inputs { parameters, rest, positions: &positions, velocities: &[] };
         let (groups, Flags { degenerate, kink }) =
@@ -71,7 +72,7 @@ impl InterpretedTerm {
     /// Subtracts an element's gradient.
     fn push(&self, number: usize, gradient: &[f64], force: &mut [Vector3<f64>]) {
         for (point, &vertex) in self.stencil(number).iter().enumerate() {
-            (0..3).for_each(|axis| force[vertex][axis] -= gradient[3 * point + axis]);
+            (0..3).for_each(|axis| force[vertex as usize][axis] -= gradient[3 * point + axis]);
         }
     }
 
@@ -89,7 +90,7 @@ impl InterpretedTerm {
                 let block = &triangle[triangle_index(self.arity, i.min(j), i.max(j))];
                 for row in 0..3 {
                     let entry = |column: usize| if i <= j { block[row][column] } else { block[column][row] };
-                    product[p][row] -= (0..3).map(|column| entry(column) * v[q][column]).sum::<f64>();
+                    product[p as usize][row] -= (0..3).map(|column| entry(column) * v[q as usize][column]).sum::<f64>();
                 }
             }
         }
@@ -115,7 +116,7 @@ impl Term for InterpretedTerm {
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
-        let is_free = |stencil: &[usize]| stencil.iter().any(|&vertex| dofs.place(vertex).is_some());
+        let is_free = |stencil: &[u32]| stencil.iter().any(|&vertex| dofs.place(vertex as usize).is_some());
         self.active = (0..self.bound.len()).filter(|&number| is_free(self.stencil(number))).collect();
         if self.character().curved {
             self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);

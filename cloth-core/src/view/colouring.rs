@@ -151,8 +151,8 @@ pub fn stored_energies(simulation: &Simulation, x: &[Vector3<f64>]) -> Vec<f64> 
 }
 
 /// An element's energy divided evenly among its vertices. Stencils of unequal size are filled up by repeating a vertex, which counts once.
-fn shares(stencil: &[usize], energy: f64) -> impl Iterator<Item = (usize, f64)> {
-    let vertices: BTreeSet<usize> = stencil.iter().copied().collect();
+fn shares(stencil: &[u32], energy: f64) -> impl Iterator<Item = (usize, f64)> {
+    let vertices: BTreeSet<usize> = stencil.iter().map(|&vertex| vertex as usize).collect();
     let share = energy / vertices.len() as f64;
     vertices.into_iter().map(move |vertex| (vertex, share))
 }

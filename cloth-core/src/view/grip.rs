@@ -3,7 +3,7 @@ use std::rc::Rc;
 
 use energy_dsl::{Declaration, Element, Potential, Vector3};
 use energy_elements::ZeroLengthSpring;
-use energy_solve::{Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term};
+use energy_solve::{Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, index};
 
 use crate::mesh::dot;
 use crate::scene::{IslandModel, TermLabel};
@@ -53,7 +53,7 @@ impl Grip {
     /// Adds its force to those of an island.
     pub(super) fn hold_on(&self, island: &mut IslandModel, label: usize) {
         let vertices = island.vertices.clone();
-        let (stencils, slots) = ((0..vertices.len()).collect(), vec![None; vertices.len()]);
+        let (stencils, slots) = ((0..index(vertices.len())).collect(), vec![None; vertices.len()]);
         island.terms.push(Box::new(GripTerm { grip: self.clone(), vertices, stencils, slots }));
         island.labels.push(label);
     }
@@ -67,7 +67,7 @@ struct GripTerm {
     grip: Grip,
     /// By their numbers in the whole.
     vertices: Vec<usize>,
-    stencils: Vec<usize>,
+    stencils: Vec<u32>,
     /// Where the diagonal block of each vertex is stored; `None` where it is pinned.
     slots: Vec<Option<usize>>,
 }
@@ -104,7 +104,8 @@ impl Term for GripTerm {
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
-        self.slots = self.stencils.iter().map(|&vertex| dofs.place(vertex).map(|row| pattern.diagonal(row))).collect();
+        self.slots =
+            self.stencils.iter().map(|&vertex| dofs.place(vertex as usize).map(|row| pattern.diagonal(row))).collect();
     }
 
     fn has_energy(&self) -> bool {

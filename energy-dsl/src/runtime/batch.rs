@@ -121,6 +121,12 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         self.elements == 0
     }
 
+    /// The numbers of an element and those beside it; there are none of elements without parameters.
+    #[inline(always)]
+    fn numbers_from(&self, block: usize, offset: usize) -> &[S] {
+        if E::NUMBERS == 0 { &[] } else { &self.numbers[block * E::NUMBERS * BLOCK + offset..] }
+    }
+
     /// Replaces an element, on the same stencil.
     ///
     /// # Panics
@@ -135,16 +141,22 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         }
     }
 
-    /// The numbers of an element and those beside it; there are none of elements without parameters.
-    #[inline(always)]
-    fn numbers_from(&self, block: usize, offset: usize) -> &[S] {
-        if E::NUMBERS == 0 { &[] } else { &self.numbers[block * E::NUMBERS * BLOCK + offset..] }
-    }
-
     fn write(&mut self, place: usize, element: &E) {
         if E::NUMBERS > 0 {
             element.store(&mut self.numbers[place / BLOCK * E::NUMBERS * BLOCK + place % BLOCK..], BLOCK);
         }
+    }
+}
+
+impl<S: Real + Lane<S>, E: PackedPotential<S>> Packed<E, S> {
+    /// One element, taken out again.
+    ///
+    /// # Panics
+    /// When there is no such element.
+    #[must_use]
+    pub fn element(&self, element: usize) -> E::Wide<S> {
+        assert!(element < self.elements, "element {element} of {}", self.elements);
+        E::load::<S>(self.numbers_from(element / BLOCK, element % BLOCK), BLOCK)
     }
 }
 

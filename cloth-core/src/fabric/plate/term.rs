@@ -4,7 +4,7 @@ use energy_dsl::{
 use energy_elements::HingeAngle;
 use energy_solve::{
     Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage,
-    Tally, Term,
+    Tally, Term, index,
 };
 
 use super::rigidity::cholesky;
@@ -23,7 +23,7 @@ pub struct PlateTerm {
     rest: Vec<f64>,
     patches: Vec<Patch>,
     /// The vertices of the patches, each filled up to the most by repeating its first.
-    stencils: Vec<usize>,
+    stencils: Vec<u32>,
     arity: usize,
     /// The patches with a free vertex, and what else is known once vertices have places.
     active: Vec<usize>,
@@ -90,8 +90,8 @@ impl PlateTerm {
         let arity = patches.iter().map(|patch| patch.vertices.len()).max().unwrap_or(1);
         let mut stencils = Vec::with_capacity(arity * patches.len());
         for patch in &patches {
-            stencils.extend(&patch.vertices);
-            stencils.extend(std::iter::repeat_n(patch.vertices[0], arity - patch.vertices.len()));
+            let filled = std::iter::repeat_n(&patch.vertices[0], arity - patch.vertices.len());
+            stencils.extend(patch.vertices.iter().chain(filled).copied().map(index));
         }
         Ok(Self {
             name: name.into(),
@@ -114,7 +114,7 @@ impl PlateTerm {
     pub fn on_vertices_from(mut self, first: usize) -> Self {
         self.hinges.iter_mut().flatten().for_each(|vertex| *vertex += first);
         self.patches.iter_mut().flat_map(|patch| &mut patch.vertices).for_each(|vertex| *vertex += first);
-        self.stencils.iter_mut().for_each(|vertex| *vertex += first);
+        self.stencils.iter_mut().for_each(|vertex| *vertex += index(first));
         self
     }
 
@@ -362,7 +362,6 @@ impl Term for PlateTerm {
         let is_free = |&vertex: &usize| dofs.place(vertex).is_some();
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
-        let index = |number: usize| u32::try_from(number).expect("fewer than 2³² vertices and blocks");
         let mut needed: Vec<usize> =
             self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(|angle| angle.hinge)).collect();
         needed.sort_unstable();
