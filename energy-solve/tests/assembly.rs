@@ -2,7 +2,7 @@
 
 mod elements;
 
-use elements::{Damper, Spring};
+use elements::{AnySpring, Damper, Spring};
 use energy_dsl::Vector3;
 use energy_solve::{
     BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, LinearisationOptions, ListError, PotentialTerm,
@@ -27,6 +27,13 @@ fn springs() -> Box<dyn Term> {
 fn dampers() -> Box<dyn Term> {
     let elements = (0..EDGES.len()).map(|i| Damper { c: 0.5 + 0.1 * i as f64, e: [0.3, -0.2, 0.7] }).collect();
     Box::new(ForceTerm::new(ElementList::new("dampers", elements, &EDGES).unwrap()))
+}
+
+/// Springs without rest length, whose Jacobians are constant, two of them between vertices that nothing else couples.
+fn slack_springs() -> Box<dyn Term> {
+    let edges = [[0, 1], [0, 4], [2, 4]];
+    let elements = (0..3).map(|i| AnySpring::<f64, true> { stiffness: 3.0 + i as f64, length: 0.0 }).collect();
+    Box::new(PotentialTerm::new(ElementList::new("slack springs", elements, &edges).unwrap()))
 }
 
 fn system(pinned: &[usize]) -> System {
@@ -87,9 +94,9 @@ fn masses_are_added_on_the_diagonal() {
     let heavier: Vec<f64> = masses.iter().map(|mass| 2.0 * mass).collect();
     let weights = Weights { position: -1e-2, velocity: -0.1 };
     let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
-    // Dampers have constant Jacobians, springs have not.
-    let ropes = || System::new(vec![springs()], &[false, false, false, true, false]).unwrap();
-    for mut system in [system(&[3]), ropes()] {
+    // Slack springs have constant Jacobians, others have not.
+    let ropes = |terms| System::new(terms, &[false, false, false, true, false]).unwrap();
+    for mut system in [system(&[3]), ropes(vec![springs()]), ropes(vec![springs(), slack_springs()])] {
         let mut bare = system.matrix();
         let expected = system.linearise(state, options, &mut bare).unwrap();
         let mut massive = system.matrix();
@@ -113,7 +120,8 @@ fn masses_are_added_on_the_diagonal() {
 
 #[test]
 fn single_precision_rounds_the_matrix_and_nothing_else() {
-    let mut system = system(&[3]);
+    let terms = vec![springs(), slack_springs(), dampers()];
+    let mut system = System::new(terms, &[false, false, false, true, false]).unwrap();
     let (x, v) = (positions(), velocities());
     let weights = Weights { position: -1e-2, velocity: -0.1 };
     let state = State { x: &x, v: &v };
@@ -125,6 +133,7 @@ fn single_precision_rounds_the_matrix_and_nothing_else() {
         for time in 0..3 {
             if time == 2 {
                 single.values_mut().fill([[7.0; 3]; 3]);
+                *single.diagonal_mut(0) = [[5.0; 3]; 3];
             }
             let found = system.linearise_with_masses(state, options, &[0.5; 5], &mut single).unwrap();
             assert_eq!(found, expected);

@@ -47,14 +47,16 @@ fn delta(row: usize, column: usize) -> f64 {
     f64::from(row == column)
 }
 
-/// U = ½ k (‖p − q‖ − L)², without precautions: coincident ends divide by zero.
+/// U = ½ k (‖p − q‖ − L)², without precautions: coincident ends divide by zero. `SLACK` ones are declared quadratic, and must have L = 0.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spring<T = f64> {
+pub(crate) struct AnySpring<T, const SLACK: bool> {
     pub(crate) stiffness: T,
     pub(crate) length: T,
 }
 
-impl<T: Real> Spring<T> {
+pub(crate) type Spring<T = f64> = AnySpring<T, false>;
+
+impl<T: Real, const SLACK: bool> AnySpring<T, SLACK> {
     /// d, ‖d‖ and the stretch.
     fn state(&self, [p, q]: &[Vector3<T>; 2]) -> (Vector3<T>, T, T) {
         let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
@@ -63,16 +65,17 @@ impl<T: Real> Spring<T> {
     }
 }
 
-impl<T: Real> Element for Spring<T> {
-    const DECLARATION: &'static Declaration = &declaration("Spring", Kind::Energy, "k/2 (‖p − q‖ − L)²", 1);
-    type Over<R: Real> = Spring<R>;
+impl<T: Real, const SLACK: bool> Element for AnySpring<T, SLACK> {
+    const DECLARATION: &'static Declaration =
+        &Declaration { quadratic: SLACK, ..declaration("Spring", Kind::Energy, "k/2 (‖p − q‖ − L)²", 1) };
+    type Over<R: Real> = AnySpring<R, SLACK>;
 
     fn evaluate<R: Real>(_: &Inputs<'_, R>) -> Result<Outputs<R>, RestError> {
         Err(RestError { element: "Spring" })
     }
 }
 
-impl<T: Real> Potential<T> for Spring<T> {
+impl<T: Real, const SLACK: bool> Potential<T> for AnySpring<T, SLACK> {
     type Points = [Vector3<T>; 2];
     type Triangle = [Block<T>; 3];
 
@@ -92,7 +95,7 @@ impl<T: Real> Potential<T> for Spring<T> {
     }
 }
 
-impl<T: Real> ReducedPotential<T> for Spring<T> {
+impl<T: Real, const SLACK: bool> ReducedPotential<T> for AnySpring<T, SLACK> {
     type Coordinates = [T; 3];
     type Upper = [T; 6];
 
@@ -119,7 +122,7 @@ impl<T: Real> ReducedPotential<T> for Spring<T> {
     }
 }
 
-impl Stored<f64> for Spring {
+impl<const SLACK: bool> Stored<f64> for AnySpring<f64, SLACK> {
     const NUMBERS: usize = 2;
 
     fn store(&self, numbers: &mut [f64], stride: usize) {
@@ -128,11 +131,11 @@ impl Stored<f64> for Spring {
     }
 }
 
-impl PackedPotential<f64> for Spring {
-    type Wide<V: Lane<f64>> = Spring<V>;
+impl<const SLACK: bool> PackedPotential<f64> for AnySpring<f64, SLACK> {
+    type Wide<V: Lane<f64>> = AnySpring<V, SLACK>;
 
-    fn load<V: Lane<f64>>(numbers: &[f64], stride: usize) -> Spring<V> {
-        Spring { stiffness: V::load(numbers), length: V::load(&numbers[stride..]) }
+    fn load<V: Lane<f64>>(numbers: &[f64], stride: usize) -> AnySpring<V, SLACK> {
+        AnySpring { stiffness: V::load(numbers), length: V::load(&numbers[stride..]) }
     }
 }
 
