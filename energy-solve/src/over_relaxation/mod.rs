@@ -1,30 +1,20 @@
 mod domain;
-mod meeting;
 
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-use energy_dsl::{Block, Kernel, Level, Real, Vector3, dispatch};
+use energy_dsl::{Block, Kernel, Level, Vector3, dispatch};
 
-use self::domain::{Domain, Wide, inverse_factor, scaled};
-use self::meeting::{Meeting, Shared};
+use self::domain::Domain;
+use crate::domains::{Meeting, Precision, Shared, Wide, divided, inverse_factor, ranges, scaled};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage};
 use crate::preconditioner::SingularBlock;
 use crate::solve::{SolveOptions, SolveReport, StopReason};
 use crate::threads::{for_each, in_parts, split_mut};
 
-/// What numbers are stored and computed in: `f32` or `f64`.
-pub trait Precision: Real + Into<f64> + Send + Sync {}
-
-impl Precision for f32 {}
-impl Precision for f64 {}
-
 /// ω. From 1.4 to 1.8 the iterations on sheets of cloth, soft and stiff, fine and coarse, differ by a fifth.
 const RELAXATION: f64 = 1.6;
-
-/// Rows of a domain, about. A domain is what one thread at least relaxes on its own, so more of them cost iterations.
-const DOMAIN: usize = 8192;
 
 /// Conjugate gradients with the preconditioner of symmetric successive over-relaxation, at the price of conjugate gradients without:
 /// Eisenstat's method (SIAM J. Sci. Stat. Comput. 2, 1981).
@@ -73,8 +63,9 @@ impl<T: Precision> OverRelaxation<T> {
     #[must_use]
     pub fn with_threads(pattern: &Arc<Pattern>, threads: usize) -> Self {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices are solved by conjugate gradients");
-        let domains = Domain::all(pattern, &ranges(pattern.rows()));
-        let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.border()]);
+        let domains = divided(pattern, &ranges(pattern.rows())).into_iter();
+        let domains: Vec<_> = domains.map(|(triangle, couplings)| Domain::new(triangle, couplings)).collect();
+        let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.couplings.border().len()]);
         let borders = domains.iter().map(border).collect();
         let inverses = vec![[[0.0; 3]; 3]; pattern.rows()];
         Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders }
@@ -90,7 +81,7 @@ impl<T: Precision> OverRelaxation<T> {
     pub fn scale(&mut self, matrix: &BlockMatrix) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { pattern, threads, inverses, domains, .. } = self;
-        let rows = || domains.iter().map(|domain| domain.rows.clone());
+        let rows = || domains.iter().map(|domain| domain.triangle.rows.clone());
         let parts = rows().zip(split_mut(inverses, rows().map(|rows| rows.len()))).collect();
         let inverted = for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix }));
         inverted.into_iter().collect::<Result<(), usize>>().map_err(|row| SingularBlock { row })?;
@@ -104,7 +95,7 @@ impl<T: Precision> OverRelaxation<T> {
     /// Solves A x = b from x = 0. Residuals are measured as √(rᵀ M⁻¹ r), M = (D/ω + L) (D/ω)⁻¹ (D/ω + Lᵀ).
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
         let Self { pattern, threads, inverses, domains, borders } = self;
-        let lengths: Vec<usize> = domains.iter().map(|domain| domain.rows.len()).collect();
+        let lengths: Vec<usize> = domains.iter().map(|domain| domain.triangle.rows.len()).collect();
         let sum = || Shared::new(lengths.len());
         let common = Common {
             pattern,
@@ -119,7 +110,7 @@ impl<T: Precision> OverRelaxation<T> {
         };
         let parts = domains.iter_mut().zip(split_mut(x, lengths.iter().copied())).enumerate();
         let parts = parts.map(|(number, (domain, x))| {
-            let rows = domain.rows.clone();
+            let rows = domain.triangle.rows.clone();
             Part { number, inverses: &inverses[rows.clone()], b: &b[rows], domain, x }
         });
         let solved = in_parts(*threads, parts.collect(), |parts| dispatch(Gradients { parts, common: &common }));
@@ -142,12 +133,6 @@ impl<T: Precision> Clone for OverRelaxation<T> {
     }
 }
 
-/// The rows of each domain.
-fn ranges(rows: usize) -> Vec<Range<usize>> {
-    let domains = (rows / DOMAIN).max(usize::from(rows > 0));
-    (0..domains).map(|domain| domain * rows / domains..(domain + 1) * rows / domains).collect()
-}
-
 /// C⁻¹ of some rows. Fails with the row whose diagonal block is not positive definite.
 struct Inversion<'a> {
     rows: Range<usize>,
@@ -161,7 +146,8 @@ impl Kernel for Inversion<'_> {
     #[inline(always)]
     fn run<L: Level>(self) -> Self::Output {
         for (place, row) in self.rows.enumerate() {
-            self.inverses[place] = inverse_factor(self.matrix.diagonal(row)).ok_or(row)?;
+            let relaxed = self.matrix.diagonal(row).map(|row| row.map(|entry| entry / RELAXATION));
+            self.inverses[place] = inverse_factor(&relaxed).ok_or(row)?;
         }
         Ok(())
     }

@@ -1,0 +1,218 @@
+use std::sync::RwLock;
+
+use energy_dsl::{Block, Level, Vector3};
+
+use crate::domains::{
+    Couplings, Precision, SLACK, Triangle, Wide, inverse_factor, scaled_block, subtract_product, total,
+};
+use crate::matrix::BlockMatrix;
+use crate::pattern::Pattern;
+
+/// Gauss–Seidel relaxation of the rows of a domain, forth and back: solutions with I + L̃ and I + L̃ᵀ, the matrix being scaled to
+///
+/// C⁻¹ A C⁻ᵀ = I + L̃ + L̃ᵀ + Ẽ.
+///
+/// C Cᵀ is the diagonal block, strengthened on the border by half of what couples the row with other domains: then the relaxation of all domains
+/// at once converges, wherever they are cut (hybrid ℓ₁ Gauss–Seidel, Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput. 33, 2011). Ẽ takes it back.
+#[derive(Clone, Debug)]
+pub(super) struct Smoother<T> {
+    pub(super) triangle: Triangle<T>,
+    pub(super) couplings: Couplings<T>,
+    /// On the border, what the diagonal was strengthened by: column by column.
+    strengthened: Vec<[Wide<T>; 3]>,
+    /// C by rows, in a unit of its own.
+    factors: Vec<[T; 6]>,
+}
+
+impl<T: Precision> Smoother<T> {
+    pub(super) fn new(triangle: Triangle<T>, couplings: Couplings<T>) -> Self {
+        let zero = T::from_f64(0.0);
+        let strengthened = vec![[[zero; 4]; 3]; couplings.border().len()];
+        let factors = vec![[zero; 6]; triangle.rows.len()];
+        Self { triangle, couplings, strengthened, factors }
+    }
+
+    /// C⁻¹ of its rows; fails with one whose diagonal block is not positive definite.
+    #[inline(always)]
+    pub(super) fn invert<L: Level>(
+        &mut self,
+        matrix: &BlockMatrix,
+        unit: f64,
+        inverses: &mut [Block<f64>],
+    ) -> Result<(), usize> {
+        let first = self.triangle.rows.start;
+        for (local, row) in self.triangle.rows.clone().enumerate() {
+            inverses[local] = inverse_factor(matrix.diagonal(row)).ok_or(row)?;
+        }
+        let sums = self.couplings.absolute_row_sums(matrix);
+        for (place, &local) in self.couplings.border().iter().enumerate() {
+            let (mut diagonal, mut more) = (*matrix.diagonal(first + local as usize), [[0.0; 3]; 3]);
+            for i in 0..3 {
+                more[i][i] = 0.5 * sums[place][i];
+                diagonal[i][i] += more[i][i];
+            }
+            let inverse = inverse_factor(&diagonal).ok_or(first + local as usize)?;
+            let more = scaled_block::<L>(&inverse, &more, &inverse);
+            for i in 0..3 {
+                for j in 0..3 {
+                    self.strengthened[place][j][i] = T::from_f64(more[i][j]);
+                }
+            }
+            inverses[local as usize] = inverse;
+        }
+        for local in 0..inverses.len() {
+            let [[x, ..], [yx, y, _], [zx, zy, z]] = inverses[local];
+            let [a, c, f] = [1.0 / x, 1.0 / y, 1.0 / z];
+            let (b, e) = (-yx * a * c, -zy * c * f);
+            let d = -(zx * a + zy * b) * f;
+            for (place, entry) in [a, b, c, d, e, f].into_iter().enumerate() {
+                self.factors[local][place] = T::from_f64(unit * entry);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
+    #[inline(always)]
+    pub(super) fn scale<L: Level>(&mut self, pattern: &Pattern, inverses: &[Block<f64>], matrix: &BlockMatrix) {
+        self.triangle.scale::<L>(pattern, inverses, matrix);
+        self.couplings.scale::<L>(inverses, matrix);
+    }
+
+    /// C r in a row.
+    #[inline(always)]
+    pub(super) fn unscaled(&self, row: usize, [u, v, w, _]: &Wide<T>) -> Wide<T> {
+        let [a, b, c, d, e, f] = self.factors[row];
+        [a * *u, b * *u + c * *v, d * *u + e * *v + f * *w, T::from_f64(0.0)]
+    }
+
+    /// Cᵀ e in a row.
+    #[inline(always)]
+    pub(super) fn scaled(&self, row: usize, [u, v, w, _]: &Wide<T>) -> Wide<T> {
+        let [a, b, c, d, e, f] = self.factors[row];
+        [a * *u + b * *v + d * *w, c * *v + e * *w, f * *w, T::from_f64(0.0)]
+    }
+
+    /// v ← (I + L̃)⁻¹ v.
+    #[inline(always)]
+    pub(super) fn forward<L: Level>(&self, pattern: &Pattern, v: &mut [Wide<T>]) {
+        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        for row in 0..v.len() {
+            let here = v[row];
+            let excess = triangle.excess(row);
+            for place in triangle.places(pattern, row) {
+                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
+                subtract_from::<T, L>(&mut v[pattern.columns()[place] as usize - first], block, &here);
+            }
+        }
+    }
+
+    /// v ← (I + L̃ᵀ)⁻¹ v.
+    #[inline(always)]
+    pub(super) fn backward<L: Level>(&self, pattern: &Pattern, v: &mut [Wide<T>]) {
+        for row in (0..v.len()).rev() {
+            v[row] = self.less_later::<L>(pattern, row, v[row], v);
+        }
+    }
+
+    /// r ← −L̃ᵀ v.
+    #[inline(always)]
+    pub(super) fn minus_upper<L: Level>(&self, pattern: &Pattern, v: &[Wide<T>], r: &mut [Wide<T>]) {
+        for row in 0..v.len() {
+            r[row] = self.less_later::<L>(pattern, row, [T::from_f64(0.0); 4], v);
+        }
+    }
+
+    /// r ← r − L̃ v.
+    #[inline(always)]
+    pub(super) fn subtract_lower<L: Level>(&self, pattern: &Pattern, v: &[Wide<T>], r: &mut [Wide<T>]) {
+        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        for row in 0..v.len() {
+            let here = v[row];
+            let excess = triangle.excess(row);
+            for place in triangle.places(pattern, row) {
+                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
+                subtract_from::<T, L>(&mut r[pattern.columns()[place] as usize - first], block, &here);
+            }
+        }
+    }
+
+    /// w ← w + L̃ y and v ← (I + L̃)⁻¹ w, reading the blocks once.
+    #[inline(always)]
+    pub(super) fn add_lower_and_forward<L: Level>(
+        &self,
+        pattern: &Pattern,
+        y: &[Wide<T>],
+        w: &mut [Wide<T>],
+        v: &mut [Wide<T>],
+    ) {
+        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        v.fill([T::from_f64(0.0); 4]);
+        for row in 0..v.len() {
+            let (mut minus, mut here) = (y[row], v[row]);
+            for lane in 0..4 {
+                minus[lane] = -minus[lane];
+                here[lane] = here[lane] + w[row][lane];
+            }
+            v[row] = here;
+            let excess = triangle.excess(row);
+            for place in triangle.places(pattern, row) {
+                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
+                let column = pattern.columns()[place] as usize - first;
+                subtract_from::<T, L>(&mut w[column], block, &minus);
+                subtract_from::<T, L>(&mut v[column], block, &here);
+            }
+        }
+    }
+
+    /// r ← r + s Ẽ v, v as others show it.
+    #[inline(always)]
+    pub(super) fn add_coupled<L: Level>(
+        &self,
+        sign: f64,
+        borders: &[RwLock<Vec<Wide<T>>>],
+        v: &[Wide<T>],
+        r: &mut [Wide<T>],
+    ) {
+        let sign = T::from_f64(sign);
+        self.couplings.add_product::<L>(sign, borders, r);
+        for (&row, columns) in self.couplings.border().iter().zip(&self.strengthened) {
+            let (v, mut sum) = (v[row as usize], r[row as usize]);
+            for column in 0..3 {
+                let factor = -sign * v[column];
+                for lane in 0..4 {
+                    sum[lane] = columns[column][lane].mul_add::<L>(factor, sum[lane]);
+                }
+            }
+            r[row as usize] = sum;
+        }
+    }
+
+    /// A vector less what the later rows of another one are multiplied by.
+    #[inline(always)]
+    fn less_later<L: Level>(&self, pattern: &Pattern, row: usize, from: Wide<T>, v: &[Wide<T>]) -> Wide<T> {
+        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        let mut sums = [from, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
+        let excess = triangle.excess(row);
+        // The nearest row, computed just before when going back, comes last: the others do not have to wait for it.
+        for place in triangle.places(pattern, row).rev() {
+            let block = &triangle.columns[9 * (place - excess)..][..9 + SLACK];
+            subtract_product::<T, L>(&mut sums, block, &v[pattern.columns()[place] as usize - first]);
+        }
+        total(&sums)
+    }
+}
+
+/// v ← v − B u, B stored column by column.
+#[inline(always)]
+fn subtract_from<T: Precision, L: Level>(v: &mut Wide<T>, block: &[T], u: &Wide<T>) {
+    let mut sums = [*v, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
+    subtract_product::<T, L>(&mut sums, block, u);
+    *v = total(&sums);
+}
+
+/// A vector in a register.
+#[inline(always)]
+pub(super) fn widened<T: Precision>([u, v, w]: Vector3<f64>) -> Wide<T> {
+    [T::from_f64(u), T::from_f64(v), T::from_f64(w), T::from_f64(0.0)]
+}
