@@ -10,9 +10,10 @@
 //!
 //! Pinned vertices are removed from the matrix, not penalised; elements with pinned vertices only are never evaluated. What
 //! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix, and
-//! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time.
+//! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time; [`Multigrid`] where sheets are so fine or so stiff that the
+//! iterations of both are many; [`BlockCholesky`] to all digits.
 //!
-//! Potentials are evaluated many elements at once, and by several threads ([`System::set_threads`], [`OverRelaxation::with_threads`]). Everything is
+//! Potentials are evaluated many elements at once, and by several threads ([`System::set_threads`], [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is
 //! deterministic: sums run in the order of terms and elements, whatever the number of threads.
 //!
 //! ```

@@ -170,7 +170,7 @@ impl<T: Precision> Kernel for Scaling<'_, T> {
     }
 }
 
-/// s = (I + L̃)⁻¹ r is added to the solution, r ← −L̃ᵀ s, and Pᵀ r passed on.
+/// s = (I + L̃)⁻¹ r is added to the solution, r ← −(L̃ᵀ + Ẽ) s, and Pᵀ r passed on.
 struct Down<'a, T> {
     level: &'a mut Relaxed<T>,
     pattern: &'a Pattern,
@@ -194,7 +194,7 @@ impl<T: Precision> Kernel for Down<'_, T> {
     }
 }
 
-/// c = (I + L̃ᵀ)⁻¹ (r − L̃ e), e the correction, is added to the solution, and r ← −L̃ (c − e) unless this is the last visit.
+/// c = (I + L̃ᵀ)⁻¹ (r − (L̃ + Ẽ) e), e the correction, is added to the solution, and r ← −(L̃ + Ẽ) (c − e) unless this is the last visit.
 struct Up<'a, T> {
     level: &'a mut Relaxed<T>,
     pattern: &'a Pattern,

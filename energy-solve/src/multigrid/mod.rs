@@ -21,12 +21,12 @@ use crate::threads::{for_each, in_parts, split_mut};
 /// Conjugate gradients with algebraic multigrid by smoothed aggregation as preconditioner, for matrices of cloth: a number of iterations that hardly
 /// depends on how fine the mesh is (Tamstorf, Jones and McCormick, "Smoothed aggregation multigrid for cloth simulation", ACM Trans. Graph. 34, 2015).
 ///
-/// M⁻¹ r is a cycle: with D the diagonal blocks, A = D + L + Lᵀ, and P as below,
+/// M⁻¹ r is a cycle: with D the diagonal blocks, A = D + L + Lᵀ, D̂ = D/ω, and P as below,
 ///
-/// s = (D + L)⁻¹ r,  e = P A_c⁻¹ Pᵀ (r − A s),  z = s + e + (D + Lᵀ)⁻¹ (r − A (s + e)),  A_c = Pᵀ A P,
+/// s = (D̂ + L)⁻¹ r,  e = P A_c⁻¹ Pᵀ (r − A s),  z = s + e + (D̂ + Lᵀ)⁻¹ (r − A (s + e)),  A_c = Pᵀ A P,
 ///
 /// where coarse systems are solved nearly, by two such cycles each (a W-cycle), and by Cholesky's factorisation in the end. Products with A are never
-/// computed as such: r − A s = −Lᵀ s, and A z = r + L (z − s − e). Blocks above the diagonal are read four times an iteration, where
+/// computed as such: with D' = D − D̂, r − A s = −(D' + Lᵀ) s, and A z = r + (D' + L) (z − s − e). Blocks above the diagonal are read four times an iteration, where
 /// [`OverRelaxation`](crate::OverRelaxation) reads them twice.
 ///
 /// P carries translations: aggregates of vertices and their neighbours, as the pattern couples them, move as wholes, and each vertex by the mean of its own
@@ -34,7 +34,7 @@ use crate::threads::{for_each, in_parts, split_mut};
 /// blocks are multiples of the identity, and A_c, which follows A in every iteration of Newton's method, is a weighted sum of blocks. To carry
 /// rotations too, and to smooth with D⁻¹A, saves no iterations on sheets of cloth, but multiplies the price of A_c.
 ///
-/// Residuals are measured as √(rᵀ M⁻¹ r), M = (D + L) D⁻¹ (D + Lᵀ), the norm of over-relaxation, and may be twice as large in it: as they are rough
+/// Residuals are measured as √(rᵀ M⁻¹ r), M = (D̂ + L) D̂⁻¹ (D̂ + Lᵀ), the norm of over-relaxation, and may be twice as large in it: as they are rough
 /// then, where those left by over-relaxation are smooth, the same tolerance means the same error of the solution, in the norm √(eᵀ A e).
 ///
 /// Numbers are stored, and computed with, in `T`, products of vectors and A_c are summed up in doubles. Large matrices are divided into domains of

@@ -8,17 +8,21 @@ use crate::domains::{
 use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
 
-/// Gauss–Seidel relaxation of the rows of a domain, forth and back: solutions with I + L̃ and I + L̃ᵀ, the matrix being scaled to
+/// ω. Multigrid for sheets takes a quarter less of the iterations than with Gauss–Seidel relaxation, ω = 1; from 1.4 to 1.7 the same.
+const RELAXATION: f64 = 1.5;
+
+/// Over-relaxation of the rows of a domain, forth and back: solutions with I + L̃ and I + L̃ᵀ, the matrix being scaled to
 ///
 /// C⁻¹ A C⁻ᵀ = I + L̃ + L̃ᵀ + Ẽ.
 ///
-/// C Cᵀ is the diagonal block, strengthened on the border by half of what couples the row with other domains: then the relaxation of all domains
-/// at once converges, wherever they are cut (hybrid ℓ₁ Gauss–Seidel, Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput. 33, 2011). Ẽ takes it back.
+/// C Cᵀ is D/ω, D the diagonal block, and more on the border by half of what couples the row with other domains: then the relaxation of all domains
+/// at once converges, wherever they are cut (hybrid ℓ₁ Gauss–Seidel, Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput. 33, 2011). Ẽ takes it back:
+/// it is ω − 1, less what the border has more of, and what couples the domain with others.
 #[derive(Clone, Debug)]
 pub(super) struct Smoother<T> {
     pub(super) triangle: Triangle<T>,
     pub(super) couplings: Couplings<T>,
-    /// On the border, what the diagonal was strengthened by: column by column.
+    /// On the border, ω times what D/ω was strengthened by: column by column.
     strengthened: Vec<[Wide<T>; 3]>,
     /// C by rows, in a unit of its own.
     factors: Vec<[T; 6]>,
@@ -42,11 +46,11 @@ impl<T: Precision> Smoother<T> {
     ) -> Result<(), usize> {
         let first = self.triangle.rows.start;
         for (local, row) in self.triangle.rows.clone().enumerate() {
-            inverses[local] = inverse_factor(matrix.diagonal(row)).ok_or(row)?;
+            inverses[local] = inverse_factor(&relaxed(matrix.diagonal(row))).ok_or(row)?;
         }
         let sums = self.couplings.absolute_row_sums(matrix);
         for (place, &local) in self.couplings.border().iter().enumerate() {
-            let (mut diagonal, mut more) = (*matrix.diagonal(first + local as usize), [[0.0; 3]; 3]);
+            let (mut diagonal, mut more) = (relaxed(matrix.diagonal(first + local as usize)), [[0.0; 3]; 3]);
             for i in 0..3 {
                 more[i][i] = 0.5 * sums[place][i];
                 diagonal[i][i] += more[i][i];
@@ -55,7 +59,7 @@ impl<T: Precision> Smoother<T> {
             let more = scaled_block::<L>(&inverse, &more, &inverse);
             for i in 0..3 {
                 for j in 0..3 {
-                    self.strengthened[place][j][i] = T::from_f64(more[i][j]);
+                    self.strengthened[place][j][i] = T::from_f64(RELAXATION * more[i][j]);
                 }
             }
             inverses[local as usize] = inverse;
@@ -115,20 +119,22 @@ impl<T: Precision> Smoother<T> {
         }
     }
 
-    /// r ← −L̃ᵀ v.
+    /// r ← −(L̃ᵀ + ω − 1) v.
     #[inline(always)]
     pub(super) fn minus_upper<L: Level>(&self, pattern: &Pattern, v: &[Wide<T>], r: &mut [Wide<T>]) {
         for row in 0..v.len() {
-            r[row] = self.less_later::<L>(pattern, row, [T::from_f64(0.0); 4], v);
+            let own = plus::<T, L>([T::from_f64(0.0); 4], 1.0 - RELAXATION, &v[row]);
+            r[row] = self.less_later::<L>(pattern, row, own, v);
         }
     }
 
-    /// r ← r − L̃ v.
+    /// r ← r − (L̃ + ω − 1) v.
     #[inline(always)]
     pub(super) fn subtract_lower<L: Level>(&self, pattern: &Pattern, v: &[Wide<T>], r: &mut [Wide<T>]) {
         let (triangle, first) = (&self.triangle, self.triangle.rows.start);
         for row in 0..v.len() {
             let here = v[row];
+            r[row] = plus::<T, L>(r[row], 1.0 - RELAXATION, &here);
             let excess = triangle.excess(row);
             for place in triangle.places(pattern, row) {
                 let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
@@ -137,7 +143,7 @@ impl<T: Precision> Smoother<T> {
         }
     }
 
-    /// w ← w + L̃ y and v ← (I + L̃)⁻¹ w, reading the blocks once.
+    /// w ← w + (L̃ + ω − 1) y and v ← (I + L̃)⁻¹ w, reading the blocks once.
     #[inline(always)]
     pub(super) fn add_lower_and_forward<L: Level>(
         &self,
@@ -149,12 +155,12 @@ impl<T: Precision> Smoother<T> {
         let (triangle, first) = (&self.triangle, self.triangle.rows.start);
         v.fill([T::from_f64(0.0); 4]);
         for row in 0..v.len() {
-            let (mut minus, mut here) = (y[row], v[row]);
+            let (own, mut minus, mut here) = (plus::<T, L>(w[row], RELAXATION - 1.0, &y[row]), y[row], v[row]);
             for lane in 0..4 {
                 minus[lane] = -minus[lane];
-                here[lane] = here[lane] + w[row][lane];
+                here[lane] = here[lane] + own[lane];
             }
-            v[row] = here;
+            (w[row], v[row]) = (own, here);
             let excess = triangle.excess(row);
             for place in triangle.places(pattern, row) {
                 let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
@@ -165,7 +171,7 @@ impl<T: Precision> Smoother<T> {
         }
     }
 
-    /// r ← r + s Ẽ v, v as others show it.
+    /// r ← r + s (Ẽ − ω + 1) v, v as others show it.
     #[inline(always)]
     pub(super) fn add_coupled<L: Level>(
         &self,
@@ -203,12 +209,33 @@ impl<T: Precision> Smoother<T> {
     }
 }
 
+/// D/ω.
+#[inline(always)]
+fn relaxed(diagonal: &Block<f64>) -> Block<f64> {
+    diagonal.map(|row| row.map(|entry| entry / RELAXATION))
+}
+
+/// v + s u.
+#[inline(always)]
+fn plus<T: Precision, L: Level>(mut v: Wide<T>, scale: f64, u: &Wide<T>) -> Wide<T> {
+    let scale = T::from_f64(scale);
+    for lane in 0..4 {
+        v[lane] = u[lane].mul_add::<L>(scale, v[lane]);
+    }
+    v
+}
+
 /// v ← v − B u, B stored column by column.
 #[inline(always)]
 fn subtract_from<T: Precision, L: Level>(v: &mut Wide<T>, block: &[T], u: &Wide<T>) {
-    let mut sums = [*v, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
-    subtract_product::<T, L>(&mut sums, block, u);
-    *v = total(&sums);
+    let mut sum = *v;
+    for column in 0..3 {
+        let factor = -u[column];
+        for lane in 0..4 {
+            sum[lane] = block[3 * column + lane].mul_add::<L>(factor, sum[lane]);
+        }
+    }
+    *v = sum;
 }
 
 /// A vector in a register.
