@@ -8,7 +8,7 @@ use energy_solve::{ElementList, ListError, PotentialTerm, System, SystemError};
 
 use crate::body::Body;
 use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
-use crate::integrator::{Integrator, Newton, NewtonOptions, Phases, StepError, StepReport};
+use crate::integrator::{Integrator, LinearSolverChoice, Newton, NewtonOptions, Phases, StepError, StepReport};
 use crate::mesh::{Diagonals, MeshError, Plane, Sheet, SpringNetwork};
 
 /// A cloth of the benchmark.
@@ -117,6 +117,8 @@ pub struct Measured {
     pub vertices: usize,
     /// How many threads there could be.
     pub threads: usize,
+    /// What solved the linear systems.
+    pub linear_solver: LinearSolverChoice,
     /// Steps done.
     pub steps: u64,
     /// Newton's method's iterations and what they took.
@@ -131,7 +133,7 @@ pub struct Measured {
     pub peak_memory: Option<u64>,
 }
 
-/// Runs a cloth for `seconds` of its time on at most so many threads, calling `progress` after every step.
+/// Runs a cloth for `seconds` of its time on at most so many threads with a linear solver, calling `progress` after every step.
 ///
 /// # Errors
 /// When a step fails.
@@ -139,6 +141,7 @@ pub fn measure(
     cloth: Cloth,
     cells: usize,
     threads: usize,
+    linear_solver: LinearSolverChoice,
     seconds: f64,
     mut progress: impl FnMut(),
 ) -> Result<Measured, BenchError> {
@@ -146,7 +149,8 @@ pub fn measure(
     let mut body = hang(cloth, cells)?;
     body.system.set_threads(threads);
     // The stop test of the comparison in the literature: absolute, at the scale of this scene.
-    let options = NewtonOptions { velocity_tolerance: 1e-3, impulse_tolerance: 1e-6, ..NewtonOptions::default() };
+    let tolerances = NewtonOptions { velocity_tolerance: 1e-3, impulse_tolerance: 1e-6, ..NewtonOptions::default() };
+    let options = NewtonOptions { linear_solver, ..tolerances };
     let mut integrator = Newton::with_options(options);
     let set_up = started.elapsed();
     let vertices = (cells + 1) * (cells + 1);
@@ -160,7 +164,18 @@ pub fn measure(
     }
     let time = started.elapsed();
     let lowest = body.x.iter().fold(f64::INFINITY, |lowest, x| lowest.min(x[2]));
-    Ok(Measured { cloth, vertices, threads, steps, report, set_up, time, lowest, peak_memory: peak_memory() })
+    Ok(Measured {
+        cloth,
+        vertices,
+        threads,
+        linear_solver,
+        steps,
+        report,
+        set_up,
+        time,
+        lowest,
+        peak_memory: peak_memory(),
+    })
 }
 
 /// What Linux calls the high-water mark of the resident set.
@@ -180,6 +195,7 @@ pub fn table(runs: &[Measured]) -> Table {
         "cloth",
         "vertices",
         "threads",
+        "solver",
         "ms/step",
         "Newton/step",
         "CG/Newton",
@@ -192,25 +208,31 @@ pub fn table(runs: &[Measured]) -> Table {
         "lowest m",
         "growth",
         "of one thread",
+        "solved by",
     ]);
     for run in runs {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let a_step = |run: &Measured| milliseconds(run.time) / run.steps as f64;
         let share = |time: Duration| format!("{:.0} %", 100.0 * time.as_secs_f64() / run.time.as_secs_f64());
         let Phases { assembly, factorisation, solve, line_search } = run.report.phases;
-        let alike = |other: &&Measured| other.cloth == run.cloth && other.threads == run.threads;
+        let alike = |other: &&Measured| {
+            other.cloth == run.cloth && other.threads == run.threads && other.linear_solver == run.linear_solver
+        };
         let smaller = runs.iter().filter(alike).filter(|other| other.vertices < run.vertices);
         let before = smaller.max_by_key(|other| other.vertices);
         let growth = before.map_or("–".to_owned(), |before| {
             let (times, sizes) = (a_step(run) / a_step(before), run.vertices as f64 / before.vertices as f64);
             format!("{:.2}", times.ln() / sizes.ln())
         });
-        let same = |other: &&Measured| other.cloth == run.cloth && other.vertices == run.vertices;
+        let same = |other: &&Measured| {
+            other.cloth == run.cloth && other.vertices == run.vertices && other.linear_solver == run.linear_solver
+        };
         let alone = runs.iter().filter(same).find(|other| other.threads == 1 && run.threads > 1);
         table.add_row([
             run.cloth.name().to_owned(),
             run.vertices.to_string(),
             run.threads.to_string(),
+            run.linear_solver.name().to_owned(),
             format!("{:.2}", a_step(run)),
             format!("{:.1}", run.report.solves as f64 / run.steps as f64),
             format!("{:.1}", run.report.iterations as f64 / run.report.solves as f64),
@@ -223,6 +245,7 @@ pub fn table(runs: &[Measured]) -> Table {
             format!("{:.4}", run.lowest),
             growth,
             alone.map_or("–".to_owned(), |alone| format!("× {:.2}", a_step(run) / a_step(alone))),
+            run.report.solved_by.to_string(),
         ]);
     }
     for column in table.column_iter_mut().skip(1) {

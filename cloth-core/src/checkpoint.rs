@@ -7,7 +7,7 @@ use energy_dsl::Vector3;
 use energy_solve::{Counts, EvaluationError, Tally};
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::Phases;
+use crate::integrator::{Phases, SolvedBy};
 use crate::island::SavedIsland;
 use crate::ledger::Ledger;
 
@@ -33,6 +33,9 @@ pub struct SavedState {
     pub ledger: Option<Ledger>,
     /// Linear systems solved.
     pub solves: u64,
+    /// And by what.
+    #[serde(default)]
+    pub solved_by: SolvedBy,
     /// Iterations of the linear solver.
     pub iterations: u64,
     /// Steps solved again with projected curvature.

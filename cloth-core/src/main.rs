@@ -12,6 +12,7 @@ use clap::{Parser, Subcommand};
 use cloth_core::bench::{self, Cloth};
 use cloth_core::bench_sleep::{self, Sizes};
 use cloth_core::fabric::MEASURED;
+use cloth_core::integrator::LinearSolverChoice;
 use cloth_core::output::OutputFolder;
 use cloth_core::progress::Progress;
 use cloth_core::run::{Ending, Run, RunError};
@@ -141,6 +142,9 @@ enum Command {
         /// Numbers of threads. What is computed is the same, to the last bit.
         #[arg(long, value_delimiter = ',', default_values_t = [1, 2], value_parser = clap::value_parser!(u16).range(1..))]
         threads: Vec<u16>,
+        /// What solves the linear systems: `auto`, `over-relaxation`, `multigrid`, `cholesky`, `incomplete-cholesky`.
+        #[arg(long, value_delimiter = ',', default_value = "auto", value_parser = solver_named)]
+        solver: Vec<LinearSolverChoice>,
         /// How long is simulated, in s. Default: 1, and 0.3 from 129 vertices a side.
         #[arg(long)]
         seconds: Option<f64>,
@@ -185,6 +189,11 @@ fn parameter(text: &str) -> Result<(String, f64), String> {
 
 fn cloth_named(name: &str) -> Result<Cloth, String> {
     Cloth::ALL.into_iter().find(|cloth| cloth.name() == name).ok_or_else(|| "it is soft or cotton".to_owned())
+}
+
+fn solver_named(name: &str) -> Result<LinearSolverChoice, String> {
+    let names = || LinearSolverChoice::ALL.map(LinearSolverChoice::name).join(", ");
+    LinearSolverChoice::ALL.into_iter().find(|solver| solver.name() == name).ok_or_else(names)
 }
 
 /// Prints findings as they are made; an error when one is missed.
@@ -287,9 +296,9 @@ fn obey(command: Command) -> Result<ExitCode> {
             progress.finish_and_clear();
             print(&format!("{}\n", bench_sleep::table(&ratios)))
         }
-        Command::Bench { sizes, cloth, threads, seconds, .. } => {
+        Command::Bench { sizes, cloth, threads, solver, seconds, .. } => {
             let cloths = if cloth.is_empty() { Cloth::ALL.to_vec() } else { cloth };
-            time(&cloths, &threads, &sizes, seconds)
+            time(&cloths, &threads, &solver, &sizes, seconds)
         }
     }
     .map(|()| ExitCode::SUCCESS)
@@ -317,15 +326,23 @@ fn on_threads(run: Run, threads: Option<u16>) -> Run {
 }
 
 /// Times the benchmark's scene and prints the table.
-fn time(cloths: &[Cloth], threads: &[u16], sizes: &[u16], seconds: Option<f64>) -> Result<()> {
+fn time(
+    cloths: &[Cloth],
+    threads: &[u16],
+    solvers: &[LinearSolverChoice],
+    sizes: &[u16],
+    seconds: Option<f64>,
+) -> Result<()> {
     let mut runs = Vec::new();
     for &cloth in cloths {
-        for &threads in threads {
+        for (&threads, &solver) in
+            threads.iter().flat_map(|threads| solvers.iter().map(move |solver| (threads, solver)))
+        {
             for &size in sizes {
                 let seconds = seconds.unwrap_or(if size < 129 { 1.0 } else { 0.3 });
                 let progress = progress_bar((seconds / 0.01).round() as u64);
                 let (cells, threads) = (usize::from(size) - 1, usize::from(threads));
-                runs.push(bench::measure(cloth, cells, threads, seconds, || progress.inc(1))?);
+                runs.push(bench::measure(cloth, cells, threads, solver, seconds, || progress.inc(1))?);
                 progress.finish_and_clear();
             }
         }

@@ -265,6 +265,7 @@ impl Simulation {
         })?;
         self.summary.steps = step;
         self.summary.solves += report.solves;
+        self.summary.solved_by += report.solved_by;
         self.summary.iterations += report.iterations;
         self.summary.projected += u64::from(report.projected);
         self.summary.rejected += report.rejected;
@@ -363,6 +364,7 @@ impl Simulation {
             islands: self.islands.iter().map(Island::save).collect(),
             ledger: self.ledger.clone(),
             solves: self.summary.solves,
+            solved_by: self.summary.solved_by,
             iterations: self.summary.iterations,
             projected: self.summary.projected,
             rejected: self.summary.rejected,
@@ -390,6 +392,7 @@ impl Simulation {
         self.ledger = saved.ledger;
         self.summary.steps = saved.steps;
         self.summary.solves = saved.solves;
+        self.summary.solved_by = saved.solved_by;
         self.summary.iterations = saved.iterations;
         self.summary.projected = saved.projected;
         self.summary.rejected = saved.rejected;

@@ -5,10 +5,11 @@ use std::fmt::Write as _;
 use comfy_table::{CellAlignment, Table, presets};
 use energy_solve::Tally;
 
+use crate::integrator::SolvedBy;
 use crate::summary::Summary;
 
 /// For each term its elements and, for values, gradients and Hessians, how many were evaluated and skipped (all their vertices are pinned); how many were
-/// flagged or had negative curvature changed, and how many Hessians were known already because they are constant. Then islands, asleep or not, and the
+/// flagged or had negative curvature changed, and how many Hessians were known already because they are constant. Then islands, asleep or not, what solved the linear systems, and the
 /// time of each phase, where the integrator tells.
 ///
 /// ```
@@ -23,6 +24,9 @@ use crate::summary::Summary;
 #[must_use]
 pub fn tables(summary: &Summary) -> String {
     let mut text = format!("{}\n\n{}\n", terms(summary), summary.sleep());
+    if summary.solved_by != SolvedBy::default() {
+        writeln!(text, "linear systems solved by {}", summary.solved_by).expect("writing to a string succeeds");
+    }
     if let Some(phases) = phases(summary) {
         write!(text, "\n{phases}\n").expect("writing to a string succeeds");
     }

@@ -5,7 +5,7 @@ use energy_dsl::Vector3;
 use energy_solve::{Counts, Tally};
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::Phases;
+use crate::integrator::{Phases, SolvedBy};
 
 /// What a simulation did, and where it ended. Its `Display` is a report for people.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -33,6 +33,9 @@ pub struct Summary {
     pub steps: u64,
     /// Linear systems solved.
     pub solves: u64,
+    /// Of those that are symmetric, by what.
+    #[serde(default)]
+    pub solved_by: SolvedBy,
     /// Iterations of the linear solver.
     pub iterations: u64,
     /// Steps solved again with projected curvature; see [`crate::integrator::ImplicitEuler`].
@@ -115,6 +118,9 @@ impl fmt::Display for Summary {
         if self.solves > 0 {
             let mean = self.iterations as f64 / self.solves as f64;
             writeln!(f, "{} linear solves, {} iterations ({mean:.1} each)", self.solves, self.iterations)?;
+            if self.solved_by != SolvedBy::default() {
+                writeln!(f, "by {}", self.solved_by)?;
+            }
             writeln!(f, "{} steps solved again with projected curvature", self.projected)?;
         }
         if self.rejected > 0 {

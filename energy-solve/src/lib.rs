@@ -10,9 +10,10 @@
 //!
 //! Pinned vertices are removed from the matrix, not penalised; elements with pinned vertices only are never evaluated. What
 //! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix, and
-//! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time.
+//! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time; [`Multigrid`] where sheets are so fine or so stiff that the
+//! iterations of both are many; [`BlockCholesky`] to all digits.
 //!
-//! Potentials are evaluated many elements at once, and by several threads ([`System::set_threads`], [`OverRelaxation::with_threads`]). Everything is
+//! Potentials are evaluated many elements at once, and by several threads ([`System::set_threads`], [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is
 //! deterministic: sums run in the order of terms and elements, whatever the number of threads.
 //!
 //! ```
@@ -35,6 +36,7 @@
 
 mod active;
 mod bicgstab;
+mod block_cholesky;
 mod block_jacobi;
 mod conjugate_gradients;
 mod constant;
@@ -42,12 +44,14 @@ mod counts;
 mod curvature;
 mod division;
 mod dofs;
+mod domains;
 mod force_term;
 mod gauss_newton;
 mod incomplete_cholesky;
 mod list;
 mod loss;
 mod matrix;
+mod multigrid;
 mod normal_matrix;
 mod normal_solver;
 mod over_relaxation;
@@ -59,6 +63,7 @@ mod preconditioner;
 mod residual_term;
 mod rounded_block;
 mod solve;
+mod sparse_factor;
 mod system;
 mod term;
 mod threads;
@@ -66,6 +71,7 @@ mod triangle_places;
 mod vector;
 
 pub use bicgstab::bicgstab;
+pub use block_cholesky::{BlockCholesky, CholeskyError};
 pub use block_jacobi::BlockJacobi;
 pub use conjugate_gradients::conjugate_gradients;
 pub use counts::{Counts, Tally};
@@ -77,6 +83,7 @@ pub use incomplete_cholesky::IncompleteCholesky;
 pub use list::{ElementList, ListError};
 pub use loss::Loss;
 pub use matrix::BlockMatrix;
+pub use multigrid::Multigrid;
 pub use normal_matrix::{CouplingError, Couplings, NormalMatrix, NormalPattern};
 pub use normal_solver::{NormalSolution, NormalSolver, NormalSolverKind, SolverError};
 pub use over_relaxation::OverRelaxation;

@@ -1,10 +1,5 @@
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
-use faer::{Conj, MatMut, Par, Side};
-
 use crate::normal_matrix::{NormalMatrix, NormalPattern};
+use crate::sparse_factor::SparseFactor;
 
 /// How (JᵀJ + μ 1) d = −Jᵀr is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,26 +85,13 @@ impl<const D: usize> NormalSolver<D> {
     }
 }
 
-/// A sparse Cholesky factor and all memory it needs.
-struct Factor {
-    /// The lower triangle by columns: an upper block's rows, turned.
-    structure: SymbolicSparseColMat<usize>,
-    symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
-    factor: Vec<f64>,
-    memory: MemBuffer,
-}
-
-impl std::fmt::Debug for Factor {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Factor").field("entries", &self.factor.len()).finish_non_exhaustive()
-    }
-}
+/// A sparse Cholesky factor of matrices of blocks.
+#[derive(Debug)]
+struct Factor(SparseFactor);
 
 impl Factor {
     fn new<const D: usize>(pattern: &NormalPattern) -> Result<Self, SolverError> {
         let unknowns = pattern.blocks() * D;
-        let failed = |_| SolverError::OutOfMemory { unknowns };
         let (mut columns, mut rows) = (vec![0], Vec::new());
         for row in 0..pattern.blocks() {
             for i in 0..D {
@@ -120,17 +102,8 @@ impl Factor {
                 columns.push(rows.len());
             }
         }
-        let structure = SymbolicSparseColMat::new_checked(unknowns, unknowns, columns, None, rows);
-        let (order, parameters) = (SymmetricOrdering::Amd, Default::default());
-        let symbolic =
-            factorize_symbolic_cholesky(structure.as_ref(), Side::Lower, order, parameters).map_err(failed)?;
-        let scratch = symbolic
-            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
-            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let memory = MemBuffer::try_new(scratch).map_err(|_| SolverError::OutOfMemory { unknowns })?;
-        let values = vec![0.0; structure.row_idx().len()];
-        let factor = vec![0.0; symbolic.len_val()];
-        Ok(Self { structure, symbolic, values, factor, memory })
+        // An upper block's rows are the lower triangle's columns.
+        SparseFactor::new(columns, rows, None).map(Self).map_err(|_| SolverError::OutOfMemory { unknowns })
     }
 
     fn solve<const D: usize>(
@@ -140,29 +113,15 @@ impl Factor {
         x: &mut [[f64; D]],
     ) -> Result<(), SolverError> {
         self.fill(matrix, damping);
-        let Self { structure, symbolic, values, factor, memory } = self;
-        let a = SparseColMatRef::new(structure.as_ref(), values.as_slice());
-        let regularisation = LltRegularization::default();
-        let stack = MemStack::new(memory);
-        let parameters = Default::default();
-        symbolic
-            .factorize_numeric_llt(factor, a, Side::Lower, regularisation, Par::Seq, stack, parameters)
-            .map_err(|_| SolverError::NotPositiveDefinite)?;
-        let numbers = x.as_flattened_mut();
-        let rows = numbers.len();
-        LltRef::new(symbolic, factor).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(numbers, rows, 1),
-            Par::Seq,
-            MemStack::new(memory),
-        );
+        self.0.factor().map_err(|_| SolverError::NotPositiveDefinite)?;
+        self.0.solve(x.as_flattened_mut());
         Ok(())
     }
 
     /// The values in the order of the structure, damped.
     fn fill<const D: usize>(&mut self, matrix: &NormalMatrix<D>, damping: f64) {
         let pattern = matrix.pattern();
-        let mut rest = self.values.as_mut_slice();
+        let mut rest = self.0.values_mut();
         for row in 0..pattern.blocks() {
             let blocks = &matrix.values[pattern.row_start(row)..][..pattern.row(row).len()];
             for i in 0..D {

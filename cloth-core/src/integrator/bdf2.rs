@@ -72,18 +72,24 @@ impl Integrator for Bdf2 {
                 }
                 start_from(body, &here, &from, &mut self.newton, 2.0 / 3.0 * dt)?
             }
-            _ => self.first.step(body, dt)?,
+            _ => {
+                self.first.restore(self.newton.memory());
+                let report = self.first.step(body, dt);
+                self.newton.restore(self.first.memory());
+                report?
+            }
         };
         self.history = Some(History { dt, before: here, after: Substep::of(body) });
         Ok(report)
     }
 
     fn memory(&self) -> IntegratorMemory {
-        IntegratorMemory { last_step: self.history.clone(), ..IntegratorMemory::default() }
+        IntegratorMemory { last_step: self.history.clone(), ..self.newton.memory() }
     }
 
     fn restore(&mut self, memory: IntegratorMemory) {
-        self.history = memory.last_step;
+        self.history = memory.last_step.clone();
+        self.newton.restore(memory);
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

@@ -4,8 +4,9 @@ use energy_solve::{
     StopReason, Weights, bicgstab,
 };
 
-use super::linear_solver::LinearSolver;
-use super::{Integrator, StepError, StepReport, advance};
+use super::linear_solver::{LinearSolver, LinearSolverChoice, SolvedBy};
+use super::trial::Trial;
+use super::{Integrator, IntegratorMemory, StepError, StepReport, advance};
 use crate::body::Body;
 
 /// Linearised implicit Euler (Baraff & Witkin 1998), one linear solve per step:
@@ -22,6 +23,8 @@ use crate::body::Body;
 #[derive(Clone, Debug, Default)]
 pub struct ImplicitEuler {
     options: Options,
+    linear_solver: LinearSolverChoice,
+    trial: Trial,
     memory: Option<Memory>,
 }
 
@@ -48,11 +51,17 @@ impl ImplicitEuler {
     /// With other tolerances for the linear systems.
     #[must_use]
     pub fn with_options(options: SolveOptions) -> Self {
-        Self { options: Options(options), memory: None }
+        Self { options: Options(options), ..Self::default() }
+    }
+
+    /// With a solver of the linear systems, where they are symmetric.
+    #[must_use]
+    pub fn solved_by(linear_solver: LinearSolverChoice) -> Self {
+        Self { linear_solver, ..Self::default() }
     }
 
     fn solve(
-        &self,
+        &mut self,
         body: &mut Body,
         dt: f64,
         curvature: Curvature,
@@ -68,16 +77,18 @@ impl ImplicitEuler {
         };
         let right: Vec<_> = body.system.dofs().free().iter().map(right).collect();
         let mut delta = vec![[0.0; 3]; right.len()];
-        let report = match solver {
-            None => bicgstab(matrix, &BlockJacobi::new(matrix)?, &right, &mut delta, &self.options.0),
-            Some(solver) => match solver.prepare(matrix) {
-                Ok(()) => solver.solve(matrix, &right, &mut delta, &self.options.0),
+        let options = &self.options.0;
+        let other = |report| (report, SolvedBy::default());
+        let (report, solved_by) = match solver {
+            None => other(bicgstab(matrix, &BlockJacobi::new(matrix)?, &right, &mut delta, options)),
+            Some(solver) => match solver.prepare(matrix, &self.trial) {
+                Ok(()) => solver.solve(matrix, &right, &mut delta, options, &mut self.trial),
                 // A block on the diagonal already proves what a direction would.
-                Err(_) if curvature == Curvature::Exact => SolveReport::indefinite(),
-                Err(singular) => return Err(singular.into()),
+                Err(_) if curvature == Curvature::Exact => other(SolveReport::indefinite()),
+                Err(error) => return Err(error),
             },
         };
-        Ok(Solution { delta, right, report })
+        Ok(Solution { delta, right, report, solved_by })
     }
 
     fn failure(&self, solution: &Solution, matrix: &BlockMatrix, free: &[usize]) -> StepError {
@@ -105,6 +116,7 @@ struct Solution {
     delta: Vec<Vector3<f64>>,
     right: Vec<Vector3<f64>>,
     report: SolveReport,
+    solved_by: SolvedBy,
 }
 
 impl Integrator for ImplicitEuler {
@@ -118,16 +130,18 @@ impl Integrator for ImplicitEuler {
             _ => {
                 let matrix = body.system.matrix();
                 let symmetric = body.system.character().symmetric;
-                let solver = symmetric.then(|| LinearSolver::new(&matrix, body.system.threads()));
+                let solver = symmetric.then(|| LinearSolver::new(self.linear_solver, &matrix, body.system.threads()));
                 Memory { matrix, solver }
             }
         };
         let mut solution = self.solve(body, dt, Curvature::Exact, &mut memory)?;
-        let mut step = StepReport { solves: 1, iterations: solution.report.iterations as u64, ..StepReport::default() };
+        let (iterations, solved_by) = (solution.report.iterations as u64, solution.solved_by);
+        let mut step = StepReport { solves: 1, iterations, solved_by, ..StepReport::default() };
         if solution.report.stopped == StopReason::IndefiniteCurvature {
             solution = self.solve(body, dt, Curvature::Clamped, &mut memory)?;
             step.solves += 1;
             step.iterations += solution.report.iterations as u64;
+            step.solved_by += solution.solved_by;
             step.projected = true;
         }
         let free = body.system.dofs().free();
@@ -141,6 +155,14 @@ impl Integrator for ImplicitEuler {
         self.memory = Some(memory);
         advance(body, &velocities, dt)?;
         Ok(step)
+    }
+
+    fn memory(&self) -> IntegratorMemory {
+        IntegratorMemory { trial: self.trial, ..IntegratorMemory::default() }
+    }
+
+    fn restore(&mut self, memory: IntegratorMemory) {
+        self.trial = memory.trial;
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

@@ -1,7 +1,7 @@
 use energy_solve::EvaluationError;
 
 use super::substep::{Substep, start_from};
-use super::{Integrator, Newton, NewtonOptions, StepError, StepReport};
+use super::{Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport};
 use crate::body::Body;
 
 /// The implicit midpoint rule: x' = x + h ½(v + v'), v' = v + h M⁻¹ f(½(x + x'), ½(v + v')). Second order; keeps momentum and
@@ -43,6 +43,14 @@ impl Integrator for ImplicitMidpoint {
             }
         }
         Ok(report)
+    }
+
+    fn memory(&self) -> IntegratorMemory {
+        self.newton.memory()
+    }
+
+    fn restore(&mut self, memory: IntegratorMemory) {
+        self.newton.restore(memory);
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

@@ -1,52 +1,219 @@
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, IncompleteCholesky, OverRelaxation, Precision, SingularBlock, SolveOptions, SolveReport,
+    BlockCholesky, BlockMatrix, IncompleteCholesky, Multigrid, OverRelaxation, Precision, SolveOptions, SolveReport,
     conjugate_gradients,
 };
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// What solves the symmetric systems of an integrator, chosen once for a pattern.
-#[derive(Clone, Debug)]
-pub(super) enum LinearSolver<T: Precision> {
-    /// Sheets: nothing to factor, little to read.
-    Relaxed(OverRelaxation<T>),
-    /// Strands of hair, and whatever else is eliminated vertex by vertex without new couplings: there the incomplete factorisation is
-    /// complete, and relaxation would carry news from one end to the other by a few vertices an iteration.
-    Factored(Box<IncompleteCholesky>),
+use super::StepError;
+use super::trial::Trial;
+
+/// What solves the symmetric linear systems of implicit integrators.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LinearSolverChoice {
+    /// Over-relaxation for sheets, or multigrid where that takes so many iterations that multigrid is faster; incomplete Cholesky for strands.
+    #[default]
+    Auto,
+    /// Conjugate gradients with symmetric over-relaxation.
+    OverRelaxation,
+    /// Conjugate gradients with multigrid.
+    Multigrid,
+    /// A sparse factorisation of every matrix.
+    Cholesky,
+    /// Conjugate gradients with an incomplete factorisation.
+    IncompleteCholesky,
+}
+
+impl LinearSolverChoice {
+    /// All.
+    pub const ALL: [Self; 5] =
+        [Self::Auto, Self::OverRelaxation, Self::Multigrid, Self::Cholesky, Self::IncompleteCholesky];
+
+    /// What it is called in scenes.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::OverRelaxation => "over-relaxation",
+            Self::Multigrid => "multigrid",
+            Self::Cholesky => "cholesky",
+            Self::IncompleteCholesky => "incomplete-cholesky",
+        }
+    }
+}
+
+/// How many linear systems were solved by what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SolvedBy {
+    /// [`OverRelaxation`].
+    pub over_relaxation: u64,
+    /// [`Multigrid`].
+    pub multigrid: u64,
+    /// [`BlockCholesky`].
+    pub cholesky: u64,
+    /// [`IncompleteCholesky`].
+    pub incomplete_cholesky: u64,
+    /// The most levels of multigrid, the finest among them.
+    pub levels: usize,
+    /// The blocks of all levels for one of the finest: the most.
+    pub complexity: f64,
+}
+
+impl std::ops::AddAssign for SolvedBy {
+    fn add_assign(&mut self, other: Self) {
+        self.over_relaxation += other.over_relaxation;
+        self.multigrid += other.multigrid;
+        self.cholesky += other.cholesky;
+        self.incomplete_cholesky += other.incomplete_cholesky;
+        self.levels = self.levels.max(other.levels);
+        self.complexity = self.complexity.max(other.complexity);
+    }
+}
+
+/// Such as `multigrid 97 (4 levels, complexity 1.08), over-relaxation 3`.
+impl std::fmt::Display for SolvedBy {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let named = [
+            ("multigrid", self.multigrid),
+            ("over-relaxation", self.over_relaxation),
+            ("Cholesky", self.cholesky),
+            ("incomplete Cholesky", self.incomplete_cholesky),
+        ];
+        let mut separator = "";
+        for (name, count) in named.into_iter().filter(|(_, count)| *count > 0) {
+            write!(f, "{separator}{name} {count}")?;
+            if name == "multigrid" {
+                write!(f, " ({} levels, complexity {:.2})", self.levels, self.complexity)?;
+            }
+            separator = ", ";
+        }
+        Ok(())
+    }
+}
+
+/// What solves the symmetric systems of an integrator. Each of the solvers is set up when it is first called for.
+#[derive(Debug)]
+pub(super) struct LinearSolver<T> {
+    choice: LinearSolverChoice,
+    threads: usize,
+    /// What the matrix was prepared for.
+    method: Method,
+    over_relaxation: Option<OverRelaxation<T>>,
+    multigrid: Option<Box<Multigrid<T>>>,
+    cholesky: Option<Box<BlockCholesky>>,
+    incomplete_cholesky: Option<Box<IncompleteCholesky>>,
+}
+
+/// Without what can be set up again.
+impl<T: Precision> Clone for LinearSolver<T> {
+    fn clone(&self) -> Self {
+        Self::of(self.choice, self.threads)
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    OverRelaxation,
+    Multigrid,
+    Cholesky,
+    IncompleteCholesky,
 }
 
 impl<T: Precision> LinearSolver<T> {
     /// For matrices of the pattern of this one, to be solved by at most so many threads.
-    pub(super) fn new(matrix: &BlockMatrix<impl Precision>, threads: usize) -> Self {
-        let pattern = matrix.pattern();
-        if pattern.fills_in() {
-            Self::Relaxed(OverRelaxation::with_threads(pattern, threads))
-        } else {
-            Self::Factored(Box::new(IncompleteCholesky::new(pattern)))
+    pub(super) fn new(choice: LinearSolverChoice, matrix: &BlockMatrix<impl Precision>, threads: usize) -> Self {
+        // Where elimination vertex by vertex makes no new couplings, the incomplete factorisation is complete, and relaxation would carry news from one
+        // end to the other by a few vertices an iteration.
+        let choice = match choice {
+            LinearSolverChoice::Auto if !matrix.pattern().fills_in() => LinearSolverChoice::IncompleteCholesky,
+            choice => choice,
+        };
+        Self::of(choice, threads)
+    }
+
+    fn of(choice: LinearSolverChoice, threads: usize) -> Self {
+        Self {
+            choice,
+            threads,
+            method: Method::OverRelaxation,
+            over_relaxation: None,
+            multigrid: None,
+            cholesky: None,
+            incomplete_cholesky: None,
         }
     }
 
     /// Takes over a matrix.
-    pub(super) fn prepare(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
-        match self {
-            Self::Relaxed(relaxed) => relaxed.scale(matrix),
-            Self::Factored(factor) => factor.factor(matrix),
+    pub(super) fn prepare(&mut self, matrix: &BlockMatrix<impl Precision>, trial: &Trial) -> Result<(), StepError> {
+        self.method = match self.choice {
+            LinearSolverChoice::Auto if trial.multigrid() => Method::Multigrid,
+            LinearSolverChoice::Auto | LinearSolverChoice::OverRelaxation => Method::OverRelaxation,
+            LinearSolverChoice::Multigrid => Method::Multigrid,
+            LinearSolverChoice::Cholesky => Method::Cholesky,
+            LinearSolverChoice::IncompleteCholesky => Method::IncompleteCholesky,
+        };
+        let (pattern, threads) = (matrix.pattern(), self.threads);
+        match self.method {
+            Method::OverRelaxation => {
+                let solver = self.over_relaxation.get_or_insert_with(|| OverRelaxation::with_threads(pattern, threads));
+                solver.scale(matrix)?;
+            }
+            Method::Multigrid => {
+                let solver = self.multigrid.get_or_insert_with(|| Multigrid::with_threads(pattern, threads).into());
+                solver.take_over(matrix)?;
+            }
+            Method::Cholesky => {
+                if self.cholesky.is_none() {
+                    self.cholesky = Some(Box::new(BlockCholesky::new(pattern)?));
+                }
+                self.cholesky.as_mut().expect("it was just made").factor(matrix)?;
+            }
+            Method::IncompleteCholesky => {
+                let solver = self.incomplete_cholesky.get_or_insert_with(|| IncompleteCholesky::new(pattern).into());
+                solver.factor(matrix)?;
+            }
         }
+        Ok(())
     }
 
-    /// Solves A x = b from x = 0, A the matrix that was prepared.
+    /// Solves A x = b from x = 0, A the matrix that was prepared, and notes what it took.
     pub(super) fn solve(
         &mut self,
         matrix: &BlockMatrix<impl Precision>,
         b: &[Vector3<f64>],
         x: &mut [Vector3<f64>],
         options: &SolveOptions,
-    ) -> SolveReport {
-        match self {
-            Self::Relaxed(relaxed) => relaxed.solve(b, x, options),
-            Self::Factored(factor) => {
-                x.fill([0.0; 3]);
-                conjugate_gradients(matrix, &**factor, b, x, options)
+        trial: &mut Trial,
+    ) -> (SolveReport, SolvedBy) {
+        let mut solved_by = SolvedBy::default();
+        let Self { over_relaxation, multigrid, cholesky, incomplete_cholesky, .. } = self;
+        let report = match (self.method, over_relaxation, multigrid, cholesky, incomplete_cholesky) {
+            (Method::OverRelaxation, Some(solver), ..) => {
+                solved_by.over_relaxation = 1;
+                solver.solve(b, x, options)
             }
+            (Method::Multigrid, _, Some(solver), ..) => {
+                let (levels, complexity) = (solver.levels(), solver.operator_complexity());
+                solved_by = SolvedBy { multigrid: 1, levels, complexity, ..solved_by };
+                solver.solve(b, x, options)
+            }
+            (Method::Cholesky, _, _, Some(solver), _) => {
+                solved_by.cholesky = 1;
+                solver.solve(b, x)
+            }
+            (Method::IncompleteCholesky, .., Some(solver)) => {
+                solved_by.incomplete_cholesky = 1;
+                x.fill([0.0; 3]);
+                conjugate_gradients(matrix, &**solver, b, x, options)
+            }
+            _ => unreachable!("a matrix was prepared"),
+        };
+        if self.choice == LinearSolverChoice::Auto && report.converged() {
+            trial.note(report.iterations, options.relative_tolerance);
         }
+        (report, solved_by)
     }
 }

@@ -11,6 +11,7 @@ mod stability;
 mod substep;
 mod symplectic_euler;
 mod trapezoid;
+mod trial;
 mod verlet;
 
 use schemars::JsonSchema;
@@ -23,6 +24,7 @@ pub use bdf2::Bdf2;
 pub use explicit_euler::ExplicitEuler;
 pub use implicit_euler::ImplicitEuler;
 pub use implicit_midpoint::ImplicitMidpoint;
+pub use linear_solver::{LinearSolverChoice, SolvedBy};
 pub use newton::{Newton, NewtonOptions, Phases};
 pub use symplectic_euler::SymplecticEuler;
 pub use trapezoid::Trapezoid;
@@ -66,13 +68,18 @@ pub struct IntegratorMemory {
     pub(crate) last_step: Option<bdf2::History>,
     /// Of [`Adaptive`]: halvings of the step, and successes since the last change.
     pub(crate) adaptive: [u32; 2],
+    /// Which linear solver is in use, and why.
+    #[serde(default)]
+    pub(crate) trial: trial::Trial,
 }
 
 /// What a step took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepReport {
     /// Linear systems solved.
     pub solves: u64,
+    /// And by what, if they were symmetric.
+    pub solved_by: SolvedBy,
     /// Iterations of the linear solver.
     pub iterations: u64,
     /// Whether exact curvature turned out to be negative, and was projected; see [`ImplicitEuler`].
@@ -88,6 +95,7 @@ pub struct StepReport {
 impl std::ops::AddAssign for StepReport {
     fn add_assign(&mut self, other: Self) {
         self.solves += other.solves;
+        self.solved_by += other.solved_by;
         self.iterations += other.iterations;
         self.projected |= other.projected;
         self.halvings += other.halvings;
@@ -105,6 +113,9 @@ pub enum StepError {
     /// A free vertex has neither mass nor stiffness.
     #[error(transparent)]
     Singular(#[from] energy_solve::SingularBlock),
+    /// A matrix could not be factored.
+    #[error(transparent)]
+    Factor(#[from] energy_solve::CholeskyError),
     /// The linear solver gave up.
     #[error(
         "the linear solver stopped after {iterations} iterations: {stopped}; \
@@ -232,15 +243,16 @@ impl Scheme {
     /// The integrator.
     #[must_use]
     pub fn integrator(self) -> Box<dyn Integrator> {
-        self.with_tolerances(Tolerances::default())
+        self.with_options(Tolerances::default(), LinearSolverChoice::Auto)
     }
 
-    /// The integrator with other tolerances, where it has some.
+    /// The integrator with other tolerances and another linear solver, where it has some.
     #[must_use]
-    pub fn with_tolerances(self, tolerances: Tolerances) -> Box<dyn Integrator> {
-        let (first, second) = (tolerances.of(NewtonOptions::default()), tolerances.of(second_order_tolerances()));
+    pub fn with_options(self, tolerances: Tolerances, linear_solver: LinearSolverChoice) -> Box<dyn Integrator> {
+        let of = |default: NewtonOptions| NewtonOptions { linear_solver, ..tolerances.of(default) };
+        let (first, second) = (of(NewtonOptions::default()), of(second_order_tolerances()));
         match self {
-            Self::ImplicitEuler => Box::new(ImplicitEuler::default()),
+            Self::ImplicitEuler => Box::new(ImplicitEuler::solved_by(linear_solver)),
             Self::Newton => Box::new(Newton::with_options(first)),
             Self::Bdf2 => Box::new(Bdf2::with_options(second)),
             Self::ImplicitMidpoint => Box::new(ImplicitMidpoint::with_options(second)),

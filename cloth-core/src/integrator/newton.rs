@@ -7,8 +7,9 @@ use energy_solve::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::linear_solver::LinearSolver;
-use super::{Integrator, StepError, StepReport, moved_by_velocities};
+use super::linear_solver::{LinearSolver, LinearSolverChoice};
+use super::trial::Trial;
+use super::{Integrator, IntegratorMemory, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
 /// Implicit Euler by Newton's method on the incremental potential (Gast, Schroeder, Stomakhin, Jiang and Teran 2015)
@@ -24,6 +25,7 @@ use crate::body::Body;
 #[derive(Clone, Debug, Default)]
 pub struct Newton {
     options: NewtonOptions,
+    trial: Trial,
     memory: Option<Memory>,
 }
 
@@ -38,12 +40,20 @@ pub struct NewtonOptions {
     pub iteration_limit: usize,
     /// Each linear system's residual relative to its right-hand side; up to ten times as much where Newton's method is slow anyway.
     pub linear_tolerance: f64,
+    /// What solves them.
+    pub linear_solver: LinearSolverChoice,
 }
 
 impl Default for NewtonOptions {
     /// 10⁻⁴ m/s, whatever the impulse; 100 iterations; linear systems to 0.01, which Newton's method makes up for.
     fn default() -> Self {
-        Self { velocity_tolerance: 1e-4, impulse_tolerance: 0.0, iteration_limit: 100, linear_tolerance: 0.01 }
+        Self {
+            velocity_tolerance: 1e-4,
+            impulse_tolerance: 0.0,
+            iteration_limit: 100,
+            linear_tolerance: 0.01,
+            linear_solver: LinearSolverChoice::Auto,
+        }
     }
 }
 
@@ -91,7 +101,7 @@ impl Newton {
     /// With other tolerances.
     #[must_use]
     pub fn with_options(options: NewtonOptions) -> Self {
-        Self { options, memory: None }
+        Self { options, ..Self::default() }
     }
 
     /// How exactly to solve for the next direction: as exactly as Newton's method, by its progress since the last, can make use of (Eisenstat and
@@ -221,11 +231,12 @@ impl Step<'_> {
         down: &[Vector3<f64>],
         curvature: Curvature,
         Memory { matrix, solver }: &mut Memory,
+        trial: &mut Trial,
         relative_tolerance: f64,
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
         let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
         let started = Instant::now();
-        let prepared = solver.prepare(matrix);
+        let prepared = solver.prepare(matrix, trial);
         self.report.phases.factorisation += started.elapsed();
 
         let started = Instant::now();
@@ -233,7 +244,9 @@ impl Step<'_> {
         let mut solved = SolveReport::indefinite();
         if curvature != Curvature::Exact || prepared.is_ok() {
             prepared?;
-            solved = solver.solve(matrix, down, &mut direction, &options);
+            let (report, solved_by) = solver.solve(matrix, down, &mut direction, &options, trial);
+            solved = report;
+            self.report.solved_by += solved_by;
         }
         if curvature != Curvature::Exact && !solved.converged() {
             // Single precision made the stiffest of matrices indefinite.
@@ -311,7 +324,7 @@ impl Integrator for Newton {
             Some(memory) if body.system.owns(&memory.matrix) => memory,
             _ => {
                 let matrix = body.system.matrix_in();
-                let solver = LinearSolver::new(&matrix, body.system.threads());
+                let solver = LinearSolver::new(self.options.linear_solver, &matrix, body.system.threads());
                 Memory { matrix, solver }
             }
         };
@@ -339,7 +352,8 @@ impl Integrator for Newton {
             let down = step.linearise(&x, curvature, &mut memory.matrix)?;
             let forcing = self.forcing(largest(&down), last);
             last = Some(forcing);
-            let (direction, solved) = step.direction(&x, &down, curvature, &mut memory, forcing.tolerance)?;
+            let (direction, solved) =
+                step.direction(&x, &down, curvature, &mut memory, &mut self.trial, forcing.tolerance)?;
             let indefinite = curvature == Curvature::Exact && !solved.converged();
             let Some((moved, lower, scale)) = step.line_search(&x, energy, &down, &direction)? else {
                 if curvature == Curvature::Exact {
@@ -359,6 +373,14 @@ impl Integrator for Newton {
         (body.x, body.v) = (x, v);
         self.memory = Some(memory);
         Ok(report)
+    }
+
+    fn memory(&self) -> IntegratorMemory {
+        IntegratorMemory { trial: self.trial, ..IntegratorMemory::default() }
+    }
+
+    fn restore(&mut self, memory: IntegratorMemory) {
+        self.trial = memory.trial;
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

@@ -1,7 +1,7 @@
 use energy_solve::{EvaluationError, State};
 
 use super::substep::{Substep, start_from};
-use super::{Integrator, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities};
+use super::{Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
 /// The trapezoidal rule, which is Newmark's method of average acceleration (β = ¼, γ = ½; Newmark 1959):
@@ -44,6 +44,14 @@ impl Integrator for Trapezoid {
             from.v[vertex] = std::array::from_fn(|axis| body.v[vertex][axis] + kick * force[vertex][axis]);
         }
         start_from(body, &before, &from, &mut self.newton, half)
+    }
+
+    fn memory(&self) -> IntegratorMemory {
+        self.newton.memory()
+    }
+
+    fn restore(&mut self, memory: IntegratorMemory) {
+        self.newton.restore(memory);
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

@@ -5,7 +5,7 @@ use super::garment::{Garment, Mesh, Placement};
 use super::numbers::{finite_triple, non_negative, positive};
 use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
 use crate::fabric::Fabric;
-use crate::integrator::{Scheme, Tolerances};
+use crate::integrator::{LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
 
 /// The version of scene files that this program reads.
@@ -55,6 +55,10 @@ pub(super) struct File {
     /// How exactly Newton's method solves a step, for the integrators that use it. Default each integrator's own.
     #[serde(default)]
     tolerances: Tolerances,
+    /// What solves the linear systems of implicit integrators, where they are symmetric: `auto` (the default), `over-relaxation`, `multigrid`, `cholesky`
+    /// or `incomplete-cholesky`.
+    #[serde(default)]
+    linear_solver: LinearSolverChoice,
     /// Whether a step that fails is tried again with half its size, and so on. Default false.
     #[serde(default)]
     adaptive: bool,
@@ -127,6 +131,7 @@ impl TryFrom<File> for Scene {
             drag: file.drag,
             integrator: file.integrator,
             tolerances: file.tolerances,
+            linear_solver: file.linear_solver,
             adaptive: file.adaptive,
             sleep: file.sleep,
             dt: file.dt,

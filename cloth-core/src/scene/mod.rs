@@ -33,7 +33,7 @@ pub use seam::{Seam, SeamError};
 pub use sleep::Sleep;
 
 use crate::fabric::Material;
-use crate::integrator::{Adaptive, Integrator, Scheme, Tolerances};
+use crate::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
 
 /// A scene.
@@ -60,6 +60,8 @@ pub struct Scene {
     pub integrator: Scheme,
     /// How exactly Newton's method solves a step.
     pub tolerances: Tolerances,
+    /// What solves its linear systems.
+    pub linear_solver: LinearSolverChoice,
     /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`].
     pub adaptive: bool,
     /// When what is still falls asleep; `None` for never.
@@ -111,7 +113,7 @@ impl Scene {
     /// The integrator.
     #[must_use]
     pub fn stepper(&self) -> Box<dyn Integrator> {
-        let scheme = self.integrator.with_tolerances(self.tolerances);
+        let scheme = self.integrator.with_options(self.tolerances, self.linear_solver);
         if self.adaptive { Box::new(Adaptive::new(scheme)) } else { scheme }
     }
 

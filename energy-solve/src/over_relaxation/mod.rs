@@ -1,27 +1,20 @@
-mod diagonal;
 mod domain;
-mod meeting;
 
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
-use self::diagonal::{Inverse, Inversion, scaled};
-use self::domain::{Domain, Wide};
-use self::meeting::{Meeting, Shared};
+use self::domain::Domain;
+use crate::domains::{InverseFactor, Meeting, Precision, Shared, Wide, divided, invert, ranges, scaled};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage};
-use crate::precision::Precision;
 use crate::preconditioner::SingularBlock;
 use crate::solve::{SolveOptions, SolveReport, StopReason};
 use crate::threads::{for_each, in_parts, split_mut};
 
 /// ω. From 1.4 to 1.8 the iterations on sheets of cloth, soft and stiff, fine and coarse, differ by a fifth.
 const RELAXATION: f64 = 1.6;
-
-/// Rows of a domain, about. A domain is what one thread at least relaxes on its own, so more of them cost iterations.
-const DOMAIN: usize = 8192;
 
 /// Conjugate gradients with the preconditioner of symmetric successive over-relaxation, at the price of conjugate gradients without:
 /// Eisenstat's method (SIAM J. Sci. Stat. Comput. 2, 1981).
@@ -47,7 +40,7 @@ pub struct OverRelaxation<T> {
     pattern: Arc<Pattern>,
     threads: usize,
     /// C⁻¹ of each row.
-    inverses: Vec<Inverse>,
+    inverses: Vec<InverseFactor>,
     domains: Vec<Domain<T>>,
     /// Of each domain t in the rows that others are coupled with.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
@@ -70,8 +63,9 @@ impl<T: Precision> OverRelaxation<T> {
     #[must_use]
     pub fn with_threads(pattern: &Arc<Pattern>, threads: usize) -> Self {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices are solved by conjugate gradients");
-        let domains = Domain::all(pattern, &ranges(pattern.rows()));
-        let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.border()]);
+        let domains = divided(pattern, &ranges(pattern.rows())).into_iter();
+        let domains: Vec<_> = domains.map(|(triangle, couplings)| Domain::new(triangle, couplings)).collect();
+        let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.couplings.border().len()]);
         let borders = domains.iter().map(border).collect();
         let inverses = vec![[[0.0; 4]; 3]; pattern.rows()];
         Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders }
@@ -87,7 +81,7 @@ impl<T: Precision> OverRelaxation<T> {
     pub fn scale(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { pattern, threads, inverses, domains, .. } = self;
-        let rows = || domains.iter().map(|domain| domain.rows.clone());
+        let rows = || domains.iter().map(|domain| domain.triangle.rows.clone());
         let parts = rows().zip(split_mut(inverses, rows().map(|rows| rows.len()))).collect();
         let inverted = for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix }));
         inverted.into_iter().collect::<Result<(), usize>>().map_err(|row| SingularBlock { row })?;
@@ -101,7 +95,7 @@ impl<T: Precision> OverRelaxation<T> {
     /// Solves A x = b from x = 0. Residuals are measured as √(rᵀ M⁻¹ r), M = (D/ω + L) (D/ω)⁻¹ (D/ω + Lᵀ).
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
         let Self { pattern, threads, inverses, domains, borders } = self;
-        let lengths: Vec<usize> = domains.iter().map(|domain| domain.rows.len()).collect();
+        let lengths: Vec<usize> = domains.iter().map(|domain| domain.triangle.rows.len()).collect();
         let sum = || Shared::new(lengths.len());
         let common = Common {
             pattern,
@@ -116,7 +110,7 @@ impl<T: Precision> OverRelaxation<T> {
         };
         let parts = domains.iter_mut().zip(split_mut(x, lengths.iter().copied())).enumerate();
         let parts = parts.map(|(number, (domain, x))| {
-            let rows = domain.rows.clone();
+            let rows = domain.triangle.rows.clone();
             Part { number, inverses: &inverses[rows.clone()], b: &b[rows], domain, x }
         });
         let solved = in_parts(*threads, parts.collect(), |parts| dispatch(Gradients { parts, common: &common }));
@@ -139,17 +133,27 @@ impl<T: Precision> Clone for OverRelaxation<T> {
     }
 }
 
-/// The rows of each domain.
-fn ranges(rows: usize) -> Vec<Range<usize>> {
-    let domains = (rows / DOMAIN).max(usize::from(rows > 0));
-    (0..domains).map(|domain| domain * rows / domains..(domain + 1) * rows / domains).collect()
+/// [`invert`].
+struct Inversion<'a, M> {
+    rows: Range<usize>,
+    inverses: &'a mut [InverseFactor],
+    matrix: &'a BlockMatrix<M>,
+}
+
+impl<M: Precision> Kernel for Inversion<'_, M> {
+    type Output = Result<(), usize>;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Self::Output {
+        invert::<M, L>(self.matrix, self.rows, RELAXATION, self.inverses)
+    }
 }
 
 /// [`Domain::scale`].
 struct Scaling<'a, T, M> {
     domain: &'a mut Domain<T>,
     pattern: &'a Pattern,
-    inverses: &'a [Inverse],
+    inverses: &'a [InverseFactor],
     matrix: &'a BlockMatrix<M>,
 }
 
@@ -180,7 +184,7 @@ struct Common<'a, T> {
 struct Part<'a, T> {
     number: usize,
     domain: &'a mut Domain<T>,
-    inverses: &'a [Inverse],
+    inverses: &'a [InverseFactor],
     b: &'a [Vector3<f64>],
     x: &'a mut [Vector3<f64>],
 }

@@ -7,7 +7,7 @@ const PATIENCE: u32 = 1 << 12;
 
 /// A barrier for waits of a few microseconds, in which no thread goes to sleep.
 #[derive(Debug)]
-pub(super) struct Meeting {
+pub(crate) struct Meeting {
     participants: usize,
     arrived: AtomicUsize,
     round: AtomicUsize,
@@ -15,12 +15,12 @@ pub(super) struct Meeting {
 
 impl Meeting {
     /// For so many threads.
-    pub(super) fn new(participants: usize) -> Self {
+    pub(crate) fn new(participants: usize) -> Self {
         Self { participants, arrived: AtomicUsize::new(0), round: AtomicUsize::new(0) }
     }
 
     /// Returns when all threads have called it. What they wrote before, all can read.
-    pub(super) fn wait(&self) {
+    pub(crate) fn wait(&self) {
         if self.participants == 1 {
             return;
         }
@@ -40,16 +40,16 @@ impl Meeting {
 
 /// One number of each domain. Written before a meeting, it can be read after it.
 #[derive(Debug)]
-pub(super) struct Shared(Vec<AtomicU64>);
+pub(crate) struct Shared(Vec<AtomicU64>);
 
 impl Shared {
     /// For so many domains.
-    pub(super) fn new(domains: usize) -> Self {
+    pub(crate) fn new(domains: usize) -> Self {
         Self((0..domains).map(|_| AtomicU64::new(0)).collect())
     }
 
     /// A domain's number.
-    pub(super) fn put(&self, domain: usize, number: f64) {
+    pub(crate) fn put(&self, domain: usize, number: f64) {
         self.0[domain].store(number.to_bits(), Ordering::Relaxed);
     }
 
@@ -58,12 +58,12 @@ impl Shared {
     }
 
     /// The sum, in the order of the domains, whoever wrote them.
-    pub(super) fn sum(&self) -> f64 {
+    pub(crate) fn sum(&self) -> f64 {
         self.numbers().sum()
     }
 
     /// The largest.
-    pub(super) fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         self.numbers().fold(0.0, f64::max)
     }
 }

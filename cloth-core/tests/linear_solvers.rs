@@ -1,0 +1,107 @@
+//! The choice of what solves the linear systems: the same motion, whichever it is, and from wherever it goes on.
+
+use std::path::Path;
+
+use cloth_core::Simulation;
+use cloth_core::scene::Scene;
+
+/// A stiff sheet that hangs by two corners.
+fn hanging(integrator: &str, solver: &str, cells: usize, stiffness: f64, tolerances: [f64; 2]) -> Simulation {
+    let [velocity, linear] = tolerances;
+    let text = format!(
+        r#"dt = 0.01
+duration = 1.0
+integrator = "{integrator}"
+linear_solver = "{solver}"
+tolerances = {{ velocity = {velocity:e}, linear = {linear:e} }}
+
+[mesh.sheet]
+cells = [{cells}, {cells}]
+size = [1.0, 1.0]
+[fabric]
+density = 0.15
+[fabric.material.neo-hookean]
+stretch_stiffness = {stiffness:e}
+poisson_ratio = 0.25
+bending.flat.stiffness = 1e-6
+
+[[pins]]
+nearest = [-0.5, 0.5, 0.0]
+[[pins]]
+nearest = [0.5, 0.5, 0.0]
+"#
+    );
+    Simulation::new(&Scene::parse(&text, Path::new("scene.toml")).unwrap()).unwrap()
+}
+
+#[test]
+fn all_solvers_lead_to_the_same_motion() {
+    for (integrator, solvers) in [
+        ("newton", &["auto", "over-relaxation", "multigrid", "cholesky", "incomplete-cholesky"][..]),
+        ("implicit-euler", &["auto", "multigrid", "cholesky"]),
+        ("bdf2", &["auto", "multigrid"]),
+        ("implicit-midpoint", &["auto", "multigrid"]),
+        ("trapezoid", &["auto", "multigrid"]),
+    ] {
+        let mut ends = Vec::new();
+        for solver in solvers {
+            let mut simulation = hanging(integrator, solver, 10, 3e3, [1e-5; 2]);
+            for _ in 0..5 {
+                simulation.step().unwrap();
+            }
+            let summary = simulation.summary().unwrap();
+            let by = summary.solved_by;
+            let all = by.over_relaxation + by.multigrid + by.cholesky + by.incomplete_cholesky;
+            let asked = match *solver {
+                "multigrid" => by.multigrid,
+                "cholesky" => by.cholesky,
+                "incomplete-cholesky" => by.incomplete_cholesky,
+                _ => by.over_relaxation,
+            };
+            assert!(asked == all && (integrator == "implicit-euler" || all == summary.solves), "{solver}: {by:?}");
+            ends.push(simulation.positions().to_vec());
+        }
+        for (end, solver) in ends.iter().zip(solvers) {
+            let apart = end.iter().flatten().zip(ends[0].iter().flatten()).map(|(a, b)| (a - b).abs());
+            let apart = apart.fold(0.0, f64::max);
+            assert!(apart < 2e-6, "{integrator} by {solver}: {apart:e} m");
+        }
+    }
+}
+
+#[test]
+fn what_was_found_out_about_solvers_is_saved() {
+    for integrator in ["newton", "bdf2", "implicit-euler"] {
+        let start = || hanging(integrator, "auto", 40, 3e4, [1e-3, 1e-2]);
+        let mut whole = start();
+        let mut half = None;
+        for step in 0..16 {
+            if step == 7 {
+                half = Some(whole.save());
+            }
+            whole.step().unwrap();
+        }
+        let theirs = whole.summary().unwrap();
+        let by = theirs.solved_by;
+        assert!(by.multigrid > 0 && by.over_relaxation > 0, "{integrator}: not both tried, {by}");
+        let text = serde_json::to_string(&half.unwrap()).unwrap();
+        let mut resumed = start();
+        resumed.restore(serde_json::from_str(&text).unwrap()).unwrap();
+        for _ in 7..16 {
+            resumed.step().unwrap();
+        }
+        assert!(resumed.positions() == whole.positions(), "{integrator}");
+        let mine = resumed.summary().unwrap();
+        assert_eq!(
+            (mine.solves, mine.iterations, mine.solved_by),
+            (theirs.solves, theirs.iterations, theirs.solved_by)
+        );
+    }
+}
+
+#[test]
+fn a_solver_that_there_is_not_is_refused() {
+    let text = "dt = 0.01\nduration = 1.0\nlinear_solver = \"gauss\"\n[mesh.sheet]\n";
+    let error = Scene::parse(text, Path::new("scene.toml")).unwrap_err().to_string();
+    assert!(error.contains("gauss") && error.contains("multigrid"), "{error}");
+}

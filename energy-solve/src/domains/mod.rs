@@ -1,0 +1,81 @@
+//! Domains of consecutive rows, into which the solvers of symmetric systems divide large matrices among threads: what each relaxes on its own, what
+//! couples it with others, and where they meet. The domains depend on the matrix alone, never on the number of threads.
+
+mod couplings;
+mod diagonal;
+mod meeting;
+mod triangle;
+
+use std::ops::Range;
+
+use energy_dsl::Level;
+
+use crate::pattern::Pattern;
+
+pub(crate) use self::couplings::Couplings;
+pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, scaled, unscaled};
+pub(crate) use self::meeting::{Meeting, Shared};
+pub(crate) use self::triangle::{SLACK, Triangle, rounded, scaled_block};
+pub(crate) use crate::precision::Precision;
+
+/// A vector of three in a register of four, with a last component that means nothing.
+pub(crate) type Wide<T> = [T; 4];
+
+/// Rows of a domain, about. A domain is what one thread at least relaxes on its own, so more of them cost iterations.
+const DOMAIN: usize = 8192;
+
+/// The rows of each domain.
+pub(crate) fn ranges(rows: usize) -> Vec<Range<usize>> {
+    let domains = (rows / DOMAIN).max(usize::from(rows > 0));
+    (0..domains).map(|domain| domain * rows / domains..(domain + 1) * rows / domains).collect()
+}
+
+/// Domains of these consecutive rows, which make up the pattern.
+pub(crate) fn divided<T: Precision>(pattern: &Pattern, ranges: &[Range<usize>]) -> Vec<(Triangle<T>, Couplings<T>)> {
+    let triangles: Vec<_> = ranges.iter().map(|rows| Triangle::new(pattern, rows.clone())).collect();
+    let couplings = Couplings::all(pattern, ranges, &triangles);
+    triangles.into_iter().zip(couplings).collect()
+}
+
+/// The sum of three partial sums, which do not wait for each other.
+#[inline(always)]
+pub(crate) fn total<T: Precision>(sums: &[Wide<T>; 3]) -> Wide<T> {
+    let mut total = sums[0];
+    for lane in 0..4 {
+        total[lane] = sums[0][lane] + (sums[1][lane] + sums[2][lane]);
+    }
+    total
+}
+
+/// Subtracts B v from the sum of three, B stored column by column (and followed by one more number).
+#[inline(always)]
+pub(crate) fn subtract_product<T: Precision, L: Level>(sums: &mut [Wide<T>; 3], block: &[T], v: &Wide<T>) {
+    for column in 0..3 {
+        let factor = -v[column];
+        for lane in 0..4 {
+            sums[column][lane] = block[3 * column + lane].mul_add::<L>(factor, sums[column][lane]);
+        }
+    }
+}
+
+/// The same. What is computed for nothing costs nothing, but without this compilers take registers apart that are not needed whole.
+#[inline(always)]
+pub(crate) fn whole<T>(registers: T) -> T {
+    std::hint::black_box(registers)
+}
+
+/// The sum of the first three of four sums.
+#[inline(always)]
+pub(crate) fn of_three(sums: [f64; 4]) -> f64 {
+    let [x, y, z, _] = whole(sums);
+    x + y + z
+}
+
+/// Adds products of components, in doubles.
+#[inline(always)]
+pub(crate) fn add_products<T: Precision>(sums: &mut [f64; 4], a: &Wide<T>, b: &Wide<T>) {
+    for lane in 0..4 {
+        let product: f64 = (a[lane] * b[lane]).into();
+        sums[lane] += product;
+    }
+}
