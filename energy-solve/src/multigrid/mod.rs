@@ -32,7 +32,7 @@ use crate::threads::{for_each, in_parts, split_mut};
 /// P carries translations: aggregates of vertices and their neighbours, as the pattern couples them, move as wholes, and each vertex by the mean of its own
 /// and its neighbours' aggregates (smoothed aggregation with the graph's averages instead of D⁻¹A). So P is a matter of the pattern alone, its
 /// blocks are multiples of the identity, and A_c, which follows A in every iteration of Newton's method, is a weighted sum of blocks. To carry
-/// rotations too, and to smooth with D⁻¹A, saves no iterations on sheets of cloth, but multiplies the price of A_c.
+/// rotations too, and to smooth with D⁻¹A, saves one or two iterations on sheets of cloth, but multiplies the price of A_c.
 ///
 /// Residuals are measured as √(rᵀ M⁻¹ r), M = (D̂ + L) D̂⁻¹ (D̂ + Lᵀ), the norm of over-relaxation, and may be twice as large in it: as they are rough
 /// then, where those left by over-relaxation are smooth, the same tolerance means the same error of the solution, in the norm √(eᵀ A e).
