@@ -94,32 +94,28 @@ impl std::fmt::Display for SolvedBy {
     }
 }
 
-/// What solves the symmetric systems of an integrator. Each of the solvers is set up when it is first called for.
+/// What solves the symmetric systems of an integrator.
 #[derive(Debug)]
 pub(super) struct LinearSolver<T> {
     choice: LinearSolverChoice,
     threads: usize,
-    /// What the matrix was prepared for.
-    method: Method,
-    over_relaxation: Option<OverRelaxation<T>>,
-    multigrid: Option<Box<Multigrid<T>>>,
-    cholesky: Option<Box<BlockCholesky>>,
-    incomplete_cholesky: Option<Box<IncompleteCholesky>>,
+    /// What the matrix was prepared for; others are set up again when they are called for, rather than kept.
+    solver: Option<Solver<T>>,
+}
+
+#[derive(Debug)]
+enum Solver<T> {
+    OverRelaxation(Box<OverRelaxation<T>>),
+    Multigrid(Box<Multigrid<T>>),
+    Cholesky(Box<BlockCholesky>),
+    IncompleteCholesky(Box<IncompleteCholesky>),
 }
 
 /// Without what can be set up again.
 impl<T: Precision> Clone for LinearSolver<T> {
     fn clone(&self) -> Self {
-        Self::of(self.choice, self.threads)
+        Self { choice: self.choice, threads: self.threads, solver: None }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Method {
-    OverRelaxation,
-    Multigrid,
-    Cholesky,
-    IncompleteCholesky,
 }
 
 impl<T: Precision> LinearSolver<T> {
@@ -131,50 +127,36 @@ impl<T: Precision> LinearSolver<T> {
             LinearSolverChoice::Auto if !matrix.pattern().fills_in() => LinearSolverChoice::IncompleteCholesky,
             choice => choice,
         };
-        Self::of(choice, threads)
-    }
-
-    fn of(choice: LinearSolverChoice, threads: usize) -> Self {
-        Self {
-            choice,
-            threads,
-            method: Method::OverRelaxation,
-            over_relaxation: None,
-            multigrid: None,
-            cholesky: None,
-            incomplete_cholesky: None,
-        }
+        Self { choice, threads, solver: None }
     }
 
     /// Takes over a matrix.
     pub(super) fn prepare(&mut self, matrix: &BlockMatrix<impl Precision>, trial: &Trial) -> Result<(), StepError> {
-        self.method = match self.choice {
-            LinearSolverChoice::Auto if trial.multigrid() => Method::Multigrid,
-            LinearSolverChoice::Auto | LinearSolverChoice::OverRelaxation => Method::OverRelaxation,
-            LinearSolverChoice::Multigrid => Method::Multigrid,
-            LinearSolverChoice::Cholesky => Method::Cholesky,
-            LinearSolverChoice::IncompleteCholesky => Method::IncompleteCholesky,
-        };
         let (pattern, threads) = (matrix.pattern(), self.threads);
-        match self.method {
-            Method::OverRelaxation => {
-                let solver = self.over_relaxation.get_or_insert_with(|| OverRelaxation::with_threads(pattern, threads));
-                solver.scale(matrix)?;
+        let wanted = match self.choice {
+            LinearSolverChoice::Auto if trial.multigrid() => LinearSolverChoice::Multigrid,
+            LinearSolverChoice::Auto => LinearSolverChoice::OverRelaxation,
+            choice => choice,
+        };
+        let solver = match (self.solver.take(), wanted) {
+            (Some(Solver::Multigrid(known)), LinearSolverChoice::Multigrid) => Solver::Multigrid(known),
+            (_, LinearSolverChoice::Multigrid) => Solver::Multigrid(Multigrid::with_threads(pattern, threads).into()),
+            (Some(Solver::Cholesky(known)), LinearSolverChoice::Cholesky) => Solver::Cholesky(known),
+            (_, LinearSolverChoice::Cholesky) => Solver::Cholesky(BlockCholesky::new(pattern)?.into()),
+            (Some(Solver::IncompleteCholesky(known)), LinearSolverChoice::IncompleteCholesky) => {
+                Solver::IncompleteCholesky(known)
             }
-            Method::Multigrid => {
-                let solver = self.multigrid.get_or_insert_with(|| Multigrid::with_threads(pattern, threads).into());
-                solver.take_over(matrix)?;
+            (_, LinearSolverChoice::IncompleteCholesky) => {
+                Solver::IncompleteCholesky(IncompleteCholesky::new(pattern).into())
             }
-            Method::Cholesky => {
-                if self.cholesky.is_none() {
-                    self.cholesky = Some(Box::new(BlockCholesky::new(pattern)?));
-                }
-                self.cholesky.as_mut().expect("it was just made").factor(matrix)?;
-            }
-            Method::IncompleteCholesky => {
-                let solver = self.incomplete_cholesky.get_or_insert_with(|| IncompleteCholesky::new(pattern).into());
-                solver.factor(matrix)?;
-            }
+            (Some(Solver::OverRelaxation(known)), _) => Solver::OverRelaxation(known),
+            (_, _) => Solver::OverRelaxation(OverRelaxation::with_threads(pattern, threads).into()),
+        };
+        match self.solver.insert(solver) {
+            Solver::OverRelaxation(solver) => solver.scale(matrix)?,
+            Solver::Multigrid(solver) => solver.take_over(matrix)?,
+            Solver::Cholesky(solver) => solver.factor(matrix)?,
+            Solver::IncompleteCholesky(solver) => solver.factor(matrix)?,
         }
         Ok(())
     }
@@ -189,27 +171,25 @@ impl<T: Precision> LinearSolver<T> {
         trial: &mut Trial,
     ) -> (SolveReport, SolvedBy) {
         let mut solved_by = SolvedBy::default();
-        let Self { over_relaxation, multigrid, cholesky, incomplete_cholesky, .. } = self;
-        let report = match (self.method, over_relaxation, multigrid, cholesky, incomplete_cholesky) {
-            (Method::OverRelaxation, Some(solver), ..) => {
+        let report = match self.solver.as_mut().expect("a matrix was prepared") {
+            Solver::OverRelaxation(solver) => {
                 solved_by.over_relaxation = 1;
                 solver.solve(b, x, options)
             }
-            (Method::Multigrid, _, Some(solver), ..) => {
+            Solver::Multigrid(solver) => {
                 let (levels, complexity) = (solver.levels(), solver.operator_complexity());
                 solved_by = SolvedBy { multigrid: 1, levels, complexity, ..solved_by };
                 solver.solve(b, x, options)
             }
-            (Method::Cholesky, _, _, Some(solver), _) => {
+            Solver::Cholesky(solver) => {
                 solved_by.cholesky = 1;
                 solver.solve(b, x)
             }
-            (Method::IncompleteCholesky, .., Some(solver)) => {
+            Solver::IncompleteCholesky(solver) => {
                 solved_by.incomplete_cholesky = 1;
                 x.fill([0.0; 3]);
                 conjugate_gradients(matrix, &**solver, b, x, options)
             }
-            _ => unreachable!("a matrix was prepared"),
         };
         if self.choice == LinearSolverChoice::Auto && report.converged() {
             trial.note(report.iterations, options.relative_tolerance);

@@ -140,8 +140,6 @@ type Found = (Vec<Vector3<f64>>, (f64, f64), f64);
 struct Step<'a> {
     body: &'a mut Body,
     dt: f64,
-    free: Vec<usize>,
-    start: Vec<Vector3<f64>>,
     /// x̂.
     inertial: Vec<Vector3<f64>>,
     report: StepReport,
@@ -153,14 +151,14 @@ impl Step<'_> {
         let velocity = |(x, start): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
             std::array::from_fn(|axis| (x[axis] - start[axis]) / self.dt)
         };
-        x.iter().zip(&self.start).map(velocity).collect()
+        x.iter().zip(&self.body.x).map(velocity).collect()
     }
 
     /// E and the size of the numbers it is made of; infinite where an element's energy is.
     fn energy(&mut self, x: &[Vector3<f64>]) -> Result<(f64, f64), EvaluationError> {
         let started = Instant::now();
         let (mut sum, mut size) = (0.0, 0.0);
-        for &vertex in &self.free {
+        for &vertex in self.body.system.dofs().free() {
             let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - self.inertial[vertex][axis]);
             sum += 0.5 * self.body.masses[vertex] * away.iter().map(|component| component * component).sum::<f64>();
         }
@@ -221,7 +219,7 @@ impl Step<'_> {
                 self.body.masses[vertex] * (away[axis] - x[vertex][axis]) + self.dt * self.dt * force[axis]
             })
         };
-        self.free.iter().map(down).collect()
+        self.body.system.dofs().free().iter().map(down).collect()
     }
 
     /// Solves for the direction. Of a matrix whose curvature is exact and turns out to be negative, as far as that goes: it leads downhill, or is zero.
@@ -294,7 +292,7 @@ impl Step<'_> {
     /// x + s d on the free vertices.
     fn moved(&self, x: &[Vector3<f64>], scale: f64, direction: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut moved = x.to_vec();
-        for (&vertex, d) in self.free.iter().zip(direction) {
+        for (&vertex, d) in self.body.system.dofs().free().iter().zip(direction) {
             for axis in 0..3 {
                 moved[vertex][axis] += scale * d[axis];
             }
@@ -328,15 +326,13 @@ impl Integrator for Newton {
                 Memory { matrix, solver }
             }
         };
-        let free = body.system.dofs().free().to_vec();
-        let start = body.x.clone();
         // Pinned vertices end there: they move as they are told.
         let inertial = moved_by_velocities(body, dt);
-        let mut step = Step { body, dt, free, start, inertial, report: StepReport::default() };
+        let mut step = Step { body, dt, inertial, report: StepReport::default() };
         let mut x = step.inertial.clone();
         let mut energy = step.energy(&x)?;
         if !energy.0.is_finite() {
-            step.free.iter().for_each(|&vertex| x[vertex] = step.start[vertex]);
+            step.body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = step.body.x[vertex]);
             energy = step.energy(&x)?;
         }
         let (mut converged, mut change) = (false, f64::INFINITY);

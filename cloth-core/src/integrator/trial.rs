@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize};
 #[serde(default)]
 pub(crate) struct Trial {
     multigrid: bool,
-    /// The solutions of this round, and their iterations.
+    /// The solutions of this round, their iterations, and the decimal digits that they were solved to, in thousandths.
     count: u32,
     iterations: u32,
+    digits: u32,
     /// Rounds since the last change.
     rounds: u32,
-    /// The iterations of the last round of each; of multigrid, 0 if that is long ago.
+    /// Iterations a digit, in thousandths: of over-relaxation in its last round; of multigrid, recent rounds counting more, 0 if that is long ago.
     relaxations: u32,
     cycles: u32,
 }
@@ -28,9 +29,9 @@ const TAKE_OVER: f64 = 6.0;
 /// What an iteration of multigrid costs: in iterations of over-relaxation, which reads the blocks above the diagonal half as often, has no coarse levels,
 /// and fewer vectors.
 const CYCLE: f64 = 3.6;
-/// Iterations of multigrid for each decimal digit, on real cotton.
-const A_DIGIT: f64 = 4.0;
-/// By how much multigrid must be cheaper.
+/// Iterations of multigrid for each decimal digit, on real cotton, in thousandths.
+const A_DIGIT: u32 = 4000;
+/// By how much one must be cheaper than the other to replace it.
 const MARGIN: f64 = 1.2;
 
 impl Trial {
@@ -43,25 +44,26 @@ impl Trial {
     pub(super) fn note(&mut self, iterations: usize, relative_tolerance: f64) {
         self.count += 1;
         self.iterations += iterations as u32;
+        self.digits += (-1000.0 * relative_tolerance.log10()).max(1.0) as u32;
         if self.count < ROUND {
             return;
         }
-        let found = std::mem::take(&mut self.iterations);
-        (self.count, self.rounds) = (0, self.rounds + 1);
+        let digits = f64::from(self.digits) / f64::from(1000 * ROUND);
+        let found = (f64::from(self.iterations) / f64::from(ROUND) / digits * 1000.0) as u32;
+        (self.count, self.iterations, self.digits, self.rounds) = (0, 0, 0, self.rounds + 1);
         let was = self.multigrid;
         if self.multigrid {
-            self.cycles = found;
-            self.multigrid = cost(found.into()) <= self.relaxations.into() && self.rounds < PATIENCE;
+            // A few systems that are nearly indefinite take long with either.
+            self.cycles = if self.cycles == 0 { found } else { (self.cycles + found) / 2 };
+            let served = cycling(self.cycles, digits) <= MARGIN * relaxing(self.relaxations, digits);
+            self.multigrid = served && self.rounds < PATIENCE;
         } else {
             self.relaxations = found;
             if self.rounds >= PATIENCE {
                 (self.cycles, self.rounds) = (0, 0);
             }
-            let expected = match self.cycles {
-                0 => f64::from(ROUND) * A_DIGIT * -relative_tolerance.log10(),
-                cycles => cycles.into(),
-            };
-            self.multigrid = f64::from(found) > MARGIN * cost(expected);
+            let expected = if self.cycles == 0 { A_DIGIT } else { self.cycles };
+            self.multigrid = relaxing(found, digits) > MARGIN * cycling(expected, digits);
         }
         if was != self.multigrid {
             self.rounds = 0;
@@ -69,9 +71,14 @@ impl Trial {
     }
 }
 
-/// What a round of multigrid costs, in iterations of over-relaxation.
-fn cost(cycles: f64) -> f64 {
-    f64::from(ROUND) * TAKE_OVER + CYCLE * cycles
+/// What a solution by over-relaxation costs, in its iterations.
+fn relaxing(a_digit: u32, digits: f64) -> f64 {
+    1e-3 * f64::from(a_digit) * digits
+}
+
+/// What one by multigrid costs, in iterations of over-relaxation.
+fn cycling(a_digit: u32, digits: f64) -> f64 {
+    TAKE_OVER + CYCLE * 1e-3 * f64::from(a_digit) * digits
 }
 
 #[cfg(test)]
@@ -107,6 +114,18 @@ mod tests {
         let mut trial = Trial::default();
         let by_multigrid = after(&mut trial, 1000, |multigrid| if multigrid { 30 } else { 50 });
         assert!((3..60).contains(&by_multigrid), "{by_multigrid}");
+    }
+
+    #[test]
+    fn how_many_digits_are_asked_for_does_not_matter() {
+        let mut trial = Trial::default();
+        let mut by_multigrid = 0;
+        for solution in 0..300 {
+            let digits = if solution % 7 < 3 { 1 } else { 2 };
+            by_multigrid += usize::from(trial.multigrid());
+            trial.note(digits * if trial.multigrid() { 5 } else { 40 }, 0.1_f64.powi(digits as i32));
+        }
+        assert!(by_multigrid > 280, "{by_multigrid}");
     }
 
     #[test]

@@ -3,8 +3,8 @@ use std::sync::RwLock;
 
 use energy_dsl::{Level, Vector3};
 
-use super::triangle::{Triangle, rounded, scaled_block};
-use super::{InverseFactor, Precision, Wide};
+use super::triangle::{Triangle, scaled_block};
+use super::{InverseFactor, Precision, Wide, rounded};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, index};
 use crate::precision::doubled;
@@ -78,7 +78,7 @@ impl<T: Precision> Couplings<T> {
 
     /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
     #[inline(always)]
-    pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor], matrix: &BlockMatrix<M>) {
+    pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
         for coupling in &mut self.couplings {
             let [row, column] = coupling.between.map(|row| rounded(&inverses[row as usize]));
             let block = scaled_block::<M, L>(&row, &matrix.values()[coupling.place as usize], &column);

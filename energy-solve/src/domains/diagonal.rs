@@ -7,24 +7,36 @@ use crate::matrix::BlockMatrix;
 use crate::precision::{Precision, doubled};
 
 /// C⁻¹ column by column, each with a fourth component that is zero; C Cᵀ is a block on the diagonal, or a part of it, and C lower triangular.
-pub(crate) type InverseFactor = [Wide<f64>; 3];
+pub(crate) type InverseFactor<T> = [Wide<T>; 3];
+
+/// In another precision.
+#[inline(always)]
+pub(crate) fn rounded<T: Precision, M: Precision>(inverse: &InverseFactor<T>) -> [Wide<M>; 3] {
+    let mut rounded = [[M::from_f64(0.0); 4]; 3];
+    for column in 0..3 {
+        for lane in 0..4 {
+            rounded[column][lane] = M::from_f64(inverse[column][lane].into());
+        }
+    }
+    rounded
+}
 
 /// C⁻¹ b.
 #[inline(always)]
-pub(crate) fn scaled(inverse: &InverseFactor, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
-    let [[a, d, f, _], [_, e, g, _], [_, _, h, _]] = inverse;
+pub(crate) fn scaled<T: Precision>(inverse: &InverseFactor<T>, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
+    let [[a, d, f, _], [_, e, g, _], [_, _, h, _]] = rounded::<T, f64>(inverse);
     [a * u, d * u + e * v, f * u + g * v + h * w]
 }
 
 /// C⁻ᵀ x.
 #[inline(always)]
-pub(crate) fn unscaled(inverse: &InverseFactor, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
-    let [[a, b, d, _], [_, c, e, _], [_, _, f, _]] = inverse;
+pub(crate) fn unscaled<T: Precision>(inverse: &InverseFactor<T>, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
+    let [[a, b, d, _], [_, c, e, _], [_, _, f, _]] = rounded::<T, f64>(inverse);
     [a * u + b * v + d * w, c * v + e * w, f * w]
 }
 
 /// C⁻¹ of one block C Cᵀ; `None` where it is not positive definite.
-pub(crate) fn inverse_factor([[a, ..], [b, c, _], [d, e, f]]: &Block<f64>) -> Option<InverseFactor> {
+pub(crate) fn inverse_factor([[a, ..], [b, c, _], [d, e, f]]: &Block<f64>) -> Option<InverseFactor<f64>> {
     let (inverse, definite) = inverse_factors([*a, *b, *c, *d, *e, *f], 1.0);
     definite.then(|| by_columns(inverse))
 }
@@ -34,11 +46,11 @@ const LANES: usize = 16;
 
 /// C⁻¹ of some rows, C Cᵀ = D/ω. Fails with a row whose diagonal block is not positive definite.
 #[inline(always)]
-pub(crate) fn invert<M: Precision, L: Level>(
+pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
     matrix: &BlockMatrix<M>,
     rows: Range<usize>,
     relaxation: f64,
-    inverses: &mut [InverseFactor],
+    inverses: &mut [InverseFactor<T>],
 ) -> Result<(), usize> {
     let lanes = <L::F64 as Lane<f64>>::LANES;
     for (row, inverses) in rows.step_by(lanes).zip(inverses.chunks_mut(lanes)) {
@@ -70,8 +82,9 @@ pub(crate) fn invert<M: Precision, L: Level>(
 
 /// Of the rows of its lower triangle.
 #[inline(always)]
-fn by_columns([a, b, c, d, e, f]: [f64; 6]) -> InverseFactor {
-    [[a, b, d, 0.0], [0.0, c, e, 0.0], [0.0, 0.0, f, 0.0]]
+fn by_columns<T: Precision>(rows: [f64; 6]) -> InverseFactor<T> {
+    let ([a, b, c, d, e, f], zero) = (rows.map(T::from_f64), T::from_f64(0.0));
+    [[a, b, d, zero], [zero, c, e, zero], [zero, zero, f, zero]]
 }
 
 /// C⁻¹ with C Cᵀ = D/ω, D and C⁻¹ by the rows of their lower triangles, and where D is positive definite. C has the diagonal 1/x, 1/y, 1/z, and p, q, r below it.
@@ -108,13 +121,13 @@ mod tests {
 
     const RELAXATION: f64 = 1.6;
 
-    struct Inversion<'a>(&'a BlockMatrix<f64>, &'a mut [InverseFactor]);
+    struct Inversion<'a>(&'a BlockMatrix<f64>, &'a mut [InverseFactor<f64>]);
 
     impl Kernel for Inversion<'_> {
         type Output = Result<(), usize>;
 
         fn run<L: Level>(self) -> Self::Output {
-            invert::<f64, L>(self.0, 0..11, RELAXATION, self.1)
+            invert::<f64, f64, L>(self.0, 0..11, RELAXATION, self.1)
         }
     }
     /// 11 rows: full registers and some left over.
@@ -127,7 +140,7 @@ mod tests {
         matrix
     }
 
-    fn inverted(matrix: &BlockMatrix<f64>) -> Result<Vec<InverseFactor>, usize> {
+    fn inverted(matrix: &BlockMatrix<f64>) -> Result<Vec<InverseFactor<f64>>, usize> {
         let mut inverses = vec![[[0.0; 4]; 3]; 11];
         dispatch(Inversion(matrix, &mut inverses))?;
         Ok(inverses)

@@ -13,9 +13,9 @@ use energy_dsl::Level;
 use crate::pattern::Pattern;
 
 pub(crate) use self::couplings::Couplings;
-pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, scaled, unscaled};
+pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
 pub(crate) use self::meeting::{Meeting, Shared};
-pub(crate) use self::triangle::{SLACK, Triangle, rounded, scaled_block};
+pub(crate) use self::triangle::{SLACK, Triangle, scaled_block};
 pub(crate) use crate::precision::Precision;
 
 /// A vector of three in a register of four, with a last component that means nothing.

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use energy_dsl::{Block, Level};
 
-use super::{InverseFactor, Precision, Wide, whole};
+use super::{InverseFactor, Precision, Wide, rounded, whole};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, index};
 
@@ -61,7 +61,7 @@ impl<T: Precision> Triangle<T> {
     pub(crate) fn scale<M: Precision, L: Level>(
         &mut self,
         pattern: &Pattern,
-        inverses: &[InverseFactor],
+        inverses: &[InverseFactor<T>],
         matrix: &BlockMatrix<M>,
     ) {
         let values = matrix.values();
@@ -77,18 +77,6 @@ impl<T: Precision> Triangle<T> {
             }
         }
     }
-}
-
-/// In the precision of a matrix.
-#[inline(always)]
-pub(crate) fn rounded<M: Precision>(inverse: &InverseFactor) -> [Wide<M>; 3] {
-    let mut rounded = [[M::from_f64(0.0); 4]; 3];
-    for column in 0..3 {
-        for lane in 0..4 {
-            rounded[column][lane] = M::from_f64(inverse[column][lane]);
-        }
-    }
-    rounded
 }
 
 /// The rows of P B Qᵀ, for lower triangular P and Q given by columns: rows of B Qᵀ are sums of columns of Q, and those of the product sums of these.

@@ -39,7 +39,7 @@ enum Inverse<T> {
 #[derive(Clone, Debug)]
 struct Relaxed<T> {
     smoother: Smoother<T>,
-    inverses: Vec<InverseFactor>,
+    inverses: Vec<InverseFactor<T>>,
     unit: f64,
     residual: Vec<Wide<T>>,
     smoothed: Vec<Wide<T>>,
@@ -114,7 +114,7 @@ impl<T: Precision> Relaxed<T> {
         let zeros = vec![[T::from_f64(0.0); 4]; pattern.rows()];
         Self {
             smoother: Smoother::new(triangle, couplings),
-            inverses: vec![[[0.0; 4]; 3]; pattern.rows()],
+            inverses: vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()],
             unit: 1.0,
             residual: zeros.clone(),
             smoothed: zeros.clone(),

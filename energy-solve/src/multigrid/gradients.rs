@@ -126,7 +126,7 @@ impl<'a, T: Precision> Common<'a, T> {
 pub(super) struct Part<'a, T> {
     pub(super) number: usize,
     pub(super) vectors: &'a mut Vectors<T>,
-    pub(super) inverses: &'a [InverseFactor],
+    pub(super) inverses: &'a [InverseFactor<T>],
     pub(super) b: &'a [Vector3<f64>],
     pub(super) x: &'a mut [Vector3<f64>],
 }
@@ -196,7 +196,7 @@ pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, com
 
 /// The largest component of C⁻¹ b, or 1 if all are zero: divided by it, numbers are of the order of one whatever the unit. Single precision has less
 /// range than doubles.
-fn scale<T>(parts: &[Part<'_, T>], common: &Common<'_, T>) -> f64 {
+fn scale<T: Precision>(parts: &[Part<'_, T>], common: &Common<'_, T>) -> f64 {
     for Part { number, inverses, b, .. } in parts {
         let (mut largest, mut sum) = (0.0_f64, 0.0);
         for row in 0..b.len() {

@@ -74,7 +74,7 @@ pub struct Multigrid<T> {
     pattern: Arc<Pattern>,
     threads: usize,
     /// C⁻¹ of each row.
-    inverses: Vec<InverseFactor>,
+    inverses: Vec<InverseFactor<T>>,
     smoothers: Vec<Smoother<T>>,
     vectors: Vec<Vectors<T>>,
     coarse: Option<Coarse<T>>,
@@ -105,7 +105,7 @@ impl<T: Precision> Multigrid<T> {
         Self {
             pattern: Arc::clone(pattern),
             threads,
-            inverses: vec![[[0.0; 4]; 3]; pattern.rows()],
+            inverses: vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()],
             smoothers: smoothers.collect(),
             vectors: ranges.iter().map(|rows| Vectors::new(rows.len())).collect(),
             coarse: Coarse::below(pattern, &ranges),
@@ -175,7 +175,7 @@ impl<T: Precision> Multigrid<T> {
 /// [`Smoother::invert`].
 struct Inversion<'a, T, M> {
     smoother: &'a mut Smoother<T>,
-    inverses: &'a mut [InverseFactor],
+    inverses: &'a mut [InverseFactor<T>],
     matrix: &'a BlockMatrix<M>,
     unit: f64,
 }
@@ -193,7 +193,7 @@ impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
 struct Scaling<'a, T, M> {
     smoother: &'a mut Smoother<T>,
     pattern: &'a Pattern,
-    inverses: &'a [InverseFactor],
+    inverses: &'a [InverseFactor<T>],
     matrix: &'a BlockMatrix<M>,
 }
 

@@ -44,10 +44,10 @@ impl<T: Precision> Smoother<T> {
         &mut self,
         matrix: &BlockMatrix<M>,
         unit: f64,
-        inverses: &mut [InverseFactor],
+        inverses: &mut [InverseFactor<T>],
     ) -> Result<(), usize> {
         let first = self.triangle.rows.start;
-        invert::<M, L>(matrix, self.triangle.rows.clone(), RELAXATION, inverses)?;
+        invert::<T, M, L>(matrix, self.triangle.rows.clone(), RELAXATION, inverses)?;
         let sums = self.couplings.absolute_row_sums(matrix);
         for (place, &local) in self.couplings.border().iter().enumerate() {
             let (mut diagonal, mut more) = (relaxed(&doubled(matrix.diagonal(first + local as usize))), [[0.0; 3]; 3]);
@@ -63,10 +63,10 @@ impl<T: Precision> Smoother<T> {
                     self.strengthened[place][j][i] = T::from_f64(RELAXATION * more[i][j]);
                 }
             }
-            inverses[local as usize] = inverse;
+            inverses[local as usize] = rounded(&inverse);
         }
         for local in 0..inverses.len() {
-            let [[x, yx, zx, _], [_, y, zy, _], [_, _, z, _]] = inverses[local];
+            let [[x, yx, zx, _], [_, y, zy, _], [_, _, z, _]] = rounded::<T, f64>(&inverses[local]);
             let [a, c, f] = [1.0 / x, 1.0 / y, 1.0 / z];
             let (b, e) = (-yx * a * c, -zy * c * f);
             let d = -(zx * a + zy * b) * f;
@@ -82,7 +82,7 @@ impl<T: Precision> Smoother<T> {
     pub(super) fn scale<M: Precision, L: Level>(
         &mut self,
         pattern: &Pattern,
-        inverses: &[InverseFactor],
+        inverses: &[InverseFactor<T>],
         matrix: &BlockMatrix<M>,
     ) {
         self.triangle.scale::<M, L>(pattern, inverses, matrix);

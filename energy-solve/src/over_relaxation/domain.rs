@@ -45,7 +45,7 @@ impl<T: Precision> Domain<T> {
     pub(super) fn scale<M: Precision, L: Level>(
         &mut self,
         pattern: &Pattern,
-        inverses: &[InverseFactor],
+        inverses: &[InverseFactor<T>],
         matrix: &BlockMatrix<M>,
     ) {
         self.triangle.scale::<M, L>(pattern, inverses, matrix);
@@ -57,7 +57,7 @@ impl<T: Precision> Domain<T> {
     pub(super) fn start<L: Level>(
         &mut self,
         pattern: &Pattern,
-        inverses: &[InverseFactor],
+        inverses: &[InverseFactor<T>],
         b: &[Vector3<f64>],
         scale: f64,
     ) -> f64 {
@@ -163,7 +163,7 @@ impl<T: Precision> Domain<T> {
 
     /// C⁻ᵀ x s.
     #[inline(always)]
-    pub(super) fn finish(&self, inverses: &[InverseFactor], scale: f64, x: &mut [Vector3<f64>]) {
+    pub(super) fn finish(&self, inverses: &[InverseFactor<T>], scale: f64, x: &mut [Vector3<f64>]) {
         for row in 0..x.len() {
             let [u, v, w, _] = self.solution[row].map(|component| Into::<f64>::into(component) * scale);
             x[row] = unscaled(&inverses[row], &[u, v, w]);

@@ -40,7 +40,7 @@ pub struct OverRelaxation<T> {
     pattern: Arc<Pattern>,
     threads: usize,
     /// C⁻¹ of each row.
-    inverses: Vec<InverseFactor>,
+    inverses: Vec<InverseFactor<T>>,
     domains: Vec<Domain<T>>,
     /// Of each domain t in the rows that others are coupled with.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
@@ -67,7 +67,7 @@ impl<T: Precision> OverRelaxation<T> {
         let domains: Vec<_> = domains.map(|(triangle, couplings)| Domain::new(triangle, couplings)).collect();
         let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.couplings.border().len()]);
         let borders = domains.iter().map(border).collect();
-        let inverses = vec![[[0.0; 4]; 3]; pattern.rows()];
+        let inverses = vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()];
         Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders }
     }
 
@@ -134,18 +134,18 @@ impl<T: Precision> Clone for OverRelaxation<T> {
 }
 
 /// [`invert`].
-struct Inversion<'a, M> {
+struct Inversion<'a, T, M> {
     rows: Range<usize>,
-    inverses: &'a mut [InverseFactor],
+    inverses: &'a mut [InverseFactor<T>],
     matrix: &'a BlockMatrix<M>,
 }
 
-impl<M: Precision> Kernel for Inversion<'_, M> {
+impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
     type Output = Result<(), usize>;
 
     #[inline(always)]
     fn run<L: Level>(self) -> Self::Output {
-        invert::<M, L>(self.matrix, self.rows, RELAXATION, self.inverses)
+        invert::<T, M, L>(self.matrix, self.rows, RELAXATION, self.inverses)
     }
 }
 
@@ -153,7 +153,7 @@ impl<M: Precision> Kernel for Inversion<'_, M> {
 struct Scaling<'a, T, M> {
     domain: &'a mut Domain<T>,
     pattern: &'a Pattern,
-    inverses: &'a [InverseFactor],
+    inverses: &'a [InverseFactor<T>],
     matrix: &'a BlockMatrix<M>,
 }
 
@@ -184,7 +184,7 @@ struct Common<'a, T> {
 struct Part<'a, T> {
     number: usize,
     domain: &'a mut Domain<T>,
-    inverses: &'a [InverseFactor],
+    inverses: &'a [InverseFactor<T>],
     b: &'a [Vector3<f64>],
     x: &'a mut [Vector3<f64>],
 }
@@ -255,7 +255,7 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
 /// The largest component of C⁻¹ b, or 1 if all are zero: divided by it, numbers are of the order of one whatever the unit. Single precision has less
 /// range than doubles.
 #[inline(always)]
-fn scale<T>(parts: &[Part<'_, T>], common: &Common<'_, T>) -> f64 {
+fn scale<T: Precision>(parts: &[Part<'_, T>], common: &Common<'_, T>) -> f64 {
     for Part { number, inverses, b, .. } in parts {
         let (mut largest, mut sum) = (0.0_f64, 0.0);
         for row in 0..b.len() {
