@@ -115,6 +115,20 @@ fn newton_solves_the_equations_of_implicit_euler() {
 }
 
 #[test]
+fn newton_assembles_no_hessian_that_it_does_not_use() {
+    let options = NewtonOptions { impulse_tolerance: 1e-5, velocity_tolerance: 1e-9, ..NewtonOptions::default() };
+    let mut body = distorted(NEO_HOOKEAN);
+    let mut newton = Newton::with_options(options);
+    let solves: u64 = (0..20).map(|_| newton.step(&mut body, 0.01).unwrap().solves).sum();
+    let (membrane, counts) = body.system.terms().next().unwrap();
+    let elements = membrane.stencils().iter().len() as u64;
+    assert_eq!(counts.hessian.evaluated, solves * elements, "of {elements} elements in {solves} systems");
+    // Steps ended by their impulses, which forces alone tell, and not before every system.
+    let looked = counts.gradient.evaluated / elements;
+    assert!((20..solves).contains(&looked), "{looked} times of {solves}");
+}
+
+#[test]
 fn newton_refuses_forces_without_energy_and_says_which() {
     let mut body = distorted(PRINTED);
     let before = body.x.clone();

@@ -383,3 +383,31 @@ impl Integrator for Newton {
         Ok(None)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn systems_are_solved_as_exactly_as_progress_can_make_use_of() {
+        let newton = Newton::default();
+        let tolerance = |gradient: f64, last: f64| {
+            let last = Forcing { gradient: last, tolerance: 0.01 };
+            newton.forcing(gradient, Some(last)).tolerance
+        };
+        assert_eq!(newton.forcing(1.0, None).tolerance, 0.01);
+        // A fifth is left: nine tenths of its square. No less than a hundredth, no more than a tenth.
+        assert!((tolerance(0.2, 1.0) - 0.9 * 0.04).abs() < 1e-15);
+        assert_eq!(tolerance(0.01, 1.0), 0.01);
+        assert_eq!(tolerance(3.0, 1.0), 0.1);
+        assert_eq!(tolerance(0.0, 0.0), 0.1);
+    }
+
+    #[test]
+    fn impulses_are_looked_at_where_they_may_be_small() {
+        let newton = Newton::with_options(NewtonOptions { impulse_tolerance: 1e-3, ..NewtonOptions::default() });
+        let of = |gradient: f64, tolerance: f64| newton.may_be_enough(Forcing { gradient, tolerance }, 0.01);
+        assert!(of(9e-4, 0.01) && !of(1.1e-3, 0.01) && !of(9e-4, 0.1));
+        assert!(newton.is_enough(&[[0.0, -9e-6, 0.0]], 0.01) && !newton.is_enough(&[[0.0, -1.1e-5, 0.0]], 0.01));
+    }
+}
