@@ -16,6 +16,7 @@
 //! Both together are the patch test: a flat sheet has the rigidity D in every direction on every mesh, for any D. At free edges p is eliminated
 //! by its natural condition, no bending moment.
 
+mod assembly;
 mod rigidity;
 mod term;
 mod tilt;

@@ -1,12 +1,14 @@
 use energy_dsl::{
-    BLOCK, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, for_each_batch,
+    BLOCK, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, dispatch,
+    for_each_batch,
 };
 use energy_elements::HingeAngle;
 use energy_solve::{
-    Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Storage,
-    Tally, Term, index,
+    Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, Precision, Quantity, State, Stencils,
+    Storage, Tally, Term, TrianglePlaces, index,
 };
 
+use super::assembly::{OuterProducts, Turning};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
 use crate::mesh::{Topology, TriangleMesh, dot, rest_angle};
@@ -19,25 +21,27 @@ use crate::mesh::{Topology, TriangleMesh, dot, rest_angle};
 #[derive(Clone, Debug)]
 pub struct PlateTerm {
     name: String,
-    hinges: Vec<[usize; 4]>,
+    pub(super) hinges: Vec<[usize; 4]>,
     rest: Vec<f64>,
-    patches: Vec<Patch>,
+    pub(super) patches: Vec<Patch>,
     /// The vertices of the patches, each filled up to the most by repeating its first.
     stencils: Vec<u32>,
     arity: usize,
     /// The patches with a free vertex, and what else is known once vertices have places.
-    active: Vec<usize>,
-    places: Vec<PatchPlaces>,
-    hinge_rows: Vec<[Option<usize>; 4]>,
-    pattern: Option<Pattern>,
-    /// The hinges that active patches need, and the same packed.
-    needed: Vec<usize>,
+    pub(super) active: Vec<usize>,
+    pub(super) places: Vec<PatchPlaces>,
+    /// The hinges that active patches need, the same packed, and where their blocks are stored.
+    pub(super) needed: Vec<usize>,
     packed: Packed<HingeAngle>,
+    pub(super) hinge_places: TrianglePlaces,
 }
+
+/// Three vectors, each with a fourth component that is nothing.
+pub(super) type Row = [[f64; 4]; 3];
 
 /// A triangle and the hinges that its curvature depends on.
 #[derive(Clone, Debug)]
-struct Patch {
+pub(super) struct Patch {
     /// Its vertices, ascending.
     vertices: Vec<usize>,
     /// The hinges: their number, b, and the places of their points among the vertices.
@@ -53,9 +57,9 @@ struct Angle {
 
 /// Where the blocks of a patch are stored: of pairs (i, j), i ≤ j, and mirrored if all blocks are.
 #[derive(Clone, Debug)]
-struct PatchPlaces {
-    slots: Vec<u32>,
-    mirrored: Vec<u32>,
+pub(super) struct PatchPlaces {
+    pub(super) slots: Vec<u32>,
+    pub(super) mirrored: Vec<u32>,
 }
 
 /// A plate that cannot be laid on a mesh.
@@ -102,10 +106,9 @@ impl PlateTerm {
             arity,
             active: Vec::new(),
             places: Vec::new(),
-            hinge_rows: Vec::new(),
-            pattern: None,
             needed: Vec::new(),
             packed: Packed::new::<4>(&[], &[]),
+            hinge_places: TrianglePlaces::default(),
         })
     }
 
@@ -184,33 +187,8 @@ impl PlateTerm {
 
     /// Adds −Σ m ∇²θ and its product with v.
     fn add_turning(&self, moments: &[f64], state: State<'_>, sum: &mut Linearisation<'_>) {
-        let pattern = self.pattern.as_ref().expect("a term is placed before it is evaluated");
-        for (number, (&vertices, &moment)) in self.hinges.iter().zip(moments).enumerate() {
-            if moment == 0.0 {
-                continue;
-            }
-            let at = HingeAngle::<f64>::new().hessian(&vertices.map(|vertex| state.x[vertex]));
-            let blocks: &[Block<f64>] = at.hessian.as_ref();
-            let rows = self.hinge_rows[number];
-            let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
-            for ((i, j), block) in pairs.zip(blocks) {
-                let block = block.map(|row| row.map(|entry| -moment * entry));
-                if let Some(product) = &mut sum.stiffness_times_velocity {
-                    add_times(&mut product[vertices[i]], &block, &state.v[vertices[j]], false);
-                    if i != j {
-                        add_times(&mut product[vertices[j]], &block, &state.v[vertices[i]], true);
-                    }
-                }
-                let Some((row, column)) = rows[i].zip(rows[j]) else { continue };
-                let places = [(row, column, false), (column, row, true)];
-                let both = if pattern.storage() == Storage::Whole && i != j { 2 } else { 1 };
-                for &(row, column, turned) in &places[..both] {
-                    let (slot, flipped) = pattern.place(row, column).expect("hinges are within patches");
-                    let oriented = if turned != flipped { transposed(&block) } else { block };
-                    sum.matrix.add(slot, sum.weights.position, &oriented);
-                }
-            }
-        }
+        let mut turning = Turning::new(self, moments, state.v, sum);
+        for_each_batch(&self.packed, state.x, &mut turning);
     }
 }
 
@@ -233,10 +211,10 @@ impl BatchWork<HingeAngle> for Values<'_> {
 }
 
 /// θ − θ̄, −θ̄ at first, and ∇θ of each hinge.
-struct Angles<'a> {
+pub(super) struct Angles<'a> {
     needed: &'a [usize],
     values: Vec<f64>,
-    gradients: Vec<[f64; 12]>,
+    pub(super) gradients: Vec<[f64; 12]>,
     rows: [f64; 12 * BLOCK],
     flagged: u64,
 }
@@ -306,9 +284,10 @@ impl Patch {
     }
 
     /// ∇r: for each vertex, three vectors.
-    fn gradients(&self, gradients: &[[f64; 12]], rows: &mut Vec<[Vector3<f64>; 3]>) {
+    #[inline(always)]
+    pub(super) fn gradients(&self, gradients: &[[f64; 12]], rows: &mut Vec<Row>) {
         rows.clear();
-        rows.resize(self.vertices.len(), [[0.0; 3]; 3]);
+        rows.resize(self.vertices.len(), [[0.0; 4]; 3]);
         for angle in &self.angles {
             let gradient = &gradients[angle.hinge];
             for point in 0..4 {
@@ -326,19 +305,6 @@ impl Patch {
 fn remove(vector: &mut [f64; 3], unit: &[f64; 3]) {
     let part = dot(*vector, *unit);
     (0..3).for_each(|k| vector[k] -= part * unit[k]);
-}
-
-fn add_times(sum: &mut Vector3<f64>, block: &Block<f64>, v: &Vector3<f64>, turned: bool) {
-    for row in 0..3 {
-        for column in 0..3 {
-            sum[row] += if turned { block[column][row] } else { block[row][column] } * v[column];
-        }
-    }
-}
-
-/// Bᵀ.
-fn transposed(block: &Block<f64>) -> Block<f64> {
-    std::array::from_fn(|row| std::array::from_fn(|column| block[column][row]))
 }
 
 impl Term for PlateTerm {
@@ -370,7 +336,8 @@ impl Term for PlateTerm {
         self.packed =
             Packed::from_fn(needed.len(), 4, |_| &element, |number, point| index(self.hinges[needed[number]][point]));
         self.needed = needed;
-        self.hinge_rows = self.hinges.iter().map(|hinge| hinge.map(|vertex| dofs.place(vertex))).collect();
+        let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
+        self.hinge_places = TrianglePlaces::new(Stencils { arity: 4, vertices: &vertices }, dofs, pattern);
         let slot = |i: usize, j: usize| {
             let rows = dofs.place(i).zip(dofs.place(j));
             index(rows.and_then(|(row, column)| pattern.place(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
@@ -388,7 +355,6 @@ impl Term for PlateTerm {
             };
             self.places.push(PatchPlaces { slots, mirrored });
         }
-        self.pattern = Some(pattern.clone());
     }
 
     fn has_energy(&self) -> bool {
@@ -414,20 +380,12 @@ impl Term for PlateTerm {
         let angles = self.angles(state.x);
         let moments = self.moments(&angles);
         self.subtract_force(&angles, &moments, sum.force);
-        let weight = -sum.weights.position;
-        let mut rows = Vec::new();
-        for (&patch, places) in self.active.iter().zip(&self.places) {
-            let patch = &self.patches[patch];
-            patch.gradients(&angles.gradients, &mut rows);
-            add_outer_products(&rows, weight, places, &mut sum.matrix);
-            if let Some(product) = &mut sum.stiffness_times_velocity {
-                for k in 0..3 {
-                    let rate: f64 = patch.vertices.iter().zip(&rows).map(|(&i, row)| dot(row[k], state.v[i])).sum();
-                    for (&i, row) in patch.vertices.iter().zip(&rows) {
-                        (0..3).for_each(|axis| product[i][axis] -= rate * row[k][axis]);
-                    }
-                }
-            }
+        match &mut sum.matrix {
+            Blocks::Single(matrix) => self.add_outer_products(&angles, -sum.weights.position, matrix),
+            Blocks::Double(matrix) => self.add_outer_products(&angles, -sum.weights.position, matrix),
+        }
+        if let Some(product) = &mut sum.stiffness_times_velocity {
+            self.subtract_products(&angles, state.v, product);
         }
         if sum.curvature == Negative::Exact {
             self.add_turning(&moments, state, sum);
@@ -445,27 +403,24 @@ impl Term for PlateTerm {
     }
 }
 
-/// Adds Σ ∇r ∇rᵀ of a patch.
-fn add_outer_products(rows: &[[Vector3<f64>; 3]], weight: f64, places: &PatchPlaces, matrix: &mut Blocks<'_>) {
-    let mut pair = 0;
-    let mut mirrored = places.mirrored.iter();
-    for i in 0..rows.len() {
-        for j in i..rows.len() {
-            let mut block = [[0.0; 3]; 3];
+impl PlateTerm {
+    /// Adds s Σ ∇r ∇rᵀ.
+    fn add_outer_products<T: Precision>(&self, angles: &Angles<'_>, s: f64, matrix: &mut [Block<T>]) {
+        dispatch(OuterProducts { of: self, angles, s, matrix });
+    }
+
+    /// Subtracts Σ ∇r (∇r · v).
+    fn subtract_products(&self, angles: &Angles<'_>, v: &[Vector3<f64>], product: &mut [Vector3<f64>]) {
+        let mut rows = Vec::new();
+        for patch in self.active.iter().map(|&patch| &self.patches[patch]) {
+            patch.gradients(&angles.gradients, &mut rows);
             for k in 0..3 {
-                for row in 0..3 {
-                    for column in 0..3 {
-                        block[row][column] += rows[i][k][row] * rows[j][k][column];
-                    }
+                let along = |(&i, row): (&usize, &Row)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
+                let rate: f64 = patch.vertices.iter().zip(&rows).map(along).sum();
+                for (&i, row) in patch.vertices.iter().zip(&rows) {
+                    (0..3).for_each(|axis| product[i][axis] -= rate * row[k][axis]);
                 }
             }
-            matrix.add(places.slots[pair] as usize, weight, &block);
-            if i != j
-                && let Some(&slot) = mirrored.next()
-            {
-                matrix.add(slot as usize, weight, &transposed(&block));
-            }
-            pair += 1;
         }
     }
 }
