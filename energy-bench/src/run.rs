@@ -100,10 +100,6 @@ macro_rules! each_block {
         for group in numbers.chunks(size * (TOGETHER / $lanes)) {
             for ($block, result) in group.chunks_exact(size).zip(&mut results) {
                 *result = $call;
-                if $lanes == 1 {
-                    // One after the other: a loop over scalars without a branch would be compiled into one over lanes.
-                    black_box(&mut *result);
-                }
             }
             black_box(&mut results);
         }
