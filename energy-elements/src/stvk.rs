@@ -9,17 +9,30 @@ energy! {
     #[rest_state(zero_force)]
     pub energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
-            let D_m = columns(u1 - u0, u2 - u0);
+            let d1 = u1 - u0;
+            let d2 = u2 - u0;
+            let det = det(columns(d1, d2));
+            let n = norm_squared(d1);
             // Scaled, so that triangles of any size are computed near 1.
-            let s = power_of_two(det(D_m));
-            let B = adjugate(D_m) * s;
-            let d = (det(D_m) * s)^2;
-            let per_d = 1 / (2 * d);
-            let A = det(D_m) / 2;
+            let s = power_of_two(n);
+            // p d2 − q d1 is perpendicular to d1; m is its square.
+            let p = n * s;
+            let q = dot(d1, d2) * s;
+            let m = p * (det * s) * det;
+            let half_n = n / 2;
+            let half_m = m / 2;
+            let per_n = 1 / n;
+            let per_m = 1 / m;
+            let per_nm = 1 / (sqrt(2 * n) * sqrt(m));
+            let A = det / 2;
         }
-        // F = D D_m⁻¹, its division by s det D_m left to the end: edges that are exact give an exact zero at rest.
-        let F = columns(x1 - x0, x2 - x0) * B;
-        let E = per_d * (transpose(F) * F - d * identity(2));
-        A * (μ * ddot(E, E) + λ / 2 * trace(E)^2)
+        // E in the directions along the first edge at rest and across it, where the metric at rest is diagonal; of it only p d2 − q d1
+        // can cancel. Nothing is divided before n and m are subtracted: edges that are exact give an exact zero at rest.
+        let a = x1 - x0;
+        let b = p * (x2 - x0) - q * a;
+        let along = per_n * (norm_squared(a) / 2 - half_n);
+        let across = per_m * (norm_squared(b) / 2 - half_m);
+        let shear = per_nm * dot(a, b);
+        (μ * det * (along^2 + across^2 + shear^2) + λ * A * (along + across)^2) / 2
     }
 }

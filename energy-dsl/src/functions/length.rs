@@ -258,21 +258,19 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let scaled_value = g.add(rounded, correction);
     let value = g.div(scaled_value, scale);
 
-    // C/r, at d = 0 its limit 1 for a spring without rest length, else 0.
-    let ratio = g.mul(scaled_value, at.reciprocal);
+    // C/r, at d = 0 its limit 1 for a spring without rest length, else 0. What both derivatives have, 1/r, leads.
     let at_zero = g.select(slack, one, null);
-    let ratio = g.select(at.zero, at_zero, ratio);
+    let elongation = g.select(at.zero, at_zero, scaled_value);
+    let reciprocal = g.select(at.zero, one, at.reciprocal);
     // (L/r) n nᵀ = (L/r³) d dᵀ, of the scaled vector.
-    let reciprocal_squared = g.mul(at.reciprocal, at.reciprocal);
-    let inverse_stretch = g.mul(length, at.reciprocal);
-    let along = g.mul(inverse_stretch, reciprocal_squared);
+    let reciprocal_squared = g.mul(reciprocal, reciprocal);
     let square = g.mul(value, value);
     let half_value = g.mul(half, square);
-    let half_first = d.iter().map(|&x| vec![ratio, x]).collect();
+    let half_first = d.iter().map(|&x| vec![reciprocal, elongation, x]).collect();
     let half_second = upper(d.len())
         .map(|(i, j)| {
-            let stretching = vec![along, at.scaled[i], at.scaled[j]];
-            if i == j { vec![vec![ratio], stretching] } else { vec![stretching] }
+            let stretching = vec![reciprocal, length, reciprocal_squared, at.scaled[i], at.scaled[j]];
+            if i == j { vec![vec![reciprocal, elongation], stretching] } else { vec![stretching] }
         })
         .collect();
     let not_slack = g.not(slack);
