@@ -17,7 +17,7 @@ use crate::body::Body;
 /// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + h R(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
 ///
 /// R the dissipation function of damping: half the power that linear damping takes. Hessians are exact as long as their sum is positive definite and steps
-/// shrink; where not, each element's is made positive semi-definite for the next step (projection on demand, Longva, Löschner, Fernández-Fernández,
+/// shrink, for a dozen of iterations; where not, each element's is made positive semi-definite for the next step (projection on demand, Longva, Löschner, Fernández-Fernández,
 /// Larionov, Ascher and Bender 2023). Every step leads downhill, and is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
 ///
 /// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along
@@ -86,6 +86,8 @@ impl std::ops::AddAssign for Phases {
     }
 }
 
+/// Iterations after which Hessians are projected whatever they are: where exact ones keep leading astray, these still converge.
+const PATIENCE: u64 = 12;
 /// Linear systems are solved to this part of the square of what the last iteration left of ∇E, …
 const PROGRESS: f64 = 0.9;
 /// … but no more loosely than by this factor: an iteration of conjugate gradients is cheaper than one of Newton's method.
@@ -362,7 +364,8 @@ impl Integrator for Newton {
             let before = std::mem::replace(&mut change, scale * largest(&direction) / dt);
             converged = !indefinite && change < self.options.velocity_tolerance;
             let shrinks = scale == 1.0 && change < before;
-            curvature = if shrinks && !indefinite { Curvature::Exact } else { Curvature::Clamped };
+            let exact_may_do = shrinks && !indefinite && step.report.solves < PATIENCE;
+            curvature = if exact_may_do { Curvature::Exact } else { Curvature::Clamped };
         }
         let v = step.velocities(&x);
         let report = step.report;
