@@ -17,7 +17,7 @@ use crate::body::Body;
 /// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + h R(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
 ///
 /// R the dissipation function of damping: half the power that linear damping takes. Hessians are exact as long as their sum is positive definite and steps
-/// shrink, for a dozen of iterations; where not, each element's is made positive semi-definite for the next step (projection on demand, Longva, Löschner, Fernández-Fernández,
+/// shrink, for the first dozen iterations; where not, each element's is made positive semi-definite for the next step (projection on demand, Longva, Löschner, Fernández-Fernández,
 /// Larionov, Ascher and Bender 2023). Every step leads downhill, and is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
 ///
 /// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along

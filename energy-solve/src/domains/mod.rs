@@ -5,17 +5,20 @@ mod couplings;
 mod diagonal;
 mod meeting;
 mod triangle;
+mod unit;
 
 use std::ops::Range;
 
-use energy_dsl::Level;
+use energy_dsl::{Kernel, Level};
 
+use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
 
 pub(crate) use self::couplings::Couplings;
 pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
 pub(crate) use self::meeting::{Meeting, Shared};
 pub(crate) use self::triangle::{SLACK, Triangle, scaled_block};
+pub(crate) use self::unit::Unit;
 pub(crate) use crate::precision::Precision;
 
 /// A vector of three in a register of four, with a last component that means nothing.
@@ -35,6 +38,24 @@ pub(crate) fn divided<T: Precision>(pattern: &Pattern, ranges: &[Range<usize>]) 
     let triangles: Vec<_> = ranges.iter().map(|rows| Triangle::new(pattern, rows.clone())).collect();
     let couplings = Couplings::all(pattern, ranges, &triangles);
     triangles.into_iter().zip(couplings).collect()
+}
+
+/// Takes over a domain's part of a matrix, scaled by C⁻¹ of each row.
+pub(crate) struct Scaling<'a, T, M> {
+    pub(crate) triangle: &'a mut Triangle<T>,
+    pub(crate) couplings: &'a mut Couplings<T>,
+    pub(crate) inverses: &'a [InverseFactor<T>],
+    pub(crate) matrix: &'a BlockMatrix<M>,
+}
+
+impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        self.triangle.scale::<M, L>(self.inverses, self.matrix);
+        self.couplings.scale::<M, L>(self.inverses, self.matrix);
+    }
 }
 
 /// The sum of three partial sums, which do not wait for each other.

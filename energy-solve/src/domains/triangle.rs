@@ -58,13 +58,8 @@ impl<T: Precision> Triangle<T> {
 
     /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
     #[inline(always)]
-    pub(crate) fn scale<M: Precision, L: Level>(
-        &mut self,
-        pattern: &Pattern,
-        inverses: &[InverseFactor<T>],
-        matrix: &BlockMatrix<M>,
-    ) {
-        let values = matrix.values();
+    pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
+        let (pattern, values) = (matrix.pattern(), matrix.values());
         for (local, row) in self.rows.clone().enumerate() {
             let own = rounded(&inverses[row]);
             let excess = self.excess(local);

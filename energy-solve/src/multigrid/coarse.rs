@@ -6,8 +6,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::galerkin::GalerkinProduct;
 use super::interpolation::Interpolation;
-use super::smoother::{Smoother, widened};
-use crate::domains::{InverseFactor, Precision, Wide, divided, scaled, unscaled};
+use super::smoother::{Inversion, Smoother, widened};
+use crate::domains::{InverseFactor, Precision, Scaling, Wide, divided, scaled, unscaled};
 use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
 
@@ -126,7 +126,10 @@ impl<T: Precision> Relaxed<T> {
 
     fn take_over(&mut self, matrix: &BlockMatrix, unit: f64) -> Option<()> {
         self.unit = unit;
-        dispatch(Scaling { level: self, matrix })?;
+        let Self { smoother, inverses, .. } = self;
+        dispatch(Inversion { smoother, inverses, matrix, unit }).ok()?;
+        let Smoother { triangle, couplings, .. } = smoother;
+        dispatch(Scaling { triangle, couplings, inverses, matrix });
         self.next.as_mut().map_or(Some(()), |next| next.take_over(matrix, unit, 1))
     }
 
@@ -149,24 +152,6 @@ impl<T: Precision> Relaxed<T> {
             let z: Vector3<f64> = [u, v, w].map(|component| back * Into::<f64>::into(component));
             *e = widened(unscaled(&self.inverses[row], &z));
         }
-    }
-}
-
-/// Takes over a matrix.
-struct Scaling<'a, T> {
-    level: &'a mut Relaxed<T>,
-    matrix: &'a BlockMatrix,
-}
-
-impl<T: Precision> Kernel for Scaling<'_, T> {
-    type Output = Option<()>;
-
-    #[inline(always)]
-    fn run<L: Level>(self) -> Option<()> {
-        let Relaxed { smoother, inverses, unit, .. } = self.level;
-        smoother.invert::<f64, L>(self.matrix, *unit, inverses).ok()?;
-        smoother.scale::<f64, L>(self.matrix.pattern(), inverses, self.matrix);
-        Some(())
     }
 }
 

@@ -4,7 +4,7 @@ use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
 use super::coarse::Coarse;
 use super::smoother::{Smoother, widened};
-use crate::domains::{InverseFactor, Meeting, Precision, Shared, Wide, add_products, of_three, scaled, unscaled};
+use crate::domains::{InverseFactor, Meeting, Precision, Shared, Unit, Wide, add_products, of_three, scaled, unscaled};
 use crate::pattern::Pattern;
 use crate::solve::{SolveOptions, SolveReport, StopReason};
 
@@ -64,8 +64,7 @@ pub(super) struct Common<'a, T> {
     /// Its part of Pᵀ r, from which aggregate on.
     restricted: Vec<(usize, RwLock<Vec<Wide<T>>>)>,
     meeting: Meeting,
-    largest: Shared,
-    finite: Shared,
+    unit: Unit,
     /// s · s, r · z and p · q: each is read by all before any thread can have come round to write it again.
     square: Shared,
     along: Shared,
@@ -97,8 +96,7 @@ impl<'a, T: Precision> Common<'a, T> {
             restricted: spans.map(|span| (span.start, zeros(span.len()))).collect(),
             coarse: coarse.map(RwLock::new),
             meeting: Meeting::new(threads.clamp(1, smoothers.len().max(1))),
-            largest: sum(),
-            finite: sum(),
+            unit: Unit::new(smoothers.len()),
             square: sum(),
             along: sum(),
             curvature: sum(),
@@ -133,9 +131,13 @@ pub(super) struct Part<'a, T> {
 
 /// Conjugate gradients, as one thread sees them. See [`super::Multigrid`] for what is computed.
 pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, common: &Common<'_, T>) -> SolveReport {
-    let Common { options, meeting, square, along, curvature, .. } = common;
+    let Common { options, meeting, unit, square, along, curvature, .. } = common;
     let leads = parts.iter().any(|part| part.number == 0);
-    let scale = scale(&parts, common);
+    for Part { number, inverses, b, .. } in &parts {
+        unit.note(*number, inverses, b);
+    }
+    meeting.wait();
+    let scale = unit.agreed();
     for part in &mut parts {
         square.put(part.number, dispatch(Start { part, common, scale }));
     }
@@ -192,27 +194,6 @@ pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, com
     }
     let [initial_residual, final_residual] = [initial, sigma / ROUGHNESS.powi(2)].map(|square| square.sqrt() * scale);
     SolveReport { iterations, initial_residual, final_residual, stopped }
-}
-
-/// The largest component of C⁻¹ b, or 1 if all are zero: divided by it, numbers are of the order of one whatever the unit. Single precision has less
-/// range than doubles.
-fn scale<T: Precision>(parts: &[Part<'_, T>], common: &Common<'_, T>) -> f64 {
-    for Part { number, inverses, b, .. } in parts {
-        let (mut largest, mut sum) = (0.0_f64, 0.0);
-        for row in 0..b.len() {
-            for component in scaled(&inverses[row], &b[row]) {
-                largest = largest.max(component.abs());
-                // A NaN is not the larger of two numbers, but it spoils a sum.
-                sum += component;
-            }
-        }
-        common.largest.put(*number, largest);
-        common.finite.put(*number, sum);
-    }
-    common.meeting.wait();
-    let largest = common.largest.largest();
-    let scale = if largest > 0.0 { largest } else { 1.0 };
-    scale + 0.0 * common.finite.sum()
 }
 
 /// r ← C⁻¹ b/s, s ← (I + L̃)⁻¹ r, and zeros. Returns s · s.

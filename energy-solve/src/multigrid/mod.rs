@@ -6,12 +6,12 @@ mod smoother;
 
 use std::sync::Arc;
 
-use energy_dsl::{Kernel, Level, Number, Vector3, dispatch};
+use energy_dsl::{Number, Vector3, dispatch};
 
 use self::coarse::Coarse;
 use self::gradients::{Common, Part, Vectors, conjugate_gradients};
-use self::smoother::Smoother;
-use crate::domains::{InverseFactor, Precision, divided, ranges};
+use self::smoother::{Inversion, Smoother};
+use crate::domains::{InverseFactor, Precision, Scaling, divided, ranges};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage};
 use crate::preconditioner::SingularBlock;
@@ -143,9 +143,9 @@ impl<T: Precision> Multigrid<T> {
         let invert = |(smoother, inverses)| dispatch(Inversion { smoother, inverses, matrix, unit });
         let inverted: Result<(), usize> = for_each(*threads, parts, invert).into_iter().collect();
         inverted.map_err(|row| SingularBlock { row })?;
-        let (pattern, inverses) = (&**pattern, &**inverses);
-        for_each(*threads, smoothers.iter_mut().collect(), |smoother| {
-            dispatch(Scaling { smoother, pattern, inverses, matrix });
+        let inverses = &**inverses;
+        for_each(*threads, smoothers.iter_mut().collect(), |Smoother { triangle, couplings, .. }| {
+            dispatch(Scaling { triangle, couplings, inverses, matrix });
         });
         self.definite = coarse.as_mut().is_none_or(|coarse| coarse.take_over(matrix, unit, *threads).is_some());
         Ok(())
@@ -169,39 +169,5 @@ impl<T: Precision> Multigrid<T> {
         let solved = in_parts(*threads, parts.collect(), |parts| conjugate_gradients(parts, &common));
         // All threads come to the same.
         solved.into_iter().next().unwrap_or(nothing)
-    }
-}
-
-/// [`Smoother::invert`].
-struct Inversion<'a, T, M> {
-    smoother: &'a mut Smoother<T>,
-    inverses: &'a mut [InverseFactor<T>],
-    matrix: &'a BlockMatrix<M>,
-    unit: f64,
-}
-
-impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
-    type Output = Result<(), usize>;
-
-    #[inline(always)]
-    fn run<L: Level>(self) -> Self::Output {
-        self.smoother.invert::<M, L>(self.matrix, self.unit, self.inverses)
-    }
-}
-
-/// [`Smoother::scale`].
-struct Scaling<'a, T, M> {
-    smoother: &'a mut Smoother<T>,
-    pattern: &'a Pattern,
-    inverses: &'a [InverseFactor<T>],
-    matrix: &'a BlockMatrix<M>,
-}
-
-impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Level>(self) {
-        self.smoother.scale::<M, L>(self.pattern, self.inverses, self.matrix);
     }
 }

@@ -1,6 +1,6 @@
 use std::sync::RwLock;
 
-use energy_dsl::{Block, Level, Vector3};
+use energy_dsl::{Block, Kernel, Level, Vector3};
 
 use crate::domains::{
     Couplings, InverseFactor, Precision, SLACK, Triangle, Wide, inverse_factor, invert, rounded, scaled_block,
@@ -75,18 +75,6 @@ impl<T: Precision> Smoother<T> {
             }
         }
         Ok(())
-    }
-
-    /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
-    #[inline(always)]
-    pub(super) fn scale<M: Precision, L: Level>(
-        &mut self,
-        pattern: &Pattern,
-        inverses: &[InverseFactor<T>],
-        matrix: &BlockMatrix<M>,
-    ) {
-        self.triangle.scale::<M, L>(pattern, inverses, matrix);
-        self.couplings.scale::<M, L>(inverses, matrix);
     }
 
     /// C r in a row.
@@ -212,6 +200,23 @@ impl<T: Precision> Smoother<T> {
             subtract_product::<T, L>(&mut sums, block, &v[pattern.columns()[place] as usize - first]);
         }
         total(&sums)
+    }
+}
+
+/// [`Smoother::invert`].
+pub(super) struct Inversion<'a, T, M> {
+    pub(super) smoother: &'a mut Smoother<T>,
+    pub(super) inverses: &'a mut [InverseFactor<T>],
+    pub(super) matrix: &'a BlockMatrix<M>,
+    pub(super) unit: f64,
+}
+
+impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
+    type Output = Result<(), usize>;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Self::Output {
+        self.smoother.invert::<M, L>(self.matrix, self.unit, self.inverses)
     }
 }
 

@@ -7,7 +7,6 @@ use crate::domains::{
     Couplings, InverseFactor, Precision, SLACK, Triangle, Wide, add_products, of_three, scaled, subtract_product,
     total, unscaled,
 };
-use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
 
 /// Consecutive rows: their part of the scaled matrix, and of the vectors of conjugate gradients.
@@ -38,18 +37,6 @@ impl<T: Precision> Domain<T> {
             forth: zeros.clone(),
             solution: zeros,
         }
-    }
-
-    /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
-    #[inline(always)]
-    pub(super) fn scale<M: Precision, L: Level>(
-        &mut self,
-        pattern: &Pattern,
-        inverses: &[InverseFactor<T>],
-        matrix: &BlockMatrix<M>,
-    ) {
-        self.triangle.scale::<M, L>(pattern, inverses, matrix);
-        self.couplings.scale::<M, L>(inverses, matrix);
     }
 
     /// r ← (I + L̃)⁻¹ C⁻¹ b/s, p ← 0, x ← 0. Returns r · r.

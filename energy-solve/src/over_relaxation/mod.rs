@@ -6,7 +6,7 @@ use std::sync::{Arc, RwLock};
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
 use self::domain::Domain;
-use crate::domains::{InverseFactor, Meeting, Precision, Shared, Wide, divided, invert, ranges, scaled};
+use crate::domains::{InverseFactor, Meeting, Precision, Scaling, Shared, Unit, Wide, divided, invert, ranges};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, Storage};
 use crate::preconditioner::SingularBlock;
@@ -80,14 +80,14 @@ impl<T: Precision> OverRelaxation<T> {
     /// When the matrix has another pattern.
     pub fn scale(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
-        let Self { pattern, threads, inverses, domains, .. } = self;
+        let Self { threads, inverses, domains, .. } = self;
         let rows = || domains.iter().map(|domain| domain.triangle.rows.clone());
         let parts = rows().zip(split_mut(inverses, rows().map(|rows| rows.len()))).collect();
         let inverted = for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix }));
         inverted.into_iter().collect::<Result<(), usize>>().map_err(|row| SingularBlock { row })?;
-        let (pattern, inverses) = (&**pattern, &**inverses);
-        for_each(*threads, domains.iter_mut().collect(), |domain| {
-            dispatch(Scaling { domain, pattern, inverses, matrix });
+        let inverses = &**inverses;
+        for_each(*threads, domains.iter_mut().collect(), |Domain { triangle, couplings, .. }| {
+            dispatch(Scaling { triangle, couplings, inverses, matrix });
         });
         Ok(())
     }
@@ -102,8 +102,7 @@ impl<T: Precision> OverRelaxation<T> {
             options,
             borders,
             meeting: Meeting::new((*threads).clamp(1, lengths.len().max(1))),
-            largest: sum(),
-            finite: sum(),
+            unit: Unit::new(lengths.len()),
             first_half: sum(),
             second_half: sum(),
             square: sum(),
@@ -149,31 +148,13 @@ impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
     }
 }
 
-/// [`Domain::scale`].
-struct Scaling<'a, T, M> {
-    domain: &'a mut Domain<T>,
-    pattern: &'a Pattern,
-    inverses: &'a [InverseFactor<T>],
-    matrix: &'a BlockMatrix<M>,
-}
-
-impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Level>(self) {
-        self.domain.scale::<M, L>(self.pattern, self.inverses, self.matrix);
-    }
-}
-
 /// What all threads read that solve a system.
 struct Common<'a, T> {
     pattern: &'a Pattern,
     options: &'a SolveOptions,
     borders: &'a [RwLock<Vec<Wide<T>>>],
     meeting: Meeting,
-    largest: Shared,
-    finite: Shared,
+    unit: Unit,
     /// p · t, p · w and r · r: each is read by all before any thread can have come round to write it again.
     first_half: Shared,
     second_half: Shared,
@@ -201,8 +182,12 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
     #[inline(always)]
     fn run<L: Level>(self) -> SolveReport {
         let Self { mut parts, common } = self;
-        let Common { pattern, options, borders, meeting, first_half, second_half, square, .. } = common;
-        let scale = scale(&parts, common);
+        let Common { pattern, options, borders, meeting, unit, first_half, second_half, square, .. } = common;
+        for Part { number, inverses, b, .. } in &parts {
+            unit.note(*number, inverses, b);
+        }
+        meeting.wait();
+        let scale = unit.agreed();
         for Part { number, domain, inverses, b, .. } in &mut parts {
             square.put(*number, domain.start::<L>(pattern, inverses, b, scale));
         }
@@ -250,26 +235,4 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
         let [initial_residual, final_residual] = [initial, rho].map(|square| square.sqrt() * scale);
         SolveReport { iterations, initial_residual, final_residual, stopped }
     }
-}
-
-/// The largest component of C⁻¹ b, or 1 if all are zero: divided by it, numbers are of the order of one whatever the unit. Single precision has less
-/// range than doubles.
-#[inline(always)]
-fn scale<T: Precision>(parts: &[Part<'_, T>], common: &Common<'_, T>) -> f64 {
-    for Part { number, inverses, b, .. } in parts {
-        let (mut largest, mut sum) = (0.0_f64, 0.0);
-        for row in 0..b.len() {
-            for component in scaled(&inverses[row], &b[row]) {
-                largest = largest.max(component.abs());
-                // A NaN is not the larger of two numbers, but it spoils a sum.
-                sum += component;
-            }
-        }
-        common.largest.put(*number, largest);
-        common.finite.put(*number, sum);
-    }
-    common.meeting.wait();
-    let largest = common.largest.largest();
-    let scale = if largest > 0.0 { largest } else { 1.0 };
-    scale + 0.0 * common.finite.sum()
 }
