@@ -325,6 +325,54 @@ fn elements_over_lanes_are_those_over_scalars() {
     at_every_level::<Elements>();
 }
 
+struct Rows;
+
+impl Check for Rows {
+    fn check<S: Bits, V: Lane<S>, L: Level>() {
+        let points: Vec<[S; 3]> =
+            (0..20).map(|point| [0.0, 0.25, 0.5].map(|axis| S::from_f64(f64::from(point) + axis))).collect();
+        // The last point among them: nothing after it may be read.
+        let indices: Vec<u32> = (0..V::LANES as u32).map(|lane| (7 * lane + 19) % 20).collect();
+        let gathered = V::gather(&points, &indices);
+        for axis in 0..3 {
+            assert_lanes(gathered[axis], |lane| points[indices[lane] as usize][axis], ("point", axis));
+        }
+        for numbers in 0..20_usize {
+            let number = |number: usize, lane: usize| S::from_f64((100 * number + lane + 1) as f64);
+            let wide: Vec<V> = (0..numbers).map(|row| V::from_fn(|lane| number(row, lane))).collect();
+            for (count, gap) in (0..=V::LANES).flat_map(|count| [(count, 0), (count, 3)]) {
+                let stride = numbers + gap;
+                // No place more than needed.
+                let mut rows = vec![S::from_f64(0.0); (count * stride).saturating_sub(gap)];
+                V::store_transposed(&wide, count, &mut rows, stride);
+                for (place, &stored) in rows.iter().enumerate() {
+                    let (lane, row) = (place / stride, place % stride);
+                    let expected = if row < numbers { number(row, lane) } else { S::from_f64(0.0) };
+                    assert_eq!(stored.bits(), expected.bits(), "{numbers} numbers, {count} lanes, stride {stride}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn rows_are_turned_to_lanes_and_lanes_to_rows() {
+    at_every_level::<Rows>();
+}
+
+#[test]
+#[should_panic(expected = "index out of bounds")]
+fn points_that_do_not_exist_are_not_gathered() {
+    struct Beyond;
+    impl Kernel for Beyond {
+        type Output = f64;
+        fn run<L: Level>(self) -> f64 {
+            L::F64::gather(&[[0.0; 3]; 4], &[4, 0, 0, 0, 0, 0, 0, 0])[0].extract(0)
+        }
+    }
+    dispatch(Beyond);
+}
+
 #[test]
 fn a_plain_call_has_the_bits_of_the_best_level() {
     struct ByLanes([[f64; 3]; 4]);

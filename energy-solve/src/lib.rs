@@ -62,6 +62,7 @@ mod precision;
 mod preconditioner;
 mod residual_term;
 mod rounded_block;
+mod scatter;
 mod solve;
 mod sparse_factor;
 mod system;

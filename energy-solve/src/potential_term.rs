@@ -2,7 +2,7 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 use energy_dsl::{
-    Array, BLOCK, Batch, BatchWork, Block, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
+    Array, BLOCK, Batch, BatchWork, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
     ReducedPotential, Vector3, WidePoints, for_each_batch_in, triangle_index,
 };
 
@@ -13,7 +13,8 @@ use crate::dofs::DofMap;
 use crate::list::ElementList;
 use crate::pattern::{Pattern, Storage};
 use crate::places::Places;
-use crate::precision::{Blocks, Precision};
+use crate::precision::Blocks;
+use crate::scatter::{TriangleRoom, VectorRoom, points_of_triangle};
 use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, Stencils, Term};
 
 /// A term with f = −∇U: never dependent on velocity, always with symmetric Jacobians.
@@ -86,8 +87,8 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
         x: &[Vector3<f64>],
         force: &mut [Vector3<f64>],
     ) -> u64 {
-        let rows = vec![0.0; 3 * self.list.arity() * BLOCK];
-        let mut gradients = Gradients { force, first_vertex, rows, flagged: 0 };
+        let room = VectorRoom::new(self.list.arity());
+        let mut gradients = Gradients { force, first_vertex, room, flagged: 0 };
         for pack in packs {
             for_each_batch_in(&self.packed, pack.clone(), x, &mut gradients);
         }
@@ -103,7 +104,6 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
         sum: &mut Linearisation<'_>,
     ) -> (u64, u64) {
         let n = self.list.arity();
-        let numbers = 3 * n + 9 * n * (n + 1) / 2;
         let mut hessians = Hessians {
             sum,
             first_vertex,
@@ -111,7 +111,8 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
             velocities: state.v,
             places: &self.places,
             orthonormal: self.orthonormal.as_ref(),
-            rows: vec![0.0; numbers * BLOCK],
+            vectors: VectorRoom::new(n),
+            triangles: TriangleRoom::new(n),
             numbers: vec![0.0; MOST_NUMBERS * BLOCK],
             flagged: 0,
             projected: 0,
@@ -275,7 +276,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Values {
 struct Gradients<'a> {
     force: &'a mut [Vector3<f64>],
     first_vertex: usize,
-    rows: Vec<f64>,
+    room: VectorRoom,
     flagged: u64,
 }
 
@@ -284,33 +285,9 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let result = batch.element.gradient_at::<L>(batch.points);
         let gradient = result.gradient.as_ref();
-        scatter_vectors::<E, L>(&batch, gradient, &mut self.rows, self.first_vertex, self.force);
+        self.room.subtract::<E, L>(&batch, gradient, self.first_vertex, self.force);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
         self.flagged += count_owned(flagged, batch.vertices(0), self.first_vertex, self.force.len());
-    }
-}
-
-/// Subtracts vectors of the elements' points from those of the vertices from the first on.
-#[inline(always)]
-fn scatter_vectors<E: PackedPotential<f64>, L: Level>(
-    batch: &Batch<'_, E, L::F64>,
-    vectors: &[Vector3<L::F64>],
-    rows: &mut [f64],
-    first_vertex: usize,
-    sums: &mut [Vector3<f64>],
-) {
-    let stride = 3 * vectors.len();
-    L::F64::store_transposed(vectors.as_flattened(), batch.count, rows, stride);
-    for lane in 0..batch.count {
-        let row = &rows[lane * stride..][..stride];
-        for point in 0..vectors.len() {
-            let vertex = (batch.vertices(point)[lane] as usize).wrapping_sub(first_vertex);
-            if let Some(vector) = sums.get_mut(vertex) {
-                for axis in 0..3 {
-                    vector[axis] -= row[3 * point + axis];
-                }
-            }
-        }
     }
 }
 
@@ -322,7 +299,8 @@ struct Hessians<'a, 'b> {
     velocities: &'a [Vector3<f64>],
     places: &'a Places,
     orthonormal: Option<&'a Orthonormal>,
-    rows: Vec<f64>,
+    vectors: VectorRoom,
+    triangles: TriangleRoom,
     /// What [`Indefinite`] needs.
     numbers: Vec<f64>,
     flagged: u64,
@@ -349,11 +327,11 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         if self.orthonormal.is_none() && !exact {
             projected = change_one_by_one(result.hessian.as_mut(), batch.count, self.sum.curvature);
         }
-        scatter_vectors::<E, L>(&batch, result.gradient.as_ref(), &mut self.rows, self.first_vertex, self.sum.force);
+        self.vectors.subtract::<E, L>(&batch, result.gradient.as_ref(), self.first_vertex, self.sum.force);
         if let Some(product) = &mut self.sum.stiffness_times_velocity {
             let first_vertex = self.first_vertex;
             let triangle = result.hessian.as_ref();
-            subtract_product::<E, L>(&batch, triangle, self.velocities, &mut self.rows, first_vertex, product);
+            subtract_product::<E, L>(&batch, triangle, self.velocities, &mut self.vectors, first_vertex, product);
         }
         self.turn::<L>(batch.first, result.hessian.as_mut());
         self.scatter::<L>(batch.first, batch.count, result.hessian.as_ref());
@@ -415,83 +393,13 @@ impl Hessians<'_, '_> {
     /// Subtracts α times the blocks from those of the matrix.
     #[inline(always)]
     fn scatter<L: Level>(&mut self, first: usize, count: usize, triangle: &[[Vector3<L::F64>; 3]]) {
-        let stride = 9 * triangle.len();
-        L::F64::store_transposed(triangle.as_flattened().as_flattened(), count, &mut self.rows, stride);
-        let rows = Rows {
-            numbers: &self.rows,
-            pairs: triangle.len(),
-            first,
-            count,
-            weight: -self.sum.weights.position,
-            places: self.places,
-            first_block: self.first_block,
-        };
+        self.triangles.fill::<L>(-self.sum.weights.position, triangle);
         match &mut self.sum.matrix {
-            Blocks::Single(matrix) => rows.add_to(matrix),
-            Blocks::Double(matrix) => rows.add_to(matrix),
-        }
-    }
-}
-
-/// The triangles of consecutive elements, one a row.
-struct Rows<'a> {
-    numbers: &'a [f64],
-    /// Blocks of a triangle.
-    pairs: usize,
-    first: usize,
-    count: usize,
-    weight: f64,
-    places: &'a Places,
-    first_block: usize,
-}
-
-impl Rows<'_> {
-    /// Adds them to blocks of the matrix, from the first block on.
-    #[inline(always)]
-    fn add_to<T: Precision>(&self, matrix: &mut [Block<T>]) {
-        let stride = 9 * self.pairs;
-        for lane in 0..self.count {
-            let slots = self.places.of(self.first + lane);
-            let blocks = self.numbers[lane * stride..][..stride].as_chunks::<9>().0;
-            for pair in 0..self.pairs {
-                let slot = (slots[pair] as usize).wrapping_sub(self.first_block);
-                if let Some(block) = matrix.get_mut(slot) {
-                    add_block(block, self.weight, &blocks[pair]);
-                }
+            Blocks::Single(matrix) => {
+                self.triangles.add_to((first, count), self.places, self.first_block, matrix);
             }
-            if slots.len() > self.pairs {
-                add_mirrored(&slots[self.pairs..], blocks, self.weight, self.first_block, matrix);
-            }
-        }
-    }
-}
-
-/// B ← B + s A.
-#[inline(always)]
-fn add_block<T: Precision>(sum: &mut Block<T>, scale: f64, block: &[f64; 9]) {
-    let sum = sum.as_flattened_mut();
-    for entry in 0..9 {
-        sum[entry] = sum[entry] + T::from_f64(scale * block[entry]);
-    }
-}
-
-/// Adds the blocks below the diagonal, where other terms make the matrix one that is not symmetric.
-#[inline(never)]
-fn add_mirrored<T: Precision>(
-    slots: &[u32],
-    triangle: &[[f64; 9]],
-    weight: f64,
-    first: usize,
-    matrix: &mut [Block<T>],
-) {
-    let n = points_of_triangle(triangle.len());
-    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| triangle_index(n, i, j)));
-    for (&slot, pair) in slots.iter().zip(pairs) {
-        let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) else { continue };
-        for row in 0..3 {
-            for column in 0..3 {
-                let entry = T::from_f64(weight * triangle[pair][3 * column + row]);
-                block[row][column] = block[row][column] + entry;
+            Blocks::Double(matrix) => {
+                self.triangles.add_to((first, count), self.places, self.first_block, matrix);
             }
         }
     }
@@ -518,7 +426,7 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
     batch: &Batch<'_, E, L::F64>,
     triangle: &[[Vector3<L::F64>; 3]],
     velocities: &[Vector3<f64>],
-    rows: &mut [f64],
+    room: &mut VectorRoom,
     first_vertex: usize,
     product: &mut [Vector3<f64>],
 ) {
@@ -543,7 +451,7 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
             }
         }
     }
-    scatter_vectors::<E, L>(batch, sums, rows, first_vertex, product);
+    room.subtract::<E, L>(batch, sums, first_vertex, product);
 }
 
 /// The way of elements with many coordinates. Returns as bits which changed.
@@ -563,9 +471,4 @@ fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usiz
         }
     }
     changed
-}
-
-/// n, of n (n + 1)/2 blocks.
-fn points_of_triangle(blocks: usize) -> usize {
-    (1..).find(|n| n * (n + 1) / 2 >= blocks).expect("there is such a number")
 }

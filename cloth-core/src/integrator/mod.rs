@@ -7,12 +7,14 @@ mod implicit_euler;
 mod implicit_midpoint;
 mod linear_solver;
 mod newton;
+mod projection;
 mod stability;
 mod substep;
 mod symplectic_euler;
 mod trapezoid;
 mod trial;
 mod verlet;
+mod warm_start;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -71,6 +73,9 @@ pub struct IntegratorMemory {
     /// Which linear solver is in use, and why.
     #[serde(default)]
     pub(crate) trial: trial::Trial,
+    /// Where [`Newton`] begins the next step.
+    #[serde(default)]
+    pub(crate) warm_start: warm_start::WarmStart,
 }
 
 /// What a step took.

@@ -8,7 +8,9 @@ use energy_solve::{
 use serde::{Deserialize, Serialize};
 
 use super::linear_solver::{LinearSolver, LinearSolverChoice};
+use super::projection::Projection;
 use super::trial::Trial;
+use super::warm_start::WarmStart;
 use super::{Integrator, IntegratorMemory, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
@@ -16,9 +18,11 @@ use crate::body::Body;
 ///
 /// E(x) = ½ Σ m ‖x − x̂‖² + h² (U(x) + h R(x, v)),  x̂ = x₀ + h v₀,  v = (x − x₀)/h,
 ///
-/// R the dissipation function of damping: half the power that linear damping takes. Hessians are exact as long as their sum is positive definite and steps
-/// shrink, for the first dozen iterations; where not, each element's is made positive semi-definite for the next step (projection on demand, Longva, Löschner, Fernández-Fernández,
-/// Larionov, Ascher and Bender 2023). Every step leads downhill, and is halved until it lowers E. First order and dissipative, but the energy of a motion never grows.
+/// R the dissipation function of damping: half the power that linear damping takes. It begins where the last accelerations lead. Hessians are exact as long
+/// as their sum is positive definite and steps shrink; where not, each element's is made positive semi-definite for the next steps (projection on demand,
+/// Longva, Löschner, Fernández-Fernández, Larionov, Ascher and Bender 2023). Every step leads downhill, and is halved until it lowers E; those of projected
+/// Hessians, which are stiffer than the truth, are doubled as long as that lowers it further. First order and dissipative, but the energy of a motion never
+/// grows.
 ///
 /// Needs an energy of every force but drag: with [`crate::fabric::Bending::BridsonForce`], which has none, and with springs damped along
 /// their length, whose Jacobians are not symmetric, use [`super::ImplicitEuler`].
@@ -26,6 +30,7 @@ use crate::body::Body;
 pub struct Newton {
     options: NewtonOptions,
     trial: Trial,
+    warm_start: WarmStart,
     memory: Option<Memory>,
 }
 
@@ -86,14 +91,14 @@ impl std::ops::AddAssign for Phases {
     }
 }
 
-/// Iterations after which Hessians are projected whatever they are: where exact ones keep leading astray, these still converge.
-const PATIENCE: u64 = 12;
 /// Linear systems are solved to this part of the square of what the last iteration left of ∇E, …
 const PROGRESS: f64 = 0.9;
 /// … but no more loosely than by this factor: an iteration of conjugate gradients is cheaper than one of Newton's method.
 const LOOSENING: f64 = 10.0;
 /// Halvings of a step before it counts as stuck: the last is 2⁻⁴⁰ of the first.
 const HALVINGS: usize = 40;
+/// The longest step.
+const LONGEST: f64 = 1024.0;
 /// How much of the decrease that the slope promises must come true (Armijo).
 const DECREASE: f64 = 1e-4;
 /// Decreases are not seen below this part of the energies they are differences of.
@@ -266,13 +271,15 @@ impl Step<'_> {
         Ok((direction, solved))
     }
 
-    /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo), with E there and the part of d; `None` if none does.
+    /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo), with E there and the part of d; `None` if none does. A projected
+    /// direction is too short rather than too long: of x + d, x + 2 d, … the last before E grows.
     fn line_search(
         &mut self,
         x: &[Vector3<f64>],
         energy: (f64, f64),
         down: &[Vector3<f64>],
         direction: &[Vector3<f64>],
+        projected: bool,
     ) -> Result<Option<Found>, EvaluationError> {
         let slope = -dot(down, direction);
         if slope == 0.0 && largest(direction) == 0.0 && largest(down) > 0.0 {
@@ -283,12 +290,33 @@ impl Step<'_> {
             let moved = self.moved(x, scale, direction);
             let trial = self.energy(&moved)?;
             if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
-                return Ok(Some((moved, trial, scale)));
+                let found = (moved, trial, scale);
+                let too_short = projected && scale == 1.0;
+                return Ok(Some(if too_short { self.lengthen(x, found, direction)? } else { found }));
             }
             scale *= 0.5;
             self.report.halvings += 1;
         }
         Ok(None)
+    }
+
+    /// Doubles a step as long as that lowers E.
+    fn lengthen(
+        &mut self,
+        x: &[Vector3<f64>],
+        mut found: Found,
+        direction: &[Vector3<f64>],
+    ) -> Result<Found, EvaluationError> {
+        while found.2 < LONGEST {
+            let scale = 2.0 * found.2;
+            let moved = self.moved(x, scale, direction);
+            let trial = self.energy(&moved)?;
+            if trial.0 >= found.1.0 {
+                break;
+            }
+            found = (moved, trial, scale);
+        }
+        Ok(found)
     }
 
     /// x + s d on the free vertices.
@@ -331,14 +359,14 @@ impl Integrator for Newton {
         // Pinned vertices end there: they move as they are told.
         let inertial = moved_by_velocities(body, dt);
         let mut step = Step { body, dt, inertial, report: StepReport::default() };
-        let mut x = step.inertial.clone();
+        let mut x = self.warm_start.begin(step.body, &step.inertial, dt);
         let mut energy = step.energy(&x)?;
         if !energy.0.is_finite() {
             step.body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = step.body.x[vertex]);
             energy = step.energy(&x)?;
         }
         let (mut converged, mut change) = (false, f64::INFINITY);
-        let (mut curvature, mut last) = (Curvature::Exact, None);
+        let (mut projection, mut last) = (Projection::on_demand(), None);
         while !converged {
             if step.report.solves == self.options.iteration_limit as u64 {
                 return Err(StepError::NotConverged { iterations: step.report.solves, change });
@@ -347,39 +375,44 @@ impl Integrator for Newton {
             if last.is_some_and(|last| self.may_be_enough(last, dt)) && self.is_enough(&step.gradient(&x)?, dt) {
                 break;
             }
+            let curvature = projection.curvature;
             let down = step.linearise(&x, curvature, &mut memory.matrix)?;
             let forcing = self.forcing(largest(&down), last);
             last = Some(forcing);
             let (direction, solved) =
                 step.direction(&x, &down, curvature, &mut memory, &mut self.trial, forcing.tolerance)?;
-            let indefinite = curvature == Curvature::Exact && !solved.converged();
-            let Some((moved, lower, scale)) = step.line_search(&x, energy, &down, &direction)? else {
-                if curvature == Curvature::Exact {
-                    curvature = Curvature::Clamped;
+            let projected = !projection.is_exact();
+            let Some((moved, lower, scale)) = step.line_search(&x, energy, &down, &direction, projected)? else {
+                if !projected {
+                    projection.demand();
                     continue;
                 }
                 return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
             };
             (x, energy) = (moved, lower);
             let before = std::mem::replace(&mut change, scale * largest(&direction) / dt);
-            converged = !indefinite && change < self.options.velocity_tolerance;
-            let shrinks = scale == 1.0 && change < before;
-            let exact_may_do = shrinks && !indefinite && step.report.solves < PATIENCE;
-            curvature = if exact_may_do { Curvature::Exact } else { Curvature::Clamped };
+            if projected || solved.converged() {
+                converged = change < self.options.velocity_tolerance;
+                projection.proceed(scale >= 1.0 && change < before);
+            } else {
+                projection.demand();
+            }
         }
         let v = step.velocities(&x);
         let report = step.report;
+        self.warm_start = WarmStart::after(body, &v, dt, report.solves);
         (body.x, body.v) = (x, v);
         self.memory = Some(memory);
         Ok(report)
     }
 
     fn memory(&self) -> IntegratorMemory {
-        IntegratorMemory { trial: self.trial, ..IntegratorMemory::default() }
+        let warm_start = self.warm_start.clone();
+        IntegratorMemory { trial: self.trial, warm_start, ..IntegratorMemory::default() }
     }
 
     fn restore(&mut self, memory: IntegratorMemory) {
-        self.trial = memory.trial;
+        (self.trial, self.warm_start) = (memory.trial, memory.warm_start);
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

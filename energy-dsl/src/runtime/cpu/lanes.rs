@@ -3,7 +3,7 @@
 use std::fmt::{self, Debug};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lane::{Lane, check_transposed};
+use super::lane::Lane;
 use super::register::{DoubleRegister, Register, Scalar};
 use super::{Kernel, Level};
 use crate::runtime::elementary::{Atan2, Cos, Double, Exp, Ln, Pow, Sin};
@@ -79,8 +79,12 @@ impl<R: Register> Lane<R::Scalar> for Lanes<R> {
     }
     #[inline(always)]
     fn store_transposed(numbers: &[Self], count: usize, out: &mut [R::Scalar], stride: usize) {
-        check_transposed::<R::Scalar, Self>(numbers.len(), count, out.len(), stride);
         R::store_transposed(numbers, count, out, stride);
+    }
+    #[inline(always)]
+    fn gather(points: &[[R::Scalar; 3]], indices: &[u32]) -> [Self; 3] {
+        let [x, y, z] = R::gather(points, indices);
+        [Self(x), Self(y), Self(z)]
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a processor's register can do. [`super::lanes`] makes numbers of registers.
 
-use super::lane::{Lane, transpose_by_element};
+use super::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use super::lanes::Lanes;
 use super::{Kernel, Level};
 use crate::runtime::elementary::{Binary, Unary};
@@ -156,9 +156,16 @@ pub trait Register: Copy {
     /// The difference of the bit patterns as integers.
     fn sub_bits(a: Self, b: Self) -> Self;
 
-    /// [`Lane::store_transposed`], its conditions checked.
+    /// [`Lane::gather`].
+    #[inline(always)]
+    fn gather(points: &[[Self::Scalar; 3]], indices: &[u32]) -> [Self; 3] {
+        gather_by_element::<_, Lanes<Self>>(points, indices).map(|lanes| lanes.0)
+    }
+
+    /// [`Lane::store_transposed`].
     #[inline(always)]
     fn store_transposed(numbers: &[Lanes<Self>], count: usize, out: &mut [Self::Scalar], stride: usize) {
+        check_transposed::<_, Lanes<Self>>(numbers.len(), count, out.len(), stride);
         transpose_by_element(numbers, count, out, stride);
     }
 

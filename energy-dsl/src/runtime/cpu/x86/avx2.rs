@@ -2,6 +2,7 @@
 
 use std::arch::x86_64::*;
 
+use super::super::lane::check_transposed;
 use super::super::lanes::Lanes;
 use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
 use super::super::{Kernel, Level};
@@ -63,7 +64,13 @@ impl Register for __m256d {
 
     #[inline(always)]
     fn store_transposed(numbers: &[Lanes<Self>], count: usize, out: &mut [f64], stride: usize) {
-        transpose::avx2(numbers, count, out, stride);
+        check_transposed::<f64, Lanes<Self>>(numbers.len(), count, out.len(), stride);
+        // SAFETY: there are as many places as was checked.
+        unsafe { transpose::store_4(numbers, count, out, stride) };
+    }
+    #[inline(always)]
+    fn gather(points: &[[f64; 3]], indices: &[u32]) -> [Self; 3] {
+        transpose::gather_4(points, indices)
     }
 
     elementary_of_doubles!();

@@ -1,44 +1,45 @@
-//! Lanes written as rows.
+//! Lanes written as rows, and read from rows.
 
 use std::arch::x86_64::*;
 
 use super::super::lanes::Lanes;
+use super::super::register::Register;
 
-/// [`super::super::Lane::store_transposed`] by squares of 4×4. Its conditions were checked.
+/// [`super::super::Lane::store_transposed`] by squares of 4×4, and what is left over number by number.
+///
+/// # Safety
+/// There must be (count − 1) · stride + numbers places.
 #[inline(always)]
-pub fn avx2(numbers: &[Lanes<__m256d>], count: usize, out: &mut [f64], stride: usize) {
-    for (chunk, first) in numbers.chunks(4).zip((0..).step_by(4)) {
-        let mut rows = [chunk[0].0; 4];
-        for i in 0..4 {
-            rows[i] = chunk[i.min(chunk.len() - 1)].0;
-        }
+pub unsafe fn store_4(numbers: &[Lanes<__m256d>], count: usize, out: &mut [f64], stride: usize) {
+    let (squares, rest) = numbers.as_chunks::<4>();
+    let places = out.as_mut_ptr();
+    for (square, first) in squares.iter().zip((0..).step_by(4)) {
         // SAFETY: registers exist where the features were detected.
-        let columns = unsafe { transpose_4(rows) };
+        let columns = unsafe { transpose_4(square.map(|number| number.0)) };
         // All lanes are asked for, so that the loop is unrolled and columns stay in registers.
         for lane in 0..4 {
             if lane == count {
                 break;
             }
-            let place = &mut out[lane * stride + first..][..chunk.len()];
-            if chunk.len() == 4 {
-                // SAFETY: the place has four numbers.
-                unsafe { _mm256_storeu_pd(place.as_mut_ptr(), columns[lane]) };
-            } else {
-                // SAFETY: only as many numbers are written as the place has: those whose mask is negative.
-                unsafe {
-                    let end = _mm256_set1_epi64x(chunk.len() as i64);
-                    let mask = _mm256_cmpgt_epi64(end, _mm256_set_epi64x(3, 2, 1, 0));
-                    _mm256_maskstore_pd(place.as_mut_ptr(), mask, columns[lane]);
-                }
-            }
+            // SAFETY: there are places for the lane's numbers.
+            unsafe { _mm256_storeu_pd(places.add(lane * stride + first), columns[lane]) };
         }
     }
+    store_rest(rest, 4 * squares.len(), count, out, stride);
 }
 
-/// [`super::super::Lane::store_transposed`] by squares of 8×8. Its conditions were checked.
+/// [`super::super::Lane::store_transposed`] by squares of 8×8, and what is left over number by number, if that is not much.
+///
+/// # Safety
+/// There must be (count − 1) · stride + numbers places.
 #[inline(always)]
-pub fn avx512(numbers: &[Lanes<__m512d>], count: usize, out: &mut [f64], stride: usize) {
+pub unsafe fn store_8(numbers: &[Lanes<__m512d>], count: usize, out: &mut [f64], stride: usize) {
+    let places = out.as_mut_ptr();
     for (chunk, first) in numbers.chunks(8).zip((0..).step_by(8)) {
+        if chunk.len() < 3 {
+            store_rest(chunk, first, count, out, stride);
+            break;
+        }
         let mut rows = [chunk[0].0; 8];
         for i in 0..8 {
             rows[i] = chunk[i.min(chunk.len() - 1)].0;
@@ -50,11 +51,94 @@ pub fn avx512(numbers: &[Lanes<__m512d>], count: usize, out: &mut [f64], stride:
             if lane == count {
                 break;
             }
-            let place = &mut out[lane * stride + first..][..chunk.len()];
-            // SAFETY: only as many numbers are written as the place has.
-            unsafe { _mm512_mask_storeu_pd(place.as_mut_ptr(), mask, columns[lane]) };
+            // SAFETY: there are places for as many numbers as are written.
+            unsafe { _mm512_mask_storeu_pd(places.add(lane * stride + first), mask, columns[lane]) };
         }
     }
+}
+
+/// A few numbers, from number `first` on.
+#[inline(always)]
+fn store_rest<R: Register<Scalar = f64>>(
+    numbers: &[Lanes<R>],
+    first: usize,
+    count: usize,
+    out: &mut [f64],
+    stride: usize,
+) {
+    for (row, number) in numbers.iter().enumerate() {
+        let mut lanes = [0.0; 8];
+        number.0.store(&mut lanes);
+        for lane in 0..R::LANES {
+            if lane == count {
+                break;
+            }
+            out[lane * stride + first + row] = lanes[lane];
+        }
+    }
+}
+
+/// The points of four indices: x, y and z.
+///
+/// # Panics
+/// When there is no such point, or there are fewer indices.
+#[inline(always)]
+pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
+    // SAFETY: registers exist where the features were detected.
+    unsafe { turned_4(points, indices) }
+}
+
+/// The points of eight indices: x, y and z.
+///
+/// # Panics
+/// When there is no such point, or there are fewer indices.
+#[inline(always)]
+pub fn gather_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
+    // SAFETY: registers exist where the features were detected.
+    unsafe { turned_8(points, indices) }
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn turned_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
+    let indices = &indices[..4];
+    let point = |lane: usize| load_point(&points[indices[lane] as usize]);
+    let (a, b, c, d) = (point(0), point(1), point(2), point(3));
+    let (xz_low, xz_high) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+    let (y_low, y_high) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+    [
+        _mm256_permute2f128_pd::<0x20>(xz_low, xz_high),
+        _mm256_permute2f128_pd::<0x20>(y_low, y_high),
+        _mm256_permute2f128_pd::<0x31>(xz_low, xz_high),
+    ]
+}
+
+/// A point, and a zero.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn load_point(point: &[f64; 3]) -> __m256d {
+    // SAFETY: only the three numbers are read whose mask is negative.
+    unsafe { _mm256_maskload_pd(point.as_ptr(), _mm256_set_epi64x(0, -1, -1, -1)) }
+}
+
+#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+#[inline]
+fn turned_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
+    let indices = &indices[..8];
+    let pair = |lane: usize| {
+        let (low, high) = (&points[indices[lane] as usize], &points[indices[lane + 4] as usize]);
+        _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(load_point(low)), load_point(high))
+    };
+    let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
+    let (xz_low, xz_high) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));
+    let (y_low, y_high) = (_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d));
+    let first = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0);
+    let second = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
+    [
+        _mm512_permutex2var_pd(xz_low, first, xz_high),
+        _mm512_permutex2var_pd(y_low, first, y_high),
+        _mm512_permutex2var_pd(xz_low, second, xz_high),
+    ]
 }
 
 #[target_feature(enable = "avx2,fma")]

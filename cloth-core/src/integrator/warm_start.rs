@@ -1,0 +1,40 @@
+use energy_dsl::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::body::Body;
+
+/// Where Newton's method begins a step: near where vertices get to with the accelerations of the last.
+///
+/// Accelerations of stiff modes change from step to step, those of soft ones do not. So they are trusted where the last step was easy, and else by half:
+/// x̂ + c h² a, c = 1 after a step of one iteration, ½ after others.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct WarmStart {
+    /// Of all vertices, in m/s²; none before the first step.
+    acceleration: Vec<Vector3<f64>>,
+    /// Whether one iteration was enough.
+    easy: bool,
+}
+
+impl WarmStart {
+    /// After a step that changes the body's velocities to `v`.
+    pub(super) fn after(body: &Body, v: &[Vector3<f64>], dt: f64, iterations: u64) -> Self {
+        let change = |(v, before): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
+            std::array::from_fn(|axis| (v[axis] - before[axis]) / dt)
+        };
+        Self { acceleration: v.iter().zip(&body.v).map(change).collect(), easy: iterations <= 1 }
+    }
+
+    /// Where to begin, from `inertial` positions x̂. Pinned vertices stay there.
+    pub(super) fn begin(&self, body: &Body, inertial: &[Vector3<f64>], dt: f64) -> Vec<Vector3<f64>> {
+        let mut x = inertial.to_vec();
+        if self.acceleration.len() == x.len() {
+            let scale = if self.easy { dt * dt } else { 0.5 * dt * dt };
+            for &vertex in body.system.dofs().free() {
+                for axis in 0..3 {
+                    x[vertex][axis] += scale * self.acceleration[vertex][axis];
+                }
+            }
+        }
+        x
+    }
+}
