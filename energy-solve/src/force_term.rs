@@ -178,7 +178,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 impl<E: ForceLaw<f64>> ForceTerm<E> {
     /// Adds an element's blocks to the matrix: of two that are stored as one, the one that is not turned.
     fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
-        let slots = self.places.of(number);
+        let slots = self.places.of(number..number + 1);
         for (pair, block) in blocks.iter().enumerate() {
             if self.places.turned(number, pair) & 1 == 0 {
                 matrix.add(slots[pair] as usize, weight, block);

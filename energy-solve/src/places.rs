@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use energy_dsl::BLOCK;
 
 use crate::dofs::DofMap;
@@ -39,10 +41,10 @@ impl Places {
         Self { pairs: pairs.len(), slots, turned }
     }
 
-    /// The places of an element's pairs.
+    /// The places of the pairs of elements, one element after the other.
     #[inline(always)]
-    pub(crate) fn of(&self, number: usize) -> &[u32] {
-        &self.slots[number * self.pairs..][..self.pairs]
+    pub(crate) fn of(&self, elements: Range<usize>) -> &[u32] {
+        &self.slots[elements.start * self.pairs..elements.end * self.pairs]
     }
 
     /// Bit e is set where the pair of element `first` + e is turned.

@@ -30,7 +30,9 @@ pub struct PotentialTerm<E> {
     /// The indices of the elements that are evaluated.
     active: Vec<u32>,
     packed: Packed<E>,
+    /// Where blocks go, and those below the diagonal, where all are stored.
     places: Places,
+    mirrored: Places,
     orthonormal: Option<Orthonormal>,
     /// The elements that each share needs, in whole packs.
     shares: Vec<Vec<Range<usize>>>,
@@ -45,7 +47,9 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
     pub fn new(list: ElementList<E>) -> Self {
         let packed = Packed::from_fn(0, list.arity(), |element| &list.elements()[element], |_, _| 0);
         let (count, orthonormal) = (list.elements().len(), Orthonormal::new(E::DECLARATION));
-        Self { list, count, active: Vec::new(), packed, places: Places::default(), orthonormal, shares: Vec::new() }
+        let (active, shares) = (Vec::new(), Vec::new());
+        let (places, mirrored) = (Places::default(), Places::default());
+        Self { list, count, active, packed, places, mirrored, orthonormal, shares }
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -110,6 +114,7 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
             first_block,
             velocities: state.v,
             places: &self.places,
+            mirrored: &self.mirrored,
             orthonormal: self.orthonormal.as_ref(),
             vectors: VectorRoom::new(n),
             triangles: TriangleRoom::new(n),
@@ -182,11 +187,11 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
         let vertex = |number: usize, point: usize| self.list.stencil(active(number))[point];
         self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[active(number)], vertex);
         if self.character().curved {
-            let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
+            let places = |pairs: &[_]| Places::new(&self.active, self.list.stencils(), pairs, dofs, pattern);
+            self.places = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
             if pattern.storage() == Storage::Whole {
-                pairs.extend((0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))));
+                self.mirrored = places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>());
             }
-            self.places = Places::new(&self.active, self.list.stencils(), &pairs, dofs, pattern);
         }
     }
 
@@ -298,6 +303,7 @@ struct Hessians<'a, 'b> {
     first_block: usize,
     velocities: &'a [Vector3<f64>],
     places: &'a Places,
+    mirrored: &'a Places,
     orthonormal: Option<&'a Orthonormal>,
     vectors: VectorRoom,
     triangles: TriangleRoom,
@@ -394,13 +400,11 @@ impl Hessians<'_, '_> {
     #[inline(always)]
     fn scatter<L: Level>(&mut self, first: usize, count: usize, triangle: &[[Vector3<L::F64>; 3]]) {
         self.triangles.fill::<L>(-self.sum.weights.position, triangle);
+        let (pairs, elements) = (triangle.len(), first..first + count);
+        let (slots, mirrored) = (self.places.of(elements.clone()), self.mirrored.of(elements));
         match &mut self.sum.matrix {
-            Blocks::Single(matrix) => {
-                self.triangles.add_to((first, count), self.places, self.first_block, matrix);
-            }
-            Blocks::Double(matrix) => {
-                self.triangles.add_to((first, count), self.places, self.first_block, matrix);
-            }
+            Blocks::Single(matrix) => self.triangles.add_to(pairs, slots, mirrored, self.first_block, matrix),
+            Blocks::Double(matrix) => self.triangles.add_to(pairs, slots, mirrored, self.first_block, matrix),
         }
     }
 }

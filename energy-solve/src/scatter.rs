@@ -3,7 +3,6 @@
 
 use energy_dsl::{BLOCK, Batch, Block, Lane, Level, PackedPotential, Vector3, triangle_index};
 
-use crate::places::Places;
 use crate::precision::Precision;
 
 /// Room for a vector at each point of a batch's elements: number by number for all elements.
@@ -30,7 +29,7 @@ impl VectorRoom {
         for (stored, number) in numbers.iter_mut().zip(vectors.as_flattened()) {
             number.store(stored);
         }
-        for lane in 0..batch.count {
+        for lane in 0..batch.count.min(BLOCK) {
             for point in 0..vectors.len() {
                 let vertex = (batch.vertices(point)[lane] as usize).wrapping_sub(first_vertex);
                 if let Some(vector) = sums.get_mut(vertex) {
@@ -75,42 +74,44 @@ impl TriangleRoom {
         }
     }
 
-    /// Adds the blocks of `count` elements, the first of which is number `first`, to those of the matrix from the first block on.
+    /// Adds the blocks of elements to those of the matrix from the first block on. `pairs` is how many blocks an element has, known where this is
+    /// compiled into.
     #[inline(always)]
     pub(crate) fn add_to<T: Precision>(
         &self,
-        (first, count): (usize, usize),
-        places: &Places,
+        pairs: usize,
+        slots: &[u32],
+        mirrored: &[u32],
         first_block: usize,
         matrix: &mut [Block<T>],
     ) {
-        for lane in 0..count {
-            let slots = places.of(first + lane);
-            let eights = &self.eights[lane * self.pairs..][..self.pairs];
-            for pair in 0..self.pairs {
-                let slot = (slots[pair] as usize).wrapping_sub(first_block);
-                if let Some(block) = matrix.get_mut(slot) {
+        let elements = slots.chunks_exact(pairs).zip(self.eights.chunks_exact(pairs)).enumerate().take(BLOCK);
+        for (lane, (slots, eights)) in elements {
+            for pair in 0..pairs {
+                if let Some(block) = matrix.get_mut((slots[pair] as usize).wrapping_sub(first_block)) {
                     add_block(block, &eights[pair], self.ninths[pair][lane]);
                 }
             }
-            if slots.len() > self.pairs {
-                self.add_mirrored(lane, &slots[self.pairs..], first_block, matrix);
-            }
+        }
+        if !mirrored.is_empty() {
+            self.add_mirrored(mirrored, first_block, matrix);
         }
     }
 
     /// Adds the blocks below the diagonal, where other terms make the matrix one that is not symmetric.
     #[inline(never)]
-    fn add_mirrored<T: Precision>(&self, lane: usize, slots: &[u32], first_block: usize, matrix: &mut [Block<T>]) {
+    fn add_mirrored<T: Precision>(&self, slots: &[u32], first_block: usize, matrix: &mut [Block<T>]) {
         let n = points_of_triangle(self.pairs);
-        let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| triangle_index(n, i, j)));
-        for (&slot, pair) in slots.iter().zip(pairs) {
-            let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first_block)) else { continue };
-            let eight = &self.eights[lane * self.pairs + pair];
-            for row in 0..3 {
-                for column in 0..3 {
-                    let entry = eight.get(3 * column + row).unwrap_or(&self.ninths[pair][lane]);
-                    block[row][column] = block[row][column] + T::from_f64(*entry);
+        let below: Vec<usize> = (0..n).flat_map(|i| (i + 1..n).map(move |j| triangle_index(n, i, j))).collect();
+        for (lane, slots) in slots.chunks_exact(below.len()).enumerate() {
+            for (&slot, &pair) in slots.iter().zip(&below) {
+                let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first_block)) else { continue };
+                let eight = &self.eights[lane * self.pairs + pair];
+                for row in 0..3 {
+                    for column in 0..3 {
+                        let entry = eight.get(3 * column + row).unwrap_or(&self.ninths[pair][lane]);
+                        block[row][column] = block[row][column] + T::from_f64(*entry);
+                    }
                 }
             }
         }

@@ -78,14 +78,24 @@ fn store_rest<R: Register<Scalar = f64>>(
     }
 }
 
-/// The points of four indices: x, y and z.
+/// The points of four indices: x, y and z. It is compiled into its callers: a call would cost more than the work.
 ///
 /// # Panics
 /// When there is no such point, or there are fewer indices.
 #[inline(always)]
 pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
+    let indices = &indices[..4];
+    let [a, b, c, d] = [0, 1, 2, 3].map(|lane| load_point(&points[indices[lane] as usize]));
     // SAFETY: registers exist where the features were detected.
-    unsafe { turned_4(points, indices) }
+    unsafe {
+        let (xz_low, xz_high) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+        let (y_low, y_high) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+        [
+            _mm256_permute2f128_pd::<0x20>(xz_low, xz_high),
+            _mm256_permute2f128_pd::<0x20>(y_low, y_high),
+            _mm256_permute2f128_pd::<0x31>(xz_low, xz_high),
+        ]
+    }
 }
 
 /// The points of eight indices: x, y and z.
@@ -94,51 +104,36 @@ pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
 /// When there is no such point, or there are fewer indices.
 #[inline(always)]
 pub fn gather_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
+    let indices = &indices[..8];
+    let mut pairs = [[load_point(&points[indices[0] as usize]); 2]; 4];
+    for lane in 0..8 {
+        pairs[lane % 4][lane / 4] = load_point(&points[indices[lane] as usize]);
+    }
     // SAFETY: registers exist where the features were detected.
-    unsafe { turned_8(points, indices) }
-}
-
-#[target_feature(enable = "avx2,fma")]
-#[inline]
-fn turned_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
-    let indices = &indices[..4];
-    let point = |lane: usize| load_point(&points[indices[lane] as usize]);
-    let (a, b, c, d) = (point(0), point(1), point(2), point(3));
-    let (xz_low, xz_high) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
-    let (y_low, y_high) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
-    [
-        _mm256_permute2f128_pd::<0x20>(xz_low, xz_high),
-        _mm256_permute2f128_pd::<0x20>(y_low, y_high),
-        _mm256_permute2f128_pd::<0x31>(xz_low, xz_high),
-    ]
+    unsafe {
+        let [a, b, c, d] = [
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(pairs[0][0]), pairs[0][1]),
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(pairs[1][0]), pairs[1][1]),
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(pairs[2][0]), pairs[2][1]),
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(pairs[3][0]), pairs[3][1]),
+        ];
+        let (xz_low, xz_high) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));
+        let (y_low, y_high) = (_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d));
+        let first = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0);
+        let second = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
+        [
+            _mm512_permutex2var_pd(xz_low, first, xz_high),
+            _mm512_permutex2var_pd(y_low, first, y_high),
+            _mm512_permutex2var_pd(xz_low, second, xz_high),
+        ]
+    }
 }
 
 /// A point, and a zero.
-#[target_feature(enable = "avx2,fma")]
-#[inline]
+#[inline(always)]
 fn load_point(point: &[f64; 3]) -> __m256d {
-    // SAFETY: only the three numbers are read whose mask is negative.
+    // SAFETY: registers exist where the features were detected, and only the three numbers are read whose mask is negative.
     unsafe { _mm256_maskload_pd(point.as_ptr(), _mm256_set_epi64x(0, -1, -1, -1)) }
-}
-
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
-#[inline]
-fn turned_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
-    let indices = &indices[..8];
-    let pair = |lane: usize| {
-        let (low, high) = (&points[indices[lane] as usize], &points[indices[lane + 4] as usize]);
-        _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(load_point(low)), load_point(high))
-    };
-    let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
-    let (xz_low, xz_high) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));
-    let (y_low, y_high) = (_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d));
-    let first = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0);
-    let second = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
-    [
-        _mm512_permutex2var_pd(xz_low, first, xz_high),
-        _mm512_permutex2var_pd(y_low, first, y_high),
-        _mm512_permutex2var_pd(xz_low, second, xz_high),
-    ]
 }
 
 #[target_feature(enable = "avx2,fma")]
