@@ -13,6 +13,7 @@ pub(crate) fn active_elements(stencils: Stencils<'_>, dofs: &DofMap) -> Vec<u32>
 }
 
 /// The vectors of an element's vertices.
+#[inline(always)]
 pub(crate) fn points_of<Points: Array<Vector3<f64>>>(stencil: &[u32], all: &[Vector3<f64>]) -> Points {
     Points::from_fn(|point| all[stencil[point] as usize])
 }

@@ -1,6 +1,6 @@
 use std::fmt::{self, Debug};
 
-use energy_dsl::{Array, Block, Declaration, ForceLaw, Potential, Value, Vector3};
+use energy_dsl::{Array, Block, Declaration, ForceLaw, Kernel, Level, Potential, Value, Vector3, dispatch};
 
 use crate::active::{active_elements, points_of};
 use crate::counts::Tally;
@@ -93,21 +93,9 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
         }
     }
 
-    fn dissipation(&self, State { x, v }: State<'_>) -> Option<(f64, Tally)> {
-        let (mut sum, mut flagged) = (0.0, 0);
-        for element in self.active() {
-            let (law, stencil) = (&self.list.elements()[element], self.list.stencil(element));
-            let (points, rates): (E::Points, E::Points) = (points_of(stencil, x), points_of(stencil, v));
-            let still = <E::Points as Array<Vector3<f64>>>::repeat([0.0; 3]);
-            let (moving, still) = (law.force(&points, &rates), law.force(&points, &still));
-            for (point, rate) in rates.as_ref().iter().enumerate() {
-                for axis in 0..3 {
-                    sum += 0.5 * (still.force.as_ref()[point][axis] - moving.force.as_ref()[point][axis]) * rate[axis];
-                }
-            }
-            flagged += u64::from(moving.flags.any());
-        }
-        E::DECLARATION.velocity_dependent.then(|| (sum, self.tally(flagged)))
+    fn dissipation(&self, state: State<'_>) -> Option<(f64, Tally)> {
+        let evaluated = E::DECLARATION.velocity_dependent.then(|| dispatch(Dissipation { term: self, state }));
+        evaluated.map(|(sum, flagged)| (sum, self.tally(flagged)))
     }
 
     fn has_energy(&self) -> bool {
@@ -128,15 +116,8 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
         self.active().map(|number| Some((number, self.value(number, x)?.value))).collect()
     }
 
-    fn add_force(&self, State { x, v }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
-        let mut flagged = 0;
-        for element in self.active() {
-            let stencil = self.list.stencil(element);
-            let result = self.list.elements()[element].force(&points_of(stencil, x), &points_of(stencil, v));
-            add_vectors(stencil, result.force.as_ref(), force);
-            flagged += u64::from(result.flags.any());
-        }
-        self.tally(flagged)
+    fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        self.tally(dispatch(Forces { term: self, state, force }))
     }
 
     fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
@@ -175,6 +156,61 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     }
 }
 
+/// Σ ½ (f(x, 0) − f(x, v)) · v, and how many elements were flagged: a loop compiled for the level.
+struct Dissipation<'a, E: ForceLaw<f64>> {
+    term: &'a ForceTerm<E>,
+    state: State<'a>,
+}
+
+impl<E: ForceLaw<f64>> Kernel for Dissipation<'_, E> {
+    type Output = (f64, u64);
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> (f64, u64) {
+        let Self { term, state: State { x, v } } = self;
+        let still = <E::Points as Array<Vector3<f64>>>::repeat([0.0; 3]);
+        let (mut sum, mut flagged) = (0.0, 0);
+        for &element in &term.active {
+            let (law, stencil) = (&term.list.elements()[element as usize], term.list.stencil(element as usize));
+            let (points, rates): (E::Points, E::Points) = (points_of(stencil, x), points_of(stencil, v));
+            let (moving, at_rest) = (law.force_at::<L>(&points, &rates), law.force_at::<L>(&points, &still));
+            let mut power = 0.0;
+            for (point, rate) in rates.as_ref().iter().enumerate() {
+                for axis in 0..3 {
+                    power += (at_rest.force.as_ref()[point][axis] - moving.force.as_ref()[point][axis]) * rate[axis];
+                }
+            }
+            sum += 0.5 * power;
+            flagged += u64::from(moving.flags.any());
+        }
+        (sum, flagged)
+    }
+}
+
+/// Adds forces, and returns how many elements were flagged.
+struct Forces<'a, 'b, E: ForceLaw<f64>> {
+    term: &'a ForceTerm<E>,
+    state: State<'a>,
+    force: &'b mut [Vector3<f64>],
+}
+
+impl<E: ForceLaw<f64>> Kernel for Forces<'_, '_, E> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> u64 {
+        let Self { term, state: State { x, v }, force } = self;
+        let mut flagged = 0;
+        for &element in &term.active {
+            let (law, stencil) = (&term.list.elements()[element as usize], term.list.stencil(element as usize));
+            let result = law.force_at::<L>(&points_of(stencil, x), &points_of(stencil, v));
+            add_vectors(stencil, result.force.as_ref(), force);
+            flagged += u64::from(result.flags.any());
+        }
+        flagged
+    }
+}
+
 impl<E: ForceLaw<f64>> ForceTerm<E> {
     /// Adds an element's blocks to the matrix: of two that are stored as one, the one that is not turned.
     fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
@@ -187,6 +223,7 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     }
 }
 
+#[inline(always)]
 fn add_vectors(stencil: &[u32], vectors: &[Vector3<f64>], all: &mut [Vector3<f64>]) {
     for (&vertex, vector) in stencil.iter().zip(vectors) {
         for axis in 0..3 {

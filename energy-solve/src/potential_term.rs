@@ -1,5 +1,6 @@
 use std::fmt::Debug;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use energy_dsl::{
     Array, BLOCK, Batch, BatchWork, Declaration, Lane, Level, Mask, Number, Packed, PackedPotential, Potential,
@@ -21,7 +22,7 @@ use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, S
 ///
 /// Elements are evaluated many at once, over lanes. Everything is summed up in the order of the elements: results do not depend on
 /// how many there are at once.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct PotentialTerm<E> {
     /// Without its elements, once they are packed.
     list: ElementList<E>,
@@ -36,10 +37,12 @@ pub struct PotentialTerm<E> {
     orthonormal: Option<Orthonormal>,
     /// The elements that each share needs, in whole packs.
     shares: Vec<Vec<Range<usize>>>,
+    /// U of each pack, where it was evaluated last. Shares that need the same pack find the same.
+    energies: Vec<AtomicU64>,
 }
 
-/// Elements of a part of the energy.
-const ENERGY_PART: usize = 256 * BLOCK;
+/// Packs of a part of the energy.
+const ENERGY_PART: usize = 256;
 
 impl<E: PackedPotential<f64>> PotentialTerm<E> {
     /// The sum of the potentials of a list. Hessians that the declaration proves zero (gravity's) are never evaluated.
@@ -49,7 +52,7 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
         let (count, orthonormal) = (list.elements().len(), Orthonormal::new(E::DECLARATION));
         let (active, shares) = (Vec::new(), Vec::new());
         let (places, mirrored) = (Places::default(), Places::default());
-        Self { list, count, active, packed, places, mirrored, orthonormal, shares }
+        Self { list, count, active, packed, places, mirrored, orthonormal, shares, energies: Vec::new() }
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -92,7 +95,7 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
         force: &mut [Vector3<f64>],
     ) -> u64 {
         let room = VectorRoom::new(self.list.arity());
-        let mut gradients = Gradients { force, first_vertex, room, flagged: 0 };
+        let mut gradients = Gradients { force, first_vertex, room, energies: self.pack_energies(), flagged: 0 };
         for pack in packs {
             for_each_batch_in(&self.packed, pack.clone(), x, &mut gradients);
         }
@@ -119,6 +122,7 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
             vectors: VectorRoom::new(n),
             triangles: TriangleRoom::new(n),
             numbers: vec![0.0; MOST_NUMBERS * BLOCK],
+            energies: self.pack_energies(),
             flagged: 0,
             projected: 0,
         };
@@ -126,6 +130,17 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
             for_each_batch_in(&self.packed, pack.clone(), state.x, &mut hessians);
         }
         (hessians.flagged, hessians.projected)
+    }
+
+    /// Where energies are noted.
+    fn pack_energies(&self) -> PackEnergies<'_> {
+        PackEnergies { elements: self.active.len(), lanes: [0.0; BLOCK], found: &self.energies }
+    }
+
+    /// The energy of a part, from that of its packs.
+    fn found_in(&self, part: usize) -> f64 {
+        let packs = &self.energies[(part * ENERGY_PART).min(self.energies.len())..];
+        packs.iter().take(ENERGY_PART).map(|energy| f64::from_bits(energy.load(Relaxed))).sum()
     }
 
     /// All elements.
@@ -137,16 +152,17 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
 impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PotentialTerm<E> {
     fn energy_parts(&self) -> usize {
         // One at least, to say what was skipped.
-        self.active.len().div_ceil(ENERGY_PART).max(1)
+        self.energies.len().div_ceil(ENERGY_PART).max(1)
     }
 
     fn energy_part(&self, part: usize, x: &[Vector3<f64>]) -> (f64, Tally) {
-        let mut values = Values { sums: [0.0; BLOCK], flagged: 0 };
-        let elements = part * ENERGY_PART..((part + 1) * ENERGY_PART).min(self.active.len());
+        let mut values = Values { energies: self.pack_energies(), flagged: 0 };
+        let packs = part * ENERGY_PART..(part + 1) * ENERGY_PART;
+        let elements = packs.start * BLOCK..(packs.end * BLOCK).min(self.active.len());
         for_each_batch_in(&self.packed, elements, x, &mut values);
         let flagged = values.flagged;
         let tally = if part == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } };
-        (values.sums.iter().sum(), tally)
+        (self.found_in(part), tally)
     }
 
     fn add_force_of(&self, share: &Share, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -186,6 +202,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
         let active = |number: usize| self.active[number] as usize;
         let vertex = |number: usize, point: usize| self.list.stencil(active(number))[point];
         self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[active(number)], vertex);
+        self.energies = (0..self.active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect();
         if self.character().curved {
             let places = |pairs: &[_]| Places::new(&self.active, self.list.stencils(), pairs, dofs, pattern);
             self.places = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
@@ -215,6 +232,10 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
             tally += of_part;
         }
         Some((sum, tally))
+    }
+
+    fn energy_found(&self) -> Option<f64> {
+        Some((0..self.energy_parts()).map(|part| self.found_in(part)).sum())
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
@@ -259,19 +280,45 @@ fn count_owned(lanes: u32, vertices: &[u32], first: usize, count: usize) -> u64 
     (0..vertices.len()).filter(|lane| lanes >> lane & 1 == 1).filter(owned).count() as u64
 }
 
-/// Σ U, as one sum for each place in a block, so that it is the same for any number of lanes.
-struct Values {
-    sums: [f64; BLOCK],
+/// Σ U of each pack, always summed up in the same way, so that it is the same for any number of lanes.
+struct PackEnergies<'a> {
+    /// How many elements there are.
+    elements: usize,
+    lanes: [f64; BLOCK],
+    found: &'a [AtomicU64],
+}
+
+impl PackEnergies<'_> {
+    #[inline(always)]
+    fn note<E: PackedPotential<f64>, L: Level>(&mut self, batch: &Batch<'_, E, L::F64>, values: L::F64) {
+        let place = batch.first % BLOCK;
+        values.store(&mut self.lanes[place..]);
+        let next = place + <L::F64 as Lane<f64>>::LANES;
+        if next == BLOCK || batch.first + batch.count == self.elements {
+            // What no element has written is left over from others.
+            self.lanes[place + batch.count..].fill(0.0);
+            let mut sums = self.lanes;
+            for width in [8, 4, 2, 1] {
+                for lane in 0..width {
+                    sums[lane] += sums[lane + width];
+                }
+            }
+            self.found[batch.first / BLOCK].store(sums[0].to_bits(), Relaxed);
+        }
+    }
+}
+
+/// Σ U.
+struct Values<'a> {
+    energies: PackEnergies<'a>,
     flagged: u64,
 }
 
-impl<E: PackedPotential<f64>> BatchWork<E> for Values {
+impl<E: PackedPotential<f64>> BatchWork<E> for Values<'_> {
     #[inline(always)]
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let result = batch.element.value_at::<L>(batch.points);
-        let sums = &mut self.sums[batch.first % BLOCK..][..batch.count];
-        let sum = L::F64::load_ragged(sums) + result.value;
-        sum.store_ragged(sums);
+        self.energies.note::<E, L>(&batch, result.value);
         let flags = result.flags.degenerate | result.flags.kink;
         self.flagged += u64::from(lanes_in(flags, batch.count).count_ones());
     }
@@ -282,6 +329,7 @@ struct Gradients<'a> {
     force: &'a mut [Vector3<f64>],
     first_vertex: usize,
     room: VectorRoom,
+    energies: PackEnergies<'a>,
     flagged: u64,
 }
 
@@ -290,6 +338,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let result = batch.element.gradient_at::<L>(batch.points);
         let gradient = result.gradient.as_ref();
+        self.energies.note::<E, L>(&batch, result.value);
         self.room.subtract::<E, L>(&batch, gradient, self.first_vertex, self.force);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
         self.flagged += count_owned(flagged, batch.vertices(0), self.first_vertex, self.force.len());
@@ -309,6 +358,7 @@ struct Hessians<'a, 'b> {
     triangles: TriangleRoom,
     /// What [`Indefinite`] needs.
     numbers: Vec<f64>,
+    energies: PackEnergies<'a>,
     flagged: u64,
     projected: u64,
 }
@@ -333,6 +383,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         if self.orthonormal.is_none() && !exact {
             projected = change_one_by_one(result.hessian.as_mut(), batch.count, self.sum.curvature);
         }
+        self.energies.note::<E, L>(&batch, result.value);
         self.vectors.subtract::<E, L>(&batch, result.gradient.as_ref(), self.first_vertex, self.sum.force);
         if let Some(product) = &mut self.sum.stiffness_times_velocity {
             let first_vertex = self.first_vertex;

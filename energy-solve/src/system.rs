@@ -4,7 +4,7 @@ use std::sync::Arc;
 use energy_dsl::{Block, Vector3};
 
 use crate::constant::{Constant, coupled_runs};
-use crate::counts::Counts;
+use crate::counts::{Counts, Tally};
 use crate::curvature::Curvature;
 use crate::division::{self, Sums};
 use crate::dofs::DofMap;
@@ -112,6 +112,8 @@ pub struct System {
     terms: Vec<Counted>,
     threads: usize,
     shares: Vec<Share>,
+    /// Where forces were evaluated last, and some energies with them.
+    evaluated_at: Vec<Vector3<f64>>,
 }
 
 /// A term, and what it did.
@@ -146,7 +148,7 @@ impl System {
             Counted { term, counts: Counts::default() }
         };
         let terms = terms.into_iter().map(placed).collect();
-        let mut system = Self { dofs, pattern, terms, threads: 1, shares: Vec::new() };
+        let mut system = Self { dofs, pattern, terms, threads: 1, shares: Vec::new(), evaluated_at: Vec::new() };
         system.set_threads(1);
         Ok(system)
     }
@@ -213,19 +215,27 @@ impl System {
         self.terms.iter().map(|counted| (&*counted.term, counted.counts))
     }
 
-    /// The energy of each term, of all elements with a free vertex (the energy of the others is constant).
+    /// The energy of each term, of all elements with a free vertex (the energy of the others is constant). What came with forces or Jacobians, if they
+    /// were evaluated last at these very positions, is not evaluated again.
     ///
     /// # Errors
     /// When positions are missing or not finite, or an energy is not finite.
     pub fn energies(&mut self, x: &[Vector3<f64>]) -> Result<Vec<TermEnergy<'_>>, EvaluationError> {
         self.check_state("position", x)?;
-        let divided = division::energies(&self.divisible(|_| false), self.shares.len(), x);
+        let known = self.evaluated_at == x;
+        if !known {
+            self.evaluated_at.clear();
+        }
+        let found = |term: &dyn Term| if known { term.energy_found() } else { None };
+        let found: Vec<Option<f64>> = self.terms.iter().map(|counted| found(&*counted.term)).collect();
+        let mut divisible = self.divisible(|_| false);
+        divisible.iter_mut().zip(&found).filter(|(_, found)| found.is_some()).for_each(|(term, _)| *term = None);
+        let divided = division::energies(&divisible, self.shares.len(), x);
         let mut energies = Vec::with_capacity(self.terms.len());
-        for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
-            let energy = divided.or_else(|| term.energy(x)).map(|(energy, tally)| {
-                counts.value += tally;
-                energy
-            });
+        for ((Counted { term, counts }, divided), found) in self.terms.iter_mut().zip(divided).zip(found) {
+            let evaluated = if found.is_some() { None } else { divided.or_else(|| term.energy(x)) };
+            counts.value += evaluated.map_or_else(Tally::default, |(_, tally)| tally);
+            let energy = found.or(evaluated.map(|(energy, _)| energy));
             if energy.is_some_and(|energy| !energy.is_finite()) {
                 return Err(blame(std::iter::once(&**term), Quantity::Energy, State { x, v: &[] }));
             }
@@ -240,6 +250,7 @@ impl System {
     /// When the state is incomplete or not finite.
     pub fn begin_step(&mut self, start: StepStart<'_>) -> Result<(), EvaluationError> {
         self.check(start.state)?;
+        self.evaluated_at.clear();
         self.terms.iter_mut().for_each(|counted| counted.term.begin_step(start));
         Ok(())
     }
@@ -268,6 +279,7 @@ impl System {
     pub fn forces(&mut self, state: State<'_>) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         self.check(state)?;
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
+        state.x.clone_into(&mut self.evaluated_at);
         let divided = division::forces(&self.divisible(|_| false), &self.shares, state, &mut force);
         for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
             counts.gradient += divided.unwrap_or_else(|| term.add_force(state, &mut force));
@@ -325,6 +337,7 @@ impl System {
         let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
         let mut product = if wanted { force.clone() } else { Vec::new() };
         let product_wanted = wanted.then_some(&mut product[..]);
+        state.x.clone_into(&mut self.evaluated_at);
         let values = matrix.values_and_nowhere();
         let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
         let divided =

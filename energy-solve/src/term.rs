@@ -160,6 +160,10 @@ pub trait Term: std::fmt::Debug {
     fn has_energy(&self) -> bool;
     /// Σ U; `None` for a force law.
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)>;
+    /// Σ U at the positions where forces or Jacobians were evaluated last, if it came with them.
+    fn energy_found(&self) -> Option<f64> {
+        None
+    }
     /// U of each evaluated element, with its number among the stencils: for pictures of where energy is. `None` where it is not known by elements.
     fn element_energies(&self, _x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
         None

@@ -6,7 +6,7 @@ use elements::{AnySpring, Damper, Spring};
 use energy_dsl::Vector3;
 use energy_solve::{
     BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, LinearisationOptions, ListError, PotentialTerm,
-    Quantity, State, System, SystemError, Term, Weights,
+    Quantity, State, StepStart, System, SystemError, Term, Weights,
 };
 
 const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [4, 1]];
@@ -207,12 +207,51 @@ fn pinning_removes_rows_and_columns() {
 fn counts_say_what_was_evaluated_and_skipped() {
     let mut system = system(&[0, 3]);
     assembled(&mut system, Weights { position: 1.0, velocity: 0.0 });
-    system.energies(&positions()).unwrap();
+    system.energies(&velocities()).unwrap();
     let counts: Vec<_> = system.terms().map(|(_, counts)| counts).collect();
     // Only edge 3–0 has both ends pinned.
     assert_eq!((counts[0].hessian.evaluated, counts[0].hessian.skipped), (5, 1));
     assert_eq!((counts[0].value.evaluated, counts[0].gradient.evaluated), (5, 0));
     assert_eq!((counts[1].hessian.evaluated, counts[1].value.evaluated), (5, 0), "a force law has no energy");
+}
+
+#[test]
+fn energies_that_came_with_forces_are_not_evaluated_again() {
+    let mut system = System::new(vec![springs(), slack_springs(), dampers()], &[false; 5]).unwrap();
+    let (x, v) = (positions(), velocities());
+    let state = State { x: &x, v: &v };
+    let energies = |system: &mut System| -> Vec<Option<f64>> {
+        system.energies(&x).unwrap().into_iter().map(|term| term.energy).collect()
+    };
+    let evaluated = |system: &System| system.terms().map(|(_, counts)| counts.value.evaluated).sum::<u64>();
+    let expected = energies(&mut system);
+    let before = evaluated(&system);
+    assert!(expected[0].is_some() && expected[1].is_some() && expected[2].is_none());
+    let agree = |found: Vec<Option<f64>>| {
+        for (found, expected) in found.into_iter().zip(&expected) {
+            let difference = found.unwrap_or(0.0) - expected.unwrap_or(0.0);
+            assert!(difference.abs() <= 1e-15 * expected.unwrap_or(0.0), "{found:?}, not {expected:?}");
+        }
+    };
+
+    system.forces(state).unwrap();
+    agree(energies(&mut system));
+    let mut matrix = system.matrix();
+    let weights = Weights { position: 1.0, velocity: 0.0 };
+    system.linearise(state, options(weights, Curvature::Exact), &mut matrix).unwrap();
+    agree(energies(&mut system));
+    agree(energies(&mut system));
+    assert_eq!(evaluated(&system), before);
+
+    // Elsewhere they are, and after a step began, which may change what terms hold fixed.
+    let elsewhere = velocities();
+    assert!(system.energies(&elsewhere).unwrap()[0].energy != expected[0]);
+    agree(energies(&mut system));
+    assert_eq!(evaluated(&system), 3 * before);
+    system.forces(state).unwrap();
+    system.begin_step(StepStart { time: 0.0, dt: 0.01, state }).unwrap();
+    agree(energies(&mut system));
+    assert_eq!(evaluated(&system), 4 * before);
 }
 
 #[test]

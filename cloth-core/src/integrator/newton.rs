@@ -140,8 +140,19 @@ struct Forcing {
     tolerance: f64,
 }
 
-/// Where a line search ended, E there, and the part of the direction that was taken.
-type Found = (Vec<Vector3<f64>>, (f64, f64), f64);
+/// Where a line search ended.
+struct Found {
+    x: Vec<Vector3<f64>>,
+    /// E there, and the size of the numbers it is made of.
+    energy: (f64, f64),
+    /// The part of the direction that was taken.
+    scale: f64,
+    /// −∇E there, if it was looked at.
+    down: Option<Vec<Vector3<f64>>>,
+}
+
+/// E and −∇E.
+type Start = ((f64, f64), Vec<Vector3<f64>>);
 
 /// A step on its way.
 struct Step<'a> {
@@ -170,11 +181,8 @@ impl Step<'_> {
             sum += 0.5 * self.body.masses[vertex] * away.iter().map(|component| component * component).sum::<f64>();
         }
         size += sum;
-        let energies = match self.body.system.energies(x) {
-            Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => {
-                return Ok((f64::INFINITY, f64::INFINITY));
-            }
-            energies => energies?,
+        let Some(energies) = if_finite(self.body.system.energies(x))? else {
+            return Ok((f64::INFINITY, f64::INFINITY));
         };
         for energy in energies.iter().filter_map(|term| term.energy) {
             sum += self.dt * self.dt * energy;
@@ -206,6 +214,18 @@ impl Step<'_> {
         let down = self.downhill(x, &linear.force);
         self.report.phases.assembly += started.elapsed();
         Ok(down)
+    }
+
+    /// E, −∇E and the matrix; nothing where they are not finite.
+    fn linearise_where_finite(
+        &mut self,
+        x: &[Vector3<f64>],
+        curvature: Curvature,
+        matrix: &mut BlockMatrix<f32>,
+    ) -> Result<Option<Start>, EvaluationError> {
+        let Some(down) = if_finite(self.linearise(x, curvature, matrix))? else { return Ok(None) };
+        let energy = self.energy(x)?;
+        Ok(energy.0.is_finite().then_some((energy, down)))
     }
 
     /// −∇E alone.
@@ -271,15 +291,15 @@ impl Step<'_> {
         Ok((direction, solved))
     }
 
-    /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo), with E there and the part of d; `None` if none does. A projected
-    /// direction is too short rather than too long: of x + d, x + 2 d, … the last before E grows.
+    /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo); `None` if none does. A projected direction is too short rather than too
+    /// long: of x + d, x + 2 d, … the last before E grows. Where −∇E may turn out to be small enough (`look`), it is evaluated with E.
     fn line_search(
         &mut self,
         x: &[Vector3<f64>],
         energy: (f64, f64),
         down: &[Vector3<f64>],
         direction: &[Vector3<f64>],
-        projected: bool,
+        (projected, look): (bool, bool),
     ) -> Result<Option<Found>, EvaluationError> {
         let slope = -dot(down, direction);
         if slope == 0.0 && largest(direction) == 0.0 && largest(down) > 0.0 {
@@ -288,9 +308,10 @@ impl Step<'_> {
         let mut scale = 1.0;
         for _ in 0..=HALVINGS {
             let moved = self.moved(x, scale, direction);
+            let down = if look && scale == 1.0 { if_finite(self.gradient(&moved))? } else { None };
             let trial = self.energy(&moved)?;
             if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
-                let found = (moved, trial, scale);
+                let found = Found { x: moved, energy: trial, scale, down };
                 let too_short = projected && scale == 1.0;
                 return Ok(Some(if too_short { self.lengthen(x, found, direction)? } else { found }));
             }
@@ -307,14 +328,14 @@ impl Step<'_> {
         mut found: Found,
         direction: &[Vector3<f64>],
     ) -> Result<Found, EvaluationError> {
-        while found.2 < LONGEST {
-            let scale = 2.0 * found.2;
+        while found.scale < LONGEST {
+            let scale = 2.0 * found.scale;
             let moved = self.moved(x, scale, direction);
-            let trial = self.energy(&moved)?;
-            if trial.0 >= found.1.0 {
+            let energy = self.energy(&moved)?;
+            if energy.0 >= found.energy.0 {
                 break;
             }
-            found = (moved, trial, scale);
+            found = Found { x: moved, energy, scale, down: None };
         }
         Ok(found)
     }
@@ -328,6 +349,14 @@ impl Step<'_> {
             }
         }
         moved
+    }
+}
+
+/// Nothing where a sum or an element is not finite.
+fn if_finite<T>(evaluated: Result<T, EvaluationError>) -> Result<Option<T>, EvaluationError> {
+    match evaluated {
+        Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => Ok(None),
+        evaluated => evaluated.map(Some),
     }
 }
 
@@ -360,40 +389,53 @@ impl Integrator for Newton {
         let inertial = moved_by_velocities(body, dt);
         let mut step = Step { body, dt, inertial, report: StepReport::default() };
         let mut x = self.warm_start.begin(step.body, &step.inertial, dt);
-        let mut energy = step.energy(&x)?;
-        if !energy.0.is_finite() {
-            step.body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = step.body.x[vertex]);
-            energy = step.energy(&x)?;
-        }
+        let mut projection = Projection::on_demand();
+        let start = step.linearise_where_finite(&x, projection.curvature, &mut memory.matrix)?;
+        let (mut energy, mut linearised) = match start {
+            Some((energy, down)) => (energy, Some(down)),
+            None => {
+                step.body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = step.body.x[vertex]);
+                (step.energy(&x)?, None)
+            }
+        };
         let (mut converged, mut change) = (false, f64::INFINITY);
-        let (mut projection, mut last) = (Projection::on_demand(), None);
+        let (mut last, mut looked) = (None, None);
         while !converged {
             if step.report.solves == self.options.iteration_limit as u64 {
                 return Err(StepError::NotConverged { iterations: step.report.solves, change });
             }
             // One iteration at least: on a fine mesh no vertex weighs much, and not even free fall lacks a large impulse.
-            if last.is_some_and(|last| self.may_be_enough(last, dt)) && self.is_enough(&step.gradient(&x)?, dt) {
-                break;
+            if last.is_some_and(|last| self.may_be_enough(last, dt)) {
+                let down = match looked.take() {
+                    Some(down) => down,
+                    None => step.gradient(&x)?,
+                };
+                if self.is_enough(&down, dt) {
+                    break;
+                }
             }
-            let curvature = projection.curvature;
-            let down = step.linearise(&x, curvature, &mut memory.matrix)?;
+            let (curvature, projected) = (projection.curvature, !projection.is_exact());
+            let down = match linearised.take() {
+                Some(down) => down,
+                None => step.linearise(&x, curvature, &mut memory.matrix)?,
+            };
             let forcing = self.forcing(largest(&down), last);
             last = Some(forcing);
             let (direction, solved) =
                 step.direction(&x, &down, curvature, &mut memory, &mut self.trial, forcing.tolerance)?;
-            let projected = !projection.is_exact();
-            let Some((moved, lower, scale)) = step.line_search(&x, energy, &down, &direction, projected)? else {
+            let look = self.may_be_enough(forcing, dt);
+            let Some(found) = step.line_search(&x, energy, &down, &direction, (projected, look))? else {
                 if !projected {
                     projection.demand();
                     continue;
                 }
                 return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
             };
-            (x, energy) = (moved, lower);
-            let before = std::mem::replace(&mut change, scale * largest(&direction) / dt);
+            (x, energy, looked) = (found.x, found.energy, found.down);
+            let before = std::mem::replace(&mut change, found.scale * largest(&direction) / dt);
             if projected || solved.converged() {
                 converged = change < self.options.velocity_tolerance;
-                projection.proceed(scale >= 1.0 && change < before);
+                projection.proceed(found.scale >= 1.0 && change < before);
             } else {
                 projection.demand();
             }
