@@ -63,10 +63,14 @@ fn drag_is_taken_at_the_end_of_an_implicit_step() {
 
 /// A free sheet, wrinkled and stretched, at rest and without weight.
 fn distorted(fabric: &str) -> Body {
+    surrounded(fabric, &Surroundings { gravity: [0.0; 3], drag: 0.0 })
+}
+
+/// The same with gravity and drag.
+fn surrounded(fabric: &str, surroundings: &Surroundings) -> Body {
     let scene = scene("dt = 1.0\nduration = 1.0", fabric);
     let shape = scene.garments[0].shape(&scene.folder).unwrap();
-    let nothing = Surroundings { gravity: [0.0; 3], drag: 0.0 };
-    let garment = terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, &nothing).unwrap();
+    let garment = terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, surroundings).unwrap();
     let wave = |p: &[f64; 3]| [1.1 * p[0], p[1] + 0.05 * p[0], 0.03 * (9.0 * p[0] + 4.0 * p[1]).sin()];
     let x: Vec<[f64; 3]> = shape.start.iter().map(wave).collect();
     let system = System::new(garment.terms, &vec![false; x.len()]).unwrap();
@@ -112,6 +116,25 @@ fn newton_solves_the_equations_of_implicit_euler() {
             }
         }
     }
+}
+
+#[test]
+fn newton_begins_where_the_last_accelerations_lead() {
+    let options = NewtonOptions { impulse_tolerance: 1e-6, velocity_tolerance: 1e-9, ..NewtonOptions::default() };
+    let solves = |keep: bool| {
+        let mut body = surrounded(NEO_HOOKEAN, &Surroundings { gravity: [0.0, 0.0, -9.81], drag: 2.0 });
+        let mut newton = Newton::with_options(options);
+        let mut solves = 0;
+        for _ in 0..100 {
+            solves += newton.step(&mut body, 0.001).unwrap().solves;
+            if !keep {
+                newton = Newton::with_options(options);
+            }
+        }
+        solves
+    };
+    let (kept, forgotten) = (solves(true), solves(false));
+    assert!(4 * kept < 3 * forgotten, "{kept} systems, {forgotten} without memory");
 }
 
 #[test]

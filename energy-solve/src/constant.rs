@@ -31,7 +31,8 @@ impl<T: Precision> Constant<T> {
         runs: Vec<Range<u32>>,
         matrix: &[Block<T>],
     ) -> Self {
-        let blocks = runs.iter().flat_map(|run| &matrix[run.start as usize..run.end as usize]).copied().collect();
+        let mut blocks = Vec::with_capacity(runs.iter().map(ExactSizeIterator::len).sum());
+        runs.iter().for_each(|run| blocks.extend_from_slice(&matrix[run.start as usize..run.end as usize]));
         Self { weights, curvature, masses: masses.to_vec(), projected, runs, blocks }
     }
 
@@ -86,5 +87,6 @@ pub(crate) fn coupled_runs<'a>(
             }
         }
     }
+    runs.shrink_to_fit();
     runs
 }

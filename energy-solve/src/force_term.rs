@@ -2,7 +2,7 @@ use std::fmt::{self, Debug};
 
 use energy_dsl::{Array, Block, Declaration, ForceLaw, Kernel, Level, Potential, Value, Vector3, dispatch};
 
-use crate::active::{active_elements, points_of};
+use crate::active::{Active, points_of};
 use crate::counts::Tally;
 use crate::dofs::DofMap;
 use crate::list::ElementList;
@@ -20,8 +20,7 @@ type ValueOf<E> = fn(&E, &<E as ForceLaw<f64>>::Points) -> Value<f64>;
 pub struct ForceTerm<E: ForceLaw<f64>> {
     list: ElementList<E>,
     energy: Option<ValueOf<E>>,
-    /// The indices of the elements that are evaluated.
-    active: Vec<u32>,
+    active: Active,
     places: Places,
     /// The pairs of points whose blocks are stored.
     pairs: Vec<(usize, usize)>,
@@ -32,7 +31,7 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     /// proves.
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
-        Self { list, energy: None, active: Vec::new(), places: Places::default(), pairs: Vec::new() }
+        Self { list, energy: None, active: Active::default(), places: Places::default(), pairs: Vec::new() }
     }
 
     /// Reports the potential of the elements (damped springs have one) as the term's energy.
@@ -43,10 +42,6 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     {
         self.energy = Some(<E as Potential<f64>>::value);
         self
-    }
-
-    fn active(&self) -> impl Iterator<Item = usize> {
-        self.active.iter().map(|&element| element as usize)
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -86,7 +81,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
         let n = self.list.arity();
-        self.active = active_elements(self.list.stencils(), dofs);
+        self.active = Active::new(self.list.stencils(), dofs);
         if self.character().curved {
             self.pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
             self.places = Places::new(&self.active, self.list.stencils(), &self.pairs, dofs, pattern);
@@ -104,7 +99,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let (mut sum, mut flagged) = (0.0, 0);
-        for element in self.active() {
+        for element in self.active.iter() {
             let result = self.value(element, x)?;
             sum += result.value;
             flagged += u64::from(result.flags.any());
@@ -113,7 +108,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        self.active().map(|number| Some((number, self.value(number, x)?.value))).collect()
+        self.active.iter().map(|number| Some((number, self.value(number, x)?.value))).collect()
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -122,7 +117,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
 
     fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
         let mut flagged = 0;
-        for (number, element) in self.active().enumerate() {
+        for (number, element) in self.active.iter().enumerate() {
             let stencil = self.list.stencil(element);
             let result = self.list.elements()[element].jacobians(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), sum.force);
@@ -152,7 +147,7 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
                 result.force.as_ref().as_flattened().iter().all(|number| number.is_finite())
             }
         };
-        self.active().find(|&element| !is_finite(element))
+        self.active.iter().find(|&element| !is_finite(element))
     }
 }
 
@@ -170,8 +165,8 @@ impl<E: ForceLaw<f64>> Kernel for Dissipation<'_, E> {
         let Self { term, state: State { x, v } } = self;
         let still = <E::Points as Array<Vector3<f64>>>::repeat([0.0; 3]);
         let (mut sum, mut flagged) = (0.0, 0);
-        for &element in &term.active {
-            let (law, stencil) = (&term.list.elements()[element as usize], term.list.stencil(element as usize));
+        for element in term.active.iter() {
+            let (law, stencil) = (&term.list.elements()[element], term.list.stencil(element));
             let (points, rates): (E::Points, E::Points) = (points_of(stencil, x), points_of(stencil, v));
             let (moving, at_rest) = (law.force_at::<L>(&points, &rates), law.force_at::<L>(&points, &still));
             let mut power = 0.0;
@@ -201,8 +196,8 @@ impl<E: ForceLaw<f64>> Kernel for Forces<'_, '_, E> {
     fn run<L: Level>(self) -> u64 {
         let Self { term, state: State { x, v }, force } = self;
         let mut flagged = 0;
-        for &element in &term.active {
-            let (law, stencil) = (&term.list.elements()[element as usize], term.list.stencil(element as usize));
+        for element in term.active.iter() {
+            let (law, stencil) = (&term.list.elements()[element], term.list.stencil(element));
             let result = law.force_at::<L>(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), force);
             flagged += u64::from(result.flags.any());

@@ -2,6 +2,7 @@ use std::ops::Range;
 
 use energy_dsl::BLOCK;
 
+use crate::active::Active;
 use crate::dofs::DofMap;
 use crate::pattern::{Pattern, index};
 use crate::term::Stencils;
@@ -20,7 +21,7 @@ pub(crate) struct Places {
 impl Places {
     /// The places of the `active` elements, pairs of points in the order of `pairs`.
     pub(crate) fn new(
-        active: &[u32],
+        active: &Active,
         stencils: Stencils<'_>,
         pairs: &[(usize, usize)],
         dofs: &DofMap,
@@ -28,8 +29,8 @@ impl Places {
     ) -> Self {
         let mut slots = Vec::with_capacity(active.len() * pairs.len());
         let mut turned = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
-        for (number, &element) in active.iter().enumerate() {
-            let stencil = stencils.stencil(element as usize);
+        for (number, element) in active.iter().enumerate() {
+            let stencil = stencils.stencil(element);
             for (pair, &(i, j)) in pairs.iter().enumerate() {
                 let rows = dofs.place(stencil[i] as usize).zip(dofs.place(stencil[j] as usize));
                 let place = rows.and_then(|(row, column)| pattern.place(row, column));

@@ -7,7 +7,7 @@ use energy_dsl::{
     ReducedPotential, Vector3, WidePoints, for_each_batch_in, triangle_index,
 };
 
-use crate::active::{active_elements, points_of};
+use crate::active::{Active, points_of};
 use crate::counts::Tally;
 use crate::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::dofs::DofMap;
@@ -28,8 +28,7 @@ pub struct PotentialTerm<E> {
     list: ElementList<E>,
     /// How many elements there are.
     count: usize,
-    /// The indices of the elements that are evaluated.
-    active: Vec<u32>,
+    active: Active,
     packed: Packed<E>,
     /// Where blocks go, and those below the diagonal, where all are stored.
     places: Places,
@@ -50,9 +49,17 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
     pub fn new(list: ElementList<E>) -> Self {
         let packed = Packed::from_fn(0, list.arity(), |element| &list.elements()[element], |_, _| 0);
         let (count, orthonormal) = (list.elements().len(), Orthonormal::new(E::DECLARATION));
-        let (active, shares) = (Vec::new(), Vec::new());
-        let (places, mirrored) = (Places::default(), Places::default());
-        Self { list, count, active, packed, places, mirrored, orthonormal, shares, energies: Vec::new() }
+        Self {
+            list,
+            count,
+            active: Active::default(),
+            packed,
+            places: Places::default(),
+            mirrored: Places::default(),
+            orthonormal,
+            shares: Vec::new(),
+            energies: Vec::new(),
+        }
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -67,16 +74,17 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
 
     /// The points of an element that is evaluated, by its number among them.
     fn points(&self, number: usize, x: &[Vector3<f64>]) -> WidePoints<E, f64> {
-        points_of(self.list.stencil(self.active[number] as usize), x)
+        points_of(self.list.stencil(self.active.element(number)), x)
     }
 
     /// The packs of elements that have one of these vertices.
     fn packs_at(&self, vertices: &Range<usize>) -> Vec<Range<usize>> {
         let mut packs: Vec<Range<usize>> = Vec::new();
-        for (number, pack) in self.active.chunks(BLOCK).enumerate() {
-            let inside = |&vertex: &u32| vertices.contains(&(vertex as usize));
-            if pack.iter().any(|&element| self.list.stencil(element as usize).iter().any(inside)) {
-                let (start, end) = (number * BLOCK, number * BLOCK + pack.len());
+        let inside = |&vertex: &u32| vertices.contains(&(vertex as usize));
+        let needed = |number| self.list.stencil(self.active.element(number)).iter().any(inside);
+        for start in (0..self.active.len()).step_by(BLOCK) {
+            let end = (start + BLOCK).min(self.active.len());
+            if (start..end).any(needed) {
                 match packs.last_mut() {
                     Some(last) if last.end == start => last.end = end,
                     _ => packs.push(start..end),
@@ -198,10 +206,9 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
         let n = self.list.arity();
         let elements = self.list.take_elements();
         assert_eq!(elements.len(), self.count, "{}: a term is placed once", self.list.name());
-        self.active = active_elements(self.list.stencils(), dofs);
-        let active = |number: usize| self.active[number] as usize;
-        let vertex = |number: usize, point: usize| self.list.stencil(active(number))[point];
-        self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[active(number)], vertex);
+        self.active = Active::new(self.list.stencils(), dofs);
+        let vertex = |number: usize, point: usize| self.list.stencil(self.active.element(number))[point];
+        self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[self.active.element(number)], vertex);
         self.energies = (0..self.active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect();
         if self.character().curved {
             let places = |pairs: &[_]| Places::new(&self.active, self.list.stencils(), pairs, dofs, pattern);
@@ -240,7 +247,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
         let value = |number: usize| self.packed.element(number).value(&self.points(number, x)).value;
-        Some(self.active.iter().enumerate().map(|(number, &element)| (element as usize, value(number))).collect())
+        Some(self.active.iter().enumerate().map(|(number, element)| (element, value(number))).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -260,7 +267,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
                 Quantity::Force => result.gradient.as_ref().as_flattened().iter().all(|number| number.is_finite()),
             }
         };
-        (0..self.active.len()).find(|&number| !is_finite(number)).map(|number| self.active[number] as usize)
+        (0..self.active.len()).find(|&number| !is_finite(number)).map(|number| self.active.element(number))
     }
 }
 
