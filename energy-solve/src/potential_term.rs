@@ -148,7 +148,7 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
     /// The energy of a part, from that of its packs.
     fn found_in(&self, part: usize) -> f64 {
         let packs = &self.energies[(part * ENERGY_PART).min(self.energies.len())..];
-        packs.iter().take(ENERGY_PART).map(|energy| f64::from_bits(energy.load(Relaxed))).sum()
+        packs.iter().take(ENERGY_PART).fold(0.0, |sum, energy| sum + f64::from_bits(energy.load(Relaxed)))
     }
 
     /// All elements.
@@ -242,7 +242,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
     }
 
     fn energy_found(&self) -> Option<f64> {
-        Some((0..self.energy_parts()).map(|part| self.found_in(part)).sum())
+        Some((0..self.energy_parts()).fold(0.0, |sum, part| sum + self.found_in(part)))
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {

@@ -23,8 +23,8 @@ use crate::dissipation_term::DissipativeTerm;
 use crate::mesh::dot;
 use crate::motion::{Motion, Pose};
 use friction::FrictionLaw;
-use mesh_solid::{Corners, Edges, Faces};
-use solid::Solid;
+use mesh_solid::{Corners, Edges, Faces, Felt};
+use solid::{Shape, Solid};
 use term::{ContactTerm, Touch, surface_velocity, touches};
 
 /// One of the solids.
@@ -47,10 +47,10 @@ impl AnySolid {
     #[must_use]
     pub fn moved(&self, pose: &Pose) -> Self {
         match self {
-            Self::HalfSpace(solid) => Self::HalfSpace(solid.moved(pose)),
-            Self::Ball(solid) => Self::Ball(solid.moved(pose)),
-            Self::Capsule(solid) => Self::Capsule(solid.moved(pose)),
-            Self::Box(solid) => Self::Box(solid.moved(pose)),
+            Self::HalfSpace(solid) => Self::HalfSpace(Shape::moved(solid, pose)),
+            Self::Ball(solid) => Self::Ball(Shape::moved(solid, pose)),
+            Self::Capsule(solid) => Self::Capsule(Shape::moved(solid, pose)),
+            Self::Box(solid) => Self::Box(Shape::moved(solid, pose)),
             Self::Mesh(solid) => Self::Mesh(solid.moved(pose)),
         }
     }
@@ -109,9 +109,10 @@ impl Obstacle {
             AnySolid::Capsule(solid) => self.terms_with("", *solid, masses),
             AnySolid::Box(solid) => self.terms_with("", *solid, masses),
             AnySolid::Mesh(solid) => {
-                let mut terms = self.terms_with(": faces", Faces(solid.clone()), masses);
-                terms.extend(self.terms_with(": edges", Edges(solid.clone()), masses));
-                terms.extend(self.terms_with(": corners", Corners(solid.clone()), masses));
+                let felt = Felt::new(solid.clone(), masses.len());
+                let mut terms = self.terms_with(": faces", Faces(felt.clone()), masses);
+                terms.extend(self.terms_with(": edges", Edges(felt.clone()), masses));
+                terms.extend(self.terms_with(": corners", Corners(felt), masses));
                 terms
             }
         }
@@ -128,9 +129,10 @@ impl Obstacle {
             AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, body),
             AnySolid::Box(solid) => self.power_of(solid, step, at_end, body),
             AnySolid::Mesh(solid) => {
-                self.power_of(Faces(solid.clone()), step, at_end, body)
-                    + self.power_of(Edges(solid.clone()), step, at_end, body)
-                    + self.power_of(Corners(solid), step, at_end, body)
+                let felt = Felt::new(solid, body.x.len());
+                self.power_of(Faces(felt.clone()), step, at_end, body)
+                    + self.power_of(Edges(felt.clone()), step, at_end, body)
+                    + self.power_of(Corners(felt), step, at_end, body)
             }
         }
     }

@@ -6,16 +6,38 @@ use energy_elements::{BoxContact, CapsuleContact, PlaneContact, SphereContact};
 use crate::mesh::{dot, norm, subtract};
 use crate::motion::Pose;
 
-/// A solid that keeps cloth out.
+/// What keeps cloth out: felt by the vertices that come near.
 pub(super) trait Solid: Clone + std::fmt::Debug + 'static {
     /// The declared element.
     type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
     /// The solid after a rigid motion.
     fn moved(&self, pose: &Pose) -> Self;
+    /// The element of a vertex at x with stiffness k (N/m), if it is nearer than the thickness (m).
+    fn touched(&self, vertex: usize, x: Vector3<f64>, k: f64, thickness: f64) -> Option<Self::Contact>;
+}
+
+/// A solid with a formula for its signed distance.
+pub(super) trait Shape: Clone + std::fmt::Debug + 'static {
+    /// The declared element.
+    type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
+    /// The shape after a rigid motion.
+    fn moved(&self, pose: &Pose) -> Self;
     /// The distance of a point from the surface, in m; negative inside.
     fn signed_distance(&self, x: Vector3<f64>) -> f64;
-    /// The element of a point with stiffness k (N/m) within the thickness δ (m); `None` where the point is not this solid's to push.
-    fn contact(&self, x: Vector3<f64>, k: f64, thickness: f64) -> Option<Self::Contact>;
+    /// The element with stiffness k (N/m) within the thickness δ (m).
+    fn contact(&self, k: f64, thickness: f64) -> Self::Contact;
+}
+
+impl<S: Shape> Solid for S {
+    type Contact = S::Contact;
+
+    fn moved(&self, pose: &Pose) -> Self {
+        Shape::moved(self, pose)
+    }
+
+    fn touched(&self, _vertex: usize, x: Vector3<f64>, k: f64, thickness: f64) -> Option<S::Contact> {
+        (self.signed_distance(x) < thickness).then(|| self.contact(k, thickness))
+    }
 }
 
 /// A half-space, below a plane.
@@ -58,7 +80,7 @@ pub struct RoundedBox {
     pub radius: f64,
 }
 
-impl Solid for HalfSpace {
+impl Shape for HalfSpace {
     type Contact = PlaneContact;
 
     fn moved(&self, pose: &Pose) -> Self {
@@ -69,12 +91,12 @@ impl Solid for HalfSpace {
         dot(self.normal, subtract(x, self.point))
     }
 
-    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<PlaneContact> {
-        Some(PlaneContact::new(self.point, self.normal, k, thickness))
+    fn contact(&self, k: f64, thickness: f64) -> PlaneContact {
+        PlaneContact::new(self.point, self.normal, k, thickness)
     }
 }
 
-impl Solid for Ball {
+impl Shape for Ball {
     type Contact = SphereContact;
 
     fn moved(&self, pose: &Pose) -> Self {
@@ -85,12 +107,12 @@ impl Solid for Ball {
         norm(subtract(x, self.centre)) - self.radius
     }
 
-    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<SphereContact> {
-        Some(SphereContact::new(self.centre, self.radius, k, thickness))
+    fn contact(&self, k: f64, thickness: f64) -> SphereContact {
+        SphereContact::new(self.centre, self.radius, k, thickness)
     }
 }
 
-impl Solid for Capsule {
+impl Shape for Capsule {
     type Contact = CapsuleContact;
 
     fn moved(&self, pose: &Pose) -> Self {
@@ -104,13 +126,13 @@ impl Solid for Capsule {
         norm(std::array::from_fn(|axis| way[axis] - along * edge[axis])) - self.radius
     }
 
-    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<CapsuleContact> {
+    fn contact(&self, k: f64, thickness: f64) -> CapsuleContact {
         let [a, b] = self.ends;
-        Some(CapsuleContact::new(a, b, self.radius, k, thickness))
+        CapsuleContact::new(a, b, self.radius, k, thickness)
     }
 }
 
-impl Solid for RoundedBox {
+impl Shape for RoundedBox {
     type Contact = BoxContact;
 
     fn moved(&self, pose: &Pose) -> Self {
@@ -125,9 +147,9 @@ impl Solid for RoundedBox {
         distance - self.radius
     }
 
-    fn contact(&self, _x: Vector3<f64>, k: f64, thickness: f64) -> Option<BoxContact> {
+    fn contact(&self, k: f64, thickness: f64) -> BoxContact {
         let [e1, e2, e3] = self.axes;
-        Some(BoxContact::new(self.centre, e1, e2, e3, self.half, self.radius, k, thickness))
+        BoxContact::new(self.centre, e1, e2, e3, self.half, self.radius, k, thickness)
     }
 }
 
@@ -136,14 +158,14 @@ mod tests {
     use super::*;
 
     /// The element pushes with k (δ − d)²/δ, along the way on which the signed distance grows fastest.
-    fn agrees(solid: impl Solid, x: Vector3<f64>, distance: f64) {
+    fn agrees(solid: impl Shape, x: Vector3<f64>, distance: f64) {
         let pose = Pose::turned([0.3, -1.0, 0.5], 40.0, [0.1; 3]).shifted([0.5, 0.2, -0.1]);
         let (k, thickness) = (3.0, 0.5);
         let moved = solid.moved(&pose);
         for (solid, x) in [(solid, x), (moved, pose.applied(x))] {
             let signed = solid.signed_distance(x);
             assert!((signed - distance).abs() < 1e-12, "{signed}, not {distance}");
-            let push = solid.contact(x, k, thickness).unwrap().gradient(&[x]).gradient[0].map(|component| -component);
+            let push = solid.contact(k, thickness).gradient(&[x]).gradient[0].map(|component| -component);
             let size = k * (thickness - distance).max(0.0).powi(2) / thickness;
             assert!((norm(push) - size).abs() < 1e-12, "{push:?}");
             if size > 0.0 {

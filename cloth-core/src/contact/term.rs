@@ -48,11 +48,10 @@ impl<S: Solid> ContactTerm<S> {
 
     /// The free vertices within reach, with their elements and places.
     fn near<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (usize, usize, S::Contact)> + 'a {
-        let within = |&(vertex, _): &(usize, usize)| self.now.signed_distance(x[vertex]) < self.thickness;
-        let element = |(vertex, slot): (usize, usize)| {
-            Some((vertex, slot, self.now.contact(x[vertex], self.stiffness[vertex], self.thickness)?))
-        };
-        self.free.iter().copied().filter(within).filter_map(element)
+        self.free.iter().filter_map(|&(vertex, slot)| {
+            let element = self.now.touched(vertex, x[vertex], self.stiffness[vertex], self.thickness)?;
+            Some((vertex, slot, element))
+        })
     }
 
     fn tally(&self, evaluated: u64, flagged: u64) -> Tally {
@@ -176,13 +175,13 @@ pub(super) fn touches<S: Solid>(
     x: &[Vector3<f64>],
     vertices: impl IntoIterator<Item = usize>,
 ) -> Vec<Touch> {
-    let near = vertices.into_iter().filter(|&vertex| solid.signed_distance(x[vertex]) < thickness);
     let touch = |vertex: usize| {
-        let gradient = solid.contact(x[vertex], stiffness(vertex), thickness)?.gradient(&[x[vertex]]).gradient[0];
+        let element = solid.touched(vertex, x[vertex], stiffness(vertex), thickness)?;
+        let gradient = element.gradient(&[x[vertex]]).gradient[0];
         let force = norm(gradient);
         (force > 0.0).then(|| Touch { vertex, normal: gradient.map(|component| -component / force), force })
     };
-    near.filter_map(touch).collect()
+    vertices.into_iter().filter_map(touch).collect()
 }
 
 /// Where a solid takes a point of it over a step, in m/s: a point where it is at the step's start, or at its end.
