@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 use energy_dsl::Vector3;
 use energy_solve::{
     BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, Precision, SolveOptions,
-    SolveReport, State, StopReason, Term, Weights, dot,
+    SolveReport, State, StopReason, System, Term, Weights, dot,
 };
 use serde::{Deserialize, Serialize};
 
@@ -117,6 +117,15 @@ impl Newton {
         let tightest = self.options.linear_tolerance;
         let useful = last.map_or(0.0, |last| PROGRESS * (gradient / last.gradient).powi(2));
         Forcing { gradient, tolerance: useful.min(LOOSENING * tightest).max(tightest) }
+    }
+
+    /// The matrix and solver of this system, those of the last step if it was the same.
+    fn memory_for(&mut self, system: &System) -> Memory {
+        self.memory.take().filter(|memory| system.owns(&memory.matrix)).unwrap_or_else(|| {
+            let matrix = system.matrix_in();
+            let solver = LinearSolver::new(self.options.linear_solver, &matrix, system.threads());
+            Memory { matrix, solver }
+        })
     }
 
     /// Whether no vertex lacks much of an impulse.
@@ -352,6 +361,18 @@ impl Step<'_> {
     }
 }
 
+/// Forces without energy, but drag, have no incremental potential.
+fn refuse_without_energy(system: &System) -> Result<(), StepError> {
+    let fits = |term: &dyn Term| {
+        let character = term.character();
+        character.symmetric && (term.has_energy() || character.velocity_dependent)
+    };
+    match system.terms().find(|(term, _)| !fits(*term)) {
+        Some((term, _)) => Err(StepError::NotSymmetric { term: term.name().to_owned() }),
+        None => Ok(()),
+    }
+}
+
 /// Nothing where a sum or an element is not finite.
 fn if_finite<T>(evaluated: Result<T, EvaluationError>) -> Result<Option<T>, EvaluationError> {
     match evaluated {
@@ -370,21 +391,8 @@ impl Integrator for Newton {
     }
 
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
-        let fits = |term: &dyn Term| {
-            let character = term.character();
-            character.symmetric && (term.has_energy() || character.velocity_dependent)
-        };
-        if let Some((term, _)) = body.system.terms().find(|(term, _)| !fits(*term)) {
-            return Err(StepError::NotSymmetric { term: term.name().to_owned() });
-        }
-        let mut memory = match self.memory.take() {
-            Some(memory) if body.system.owns(&memory.matrix) => memory,
-            _ => {
-                let matrix = body.system.matrix_in();
-                let solver = LinearSolver::new(self.options.linear_solver, &matrix, body.system.threads());
-                Memory { matrix, solver }
-            }
-        };
+        refuse_without_energy(&body.system)?;
+        let mut memory = self.memory_for(&body.system);
         // Pinned vertices end there: they move as they are told.
         let inertial = moved_by_velocities(body, dt);
         let mut step = Step { body, dt, inertial, report: StepReport::default() };
