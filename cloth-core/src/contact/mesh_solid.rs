@@ -61,7 +61,7 @@ impl MeshSolid {
 }
 
 /// A solid as the vertices of a cloth feel it. Of each vertex it remembers where it was looked for last, and what was nearest: no distance changes faster
-/// than a vertex moves, so that most of them need not be looked for again, and those near by only once for faces, edges and corners.
+/// than a vertex moves (unless the surface cuts itself, and is not that of a solid), so that most of them need not be looked for again, and those near by only once for faces, edges and corners.
 #[derive(Clone, Debug)]
 pub(super) struct Felt {
     solid: MeshSolid,
@@ -94,14 +94,9 @@ impl Felt {
     fn nearest_within(&self, vertex: usize, x: Vector3<f64>, thickness: f64) -> Option<Nearest> {
         let (surface, at) = (&self.solid.surface, self.solid.pose.undone(x));
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = found[vertex].filter(|known| known.at == at);
-        let nearest = match (known, found[vertex]) {
-            (Some(known), _) => known.nearest,
-            (None, Some(Found { at: before, nearest }))
-                if nearest.distance - norm(subtract(at, before)) >= thickness =>
-            {
-                return None;
-            }
+        let nearest = match found[vertex] {
+            Some(known) if known.at == at => known.nearest,
+            Some(known) if known.nearest.distance - norm(subtract(at, known.at)) >= thickness => return None,
             _ if surface.at_least(at) >= thickness => return None,
             _ => {
                 let nearest = surface.nearest(at);

@@ -332,6 +332,14 @@ fn place(body: &mut Body, u: &[Vector3<f64>], dt: f64, velocities: &[Vector3<f64
     Ok(())
 }
 
+/// Nothing where positions are finite, but the sum or an element is not: a trial went where an energy has no value.
+pub(crate) fn if_finite<T>(evaluated: Result<T, EvaluationError>) -> Result<Option<T>, EvaluationError> {
+    match evaluated {
+        Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => Ok(None),
+        evaluated => evaluated.map(Some),
+    }
+}
+
 /// x + h v.
 fn moved_by_velocities(body: &Body, dt: f64) -> Vec<Vector3<f64>> {
     let moved = |(x, v): (&Vector3<f64>, &Vector3<f64>)| std::array::from_fn(|axis| x[axis] + dt * v[axis]);

@@ -11,7 +11,7 @@ use super::linear_solver::{LinearSolver, LinearSolverChoice};
 use super::projection::Projection;
 use super::trial::Trial;
 use super::warm_start::WarmStart;
-use super::{Integrator, IntegratorMemory, StepError, StepReport, moved_by_velocities};
+use super::{Integrator, IntegratorMemory, StepError, StepReport, if_finite, moved_by_velocities};
 use crate::body::Body;
 
 /// Implicit Euler by Newton's method on the incremental potential (Gast, Schroeder, Stomakhin, Jiang and Teran 2015)
@@ -370,14 +370,6 @@ fn refuse_without_energy(system: &System) -> Result<(), StepError> {
     match system.terms().find(|(term, _)| !fits(*term)) {
         Some((term, _)) => Err(StepError::NotSymmetric { term: term.name().to_owned() }),
         None => Ok(()),
-    }
-}
-
-/// Nothing where a sum or an element is not finite.
-fn if_finite<T>(evaluated: Result<T, EvaluationError>) -> Result<Option<T>, EvaluationError> {
-    match evaluated {
-        Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => Ok(None),
-        evaluated => evaluated.map(Some),
     }
 }
 

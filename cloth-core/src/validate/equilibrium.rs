@@ -1,8 +1,9 @@
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Curvature, EvaluationError, LinearisationOptions, State, System, Weights, dot};
+use energy_solve::{BlockMatrix, Curvature, LinearisationOptions, State, System, Weights, dot};
 
 use super::ValidateError;
 use super::banded::Banded;
+use crate::integrator::if_finite;
 
 /// A cloth at rest under its loads.
 #[derive(Debug)]
@@ -86,12 +87,7 @@ impl Equilibrium {
 
     /// U, and the size of what it is a sum of.
     fn energy(&mut self, x: &[Vector3<f64>]) -> Result<(f64, f64), ValidateError> {
-        let energies = match self.system.energies(x) {
-            Err(EvaluationError::NonFiniteElement { .. } | EvaluationError::NonFiniteSum { .. }) => {
-                return Ok((f64::INFINITY, 0.0));
-            }
-            energies => energies?,
-        };
+        let Some(energies) = if_finite(self.system.energies(x))? else { return Ok((f64::INFINITY, 0.0)) };
         let all = energies.iter().filter_map(|term| term.energy);
         Ok(all.fold((0.0, 0.0), |(sum, size), energy| (sum + energy, size + energy.abs())))
     }
