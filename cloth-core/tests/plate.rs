@@ -5,7 +5,7 @@ use cloth_core::fabric::{PlateTerm, Rigidity};
 use cloth_core::mesh::{Topology, TriangleMesh};
 use cloth_core::validate::{MeshKind, Strip};
 use energy_dsl::{Potential, Vector3};
-use energy_elements::{HingeAngle, PlateBending};
+use energy_elements::{ArcAngle, PlateBending};
 use energy_solve::{Curvature, LinearisationOptions, State, System, Weights};
 
 const WOVEN: Rigidity = Rigidity::Orthotropic { warp: 3.0, weft: 1.0, bias: 1.4, poisson_ratio: 0.2 };
@@ -21,7 +21,7 @@ fn lifted(mesh: &TriangleMesh, [xx, yy, xy]: [f64; 3]) -> Vec<Vector3<f64>> {
 }
 
 fn angles(topology: &Topology, x: &[Vector3<f64>]) -> Vec<f64> {
-    let angle = HingeAngle::<f64>::new();
+    let angle = ArcAngle::<f64>::new();
     topology.hinges.iter().map(|hinge| angle.value(&hinge.vertices.map(|vertex| x[vertex])).value).collect()
 }
 

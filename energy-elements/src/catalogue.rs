@@ -25,6 +25,7 @@ macro_rules! catalogue {
 #[must_use]
 pub fn catalogue() -> &'static [CatalogueEntry] {
     const CATALOGUE: &[CatalogueEntry] = catalogue![
+        ArcAngle,
         AsRigidAsPossible,
         BaraffWitkinShear,
         BaraffWitkinStretch,

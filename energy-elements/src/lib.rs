@@ -25,6 +25,7 @@ macro_rules! elements {
 
 elements! {
     arap: AsRigidAsPossible;
+    arc_angle: ArcAngle;
     box_contact: BoxContact;
     bridson_bending: BridsonBending;
     bridson_force: BridsonForce;

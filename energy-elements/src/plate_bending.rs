@@ -4,9 +4,9 @@ energy! {
     /// Bending of an isotropic plate on a triangle x0x1x2 whose neighbours' far corners are y0, y1, y2 (y0 across the edge x1x2, and so
     /// on), with the flexural rigidity D = Y h³/(12(1 − ν²)), λ = ν D and μ = (1 − ν) D/2:
     ///
-    /// A (λ/2 tr² κ + μ ‖κ‖²),  κ = 1/(2A) Σ ‖e‖ (θ − θ̄) n ⊗ n
+    /// A (λ/2 tr² κ + μ ‖κ‖²),  κ = 1/(2A) Σ ‖e‖ (ϑ − ϑ̄) n ⊗ n,  ϑ = √8 sin(θ/√8)
     ///
-    /// summed over its three edges, n their normals in its plane, θ their dihedral angles, θ̄ those at rest, A its area at rest. That is
+    /// summed over its three edges, n their normals in its plane, θ their dihedral angles, ϑ as arcs have them ([`ArcAngle`](crate::ArcAngle)), ϑ̄ at rest, A its area at rest. That is
     /// the lowest Hellan–Herrmann–Johnson element (Comodi 1989) with each edge's normal half-way between those of its triangles, as in
     /// Grinspun, Gingold, Reisman and Zorin 2006. Where the two triangles of each edge are turned copies of each other, as in a regular
     /// lattice, it bends as the plate does in every direction; on other meshes the normals need a tilt.
@@ -25,14 +25,15 @@ energy! {
             let c01 = 2 * (dot(a0, a1) / (l0 * l1))^2;
             let c12 = 2 * (dot(a1, a2) / (l1 * l2))^2;
             let c20 = 2 * (dot(a2, a0) / (l2 * l0))^2;
-            let per_A = 1 / (4 * norm(cross(a1, a2)));
-            let θ0 = dihedral(X0, Y0, X1, X2);
-            let θ1 = dihedral(X1, Y1, X2, X0);
-            let θ2 = dihedral(X2, Y2, X0, X1);
+            // 1/(4 · 2A), and 8 of ϑ² = 8 sin²(θ/√8).
+            let per_A = 8 / (4 * norm(cross(a1, a2)));
+            let s0 = sin(dihedral(X0, Y0, X1, X2) / sqrt(8));
+            let s1 = sin(dihedral(X1, Y1, X2, X0) / sqrt(8));
+            let s2 = sin(dihedral(X2, Y2, X0, X1) / sqrt(8));
         }
-        let q0 = l0 * (dihedral(x0, y0, x1, x2) - θ0);
-        let q1 = l1 * (dihedral(x1, y1, x2, x0) - θ1);
-        let q2 = l2 * (dihedral(x2, y2, x0, x1) - θ2);
+        let q0 = l0 * (sin(dihedral(x0, y0, x1, x2) / sqrt(8)) - s0);
+        let q1 = l1 * (sin(dihedral(x1, y1, x2, x0) / sqrt(8)) - s1);
+        let q2 = l2 * (sin(dihedral(x2, y2, x0, x1) / sqrt(8)) - s2);
         let norm2 = q0^2 + q1^2 + q2^2 + c01 * q0 * q1 + c12 * q1 * q2 + c20 * q2 * q0;
         per_A * (λ * (q0 + q1 + q2)^2 + 2 * μ * norm2)
     }

@@ -1,7 +1,7 @@
 //! The two parts of a plate's Hessian, added to the matrix.
 
 use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Number, Potential, Vector3};
-use energy_elements::HingeAngle;
+use energy_elements::ArcAngle;
 use energy_solve::{Linearisation, Precision};
 
 use super::term::{Angles, PlateTerm, Row};
@@ -18,9 +18,9 @@ pub(super) struct Turning<'a, 'b> {
     rows: [f64; HESSIAN * BLOCK],
 }
 
-impl BatchWork<HingeAngle> for Turning<'_, '_> {
+impl BatchWork<ArcAngle> for Turning<'_, '_> {
     #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
+    fn batch<L: Level>(&mut self, batch: Batch<'_, ArcAngle, L::F64>) {
         let result = batch.element.hessian_at::<L>(batch.points);
         let numbers = result.hessian.as_flattened().as_flattened();
         L::F64::store_transposed(numbers, batch.count, &mut self.rows, HESSIAN);

@@ -4,7 +4,8 @@
 //!
 //! A κ = Σ ‖e‖ p n ⊗ n,  p = ½ (θ − θ̄) ± φ,  U = Σ ½ A κᵀ D κ,
 //!
-//! p the angle between T's own normal and the surface's normal at the middle of the edge. That is the lowest element of Hellan, Herrmann
+//! p the angle between T's own normal and the surface's normal at the middle of the edge, and θ the dihedral angle as the arc over the facets has it
+//! ([`ArcAngle`](energy_elements::ArcAngle)). That is the lowest element of Hellan, Herrmann
 //! and Johnson (Comodi 1989), where the normal at an edge is an unknown of its own; in Grinspun, Gingold, Reisman and Zorin 2006 it
 //! is half-way between the two triangles' (φ = 0), with which only regular lattices bend as the plate does. Here the *tilt* φ is what it
 //! must be for every quadratic height field, written with the dihedral angles θ near the edge: φ = Σ c (θ − θ̄), c of least norm

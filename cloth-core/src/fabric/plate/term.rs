@@ -2,7 +2,7 @@ use energy_dsl::{
     BLOCK, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, dispatch,
     for_each_batch,
 };
-use energy_elements::HingeAngle;
+use energy_elements::ArcAngle;
 use energy_solve::{
     Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, Precision, Quantity, State, Stencils,
     Storage, Tally, Term, TrianglePlaces, index,
@@ -11,11 +11,11 @@ use energy_solve::{
 use super::assembly::{OuterProducts, Turning};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
-use crate::mesh::{Topology, TriangleMesh, dot, rest_angle};
+use crate::mesh::{Topology, TriangleMesh, dot};
 
-/// Plate bending of a whole mesh: Σ ½ ‖r‖² over the triangles, r = Σ b (θ − θ̄) three combinations of dihedral angles.
+/// Plate bending of a whole mesh: Σ ½ ‖r‖² over the triangles, r = Σ b (θ − θ̄) three combinations of dihedral angles, as arcs have them.
 ///
-/// Every dihedral angle is evaluated once, by the declared element [`HingeAngle`], whichever triangles need it. The Hessian is
+/// Every dihedral angle is evaluated once, by the declared element [`ArcAngle`], whichever triangles need it. The Hessian is
 /// Σ ∇r ∇rᵀ, positive semi-definite, where negative curvature is to go; the rest of it, Σ m ∇²θ with the moments m = ∂U/∂θ, is smaller by the
 /// angle between neighbours and belongs to the exact Hessian only.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct PlateTerm {
     pub(super) places: Vec<PatchPlaces>,
     /// The hinges that active patches need, the same packed, and where their blocks are stored.
     pub(super) needed: Vec<usize>,
-    packed: Packed<HingeAngle>,
+    packed: Packed<ArcAngle>,
     pub(super) hinge_places: TrianglePlaces,
 }
 
@@ -87,7 +87,8 @@ impl PlateTerm {
         let factor = cholesky(&rigidity.matrix()?);
         let topology = Topology::of(mesh);
         let hinges: Vec<[usize; 4]> = topology.hinges.iter().map(|hinge| hinge.vertices).collect();
-        let rest = topology.hinges.iter().map(|hinge| rest_angle(mesh, hinge)).collect();
+        let angle = ArcAngle::<f64>::new();
+        let rest = hinges.iter().map(|hinge| angle.value(&hinge.map(|vertex| mesh.vertices()[vertex])).value).collect();
         let woven = matches!(rigidity, Rigidity::Orthotropic { .. });
         let curvatures = curvatures(mesh, &topology, woven.then_some(warp))?;
         let patches: Vec<Patch> = curvatures.iter().filter_map(|one| Patch::new(one, &factor, &hinges)).collect();
@@ -199,9 +200,9 @@ struct Values<'a> {
     flagged: u64,
 }
 
-impl BatchWork<HingeAngle> for Values<'_> {
+impl BatchWork<ArcAngle> for Values<'_> {
     #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
+    fn batch<L: Level>(&mut self, batch: Batch<'_, ArcAngle, L::F64>) {
         let result = batch.element.value_at::<L>(batch.points);
         for lane in 0..batch.count {
             self.angles[self.needed[batch.first + lane]] += result.value.extract(lane);
@@ -219,9 +220,9 @@ pub(super) struct Angles<'a> {
     flagged: u64,
 }
 
-impl BatchWork<HingeAngle> for Angles<'_> {
+impl BatchWork<ArcAngle> for Angles<'_> {
     #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, HingeAngle, L::F64>) {
+    fn batch<L: Level>(&mut self, batch: Batch<'_, ArcAngle, L::F64>) {
         let result = batch.element.gradient_at::<L>(batch.points);
         L::F64::store_transposed(result.gradient.as_flattened(), batch.count, &mut self.rows, 12);
         for lane in 0..batch.count {
@@ -313,7 +314,7 @@ impl Term for PlateTerm {
     }
 
     fn declaration(&self) -> &'static Declaration {
-        <HingeAngle as Element>::DECLARATION
+        <ArcAngle as Element>::DECLARATION
     }
 
     fn character(&self) -> Character {
@@ -332,7 +333,7 @@ impl Term for PlateTerm {
             self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(|angle| angle.hinge)).collect();
         needed.sort_unstable();
         needed.dedup();
-        let element = HingeAngle::new();
+        let element = ArcAngle::new();
         self.packed =
             Packed::from_fn(needed.len(), 4, |_| &element, |number, point| index(self.hinges[needed[number]][point]));
         self.needed = needed;
