@@ -5,8 +5,8 @@
 use std::fmt::Debug;
 
 use energy_dsl::{
-    Array, Block, Hessian, Kernel, Lane, Level, Mask, Number, Potential, Vector3, available, dispatch, dispatch_at,
-    level,
+    Array, BLOCK_NUMBERS, Block, BlockSum, Hessian, Kernel, Lane, Level, LevelName, Mask, Number, Potential, Vector3,
+    available, dispatch, dispatch_at, level,
 };
 use energy_macros::energy;
 
@@ -416,4 +416,77 @@ fn kernels_run_at_the_level_asked_for() {
     assert_eq!(dispatch(Name).0, level().as_str());
     assert_eq!("avx2".parse(), Ok(energy_dsl::LevelName::Avx2));
     assert!("AVX9".parse::<energy_dsl::LevelName>().is_err());
+}
+
+/// Five blocks of a row, and what they are multiplied with.
+struct Row<'a, S> {
+    numbers: &'a [S],
+    vectors: &'a [[S; 4]; 5],
+}
+
+impl<S: Bits> Row<'_, S> {
+    /// Σ B v of the first four, and u − B v of the last.
+    fn sums<B: BlockSum<S>>(&self) -> [[S; 4]; 2] {
+        let block = |place: usize| self.numbers[9 * place..].first_chunk::<BLOCK_NUMBERS>().expect("enough numbers");
+        let mut sum = B::zero();
+        for place in 0..4 {
+            sum.add(block(place), &self.vectors[place]);
+        }
+        [sum.total(), B::less(self.vectors[0], block(4), &self.vectors[4])]
+    }
+}
+
+impl Kernel for Row<'_, f32> {
+    type Output = (bool, [[f32; 4]; 2]);
+    #[inline(always)]
+    fn run<L: Level>(self) -> Self::Output {
+        (L::FUSED, self.sums::<L::Sum32>())
+    }
+}
+
+impl Kernel for Row<'_, f64> {
+    type Output = (bool, [[f64; 4]; 2]);
+    #[inline(always)]
+    fn run<L: Level>(self) -> Self::Output {
+        (L::FUSED, self.sums::<L::Sum64>())
+    }
+}
+
+fn sums_of_blocks_have_the_same_bits<S: Bits>(
+    numbers: Vec<S>,
+    at: impl Fn(LevelName, &[S], &[[S; 4]; 5]) -> (bool, [[S; 4]; 2]),
+) {
+    let vectors: [[S; 4]; 5] = std::array::from_fn(|i| std::array::from_fn(|k| numbers[4 * i + k]));
+    // Products by hand, at some distance from the fused ones.
+    let entry = |place: usize, row: usize, column: usize| -> f64 { numbers[9 * place + 3 * row + column].into() };
+    let product = |place: usize, row: usize| -> f64 {
+        (0..3).map(|column| entry(place, row, column) * Into::<f64>::into(vectors[place][column])).sum()
+    };
+    let found: Vec<_> = available().map(|name| at(name, &numbers, &vectors)).collect();
+    for (fused, sums) in &found {
+        for row in 0..3 {
+            let expected = [(0..4).map(|place| product(place, row)).sum(), vectors[0][row].into() - product(4, row)];
+            for (sum, expected) in sums.iter().zip(expected) {
+                let off: f64 = Into::<f64>::into(sum[row]) - expected;
+                assert!(off.abs() < 1e-5 * (1.0 + expected.abs()), "{off:e} of {expected}");
+            }
+            for (_, others) in found.iter().filter(|(other, _)| other == fused) {
+                for (sum, other) in sums.iter().zip(others) {
+                    assert_eq!(sum[row].bits(), other[row].bits());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn sums_of_blocks_have_the_same_bits_at_every_level_and_are_right() {
+    let numbers: Vec<f64> = (0..5 * 9 + 7).map(|i| (1.7 * f64::from(i)).sin() * 10.0).collect();
+    let singles = numbers.iter().map(|&number| number as f32).collect();
+    sums_of_blocks_have_the_same_bits::<f32>(singles, |name, numbers, vectors| {
+        dispatch_at(name, Row { numbers, vectors }).expect("the level is available")
+    });
+    sums_of_blocks_have_the_same_bits::<f64>(numbers, |name, numbers, vectors| {
+        dispatch_at(name, Row { numbers, vectors }).expect("the level is available")
+    });
 }

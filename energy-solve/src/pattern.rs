@@ -96,6 +96,12 @@ impl Pattern {
         self.diagonal[row] as usize
     }
 
+    /// Where the diagonal blocks of all rows are stored.
+    #[inline(always)]
+    pub(crate) fn diagonals(&self) -> &[u32] {
+        &self.diagonal
+    }
+
     /// The places of the blocks above the diagonal in a row, for a pattern of upper triangles.
     #[inline(always)]
     pub(crate) fn above(&self, row: usize) -> std::ops::Range<usize> {

@@ -1,18 +1,22 @@
-use energy_dsl::{Block, Real};
+use energy_dsl::{Block, BlockSum, Level, Real};
 
 /// What a matrix is stored in, or a linear system solved in: `f32` or `f64`.
 pub trait Precision: Real + Into<f64> + Send + Sync {
+    /// What sweeps through a matrix stored in it sum up with.
+    type Sum<L: Level>: BlockSum<Self>;
     /// The blocks of a matrix stored in it, to be added to.
     fn blocks(blocks: &mut [Block<Self>]) -> Blocks<'_>;
 }
 
 impl Precision for f32 {
+    type Sum<L: Level> = L::Sum32;
     fn blocks(blocks: &mut [Block<Self>]) -> Blocks<'_> {
         Blocks::Single(blocks)
     }
 }
 
 impl Precision for f64 {
+    type Sum<L: Level> = L::Sum64;
     fn blocks(blocks: &mut [Block<Self>]) -> Blocks<'_> {
         Blocks::Double(blocks)
     }

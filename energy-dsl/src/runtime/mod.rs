@@ -27,7 +27,10 @@ pub use call::{
 };
 #[doc(hidden)]
 pub use choose::Choose;
-pub use cpu::{Baseline, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
+pub use cpu::{
+    BLOCK_NUMBERS, Baseline, BlockSum, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at,
+    level,
+};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
     Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual, RestError, Vector3,

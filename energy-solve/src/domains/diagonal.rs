@@ -74,7 +74,11 @@ pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
             triangle[place].store(&mut numbers[place]);
         }
         for lane in 0..inverses.len() {
-            inverses[lane] = by_columns(numbers.map(|number| number[lane]));
+            let mut rows = [0.0; 6];
+            for place in 0..6 {
+                rows[place] = numbers[place][lane];
+            }
+            inverses[lane] = by_columns(rows);
         }
     }
     Ok(())

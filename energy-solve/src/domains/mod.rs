@@ -9,7 +9,7 @@ mod unit;
 
 use std::ops::Range;
 
-use energy_dsl::{Kernel, Level};
+use energy_dsl::{BLOCK_NUMBERS, BlockSum, Kernel, Level};
 
 use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
@@ -17,7 +17,8 @@ use crate::pattern::Pattern;
 pub(crate) use self::couplings::Couplings;
 pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
 pub(crate) use self::meeting::{Meeting, Shared};
-pub(crate) use self::triangle::{SLACK, Triangle, scaled_block};
+use self::triangle::Blocks;
+pub(crate) use self::triangle::{Triangle, scaled_block};
 pub(crate) use self::unit::Unit;
 pub(crate) use crate::precision::Precision;
 
@@ -58,28 +59,43 @@ impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
     }
 }
 
-/// The sum of three partial sums, which do not wait for each other.
+/// v ← v − Bᵀ u.
 #[inline(always)]
-pub(crate) fn total<T: Precision>(sums: &[Wide<T>; 3]) -> Wide<T> {
-    let mut total = sums[0];
-    for lane in 0..4 {
-        total[lane] = sums[0][lane] + (sums[1][lane] + sums[2][lane]);
-    }
-    total
-}
-
-/// Subtracts B v from the sum of three, B stored column by column (and followed by one more number).
-#[inline(always)]
-pub(crate) fn subtract_product<T: Precision, L: Level>(sums: &mut [Wide<T>; 3], block: &[T], v: &Wide<T>) {
-    for column in 0..3 {
-        let factor = -v[column];
+pub(crate) fn subtract_turned<T: Precision, L: Level>(v: &mut Wide<T>, block: &[T; BLOCK_NUMBERS], u: &Wide<T>) {
+    let mut sum = *v;
+    for row in 0..3 {
+        let factor = -u[row];
         for lane in 0..4 {
-            sums[column][lane] = block[3 * column + lane].mul_add::<L>(factor, sums[column][lane]);
+            sum[lane] = block[3 * row + lane].mul_add::<L>(factor, sum[lane]);
         }
     }
+    *v = sum;
 }
 
-/// The same. What is computed for nothing costs nothing, but without this compilers take registers apart that are not needed whole.
+/// A vector less the products of a row's blocks with later rows of another one.
+#[inline(always)]
+pub(crate) fn less_products<T: Precision, L: Level>(
+    mut blocks: Blocks<'_, T>,
+    from: Wide<T>,
+    v: &[Wide<T>],
+) -> Wide<T> {
+    // The nearest row, computed just before when going back, comes last: the others do not have to wait for it.
+    let nearest = blocks.next();
+    let mut sum = T::Sum::<L>::zero();
+    for (block, column) in blocks {
+        sum.add(block, &v[column]);
+    }
+    let (total, mut less) = (sum.total(), from);
+    for lane in 0..4 {
+        less[lane] = less[lane] - total[lane];
+    }
+    match nearest {
+        Some((block, column)) => T::Sum::<L>::less(less, block, &v[column]),
+        None => less,
+    }
+}
+
+/// The same: compilers take registers apart that are not needed whole, though what is computed for nothing costs nothing.
 #[inline(always)]
 pub(crate) fn whole<T>(registers: T) -> T {
     std::hint::black_box(registers)

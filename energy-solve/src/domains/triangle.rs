@@ -1,13 +1,13 @@
 use std::ops::Range;
 
-use energy_dsl::{Block, Level};
+use energy_dsl::{BLOCK_NUMBERS, Block, Level};
 
 use super::{InverseFactor, Precision, Wide, rounded, whole};
 use crate::matrix::BlockMatrix;
 use crate::pattern::{Pattern, index};
 
-/// Numbers after the last block, so that four can be read where its last column begins.
-pub(crate) const SLACK: usize = 1;
+/// Numbers read after a block's nine, of which nothing comes: see [`BlockSum`](energy_dsl::BlockSum).
+const SLACK: usize = BLOCK_NUMBERS - 9;
 
 /// What couples the rows of a domain with each other: the blocks of L̃ᵀ = C⁻¹ Lᵀ C⁻ᵀ by rows. Rows and columns are counted from its first.
 #[derive(Clone, Debug)]
@@ -17,9 +17,53 @@ pub(crate) struct Triangle<T> {
     blocks_before: usize,
     /// For each row the first place that is no longer coupled within the domain.
     pub(super) inner_end: Vec<u32>,
-    /// Each block column by column, and row by row.
-    pub(crate) columns: Vec<T>,
-    pub(crate) by_rows: Vec<T>,
+    /// The blocks, each row by row.
+    numbers: Vec<T>,
+}
+
+/// The rows of a [`Triangle`]: what a sweep reads, at hand.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rows<'a, T> {
+    numbers: &'a [T],
+    columns: &'a [u32],
+    /// The first place and the end of each row.
+    diagonals: &'a [u32],
+    inner_end: &'a [u32],
+    /// The first row, and how many blocks there are before it, with those on the diagonal.
+    first: usize,
+    before: usize,
+}
+
+impl<'a, T> Rows<'a, T> {
+    /// What couples a row with later ones of its domain.
+    #[inline(always)]
+    pub(crate) fn blocks(&self, row: usize) -> Blocks<'a, T> {
+        let (diagonal, end) = (self.diagonals[row] as usize, self.inner_end[row] as usize);
+        let columns = &self.columns[diagonal + 1..end];
+        // Before it, there are as many blocks on the diagonal as rows.
+        let numbers = &self.numbers[9 * (diagonal - (self.before + row))..][..9 * columns.len() + SLACK];
+        Blocks { numbers, columns, first: self.first }
+    }
+}
+
+/// The blocks of a row, with as many numbers as are read at once, and their columns.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Blocks<'a, T> {
+    numbers: &'a [T],
+    columns: &'a [u32],
+    first: usize,
+}
+
+impl<'a, T> Iterator for Blocks<'a, T> {
+    type Item = (&'a [T; BLOCK_NUMBERS], usize);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        let (&column, columns) = self.columns.split_first()?;
+        let block = self.numbers.first_chunk()?;
+        (self.columns, self.numbers) = (columns, &self.numbers[9..]);
+        Some((block, column as usize - self.first))
+    }
 }
 
 impl<T: Precision> Triangle<T> {
@@ -34,26 +78,26 @@ impl<T: Precision> Triangle<T> {
         let last = rows.end - 1;
         let blocks = pattern.above(last).end - last - 1 - before(rows.start);
         let numbers = vec![T::from_f64(0.0); 9 * blocks + SLACK];
-        Self {
-            blocks_before: before(rows.start),
-            inner_end: inner_end.collect(),
-            rows,
-            columns: numbers.clone(),
-            by_rows: numbers,
-        }
+        Self { blocks_before: before(rows.start), inner_end: inner_end.collect(), rows, numbers }
     }
 
     /// The places in the pattern of what couples a row with later ones.
     #[inline(always)]
-    pub(crate) fn places(&self, pattern: &Pattern, local: usize) -> Range<usize> {
+    fn places(&self, pattern: &Pattern, local: usize) -> Range<usize> {
         pattern.above(self.rows.start + local).start..self.inner_end[local] as usize
     }
 
-    /// By how much the place of a block of this row in the pattern exceeds its number here: before it there are as many blocks on the
-    /// diagonal as rows, and its own.
+    /// Its rows.
     #[inline(always)]
-    pub(crate) fn excess(&self, local: usize) -> usize {
-        self.rows.start + local + 1 + self.blocks_before
+    pub(crate) fn by_rows<'a>(&'a self, pattern: &'a Pattern) -> Rows<'a, T> {
+        Rows {
+            numbers: &self.numbers,
+            columns: pattern.columns(),
+            diagonals: &pattern.diagonals()[self.rows.clone()],
+            inner_end: &self.inner_end,
+            first: self.rows.start,
+            before: self.rows.start + self.blocks_before,
+        }
     }
 
     /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
@@ -62,13 +106,12 @@ impl<T: Precision> Triangle<T> {
         let (pattern, values) = (matrix.pattern(), matrix.values());
         for (local, row) in self.rows.clone().enumerate() {
             let own = rounded(&inverses[row]);
-            let excess = self.excess(local);
+            let mut first = 9 * (pattern.diagonal(row) - row - self.blocks_before);
             for place in self.places(pattern, local) {
                 let other = rounded(&inverses[pattern.columns()[place] as usize]);
                 let rows = scaled_block::<M, L>(&own, &values[place], &other);
-                let first = 9 * (place - excess);
-                store(&mut self.by_rows[first..][..9 + SLACK], &rows);
-                store(&mut self.columns[first..][..9 + SLACK], &transposed(&rows));
+                store(&mut self.numbers[first..][..10], &rows);
+                first += 9;
             }
         }
     }
@@ -95,12 +138,6 @@ pub(crate) fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M
         }
     }
     whole(scaled)
-}
-
-#[inline(always)]
-fn transposed<M: Precision>([a, b, c]: &[Wide<M>; 3]) -> [Wide<M>; 3] {
-    let zero = M::from_f64(0.0);
-    [[a[0], b[0], c[0], zero], [a[1], b[1], c[1], zero], [a[2], b[2], c[2], zero]]
 }
 
 /// Writes three numbers of each row, and the fourth, which means nothing, where the next is written after it.

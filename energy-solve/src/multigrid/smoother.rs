@@ -3,8 +3,8 @@ use std::sync::RwLock;
 use energy_dsl::{Block, Kernel, Level, Vector3};
 
 use crate::domains::{
-    Couplings, InverseFactor, Precision, SLACK, Triangle, Wide, inverse_factor, invert, rounded, scaled_block,
-    subtract_product, total,
+    Couplings, InverseFactor, Precision, Triangle, Wide, inverse_factor, invert, less_products, rounded, scaled_block,
+    subtract_turned,
 };
 use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
@@ -94,13 +94,11 @@ impl<T: Precision> Smoother<T> {
     /// v ← (I + L̃)⁻¹ v.
     #[inline(always)]
     pub(super) fn forward<L: Level>(&self, pattern: &Pattern, v: &mut [Wide<T>]) {
-        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        let rows = self.triangle.by_rows(pattern);
         for row in 0..v.len() {
             let here = v[row];
-            let excess = triangle.excess(row);
-            for place in triangle.places(pattern, row) {
-                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
-                subtract_from::<T, L>(&mut v[pattern.columns()[place] as usize - first], block, &here);
+            for (block, column) in rows.blocks(row) {
+                subtract_turned::<T, L>(&mut v[column], block, &here);
             }
         }
     }
@@ -108,31 +106,31 @@ impl<T: Precision> Smoother<T> {
     /// v ← (I + L̃ᵀ)⁻¹ v.
     #[inline(always)]
     pub(super) fn backward<L: Level>(&self, pattern: &Pattern, v: &mut [Wide<T>]) {
+        let rows = self.triangle.by_rows(pattern);
         for row in (0..v.len()).rev() {
-            v[row] = self.less_later::<L>(pattern, row, v[row], v);
+            v[row] = less_products::<T, L>(rows.blocks(row), v[row], v);
         }
     }
 
     /// r ← −(L̃ᵀ + ω − 1) v.
     #[inline(always)]
     pub(super) fn minus_upper<L: Level>(&self, pattern: &Pattern, v: &[Wide<T>], r: &mut [Wide<T>]) {
+        let rows = self.triangle.by_rows(pattern);
         for row in 0..v.len() {
             let own = plus::<T, L>([T::from_f64(0.0); 4], 1.0 - RELAXATION, &v[row]);
-            r[row] = self.less_later::<L>(pattern, row, own, v);
+            r[row] = less_products::<T, L>(rows.blocks(row), own, v);
         }
     }
 
     /// r ← r − (L̃ + ω − 1) v.
     #[inline(always)]
     pub(super) fn subtract_lower<L: Level>(&self, pattern: &Pattern, v: &[Wide<T>], r: &mut [Wide<T>]) {
-        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        let rows = self.triangle.by_rows(pattern);
         for row in 0..v.len() {
             let here = v[row];
             r[row] = plus::<T, L>(r[row], 1.0 - RELAXATION, &here);
-            let excess = triangle.excess(row);
-            for place in triangle.places(pattern, row) {
-                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
-                subtract_from::<T, L>(&mut r[pattern.columns()[place] as usize - first], block, &here);
+            for (block, column) in rows.blocks(row) {
+                subtract_turned::<T, L>(&mut r[column], block, &here);
             }
         }
     }
@@ -146,7 +144,7 @@ impl<T: Precision> Smoother<T> {
         w: &mut [Wide<T>],
         v: &mut [Wide<T>],
     ) {
-        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        let rows = self.triangle.by_rows(pattern);
         v.fill([T::from_f64(0.0); 4]);
         for row in 0..v.len() {
             let (own, mut minus, mut here) = (plus::<T, L>(w[row], RELAXATION - 1.0, &y[row]), y[row], v[row]);
@@ -155,12 +153,9 @@ impl<T: Precision> Smoother<T> {
                 here[lane] = here[lane] + own[lane];
             }
             (w[row], v[row]) = (own, here);
-            let excess = triangle.excess(row);
-            for place in triangle.places(pattern, row) {
-                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
-                let column = pattern.columns()[place] as usize - first;
-                subtract_from::<T, L>(&mut w[column], block, &minus);
-                subtract_from::<T, L>(&mut v[column], block, &here);
+            for (block, column) in rows.blocks(row) {
+                subtract_turned::<T, L>(&mut w[column], block, &minus);
+                subtract_turned::<T, L>(&mut v[column], block, &here);
             }
         }
     }
@@ -186,20 +181,6 @@ impl<T: Precision> Smoother<T> {
             }
             r[row as usize] = sum;
         }
-    }
-
-    /// A vector less what the later rows of another one are multiplied by.
-    #[inline(always)]
-    fn less_later<L: Level>(&self, pattern: &Pattern, row: usize, from: Wide<T>, v: &[Wide<T>]) -> Wide<T> {
-        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
-        let mut sums = [from, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
-        let excess = triangle.excess(row);
-        // The nearest row, computed just before when going back, comes last: the others do not have to wait for it.
-        for place in triangle.places(pattern, row).rev() {
-            let block = &triangle.columns[9 * (place - excess)..][..9 + SLACK];
-            subtract_product::<T, L>(&mut sums, block, &v[pattern.columns()[place] as usize - first]);
-        }
-        total(&sums)
     }
 }
 
@@ -234,19 +215,6 @@ fn plus<T: Precision, L: Level>(mut v: Wide<T>, scale: f64, u: &Wide<T>) -> Wide
         v[lane] = u[lane].mul_add::<L>(scale, v[lane]);
     }
     v
-}
-
-/// v ← v − B u, B stored column by column.
-#[inline(always)]
-fn subtract_from<T: Precision, L: Level>(v: &mut Wide<T>, block: &[T], u: &Wide<T>) {
-    let mut sum = *v;
-    for column in 0..3 {
-        let factor = -u[column];
-        for lane in 0..4 {
-            sum[lane] = block[3 * column + lane].mul_add::<L>(factor, sum[lane]);
-        }
-    }
-    *v = sum;
 }
 
 /// A vector in a register.

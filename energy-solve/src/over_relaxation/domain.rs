@@ -4,8 +4,8 @@ use energy_dsl::{Level, Vector3};
 
 use super::RELAXATION;
 use crate::domains::{
-    Couplings, InverseFactor, Precision, SLACK, Triangle, Wide, add_products, of_three, scaled, subtract_product,
-    total, unscaled,
+    Couplings, InverseFactor, Precision, Triangle, Wide, add_products, less_products, of_three, scaled,
+    subtract_turned, unscaled,
 };
 use crate::pattern::Pattern;
 
@@ -51,9 +51,10 @@ impl<T: Precision> Domain<T> {
         let zero = [T::from_f64(0.0); 4];
         self.solution.fill(zero);
         self.direction.fill(zero);
+        let per_scale = 1.0 / scale;
         for row in 0..self.forth.len() {
-            let [u, v, w] = scaled(&inverses[row], &b[row]).map(|component| T::from_f64(component / scale));
-            self.forth[row] = [u, v, w, T::from_f64(0.0)];
+            let [u, v, w] = scaled(&inverses[row], &b[row]);
+            self.forth[row] = [u, v, w, 0.0].map(|component| T::from_f64(component * per_scale));
         }
         self.forward::<L>(pattern);
         std::mem::swap(&mut self.residual, &mut self.forth);
@@ -73,7 +74,7 @@ impl<T: Precision> Domain<T> {
         border: &RwLock<Vec<Wide<T>>>,
     ) -> f64 {
         let (conjugate, rest) = (T::from_f64(conjugate), T::from_f64(RELAXATION - 2.0));
-        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        let rows = self.triangle.by_rows(pattern);
         let (r, p, t, w) = (&self.residual[..], &mut self.direction[..], &mut self.back[..], &mut self.forth[..]);
         let mut along = [0.0; 4];
         for row in (0..p.len()).rev() {
@@ -82,14 +83,7 @@ impl<T: Precision> Domain<T> {
                 direction[lane] = direction[lane].mul_add::<L>(conjugate, residual[lane]);
             }
             p[row] = direction;
-            let mut sums = [direction, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
-            // The nearest row, computed just before, comes last: the others do not have to wait for it.
-            let excess = triangle.excess(row);
-            for place in triangle.places(pattern, row).rev() {
-                let block = &triangle.columns[9 * (place - excess)..][..9 + SLACK];
-                subtract_product::<T, L>(&mut sums, block, &t[pattern.columns()[place] as usize - first]);
-            }
-            let back = total(&sums);
+            let back = less_products::<T, L>(rows.blocks(row), direction, t);
             let mut start = direction;
             for lane in 0..4 {
                 start[lane] = back[lane].mul_add::<L>(rest, direction[lane]);
@@ -110,19 +104,14 @@ impl<T: Precision> Domain<T> {
     /// w ← (I + L̃)⁻¹ w. Returns p · w.
     #[inline(always)]
     pub(super) fn forward<L: Level>(&mut self, pattern: &Pattern) -> f64 {
-        let (triangle, first) = (&self.triangle, self.triangle.rows.start);
+        let rows = self.triangle.by_rows(pattern);
         let (p, w) = (&self.direction[..], &mut self.forth[..]);
         let mut along = [0.0; 4];
         for row in 0..w.len() {
             let here = w[row];
             add_products(&mut along, &p[row], &here);
-            let excess = triangle.excess(row);
-            for place in triangle.places(pattern, row) {
-                let block = &triangle.by_rows[9 * (place - excess)..][..9 + SLACK];
-                let other = &mut w[pattern.columns()[place] as usize - first];
-                let mut sums = [*other, [T::from_f64(0.0); 4], [T::from_f64(0.0); 4]];
-                subtract_product::<T, L>(&mut sums, block, &here);
-                *other = total(&sums);
+            for (block, column) in rows.blocks(row) {
+                subtract_turned::<T, L>(&mut w[column], block, &here);
             }
         }
         of_three(along)

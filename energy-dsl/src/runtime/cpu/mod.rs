@@ -8,6 +8,7 @@
 //! environment variable `ENERGY_LEVEL` (`baseline`, `avx2` or `avx512`), read once, caps the level: with it one machine
 //! reproduces the results of a lesser one. (It cannot undo what the program was compiled to require.)
 
+mod block_sum;
 mod lane;
 mod lanes;
 mod portable;
@@ -19,6 +20,8 @@ use std::fmt::{self, Debug, Display};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use block_sum::Rows;
+pub use block_sum::{BLOCK_NUMBERS, BlockSum};
 pub use lane::Lane;
 use lanes::Lanes;
 pub(crate) use register::Scalar;
@@ -33,6 +36,10 @@ pub trait Level: Copy + Debug + 'static {
     type F64: Lane<f64>;
     /// As many single-precision numbers as one instruction takes.
     type F32: Lane<f32>;
+    /// What sweeps through sparse matrices of doubles sum up with.
+    type Sum64: BlockSum<f64>;
+    /// The same of single-precision numbers.
+    type Sum32: BlockSum<f32>;
 }
 
 /// What every processor of the target has.
@@ -44,6 +51,8 @@ impl Level for Baseline {
     const FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
     type F64 = Lanes<portable::F64x2>;
     type F32 = Lanes<portable::F32x4>;
+    type Sum64 = Rows<f64, Self>;
+    type Sum32 = Rows<f32, Self>;
 }
 
 /// Baseline, with fused operations by library calls: what gives the bits of fused levels outside their kernels.
@@ -55,6 +64,8 @@ impl Level for Fused {
     const FUSED: bool = true;
     type F64 = Lanes<portable::F64x2>;
     type F32 = Lanes<portable::F32x4>;
+    type Sum64 = Rows<f64, Self>;
+    type Sum32 = Rows<f32, Self>;
 }
 
 /// Work that can be compiled for any [`Level`].

@@ -8,8 +8,10 @@
 
 mod avx2;
 mod avx512;
+mod block_sum;
 mod transpose;
 
+use super::block_sum::Rows;
 use super::lanes::Lanes;
 use super::{Baseline, Kernel, Level, LevelName};
 use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
@@ -23,6 +25,8 @@ impl Level for Avx2 {
     const FUSED: bool = true;
     type F64 = Lanes<__m256d>;
     type F32 = Lanes<__m256>;
+    type Sum64 = Rows<f64, Self>;
+    type Sum32 = Rows<f32, Self>;
 }
 
 /// AVX-512 F, DQ, VL and BW.
@@ -34,6 +38,8 @@ impl Level for Avx512 {
     const FUSED: bool = true;
     type F64 = Lanes<__m512d>;
     type F32 = Lanes<__m512>;
+    type Sum64 = Rows<f64, Self>;
+    type Sum32 = block_sum::Nine;
 }
 
 /// The best level of this machine. The standard library remembers what it detected.
