@@ -42,6 +42,11 @@ impl Places {
         Self { pairs: pairs.len(), slots, turned }
     }
 
+    /// Whether there are none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
     /// The places of the pairs of elements, one element after the other.
     #[inline(always)]
     pub(crate) fn of(&self, elements: Range<usize>) -> &[u32] {

@@ -210,13 +210,26 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
         let vertex = |number: usize, point: usize| self.list.stencil(self.active.element(number))[point];
         self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[self.active.element(number)], vertex);
         self.energies = (0..self.active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect();
-        if self.character().curved {
-            let places = |pairs: &[_]| Places::new(&self.active, self.list.stencils(), pairs, dofs, pattern);
-            self.places = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
-            if pattern.storage() == Storage::Whole {
-                self.mirrored = places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>());
-            }
+        // Constant Jacobians are evaluated before there are many vectors: their places would be of use once, and take memory for good.
+        if !self.character().quadratic {
+            self.place_blocks(dofs, pattern);
         }
+    }
+
+    fn place_blocks(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        if !self.character().curved || !self.places.is_empty() {
+            return;
+        }
+        let n = self.list.arity();
+        let places = |pairs: &[_]| Places::new(&self.active, self.list.stencils(), pairs, dofs, pattern);
+        self.places = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
+        if pattern.storage() == Storage::Whole {
+            self.mirrored = places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>());
+        }
+    }
+
+    fn forget_blocks(&mut self) {
+        (self.places, self.mirrored) = (Places::default(), Places::default());
     }
 
     fn divide(&mut self, shares: &[Share]) {

@@ -328,6 +328,9 @@ impl System {
         let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
         // For the product every term is evaluated anyway.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
+        if !with_constant {
+            self.terms.iter_mut().for_each(|counted| counted.term.place_blocks(&self.dofs, &self.pattern));
+        }
         // Without it the matrix will hold something else.
         let known = matrix.constant.take();
         let constant = with_constant.then(|| match known {
@@ -403,7 +406,9 @@ impl System {
         };
         let mut projected = false;
         for Counted { term, counts } in self.terms.iter_mut().filter(|counted| is_constant(&*counted.term)) {
+            term.place_blocks(&self.dofs, &self.pattern);
             let tally = term.add_linearisation(state, &mut sum);
+            term.forget_blocks();
             projected |= tally.projected > 0;
             counts.hessian += tally;
         }

@@ -143,6 +143,10 @@ pub trait Term: std::fmt::Debug {
     fn stencils(&self) -> Stencils<'_>;
     /// Finds out which elements have a free vertex, and where their blocks are stored.
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern);
+    /// Finds out again where its blocks are stored, if it does not know.
+    fn place_blocks(&mut self, _dofs: &DofMap, _pattern: &Pattern) {}
+    /// May forget where its blocks are stored, until [`Term::place_blocks`] is called: its Jacobians are constant, and were evaluated.
+    fn forget_blocks(&mut self) {}
     /// Finds out what elements each share needs, if it can be divided. Called after [`Term::place`], and whenever the number of threads changes.
     fn divide(&mut self, _shares: &[Share]) {}
     /// Its shares; `None` if one thread has to do it all.
