@@ -156,8 +156,18 @@ struct Found {
     energy: (f64, f64),
     /// The part of the direction that was taken.
     scale: f64,
-    /// −∇E there, if it was looked at.
-    down: Option<Vec<Vector3<f64>>>,
+    /// −∇E there, if it was looked at, or came with the matrix.
+    looked: Option<Vec<Vector3<f64>>>,
+    linearised: Option<Vec<Vector3<f64>>>,
+}
+
+/// What is evaluated where a whole step leads, before it is known whether E is low enough there: E comes with it.
+enum Ahead<'a> {
+    Nothing,
+    /// −∇E, which may turn out to be small enough.
+    Gradient,
+    /// −∇E and the matrix of the next iteration.
+    Matrix(&'a mut BlockMatrix<f32>),
 }
 
 /// E and −∇E.
@@ -301,14 +311,15 @@ impl Step<'_> {
     }
 
     /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo); `None` if none does. A projected direction is too short rather than too
-    /// long: of x + d, x + 2 d, … the last before E grows. Where −∇E may turn out to be small enough (`look`), it is evaluated with E.
+    /// long: of x + d, x + 2 d, … the last before E grows. With E at x + d comes what will be needed there (`ahead`).
     fn line_search(
         &mut self,
         x: &[Vector3<f64>],
         energy: (f64, f64),
         down: &[Vector3<f64>],
         direction: &[Vector3<f64>],
-        (projected, look): (bool, bool),
+        projected: bool,
+        mut ahead: Ahead<'_>,
     ) -> Result<Option<Found>, EvaluationError> {
         let slope = -dot(down, direction);
         if slope == 0.0 && largest(direction) == 0.0 && largest(down) > 0.0 {
@@ -317,10 +328,15 @@ impl Step<'_> {
         let mut scale = 1.0;
         for _ in 0..=HALVINGS {
             let moved = self.moved(x, scale, direction);
-            let down = if look && scale == 1.0 { if_finite(self.gradient(&moved))? } else { None };
+            let (mut looked, mut linearised) = (None, None);
+            match std::mem::replace(&mut ahead, Ahead::Nothing) {
+                Ahead::Nothing => {}
+                Ahead::Gradient => looked = if_finite(self.gradient(&moved))?,
+                Ahead::Matrix(matrix) => linearised = if_finite(self.linearise(&moved, Curvature::Exact, matrix))?,
+            }
             let trial = self.energy(&moved)?;
             if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
-                let found = Found { x: moved, energy: trial, scale, down };
+                let found = Found { x: moved, energy: trial, scale, looked, linearised };
                 let too_short = projected && scale == 1.0;
                 return Ok(Some(if too_short { self.lengthen(x, found, direction)? } else { found }));
             }
@@ -344,7 +360,7 @@ impl Step<'_> {
             if energy.0 >= found.energy.0 {
                 break;
             }
-            found = Found { x: moved, energy, scale, down: None };
+            found = Found { x: moved, energy, scale, looked: None, linearised: None };
         }
         Ok(found)
     }
@@ -400,6 +416,8 @@ impl Integrator for Newton {
         };
         let (mut converged, mut change) = (false, f64::INFINITY);
         let (mut last, mut looked) = (None, None);
+        // Whether the last line search took a whole step: then the next one probably will.
+        let mut whole = true;
         while !converged {
             if step.report.solves == self.options.iteration_limit as u64 {
                 return Err(StepError::NotConverged { iterations: step.report.solves, change });
@@ -415,7 +433,7 @@ impl Integrator for Newton {
                 }
             }
             let (curvature, projected) = (projection.curvature, !projection.is_exact());
-            let down = match linearised.take() {
+            let down = match linearised.take().filter(|_| !projected) {
                 Some(down) => down,
                 None => step.linearise(&x, curvature, &mut memory.matrix)?,
             };
@@ -423,19 +441,25 @@ impl Integrator for Newton {
             last = Some(forcing);
             let (direction, solved) =
                 step.direction(&x, &down, curvature, &mut memory, &mut self.trial, forcing.tolerance)?;
-            let look = self.may_be_enough(forcing, dt);
-            let Some(found) = step.line_search(&x, energy, &down, &direction, (projected, look))? else {
+            let ends = largest(&direction) < dt * self.options.velocity_tolerance;
+            let ahead = match () {
+                () if self.may_be_enough(forcing, dt) => Ahead::Gradient,
+                () if projected || ends || !whole || !solved.converged() => Ahead::Nothing,
+                () => Ahead::Matrix(&mut memory.matrix),
+            };
+            let Some(found) = step.line_search(&x, energy, &down, &direction, projected, ahead)? else {
                 if !projected {
                     projection.demand();
                     continue;
                 }
                 return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
             };
-            (x, energy, looked) = (found.x, found.energy, found.down);
+            (x, energy, looked, linearised) = (found.x, found.energy, found.looked, found.linearised);
+            whole = found.scale >= 1.0;
             let before = std::mem::replace(&mut change, found.scale * largest(&direction) / dt);
             if projected || solved.converged() {
                 converged = change < self.options.velocity_tolerance;
-                projection.proceed(found.scale >= 1.0 && change < before);
+                projection.proceed(whole && change < before);
             } else {
                 projection.demand();
             }
