@@ -253,3 +253,56 @@ pub fn table(runs: &[Measured]) -> Table {
     }
     table
 }
+
+/// The exponent with which the time of a step grows with the number of vertices, over all sizes: of t ~ nᵖ, p by least squares of ln t. A line for each
+/// cloth, number of threads and solver that ran at three sizes or more.
+#[must_use]
+pub fn growth(runs: &[Measured]) -> String {
+    let mut lines = String::new();
+    let mut told: Vec<(Cloth, usize, &str)> = Vec::new();
+    for run in runs {
+        let kind = |run: &Measured| (run.cloth, run.threads, run.linear_solver.name());
+        if told.contains(&kind(run)) {
+            continue;
+        }
+        told.push(kind(run));
+        let alike = runs.iter().filter(|other| kind(other) == kind(run));
+        let times: Vec<[f64; 2]> =
+            alike.map(|run| [run.vertices as f64, run.time.as_secs_f64() / run.steps as f64]).collect();
+        if times.len() < 3 {
+            continue;
+        }
+        let (cloth, threads) = (run.cloth.name(), if run.threads == 1 { "thread" } else { "threads" });
+        let exponent = exponent(&times);
+        lines += &format!("{cloth}, {} {threads}: a step's time grows as vertices ^ {exponent:.2}\n", run.threads);
+    }
+    lines
+}
+
+/// p of t = c nᵖ through points (n, t), by least squares of logarithms.
+fn exponent(points: &[[f64; 2]]) -> f64 {
+    let count = points.len() as f64;
+    let logarithms = points.iter().map(|point| point.map(f64::ln));
+    let mean = |axis: usize| logarithms.clone().map(|point| point[axis]).sum::<f64>() / count;
+    let [n, t] = [mean(0), mean(1)];
+    let (mut across, mut along) = (0.0, 0.0);
+    for [x, y] in logarithms.clone() {
+        across += (x - n) * (y - t);
+        along += (x - n) * (x - n);
+    }
+    across / along
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_fitted() {
+        let points = |p: f64| [10.0_f64, 20.0, 70.0].map(|n| [n, 3.0 * n.powf(p)]);
+        assert!((exponent(&points(1.2)) - 1.2).abs() < 1e-12);
+        // Off by the same factor at both ends: the slope is that of the middle.
+        let off = [[1.0, 2.0], [4.0, 4.0], [16.0, 32.0]];
+        assert!((exponent(&off) - 1.0).abs() < 1e-12);
+    }
+}

@@ -347,7 +347,7 @@ fn time(
             }
         }
     }
-    print(&format!("{}\n", bench::table(&runs)))
+    print(&format!("{}\n{}", bench::table(&runs), bench::growth(&runs)))
 }
 
 /// Compares the integrators, prints the table, and writes it.
