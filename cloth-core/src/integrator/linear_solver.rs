@@ -1,7 +1,9 @@
+use std::sync::Arc;
+
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockCholesky, BlockMatrix, IncompleteCholesky, Multigrid, OverRelaxation, Precision, SolveOptions, SolveReport,
-    conjugate_gradients,
+    BlockCholesky, BlockMatrix, IncompleteCholesky, Multigrid, OverRelaxation, Pattern, Precision, SolveOptions,
+    SolveReport, conjugate_gradients,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -111,6 +113,30 @@ enum Solver<T> {
     IncompleteCholesky(Box<IncompleteCholesky>),
 }
 
+impl<T: Precision> Solver<T> {
+    /// For matrices of a pattern. What is chosen automatically is over-relaxation.
+    fn set_up(choice: LinearSolverChoice, pattern: &Arc<Pattern>, threads: usize) -> Result<Self, StepError> {
+        Ok(match choice {
+            LinearSolverChoice::Multigrid => Self::Multigrid(Multigrid::with_threads(pattern, threads).into()),
+            LinearSolverChoice::Cholesky => Self::Cholesky(BlockCholesky::new(pattern)?.into()),
+            LinearSolverChoice::IncompleteCholesky => Self::IncompleteCholesky(IncompleteCholesky::new(pattern).into()),
+            LinearSolverChoice::Auto | LinearSolverChoice::OverRelaxation => {
+                Self::OverRelaxation(OverRelaxation::with_threads(pattern, threads).into())
+            }
+        })
+    }
+
+    /// Whether it is what is chosen.
+    fn is(&self, choice: LinearSolverChoice) -> bool {
+        match self {
+            Self::OverRelaxation(_) => matches!(choice, LinearSolverChoice::Auto | LinearSolverChoice::OverRelaxation),
+            Self::Multigrid(_) => choice == LinearSolverChoice::Multigrid,
+            Self::Cholesky(_) => choice == LinearSolverChoice::Cholesky,
+            Self::IncompleteCholesky(_) => choice == LinearSolverChoice::IncompleteCholesky,
+        }
+    }
+}
+
 /// Without what can be set up again.
 impl<T: Precision> Clone for LinearSolver<T> {
     fn clone(&self) -> Self {
@@ -138,20 +164,9 @@ impl<T: Precision> LinearSolver<T> {
             LinearSolverChoice::Auto => LinearSolverChoice::OverRelaxation,
             choice => choice,
         };
-        let solver = match (self.solver.take(), wanted) {
-            (Some(Solver::Multigrid(known)), LinearSolverChoice::Multigrid) => Solver::Multigrid(known),
-            (_, LinearSolverChoice::Multigrid) => Solver::Multigrid(Multigrid::with_threads(pattern, threads).into()),
-            (Some(Solver::Cholesky(known)), LinearSolverChoice::Cholesky) => Solver::Cholesky(known),
-            (_, LinearSolverChoice::Cholesky) => Solver::Cholesky(BlockCholesky::new(pattern)?.into()),
-            (Some(Solver::IncompleteCholesky(known)), LinearSolverChoice::IncompleteCholesky) => {
-                Solver::IncompleteCholesky(known)
-            }
-            (_, LinearSolverChoice::IncompleteCholesky) => {
-                Solver::IncompleteCholesky(IncompleteCholesky::new(pattern).into())
-            }
-            (Some(Solver::OverRelaxation(known)), _) => Solver::OverRelaxation(known),
-            (_, _) => Solver::OverRelaxation(OverRelaxation::with_threads(pattern, threads).into()),
-        };
+        // One that is not wanted any more goes before another is set up: there is not to be memory for both.
+        let known = self.solver.take().filter(|solver| solver.is(wanted));
+        let solver = known.map_or_else(|| Solver::set_up(wanted, pattern, threads), Ok)?;
         match self.solver.insert(solver) {
             Solver::OverRelaxation(solver) => solver.scale(matrix)?,
             Solver::Multigrid(solver) => solver.take_over(matrix)?,

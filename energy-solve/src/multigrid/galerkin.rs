@@ -31,7 +31,6 @@ struct Part {
     rows: Range<usize>,
     /// The halves that they add to, and those between.
     halves: Range<usize>,
-    sums: Vec<Half>,
 }
 
 /// A block of G as it is, or the one that its mirror image adds to: by rows.
@@ -77,26 +76,26 @@ impl GalerkinProduct {
             let touched = &halves[half_start[rows.start] as usize..half_start[rows.end] as usize];
             let first = touched.iter().min().map_or(0, |&first| first as usize);
             let halves = first..touched.iter().max().map_or(first, |&last| last as usize + 1);
-            Part { rows: rows.clone(), sums: vec![[0.0; 9]; halves.len()], halves }
+            Part { rows: rows.clone(), halves }
         };
         let parts = ranges.iter().map(part).collect();
+        slots.shrink_to_fit();
         (Self { sums, slot_start, slots, half_start, halves, parts }, Arc::new(coarse))
     }
 
     /// Computes the product, on at most so many threads.
     pub(super) fn compute<T: Precision>(
-        &mut self,
+        &self,
         fine: &BlockMatrix<impl Precision>,
         interpolation: &Interpolation<T>,
         threads: usize,
         coarse: &mut BlockMatrix,
     ) {
-        let mut parts = std::mem::take(&mut self.parts);
-        let of = &*self;
-        for_each(threads, parts.iter_mut().collect(), |part| dispatch(Contribution { of, part, fine, interpolation }));
+        let contribution = |part| dispatch(Contribution { of: self, part, fine, interpolation });
+        let contributions = for_each(threads, self.parts.iter().collect(), contribution);
         let mut whole = vec![[0.0; 9]; 2 * coarse.pattern().blocks()];
-        for part in &parts {
-            for (sum, half) in whole[part.halves.clone()].iter_mut().zip(&part.sums) {
+        for (part, sums) in self.parts.iter().zip(contributions) {
+            for (sum, half) in whole[part.halves.clone()].iter_mut().zip(&sums) {
                 (0..9).for_each(|entry| sum[entry] += half[entry]);
             }
         }
@@ -116,26 +115,25 @@ impl GalerkinProduct {
                 }
             }
         }
-        self.parts = parts;
     }
 }
 
 /// What the rows of a part contribute.
 struct Contribution<'a, T, M> {
     of: &'a GalerkinProduct,
-    part: &'a mut Part,
+    part: &'a Part,
     fine: &'a BlockMatrix<M>,
     interpolation: &'a Interpolation<T>,
 }
 
 impl<T: Precision, M: Precision> Kernel for Contribution<'_, T, M> {
-    type Output = ();
+    type Output = Vec<Half>;
 
     #[inline(always)]
-    fn run<L: Level>(self) {
+    fn run<L: Level>(self) -> Vec<Half> {
         let Self { of, part, fine, interpolation } = self;
         let (pattern, values) = (fine.pattern(), fine.values().as_flattened().as_flattened().as_chunks::<9>().0);
-        part.sums.fill([0.0; 9]);
+        let mut sums = vec![[0.0; 9]; part.halves.len()];
         let mut row_of_product: Vec<Half> = Vec::new();
         for row in part.rows.clone() {
             row_of_product.clear();
@@ -154,11 +152,12 @@ impl<T: Precision, M: Precision> Kernel for Contribution<'_, T, M> {
             for &weight in interpolation.weights(row) {
                 for block in &row_of_product {
                     let half = of.halves[place] as usize - part.halves.start;
-                    add_times::<f64, L>(&mut part.sums[half], weight.into(), block);
+                    add_times::<f64, L>(&mut sums[half], weight.into(), block);
                     place += 1;
                 }
             }
         }
+        sums
     }
 }
 
@@ -210,7 +209,7 @@ mod tests {
         let expected = p.transpose() * dense(&fine) * &p;
         for bounds in [[0, 122].as_slice(), &[0, 50, 80, 122]] {
             let ranges: Vec<_> = bounds.windows(2).map(|ends| ends[0]..ends[1]).collect();
-            let (mut product, coarse) = GalerkinProduct::new(&pattern, &interpolation, &ranges);
+            let (product, coarse) = GalerkinProduct::new(&pattern, &interpolation, &ranges);
             let mut computed = BlockMatrix::zeros(coarse);
             for _ in 0..2 {
                 product.compute(&fine, &interpolation, 2, &mut computed);
