@@ -133,6 +133,23 @@ pub struct Measured {
     pub peak_memory: Option<u64>,
 }
 
+impl Measured {
+    /// What runs of several sizes have in common.
+    fn kind(&self) -> (Cloth, usize, LinearSolverChoice) {
+        (self.cloth, self.threads, self.linear_solver)
+    }
+
+    /// The time of a step, in s.
+    fn a_step(&self) -> f64 {
+        self.time.as_secs_f64() / self.steps as f64
+    }
+
+    /// The number of vertices and the time of a step.
+    fn point(&self) -> [f64; 2] {
+        [self.vertices as f64, self.a_step()]
+    }
+}
+
 /// Runs a cloth for `seconds` of its time on at most so many threads with a linear solver, calling `progress` after every step.
 ///
 /// # Errors
@@ -212,18 +229,14 @@ pub fn table(runs: &[Measured]) -> Table {
     ]);
     for run in runs {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
-        let a_step = |run: &Measured| milliseconds(run.time) / run.steps as f64;
+        let a_step = |run: &Measured| 1e3 * run.a_step();
         let share = |time: Duration| format!("{:.0} %", 100.0 * time.as_secs_f64() / run.time.as_secs_f64());
         let Phases { assembly, factorisation, solve, line_search } = run.report.phases;
-        let alike = |other: &&Measured| {
-            other.cloth == run.cloth && other.threads == run.threads && other.linear_solver == run.linear_solver
-        };
-        let smaller = runs.iter().filter(alike).filter(|other| other.vertices < run.vertices);
+        let alike = runs.iter().filter(|other| other.kind() == run.kind());
+        let smaller = alike.filter(|other| other.vertices < run.vertices);
         let before = smaller.max_by_key(|other| other.vertices);
-        let growth = before.map_or("–".to_owned(), |before| {
-            let (times, sizes) = (a_step(run) / a_step(before), run.vertices as f64 / before.vertices as f64);
-            format!("{:.2}", times.ln() / sizes.ln())
-        });
+        let growth =
+            before.map_or("–".to_owned(), |before| format!("{:.2}", exponent(&[before.point(), run.point()])));
         let same = |other: &&Measured| {
             other.cloth == run.cloth && other.vertices == run.vertices && other.linear_solver == run.linear_solver
         };
@@ -259,22 +272,17 @@ pub fn table(runs: &[Measured]) -> Table {
 #[must_use]
 pub fn growth(runs: &[Measured]) -> String {
     let mut lines = String::new();
-    let mut told: Vec<(Cloth, usize, &str)> = Vec::new();
-    for run in runs {
-        let kind = |run: &Measured| (run.cloth, run.threads, run.linear_solver.name());
-        if told.contains(&kind(run)) {
+    for (number, run) in runs.iter().enumerate() {
+        if runs[..number].iter().any(|told| told.kind() == run.kind()) {
             continue;
         }
-        told.push(kind(run));
-        let alike = runs.iter().filter(|other| kind(other) == kind(run));
-        let times: Vec<[f64; 2]> =
-            alike.map(|run| [run.vertices as f64, run.time.as_secs_f64() / run.steps as f64]).collect();
-        if times.len() < 3 {
-            continue;
+        let alike = runs.iter().filter(|other| other.kind() == run.kind());
+        let points: Vec<[f64; 2]> = alike.map(Measured::point).collect();
+        if points.len() >= 3 {
+            let threads = if run.threads == 1 { "thread" } else { "threads" };
+            let of = format!("{}, {} {threads}", run.cloth.name(), run.threads);
+            lines += &format!("{of}: a step's time grows as vertices ^ {:.2}\n", exponent(&points));
         }
-        let (cloth, threads) = (run.cloth.name(), if run.threads == 1 { "thread" } else { "threads" });
-        let exponent = exponent(&times);
-        lines += &format!("{cloth}, {} {threads}: a step's time grows as vertices ^ {exponent:.2}\n", run.threads);
     }
     lines
 }

@@ -141,9 +141,9 @@ pub trait Term: std::fmt::Debug {
     fn character(&self) -> Character;
     /// The vertices of its elements.
     fn stencils(&self) -> Stencils<'_>;
-    /// Finds out which elements have a free vertex, and where their blocks are stored.
+    /// Finds out which elements have a free vertex, and where their blocks are stored; of constant ones that may wait for [`Term::place_blocks`].
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern);
-    /// Finds out again where its blocks are stored, if it does not know.
+    /// Finds out where its blocks are stored, if it does not know. Called before constant Jacobians are evaluated.
     fn place_blocks(&mut self, _dofs: &DofMap, _pattern: &Pattern) {}
     /// May forget where its blocks are stored, until [`Term::place_blocks`] is called: its Jacobians are constant, and were evaluated.
     fn forget_blocks(&mut self) {}

@@ -126,13 +126,13 @@ impl<T: Precision> Solver<T> {
         })
     }
 
-    /// Whether it is what is chosen.
-    fn is(&self, choice: LinearSolverChoice) -> bool {
+    /// What it is.
+    fn choice(&self) -> LinearSolverChoice {
         match self {
-            Self::OverRelaxation(_) => matches!(choice, LinearSolverChoice::Auto | LinearSolverChoice::OverRelaxation),
-            Self::Multigrid(_) => choice == LinearSolverChoice::Multigrid,
-            Self::Cholesky(_) => choice == LinearSolverChoice::Cholesky,
-            Self::IncompleteCholesky(_) => choice == LinearSolverChoice::IncompleteCholesky,
+            Self::OverRelaxation(_) => LinearSolverChoice::OverRelaxation,
+            Self::Multigrid(_) => LinearSolverChoice::Multigrid,
+            Self::Cholesky(_) => LinearSolverChoice::Cholesky,
+            Self::IncompleteCholesky(_) => LinearSolverChoice::IncompleteCholesky,
         }
     }
 }
@@ -165,7 +165,7 @@ impl<T: Precision> LinearSolver<T> {
             choice => choice,
         };
         // One that is not wanted any more goes before another is set up: there is not to be memory for both.
-        let known = self.solver.take().filter(|solver| solver.is(wanted));
+        let known = self.solver.take().filter(|solver| solver.choice() == wanted);
         let solver = known.map_or_else(|| Solver::set_up(wanted, pattern, threads), Ok)?;
         match self.solver.insert(solver) {
             Solver::OverRelaxation(solver) => solver.scale(matrix)?,

@@ -442,10 +442,12 @@ impl Integrator for Newton {
             let (direction, solved) =
                 step.direction(&x, &down, curvature, &mut memory, &mut self.trial, forcing.tolerance)?;
             let ends = largest(&direction) < dt * self.options.velocity_tolerance;
-            let ahead = match () {
-                () if self.may_be_enough(forcing, dt) => Ahead::Gradient,
-                () if projected || ends || !whole || !solved.converged() => Ahead::Nothing,
-                () => Ahead::Matrix(&mut memory.matrix),
+            let ahead = if self.may_be_enough(forcing, dt) {
+                Ahead::Gradient
+            } else if projected || ends || !whole || !solved.converged() {
+                Ahead::Nothing
+            } else {
+                Ahead::Matrix(&mut memory.matrix)
             };
             let Some(found) = step.line_search(&x, energy, &down, &direction, projected, ahead)? else {
                 if !projected {
