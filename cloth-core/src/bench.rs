@@ -95,8 +95,10 @@ pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
     let mut garment = fabric::terms(&cloth.fabric(), &mesh, &SpringNetwork::default(), &surroundings)?;
     let mut x = mesh.vertices().to_vec();
     let mut pinned = vec![false; x.len()];
+    let corners = [sheet.vertex(0, cells), sheet.vertex(cells, cells)];
+    garment.masses.reserve_exact(corners.len());
     let mut held = Vec::new();
-    for corner in [sheet.vertex(0, cells), sheet.vertex(cells, cells)] {
+    for corner in corners {
         held.push([corner, x.len()]);
         x.push(x[corner]);
         garment.masses.push(0.0);

@@ -62,13 +62,13 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: self.arity, vertices: &self.stencils }
+        Stencils::new(self.arity, &self.stencils)
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
-        let is_free = |stencil: &[u32]| stencil.iter().any(|&vertex| dofs.place(vertex as usize).is_some());
+        let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
         self.acting.clear();
-        self.is_free = self.stencils().iter().map(is_free).collect();
+        self.is_free = self.stencils().iter().map(|mut stencil| stencil.any(is_free)).collect();
         self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);
     }
 

@@ -332,7 +332,7 @@ impl Simulation {
                 energies[label] = term.energy.map(|energy| energies[label].unwrap_or(0.0) + energy).or(energies[label]);
             }
             for (&label, (term, _)) in labels.iter().zip(body.system.terms()) {
-                elements[label] += term.stencils().iter().len();
+                elements[label] += term.stencils().len();
             }
             let force = body.system.forces(State { x: &body.x, v: &body.v })?;
             summary.kinetic_energy += body.kinetic_energy();

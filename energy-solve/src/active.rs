@@ -4,7 +4,7 @@ use energy_dsl::{Array, Vector3};
 
 use crate::dofs::DofMap;
 use crate::pattern::index;
-use crate::term::Stencils;
+use crate::stencils::Stencils;
 
 /// The elements that are evaluated: those with a free vertex.
 #[derive(Clone, Debug, Default)]
@@ -16,11 +16,16 @@ pub(crate) struct Active {
 
 impl Active {
     pub(crate) fn new(stencils: Stencils<'_>, dofs: &DofMap) -> Self {
-        let is_active = |stencil: &[u32]| stencil.iter().any(|&vertex| dofs.place(vertex as usize).is_some());
-        let active = || stencils.iter().enumerate().filter(|(_, stencil)| is_active(stencil));
+        let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
+        let active = || (0..stencils.len()).filter(|&element| stencils.stencil(element).any(is_free));
         let count = active().count();
-        let chosen = (count < stencils.iter().len()).then(|| active().map(|(element, _)| index(element)).collect());
+        let chosen = (count < stencils.len()).then(|| active().map(index).collect());
         Self { count, chosen }
+    }
+
+    /// Whether there are no others.
+    pub(crate) fn are_all(&self) -> bool {
+        self.chosen.is_none()
     }
 
     /// How many there are.

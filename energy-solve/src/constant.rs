@@ -5,7 +5,8 @@ use energy_dsl::Block;
 use crate::curvature::Curvature;
 use crate::pattern::{Pattern, Storage, index};
 use crate::precision::Precision;
-use crate::term::{Stencils, Weights};
+use crate::stencils::Stencils;
+use crate::term::Weights;
 
 /// What is constant of a matrix M + α ∂f/∂x + β ∂f/∂v: masses and quadratic terms, evaluated once for all steps of one size. The matrix holds it; of
 /// the blocks that other terms are added to it is kept here, to begin with again.
@@ -67,8 +68,8 @@ pub(crate) fn coupled_runs<'a>(
 ) -> Vec<Range<u32>> {
     let mut coupled = vec![false; pattern.blocks()];
     for stencil in terms.flat_map(Stencils::iter) {
-        for i in stencil.iter().filter_map(|&vertex| row(vertex)) {
-            for j in stencil.iter().filter_map(|&vertex| row(vertex)) {
+        for i in stencil.clone().filter_map(&row) {
+            for j in stencil.clone().filter_map(&row) {
                 if (pattern.storage() == Storage::Whole || i <= j)
                     && let Some((place, _)) = pattern.place(i, j)
                 {

@@ -17,7 +17,8 @@ impl DofMap {
     /// Vertex i is pinned where `pinned[i]`.
     #[must_use]
     pub fn new(pinned: &[bool]) -> Self {
-        let free: Vec<usize> = (0..pinned.len()).filter(|&vertex| !pinned[vertex]).collect();
+        let mut free: Vec<usize> = (0..pinned.len()).filter(|&vertex| !pinned[vertex]).collect();
+        free.shrink_to_fit();
         let mut place = vec![PINNED; pinned.len()];
         for (number, &vertex) in free.iter().enumerate() {
             place[vertex] = index(number);

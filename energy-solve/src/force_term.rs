@@ -9,7 +9,8 @@ use crate::list::ElementList;
 use crate::pattern::Pattern;
 use crate::places::Places;
 use crate::precision::Blocks;
-use crate::term::{Character, Linearisation, Quantity, State, Stencils, Term};
+use crate::stencils::Stencils;
+use crate::term::{Character, Linearisation, Quantity, State, Term};
 use crate::vector::block_times;
 
 /// A method that evaluates an element's energy.

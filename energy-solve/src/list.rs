@@ -1,7 +1,7 @@
 use energy_dsl::Element;
 
 use crate::pattern::index;
-use crate::term::Stencils;
+use crate::stencils::Stencils;
 
 /// Stencils that do not fit their elements.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -98,16 +98,15 @@ impl<E: Element> ElementList<E> {
         std::mem::take(&mut self.elements)
     }
 
-    /// The vertices of all elements, `arity` to an element.
-    #[must_use]
-    pub fn vertices(&self) -> &[u32] {
-        &self.vertices
+    /// Leaves the list without stencils.
+    pub(crate) fn forget_stencils(&mut self) {
+        self.vertices = Vec::new();
     }
 
     /// The stencils of all elements.
     #[must_use]
     pub fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: self.arity, vertices: &self.vertices }
+        Stencils::new(self.arity, &self.vertices)
     }
 
     /// How many points an element has.

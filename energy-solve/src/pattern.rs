@@ -22,30 +22,39 @@ impl Pattern {
     /// # Panics
     /// When a stencil names a row there is not, or there are more than 2³² blocks.
     #[must_use]
-    pub fn from_stencils<'a>(storage: Storage, rows: usize, stencils: impl IntoIterator<Item = &'a [u32]>) -> Self {
-        let mut couplings: Vec<Vec<u32>> = (0..rows).map(|row| vec![index(row)]).collect();
-        for stencil in stencils {
-            for &row in stencil {
-                let known = &mut couplings[row as usize];
-                for &column in stencil.iter().filter(|&&column| storage == Storage::Whole || column > row) {
-                    if !known.contains(&column) {
-                        known.push(column);
+    pub fn from_stencils<'a, S>(storage: Storage, rows: usize, stencils: S) -> Self
+    where
+        S: IntoIterator<Item = &'a [u32], IntoIter: Clone>,
+    {
+        let pairs =
+            |stencil: &'a [u32]| stencil.iter().flat_map(|&row| stencil.iter().map(move |&column| (row, column)));
+        Self::from_pairs(storage, rows, stencils.into_iter().flat_map(pairs))
+    }
+
+    /// The pattern of `rows` block rows with these blocks, of which those that are not stored are left out.
+    pub(crate) fn from_pairs(storage: Storage, rows: usize, blocks: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
+        let (start, mut columns) = sorted_by_row(storage, rows, blocks);
+        let (mut row_start, mut diagonal, mut end) = (Vec::with_capacity(rows + 1), Vec::with_capacity(rows), 0);
+        row_start.push(0);
+        for row in 0..rows {
+            let named = start[row]..start[row + 1];
+            columns[named.clone()].sort_unstable();
+            for place in named {
+                let column = columns[place];
+                // Each once.
+                if end == row_start[row] as usize || columns[end - 1] != column {
+                    if column == index(row) {
+                        diagonal.push(index(end));
                     }
+                    columns[end] = column;
+                    end += 1;
                 }
             }
+            row_start.push(index(end));
         }
-        let blocks = couplings.iter().map(Vec::len).sum();
-        let (row_start, columns) = (Vec::with_capacity(rows + 1), Vec::with_capacity(blocks));
-        let mut pattern = Self { storage, row_start, columns, diagonal: Vec::with_capacity(rows) };
-        pattern.row_start.push(0);
-        for (row, mut columns) in couplings.into_iter().enumerate() {
-            columns.sort_unstable();
-            let before = columns.partition_point(|&column| column < index(row));
-            pattern.diagonal.push(index(pattern.columns.len() + before));
-            pattern.columns.extend(columns);
-            pattern.row_start.push(index(pattern.columns.len()));
-        }
-        pattern
+        columns.truncate(end);
+        columns.shrink_to_fit();
+        Self { storage, row_start, columns, diagonal }
     }
 
     /// Which blocks are stored.
@@ -126,6 +135,31 @@ impl Pattern {
         let columns = &self.columns[start..end];
         columns.iter().enumerate().map(move |(offset, &column)| (start + offset, column as usize))
     }
+}
+
+/// The columns of the blocks that are stored, and those on the diagonal, one row after the other, and where each row begins.
+fn sorted_by_row(
+    storage: Storage,
+    rows: usize,
+    blocks: impl Iterator<Item = (u32, u32)> + Clone,
+) -> (Vec<usize>, Vec<u32>) {
+    let is_stored = |row: u32, column: u32| column > row || storage == Storage::Whole && column < row;
+    // One on the diagonal of each.
+    let mut start = vec![1; rows + 1];
+    start[0] = 0;
+    blocks.clone().for_each(|(row, column)| start[row as usize + 1] += usize::from(is_stored(row, column)));
+    for row in 0..rows {
+        start[row + 1] += start[row];
+    }
+    let (mut columns, mut next) = (vec![0; start[rows]], start.clone());
+    let mut put = |row: u32, column: u32| {
+        let place = &mut next[row as usize];
+        columns[*place] = column;
+        *place += 1;
+    };
+    (0..index(rows)).for_each(|row| put(row, row));
+    blocks.filter(|&(row, column)| is_stored(row, column)).for_each(|(row, column)| put(row, column));
+    (start, columns)
 }
 
 /// A number as indices are stored, with 32 bits.

@@ -5,7 +5,7 @@ use energy_dsl::BLOCK;
 use crate::active::Active;
 use crate::dofs::DofMap;
 use crate::pattern::{Pattern, index};
-use crate::term::Stencils;
+use crate::stencils::Stencils;
 
 /// Where the blocks of elements go: for each pair of an element's points one place in the matrix, for which block (i, j) may have to be
 /// turned to block (j, i).
@@ -30,10 +30,9 @@ impl Places {
         let mut slots = Vec::with_capacity(active.len() * pairs.len());
         let mut turned = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
         for (number, element) in active.iter().enumerate() {
-            let stencil = stencils.stencil(element);
+            let row = |point: usize| dofs.place(stencils.vertex(element, point) as usize);
             for (pair, &(i, j)) in pairs.iter().enumerate() {
-                let rows = dofs.place(stencil[i] as usize).zip(dofs.place(stencil[j] as usize));
-                let place = rows.and_then(|(row, column)| pattern.place(row, column));
+                let place = row(i).zip(row(j)).and_then(|(row, column)| pattern.place(row, column));
                 let (slot, flipped) = place.unwrap_or((pattern.nowhere(), false));
                 slots.push(index(slot));
                 turned[number / BLOCK * pairs.len() + pair] |= u16::from(flipped) << (number % BLOCK);

@@ -7,7 +7,7 @@ use energy_dsl::{
     ReducedPotential, Vector3, WidePoints, for_each_batch_in, triangle_index,
 };
 
-use crate::active::{Active, points_of};
+use crate::active::Active;
 use crate::counts::Tally;
 use crate::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::dofs::DofMap;
@@ -16,7 +16,8 @@ use crate::pattern::{Pattern, Storage};
 use crate::places::Places;
 use crate::precision::Blocks;
 use crate::scatter::{TriangleRoom, VectorRoom, points_of_triangle};
-use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, Stencils, Term};
+use crate::stencils::Stencils;
+use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, Term};
 
 /// A term with f = −∇U: never dependent on velocity, always with symmetric Jacobians.
 ///
@@ -24,7 +25,7 @@ use crate::term::{Character, Divisible, Linearisation, Quantity, Share, State, S
 /// how many there are at once.
 #[derive(Debug)]
 pub struct PotentialTerm<E> {
-    /// Without its elements, once they are packed.
+    /// Without its elements, once they are packed, and without their stencils, if all are.
     list: ElementList<E>,
     /// How many elements there are.
     count: usize,
@@ -72,16 +73,27 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
         if share.number == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
     }
 
+    /// The stencils, from wherever they are.
+    fn all_stencils(&self) -> Stencils<'_> {
+        let packed = !self.packed.is_empty() && self.active.are_all();
+        if packed {
+            Stencils::in_lanes(self.count, self.list.arity(), self.packed.stencils())
+        } else {
+            self.list.stencils()
+        }
+    }
+
     /// The points of an element that is evaluated, by its number among them.
     fn points(&self, number: usize, x: &[Vector3<f64>]) -> WidePoints<E, f64> {
-        points_of(self.list.stencil(self.active.element(number)), x)
+        let (stencils, element) = (self.all_stencils(), self.active.element(number));
+        WidePoints::<E, f64>::from_fn(|point| x[stencils.vertex(element, point) as usize])
     }
 
     /// The packs of elements that have one of these vertices.
     fn packs_at(&self, vertices: &Range<usize>) -> Vec<Range<usize>> {
         let mut packs: Vec<Range<usize>> = Vec::new();
-        let inside = |&vertex: &u32| vertices.contains(&(vertex as usize));
-        let needed = |number| self.list.stencil(self.active.element(number)).iter().any(inside);
+        let (stencils, inside) = (self.all_stencils(), |vertex: u32| vertices.contains(&(vertex as usize)));
+        let needed = |number| stencils.stencil(self.active.element(number)).any(inside);
         for start in (0..self.active.len()).step_by(BLOCK) {
             let end = (start + BLOCK).min(self.active.len());
             if (start..end).any(needed) {
@@ -199,7 +211,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        self.list.stencils()
+        self.all_stencils()
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
@@ -207,8 +219,12 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
         let elements = self.list.take_elements();
         assert_eq!(elements.len(), self.count, "{}: a term is placed once", self.list.name());
         self.active = Active::new(self.list.stencils(), dofs);
-        let vertex = |number: usize, point: usize| self.list.stencil(self.active.element(number))[point];
+        let stencils = self.list.stencils();
+        let vertex = |number: usize, point: usize| stencils.vertex(self.active.element(number), point);
         self.packed = Packed::from_fn(self.active.len(), n, |number| &elements[self.active.element(number)], vertex);
+        if self.active.are_all() {
+            self.list.forget_stencils();
+        }
         self.energies = (0..self.active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect();
         // Constant Jacobians are evaluated before there are many vectors: their places would be of use once, and take memory for good.
         if !self.character().quadratic {
@@ -221,11 +237,12 @@ impl<E: PackedPotential<f64> + Debug + Sync> Term for PotentialTerm<E> {
             return;
         }
         let n = self.list.arity();
-        let places = |pairs: &[_]| Places::new(&self.active, self.list.stencils(), pairs, dofs, pattern);
-        self.places = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
+        let places = |pairs: &[_]| Places::new(&self.active, self.all_stencils(), pairs, dofs, pattern);
+        let upper = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
         if pattern.storage() == Storage::Whole {
             self.mirrored = places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>());
         }
+        self.places = upper;
     }
 
     fn forget_blocks(&mut self) {

@@ -138,7 +138,7 @@ impl System {
         let curved = terms.iter().filter(|term| term.character().curved);
         let (mut coupled, mut ends) = (Vec::new(), vec![0]);
         for stencil in curved.flat_map(|term| term.stencils().iter()) {
-            coupled.extend(stencil.iter().filter_map(|&vertex| dofs.place(vertex as usize)).map(index));
+            coupled.extend(stencil.filter_map(|vertex| dofs.place(vertex as usize)).map(index));
             ends.push(coupled.len());
         }
         let stencils = ends.windows(2).map(|ends| &coupled[ends[0]..ends[1]]);
@@ -465,7 +465,7 @@ fn is_constant(term: &dyn Term) -> bool {
 fn blame<'a>(terms: impl Iterator<Item = &'a dyn Term>, what: Quantity, state: State<'_>) -> EvaluationError {
     for term in terms {
         if let Some(element) = term.find_non_finite(what, state) {
-            let vertices = term.stencils().stencil(element).iter().map(|&vertex| vertex as usize).collect();
+            let vertices = term.stencils().stencil(element).map(|vertex| vertex as usize).collect();
             return EvaluationError::NonFiniteElement { term: term.name().to_owned(), element, vertices, what };
         }
     }
@@ -473,8 +473,8 @@ fn blame<'a>(terms: impl Iterator<Item = &'a dyn Term>, what: Quantity, state: S
 }
 
 fn check_range(term: &dyn Term, vertex_count: usize) -> Result<(), SystemError> {
-    for (element, stencil) in term.stencils().iter().enumerate() {
-        if let Some(&vertex) = stencil.iter().find(|&&vertex| vertex as usize >= vertex_count) {
+    for (element, mut stencil) in term.stencils().iter().enumerate() {
+        if let Some(vertex) = stencil.find(|&vertex| vertex as usize >= vertex_count) {
             let (term, vertex) = (term.name().to_owned(), vertex as usize);
             return Err(SystemError::VertexOutOfRange { term, element, vertex, vertex_count });
         }

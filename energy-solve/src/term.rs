@@ -7,6 +7,7 @@ use crate::curvature::Curvature;
 use crate::dofs::DofMap;
 use crate::pattern::Pattern;
 use crate::precision::Blocks;
+use crate::stencils::Stencils;
 
 /// What a term's force is like, so that what is absent costs nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,28 +40,6 @@ pub struct StepStart<'a> {
     pub dt: f64,
     /// Positions and velocities then.
     pub state: State<'a>,
-}
-
-/// The vertices of a term's elements, `arity` to an element.
-#[derive(Clone, Copy, Debug)]
-pub struct Stencils<'a> {
-    /// Points of an element.
-    pub arity: usize,
-    /// All stencils one after the other.
-    pub vertices: &'a [u32],
-}
-
-impl<'a> Stencils<'a> {
-    /// The stencils one by one.
-    pub fn iter(self) -> impl ExactSizeIterator<Item = &'a [u32]> {
-        self.vertices.chunks_exact(self.arity)
-    }
-
-    /// The vertices of one element.
-    #[must_use]
-    pub fn stencil(&self, element: usize) -> &'a [u32] {
-        &self.vertices[element * self.arity..][..self.arity]
-    }
 }
 
 /// What one of several threads sums up: consecutive vertices, and the blocks in their rows of the matrix.

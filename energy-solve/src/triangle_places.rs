@@ -3,7 +3,7 @@ use energy_dsl::Block;
 use crate::dofs::DofMap;
 use crate::pattern::{Pattern, Storage};
 use crate::precision::Blocks;
-use crate::term::Stencils;
+use crate::stencils::Stencils;
 use crate::vector::transposed;
 
 /// Where the blocks of symmetric elements go, for terms that add them one by one: of each pair of points (i, j), i ≤ j, in the order of
@@ -28,18 +28,17 @@ impl TrianglePlaces {
     /// The places of all elements with these stencils. Blocks of pinned vertices go nowhere.
     #[must_use]
     pub fn new(stencils: Stencils<'_>, dofs: &DofMap, pattern: &Pattern) -> Self {
-        let n = stencils.arity;
-        let stored = |p: u32, q: u32| {
-            let (row, column) = dofs.place(p as usize).zip(dofs.place(q as usize))?;
-            pattern.place(row, column)
-        };
+        let n = stencils.arity();
         let mut places = Vec::new();
-        for stencil in stencils.iter() {
+        for element in 0..stencils.len() {
+            let row = |point: usize| dofs.place(stencils.vertex(element, point) as usize);
+            let stored =
+                |(i, j): (usize, usize)| row(i).zip(row(j)).and_then(|(row, column)| pattern.place(row, column));
             for i in 0..n {
                 for j in i..n {
-                    let (slot, turned) = stored(stencil[i], stencil[j]).unwrap_or((pattern.nowhere(), false));
+                    let (slot, turned) = stored((i, j)).unwrap_or((pattern.nowhere(), false));
                     let mirrored = pattern.storage() == Storage::Whole && i != j;
-                    let mirror = if mirrored { stored(stencil[j], stencil[i]) } else { None };
+                    let mirror = if mirrored { stored((j, i)) } else { None };
                     places.push(Place { slot, turned, mirror: mirror.map(|(slot, _)| slot) });
                 }
             }

@@ -73,7 +73,7 @@ impl<S: Solid> Term for ContactTerm<S> {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: 1, vertices: &self.stencils }
+        Stencils::new(1, &self.stencils)
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {

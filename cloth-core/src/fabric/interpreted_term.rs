@@ -112,7 +112,7 @@ impl Term for InterpretedTerm {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: self.arity, vertices: &self.stencils }
+        Stencils::new(self.arity, &self.stencils)
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {

@@ -342,6 +342,10 @@ pub(crate) fn if_finite<T>(evaluated: Result<T, EvaluationError>) -> Result<Opti
 
 /// x + h v.
 fn moved_by_velocities(body: &Body, dt: f64) -> Vec<Vector3<f64>> {
-    let moved = |(x, v): (&Vector3<f64>, &Vector3<f64>)| std::array::from_fn(|axis| x[axis] + dt * v[axis]);
-    body.x.iter().zip(&body.v).map(moved).collect()
+    body.x.iter().zip(&body.v).map(|(x, v)| moved_by_velocity(x, v, dt)).collect()
+}
+
+/// x + h v of one vertex.
+fn moved_by_velocity(x: &Vector3<f64>, v: &Vector3<f64>, dt: f64) -> Vector3<f64> {
+    std::array::from_fn(|axis| x[axis] + dt * v[axis])
 }

@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
@@ -11,7 +12,7 @@ use super::linear_solver::{LinearSolver, LinearSolverChoice};
 use super::projection::Projection;
 use super::trial::Trial;
 use super::warm_start::WarmStart;
-use super::{Integrator, IntegratorMemory, StepError, StepReport, if_finite, moved_by_velocities};
+use super::{Integrator, IntegratorMemory, StepError, StepReport, if_finite, moved_by_velocity};
 use crate::body::Body;
 
 /// Implicit Euler by Newton's method on the incremental potential (Gast, Schroeder, Stomakhin, Jiang and Teran 2015)
@@ -151,11 +152,10 @@ struct Forcing {
 
 /// Where a line search ended.
 struct Found {
-    x: Vec<Vector3<f64>>,
+    /// The part of the direction that it takes.
+    scale: f64,
     /// E there, and the size of the numbers it is made of.
     energy: (f64, f64),
-    /// The part of the direction that was taken.
-    scale: f64,
     /// −∇E there, if it was looked at, or came with the matrix.
     looked: Option<Vec<Vector3<f64>>>,
     linearised: Option<Vec<Vector3<f64>>>,
@@ -177,18 +177,13 @@ type Start = ((f64, f64), Vec<Vector3<f64>>);
 struct Step<'a> {
     body: &'a mut Body,
     dt: f64,
-    /// x̂.
-    inertial: Vec<Vector3<f64>>,
     report: StepReport,
 }
 
 impl Step<'_> {
-    /// v = (x − x₀)/h.
-    fn velocities(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let velocity = |(x, start): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
-            std::array::from_fn(|axis| (x[axis] - start[axis]) / self.dt)
-        };
-        x.iter().zip(&self.body.x).map(velocity).collect()
+    /// x̂ of a vertex.
+    fn inertial(&self, vertex: usize) -> Vector3<f64> {
+        moved_by_velocity(&self.body.x[vertex], &self.body.v[vertex], self.dt)
     }
 
     /// E and the size of the numbers it is made of; infinite where an element's energy is.
@@ -196,7 +191,8 @@ impl Step<'_> {
         let started = Instant::now();
         let (mut sum, mut size) = (0.0, 0.0);
         for &vertex in self.body.system.dofs().free() {
-            let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - self.inertial[vertex][axis]);
+            let inertial = self.inertial(vertex);
+            let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - inertial[axis]);
             sum += 0.5 * self.body.masses[vertex] * away.iter().map(|component| component * component).sum::<f64>();
         }
         size += sum;
@@ -208,7 +204,7 @@ impl Step<'_> {
             size += self.dt * self.dt * energy.abs();
         }
         if self.body.system.character().velocity_dependent {
-            let v = self.velocities(x);
+            let v = velocities(x, &self.body.x, self.dt);
             let dissipation = self.body.system.dissipation(State { x, v: &v })?;
             sum += self.dt.powi(3) * dissipation;
             size += self.dt.powi(3) * dissipation.abs();
@@ -225,12 +221,12 @@ impl Step<'_> {
         matrix: &mut BlockMatrix<T>,
     ) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         let started = Instant::now();
-        let v = self.velocities(x);
+        let Body { system, masses, x: start, v: before, .. } = &mut *self.body;
+        let v = if_dependent(system, before, || velocities(x, start, self.dt));
         let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
         let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
-        let Body { system, masses, .. } = &mut *self.body;
         let linear = system.linearise_with_masses(State { x, v: &v }, options, masses, matrix)?;
-        let down = self.downhill(x, &linear.force);
+        let down = self.downhill(x, linear.force);
         self.report.phases.assembly += started.elapsed();
         Ok(down)
     }
@@ -250,22 +246,25 @@ impl Step<'_> {
     /// −∇E alone.
     fn gradient(&mut self, x: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         let started = Instant::now();
-        let v = self.velocities(x);
-        let force = self.body.system.forces(State { x, v: &v })?;
-        let down = self.downhill(x, &force);
+        let Body { system, x: start, v: before, .. } = &mut *self.body;
+        let v = if_dependent(system, before, || velocities(x, start, self.dt));
+        let force = system.forces(State { x, v: &v })?;
+        let down = self.downhill(x, force);
         self.report.phases.assembly += started.elapsed();
         Ok(down)
     }
 
     /// M (x̂ − x) + h² f of the free vertices.
-    fn downhill(&self, x: &[Vector3<f64>], force: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let down = |&vertex: &usize| -> Vector3<f64> {
-            let (away, force) = (self.inertial[vertex], force[vertex]);
-            std::array::from_fn(|axis| {
-                self.body.masses[vertex] * (away[axis] - x[vertex][axis]) + self.dt * self.dt * force[axis]
-            })
-        };
-        self.body.system.dofs().free().iter().map(down).collect()
+    fn downhill(&self, x: &[Vector3<f64>], mut force: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+        let free = self.body.system.dofs().free();
+        // In place: free vertices are in ascending order.
+        for (place, &vertex) in free.iter().enumerate() {
+            let (mass, inertial, pull) = (self.body.masses[vertex], self.inertial(vertex), force[vertex]);
+            force[place] =
+                std::array::from_fn(|axis| mass * (inertial[axis] - x[vertex][axis]) + self.dt * self.dt * pull[axis]);
+        }
+        force.truncate(free.len());
+        force
     }
 
     /// Solves for the direction. Of a matrix whose curvature is exact and turns out to be negative, as far as that goes: it leads downhill, or is zero.
@@ -311,20 +310,16 @@ impl Step<'_> {
     }
 
     /// The first of x + d, x + d/2, … that lowers E as the slope promises (Armijo); `None` if none does. A projected direction is too short rather than too
-    /// long: of x + d, x + 2 d, … the last before E grows. With E at x + d comes what will be needed there (`ahead`).
+    /// long: of x + d, x + 2 d, … the last before E grows. `slope` is dᵀ ∇E. With E at x + d comes what will be needed there (`ahead`).
     fn line_search(
         &mut self,
         x: &[Vector3<f64>],
         energy: (f64, f64),
-        down: &[Vector3<f64>],
+        slope: f64,
         direction: &[Vector3<f64>],
         projected: bool,
         mut ahead: Ahead<'_>,
     ) -> Result<Option<Found>, EvaluationError> {
-        let slope = -dot(down, direction);
-        if slope == 0.0 && largest(direction) == 0.0 && largest(down) > 0.0 {
-            return Ok(None);
-        }
         let mut scale = 1.0;
         for _ in 0..=HALVINGS {
             let moved = self.moved(x, scale, direction);
@@ -336,7 +331,8 @@ impl Step<'_> {
             }
             let trial = self.energy(&moved)?;
             if trial.0 <= energy.0 + DECREASE * scale * slope + ROUNDING * energy.1.min(trial.1) {
-                let found = Found { x: moved, energy: trial, scale, looked, linearised };
+                drop(moved);
+                let found = Found { scale, energy: trial, looked, linearised };
                 let too_short = projected && scale == 1.0;
                 return Ok(Some(if too_short { self.lengthen(x, found, direction)? } else { found }));
             }
@@ -360,7 +356,7 @@ impl Step<'_> {
             if energy.0 >= found.energy.0 {
                 break;
             }
-            found = Found { x: moved, energy, scale, looked: None, linearised: None };
+            found = Found { scale, energy, looked: None, linearised: None };
         }
         Ok(found)
     }
@@ -368,13 +364,35 @@ impl Step<'_> {
     /// x + s d on the free vertices.
     fn moved(&self, x: &[Vector3<f64>], scale: f64, direction: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut moved = x.to_vec();
-        for (&vertex, d) in self.body.system.dofs().free().iter().zip(direction) {
-            for axis in 0..3 {
-                moved[vertex][axis] += scale * d[axis];
-            }
-        }
+        self.advance(&mut moved, scale, direction);
         moved
     }
+
+    /// x ← x + s d on the free vertices.
+    fn advance(&self, x: &mut [Vector3<f64>], scale: f64, direction: &[Vector3<f64>]) {
+        for (&vertex, d) in self.body.system.dofs().free().iter().zip(direction) {
+            for axis in 0..3 {
+                x[vertex][axis] += scale * d[axis];
+            }
+        }
+    }
+}
+
+/// v = (x − x₀)/h.
+fn velocities(x: &[Vector3<f64>], start: &[Vector3<f64>], dt: f64) -> Vec<Vector3<f64>> {
+    let velocity = |(x, start): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
+        std::array::from_fn(|axis| (x[axis] - start[axis]) / dt)
+    };
+    x.iter().zip(start).map(velocity).collect()
+}
+
+/// The velocities where some force depends on them; elsewhere any will do, and those before the step are at hand.
+fn if_dependent<'a>(
+    system: &System,
+    before: &'a [Vector3<f64>],
+    velocities: impl FnOnce() -> Vec<Vector3<f64>>,
+) -> Cow<'a, [Vector3<f64>]> {
+    if system.character().velocity_dependent { velocities().into() } else { before.into() }
 }
 
 /// Forces without energy, but drag, have no incremental potential.
@@ -401,10 +419,8 @@ impl Integrator for Newton {
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
         refuse_without_energy(&body.system)?;
         let mut memory = self.memory_for(&body.system);
-        // Pinned vertices end there: they move as they are told.
-        let inertial = moved_by_velocities(body, dt);
-        let mut step = Step { body, dt, inertial, report: StepReport::default() };
-        let mut x = self.warm_start.begin(step.body, &step.inertial, dt);
+        let mut step = Step { body, dt, report: StepReport::default() };
+        let mut x = self.warm_start.begin(step.body, dt);
         let mut projection = Projection::on_demand();
         let start = step.linearise_where_finite(&x, projection.curvature, &mut memory.matrix)?;
         let (mut energy, mut linearised) = match start {
@@ -441,7 +457,11 @@ impl Integrator for Newton {
             last = Some(forcing);
             let (direction, solved) =
                 step.direction(&x, &down, curvature, &mut memory, &mut self.trial, forcing.tolerance)?;
-            let ends = largest(&direction) < dt * self.options.velocity_tolerance;
+            let slope = -dot(&down, &direction);
+            // Not needed while lines are searched, which takes most memory.
+            drop(down);
+            let length = largest(&direction);
+            let ends = length < dt * self.options.velocity_tolerance;
             let ahead = if self.may_be_enough(forcing, dt) {
                 Ahead::Gradient
             } else if projected || ends || !whole || !solved.converged() {
@@ -449,16 +469,20 @@ impl Integrator for Newton {
             } else {
                 Ahead::Matrix(&mut memory.matrix)
             };
-            let Some(found) = step.line_search(&x, energy, &down, &direction, projected, ahead)? else {
+            let leads_nowhere = length == 0.0 && forcing.gradient > 0.0;
+            let found =
+                if leads_nowhere { None } else { step.line_search(&x, energy, slope, &direction, projected, ahead)? };
+            let Some(found) = found else {
                 if !projected {
                     projection.demand();
                     continue;
                 }
                 return Err(StepError::Stuck { iterations: step.report.solves, stopped: solved.stopped });
             };
-            (x, energy, looked, linearised) = (found.x, found.energy, found.looked, found.linearised);
+            step.advance(&mut x, found.scale, &direction);
+            (energy, looked, linearised) = (found.energy, found.looked, found.linearised);
             whole = found.scale >= 1.0;
-            let before = std::mem::replace(&mut change, found.scale * largest(&direction) / dt);
+            let before = std::mem::replace(&mut change, found.scale * length / dt);
             if projected || solved.converged() {
                 converged = change < self.options.velocity_tolerance;
                 projection.proceed(whole && change < before);
@@ -466,7 +490,7 @@ impl Integrator for Newton {
                 projection.demand();
             }
         }
-        let v = step.velocities(&x);
+        let v = velocities(&x, &step.body.x, dt);
         let report = step.report;
         self.warm_start = WarmStart::after(body, &v, dt, report.solves);
         (body.x, body.v) = (x, v);

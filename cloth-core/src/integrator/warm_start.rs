@@ -1,6 +1,7 @@
 use energy_dsl::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::moved_by_velocities;
 use crate::body::Body;
 
 /// Where Newton's method begins a step: near where vertices get to with the accelerations of the last.
@@ -24,9 +25,9 @@ impl WarmStart {
         Self { acceleration: v.iter().zip(&body.v).map(change).collect(), easy: iterations <= 1 }
     }
 
-    /// Where to begin, from `inertial` positions x̂. Pinned vertices stay there.
-    pub(super) fn begin(&self, body: &Body, inertial: &[Vector3<f64>], dt: f64) -> Vec<Vector3<f64>> {
-        let mut x = inertial.to_vec();
+    /// Where to begin. Pinned vertices are where their velocities bring them: they move as they are told.
+    pub(super) fn begin(&self, body: &Body, dt: f64) -> Vec<Vector3<f64>> {
+        let mut x = moved_by_velocities(body, dt);
         if self.acceleration.len() == x.len() {
             let scale = if self.easy { dt * dt } else { 0.5 * dt * dt };
             for &vertex in body.system.dofs().free() {

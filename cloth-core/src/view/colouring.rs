@@ -138,7 +138,7 @@ pub fn stored_energies(simulation: &Simulation, x: &[Vector3<f64>]) -> Vec<f64> 
     for island in simulation.islands() {
         let vertices = island.vertices();
         let within: Vec<Vector3<f64>> = vertices.iter().map(|&vertex| x[vertex]).collect();
-        for (term, _) in island.body().system.terms().filter(|(term, _)| term.stencils().arity > 1) {
+        for (term, _) in island.body().system.terms().filter(|(term, _)| term.stencils().arity() > 1) {
             let stencils = term.stencils();
             for (number, energy) in term.element_energies(&within).unwrap_or_default() {
                 for (vertex, share) in shares(stencils.stencil(number), energy) {
@@ -151,8 +151,8 @@ pub fn stored_energies(simulation: &Simulation, x: &[Vector3<f64>]) -> Vec<f64> 
 }
 
 /// An element's energy divided evenly among its vertices. Stencils of unequal size are filled up by repeating a vertex, which counts once.
-fn shares(stencil: &[u32], energy: f64) -> impl Iterator<Item = (usize, f64)> {
-    let vertices: BTreeSet<usize> = stencil.iter().map(|&vertex| vertex as usize).collect();
+fn shares(stencil: impl Iterator<Item = u32>, energy: f64) -> impl Iterator<Item = (usize, f64)> {
+    let vertices: BTreeSet<usize> = stencil.map(|vertex| vertex as usize).collect();
     let share = energy / vertices.len() as f64;
     vertices.into_iter().map(move |vertex| (vertex, share))
 }
@@ -203,7 +203,7 @@ mod tests {
                 .iter()
                 .flat_map(|island| {
                     let x: Vec<Vector3<f64>> = island.vertices().iter().map(|&vertex| x[vertex]).collect();
-                    let terms = island.body().system.terms().filter(|(term, _)| term.stencils().arity > 1);
+                    let terms = island.body().system.terms().filter(|(term, _)| term.stencils().arity() > 1);
                     terms.filter_map(|(term, _)| Some(term.energy(&x)?.0)).collect::<Vec<_>>()
                 })
                 .sum();
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_vertex_that_fills_up_a_stencil_counts_once() {
-        assert_eq!(shares(&[3, 5, 3, 3], 1.0).collect::<Vec<_>>(), [(3, 0.5), (5, 0.5)]);
+        assert_eq!(shares([3, 5, 3, 3].into_iter(), 1.0).collect::<Vec<_>>(), [(3, 0.5), (5, 0.5)]);
     }
 
     #[test]

@@ -100,7 +100,7 @@ impl Term for GripTerm {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: 1, vertices: &self.stencils }
+        Stencils::new(1, &self.stencils)
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {

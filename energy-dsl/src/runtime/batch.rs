@@ -121,6 +121,12 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         self.elements == 0
     }
 
+    /// The points of all elements, in blocks of [`BLOCK`] elements, by point; the last block is filled up with the last element.
+    #[must_use]
+    pub fn stencils(&self) -> &[u32] {
+        &self.stencils
+    }
+
     /// The numbers of an element and those beside it; there are none of elements without parameters.
     #[inline(always)]
     fn numbers_from(&self, block: usize, offset: usize) -> &[S] {

@@ -22,7 +22,6 @@ const VISITS: usize = 2;
 pub(super) struct Coarse<T> {
     pub(super) interpolation: Interpolation<T>,
     product: GalerkinProduct,
-    matrix: BlockMatrix,
     /// Pᵀ r and e, both in the unit of the finest level's scaling.
     pub(super) restricted: Vec<Wide<T>>,
     pub(super) correction: Vec<Wide<T>>,
@@ -55,18 +54,20 @@ impl<T: Precision> Coarse<T> {
         if interpolation.aggregates() == 0 {
             return None;
         }
-        let (product, coarse) = GalerkinProduct::new(pattern, &interpolation, ranges);
-        let rows = coarse.rows();
+        let product = GalerkinProduct::new(pattern, &interpolation, ranges)?;
+        let rows = product.pattern().rows();
         let zeros = vec![[T::from_f64(0.0); 4]; rows];
-        let inverse =
-            if rows <= COARSEST { Inverse::Dense(None) } else { Inverse::Cycle(Box::new(Relaxed::new(&coarse))) };
-        let matrix = BlockMatrix::zeros(coarse);
-        Some(Self { interpolation, product, matrix, restricted: zeros.clone(), correction: zeros, inverse })
+        let inverse = if rows <= COARSEST {
+            Inverse::Dense(None)
+        } else {
+            Inverse::Cycle(Box::new(Relaxed::new(product.pattern())))
+        };
+        Some(Self { interpolation, product, restricted: zeros.clone(), correction: zeros, inverse })
     }
 
     /// The blocks of this level's matrix and of those below, from here on.
     pub(super) fn blocks(&self) -> Vec<usize> {
-        let mut blocks = vec![self.matrix.pattern().blocks()];
+        let mut blocks = vec![self.product.pattern().blocks()];
         if let Inverse::Cycle(relaxed) = &self.inverse
             && let Some(next) = &relaxed.next
         {
@@ -77,15 +78,15 @@ impl<T: Precision> Coarse<T> {
 
     /// Takes over a matrix of the finer level. Fails where this shows that it is not positive definite.
     pub(super) fn take_over(&mut self, fine: &BlockMatrix<impl Precision>, unit: f64, threads: usize) -> Option<()> {
-        self.product.compute(fine, &self.interpolation, threads, &mut self.matrix);
+        let matrix = self.product.compute(fine, &self.interpolation, threads);
         match &mut self.inverse {
             Inverse::Dense(factor) => {
-                let rows = 3 * self.matrix.pattern().rows();
-                let entry = |i: usize, j: usize| unit * unit * self.matrix.block(i / 3, j / 3)[i % 3][j % 3];
+                let rows = 3 * matrix.pattern().rows();
+                let entry = |i: usize, j: usize| unit * unit * matrix.block(i / 3, j / 3)[i % 3][j % 3];
                 *factor = Cholesky::new(DMatrix::from_fn(rows, rows, entry));
                 factor.as_ref().map(|_| ())
             }
-            Inverse::Cycle(relaxed) => relaxed.take_over(&self.matrix, unit),
+            Inverse::Cycle(relaxed) => relaxed.take_over(&matrix, unit),
         }
     }
 
@@ -101,7 +102,7 @@ impl<T: Precision> Coarse<T> {
                     *correction = widened([u, v, w]);
                 }
             }
-            Inverse::Cycle(relaxed) => relaxed.cycle(self.matrix.pattern(), &self.restricted, &mut self.correction),
+            Inverse::Cycle(relaxed) => relaxed.cycle(self.product.pattern(), &self.restricted, &mut self.correction),
         }
     }
 }

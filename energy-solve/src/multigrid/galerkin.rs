@@ -14,13 +14,13 @@ use crate::threads::for_each;
 /// With A = U + Uᵀ, half of each diagonal block in U, it is G + Gᵀ with G = Pᵀ (U P). The rows of U P are summed up one by one.
 #[derive(Clone, Debug)]
 pub(super) struct GalerkinProduct {
+    /// That of the product.
+    pattern: Arc<Pattern>,
     /// By row, how many blocks that of U P has.
-    sums: Vec<u32>,
+    sums: Vec<u16>,
     /// By row, block of U and weight of the block's column: to which of them they add.
-    slot_start: Vec<u32>,
-    slots: Vec<u32>,
+    slots: Vec<u16>,
     /// By row, weight and block of U P: to which half of which block of G they add.
-    half_start: Vec<u32>,
     halves: Vec<u32>,
     parts: Vec<Part>,
 }
@@ -29,58 +29,75 @@ pub(super) struct GalerkinProduct {
 #[derive(Clone, Debug)]
 struct Part {
     rows: Range<usize>,
-    /// The halves that they add to, and those between.
-    halves: Range<usize>,
+    /// Where those of its first row begin.
+    first_slot: usize,
+    first_half: usize,
+    /// The halves of blocks that they add to, and those between.
+    touched: Range<usize>,
 }
 
 /// A block of G as it is, or the one that its mirror image adds to: by rows.
 type Half = [f64; 9];
 
 impl GalerkinProduct {
-    /// For matrices of a pattern, and the pattern of the product. `ranges` of rows are summed up by themselves.
+    /// For matrices of a pattern. `ranges` of rows are summed up by themselves. `None` where a row is coupled with more aggregates than can be
+    /// counted in 16 bits.
     pub(super) fn new<T: Precision>(
         fine: &Pattern,
         interpolation: &Interpolation<T>,
         ranges: &[Range<usize>],
-    ) -> (Self, Arc<Pattern>) {
-        let (mut sums, mut slots, mut slot_start) = (Vec::new(), Vec::new(), vec![0]);
-        let (mut touched, mut pairs): (Vec<u32>, Vec<[u32; 2]>) = (Vec::new(), Vec::new());
+    ) -> Option<Self> {
+        let (mut sums, mut slots) = (Vec::with_capacity(fine.rows()), Vec::new());
+        // The columns of the blocks of U P, row by row.
+        let (mut columns, mut start) = (Vec::new(), vec![0]);
+        let mut first_slots = Vec::new();
         for row in 0..fine.rows() {
-            touched.clear();
+            if ranges.get(first_slots.len()).is_some_and(|rows| rows.start == row) {
+                first_slots.push(slots.len());
+            }
+            let before = columns.len();
             for (_, column) in fine.row(row) {
                 for aggregate in interpolation.columns(column) {
-                    let known = touched.iter().position(|known| known == aggregate);
-                    slots.push(index(known.unwrap_or(touched.len())));
+                    let known = columns[before..].iter().position(|known| known == aggregate);
+                    slots.push(u16::try_from(known.unwrap_or(columns.len() - before)).ok()?);
                     if known.is_none() {
-                        touched.push(*aggregate);
+                        columns.push(*aggregate);
                     }
                 }
             }
-            let own = interpolation.columns(row);
-            pairs.extend(own.iter().flat_map(|&own| touched.iter().map(move |&other| [own, other])));
-            sums.push(index(touched.len()));
-            slot_start.push(index(slots.len()));
+            sums.push(u16::try_from(columns.len() - before).ok()?);
+            start.push(columns.len());
         }
-        let stencils = pairs.iter().map(<[u32; 2]>::as_slice);
-        let coarse = Pattern::from_stencils(Storage::Upper, interpolation.aggregates(), stencils);
-        let half = |&[row, column]: &[u32; 2]| {
+        slots.shrink_to_fit();
+        let (columns, start) = (&columns[..], &start[..]);
+        let blocks_of_row = |row: usize| {
+            let of_product = &columns[start[row]..start[row + 1]];
+            interpolation.columns(row).iter().flat_map(move |&own| of_product.iter().map(move |&other| (own, other)))
+        };
+        let blocks = (0..fine.rows()).flat_map(blocks_of_row);
+        let upper = blocks.clone().map(|(row, column)| (row.min(column), row.max(column)));
+        let coarse = Pattern::from_pairs(Storage::Upper, interpolation.aggregates(), upper);
+        let half = |(row, column): (u32, u32)| {
             let (place, turned) = coarse.place(row as usize, column as usize).expect("it is coupled");
             index(2 * place + usize::from(turned))
         };
-        let halves: Vec<u32> = pairs.iter().map(half).collect();
-        let mut half_start = vec![0];
-        for row in 0..fine.rows() {
-            half_start.push(half_start[row] + index(interpolation.columns(row).len()) * sums[row]);
-        }
-        let part = |rows: &Range<usize>| {
-            let touched = &halves[half_start[rows.start] as usize..half_start[rows.end] as usize];
-            let first = touched.iter().min().map_or(0, |&first| first as usize);
-            let halves = first..touched.iter().max().map_or(first, |&last| last as usize + 1);
-            Part { rows: rows.clone(), halves }
+        let mut halves = Vec::with_capacity(blocks.clone().count());
+        halves.extend(blocks.map(half));
+        let mut first_half = 0;
+        let part = |(rows, first_slot): (&Range<usize>, usize)| {
+            let end = first_half + rows.clone().map(|row| blocks_of_row(row).count()).sum::<usize>();
+            let of_rows = &halves[std::mem::replace(&mut first_half, end)..end];
+            let first = of_rows.iter().min().map_or(0, |&first| first as usize);
+            let touched = first..of_rows.iter().max().map_or(first, |&last| last as usize + 1);
+            Part { rows: rows.clone(), first_slot, first_half: end - of_rows.len(), touched }
         };
-        let parts = ranges.iter().map(part).collect();
-        slots.shrink_to_fit();
-        (Self { sums, slot_start, slots, half_start, halves, parts }, Arc::new(coarse))
+        let parts = ranges.iter().zip(first_slots).map(part).collect();
+        Some(Self { pattern: Arc::new(coarse), sums, slots, halves, parts })
+    }
+
+    /// The pattern of the product.
+    pub(super) fn pattern(&self) -> &Arc<Pattern> {
+        &self.pattern
     }
 
     /// Computes the product, on at most so many threads.
@@ -89,32 +106,29 @@ impl GalerkinProduct {
         fine: &BlockMatrix<impl Precision>,
         interpolation: &Interpolation<T>,
         threads: usize,
-        coarse: &mut BlockMatrix,
-    ) {
-        let contribution = |part| dispatch(Contribution { of: self, part, fine, interpolation });
-        let contributions = for_each(threads, self.parts.iter().collect(), contribution);
-        let mut whole = vec![[0.0; 9]; 2 * coarse.pattern().blocks()];
-        for (part, sums) in self.parts.iter().zip(contributions) {
-            for (sum, half) in whole[part.halves.clone()].iter_mut().zip(&sums) {
-                (0..9).for_each(|entry| sum[entry] += half[entry]);
-            }
-        }
-        let pattern = Arc::clone(coarse.pattern());
-        for (block, halves) in coarse.values_mut().iter_mut().zip(whole.as_chunks::<2>().0) {
-            for i in 0..3 {
-                for j in 0..3 {
-                    block[i][j] = halves[0][3 * i + j] + halves[1][3 * j + i];
+    ) -> BlockMatrix {
+        let mut product = BlockMatrix::zeros(Arc::clone(&self.pattern));
+        let blocks = product.values_mut();
+        // A few at a time, for less memory.
+        for parts in self.parts.chunks(threads.max(1)) {
+            let contribution = |part| dispatch(Contribution { of: self, part, fine, interpolation });
+            let contributions = for_each(threads, parts.iter().collect(), contribution);
+            for (part, contribution) in parts.iter().zip(contributions) {
+                for (half, sum) in part.touched.clone().zip(contribution) {
+                    let (block, turned) = (&mut blocks[half / 2], half % 2 == 1);
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            block[i][j] += if turned { sum[3 * j + i] } else { sum[3 * i + j] };
+                        }
+                    }
                 }
             }
         }
-        for row in 0..pattern.rows() {
-            let half = whole[2 * pattern.diagonal(row)];
-            for i in 0..3 {
-                for j in 0..3 {
-                    coarse.diagonal_mut(row)[i][j] = half[3 * i + j] + half[3 * j + i];
-                }
-            }
+        for row in 0..self.pattern.rows() {
+            let diagonal = product.diagonal_mut(row);
+            *diagonal = std::array::from_fn(|i| std::array::from_fn(|j| diagonal[i][j] + diagonal[j][i]));
         }
+        product
     }
 }
 
@@ -133,25 +147,24 @@ impl<T: Precision, M: Precision> Kernel for Contribution<'_, T, M> {
     fn run<L: Level>(self) -> Vec<Half> {
         let Self { of, part, fine, interpolation } = self;
         let (pattern, values) = (fine.pattern(), fine.values().as_flattened().as_flattened().as_chunks::<9>().0);
-        let mut sums = vec![[0.0; 9]; part.halves.len()];
+        let mut sums = vec![[0.0; 9]; part.touched.len()];
         let mut row_of_product: Vec<Half> = Vec::new();
+        let (mut slot, mut place) = (part.first_slot, part.first_half);
         for row in part.rows.clone() {
             row_of_product.clear();
             row_of_product.resize(of.sums[row] as usize, [0.0; 9]);
-            let mut slot = of.slot_start[row] as usize;
             let diagonal = pattern.diagonal(row);
-            for place in diagonal..pattern.above(row).end {
-                let share = if place == diagonal { 0.5 } else { 1.0 };
-                for &weight in interpolation.weights(pattern.columns()[place] as usize) {
+            for block in diagonal..pattern.above(row).end {
+                let share = if block == diagonal { 0.5 } else { 1.0 };
+                for &weight in interpolation.weights(pattern.columns()[block] as usize) {
                     let weight: f64 = weight.into();
-                    add_times::<M, L>(&mut row_of_product[of.slots[slot] as usize], share * weight, &values[place]);
+                    add_times::<M, L>(&mut row_of_product[of.slots[slot] as usize], share * weight, &values[block]);
                     slot += 1;
                 }
             }
-            let mut place = of.half_start[row] as usize;
             for &weight in interpolation.weights(row) {
                 for block in &row_of_product {
-                    let half = of.halves[place] as usize - part.halves.start;
+                    let half = of.halves[place] as usize - part.touched.start;
                     add_times::<f64, L>(&mut sums[half], weight.into(), block);
                     place += 1;
                 }
@@ -209,10 +222,9 @@ mod tests {
         let expected = p.transpose() * dense(&fine) * &p;
         for bounds in [[0, 122].as_slice(), &[0, 50, 80, 122]] {
             let ranges: Vec<_> = bounds.windows(2).map(|ends| ends[0]..ends[1]).collect();
-            let (product, coarse) = GalerkinProduct::new(&pattern, &interpolation, &ranges);
-            let mut computed = BlockMatrix::zeros(coarse);
-            for _ in 0..2 {
-                product.compute(&fine, &interpolation, 2, &mut computed);
+            let product = GalerkinProduct::new(&pattern, &interpolation, &ranges).unwrap();
+            for threads in [1, 2] {
+                let computed = product.compute(&fine, &interpolation, threads);
                 assert!((dense(&computed) - &expected).amax() < 1e-13);
             }
         }

@@ -23,14 +23,10 @@ pub(super) struct Vectors<T> {
     product: Vec<Wide<T>>,
     forth: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
-    /// z = M⁻¹ r.
-    preconditioned: Vec<Wide<T>>,
-    /// What the coarse level corrects; then how far going back changed it.
+    /// e, what the coarse level corrects; then how far c went beyond it.
     change: Vec<Wide<T>>,
-    /// The residual after s; then A z.
-    rest: Vec<Wide<T>>,
-    /// (I + L̃)⁻¹ A z.
-    ahead: Vec<Wide<T>>,
+    /// The residual after s; then c, by which z = M⁻¹ r = s + c.
+    back: Vec<Wide<T>>,
 }
 
 impl<T: Precision> Vectors<T> {
@@ -43,10 +39,8 @@ impl<T: Precision> Vectors<T> {
             product: zeros.clone(),
             forth: zeros.clone(),
             solution: zeros.clone(),
-            preconditioned: zeros.clone(),
             change: zeros.clone(),
-            rest: zeros.clone(),
-            ahead: zeros,
+            back: zeros,
         }
     }
 }
@@ -243,17 +237,17 @@ impl<T: Precision> Kernel for Restriction<'_, '_, '_, T> {
         let Common { pattern, smoothers, borders, coarse, restricted, .. } = self.common;
         let Part { number, vectors, .. } = self.part;
         let smoother = &smoothers[*number];
-        let Vectors { smoothed, rest, .. } = &mut **vectors;
-        smoother.minus_upper::<L>(pattern, smoothed, rest);
-        smoother.add_coupled::<L>(-1.0, borders, smoothed, rest);
+        let Vectors { smoothed, back, .. } = &mut **vectors;
+        smoother.minus_upper::<L>(pattern, smoothed, back);
+        smoother.add_coupled::<L>(-1.0, borders, smoothed, back);
         let Some(coarse) = coarse else { return };
         let coarse = coarse.read().expect("no thread panics");
         let (first, sums) = &restricted[*number];
         let mut sums = sums.write().expect("no thread panics");
         sums.fill([T::from_f64(0.0); 4]);
         let before = smoother.triangle.rows.start;
-        for row in 0..rest.len() {
-            let unscaled = smoother.unscaled(row, &rest[row]);
+        for row in 0..back.len() {
+            let unscaled = smoother.unscaled(row, &back[row]);
             coarse.interpolation.add_restricted::<L>(before + row, &unscaled, *first, &mut sums);
         }
     }
@@ -280,7 +274,7 @@ impl<T: Precision> Kernel for Showing<'_, T> {
     }
 }
 
-/// z ← s + c, c = (I + L̃ᵀ)⁻¹ (rest − (L̃ + Ẽ) e); e is replaced by c − e. Returns r · z.
+/// c = (I + L̃ᵀ)⁻¹ (back − (L̃ + Ẽ) e) and z = s + c; e is replaced by c − e. Returns r · z.
 struct Correction<'a, 'b, 'c, T> {
     part: &'a mut Part<'b, T>,
     common: &'a Common<'c, T>,
@@ -294,7 +288,7 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
         let Common { pattern, smoothers, borders, coarse, .. } = self.common;
         let Part { number, vectors, .. } = self.part;
         let smoother = &smoothers[*number];
-        let Vectors { residual, smoothed, preconditioned, change, rest, .. } = &mut **vectors;
+        let Vectors { residual, smoothed, change, back, .. } = &mut **vectors;
         let before = smoother.triangle.rows.start;
         match coarse {
             Some(coarse) => {
@@ -306,17 +300,16 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
             }
             None => change.fill([T::from_f64(0.0); 4]),
         }
-        smoother.subtract_lower::<L>(pattern, change, rest);
-        smoother.add_coupled::<L>(-1.0, borders, change, rest);
-        smoother.backward::<L>(pattern, rest);
+        smoother.subtract_lower::<L>(pattern, change, back);
+        smoother.add_coupled::<L>(-1.0, borders, change, back);
+        smoother.backward::<L>(pattern, back);
         let mut along = [0.0; 4];
-        for row in 0..rest.len() {
-            let (c, mut z, mut e) = (rest[row], smoothed[row], change[row]);
+        for row in 0..back.len() {
+            let (c, mut z) = (back[row], smoothed[row]);
             for lane in 0..4 {
                 z[lane] = z[lane] + c[lane];
-                e[lane] = c[lane] - e[lane];
+                change[row][lane] = c[lane] - change[row][lane];
             }
-            (preconditioned[row], change[row]) = (z, e);
             add_products(&mut along, &residual[row], &z);
         }
         smoother.couplings.show(change, &self.common.changes[*number]);
@@ -324,7 +317,7 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
     }
 }
 
-/// A z = r + (L̃ + Ẽ) y and (I + L̃)⁻¹ A z; with them p ← z + β p, q ← A z + β q and u likewise. Returns p · q.
+/// p ← z + β p, q ← A z + β q with A z = r + (L̃ + Ẽ) (c − e), and u ← (I + L̃)⁻¹ q. Returns p · q.
 struct Conjugation<'a, 'b, 'c, T> {
     part: &'a mut Part<'b, T>,
     common: &'a Common<'c, T>,
@@ -339,21 +332,21 @@ impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
         let Common { pattern, smoothers, changes, .. } = self.common;
         let Part { number, vectors, .. } = self.part;
         let smoother = &smoothers[*number];
-        let Vectors { residual, direction, product, forth, preconditioned, change, rest, ahead, .. } = &mut **vectors;
-        rest.copy_from_slice(residual);
-        smoother.add_coupled::<L>(1.0, changes, change, rest);
-        smoother.add_lower_and_forward::<L>(pattern, change, rest, ahead);
+        let Vectors { residual, smoothed, direction, product, forth, change, back, .. } = &mut **vectors;
         let conjugate = T::from_f64(self.conjugate);
-        let mut curvature = [0.0; 4];
-        for row in 0..rest.len() {
-            let (mut p, mut q, mut u) = (direction[row], product[row], forth[row]);
+        for row in 0..product.len() {
+            let (mut p, mut q) = (direction[row], product[row]);
             for lane in 0..4 {
-                p[lane] = p[lane].mul_add::<L>(conjugate, preconditioned[row][lane]);
-                q[lane] = q[lane].mul_add::<L>(conjugate, rest[row][lane]);
-                u[lane] = u[lane].mul_add::<L>(conjugate, ahead[row][lane]);
+                p[lane] = p[lane].mul_add::<L>(conjugate, smoothed[row][lane] + back[row][lane]);
+                q[lane] = q[lane].mul_add::<L>(conjugate, residual[row][lane]);
             }
-            (direction[row], product[row], forth[row]) = (p, q, u);
-            add_products(&mut curvature, &p, &q);
+            (direction[row], product[row]) = (p, q);
+        }
+        smoother.add_coupled::<L>(1.0, changes, change, product);
+        smoother.add_lower_and_forward::<L>(pattern, change, product, forth);
+        let mut curvature = [0.0; 4];
+        for row in 0..product.len() {
+            add_products(&mut curvature, &direction[row], &product[row]);
         }
         of_three(curvature)
     }

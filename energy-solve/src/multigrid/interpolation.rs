@@ -28,7 +28,9 @@ impl<T: Precision> Interpolation<T> {
     pub(super) fn averaged(pattern: &Pattern) -> Self {
         let neighbours = Neighbours::of(pattern);
         let (of, aggregates) = neighbours.aggregates();
-        let mut interpolation = Self { aggregates, row_start: vec![0], columns: Vec::new(), weights: Vec::new() };
+        let mut row_start = Vec::with_capacity(pattern.rows() + 1);
+        row_start.push(0);
+        let mut interpolation = Self { aggregates, row_start, columns: Vec::new(), weights: Vec::new() };
         let mut shares: Vec<(u32, f64)> = Vec::new();
         for row in 0..pattern.rows() {
             shares.clear();
@@ -51,6 +53,8 @@ impl<T: Precision> Interpolation<T> {
             }
             interpolation.row_start.push(index(interpolation.columns.len()));
         }
+        interpolation.columns.shrink_to_fit();
+        interpolation.weights.shrink_to_fit();
         interpolation
     }
 

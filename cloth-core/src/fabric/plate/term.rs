@@ -322,7 +322,7 @@ impl Term for PlateTerm {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: self.arity, vertices: &self.stencils }
+        Stencils::new(self.arity, &self.stencils)
     }
 
     fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
@@ -338,7 +338,7 @@ impl Term for PlateTerm {
             Packed::from_fn(needed.len(), 4, |_| &element, |number, point| index(self.hinges[needed[number]][point]));
         self.needed = needed;
         let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
-        self.hinge_places = TrianglePlaces::new(Stencils { arity: 4, vertices: &vertices }, dofs, pattern);
+        self.hinge_places = TrianglePlaces::new(Stencils::new(4, &vertices), dofs, pattern);
         let slot = |i: usize, j: usize| {
             let rows = dofs.place(i).zip(dofs.place(j));
             index(rows.and_then(|(row, column)| pattern.place(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
