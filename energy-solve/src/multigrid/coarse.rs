@@ -48,7 +48,7 @@ struct Relaxed<T> {
 }
 
 impl<T: Precision> Coarse<T> {
-    /// Below matrices of a pattern, whose rows are summed up in these ranges; `None` where none of its rows are coupled.
+    /// Below matrices of a pattern, whose rows are summed up in these ranges; `None` where none of its rows are coupled, or one with too many.
     pub(super) fn below(pattern: &Pattern, ranges: &[Range<usize>]) -> Option<Self> {
         let interpolation = Interpolation::averaged(pattern);
         if interpolation.aggregates() == 0 {

@@ -47,51 +47,31 @@ impl GalerkinProduct {
         interpolation: &Interpolation<T>,
         ranges: &[Range<usize>],
     ) -> Option<Self> {
-        let (mut sums, mut slots) = (Vec::with_capacity(fine.rows()), Vec::new());
-        // The columns of the blocks of U P, row by row.
-        let (mut columns, mut start) = (Vec::new(), vec![0]);
-        let mut first_slots = Vec::new();
-        for row in 0..fine.rows() {
-            if ranges.get(first_slots.len()).is_some_and(|rows| rows.start == row) {
-                first_slots.push(slots.len());
-            }
-            let before = columns.len();
-            for (_, column) in fine.row(row) {
-                for aggregate in interpolation.columns(column) {
-                    let known = columns[before..].iter().position(|known| known == aggregate);
-                    slots.push(u16::try_from(known.unwrap_or(columns.len() - before)).ok()?);
-                    if known.is_none() {
-                        columns.push(*aggregate);
-                    }
-                }
-            }
-            sums.push(u16::try_from(columns.len() - before).ok()?);
-            start.push(columns.len());
-        }
-        slots.shrink_to_fit();
-        let (columns, start) = (&columns[..], &start[..]);
-        let blocks_of_row = |row: usize| {
-            let of_product = &columns[start[row]..start[row + 1]];
-            interpolation.columns(row).iter().flat_map(move |&own| of_product.iter().map(move |&other| (own, other)))
+        let UpperTimes { columns, start, mut slots, slot_start } = UpperTimes::new(fine, interpolation)?;
+        let of_row = |row: usize| &columns[start[row]..start[row + 1]];
+        let sums = (0..fine.rows()).map(|row| u16::try_from(of_row(row).len()).ok()).collect::<Option<_>>()?;
+        let of_rows = |rows: Range<usize>| {
+            rows.flat_map(|row| {
+                let others = of_row(row);
+                interpolation.columns(row).iter().flat_map(move |&own| others.iter().map(move |&other| (own, other)))
+            })
         };
-        let blocks = (0..fine.rows()).flat_map(blocks_of_row);
-        let upper = blocks.clone().map(|(row, column)| (row.min(column), row.max(column)));
+        let upper = of_rows(0..fine.rows()).map(|(row, column)| (row.min(column), row.max(column)));
         let coarse = Pattern::from_pairs(Storage::Upper, interpolation.aggregates(), upper);
         let half = |(row, column): (u32, u32)| {
             let (place, turned) = coarse.place(row as usize, column as usize).expect("it is coupled");
             index(2 * place + usize::from(turned))
         };
-        let mut halves = Vec::with_capacity(blocks.clone().count());
-        halves.extend(blocks.map(half));
-        let mut first_half = 0;
-        let part = |(rows, first_slot): (&Range<usize>, usize)| {
-            let end = first_half + rows.clone().map(|row| blocks_of_row(row).count()).sum::<usize>();
-            let of_rows = &halves[std::mem::replace(&mut first_half, end)..end];
-            let first = of_rows.iter().min().map_or(0, |&first| first as usize);
-            let touched = first..of_rows.iter().max().map_or(first, |&last| last as usize + 1);
-            Part { rows: rows.clone(), first_slot, first_half: end - of_rows.len(), touched }
+        let mut halves = Vec::with_capacity(of_rows(0..fine.rows()).count());
+        let part = |rows: &Range<usize>| {
+            let first_half = halves.len();
+            halves.extend(of_rows(rows.clone()).map(half));
+            let of_part = || halves[first_half..].iter().map(|&half| half as usize);
+            let touched = of_part().min().unwrap_or(0)..of_part().max().map_or(0, |last| last + 1);
+            Part { rows: rows.clone(), first_slot: slot_start[rows.start], first_half, touched }
         };
-        let parts = ranges.iter().zip(first_slots).map(part).collect();
+        let parts = ranges.iter().map(part).collect();
+        slots.shrink_to_fit();
         Some(Self { pattern: Arc::new(coarse), sums, slots, halves, parts })
     }
 
@@ -109,7 +89,7 @@ impl GalerkinProduct {
     ) -> BlockMatrix {
         let mut product = BlockMatrix::zeros(Arc::clone(&self.pattern));
         let blocks = product.values_mut();
-        // A few at a time, for less memory.
+        // As many at a time as there are threads, for less memory.
         for parts in self.parts.chunks(threads.max(1)) {
             let contribution = |part| dispatch(Contribution { of: self, part, fine, interpolation });
             let contributions = for_each(threads, parts.iter().collect(), contribution);
@@ -129,6 +109,37 @@ impl GalerkinProduct {
             *diagonal = std::array::from_fn(|i| std::array::from_fn(|j| diagonal[i][j] + diagonal[j][i]));
         }
         product
+    }
+}
+
+/// The pattern of U P.
+struct UpperTimes {
+    /// The columns of its blocks, in the order in which a row comes across them, and where each row begins.
+    columns: Vec<u32>,
+    start: Vec<usize>,
+    /// By row, block of U and weight of the block's column: to which block of the row they add. And where each row begins.
+    slots: Vec<u16>,
+    slot_start: Vec<usize>,
+}
+
+impl UpperTimes {
+    /// `None` where the blocks of a row are too many to be counted in 16 bits.
+    fn new<T: Precision>(fine: &Pattern, interpolation: &Interpolation<T>) -> Option<Self> {
+        let mut product = Self { columns: Vec::new(), start: vec![0], slots: Vec::new(), slot_start: vec![0] };
+        for row in 0..fine.rows() {
+            let before = product.columns.len();
+            let carried_by = fine.row(row).flat_map(|(_, column)| interpolation.columns(column));
+            for &aggregate in carried_by {
+                let known = product.columns[before..].iter().position(|&known| known == aggregate);
+                product.slots.push(u16::try_from(known.unwrap_or(product.columns.len() - before)).ok()?);
+                if known.is_none() {
+                    product.columns.push(aggregate);
+                }
+            }
+            product.start.push(product.columns.len());
+            product.slot_start.push(product.slots.len());
+        }
+        Some(product)
     }
 }
 
