@@ -92,9 +92,9 @@ impl std::ops::AddAssign for Phases {
     }
 }
 
-/// Linear systems are solved to this part of the square of what the last iteration left of ∇E, …
+/// The second system of a step is solved to this part of the square of what the first iteration left of ∇E, …
 const PROGRESS: f64 = 0.9;
-/// … but no more loosely than by this factor: an iteration of conjugate gradients is cheaper than one of Newton's method.
+/// … and none more loosely than by this factor: an iteration of conjugate gradients is cheaper than one of Newton's method.
 const LOOSENING: f64 = 10.0;
 /// Halvings of a step before it counts as stuck: the last is 2⁻⁴⁰ of the first.
 const HALVINGS: usize = 40;
@@ -113,11 +113,14 @@ impl Newton {
     }
 
     /// How exactly to solve for the next direction: as exactly as Newton's method, by its progress since the last, can make use of (Eisenstat and
-    /// Walker 1996, choice 2).
+    /// Walker 1996, choice 2). Where that takes a third system convergence is not quadratic, and no more is to be expected than was made last.
     fn forcing(&self, gradient: f64, last: Option<Forcing>) -> Forcing {
         let tightest = self.options.linear_tolerance;
-        let useful = last.map_or(0.0, |last| PROGRESS * (gradient / last.gradient).powi(2));
-        Forcing { gradient, tolerance: useful.min(LOOSENING * tightest).max(tightest) }
+        let useful = last.map_or(0.0, |last| {
+            let left = gradient / last.gradient;
+            if last.is_first { PROGRESS * left.powi(2) } else { left }
+        });
+        Forcing { gradient, tolerance: useful.min(LOOSENING * tightest).max(tightest), is_first: last.is_none() }
     }
 
     /// The matrix and solver of this system, those of the last step if it was the same.
@@ -148,6 +151,8 @@ struct Forcing {
     gradient: f64,
     /// The residual relative to it.
     tolerance: f64,
+    /// Whether it was the first of its step.
+    is_first: bool,
 }
 
 /// Where a line search ended.
@@ -519,22 +524,28 @@ mod tests {
     #[test]
     fn systems_are_solved_as_exactly_as_progress_can_make_use_of() {
         let newton = Newton::default();
-        let tolerance = |gradient: f64, last: f64| {
-            let last = Forcing { gradient: last, tolerance: 0.01 };
+        let after = |is_first: bool, gradient: f64, last: f64| {
+            let last = Forcing { gradient: last, tolerance: 0.01, is_first };
             newton.forcing(gradient, Some(last)).tolerance
         };
+        let tolerance = |gradient: f64, last: f64| after(true, gradient, last);
         assert_eq!(newton.forcing(1.0, None).tolerance, 0.01);
         // A fifth is left: nine tenths of its square. No less than a hundredth, no more than a tenth.
         assert!((tolerance(0.2, 1.0) - 0.9 * 0.04).abs() < 1e-15);
         assert_eq!(tolerance(0.01, 1.0), 0.01);
         assert_eq!(tolerance(3.0, 1.0), 0.1);
         assert_eq!(tolerance(0.0, 0.0), 0.1);
+        // A third system only down to what the second left.
+        assert_eq!(after(false, 0.05, 1.0), 0.05);
+        assert_eq!(after(false, 0.001, 1.0), 0.01);
+        assert_eq!(after(false, 0.2, 1.0), 0.1);
     }
 
     #[test]
     fn impulses_are_looked_at_where_they_may_be_small() {
         let newton = Newton::with_options(NewtonOptions { impulse_tolerance: 1e-3, ..NewtonOptions::default() });
-        let of = |gradient: f64, tolerance: f64| newton.may_be_enough(Forcing { gradient, tolerance }, 0.01);
+        let of =
+            |gradient: f64, tolerance: f64| newton.may_be_enough(Forcing { gradient, tolerance, is_first: true }, 0.01);
         assert!(of(9e-4, 0.01) && !of(1.1e-3, 0.01) && !of(9e-4, 0.1));
         assert!(newton.is_enough(&[[0.0, -9e-6, 0.0]], 0.01) && !newton.is_enough(&[[0.0, -1.1e-5, 0.0]], 0.01));
     }
