@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use comfy_table::{CellAlignment, Table, presets};
 use energy_elements::ZeroLengthSpring;
 use energy_solve::{ElementList, ListError, PotentialTerm, System, SystemError};
+use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
 use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
@@ -12,7 +13,8 @@ use crate::integrator::{Integrator, LinearSolverChoice, Newton, NewtonOptions, P
 use crate::mesh::{Diagonals, MeshError, Plane, Sheet, SpringNetwork};
 
 /// A cloth of the benchmark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Cloth {
     /// Fifty times softer than cotton: σ = 0.2 kg/m², E h = 5 N/m, ν = 0.3, k = 10⁻⁶ N m.
     Soft,
@@ -111,7 +113,7 @@ pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
 }
 
 /// What a run took.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Measured {
     /// The cloth.
     pub cloth: Cloth,
@@ -152,7 +154,7 @@ impl Measured {
     }
 }
 
-/// Runs a cloth for `seconds` of its time on at most so many threads with a linear solver, calling `progress` after every step.
+/// Runs a cloth for `seconds` of its time, one step at least, on at most so many threads with a linear solver, calling `progress` after every step.
 ///
 /// # Errors
 /// When a step fails.
@@ -173,7 +175,7 @@ pub fn measure(
     let mut integrator = Newton::with_options(options);
     let set_up = started.elapsed();
     let vertices = (cells + 1) * (cells + 1);
-    let steps = (seconds / DT).round() as u64;
+    let steps = ((seconds / DT).round() as u64).max(1);
     let mut report = StepReport::default();
     let started = Instant::now();
     for step in 1..=steps {

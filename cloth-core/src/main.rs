@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use cloth_core::bench::{self, Cloth};
+use cloth_core::bench::{self, Cloth, Measured};
 use cloth_core::bench_sleep::{self, Sizes};
 use cloth_core::fabric::MEASURED;
 use cloth_core::integrator::LinearSolverChoice;
@@ -146,7 +146,7 @@ enum Command {
         #[arg(long, value_delimiter = ',', default_value = "auto", value_parser = solver_named)]
         solver: Vec<LinearSolverChoice>,
         /// How long is simulated, in s. Default: 1, and 0.3 from 129 vertices a side.
-        #[arg(long)]
+        #[arg(long, value_parser = positive)]
         seconds: Option<f64>,
         /// Compares integrators instead: time against error of the trajectory, for steps from 16 to 0.5 ms, and the stable ones of explicit methods.
         #[arg(long)]
@@ -154,6 +154,9 @@ enum Command {
         /// Compares a step of what sleeps or is pinned with one of what moves instead.
         #[arg(long, conflicts_with = "error")]
         sleep: bool,
+        /// Prints the figures as JSON instead of a table.
+        #[arg(long, conflicts_with_all = ["error", "sleep"])]
+        json: bool,
         /// With --error: where the figures go as CSV, Markdown and SVG.
         #[arg(short, long, requires = "error")]
         output: Option<PathBuf>,
@@ -296,9 +299,13 @@ fn obey(command: Command) -> Result<ExitCode> {
             progress.finish_and_clear();
             print(&format!("{}\n", bench_sleep::table(&ratios)))
         }
-        Command::Bench { sizes, cloth, threads, solver, seconds, .. } => {
+        Command::Bench { sizes, cloth, threads, solver, seconds, json, .. } => {
             let cloths = if cloth.is_empty() { Cloth::ALL.to_vec() } else { cloth };
-            time(&cloths, &threads, &solver, &sizes, seconds)
+            let runs = time(&cloths, &threads, &solver, &sizes, seconds)?;
+            if json {
+                return print(&format!("{}\n", serde_json::to_string(&runs)?)).map(|()| ExitCode::SUCCESS);
+            }
+            print(&format!("{}\n{}", bench::table(&runs), bench::growth(&runs)))
         }
     }
     .map(|()| ExitCode::SUCCESS)
@@ -325,29 +332,64 @@ fn on_threads(run: Run, threads: Option<u16>) -> Run {
     }
 }
 
-/// Times the benchmark's scene and prints the table.
+/// Times the benchmark's scene.
 fn time(
     cloths: &[Cloth],
     threads: &[u16],
     solvers: &[LinearSolverChoice],
     sizes: &[u16],
     seconds: Option<f64>,
-) -> Result<()> {
+) -> Result<Vec<Measured>> {
     let mut runs = Vec::new();
     for &cloth in cloths {
-        for (&threads, &solver) in
-            threads.iter().flat_map(|threads| solvers.iter().map(move |solver| (threads, solver)))
-        {
-            for &size in sizes {
-                let seconds = seconds.unwrap_or(if size < 129 { 1.0 } else { 0.3 });
-                let progress = progress_bar((seconds / 0.01).round() as u64);
-                let (cells, threads) = (usize::from(size) - 1, usize::from(threads));
-                runs.push(bench::measure(cloth, cells, threads, solver, seconds, || progress.inc(1))?);
-                progress.finish_and_clear();
+        for &threads in threads {
+            for &solver in solvers {
+                let run = |&size| HangRun { cloth, size, threads, solver, seconds: seconds.unwrap_or(simulated(size)) };
+                runs.extend(sizes.iter().map(run));
             }
         }
     }
-    print(&format!("{}\n{}", bench::table(&runs), bench::growth(&runs)))
+    match &*runs {
+        [run] => Ok(vec![run.measure()?]),
+        runs => runs.iter().map(HangRun::measure_apart).collect(),
+    }
+}
+
+/// How long a sheet of this size is simulated, in s, where nothing else is said.
+fn simulated(size: u16) -> f64 {
+    if size < 129 { 1.0 } else { 0.3 }
+}
+
+/// A run of the benchmark.
+struct HangRun {
+    cloth: Cloth,
+    size: u16,
+    threads: u16,
+    solver: LinearSolverChoice,
+    seconds: f64,
+}
+
+impl HangRun {
+    fn measure(&self) -> Result<Measured> {
+        let &Self { cloth, size, threads, solver, seconds } = self;
+        let progress = progress_bar((seconds / 0.01).round() as u64);
+        let cells = usize::from(size) - 1;
+        let measured = bench::measure(cloth, cells, usize::from(threads), solver, seconds, || progress.inc(1))?;
+        progress.finish_and_clear();
+        Ok(measured)
+    }
+
+    /// In a process of its own, so that memory which others have left does not count.
+    fn measure_apart(&self) -> Result<Measured> {
+        let Self { cloth, size, threads, solver, seconds } = self;
+        let mut itself = std::process::Command::new(std::env::current_exe().context("where this program is")?);
+        itself.args(["bench", "--json", "--cloth", cloth.name(), "--solver", solver.name()]);
+        itself.args([format!("--sizes={size}"), format!("--threads={threads}"), format!("--seconds={seconds}")]);
+        let done = itself.stderr(std::process::Stdio::inherit()).output().context("running a part of the benchmark")?;
+        anyhow::ensure!(done.status.success(), "{} at {size} vertices a side ended with {}", cloth.name(), done.status);
+        let [measured] = serde_json::from_slice(&done.stdout).context("the figures of a part of the benchmark")?;
+        Ok(measured)
+    }
 }
 
 /// Compares the integrators, prints the table, and writes it.

@@ -191,3 +191,19 @@ fn materials_are_listed_with_formula_units_and_costs() {
         assert!(text.contains(part), "{part}");
     }
 }
+
+#[test]
+fn each_run_of_the_benchmark_has_memory_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    let sizes = ["bench", "--sizes", "65,5", "--cloth", "soft", "--threads", "1", "--seconds", "0.02"];
+    let json = cloth(&[&sizes[..], &["--json"]].concat(), folder.path());
+    let runs: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).unwrap();
+    let of = |name: &str| runs.iter().map(|run| run[name].as_u64()).collect::<Vec<_>>();
+    assert_eq!((of("vertices"), of("steps")), (vec![Some(4225), Some(25)], vec![Some(2), Some(2)]));
+    // A second run in the same process would find the memory of the first.
+    if let [Some(large), Some(small)] = of("peak_memory")[..] {
+        assert!(small < large, "{small} {large}");
+    }
+    let table = String::from_utf8(cloth(&sizes, folder.path()).stdout).unwrap();
+    assert!(table.contains("4225") && table.contains("ms/step"), "{table}");
+}

@@ -79,7 +79,7 @@ pub struct IntegratorMemory {
 }
 
 /// What a step took.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Linear systems solved.
     pub solves: u64,
