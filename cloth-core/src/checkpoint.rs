@@ -12,7 +12,7 @@ use crate::island::SavedIsland;
 use crate::ledger::Ledger;
 
 /// The version of checkpoints that this program writes and reads.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// How a checkpoint starts; then follow its version, the length and the CRC-32 of the rest.
 const KEYWORD: &str = "cloth-checkpoint";
 

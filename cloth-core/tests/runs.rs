@@ -147,16 +147,16 @@ fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
     assert!(with(&good[..good.len() / 2]).contains("is damaged: it is cut short"));
     let of_version = |version: &str| {
         String::from_utf8(good.clone()).unwrap().replacen(
-            "cloth-checkpoint 2 ",
+            "cloth-checkpoint 3 ",
             &format!("cloth-checkpoint {version} "),
             1,
         )
     };
     assert!(
-        with(of_version("3").as_bytes()).contains("has version 3, but this program reads version 2; use the newer")
+        with(of_version("4").as_bytes()).contains("has version 4, but this program reads version 3; use the newer")
     );
     assert!(
-        with(of_version("1").as_bytes()).contains("has version 1, but this program reads version 2; start the run")
+        with(of_version("2").as_bytes()).contains("has version 2, but this program reads version 3; start the run")
     );
     assert!(with(b"something else\n").contains("is no checkpoint"));
     std::fs::write(&checkpoint, &good).unwrap();
