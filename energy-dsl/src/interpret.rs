@@ -94,7 +94,7 @@ pub fn apply<T: Number>(
         Op::Atan2(a, b) => n(a).atan2::<Baseline>(n(b)),
         Op::Pow(a, b) => n(a).powf::<Baseline>(n(b)),
         Op::SumError(a, b) => n(a).sum_error(n(b)),
-        Op::DifferenceError(a, b) => n(a).sum_error(-n(b)),
+        Op::DifferenceError(a, b) => n(a).difference_error(n(b)),
         Op::ProductError(a, b) => n(a).product_error::<Baseline>(n(b)),
         Op::FusedMulSub(a, b, c) => n(a).fused_mul_sub::<Baseline>(n(b), n(c)),
         Op::RootError(a, b) => n(a).root_error::<Baseline>(n(b)),

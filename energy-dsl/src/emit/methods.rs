@@ -96,7 +96,10 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
             let field_types = method.field_types.iter().rev();
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
             // Lanes are computed before it is known whether they suffice, while they are at the level: those that need more are
-            // replaced afterwards. A scalar is not.
+            // replaced afterwards. A scalar is not. What is handed on is copied there: a reference to what was read would keep it
+            // in memory for all.
+            let WithCare { inputs, outputs, reads, returns, summed, code } =
+                with_care(method, name, program, routines, general);
             let select = quote! {
                 let ordinary = self.#is_ordinary::<L>(#(#names),*);
                 if T::WIDE {
@@ -104,19 +107,18 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                     if ::energy_dsl::Mask::all(ordinary) {
                         return here;
                     }
-                    let (#(#fields),*) = self.#in_general(#(#names,)* ordinary, ::core::option::Option::Some((#(here.#fields),*)));
+                    let here = ::core::option::Option::Some((#(here.#fields),*));
+                    let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
                     return ::energy_dsl::#result { #(#fields),* };
                 }
                 if ::energy_dsl::Mask::all(ordinary) {
                     self.#if_ordinary::<L>(#(#names),*)
                 } else {
-                    let (#(#fields),*) = self.#in_general(#(#names,)* ordinary, ::core::option::Option::None);
+                    let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, ::core::option::Option::None);
                     ::energy_dsl::#result { #(#fields),* }
                 }
             };
             let guard = mask(program, routines, general.ordinary);
-            let WithCare { inputs, outputs, numbers, summed, code } =
-                with_care(method, name, program, routines, general);
             let general = quote! {
                 /// Where `_if_ordinary` suffices.
                 #[inline(always)]
@@ -132,10 +134,10 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 /// With all precautions, in numbers whose exponents do not end; lanes that need none stay as they are.
                 #[cold]
                 #[inline(never)]
-                fn #in_general(#arguments, ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
+                fn #in_general(inputs: &[T; #reads], ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
                     #code
                     let (numbers, flags) =
-                        ::energy_dsl::with_care::<WithCare, T, #numbers>(&[#(#inputs),*], !ordinary, #summed);
+                        ::energy_dsl::with_care::<WithCare, T, #reads, #returns>(inputs, !ordinary, #summed);
                     let mut general = ::energy_dsl::#result { #outputs flags };
                     if let ::core::option::Option::Some((#(#fields),*)) = here {
                         let here = ::energy_dsl::#result { #(#fields),* };
@@ -167,8 +169,10 @@ struct WithCare {
     inputs: Vec<TokenStream>,
     /// The fields of the result, out of `numbers`.
     outputs: TokenStream,
-    /// How many numbers it reads and returns.
-    numbers: TokenStream,
+    /// How many numbers it reads.
+    reads: usize,
+    /// How many numbers it returns.
+    returns: usize,
     /// From which number on results are added to each other.
     summed: usize,
     code: TokenStream,
@@ -230,7 +234,7 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
     // Derivatives by several difference vectors are summed up to those by points.
     let is_summed = method.routine == "reduced_hessian" && routines.vectors.len() > 1;
     let summed = if is_summed { general.groups[0].len() } else { returns };
-    WithCare { inputs, outputs, numbers: quote!(#reads, #returns), summed, code }
+    WithCare { inputs, outputs, reads, returns, summed, code }
 }
 
 /// Statements, then a mask.

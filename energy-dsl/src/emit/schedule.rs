@@ -181,10 +181,7 @@ impl<'a> Schedule<'a> {
             Op::Atan2(a, b) => levelled("atan2", a, &[b]),
             Op::Pow(a, b) => levelled("powf", a, &[b]),
             Op::SumError(a, b) => method("sum_error", a, &[b]),
-            Op::DifferenceError(a, b) => {
-                let (a, b) = (p(a), p(b));
-                quote!(#a.sum_error(-#b))
-            }
+            Op::DifferenceError(a, b) => method("difference_error", a, &[b]),
             Op::ProductError(a, b) => levelled("product_error", a, &[b]),
             Op::FusedMulSub(a, b, c) => levelled("fused_mul_sub", a, &[b, c]),
             Op::RootError(a, b) => levelled("root_error", a, &[b]),

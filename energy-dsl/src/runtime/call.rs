@@ -1,7 +1,11 @@
 //! Calls of routines as kernels: the plain methods of generated elements run the levelled ones through these.
+//!
+//! A caller has often just gathered the points it passes, number by number. Read several at once, they would have to wait until
+//! all that writing reached the cache, and every call for the one before it; read one by one, they are at hand.
 
-use super::cpu::{Kernel, Level};
-use super::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual};
+use super::array::Array;
+use super::cpu::{Kernel, Level, read_alone};
+use super::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
 use super::real::Real;
 use super::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
@@ -10,7 +14,7 @@ use super::results::{
 
 /// A call with its element and arguments.
 macro_rules! call {
-    ($name:ident: $element:ident, $routine:ident($($argument:tt $points:ty),+) -> $output:ty) => {
+    ($name:ident: $element:ident, $routine:ident($($argument:tt $read:ident $points:ty),+) -> $output:ty) => {
         #[doc(hidden)]
         pub struct $name<'a, T: Real, E: $element<T>>(pub &'a E, $(pub &'a $points),+);
 
@@ -19,7 +23,7 @@ macro_rules! call {
 
             #[inline(always)]
             fn run<L: Level>(self) -> Self::Output {
-                self.0.$routine::<L>($(self.$argument),+)
+                self.0.$routine::<L>($(&$read(self.$argument)),+)
             }
         }
     };
@@ -27,21 +31,43 @@ macro_rules! call {
 
 type Points<E, T> = <E as Potential<T>>::Points;
 
-call!(ValueCall: Potential, value_at(1 E::Points) -> Value<T>);
-call!(GradientCall: Potential, gradient_at(1 E::Points) -> Gradient<T, E::Points>);
-call!(HessianCall: Potential, hessian_at(1 E::Points) -> Hessian<T, E::Points, E::Triangle>);
-call!(HessianVectorCall: Potential, hessian_vector_at(1 E::Points, 2 E::Points) -> HessianVector<T, E::Points>);
+/// Vectors, read number by number.
+#[inline(always)]
+fn vectors<T: Real, A: Array<Vector3<T>>>(vectors: &A) -> A {
+    let mut read = A::repeat([T::from_f64(0.0); 3]);
+    for i in 0..A::LEN {
+        for axis in 0..3 {
+            read.as_mut()[i][axis] = read_alone(&vectors.as_ref()[i][axis]);
+        }
+    }
+    read
+}
+
+/// Numbers, one by one.
+#[inline(always)]
+fn numbers<T: Real, A: Array<T>>(numbers: &A) -> A {
+    let mut read = A::repeat(T::from_f64(0.0));
+    for i in 0..A::LEN {
+        read.as_mut()[i] = read_alone(&numbers.as_ref()[i]);
+    }
+    read
+}
+
+call!(ValueCall: Potential, value_at(1 vectors E::Points) -> Value<T>);
+call!(GradientCall: Potential, gradient_at(1 vectors E::Points) -> Gradient<T, E::Points>);
+call!(HessianCall: Potential, hessian_at(1 vectors E::Points) -> Hessian<T, E::Points, E::Triangle>);
+call!(HessianVectorCall: Potential, hessian_vector_at(1 vectors E::Points, 2 vectors E::Points) -> HessianVector<T, E::Points>);
 call!(ReducedHessianCall: ReducedPotential,
-    reduced_hessian_at(1 E::Points) -> ReducedHessian<T, E::Coordinates, E::Upper>);
-call!(ForceCall: ForceLaw, force_at(1 E::Points, 2 E::Points) -> ForceValue<T, E::Points>);
-call!(JacobiansCall: ForceLaw, jacobians_at(1 E::Points, 2 E::Points) -> ForceJacobians<T, E::Points, E::Square>);
+    reduced_hessian_at(1 vectors E::Points) -> ReducedHessian<T, E::Coordinates, E::Upper>);
+call!(ForceCall: ForceLaw, force_at(1 vectors E::Points, 2 vectors E::Points) -> ForceValue<T, E::Points>);
+call!(JacobiansCall: ForceLaw, jacobians_at(1 vectors E::Points, 2 vectors E::Points) -> ForceJacobians<T, E::Points, E::Square>);
 call!(ConstraintJacobianCall: Constraint,
-    constraint_jacobian_at(1 Points<E, T>) -> ConstraintJacobian<T, E::Rows, E::Jacobian>);
+    constraint_jacobian_at(1 vectors Points<E, T>) -> ConstraintJacobian<T, E::Rows, E::Jacobian>);
 call!(ConstraintHessianCall: Constraint,
-    constraint_hessian_at(1 Points<E, T>) -> ConstraintHessian<T, E::Rows, E::Jacobian, E::Triangles>);
-call!(GaussNewtonCall: Constraint, gauss_newton_at(1 Points<E, T>) -> Hessian<T, Points<E, T>, E::Triangle>);
-call!(ResidualCall: Residual, residual_at(1 E::Unknowns) -> ResidualValue<T, E::Rows>);
-call!(ResidualJacobianCall: Residual, jacobian_at(1 E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
+    constraint_hessian_at(1 vectors Points<E, T>) -> ConstraintHessian<T, E::Rows, E::Jacobian, E::Triangles>);
+call!(GaussNewtonCall: Constraint, gauss_newton_at(1 vectors Points<E, T>) -> Hessian<T, Points<E, T>, E::Triangle>);
+call!(ResidualCall: Residual, residual_at(1 numbers E::Unknowns) -> ResidualValue<T, E::Rows>);
+call!(ResidualJacobianCall: Residual, jacobian_at(1 numbers E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
 
 /// The Hessian, written in place.
 pub(super) struct HessianInto<'a, T: Real, E: Potential<T>>(
@@ -55,6 +81,6 @@ impl<T: Real, E: Potential<T>> Kernel for HessianInto<'_, T, E> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        *self.2 = self.0.hessian_at::<L>(self.1);
+        *self.2 = self.0.hessian_at::<L>(&vectors(self.1));
     }
 }

@@ -104,6 +104,10 @@ pub trait Number:
     }
     /// What rounding `self + other` lost: (self + other) − fl(self + other), exactly. Zero in exact arithmetic.
     fn sum_error(self, other: Self) -> Self;
+    /// What rounding `self - other` lost: (self − other) − fl(self − other), exactly. Zero in exact arithmetic.
+    fn difference_error(self, other: Self) -> Self {
+        self.sum_error(-other)
+    }
     /// What rounding `self · other` lost: self·other − fl(self·other), exactly unless it underflows. Zero in exact arithmetic.
     fn product_error<L: Level>(self, other: Self) -> Self;
     /// self · factor − subtrahend as if rounded once.
@@ -235,6 +239,13 @@ macro_rules! number_for_float {
                 let sum = self + other;
                 let virtual_other = sum - self;
                 (self - (sum - virtual_other)) + (other - virtual_other)
+            }
+            #[inline(always)]
+            fn difference_error(self, other: Self) -> Self {
+                // The same without −other: one instruction less.
+                let difference = self - other;
+                let virtual_other = self - difference;
+                (self - (difference + virtual_other)) + (virtual_other - other)
             }
             #[inline(always)]
             fn product_error<L: Level>(self, other: Self) -> Self {

@@ -162,6 +162,13 @@ impl<R: Register> Number for Lanes<R> {
         (self - (sum - virtual_other)) + (other - virtual_other)
     }
     #[inline(always)]
+    fn difference_error(self, other: Self) -> Self {
+        // The same without −other: one instruction less.
+        let difference = self - other;
+        let virtual_other = self - difference;
+        (self - (difference + virtual_other)) + (virtual_other - other)
+    }
+    #[inline(always)]
     fn product_error<L: Level>(self, other: Self) -> Self {
         let product = self * other;
         if L::FUSED {

@@ -225,7 +225,16 @@ fn choose() -> LevelName {
 }
 
 #[cfg(target_arch = "x86_64")]
+pub(crate) use x86::read_alone;
+#[cfg(target_arch = "x86_64")]
 use x86::{detected, run_at, run_scalar};
+
+/// A number, by a load of its own.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
+    *number
+}
 
 #[cfg(not(target_arch = "x86_64"))]
 fn detected() -> LevelName {

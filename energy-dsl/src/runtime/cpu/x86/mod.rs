@@ -80,6 +80,13 @@ pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     }
 }
 
+/// A number, by a load of its own: volatile loads are not merged to wider ones.
+#[inline(always)]
+pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
+    // SAFETY: a reference is valid for reads, aligned and initialised, and what it refers to is `Copy`.
+    unsafe { std::ptr::read_volatile(number) }
+}
+
 /// Out of line: a scalar routine at a lesser level should not swell its callers.
 #[inline(never)]
 fn run_plain<K: Kernel>(kernel: K) -> K::Output {
