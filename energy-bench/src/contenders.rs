@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use energy_dsl::{LevelName, available, dispatch_at};
 
-use crate::run::{Doubles, Hand, Library, One, Singles, Width, Work, dual, lanes, library_plain, packed};
+use crate::run::{Doubles, Hand, Library, One, Singles, Width, Work, dual, hand_plain, lanes, library_plain, packed};
 use crate::subject::{Sample, Subject};
 
 /// Whose code it is, and how it runs.
@@ -13,6 +13,8 @@ use crate::subject::{Sample, Subject};
 pub enum Contender {
     /// The library's plain method, which dispatches at every call.
     LibraryPlain,
+    /// Hand-derived code, dispatched at every call as the library's plain method is.
+    HandPlain,
     /// The library, one element at a time, in a loop compiled for a level.
     LibraryScalar(LevelName),
     /// The library over lanes of doubles.
@@ -43,6 +45,7 @@ impl Display for Contender {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::LibraryPlain => write!(f, "library, plain method"),
+            Self::HandPlain => write!(f, "hand, plain function"),
             Self::LibraryScalar(level) => write!(f, "library, scalar, {level}"),
             Self::LibraryLanes(level) => write!(f, "library, f64 lanes, {level}"),
             Self::LibrarySingles(level) => write!(f, "library, f32 lanes, {level}"),
@@ -62,9 +65,12 @@ impl Display for Contender {
 /// Every contender that this program runs itself, with its work on all elements.
 #[must_use]
 pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
-    let numbers: Vec<f64> = packed(samples, 1, |sample| &sample.library);
-    let mut all: Vec<(Contender, Work)> =
-        vec![(Contender::LibraryPlain, Box::new(move || library_plain::<K>(&numbers)))];
+    let library_numbers: Vec<f64> = packed(samples, 1, |sample| &sample.library);
+    let hand_numbers: Vec<f64> = packed(samples, 1, |sample| &sample.hand);
+    let mut all: Vec<(Contender, Work)> = vec![
+        (Contender::LibraryPlain, Box::new(move || library_plain::<K>(&library_numbers))),
+        (Contender::HandPlain, Box::new(move || hand_plain::<K>(&hand_numbers))),
+    ];
     for level in available() {
         all.extend([
             (Contender::LibraryScalar(level), library::<K, One>(samples, level)),

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use std::hint::black_box;
 use std::marker::PhantomData;
 
-use energy_dsl::{Array, Kernel, Lane, Level, Real};
+use energy_dsl::{Array, Baseline, Kernel, Lane, Level, Number, Real};
 
 use crate::subject::{Answer, Sample, Subject};
 
@@ -143,6 +143,33 @@ pub fn library_plain<K: Subject>(numbers: &[f64]) {
     for group in numbers.chunks(size * TOGETHER) {
         for (block, result) in group.chunks_exact(size).zip(&mut results) {
             K::library_plain_into(block, result);
+        }
+        black_box(&mut results);
+    }
+}
+
+/// Hand-derived code on one element, for [`Number::dispatch`]: at the level that the library's plain methods run at.
+struct HandCall<'a, K: Subject> {
+    numbers: &'a [f64],
+    result: &'a mut K::HandAnswer<f64>,
+}
+
+impl<K: Subject> Kernel for HandCall<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        *self.result = hand::<K, f64, f64, L>(self.numbers);
+    }
+}
+
+/// Hand-derived code on all elements, a call each.
+pub fn hand_plain<K: Subject>(numbers: &[f64]) {
+    let size = <K::Hand<f64> as Array<f64>>::LEN;
+    let mut results = vec![hand::<K, f64, f64, Baseline>(&numbers[..size]); TOGETHER];
+    for group in numbers.chunks(size * TOGETHER) {
+        for (numbers, result) in group.chunks_exact(size).zip(&mut results) {
+            f64::dispatch(HandCall::<K> { numbers, result });
         }
         black_box(&mut results);
     }

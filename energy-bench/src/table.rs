@@ -15,6 +15,7 @@ pub fn table(kernels: &[Measured]) -> Table {
 
     let levels = || LevelName::ALL.into_iter();
     rows.time(Contender::LibraryPlain);
+    rows.time(Contender::HandPlain);
     levels().for_each(|level| rows.time(Contender::LibraryScalar(level)));
     levels().for_each(|level| rows.time(Contender::LibraryLanes(level)));
     levels().for_each(|level| rows.time(Contender::LibrarySingles(level)));
@@ -30,7 +31,10 @@ pub fn table(kernels: &[Measured]) -> Table {
 
     let library = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::LibraryScalar(_)));
     let hand = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::HandScalar(_)));
-    rows.ratio("library/hand, scalar", |kernel| Some(library(kernel)? / hand(kernel)?));
+    rows.ratio("library/hand, a call an element", |kernel| {
+        Some(kernel.time(Contender::LibraryPlain)? / kernel.time(Contender::HandPlain)?)
+    });
+    rows.ratio("library/hand, scalar loop", |kernel| Some(library(kernel)? / hand(kernel)?));
     for level in levels() {
         rows.ratio(&format!("library/hand, f64 lanes, {level}"), |kernel| {
             Some(kernel.time(Contender::LibraryLanes(level))? / kernel.time(Contender::HandLanes(level))?)

@@ -92,6 +92,7 @@ pub fn apply<T: Number>(
         Op::Exp(a) => n(a).exp::<Baseline>(),
         Op::Ln(a) => n(a).ln::<Baseline>(),
         Op::Atan2(a, b) => n(a).atan2::<Baseline>(n(b)),
+        Op::ModerateAtan2(a, b) => n(a).moderate_atan2::<Baseline>(n(b)),
         Op::Pow(a, b) => n(a).powf::<Baseline>(n(b)),
         Op::SumError(a, b) => n(a).sum_error(n(b)),
         Op::DifferenceError(a, b) => n(a).difference_error(n(b)),

@@ -92,7 +92,7 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
             let curvature = g.neg(square);
             Local::unary(a, slope, curvature)
         }
-        Op::Atan2(y, x) => of_atan2(g, y, x),
+        Op::Atan2(y, x) | Op::ModerateAtan2(y, x) => of_atan2(g, y, x),
         Op::Pow(a, b) => of_power(g, node, a, b),
         Op::FusedMulSub(a, b, c) => of_product_and_sum(g, (a, b), one, c, -1.0),
         Op::MulAdd(a, b, c) => of_product_and_sum(g, (a, b), one, c, 1.0),

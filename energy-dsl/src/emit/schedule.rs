@@ -179,6 +179,7 @@ impl<'a> Schedule<'a> {
             Op::Exp(a) => levelled("exp", a, &[]),
             Op::Ln(a) => levelled("ln", a, &[]),
             Op::Atan2(a, b) => levelled("atan2", a, &[b]),
+            Op::ModerateAtan2(a, b) => levelled("moderate_atan2", a, &[b]),
             Op::Pow(a, b) => levelled("powf", a, &[b]),
             Op::SumError(a, b) => method("sum_error", a, &[b]),
             Op::DifferenceError(a, b) => method("difference_error", a, &[b]),

@@ -90,7 +90,8 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
     for (precaution, instead) in [(scale, one), (e.zero, never), (degenerate, never)] {
         g.assume(precaution, instead, moderate);
     }
-    let raw = g.atan2(y, x);
+    let (raw, ordinary) = (g.atan2(y, x), g.moderate_atan2(y, x));
+    g.assume(raw, ordinary, moderate);
     let value = g.select(degenerate, null, raw);
 
     let areas = g.sqrt(areas_squared);

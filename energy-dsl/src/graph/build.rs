@@ -341,6 +341,11 @@ impl Graph {
         self.node(Op::Atan2(y, x))
     }
 
+    /// atan2(y, x) where y² + x² is moderate.
+    pub fn moderate_atan2(&mut self, y: NodeId, x: NodeId) -> NodeId {
+        self.node(Op::ModerateAtan2(y, x))
+    }
+
     /// min(a, b).
     pub fn min(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if a == b { a } else { self.node(Op::Min(a.min(b), a.max(b))) }

@@ -25,7 +25,9 @@ pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
             Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => {}
             Op::Rule(_) => unreachable!("resolved"),
             Op::Div(..) | Op::Sqrt(_) => count.divisions_and_roots += 1,
-            Op::Sin(_) | Op::Cos(_) | Op::Exp(_) | Op::Ln(_) | Op::Atan2(..) | Op::Pow(..) => count.transcendental += 1,
+            Op::Sin(_) | Op::Cos(_) | Op::Exp(_) | Op::Ln(_) | Op::Atan2(..) | Op::ModerateAtan2(..) | Op::Pow(..) => {
+                count.transcendental += 1
+            }
             Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) | Op::RootError(..) => {
                 count.error_terms += 1
             }

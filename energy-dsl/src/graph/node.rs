@@ -58,6 +58,8 @@ pub enum Op {
     Ln(NodeId),
     /// The angle of the point (x = b, y = a).
     Atan2(NodeId, NodeId),
+    /// The same where x² + y² is moderate. Stands for it where that is assumed.
+    ModerateAtan2(NodeId, NodeId),
     /// a to the power b.
     Pow(NodeId, NodeId),
     /// What rounding a + b lost; zero derivative.
@@ -124,6 +126,7 @@ impl Op {
             | Self::Min(a, b)
             | Self::Max(a, b)
             | Self::Atan2(a, b)
+            | Self::ModerateAtan2(a, b)
             | Self::Pow(a, b)
             | Self::SumError(a, b)
             | Self::DifferenceError(a, b)

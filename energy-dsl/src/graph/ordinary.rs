@@ -78,7 +78,11 @@ impl Path {
             }
             if let Some(assumption) = self.assumptions.get(&next).copied() {
                 self.guards.insert(assumption.guard);
-                self.done.insert(next, assumption.instead);
+                let instead = g.resolve(assumption.instead);
+                match self.done.get(&instead) {
+                    Some(&instead) => _ = self.done.insert(next, instead),
+                    None => stack.push(instead),
+                }
                 continue;
             }
             let needed = self.needed(g, next);
@@ -146,6 +150,7 @@ impl Path {
             Op::Exp(a) => g.exp(d(a)),
             Op::Ln(a) => g.ln(d(a)),
             Op::Atan2(a, b) => g.atan2(d(a), d(b)),
+            Op::ModerateAtan2(a, b) => g.moderate_atan2(d(a), d(b)),
             Op::Pow(a, b) => g.plain_pow(d(a), d(b)),
             Op::SumError(a, b) => g.sum_error(d(a), d(b)),
             Op::DifferenceError(a, b) => g.difference_error(d(a), d(b)),

@@ -2,7 +2,7 @@ use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
-use super::elementary::{Atan2, Binary, Cos, Exp, Ln, Pow, Sin, Unary, sin_cos};
+use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
 use super::flags::Flags;
 use super::unbounded::{Unbounded, WithCare};
 
@@ -96,6 +96,10 @@ pub trait Number:
     fn ln<L: Level>(self) -> Self;
     /// The angle of the point (`x`, `self`), in (−π, π].
     fn atan2<L: Level>(self, x: Self) -> Self;
+    /// The same where `self`² + `x`² [is moderate](Self::is_moderate), of degree 8 at most; elsewhere anything.
+    fn moderate_atan2<L: Level>(self, x: Self) -> Self {
+        self.atan2::<L>(x)
+    }
     /// self to a real power.
     fn powf<L: Level>(self, exponent: Self) -> Self;
     /// self · factor + addend, rounded once where the level has fused operations and twice elsewhere.
@@ -224,6 +228,10 @@ macro_rules! number_for_float {
             #[inline(always)]
             fn atan2<L: Level>(self, x: Self) -> Self {
                 Atan2::$binary::<f64, L>(f64::from(self), f64::from(x)) as $float
+            }
+            #[inline(always)]
+            fn moderate_atan2<L: Level>(self, x: Self) -> Self {
+                ModerateAtan2::$binary::<f64, L>(f64::from(self), f64::from(x)) as $float
             }
             #[inline(always)]
             fn powf<L: Level>(self, exponent: Self) -> Self {

@@ -6,7 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::lane::Lane;
 use super::register::{DoubleRegister, Register, Scalar};
 use super::{Kernel, Level};
-use crate::runtime::elementary::{Atan2, Cos, Double, Exp, Ln, Pow, Sin};
+use crate::runtime::elementary::{Atan2, Cos, Double, Exp, Ln, ModerateAtan2, Pow, Sin};
 use crate::runtime::real::Number;
 use crate::runtime::unbounded::Unbounded;
 
@@ -145,6 +145,10 @@ impl<R: Register> Number for Lanes<R> {
     #[inline(always)]
     fn atan2<L: Level>(self, x: Self) -> Self {
         Self(R::binary::<Atan2, L>(self.0, x.0))
+    }
+    #[inline(always)]
+    fn moderate_atan2<L: Level>(self, x: Self) -> Self {
+        Self(R::binary::<ModerateAtan2, L>(self.0, x.0))
     }
     #[inline(always)]
     fn powf<L: Level>(self, exponent: Self) -> Self {

@@ -15,7 +15,7 @@ mod logarithm;
 mod power;
 mod trigonometry;
 
-pub(crate) use arctangent::Atan2;
+pub(crate) use arctangent::{Atan2, ModerateAtan2};
 pub(crate) use exponential::Exp;
 pub(crate) use logarithm::Ln;
 pub(crate) use power::Pow;
@@ -111,25 +111,35 @@ const fn power_of_two(exponent: i32) -> f64 {
     f64::from_bits(((1023 + exponent) as u64) << 52)
 }
 
-/// Σ `coefficients[i]` zⁱ by Estrin's scheme: a short chain of dependent operations.
+/// Σ `coefficients[i]` zⁱ of at most 16 coefficients by Estrin's scheme: a short chain of dependent operations. (A loop over its
+/// rounds would not always be unrolled, and then the terms live in memory.)
 #[inline(always)]
 fn polynomial<D: Double, L: Level, const N: usize>(z: D, coefficients: [f64; N]) -> D {
+    const { assert!(N <= 16, "there are four rounds") };
     let mut terms = [z; N];
     for i in 0..N {
         terms[i] = D::splat(coefficients[i]);
     }
-    let (mut count, mut power) = (N, z);
-    while count > 1 {
-        for i in 0..count / 2 {
-            terms[i] = terms[2 * i + 1].mul_add::<L>(power, terms[2 * i]);
-        }
-        if count % 2 == 1 {
-            terms[count / 2] = terms[count - 1];
-        }
-        count = count.div_ceil(2);
-        power = power * power;
-    }
+    let z2 = z * z;
+    let z4 = z2 * z2;
+    let z8 = z4 * z4;
+    let count = estrin_round::<D, L, N>(&mut terms, N, z);
+    let count = estrin_round::<D, L, N>(&mut terms, count, z2);
+    let count = estrin_round::<D, L, N>(&mut terms, count, z4);
+    estrin_round::<D, L, N>(&mut terms, count, z8);
     terms[0]
+}
+
+/// Of the first `count` terms each second one, times the power, is added to the one before it. Returns how many are left.
+#[inline(always)]
+fn estrin_round<D: Double, L: Level, const N: usize>(terms: &mut [D; N], count: usize, power: D) -> usize {
+    for i in 0..count / 2 {
+        terms[i] = terms[2 * i + 1].mul_add::<L>(power, terms[2 * i]);
+    }
+    if count % 2 == 1 {
+        terms[count / 2] = terms[count - 1];
+    }
+    count.div_ceil(2)
 }
 
 /// The sum of two numbers, the first of which is the larger, and what rounding lost.
