@@ -27,7 +27,7 @@ where
     // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as elements, a few more than
     // in a mesh of triangles.
     let ends = std::iter::repeat_n(samples.last().expect("there are elements"), N);
-    let last_point = |sample: &Sample| points::<N>(&sample.library, E::NUMBERS)[N - 1];
+    let last_point = |sample: &Sample| points::<N>(&sample.unknowns)[N - 1];
     let positions: Vec<Vector3<f64>> = samples.iter().chain(ends).map(last_point).collect();
     let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| i + p)).collect();
     let short: Vec<[u32; N]> = stencils.iter().map(|s| s.map(|v| u32::try_from(v).expect("few vertices"))).collect();

@@ -13,7 +13,7 @@ pub const TOLERANCE: f64 = 1e-9;
 /// The library's results by its plain method: what the others are compared with.
 #[must_use]
 pub fn expected<K: Subject>(samples: &[Sample]) -> Vec<Vec<f64>> {
-    samples.iter().map(|sample| K::library_plain(&sample.library).numbers()).collect()
+    samples.iter().map(|sample| K::library_plain(&K::element(&sample.library), &sample.unknowns).numbers()).collect()
 }
 
 /// The largest difference of any contender's results from the library's, relative to the largest number of the same order of

@@ -65,10 +65,11 @@ impl Display for Contender {
 /// Every contender that this program runs itself, with its work on all elements.
 #[must_use]
 pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
-    let library_numbers: Vec<f64> = packed(samples, 1, |sample| &sample.library);
+    let elements: Vec<K::Element> = samples.iter().map(|sample| K::element(&sample.library)).collect();
+    let unknowns: Vec<f64> = packed(samples, 1, |sample| &sample.unknowns);
     let hand_numbers: Vec<f64> = packed(samples, 1, |sample| &sample.hand);
     let mut all: Vec<(Contender, Work)> = vec![
-        (Contender::LibraryPlain, Box::new(move || library_plain::<K>(&library_numbers))),
+        (Contender::LibraryPlain, Box::new(move || library_plain::<K>(&elements, &unknowns))),
         (Contender::HandPlain, Box::new(move || hand_plain::<K>(&hand_numbers))),
     ];
     for level in available() {

@@ -136,13 +136,13 @@ impl<K: Subject, W: Width> Kernel for Library<'_, K, W> {
     }
 }
 
-/// The library's plain method on all elements.
-pub fn library_plain<K: Subject>(numbers: &[f64]) {
-    let size = K::library_numbers();
-    let mut results = vec![K::library_plain(&numbers[..size]); TOGETHER];
-    for group in numbers.chunks(size * TOGETHER) {
-        for (block, result) in group.chunks_exact(size).zip(&mut results) {
-            K::library_plain_into(block, result);
+/// The library's plain method on all elements, with the unknowns of all one after the other.
+pub fn library_plain<K: Subject>(elements: &[K::Element], unknowns: &[f64]) {
+    let size = unknowns.len() / elements.len();
+    let mut results = vec![K::library_plain(&elements[0], &unknowns[..size]); TOGETHER];
+    for (elements, unknowns) in elements.chunks(TOGETHER).zip(unknowns.chunks(size * TOGETHER)) {
+        for ((element, unknowns), result) in elements.iter().zip(unknowns.chunks_exact(size)).zip(&mut results) {
+            K::library_plain_into(element, unknowns, result);
         }
         black_box(&mut results);
     }

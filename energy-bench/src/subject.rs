@@ -21,6 +21,8 @@ pub trait Subject: Debug + 'static {
     /// The library's routine that is measured.
     const ROUTINE: &'static str;
 
+    /// The library's element.
+    type Element: 'static;
     /// What hand-derived code reads: numbers prepared once for an element, then its unknowns.
     type Hand<T: Copy>: Array<T>;
     /// What hand-derived code returns.
@@ -40,13 +42,14 @@ pub trait Subject: Debug + 'static {
     /// The library at level `L`, on numbers at 0, `stride`, 2 `stride`, …, as many side by side as `V` has lanes.
     fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V>;
 
-    /// The library by its plain method, which dispatches at every call.
-    fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64>;
+    /// The library's element, of its own numbers and possibly more.
+    fn element(numbers: &[f64]) -> Self::Element;
 
-    /// [`Self::library_plain`] written to where the result is wanted, if the library can.
-    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        *result = Self::library_plain(numbers);
-    }
+    /// The library by its plain method, which dispatches at every call.
+    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64>;
+
+    /// [`Self::library_plain`] written to where the result is wanted.
+    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>);
 
     /// The textbook formula over num-dual's dual numbers: value, gradient and full Hessian (or Jacobian), flattened as the
     /// library's results are.
@@ -68,6 +71,8 @@ pub trait Subject: Debug + 'static {
 pub struct Sample {
     /// For the library: the element's own numbers, then its unknowns.
     pub library: Vec<f64>,
+    /// The unknowns alone.
+    pub unknowns: Vec<f64>,
     /// For hand-derived code; see [`Subject::Hand`].
     pub hand: Vec<f64>,
     /// For the textbook formula, which dual numbers and computer algebra differentiate.
@@ -80,7 +85,7 @@ impl Sample {
         let mut library = vec![0.0; E::NUMBERS];
         element.store(&mut library, 1);
         library.extend_from_slice(unknowns);
-        Self { library, hand, textbook }
+        Self { library, unknowns: unknowns.to_vec(), hand, textbook }
     }
 }
 
@@ -192,7 +197,7 @@ pub(crate) fn number_count<E: Stored<f64>>() -> usize {
     E::NUMBERS + <E as Element>::DECLARATION.points.iter().map(|field| field.size).sum::<usize>()
 }
 
-/// The points after the first `from` numbers.
-pub(crate) fn points<const N: usize>(numbers: &[f64], from: usize) -> [Vector3<f64>; N] {
-    std::array::from_fn(|point| std::array::from_fn(|axis| numbers[from + 3 * point + axis]))
+/// The points that unknowns are the coordinates of.
+pub(crate) fn points<const N: usize>(unknowns: &[f64]) -> [Vector3<f64>; N] {
+    std::array::from_fn(|point| std::array::from_fn(|axis| unknowns[3 * point + axis]))
 }

@@ -16,6 +16,7 @@ impl Subject for HairBendKernel {
     const TITLE: &'static str = "hair bend";
     const DECLARATION: &'static Declaration = <HairBend as Element>::DECLARATION;
     const ROUTINE: &'static str = "hessian";
+    type Element = HairBend;
     /// k, p0, p1, p2.
     type Hand<T: Copy> = [T; 10];
     type HandAnswer<T: Real> = Derivatives<T, 3, 6>;
@@ -81,14 +82,18 @@ impl Subject for HairBendKernel {
         potential::<S, HairBend<S>, V, L>(numbers, stride)
     }
 
-    #[inline]
-    fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64> {
-        HairBend { k: numbers[0] }.hessian(&points(numbers, 1))
+    fn element(numbers: &[f64]) -> Self::Element {
+        HairBend { k: numbers[0] }
     }
 
     #[inline]
-    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        HairBend { k: numbers[0] }.hessian_into(&points(numbers, 1), result);
+    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+        element.hessian(&points(unknowns))
+    }
+
+    #[inline]
+    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        element.hessian_into(&points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 3, 6> {

@@ -16,6 +16,7 @@ impl Subject for HingeKernel {
     const TITLE: &'static str = "hinge";
     const DECLARATION: &'static Declaration = <QuadraticHinge as Element>::DECLARATION;
     const ROUTINE: &'static str = "hessian";
+    type Element = QuadraticHinge;
     /// k, θ₀, x1 to x4.
     type Hand<T: Copy> = [T; 14];
     type HandAnswer<T: Real> = Derivatives<T, 4, 10>;
@@ -107,14 +108,18 @@ impl Subject for HingeKernel {
         potential::<S, QuadraticHinge<S>, V, L>(numbers, stride)
     }
 
-    #[inline]
-    fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64> {
-        QuadraticHinge { k: numbers[0], θ0: numbers[1] }.hessian(&points(numbers, 2))
+    fn element(numbers: &[f64]) -> Self::Element {
+        QuadraticHinge { k: numbers[0], θ0: numbers[1] }
     }
 
     #[inline]
-    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        QuadraticHinge { k: numbers[0], θ0: numbers[1] }.hessian_into(&points(numbers, 2), result);
+    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+        element.hessian(&points(unknowns))
+    }
+
+    #[inline]
+    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        element.hessian_into(&points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 4, 10> {

@@ -1,4 +1,4 @@
-use energy_dsl::{Declaration, Element, Lane, Level, Mask, Real, Residual, ResidualJacobian, Vector3};
+use energy_dsl::{Declaration, Element, Lane, Level, Mask, PackedResidual, Real, Residual, ResidualJacobian, Vector3};
 use energy_elements::PointToPlane;
 use nalgebra::SVector;
 use num_dual::gradient;
@@ -85,6 +85,7 @@ impl Subject for PointToPlaneKernel {
     const TITLE: &'static str = "point to plane";
     const DECLARATION: &'static Declaration = <PointToPlane as Element>::DECLARATION;
     const ROUTINE: &'static str = "jacobian";
+    type Element = PointToPlane;
     /// w, v, n, u, then four times θ and t.
     type Hand<T: Copy> = [T; 37];
     type HandAnswer<T: Real> = Row<T, 24>;
@@ -182,10 +183,18 @@ impl Subject for PointToPlaneKernel {
         residual::<S, PointToPlane<S>, V, L>(numbers, stride)
     }
 
+    fn element(numbers: &[f64]) -> Self::Element {
+        <PointToPlane as PackedResidual<f64>>::load::<f64>(numbers, 1)
+    }
+
     #[inline]
-    fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64> {
-        let element: PointToPlane = <PointToPlane as energy_dsl::PackedResidual<f64>>::load::<f64>(numbers, 1);
-        element.jacobian(&std::array::from_fn(|i| numbers[13 + i]))
+    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+        element.jacobian(unknowns.try_into().expect("24 unknowns"))
+    }
+
+    #[inline]
+    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        element.jacobian_into(unknowns.try_into().expect("24 unknowns"), result);
     }
 
     fn dual(x: &[f64]) -> Row<f64, 24> {

@@ -16,6 +16,7 @@ impl Subject for SpringKernel {
     const TITLE: &'static str = "spring";
     const DECLARATION: &'static Declaration = <HookeSpring as Element>::DECLARATION;
     const ROUTINE: &'static str = "hessian";
+    type Element = HookeSpring;
     /// k, L, p, q.
     type Hand<T: Copy> = [T; 8];
     type HandAnswer<T: Real> = Derivatives<T, 2, 3>;
@@ -59,14 +60,18 @@ impl Subject for SpringKernel {
         potential::<S, HookeSpring<S>, V, L>(numbers, stride)
     }
 
-    #[inline]
-    fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64> {
-        HookeSpring { K: numbers[0], L: numbers[1] }.hessian(&points(numbers, 2))
+    fn element(numbers: &[f64]) -> Self::Element {
+        HookeSpring { K: numbers[0], L: numbers[1] }
     }
 
     #[inline]
-    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        HookeSpring { K: numbers[0], L: numbers[1] }.hessian_into(&points(numbers, 2), result);
+    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+        element.hessian(&points(unknowns))
+    }
+
+    #[inline]
+    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        element.hessian_into(&points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 2, 3> {

@@ -16,6 +16,7 @@ impl Subject for StVKKernel {
     const TITLE: &'static str = "StVK triangle";
     const DECLARATION: &'static Declaration = <StVK as Element>::DECLARATION;
     const ROUTINE: &'static str = "hessian";
+    type Element = StVK;
     /// λ A, μ A, the metric D_m⁻¹ D_m⁻ᵀ (11, 12, 22), x0 to x2. The textbook formula has λ, μ, A, D_m⁻¹ by rows, x0 to x2.
     type Hand<T: Copy> = [T; 14];
     type HandAnswer<T: Real> = Derivatives<T, 3, 6>;
@@ -108,16 +109,18 @@ impl Subject for StVKKernel {
         potential::<S, StVK<S>, V, L>(numbers, stride)
     }
 
-    #[inline]
-    fn library_plain(numbers: &[f64]) -> Self::LibraryAnswer<f64> {
-        let element: StVK = <StVK as energy_dsl::PackedPotential<f64>>::load::<f64>(numbers, 1);
-        element.hessian(&points(numbers, <StVK as energy_dsl::Stored<f64>>::NUMBERS))
+    fn element(numbers: &[f64]) -> Self::Element {
+        <StVK as energy_dsl::PackedPotential<f64>>::load::<f64>(numbers, 1)
     }
 
     #[inline]
-    fn library_plain_into(numbers: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        let element: StVK = <StVK as energy_dsl::PackedPotential<f64>>::load::<f64>(numbers, 1);
-        element.hessian_into(&points(numbers, <StVK as energy_dsl::Stored<f64>>::NUMBERS), result);
+    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+        element.hessian(&points(unknowns))
+    }
+
+    #[inline]
+    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+        element.hessian_into(&points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 3, 6> {

@@ -84,3 +84,19 @@ impl<T: Real, E: Potential<T>> Kernel for HessianInto<'_, T, E> {
         *self.2 = self.0.hessian_at::<L>(&vectors(self.1));
     }
 }
+
+/// The Jacobian of a residual, written in place.
+pub(super) struct ResidualJacobianInto<'a, T: Real, E: Residual<T>>(
+    pub &'a E,
+    pub &'a E::Unknowns,
+    pub &'a mut ResidualJacobian<T, E::Rows, E::Jacobian>,
+);
+
+impl<T: Real, E: Residual<T>> Kernel for ResidualJacobianInto<'_, T, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        *self.2 = self.0.jacobian_at::<L>(&numbers(self.1));
+    }
+}

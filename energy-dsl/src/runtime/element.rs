@@ -6,7 +6,7 @@
 //! N×N blocks row by row.
 
 use super::array::Array;
-use super::call::HessianInto;
+use super::call::{HessianInto, ResidualJacobianInto};
 use super::cpu::Level;
 use super::declaration::Declaration;
 use super::flags::Flags;
@@ -294,5 +294,11 @@ pub trait Residual<T: Real>: Element {
     #[inline(always)]
     fn jacobian_at<L: Level>(&self, u: &Self::Unknowns) -> ResidualJacobian<T, Self::Rows, Self::Jacobian> {
         self.jacobian(u)
+    }
+
+    /// [`Self::jacobian`], written to `result` where it is and not made elsewhere and copied.
+    #[inline]
+    fn jacobian_into(&self, u: &Self::Unknowns, result: &mut ResidualJacobian<T, Self::Rows, Self::Jacobian>) {
+        T::dispatch(ResidualJacobianInto(self, u, result));
     }
 }
