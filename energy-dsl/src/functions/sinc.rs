@@ -96,17 +96,22 @@ pub(super) fn assume_at_most_a_quarter_turn(g: &mut Graph, y: NodeId) {
     let shared = shared(g, x, y);
     let limit = g.constant(BELOW);
     let small = g.less(y, limit);
+    let cosine = cosine_series(g, y, BELOW);
+    g.assume(shared.cosine, cosine, small);
     let curvature = shared.curvature(g);
-    let [sinc, slope, bend] = [0, 1, 2].map(|order| series(g, y, BELOW, order));
-    for (node, series) in [(shared.sinc, sinc), (shared.slope, slope), (curvature, bend)] {
+    for (node, order) in [(shared.sinc, 0), (shared.slope, 1), (curvature, 2)] {
+        let series = series(g, y, BELOW, order);
         g.assume(node, series, small);
     }
-    // cos x = S + 2y S₁: where there are derivatives, S₁ is needed anyway.
-    let two = g.constant(2.0);
-    let twice = g.mul(two, y);
-    let product = g.mul(twice, slope);
-    let cosine = g.add(sinc, product);
-    g.assume(shared.cosine, cosine, small);
+}
+
+/// cos √y = Σ (−y)ᵏ/(2k)! for y ≤ `below`.
+fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
+    let coefficient = |k: i32| {
+        let factorial: f64 = (1..=2 * k).map(f64::from).product();
+        (if k % 2 == 0 { 1.0 } else { -1.0 }) / factorial
+    };
+    polynomial(g, y, economised(coefficient, below))
 }
 
 /// Σ cₖ yᵏ by Horner's rule.
