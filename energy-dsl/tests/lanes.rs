@@ -123,6 +123,7 @@ impl Check for Arithmetic {
                 assert_lanes(va.min(vb), |l| a(l).min(b(l)), ("min", va, vb));
                 assert_lanes(va.max(vb), |l| a(l).max(b(l)), ("max", va, vb));
                 assert_lanes(va.sum_error(vb), |l| a(l).sum_error(b(l)), ("sum_error", va, vb));
+                assert_lanes(va.difference_error(vb), |l| a(l).sum_error(-b(l)), ("difference_error", va, vb));
                 assert_lanes(va.product_error::<L>(vb), |l| a(l).product_error::<L>(b(l)), ("product_error", va, vb));
                 assert_mask(va.less(vb), V::LANES, |l| a(l).less(b(l)), ("<", va, vb));
                 assert_mask(va.less_or_equal(vb), V::LANES, |l| a(l).less_or_equal(b(l)), ("<=", va, vb));
@@ -208,6 +209,33 @@ impl Check for ElementaryFunctions {
 #[test]
 fn elementary_functions_are_those_of_scalars() {
     at_every_level::<ElementaryFunctions>();
+}
+
+struct ModerateAngles;
+
+impl Check for ModerateAngles {
+    fn check<S: Bits, V: Lane<S>, L: Level>() {
+        let mut numbers = S::examples();
+        let powers = (-330..330).step_by(11).map(|i| (f64::from(i) + 0.3).exp2());
+        numbers.extend(powers.flat_map(|x| [x, -1.1 * x]).map(S::from_f64));
+        let mut moderate = 0;
+        for &y in &numbers {
+            for &x in &numbers {
+                if (x * x + y * y).is_moderate(8).all() {
+                    moderate += 1;
+                    let lanes = V::splat(y).moderate_atan2::<L>(V::splat(x));
+                    assert_lanes(lanes, |_| y.atan2::<L>(x), ("moderate atan2", y, x));
+                    assert_eq!(y.moderate_atan2::<L>(x).bits(), y.atan2::<L>(x).bits(), "{y:?}, {x:?}");
+                }
+            }
+        }
+        assert!(moderate > 1000, "{moderate} points");
+    }
+}
+
+#[test]
+fn the_angle_of_a_moderate_point_is_the_same_bit_for_bit() {
+    at_every_level::<ModerateAngles>();
 }
 
 struct SpecialCases;
