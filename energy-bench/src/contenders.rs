@@ -13,6 +13,10 @@ use crate::subject::{Sample, Subject};
 pub enum Contender {
     /// The library's plain method, which dispatches at every call.
     LibraryPlain,
+    /// The plain method of an element without compensation.
+    UncompensatedPlain,
+    /// Such an element over lanes of doubles.
+    UncompensatedLanes(LevelName),
     /// Hand-derived code, dispatched at every call as the library's plain method is.
     HandPlain,
     /// The library, one element at a time, in a loop compiled for a level.
@@ -45,6 +49,8 @@ impl Display for Contender {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::LibraryPlain => write!(f, "library, plain method"),
+            Self::UncompensatedPlain => write!(f, "uncompensated, plain method"),
+            Self::UncompensatedLanes(level) => write!(f, "uncompensated, f64 lanes, {level}"),
             Self::HandPlain => write!(f, "hand, plain function"),
             Self::LibraryScalar(level) => write!(f, "library, scalar, {level}"),
             Self::LibraryLanes(level) => write!(f, "library, f64 lanes, {level}"),
@@ -85,6 +91,7 @@ pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
     let size = samples[0].textbook.len();
     let numbers: Vec<f64> = packed(samples, 1, |sample| &sample.textbook);
     all.push((Contender::Dual, Box::new(move || dual::<K>(&numbers, size))));
+    all.extend(K::uncompensated(samples));
     if let Some(assembled) = K::assembled(samples) {
         all.extend([
             (Contender::Batches, assembled.batches),

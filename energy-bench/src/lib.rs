@@ -13,6 +13,7 @@ mod run;
 mod script;
 mod subject;
 mod table;
+mod uncompensated;
 mod vector;
 
 pub use assembled::Assembled;

@@ -106,6 +106,8 @@ macro_rules! each_block {
     }};
 }
 
+pub(crate) use each_block;
+
 /// Hand-derived code on all elements, [`packed`] for the lanes of the level.
 #[derive(Debug)]
 pub struct Hand<'a, K, W: Width>(pub &'a [W::Scalar], pub PhantomData<K>);

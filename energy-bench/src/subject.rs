@@ -8,7 +8,9 @@ use energy_dsl::{
 };
 
 use crate::assembled::Assembled;
+use crate::contenders::Contender;
 use crate::random::Random;
+use crate::run::Work;
 
 /// A kernel: one element of the library, and the same derivatives by other means.
 pub trait Subject: Debug + 'static {
@@ -54,6 +56,12 @@ pub trait Subject: Debug + 'static {
     /// The textbook formula over num-dual's dual numbers: value, gradient and full Hessian (or Jacobian), flattened as the
     /// library's results are.
     fn dual(textbook: &[f64]) -> Self::HandAnswer<f64>;
+
+    /// The same without compensation, where the library's element has it.
+    #[must_use]
+    fn uncompensated(_samples: &[Sample]) -> Vec<(Contender, Work)> {
+        Vec::new()
+    }
 
     /// All elements by way of vertices, where the kernel is a potential of points.
     fn assembled(samples: &[Sample]) -> Option<Assembled>;

@@ -15,9 +15,11 @@ pub fn table(kernels: &[Measured]) -> Table {
 
     let levels = || LevelName::ALL.into_iter();
     rows.time(Contender::LibraryPlain);
+    rows.time(Contender::UncompensatedPlain);
     rows.time(Contender::HandPlain);
     levels().for_each(|level| rows.time(Contender::LibraryScalar(level)));
     levels().for_each(|level| rows.time(Contender::LibraryLanes(level)));
+    levels().for_each(|level| rows.time(Contender::UncompensatedLanes(level)));
     levels().for_each(|level| rows.time(Contender::LibrarySingles(level)));
     levels().for_each(|level| rows.time(Contender::HandScalar(level)));
     levels().for_each(|level| rows.time(Contender::HandLanes(level)));
@@ -34,10 +36,18 @@ pub fn table(kernels: &[Measured]) -> Table {
     rows.ratio("library/hand, a call an element", |kernel| {
         Some(kernel.time(Contender::LibraryPlain)? / kernel.time(Contender::HandPlain)?)
     });
+    rows.ratio("uncompensated/hand, a call an element", |kernel| {
+        Some(kernel.time(Contender::UncompensatedPlain)? / kernel.time(Contender::HandPlain)?)
+    });
     rows.ratio("library/hand, scalar loop", |kernel| Some(library(kernel)? / hand(kernel)?));
     for level in levels() {
         rows.ratio(&format!("library/hand, f64 lanes, {level}"), |kernel| {
             Some(kernel.time(Contender::LibraryLanes(level))? / kernel.time(Contender::HandLanes(level))?)
+        });
+    }
+    for level in levels() {
+        rows.ratio(&format!("uncompensated/hand, f64 lanes, {level}"), |kernel| {
+            Some(kernel.time(Contender::UncompensatedLanes(level))? / kernel.time(Contender::HandLanes(level))?)
         });
     }
     rows.ratio("plain method/in the loop", |kernel| {

@@ -108,7 +108,9 @@ struct Lowering<'a> {
 
 impl<'a> Lowering<'a> {
     fn new(program: &'a Program, form: Form, slots: Option<BTreeMap<usize, usize>>) -> Self {
-        Self { program, graph: Graph::new(form), done: BTreeMap::new(), slots, gradients: Vec::new() }
+        let mut graph = Graph::new(form);
+        graph.compensate(!program.uncompensated);
+        Self { program, graph, done: BTreeMap::new(), slots, gradients: Vec::new() }
     }
 
     fn inputs(&mut self, shape: Shape, first: usize, input: fn(u16) -> Input) -> Lowered {

@@ -2,9 +2,12 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::HairBend;
 
 use crate::assembled::{Assembled, assembled};
+use crate::contenders::Contender;
 use crate::dual;
 use crate::random::Random;
+use crate::run::Work;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
+use crate::uncompensated::{UncompensatedHairBend, uncompensated};
 use crate::vector::{block, dot, negative, negative_block, scale, scale_add, sub, symmetric};
 
 /// K2, the bending k/2 (1 − â·b̂) of a hair at the middle one of three points.
@@ -102,6 +105,10 @@ impl Subject for HairBendKernel {
             let cosine = dual::dot(&a, &b) / (dual::norm(&a) * dual::norm(&b));
             (-cosine + 1.0) * (0.5 * x[0])
         })
+    }
+
+    fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
+        uncompensated::<UncompensatedHairBend>(samples)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

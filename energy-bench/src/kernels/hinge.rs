@@ -2,9 +2,12 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::QuadraticHinge;
 
 use crate::assembled::{Assembled, assembled};
+use crate::contenders::Contender;
 use crate::dual;
 use crate::random::Random;
+use crate::run::Work;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
+use crate::uncompensated::{UncompensatedHinge, uncompensated};
 use crate::vector::{add, block, cross, dot, negative_block, scale, scale_add, sub, symmetric};
 
 /// K3, a hinge k (θ − θ₀)² of two triangles over a shared edge; the weight ‖e‖²/A is in k.
@@ -131,6 +134,10 @@ impl Subject for HingeKernel {
             let off = num_dual::DualNum::atan2(&sine, cosine) - x[1];
             off * off * x[0]
         })
+    }
+
+    fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
+        uncompensated::<UncompensatedHinge>(samples)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

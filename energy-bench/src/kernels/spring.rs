@@ -2,9 +2,12 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::HookeSpring;
 
 use crate::assembled::{Assembled, assembled};
+use crate::contenders::Contender;
 use crate::dual;
 use crate::random::Random;
+use crate::run::Work;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
+use crate::uncompensated::{UncompensatedSpring, uncompensated};
 use crate::vector::{dot, negative, negative_block, scale, sub, symmetric};
 
 /// K1, a spring ½ k (‖d‖ − L)² between two points.
@@ -79,6 +82,10 @@ impl Subject for SpringKernel {
             let elongation = dual::norm(&dual::sub(q, p)) - x[1];
             elongation * elongation * (0.5 * x[0])
         })
+    }
+
+    fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
+        uncompensated::<UncompensatedSpring>(samples)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -92,6 +92,7 @@ fn check_declaration(
         visibility: declaration.visibility.clone(),
         audit_samples: declaration.audit_samples,
         properties: declaration.properties.clone(),
+        uncompensated: declaration.uncompensated,
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),

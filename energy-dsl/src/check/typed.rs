@@ -18,6 +18,8 @@ pub struct Program {
     pub audit_samples: Option<usize>,
     /// What it claims of itself, and where.
     pub properties: Vec<(Property, Span)>,
+    /// Whether rounding errors are left uncorrected.
+    pub uncompensated: bool,
     /// What it describes.
     pub kind: Kind,
     /// The declaration as text.

@@ -66,6 +66,11 @@ fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
     if !routines.primitives.is_empty() {
         lines.push(format!("Compiled to the robust primitives: {}.", routines.primitives.join("; ")));
     }
+    if program.uncompensated {
+        lines.push(
+            "Uncompensated: differences of points, and what cancels, are accurate to the rounding of the points themselves.".into(),
+        );
+    }
     lines.extend(["".into(), "| routine | operations | in reduced coordinates |".into(), "|---|---|---|".into()]);
     for routine in &routines.list {
         let (full, reduced) = (

@@ -49,6 +49,8 @@ pub struct Graph {
     weighable: BTreeMap<NodeId, [[NodeId; 2]; 2]>,
     /// Whether powers of two move out of products and sums, to meet and cancel.
     outward: bool,
+    /// Whether rounding errors are computed, to be added where they matter.
+    compensated: bool,
 }
 
 impl Graph {
@@ -68,7 +70,13 @@ impl Graph {
             rounded: BTreeSet::new(),
             weighable: BTreeMap::new(),
             outward: false,
+            compensated: true,
         }
+    }
+
+    /// Whether rounding errors are computed; otherwise each is taken as 0, and vanishes with what is made of it.
+    pub fn compensate(&mut self, compensated: bool) {
+        self.compensated = compensated;
     }
 
     /// Whether powers of two move out of products and sums.

@@ -12,7 +12,7 @@ impl Graph {
 
     /// What rounding a + b lost. Signs move out as they do of the sum itself, so that a sum and its error name the same operands.
     pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.is(a, 0.0) || self.is(b, 0.0) {
+        if !self.compensated || self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
         }
         match (self.magnitude(a), self.magnitude(b)) {
@@ -28,7 +28,7 @@ impl Graph {
 
     /// What rounding a − b lost.
     pub fn difference_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.is(a, 0.0) || self.is(b, 0.0) {
+        if !self.compensated || self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
         }
         match (self.magnitude(a), self.magnitude(b)) {
@@ -48,7 +48,8 @@ impl Graph {
 
     /// What rounding a · b lost.
     pub fn product_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        if self.as_constant(a).is_some_and(is_power_of_two) || self.as_constant(b).is_some_and(is_power_of_two) {
+        let exact = [a, b].iter().any(|&factor| self.as_constant(factor).is_some_and(is_power_of_two));
+        if !self.compensated || exact {
             return self.constant(0.0);
         }
         let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
@@ -68,9 +69,9 @@ impl Graph {
         }
     }
 
-    /// a · b − c, as if rounded once.
+    /// a · b − c, as if rounded once; uncompensated rounded twice, so that a · b − b · a is 0.
     pub fn fused_mul_sub(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
-        if self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
+        if !self.compensated || self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
             let product = self.mul(a, b);
             return self.sub(product, c);
         }
@@ -101,6 +102,9 @@ impl Graph {
 
     /// a − b², b being √a rounded.
     pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if !self.compensated {
+            return self.constant(0.0);
+        }
         self.node(Op::RootError(a, b))
     }
 

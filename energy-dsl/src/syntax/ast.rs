@@ -27,6 +27,8 @@ pub struct Declaration {
     pub audit_samples: Option<usize>,
     /// What it claims of itself, and where.
     pub properties: Vec<(Property, Span)>,
+    /// Whether `#[uncompensated]` stands above it.
+    pub uncompensated: bool,
     /// What it describes.
     pub kind: Kind,
     /// Its name.

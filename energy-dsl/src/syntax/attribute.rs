@@ -1,4 +1,4 @@
-//! What stands above a declaration: documentation, the audit, and properties it claims.
+//! What stands above a declaration: documentation, the audit, properties it claims, and how accurate it is to be.
 
 use super::parse::{Parsed, Parser};
 use super::tokens::{Kind as TokenKind, Token};
@@ -11,11 +11,12 @@ pub(super) struct Attributes {
     pub(super) docs: Vec<String>,
     pub(super) audit_samples: Option<usize>,
     pub(super) properties: Vec<(Property, Span)>,
+    pub(super) uncompensated: bool,
 }
 
 impl Parser<'_> {
-    /// `[doc = "…"]`, `[audit]`, `[audit(samples = n)]`, `[invariant(translation, rotation)]`, `[rest_state(zero_force)]` or
-    /// `[even]`, after the `#`.
+    /// `[doc = "…"]`, `[audit]`, `[audit(samples = n)]`, `[invariant(translation, rotation)]`, `[rest_state(zero_force)]`, `[even]` or
+    /// `[uncompensated]`, after the `#`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
         self.expect("[", "to open the attribute")?;
         let name = self.name("`doc`, `audit` or a property")?;
@@ -36,10 +37,11 @@ impl Parser<'_> {
             }
             "rest_state" => self.properties(&[("zero_force", Property::ZeroForceAtRest)], attributes)?,
             "even" => attributes.properties.push((Property::Even, name.span)),
+            "uncompensated" => attributes.uncompensated = true,
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
                     "a declaration takes doc comments, #[audit], #[audit(samples = 200)], #[invariant(translation, rotation)], \
-                     #[rest_state(zero_force)] and #[even]",
+                     #[rest_state(zero_force)], #[even] and #[uncompensated]",
                 )));
             }
         }

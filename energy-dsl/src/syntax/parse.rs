@@ -161,7 +161,8 @@ impl<'a> Parser<'a> {
         while self.take("#") {
             self.attribute(&mut attributes)?;
         }
-        let Attributes { docs, audit_samples, properties } = attributes;
+        let Attributes { docs, audit_samples, properties, uncompensated } = attributes;
+        let prefix = if uncompensated { "#[uncompensated] " } else { "" };
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -187,6 +188,7 @@ impl<'a> Parser<'a> {
                 visibility,
                 audit_samples,
                 properties,
+                uncompensated,
                 kind,
                 name,
                 inputs: Vec::new(),
@@ -194,7 +196,9 @@ impl<'a> Parser<'a> {
                 source: String::new(),
                 formula: String::new(),
             };
-            return self.specialisation(start, declaration).map(|s| Item::Specialisation(Box::new(s)));
+            let mut specialisation = self.specialisation(start, declaration)?;
+            specialisation.declaration.source.insert_str(0, prefix);
+            return Ok(Item::Specialisation(Box::new(specialisation)));
         }
         let inputs = self.inputs()?;
         let body_start = self.at;
@@ -208,12 +212,13 @@ impl<'a> Parser<'a> {
             }
         };
         let formula = formula(&self.tokens[body_start..self.at]);
-        let source = tokens::text(&self.tokens[start..self.at]);
+        let source = format!("{prefix}{}", tokens::text(&self.tokens[start..self.at]));
         Ok(Item::Declaration(Declaration {
             docs,
             visibility,
             audit_samples,
             properties,
+            uncompensated,
             kind,
             name,
             inputs,

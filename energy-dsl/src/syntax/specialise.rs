@@ -83,5 +83,6 @@ fn specialised(
     docs.push(format!(" `{}` with fixed {}: {}", of.text, fixed.join(", "), declaration.formula));
     // The text of the other follows, so that this one still comes first.
     let source = format!("{} {}", declaration.source, original.source);
-    Some(Declaration { docs, inputs, body, formula: original.formula.clone(), source, ..declaration })
+    let uncompensated = declaration.uncompensated || original.uncompensated;
+    Some(Declaration { docs, inputs, body, uncompensated, formula: original.formula.clone(), source, ..declaration })
 }

@@ -1,0 +1,79 @@
+//! The kernels whose library elements correct rounding errors, declared without: what that accuracy costs.
+
+use std::hint::black_box;
+use std::marker::PhantomData;
+
+use energy_dsl::{Array, Kernel, Lane, Level, LevelName, PackedPotential, Potential, Vector3, available, dispatch_at};
+use energy_macros::energy;
+
+use crate::contenders::Contender;
+use crate::run::{Doubles, TOGETHER, Work, each_block, lanes, packed};
+use crate::subject::{Sample, potential};
+
+energy! {
+    /// K1.
+    #[uncompensated]
+    pub energy UncompensatedSpring(p, q: Point; K: Scalar[N/m], L: Scalar[m]) = "K/2 (‖p − q‖ − L)²";
+
+    /// K2.
+    #[uncompensated]
+    pub energy UncompensatedHairBend(p0, p1, p2: Point; k: Scalar[J]) {
+        let a = p1 - p0;
+        let b = p2 - p1;
+        "k/2 (1 − â·b̂)"
+    }
+
+    /// K3.
+    #[uncompensated]
+    pub energy UncompensatedHinge(x1, x2, x3, x4: Point; k: Scalar[J], θ0: Scalar[rad]) {
+        let θ = dihedral(x1, x2, x3, x4);
+        "k (θ − θ₀)²"
+    }
+}
+
+/// An element in place of a kernel's own, with the same numbers: its plain method, and lanes at every level.
+pub(crate) fn uncompensated<E>(samples: &[Sample]) -> Vec<(Contender, Work)>
+where
+    E: PackedPotential<f64, Wide<f64> = E> + Potential<f64> + 'static,
+{
+    let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
+    let unknowns: Vec<f64> = packed(samples, 1, |sample| &sample.unknowns);
+    let mut all: Vec<(Contender, Work)> =
+        vec![(Contender::UncompensatedPlain, Box::new(move || plain::<E>(&elements, &unknowns)))];
+    all.extend(available().map(|level| (Contender::UncompensatedLanes(level), over_lanes::<E>(samples, level))));
+    all
+}
+
+fn over_lanes<E: PackedPotential<f64> + 'static>(samples: &[Sample], level: LevelName) -> Work {
+    let width = lanes::<Doubles>(level).expect("the level is available");
+    let numbers: Vec<f64> = packed(samples, width, |sample| &sample.library);
+    Box::new(move || dispatch_at(level, Lanes::<E>(&numbers, PhantomData)).expect("the level is available"))
+}
+
+/// An element's routine at the level, on all elements, [`packed`] for its lanes.
+struct Lanes<'a, E>(&'a [f64], PhantomData<E>);
+
+impl<E: PackedPotential<f64>> Kernel for Lanes<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        let size = (E::NUMBERS + 3 * <<E::Wide<f64> as Potential<f64>>::Points as Array<Vector3<f64>>>::LEN) * lanes;
+        each_block!(self.0, size, lanes, |block| potential::<f64, E, L::F64, L>(block, lanes));
+    }
+}
+
+fn plain<E: Potential<f64>>(elements: &[E], unknowns: &[f64]) {
+    let size = unknowns.len() / elements.len();
+    let points = |unknowns: &[f64]| {
+        <E::Points as Array<Vector3<f64>>>::from_fn(|p| std::array::from_fn(|axis| unknowns[3 * p + axis]))
+    };
+    let mut results = vec![elements[0].hessian(&points(&unknowns[..size])); TOGETHER];
+    for (elements, unknowns) in elements.chunks(TOGETHER).zip(unknowns.chunks(size * TOGETHER)) {
+        for ((element, unknowns), result) in elements.iter().zip(unknowns.chunks_exact(size)).zip(&mut results) {
+            element.hessian_into(&points(unknowns), result);
+        }
+        black_box(&mut results);
+    }
+}
