@@ -72,8 +72,8 @@ impl Display for Contender {
 #[must_use]
 pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
     let elements: Vec<K::Element> = samples.iter().map(|sample| K::element(&sample.library)).collect();
-    let unknowns: Vec<f64> = packed(samples, 1, |sample| &sample.unknowns);
-    let hand_numbers: Vec<f64> = packed(samples, 1, |sample| &sample.hand);
+    let unknowns = packed::<f64>(samples, 1, |sample| &sample.unknowns);
+    let hand_numbers = packed::<f64>(samples, 1, |sample| &sample.hand);
     let mut all: Vec<(Contender, Work)> = vec![
         (Contender::LibraryPlain, Box::new(move || library_plain::<K>(&elements, &unknowns))),
         (Contender::HandPlain, Box::new(move || hand_plain::<K>(&hand_numbers))),
@@ -89,7 +89,7 @@ pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
         ]);
     }
     let size = samples[0].textbook.len();
-    let numbers: Vec<f64> = packed(samples, 1, |sample| &sample.textbook);
+    let numbers = packed::<f64>(samples, 1, |sample| &sample.textbook);
     all.push((Contender::Dual, Box::new(move || dual::<K>(&numbers, size))));
     all.extend(K::uncompensated(samples));
     if let Some(assembled) = K::assembled(samples) {
@@ -104,12 +104,12 @@ pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
 
 fn library<K: Subject, W: Width>(samples: &[Sample], level: LevelName) -> Work {
     let width = lanes::<W>(level).expect("the level is available");
-    let numbers: Vec<W::Scalar> = packed(samples, width, |sample| &sample.library);
+    let numbers = packed::<W::Scalar>(samples, width, |sample| &sample.library);
     Box::new(move || dispatch_at(level, Library::<K, W>(&numbers, PhantomData)).expect("the level is available"))
 }
 
 fn hand<K: Subject, W: Width>(samples: &[Sample], level: LevelName) -> Work {
     let width = lanes::<W>(level).expect("the level is available");
-    let numbers: Vec<W::Scalar> = packed(samples, width, |sample| &sample.hand);
+    let numbers = packed::<W::Scalar>(samples, width, |sample| &sample.hand);
     Box::new(move || dispatch_at(level, Hand::<K, W>(&numbers, PhantomData)).expect("the level is available"))
 }

@@ -79,8 +79,8 @@ impl Measured {
     }
 }
 
-/// Runs every contender once to warm up and then `repetitions` times, one after the other in turns, calling `progress`
-/// after every turn; `elements` is how many elements a run computes.
+/// Runs every contender `repetitions` times, one after the other in turns and each time once more before, to fill the caches; calls
+/// `progress` after every turn. `elements` is how many elements a run computes.
 ///
 /// # Panics
 /// When there are no repetitions.
@@ -92,14 +92,13 @@ pub fn measure(
 ) -> Vec<Time> {
     assert!(repetitions > 0, "a median needs repetitions");
     let mut times = vec![Vec::with_capacity(repetitions); contenders.len()];
-    for turn in 0..=repetitions {
+    for _ in 0..repetitions {
         for ((_, work), times) in contenders.iter_mut().zip(&mut times) {
+            // Once for the caches, which the others have filled.
+            work();
             let start = Instant::now();
             work();
-            let elapsed = start.elapsed().as_secs_f64();
-            if turn > 0 {
-                times.push(elapsed * 1e9 / elements as f64);
-            }
+            times.push(start.elapsed().as_secs_f64() * 1e9 / elements as f64);
         }
         progress();
     }

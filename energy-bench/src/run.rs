@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use std::hint::black_box;
 use std::marker::PhantomData;
 
-use energy_dsl::{Array, Baseline, Kernel, Lane, Level, Number, Real};
+use energy_dsl::{Aligned, Array, Baseline, Kernel, Lane, Level, Number, Real};
 
 use crate::subject::{Answer, Sample, Subject};
 
@@ -69,14 +69,14 @@ pub fn lanes<W: Width>(level: energy_dsl::LevelName) -> Option<usize> {
 
 /// Elements side by side: number by number, `width` elements together. With a width of one, an array of structs.
 #[must_use]
-pub fn packed<S: Real>(samples: &[Sample], width: usize, of: impl Fn(&Sample) -> &[f64]) -> Vec<S> {
+pub fn packed<S: Real>(samples: &[Sample], width: usize, of: impl Fn(&Sample) -> &[f64]) -> Aligned<S> {
     let mut numbers = Vec::new();
     for block in samples.chunks_exact(width) {
         for i in 0..of(&block[0]).len() {
             numbers.extend(block.iter().map(|sample| S::from_f64(of(sample)[i])));
         }
     }
-    numbers
+    Aligned::from(numbers.as_slice())
 }
 
 #[inline(always)]

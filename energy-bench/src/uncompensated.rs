@@ -37,7 +37,7 @@ where
     E: PackedPotential<f64, Wide<f64> = E> + Potential<f64> + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
-    let unknowns: Vec<f64> = packed(samples, 1, |sample| &sample.unknowns);
+    let unknowns = packed::<f64>(samples, 1, |sample| &sample.unknowns);
     let mut all: Vec<(Contender, Work)> =
         vec![(Contender::UncompensatedPlain, Box::new(move || plain::<E>(&elements, &unknowns)))];
     all.extend(available().map(|level| (Contender::UncompensatedLanes(level), over_lanes::<E>(samples, level))));
@@ -46,7 +46,7 @@ where
 
 fn over_lanes<E: PackedPotential<f64> + 'static>(samples: &[Sample], level: LevelName) -> Work {
     let width = lanes::<Doubles>(level).expect("the level is available");
-    let numbers: Vec<f64> = packed(samples, width, |sample| &sample.library);
+    let numbers = packed::<f64>(samples, width, |sample| &sample.library);
     Box::new(move || dispatch_at(level, Lanes::<E>(&numbers, PhantomData)).expect("the level is available"))
 }
 

@@ -6,6 +6,7 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
+use super::aligned::Aligned;
 use super::array::Array;
 use super::cpu::{Kernel, Lane, Level, dispatch};
 use super::element::{Element, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
@@ -61,7 +62,7 @@ pub struct Packed<E, S = f64> {
     /// One more than the largest index of a point.
     reach: usize,
     /// By block, number, element.
-    numbers: Vec<S>,
+    numbers: Aligned<S>,
     /// By block, point, element.
     stencils: Vec<u32>,
     of: PhantomData<E>,
@@ -93,7 +94,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
             elements: count,
             points,
             reach: 0,
-            numbers: vec![S::from_f64(0.0); blocks * E::NUMBERS * BLOCK],
+            numbers: Aligned::new(blocks * E::NUMBERS * BLOCK, S::from_f64(0.0)),
             stencils: vec![0; blocks * points * BLOCK],
             of: PhantomData,
         };

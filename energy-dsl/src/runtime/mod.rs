@@ -1,6 +1,7 @@
 //! What generated code calls, and what calls generated code: number types, lanes and levels, element traits and the
 //! self-description that every generated element carries.
 
+mod aligned;
 mod array;
 mod batch;
 mod call;
@@ -15,6 +16,7 @@ mod real;
 mod results;
 mod unbounded;
 
+pub use aligned::Aligned;
 pub use array::Array;
 pub use batch::{
     BLOCK, Batch, BatchWork, Batches, Hessians, Packed, PackedForce, PackedPotential, PackedResidual, Stored,
