@@ -205,7 +205,8 @@ pub(crate) fn number_count<E: Stored<f64>>() -> usize {
     E::NUMBERS + <E as Element>::DECLARATION.points.iter().map(|field| field.size).sum::<usize>()
 }
 
-/// The points that unknowns are the coordinates of.
-pub(crate) fn points<const N: usize>(unknowns: &[f64]) -> [Vector3<f64>; N] {
-    std::array::from_fn(|point| std::array::from_fn(|axis| unknowns[3 * point + axis]))
+/// The points that unknowns are the coordinates of, where they are.
+pub(crate) fn points<const N: usize>(unknowns: &[f64]) -> &[Vector3<f64>; N] {
+    let (points, _) = unknowns.as_chunks();
+    points.try_into().expect("three numbers a point")
 }

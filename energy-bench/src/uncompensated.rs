@@ -8,7 +8,7 @@ use energy_macros::energy;
 
 use crate::contenders::Contender;
 use crate::run::{Doubles, TOGETHER, Work, each_block, lanes, packed};
-use crate::subject::{Sample, potential};
+use crate::subject::{Sample, points, potential};
 
 energy! {
     /// K1.
@@ -32,14 +32,14 @@ energy! {
 }
 
 /// An element in place of a kernel's own, with the same numbers: its plain method, and lanes at every level.
-pub(crate) fn uncompensated<E>(samples: &[Sample]) -> Vec<(Contender, Work)>
+pub(crate) fn uncompensated<E, const N: usize>(samples: &[Sample]) -> Vec<(Contender, Work)>
 where
-    E: PackedPotential<f64, Wide<f64> = E> + Potential<f64> + 'static,
+    E: PackedPotential<f64, Wide<f64> = E> + Potential<f64, Points = [Vector3<f64>; N]> + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
     let unknowns = packed::<f64>(samples, 1, |sample| &sample.unknowns);
     let mut all: Vec<(Contender, Work)> =
-        vec![(Contender::UncompensatedPlain, Box::new(move || plain::<E>(&elements, &unknowns)))];
+        vec![(Contender::UncompensatedPlain, Box::new(move || plain::<E, N>(&elements, &unknowns)))];
     all.extend(available().map(|level| (Contender::UncompensatedLanes(level), over_lanes::<E>(samples, level))));
     all
 }
@@ -64,15 +64,12 @@ impl<E: PackedPotential<f64>> Kernel for Lanes<'_, E> {
     }
 }
 
-fn plain<E: Potential<f64>>(elements: &[E], unknowns: &[f64]) {
-    let size = unknowns.len() / elements.len();
-    let points = |unknowns: &[f64]| {
-        <E::Points as Array<Vector3<f64>>>::from_fn(|p| std::array::from_fn(|axis| unknowns[3 * p + axis]))
-    };
-    let mut results = vec![elements[0].hessian(&points(&unknowns[..size])); TOGETHER];
+fn plain<E: Potential<f64, Points = [Vector3<f64>; N]>, const N: usize>(elements: &[E], unknowns: &[f64]) {
+    let size = 3 * N;
+    let mut results = vec![elements[0].hessian(points(&unknowns[..size])); TOGETHER];
     for (elements, unknowns) in elements.chunks(TOGETHER).zip(unknowns.chunks(size * TOGETHER)) {
         for ((element, unknowns), result) in elements.iter().zip(unknowns.chunks_exact(size)).zip(&mut results) {
-            element.hessian_into(&points(unknowns), result);
+            element.hessian_into(points(unknowns), result);
         }
         black_box(&mut results);
     }

@@ -117,12 +117,12 @@ impl Subject for HingeKernel {
 
     #[inline]
     fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
-        element.hessian(&points(unknowns))
+        element.hessian(points(unknowns))
     }
 
     #[inline]
     fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        element.hessian_into(&points(unknowns), result);
+        element.hessian_into(points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 4, 10> {
@@ -137,7 +137,7 @@ impl Subject for HingeKernel {
     }
 
     fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
-        uncompensated::<UncompensatedHinge>(samples)
+        uncompensated::<UncompensatedHinge, 4>(samples)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -69,12 +69,12 @@ impl Subject for SpringKernel {
 
     #[inline]
     fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
-        element.hessian(&points(unknowns))
+        element.hessian(points(unknowns))
     }
 
     #[inline]
     fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        element.hessian_into(&points(unknowns), result);
+        element.hessian_into(points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 2, 3> {
@@ -85,7 +85,7 @@ impl Subject for SpringKernel {
     }
 
     fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
-        uncompensated::<UncompensatedSpring>(samples)
+        uncompensated::<UncompensatedSpring, 2>(samples)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

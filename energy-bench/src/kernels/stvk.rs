@@ -115,12 +115,12 @@ impl Subject for StVKKernel {
 
     #[inline]
     fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
-        element.hessian(&points(unknowns))
+        element.hessian(points(unknowns))
     }
 
     #[inline]
     fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
-        element.hessian_into(&points(unknowns), result);
+        element.hessian_into(points(unknowns), result);
     }
 
     fn dual(x: &[f64]) -> Derivatives<f64, 3, 6> {
