@@ -39,6 +39,9 @@ pub fn agreement<K: Subject>(samples: &[Sample]) -> Result<f64, String> {
     };
     let dual: Vec<Vec<f64>> = samples.iter().map(|sample| K::dual(&sample.textbook).numbers()).collect();
     compare("by dual numbers", &dual)?;
+    if let Some(uncompensated) = K::uncompensated(samples) {
+        compare("uncompensated", &uncompensated.answers)?;
+    }
     for level in available() {
         compare(&format!("by hand at {level}"), &collect::<K, One>(samples, level, true))?;
         compare(&format!("by hand over lanes at {level}"), &collect::<K, Doubles>(samples, level, true))?;

@@ -91,7 +91,7 @@ pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
     let size = samples[0].textbook.len();
     let numbers = packed::<f64>(samples, 1, |sample| &sample.textbook);
     all.push((Contender::Dual, Box::new(move || dual::<K>(&numbers, size))));
-    all.extend(K::uncompensated(samples));
+    all.extend(K::uncompensated(samples).into_iter().flat_map(|uncompensated| uncompensated.contenders));
     if let Some(assembled) = K::assembled(samples) {
         all.extend([
             (Contender::Batches, assembled.batches),

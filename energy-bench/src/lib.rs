@@ -24,3 +24,4 @@ pub use run::Work;
 pub use script::run_script;
 pub use subject::{Answer, Derivatives, Row, Sample, Subject, samples};
 pub use table::table;
+pub use uncompensated::Uncompensated;

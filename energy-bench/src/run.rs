@@ -96,12 +96,12 @@ macro_rules! each_block {
             let $block = &numbers[..size];
             $call
         };
-        let mut results = vec![first; TOGETHER / $lanes];
-        for group in numbers.chunks(size * (TOGETHER / $lanes)) {
+        let mut results = vec![first; $crate::run::TOGETHER / $lanes];
+        for group in numbers.chunks(size * ($crate::run::TOGETHER / $lanes)) {
             for ($block, result) in group.chunks_exact(size).zip(&mut results) {
                 *result = $call;
             }
-            black_box(&mut results);
+            std::hint::black_box(&mut results);
         }
     }};
 }
@@ -140,11 +140,21 @@ impl<K: Subject, W: Width> Kernel for Library<'_, K, W> {
 
 /// The library's plain method on all elements, with the unknowns of all one after the other.
 pub fn library_plain<K: Subject>(elements: &[K::Element], unknowns: &[f64]) {
+    call_each(elements, unknowns, K::library_plain, K::library_plain_into);
+}
+
+/// A call for each element, after one that makes room for results.
+pub(crate) fn call_each<E, A: Clone>(
+    elements: &[E],
+    unknowns: &[f64],
+    first: impl Fn(&E, &[f64]) -> A,
+    call: impl Fn(&E, &[f64], &mut A),
+) {
     let size = unknowns.len() / elements.len();
-    let mut results = vec![K::library_plain(&elements[0], &unknowns[..size]); TOGETHER];
+    let mut results = vec![first(&elements[0], &unknowns[..size]); TOGETHER];
     for (elements, unknowns) in elements.chunks(TOGETHER).zip(unknowns.chunks(size * TOGETHER)) {
         for ((element, unknowns), result) in elements.iter().zip(unknowns.chunks_exact(size)).zip(&mut results) {
-            K::library_plain_into(element, unknowns, result);
+            call(element, unknowns, result);
         }
         black_box(&mut results);
     }

@@ -8,9 +8,8 @@ use energy_dsl::{
 };
 
 use crate::assembled::Assembled;
-use crate::contenders::Contender;
 use crate::random::Random;
-use crate::run::Work;
+use crate::uncompensated::Uncompensated;
 
 /// A kernel: one element of the library, and the same derivatives by other means.
 pub trait Subject: Debug + 'static {
@@ -59,8 +58,8 @@ pub trait Subject: Debug + 'static {
 
     /// The same without compensation, where the library's element has it.
     #[must_use]
-    fn uncompensated(_samples: &[Sample]) -> Vec<(Contender, Work)> {
-        Vec::new()
+    fn uncompensated(_samples: &[Sample]) -> Option<Uncompensated> {
+        None
     }
 
     /// All elements by way of vertices, where the kernel is a potential of points.

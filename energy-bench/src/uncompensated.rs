@@ -1,14 +1,13 @@
 //! The kernels whose library elements correct rounding errors, declared without: what that accuracy costs.
 
-use std::hint::black_box;
 use std::marker::PhantomData;
 
 use energy_dsl::{Array, Kernel, Lane, Level, LevelName, PackedPotential, Potential, Vector3, available, dispatch_at};
 use energy_macros::energy;
 
 use crate::contenders::Contender;
-use crate::run::{Doubles, TOGETHER, Work, each_block, lanes, packed};
-use crate::subject::{Sample, points, potential};
+use crate::run::{Doubles, Work, call_each, each_block, lanes, packed};
+use crate::subject::{Answer, Sample, points, potential};
 
 energy! {
     /// K1.
@@ -31,17 +30,30 @@ energy! {
     }
 }
 
-/// An element in place of a kernel's own, with the same numbers: its plain method, and lanes at every level.
-pub(crate) fn uncompensated<E, const N: usize>(samples: &[Sample]) -> Vec<(Contender, Work)>
+/// An element in place of a kernel's own, with the same numbers.
+pub struct Uncompensated {
+    /// Value, gradient and Hessian of each.
+    pub answers: Vec<Vec<f64>>,
+    /// Its plain method, and lanes at every level.
+    pub contenders: Vec<(Contender, Work)>,
+}
+
+pub(crate) fn uncompensated<E, const N: usize>(samples: &[Sample]) -> Uncompensated
 where
     E: PackedPotential<f64, Wide<f64> = E> + Potential<f64, Points = [Vector3<f64>; N]> + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
+    let hessian = |element: &E, unknowns: &[f64]| element.hessian(points(unknowns));
+    let answers = elements.iter().zip(samples).map(|(element, s)| hessian(element, &s.unknowns).numbers()).collect();
     let unknowns = packed::<f64>(samples, 1, |sample| &sample.unknowns);
-    let mut all: Vec<(Contender, Work)> =
-        vec![(Contender::UncompensatedPlain, Box::new(move || plain::<E, N>(&elements, &unknowns)))];
-    all.extend(available().map(|level| (Contender::UncompensatedLanes(level), over_lanes::<E>(samples, level))));
-    all
+    let plain = move || {
+        call_each(&elements, &unknowns, hessian, |element, unknowns, result| {
+            element.hessian_into(points(unknowns), result);
+        });
+    };
+    let mut contenders: Vec<(Contender, Work)> = vec![(Contender::UncompensatedPlain, Box::new(plain))];
+    contenders.extend(available().map(|level| (Contender::UncompensatedLanes(level), over_lanes::<E>(samples, level))));
+    Uncompensated { answers, contenders }
 }
 
 fn over_lanes<E: PackedPotential<f64> + 'static>(samples: &[Sample], level: LevelName) -> Work {
@@ -61,16 +73,5 @@ impl<E: PackedPotential<f64>> Kernel for Lanes<'_, E> {
         let lanes = <L::F64 as Lane<f64>>::LANES;
         let size = (E::NUMBERS + 3 * <<E::Wide<f64> as Potential<f64>>::Points as Array<Vector3<f64>>>::LEN) * lanes;
         each_block!(self.0, size, lanes, |block| potential::<f64, E, L::F64, L>(block, lanes));
-    }
-}
-
-fn plain<E: Potential<f64, Points = [Vector3<f64>; N]>, const N: usize>(elements: &[E], unknowns: &[f64]) {
-    let size = 3 * N;
-    let mut results = vec![elements[0].hessian(points(&unknowns[..size])); TOGETHER];
-    for (elements, unknowns) in elements.chunks(TOGETHER).zip(unknowns.chunks(size * TOGETHER)) {
-        for ((element, unknowns), result) in elements.iter().zip(unknowns.chunks_exact(size)).zip(&mut results) {
-            element.hessian_into(points(unknowns), result);
-        }
-        black_box(&mut results);
     }
 }

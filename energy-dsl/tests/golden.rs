@@ -96,6 +96,7 @@ fn claims_are_proved_or_refused() {
         ),
         ("#[audit] #[invariant(scale)] energy A(p: Point) { norm(p) }", "unknown property `scale`"),
         ("#[odd] energy A(p: Point) { norm(p) }", "unknown attribute `odd`"),
+        ("#[uncompensated] fn f(a) { a } energy A(p: Point) { f(norm(p)) }", "a declaration after its attributes"),
     ] {
         let code = compile(source.parse().unwrap()).to_string();
         assert!(code.contains("compile_error") && code.contains(expected), "{source}: {code}");

@@ -2,12 +2,10 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::HairBend;
 
 use crate::assembled::{Assembled, assembled};
-use crate::contenders::Contender;
 use crate::dual;
 use crate::random::Random;
-use crate::run::Work;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
-use crate::uncompensated::{UncompensatedHairBend, uncompensated};
+use crate::uncompensated::{Uncompensated, UncompensatedHairBend, uncompensated};
 use crate::vector::{block, dot, negative, negative_block, scale, scale_add, sub, symmetric};
 
 /// K2, the bending k/2 (1 − â·b̂) of a hair at the middle one of three points.
@@ -107,8 +105,8 @@ impl Subject for HairBendKernel {
         })
     }
 
-    fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
-        uncompensated::<UncompensatedHairBend, 3>(samples)
+    fn uncompensated(samples: &[Sample]) -> Option<Uncompensated> {
+        Some(uncompensated::<UncompensatedHairBend, 3>(samples))
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -2,12 +2,10 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::QuadraticHinge;
 
 use crate::assembled::{Assembled, assembled};
-use crate::contenders::Contender;
 use crate::dual;
 use crate::random::Random;
-use crate::run::Work;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
-use crate::uncompensated::{UncompensatedHinge, uncompensated};
+use crate::uncompensated::{Uncompensated, UncompensatedHinge, uncompensated};
 use crate::vector::{add, block, cross, dot, negative_block, scale, scale_add, sub, symmetric};
 
 /// K3, a hinge k (θ − θ₀)² of two triangles over a shared edge; the weight ‖e‖²/A is in k.
@@ -136,8 +134,8 @@ impl Subject for HingeKernel {
         })
     }
 
-    fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
-        uncompensated::<UncompensatedHinge, 4>(samples)
+    fn uncompensated(samples: &[Sample]) -> Option<Uncompensated> {
+        Some(uncompensated::<UncompensatedHinge, 4>(samples))
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -2,12 +2,10 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::HookeSpring;
 
 use crate::assembled::{Assembled, assembled};
-use crate::contenders::Contender;
 use crate::dual;
 use crate::random::Random;
-use crate::run::Work;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
-use crate::uncompensated::{UncompensatedSpring, uncompensated};
+use crate::uncompensated::{Uncompensated, UncompensatedSpring, uncompensated};
 use crate::vector::{dot, negative, negative_block, scale, sub, symmetric};
 
 /// K1, a spring ½ k (‖d‖ − L)² between two points.
@@ -84,8 +82,8 @@ impl Subject for SpringKernel {
         })
     }
 
-    fn uncompensated(samples: &[Sample]) -> Vec<(Contender, Work)> {
-        uncompensated::<UncompensatedSpring, 2>(samples)
+    fn uncompensated(samples: &[Sample]) -> Option<Uncompensated> {
+        Some(uncompensated::<UncompensatedSpring, 2>(samples))
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -69,34 +69,14 @@ call!(GaussNewtonCall: Constraint, gauss_newton_at(1 vectors Points<E, T>) -> He
 call!(ResidualCall: Residual, residual_at(1 numbers E::Unknowns) -> ResidualValue<T, E::Rows>);
 call!(ResidualJacobianCall: Residual, jacobian_at(1 numbers E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
 
-/// The Hessian, written in place.
-pub(super) struct HessianInto<'a, T: Real, E: Potential<T>>(
-    pub &'a E,
-    pub &'a E::Points,
-    pub &'a mut Hessian<T, E::Points, E::Triangle>,
-);
+/// Another kernel, whose output is written to where it is wanted.
+pub(super) struct WrittenTo<'a, K: Kernel>(pub K, pub &'a mut K::Output);
 
-impl<T: Real, E: Potential<T>> Kernel for HessianInto<'_, T, E> {
+impl<K: Kernel> Kernel for WrittenTo<'_, K> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        *self.2 = self.0.hessian_at::<L>(&vectors(self.1));
-    }
-}
-
-/// The Jacobian of a residual, written in place.
-pub(super) struct ResidualJacobianInto<'a, T: Real, E: Residual<T>>(
-    pub &'a E,
-    pub &'a E::Unknowns,
-    pub &'a mut ResidualJacobian<T, E::Rows, E::Jacobian>,
-);
-
-impl<T: Real, E: Residual<T>> Kernel for ResidualJacobianInto<'_, T, E> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Level>(self) {
-        *self.2 = self.0.jacobian_at::<L>(&numbers(self.1));
+        *self.1 = self.0.run::<L>();
     }
 }

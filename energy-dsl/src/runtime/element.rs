@@ -6,7 +6,7 @@
 //! N×N blocks row by row.
 
 use super::array::Array;
-use super::call::{HessianInto, ResidualJacobianInto};
+use super::call::{HessianCall, ResidualJacobianCall, WrittenTo};
 use super::cpu::Level;
 use super::declaration::Declaration;
 use super::flags::Flags;
@@ -121,7 +121,7 @@ pub trait Potential<T: Real>: Element {
     /// numbers, at about the cost of computing them.
     #[inline]
     fn hessian_into(&self, x: &Self::Points, result: &mut Hessian<T, Self::Points, Self::Triangle>) {
-        T::dispatch(HessianInto(self, x, result));
+        T::dispatch(WrittenTo(HessianCall(self, x), result));
     }
 
     /// ∇²U v, for one vector per point in `v`, without forming ∇²U where that is cheaper.
@@ -299,6 +299,6 @@ pub trait Residual<T: Real>: Element {
     /// [`Self::jacobian`], written to `result` where it is and not made elsewhere and copied.
     #[inline]
     fn jacobian_into(&self, u: &Self::Unknowns, result: &mut ResidualJacobian<T, Self::Rows, Self::Jacobian>) {
-        T::dispatch(ResidualJacobianInto(self, u, result));
+        T::dispatch(WrittenTo(ResidualJacobianCall(self, u), result));
     }
 }

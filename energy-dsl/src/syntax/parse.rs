@@ -173,6 +173,10 @@ impl<'a> Parser<'a> {
             }
         }
         let visibility = tokens::text(&self.tokens[visibility_start..self.at]);
+        let claims = audit_samples.is_some() || uncompensated || !properties.is_empty();
+        if claims && (self.is_word("fn") || self.is_word("const")) {
+            return self.fail("a declaration after its attributes (functions and constants have only documentation)");
+        }
         if self.take_word("fn") {
             return self.user_function().map(Item::Function);
         }
