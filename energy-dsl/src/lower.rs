@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::check::{Program, Source, Typed, TypedKind};
-use crate::diff::{Coordinates, Moving, first_derivatives};
+use crate::diff::{Coordinates, Moving, Order, first_derivatives};
 use crate::functions::{Lowered, Shape};
 use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
 
@@ -178,7 +178,7 @@ impl<'a> Lowering<'a> {
         }
         let g = &mut self.graph;
         let coordinates = Coordinates::of_points(g, &[of], Moving::Positions);
-        let reduced = first_derivatives(g, &[of], &coordinates).remove(0);
+        let reduced = first_derivatives(g, &[of], &coordinates, Order::FirstToDifferentiate).remove(0);
         coordinates.expand(g, &reduced, point)
     }
 }

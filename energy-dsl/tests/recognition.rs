@@ -16,6 +16,20 @@ fn plan(formula: &str) -> String {
             k * norm(a) * norm(b) * (x + y) * δ + {formula}
         }}"
     );
+    plan_of(&source)
+}
+
+/// The same of a residual of a motion Q by a unit dual quaternion, and of the vectors n, v and u and a quaternion h of any length.
+fn plan_of_motion(formula: &str) -> String {
+    plan_of(&format!(
+        "residual Test(ξ: [Twist; 2]; w: [Scalar; 2], h: Quat, n, v, u: Vec3) {{
+            let Q = unit(sum(j in 0..2, w[j] * exp(ξ[j])));
+            dot(n, u) * dot(v, u) * real(h) * real(real(Q)) + ({formula})
+        }}"
+    ))
+}
+
+fn plan_of(source: &str) -> String {
     let code = compile(source.parse().unwrap()).to_string();
     assert!(!code.contains("compile_error"), "{source}");
     let (_, plan) = code.split_once("primitives : &").unwrap();
@@ -38,6 +52,34 @@ fn naive_and_robust_spellings_are_the_same_code() {
         ("(1 - cos(dihedral(p, r, q, a)))", "one_minus_cos(dihedral(p, r, q, a))"),
     ] {
         assert!(plan(naive) == plan(robust), "{naive} is not {robust}");
+    }
+}
+
+#[test]
+fn what_a_rotation_keeps_is_not_rotated() {
+    let shifted = "dot(n, v) + dot(rotate(Q, n), transform(Q, 0 * v) - u)";
+    for (naive, robust) in [
+        ("dot(rotate(Q, n), rotate(Q, v)) + dot(rotate(Q, n), u)", "dot(n, v) + dot(rotate(Q, n), u)"),
+        ("dot(rotate(Q, n), transform(Q, v) - u)", shifted),
+        ("dot(transform(Q, v) - u, rotate(Q, n))", shifted),
+        ("-dot(rotate(Q, n), u - transform(Q, v))", shifted),
+        (
+            "dot(rotate(rotation(angular(ξ[0])), n), rotate(rotation(angular(ξ[0])), v) - u)",
+            "dot(n, v) + dot(rotate(rotation(angular(ξ[0])), n), -u)",
+        ),
+        (
+            "dot(rotate(unit(real(Q)), n), rotate(unit(real(Q)), v) - u)",
+            "dot(n, v) + dot(rotate(unit(real(Q)), n), -u)",
+        ),
+    ] {
+        assert!(plan_of_motion(naive) == plan_of_motion(robust), "{naive} is not {robust}");
+    }
+    // A quaternion that may have another length, and one of two.
+    for (one, other) in [
+        ("dot(rotate(h, n), rotate(h, v))", "dot(n, v)"),
+        ("dot(rotate(exp(ξ[0]), n), rotate(exp(ξ[1]), v))", "dot(n, v)"),
+    ] {
+        assert!(plan_of_motion(one) != plan_of_motion(other), "{one} became {other}");
     }
 }
 

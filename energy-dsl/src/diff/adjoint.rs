@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
 use super::forward::{Sparse, products, tangents};
-use super::local::local;
+use super::local::{Order, local};
 use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
@@ -17,15 +17,15 @@ pub(super) fn alone(g: &mut Graph, output: NodeId) -> Weighted {
 }
 
 /// Derivatives of Σ weight · output by every node the outputs are made of.
-fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second_order: bool) -> Weighted {
+fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, order: Order) -> Weighted {
     let mut adjoints = outputs.clone();
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
-    for node in differentiable(g, &roots, second_order).into_iter().rev() {
+    for node in differentiable(g, &roots, order).into_iter().rev() {
         let Some(&weight) = adjoints.get(&node) else { continue };
         if coordinates.seeds.contains_key(&node) {
             continue;
         }
-        let local = local(g, node, second_order);
+        let local = local(g, node, order);
         for (operand, first) in local.operands.into_iter().zip(local.first) {
             if !g.varies(operand) {
                 continue;
@@ -39,8 +39,8 @@ fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, second
 
 /// Whether reverse accumulation is right, on the ordinary path or everywhere. Through a selection it multiplies the derivative of
 /// the other branch, which may be infinite, by zero; unless it is known which branch is taken, or both are constant (a sign).
-pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], second_order: bool, everywhere: bool) -> bool {
-    let nodes = differentiable(g, roots, second_order);
+pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], order: Order, everywhere: bool) -> bool {
+    let nodes = differentiable(g, roots, order);
     nodes.into_iter().all(|node| match g.op(node) {
         Op::Select(_, yes, no) if !g.varies(yes) && !g.varies(no) => true,
         Op::Select(mask, ..) => !everywhere && g.is_decided(mask),
@@ -54,13 +54,13 @@ pub(super) fn gradient(
     g: &mut Graph,
     outputs: &Weighted,
     coordinates: &Coordinates,
-    second_order: bool,
+    order: Order,
 ) -> Option<Vec<NodeId>> {
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
-    if !is_safe(g, &roots, second_order, false) {
+    if !is_safe(g, &roots, order, false) {
         return None;
     }
-    let adjoints = adjoints(g, outputs, coordinates, second_order);
+    let adjoints = adjoints(g, outputs, coordinates, order);
     Some(gathered(g, &adjoints, coordinates))
 }
 
@@ -72,13 +72,13 @@ pub(super) fn second_derivatives(
     coordinates: &Coordinates,
 ) -> Option<BTreeMap<usize, NodeId>> {
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
-    if !is_safe(g, &roots, true, false) {
+    if !is_safe(g, &roots, Order::Second, false) {
         return None;
     }
-    let nodes = differentiable(g, &roots, true);
+    let nodes = differentiable(g, &roots, Order::Second);
     let n = coordinates.len();
-    let tangents = tangents(g, &roots, coordinates, true);
-    let adjoints = adjoints(g, outputs, coordinates, true);
+    let tangents = tangents(g, &roots, coordinates, Order::Second);
+    let adjoints = adjoints(g, outputs, coordinates, Order::Second);
     let mut hessian: BTreeMap<usize, NodeId> = BTreeMap::new();
     let none = Sparse::new();
     for node in nodes {
@@ -86,7 +86,7 @@ pub(super) fn second_derivatives(
             continue;
         }
         let Some(&weight) = adjoints.get(&node) else { continue };
-        let local = local(g, node, true);
+        let local = local(g, node, Order::Second);
         for (i, j, products_of) in local.second {
             let a = tangents.get(&local.operands[i]).unwrap_or(&none);
             let b = tangents.get(&local.operands[j]).unwrap_or(&none);
@@ -111,21 +111,21 @@ pub(super) fn hessian_vector(
     coordinates: &Coordinates,
     direction: &[NodeId],
 ) -> Option<Vec<NodeId>> {
-    if !is_safe(g, &[output], true, false) {
+    if !is_safe(g, &[output], Order::Second, false) {
         return None;
     }
     let along = coordinates.along(g, direction);
-    let rates = tangents(g, &[output], &along, true);
+    let rates = tangents(g, &[output], &along, Order::Second);
     let rate = |node: &NodeId| rates.get(node).and_then(|parts| parts.first()).map(|&(_, part)| part);
     let whole = alone(g, output);
-    let adjoints = adjoints(g, &whole, coordinates, true);
+    let adjoints = adjoints(g, &whole, coordinates, Order::Second);
     let mut turning: Weighted = BTreeMap::new();
-    for node in differentiable(g, &[output], true).into_iter().rev() {
+    for node in differentiable(g, &[output], Order::Second).into_iter().rev() {
         if coordinates.seeds.contains_key(&node) {
             continue;
         }
         let Some(&weight) = adjoints.get(&node) else { continue };
-        let local = local(g, node, true);
+        let local = local(g, node, Order::Second);
         for (i, j, products_of) in &local.second {
             let (a, b) = (local.operands[*i], local.operands[*j]);
             let factor = g.sum_of_products(Some(weight), products_of);

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use super::differentiable;
 use super::forward::Sparse;
+use super::local::Order;
 use crate::graph::{Graph, Input, NodeId, Op};
 
 /// What the derivatives are taken by.
@@ -102,7 +103,7 @@ impl Coordinates {
                 fronts.push((output, point, GROUND, axis));
             }
         }
-        for node in differentiable(g, outputs, true) {
+        for node in differentiable(g, outputs, Order::Second) {
             if let Op::Sub(a, b) = g.op(node)
                 && let (Some((p, axis)), Some((q, other))) = (coordinate(g, a), coordinate(g, b))
                 && axis == other

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
 use super::forward::{self, Sparse, combine, tangents};
+use super::local::Order;
 use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
@@ -18,10 +19,10 @@ pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinat
     let n = coordinates.len();
     let (slopes, curvatures) = by_cut(g, output, &cut);
     let weights: Weighted = cut.iter().copied().zip(slopes).collect();
-    let gradient = adjoint::gradient(g, &weights, coordinates, true)?;
+    let gradient = adjoint::gradient(g, &weights, coordinates, Order::Second)?;
     let mut hessian = adjoint::second_derivatives(g, &weights, coordinates)?;
 
-    let tangents = tangents(g, &cut, coordinates, true);
+    let tangents = tangents(g, &cut, coordinates, Order::Second);
     let none = Sparse::new();
     let m = cut.len();
     for (row, node) in cut.iter().enumerate() {
@@ -48,9 +49,9 @@ pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinat
 fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeMap<usize, NodeId>) {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
-    let slopes = match adjoint::gradient(g, &whole, &coordinates, true) {
+    let slopes = match adjoint::gradient(g, &whole, &coordinates, Order::Second) {
         Some(slopes) => slopes,
-        None => forward::first_derivatives(g, &[output], &coordinates).remove(0),
+        None => forward::first_derivatives(g, &[output], &coordinates, Order::First).remove(0),
     };
     let curvatures = match adjoint::second_derivatives(g, &whole, &coordinates) {
         Some(curvatures) => curvatures,
@@ -61,7 +62,7 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeM
 
 /// The robust primitives that no other one feeds, if every path from the coordinates to U leads through them.
 fn primitives_by_coordinates(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
-    let nodes = differentiable(g, &[output], true);
+    let nodes = differentiable(g, &[output], Order::Second);
     // Nodes above some primitive.
     let mut above: BTreeSet<NodeId> = BTreeSet::new();
     let mut cut = Vec::new();

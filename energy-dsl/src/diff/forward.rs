@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
-use super::local::local;
+use super::local::{Order, local};
 use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
@@ -35,10 +35,10 @@ pub(super) fn tangents(
     g: &mut Graph,
     outputs: &[NodeId],
     coordinates: &Coordinates,
-    second_order: bool,
+    order: Order,
 ) -> BTreeMap<NodeId, Sparse> {
     let mut tangents: BTreeMap<NodeId, Sparse> = coordinates.seeds.clone();
-    for node in differentiable(g, outputs, second_order) {
+    for node in differentiable(g, outputs, order) {
         if tangents.contains_key(&node) {
             continue;
         }
@@ -49,7 +49,7 @@ pub(super) fn tangents(
                 choose(g, mask, a, b)
             }
             _ => {
-                let local = local(g, node, second_order);
+                let local = local(g, node, order);
                 let factors: Vec<_> = local.first.iter().map(|f| g.product(None, f)).collect();
                 let terms: Vec<_> =
                     local.operands.iter().zip(factors).filter_map(|(o, f)| Some((f, tangents.get(o)?))).collect();
@@ -61,9 +61,14 @@ pub(super) fn tangents(
     tangents
 }
 
-/// First derivatives of each output by each coordinate, zeros included.
-pub fn first_derivatives(g: &mut Graph, outputs: &[NodeId], coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
-    let tangents = tangents(g, outputs, coordinates, false);
+/// First derivatives of each output by each coordinate, zeros included; `order` says what becomes of them.
+pub fn first_derivatives(
+    g: &mut Graph,
+    outputs: &[NodeId],
+    coordinates: &Coordinates,
+    order: Order,
+) -> Vec<Vec<NodeId>> {
+    let tangents = tangents(g, outputs, coordinates, order);
     let zero = g.constant(0.0);
     outputs
         .iter()
@@ -80,10 +85,10 @@ pub fn first_derivatives(g: &mut Graph, outputs: &[NodeId], coordinates: &Coordi
 /// Second dual parts: entries (i, j), i ≤ j, at i·n + j.
 pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<usize, NodeId> {
     let n = coordinates.len();
-    let tangents = tangents(g, &[output], coordinates, true);
+    let tangents = tangents(g, &[output], coordinates, Order::Second);
     let mut curvatures: BTreeMap<NodeId, Sparse> = BTreeMap::new();
     let none = Sparse::new();
-    for node in differentiable(g, &[output], true) {
+    for node in differentiable(g, &[output], Order::Second) {
         if coordinates.seeds.contains_key(&node) {
             continue;
         }
@@ -93,7 +98,7 @@ pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Co
             curvatures.insert(node, parts);
             continue;
         }
-        let local = local(g, node, true);
+        let local = local(g, node, Order::Second);
         let mut own: Vec<(NodeId, Sparse)> = Vec::new();
         for (i, j, products_of) in &local.second {
             let (i, j) = (*i, *j);

@@ -1,5 +1,16 @@
 use crate::graph::{Graph, NodeId, Op, Product, symmetric_index};
 
+/// Which derivatives are taken.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// First ones.
+    First,
+    /// First ones that the formula goes on with, so that they will be differentiated: those of rules are rules too.
+    FirstToDifferentiate,
+    /// First and second ones.
+    Second,
+}
+
 /// An operation's derivatives by its own operands.
 pub(super) struct Local {
     /// The operands, each once.
@@ -26,13 +37,13 @@ impl Local {
     }
 }
 
-/// The derivatives of `node` by its operands; second ones only where asked for.
-pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
+/// The derivatives of `node` by its operands, of the orders asked for.
+pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
     let one = g.constant(1.0);
     let zero = g.constant(0.0);
     let two = g.constant(2.0);
     match g.op(node) {
-        Op::Rule(_) => of_rule(g, node, second_order),
+        Op::Rule(_) => of_rule(g, node, order),
         Op::Neg(a) => {
             let minus = g.neg(one);
             Local::linear(vec![a], vec![minus])
@@ -123,16 +134,20 @@ pub(super) fn local(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
     }
 }
 
-fn of_rule(g: &mut Graph, node: NodeId, second_order: bool) -> Local {
+fn of_rule(g: &mut Graph, node: NodeId, order: Order) -> Local {
     let rule = g.rule(node).expect("a rule").clone();
     let n = rule.arguments.len();
-    let Some(second) = rule.second.as_ref().filter(|_| second_order) else {
-        if second_order {
+    let second = match (order, &rule.second) {
+        (Order::First, _) => return Local { operands: rule.arguments, first: rule.first, second: Vec::new() },
+        (Order::FirstToDifferentiate, _) => {
+            let first = (0..n).map(|i| g.partial(node, i)).collect();
+            return Local::linear(rule.arguments, first);
+        }
+        (Order::Second, None) => {
             let one = g.constant(1.0);
             return Local::linear(vec![rule.value], vec![one]);
         }
-        let first = (0..n).map(|i| g.partial(node, i)).collect();
-        return Local::linear(rule.arguments, first);
+        (Order::Second, Some(second)) => second,
     };
     let second = (0..n)
         .flat_map(|i| (i..n).map(move |j| (i, j)))

@@ -15,6 +15,7 @@ mod plan;
 
 pub use coordinates::{Coordinates, Moving};
 pub use forward::first_derivatives;
+pub use local::Order;
 pub use plan::{Plan, SecondOrder, first_order, hessian_vector, second_order};
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,7 +24,7 @@ use crate::graph::{Graph, NodeId, Op};
 
 /// The nodes through which `outputs` depend on what moves, in topological order. A rule leads on to its arguments, or to its
 /// value where only that can be differentiated; masks and rounding errors have no derivatives.
-fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTreeSet<NodeId> {
+fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack: Vec<NodeId> = outputs.to_vec();
     while let Some(node) = stack.pop() {
@@ -31,7 +32,7 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], second_order: bool) -> BTre
             continue;
         }
         match graph.rule(node) {
-            Some(rule) if second_order && rule.second.is_none() => stack.push(rule.value),
+            Some(rule) if order == Order::Second && rule.second.is_none() => stack.push(rule.value),
             Some(rule) => stack.extend(&rule.arguments),
             None => match graph.op(node) {
                 Op::Select(_, yes, no) => stack.extend([yes, no]),

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
+use super::local::Order;
 use super::{adjoint, cut, forward};
 use crate::graph::{Graph, NodeId, count, ordinary, symmetric_index};
 use crate::runtime::OperationCount;
@@ -89,9 +90,9 @@ pub fn second_order(
         hessian
     };
     let whole = adjoint::alone(g, value);
-    let safe = adjoint::is_safe(g, &[value], true, true);
-    let forward_gradient = forward::first_derivatives(g, &[value], coordinates).remove(0);
-    let reverse_gradient = adjoint::gradient(g, &whole, coordinates, true);
+    let safe = adjoint::is_safe(g, &[value], Order::Second, true);
+    let forward_gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
+    let reverse_gradient = adjoint::gradient(g, &whole, coordinates, Order::Second);
     let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
     let mut alternatives = Vec::new();
     let mut offer = |name, gradient: &[NodeId], hessian: &[NodeId], safe| {
@@ -133,7 +134,7 @@ pub fn hessian_vector(
         .collect();
     // What ∇²U does with caution, its product does.
     let mut alternatives = vec![Alternative { name: "from the Hessian", nodes: formed, safe: true }];
-    let safe = adjoint::is_safe(g, &[energy.value], true, true);
+    let safe = adjoint::is_safe(g, &[energy.value], Order::Second, true);
     if let Some(nodes) = adjoint::hessian_vector(g, energy.value, coordinates, &rates) {
         alternatives.push(Alternative { name: "second-order reverse", nodes, safe });
     }
@@ -148,14 +149,14 @@ pub fn first_order(
     coordinates: &Coordinates,
     known: Option<Vec<NodeId>>,
 ) -> (Vec<Vec<NodeId>>, Plan) {
-    let forward = forward::first_derivatives(g, outputs, coordinates).concat();
+    let forward = forward::first_derivatives(g, outputs, coordinates, Order::First).concat();
     let mut alternatives = vec![Alternative { name: "forward", nodes: forward, safe: true }];
-    let safe = adjoint::is_safe(g, outputs, false, true);
+    let safe = adjoint::is_safe(g, outputs, Order::First, true);
     let reverse: Option<Vec<_>> = outputs
         .iter()
         .map(|&output| {
             let whole = adjoint::alone(g, output);
-            adjoint::gradient(g, &whole, coordinates, false)
+            adjoint::gradient(g, &whole, coordinates, Order::First)
         })
         .collect();
     if let Some(rows) = reverse {

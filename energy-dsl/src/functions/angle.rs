@@ -79,8 +79,8 @@ fn vector_of_unit(g: &Graph, components: &[NodeId]) -> Option<Vec<NodeId>> {
     all.then_some(arguments)
 }
 
-/// The cosine c of the angle between a and b, and what it and 1 − c need of them. With w = a × b, and lengths only in
-/// γ = 1/(‖a‖‖b‖), 1/‖a‖² = ‖b‖²γ² and 1/‖b‖² = ‖a‖²γ²: one root and one division serve all.
+/// The cosine c of the angle between a and b, and what it and 1 − c need of them, w = a × b. The root in γ = √P/P, P = ‖a‖²‖b‖², and
+/// the division in 1/P do not wait for each other; 1/‖a‖² = ‖b‖²/P and 1/‖b‖² = ‖a‖²/P.
 struct Aligned {
     a: Vec<NodeId>,
     b: Vec<NodeId>,
@@ -109,23 +109,22 @@ fn aligned(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Aligned {
     let cross = accurate_cross(g, &x, &y);
     let dot = g.dot(&x, &y);
     let product = g.mul(squares[0], squares[1]);
+    let per_product = g.div(one, product);
+    let per_product = g.select(degenerate, null, per_product);
+    let per_square = [g.mul(squares[1], per_product), g.mul(squares[0], per_product)];
     let lengths = g.sqrt(product);
-    // 1 − c = ‖w‖²/(m (m + a·b)), m = ‖a‖‖b‖, where a·b > 0; elsewhere the difference itself is exact enough.
-    let acute = g.less(null, dot);
-    let sum = g.add(lengths, dot);
-    let sum = g.select(acute, sum, one);
-    let denominator = g.mul(lengths, sum);
-    let reciprocal = g.div(one, denominator);
-    let reciprocal = g.select(degenerate, null, reciprocal);
-    let per_both = g.mul(sum, reciprocal);
+    let per_both = g.mul(lengths, per_product);
     let cosine = g.mul(dot, per_both);
+    // 1 − |c| = ‖w‖²γ/(m + |a·b|), m = ‖a‖‖b‖; to which (|a·b| − a·b) γ adds 0 or 2 |c|.
+    let size = g.abs(dot);
     let cross_squared = g.sum_of_squares(&cross);
-    let small = g.mul(cross_squared, reciprocal);
-    let large = g.sub(one, cosine);
-    let one_minus = g.select(acute, small, large);
-    let one_minus = g.select(degenerate, null, one_minus);
-    let square = g.mul(per_both, per_both);
-    let per_square = [g.mul(squares[1], square), g.mul(squares[0], square)];
+    let numerator = g.mul(cross_squared, per_both);
+    let denominator = g.add(lengths, size);
+    let quotient = g.div(numerator, denominator);
+    let one_minus_size = g.select(degenerate, null, quotient);
+    let behind = g.sub(size, dot);
+    let behind = g.mul(behind, per_both);
+    let one_minus = g.add(one_minus_size, behind);
     Aligned { a: x, b: y, scales, cross, cosine, one_minus, per_both, per_square, degenerate }
 }
 
@@ -150,48 +149,56 @@ pub(crate) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
     Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
-/// Derivatives by a and b of c, or of −c with `negative`: κ = ±c and μ = ±γ. With p = ±γ (w × a)/‖a‖², q = ±γ (b × w)/‖b‖²,
-/// a′ = a/‖a‖² and b′ = b/‖b‖² the gradient is (p, q); the second derivatives have the blocks −κ/‖a‖² I − a′ sᵀ − s a′ᵀ,
-/// s = p − ½ κ a′ (likewise for b), and μ (I − a a′ᵀ) − p b′ᵀ. Weighed, p and q are parts of the gradient, which is computed anyway.
+/// What the derivatives by one of the two vectors, a, are made of.
+struct Side {
+    /// p.
+    gradient: [NodeId; 3],
+    /// −a′.
+    minus_inverse: Vec<NodeId>,
+    /// s.
+    slant: [NodeId; 3],
+    /// −1/‖a‖².
+    minus_per_square: NodeId,
+}
+
+/// Derivatives by a and b of c, or of −c with `negative`: κ = ±c and μ = ±γ. With a′ = a/‖a‖², b′ = b/‖b‖², p = μ w × a′ and
+/// q = μ b′ × w the gradient is (p, q); the second derivatives have the blocks −κ/‖a‖² I − a′ sᵀ − s a′ᵀ, s = p − ½ κ a′
+/// (likewise for b), and μ (I − a a′ᵀ) − p b′ᵀ. Weighed, p and q are parts of the gradient, which is computed anyway.
 fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
     let half = g.constant(0.5);
-    let (w, vectors) = (&at.cross, [&at.a, &at.b]);
-    let turned = match negative {
-        false => [g.fused_cross(w, &at.a), g.fused_cross(&at.b, w)],
-        true => [g.fused_cross(&at.a, w), g.fused_cross(w, &at.b)],
-    };
     let [kappa, mixed] = [at.cosine, at.per_both].map(|node| if negative { g.neg(node) } else { node });
     // Scalars lead the products and vectors follow, so that what weighs a product weighs a scalar.
     let mut first = Vec::new();
-    // Of each vector: γ/‖a‖², −a′, s and −κ/‖a‖².
-    let mut parts = Vec::new();
-    for own in 0..2 {
-        let slope = g.mul(at.per_both, at.per_square[own]);
-        let scaled = g.mul(at.scales[own], slope);
-        first.extend(turned[own].iter().map(|&turned| vec![scaled, turned]));
-        let curvature = g.mul(kappa, at.per_square[own]);
-        let slanting = g.mul(half, curvature);
-        let slant: Vec<_> =
-            (0..3).map(|i| g.weighable_difference([slope, turned[own][i]], [slanting, vectors[own][i]])).collect();
-        let minus_per_square = g.neg(at.per_square[own]);
-        parts.push((slope, g.scaled(minus_per_square, vectors[own]), slant, g.neg(curvature)));
+    let mut sides = Vec::new();
+    for (own, vector) in [&at.a, &at.b].into_iter().enumerate() {
+        let inverse = g.scaled(at.per_square[own], vector);
+        let gradient = [0, 1, 2].map(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let [plus, minus] = [(j, k), (k, j)].map(|(j, k)| [at.per_both, at.cross[j], inverse[k]]);
+            let turned = (own == 1) != negative;
+            let (plus, minus) = if turned { (minus, plus) } else { (plus, minus) };
+            g.weighable_difference(&plus, &minus)
+        });
+        let slant = [0, 1, 2].map(|i| g.weighable_difference(&[gradient[i]], &[kappa, half, inverse[i]]));
+        let minus_inverse: Vec<_> = inverse.iter().map(|&x| g.neg(x)).collect();
+        first.extend(gradient.map(|p| vec![p, at.scales[own]]));
+        sides.push(Side { gradient, minus_inverse, slant, minus_per_square: g.neg(at.per_square[own]) });
     }
 
     let second = upper(6)
         .map(|(i, j)| {
             let (own, other) = (i / 3, j / 3);
             let (row, column) = (i % 3, j % 3);
-            let mut products = if own == other {
-                let (_, per_square, slant, curvature) = &parts[own];
-                let mut products = vec![vec![slant[row], per_square[column]], vec![slant[column], per_square[row]]];
-                if row == column {
-                    products.push(vec![*curvature]);
-                }
-                products
+            let mut products: Vec<Product> = if own == other {
+                let Side { minus_inverse, slant, minus_per_square, .. } = &sides[own];
+                // The diagonal's own term leads: it is computed once, and the others fuse with it.
+                let round = (row == column).then(|| vec![kappa, *minus_per_square]);
+                let slanted = [vec![slant[row], minus_inverse[column]], vec![slant[column], minus_inverse[row]]];
+                round.into_iter().chain(slanted).collect()
             } else {
                 let mut products = vec![
-                    vec![mixed, at.a[row], parts[0].1[column]],
-                    vec![parts[0].0, turned[0][row], parts[1].1[column]],
+                    vec![mixed, at.a[row], sides[0].minus_inverse[column]],
+                    vec![sides[0].gradient[row], sides[1].minus_inverse[column]],
                 ];
                 if row == column {
                     products.push(vec![mixed]);

@@ -137,8 +137,8 @@ fn neg(g: &mut Graph, args: &[Lowered]) -> Lowered {
 fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let (a, b) = (&args[0], &args[1]);
     match (a.shape, b.shape) {
-        (Shape::Scalar, _) => Lowered { shape: b.shape, parts: g.scaled(a.node(), &b.parts) },
-        (_, Shape::Scalar) => Lowered { shape: a.shape, parts: g.scaled(b.node(), &a.parts) },
+        (Shape::Scalar, _) => scaled(g, a.node(), b),
+        (_, Shape::Scalar) => scaled(g, b.node(), a),
         (Shape::Quat | Shape::DualQuat, _) => super::quaternion::product(g, a, b),
         _ => {
             let ((rows, inner), (_, columns)) = (a.dimensions(), b.dimensions());
@@ -157,6 +157,12 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
             }
         }
     }
+}
+
+/// factor · a.
+pub(super) fn scaled(g: &mut Graph, factor: NodeId, a: &Lowered) -> Lowered {
+    let parts = super::quaternion::scaled_exponential(g, factor, &a.parts);
+    Lowered { shape: a.shape, parts: parts.unwrap_or_else(|| g.scaled(factor, &a.parts)) }
 }
 
 fn div(g: &mut Graph, args: &[Lowered]) -> Lowered {

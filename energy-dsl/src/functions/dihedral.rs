@@ -101,16 +101,15 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
     });
     let parts = half_angles(g, sine, cosine, degenerate);
 
-    let per_edge_squared = g.mul(e.reciprocal, e.reciprocal);
     let half = g.constant(0.5);
-    let aspect_unit = g.mul(per_edge_squared, per_edge_squared);
+    let aspect_unit = g.mul(e.per_square, e.per_square);
     let aspect_unit = g.mul(half, aspect_unit);
     let wing = |g: &mut Graph, normal: &[NodeId], negative: bool, apex: &[NodeId]| {
         let square = g.sum_of_squares(normal);
         let reciprocal = g.div(one, square);
         let reciprocal = g.select(degenerate, null, reciprocal);
         let along = g.dot(apex, &e.scaled);
-        let along = g.mul(along, per_edge_squared);
+        let along = g.mul(along, e.per_square);
         let across = g.fused_cross(normal, &e.scaled);
         let tangent = g.scaled(reciprocal, &across);
         let factor = g.mul(e.length, reciprocal);
@@ -118,7 +117,7 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
         Wing { slope: g.scaled(factor, normal), tangent, along, aspect: g.mul(aspect_unit, square) }
     };
     let wings = [wing(g, &n1, false, &a_scaled), wing(g, &n2, true, &b_scaled)];
-    let per_edge = g.scaled(per_edge_squared, &e.scaled);
+    let per_edge = g.scaled(e.per_square, &e.scaled);
     let (first, second) = derivatives(g, scale, &per_edge, &wings);
     let mut rule =
         Rule::factored(Primitive::Dihedral, arguments, value, first, second).flagged(0, Flag::Degenerate, degenerate);

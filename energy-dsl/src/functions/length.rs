@@ -5,7 +5,7 @@
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape, parallelogram};
-use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule};
 use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -62,6 +62,8 @@ pub(super) struct Direction {
     pub(super) length: NodeId,
     /// Whether d = 0.
     pub(super) zero: NodeId,
+    /// 1/‖scale · d‖², or 0 where d = 0.
+    pub(super) per_square: NodeId,
     /// 1/‖scale · d‖, or 0 where d = 0.
     pub(super) reciprocal: NodeId,
     /// d/‖d‖, or 0 where d = 0.
@@ -94,10 +96,12 @@ pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Di
     let length = g.sqrt(square);
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     let zero = g.equal(square, null);
-    let reciprocal = g.div(one, length);
-    let reciprocal = g.select(zero, null, reciprocal);
+    // 1/‖d‖ = √s/s, so that root and division do not wait for each other.
+    let per_square = g.div(one, square);
+    let per_square = g.select(zero, null, per_square);
+    let reciprocal = g.mul(length, per_square);
     let unit = g.scaled(reciprocal, &scaled);
-    Direction { scale, scaled, square, length, zero, reciprocal, unit }
+    Direction { scale, scaled, square, length, zero, per_square, reciprocal, unit }
 }
 
 /// Finds the direction of `d`.
@@ -158,7 +162,11 @@ fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
     if shape == Shape::DualQuat {
         return super::quaternion::unit_dual(g, q);
     }
-    Lowered { shape, parts: unit_parts(g, &q.parts) }
+    let parts = unit_parts(g, &q.parts);
+    if shape == Shape::Quat {
+        g.note_origin(&parts, Origin::UnitQuaternion);
+    }
+    Lowered { shape, parts }
 }
 
 fn unit_parts(g: &mut Graph, d: &[NodeId]) -> Vec<NodeId> {
@@ -253,7 +261,15 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let (null, one, half) = (g.constant(0.0), g.constant(1.0), g.constant(0.5));
     let slack = g.equal(length, null);
     let rounding = rounding_of_length(g, &d, &at);
-    let correction = g.mul(rounding, at.reciprocal);
+    let (reciprocal, per_square) = if g.is(rounding, 0.0) {
+        (at.reciprocal, at.per_square)
+    } else {
+        // Below a strain of u the correction nearly cancels r − L: it takes 1/r of the rounded length itself, rounded once.
+        let reciprocal = g.div(one, at.length);
+        (reciprocal, g.mul(reciprocal, reciprocal))
+    };
+    let [reciprocal, per_square] = [reciprocal, per_square].map(|factor| g.select(at.zero, one, factor));
+    let correction = g.mul(rounding, reciprocal);
     let rounded = g.sub(at.length, length);
     let scaled_value = g.add(rounded, correction);
     let value = g.div(scaled_value, scale);
@@ -261,15 +277,13 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     // C/r, at d = 0 its limit 1 for a spring without rest length, else 0. What both derivatives have, 1/r, leads.
     let at_zero = g.select(slack, one, null);
     let elongation = g.select(at.zero, at_zero, scaled_value);
-    let reciprocal = g.select(at.zero, one, at.reciprocal);
     // (L/r) n nᵀ = (L/r³) d dᵀ, of the scaled vector.
-    let reciprocal_squared = g.mul(reciprocal, reciprocal);
     let square = g.mul(value, value);
     let half_value = g.mul(half, square);
     let half_first = d.iter().map(|&x| vec![reciprocal, elongation, x]).collect();
     let half_second = upper(d.len())
         .map(|(i, j)| {
-            let stretching = vec![reciprocal, length, reciprocal_squared, at.scaled[i], at.scaled[j]];
+            let stretching = vec![reciprocal, length, per_square, at.scaled[i], at.scaled[j]];
             if i == j { vec![vec![reciprocal, elongation], stretching] } else { vec![stretching] }
         })
         .collect();

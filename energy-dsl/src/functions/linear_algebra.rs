@@ -1,14 +1,17 @@
 //! Products, transposes and inverses of vectors and matrices, and how they are put together.
 
+use super::angle::recognise_cosine;
+use super::arithmetic::scaled;
 use super::inner_product::inner_product;
+use super::rotated::recognise_rotated_product;
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId};
+use crate::graph::{Form, Graph, NodeId, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "dot",
         usage: "dot(a, b) or a·b",
-        docs: "Inner product of two vectors or quaternions; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive.",
+        docs: "Inner product of two vectors or quaternions; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive. Of vectors that one unit quaternion turned, as in `dot(rotate(q, n), transform(q, p) - x)`, p is not turned: a rotation keeps n·p.",
         shape: dot_shape,
         lower: dot,
         accuracy: "",
@@ -198,24 +201,25 @@ fn component_shape(shapes: &[Shape]) -> Result<Shape, String> {
 fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (x, y) = (&a[0], &a[1]);
     match (x.shape, y.shape) {
-        (Shape::Scalar, _) => Lowered { shape: y.shape, parts: g.scaled(x.node(), &y.parts) },
-        (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
-        _ => match super::angle::recognise_cosine(g, &x.parts, &y.parts) {
-            Some(cosine) => Lowered::scalar(cosine),
-            None => Lowered::scalar(inner_product(g, &x.parts, &y.parts)),
-        },
+        (Shape::Scalar, _) => scaled(g, x.node(), y),
+        (_, Shape::Scalar) => scaled(g, y.node(), x),
+        _ => {
+            let recognised = recognise_cosine(g, &x.parts, &y.parts);
+            let recognised = recognised.or_else(|| recognise_rotated_product(g, &x.parts, &y.parts));
+            Lowered::scalar(recognised.unwrap_or_else(|| inner_product(g, &x.parts, &y.parts)))
+        }
     }
 }
 
 fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (x, y) = (&a[0], &a[1]);
     match (x.shape, y.shape) {
-        (Shape::Scalar, _) => Lowered { shape: y.shape, parts: g.scaled(x.node(), &y.parts) },
-        (_, Shape::Scalar) => Lowered { shape: x.shape, parts: g.scaled(y.node(), &x.parts) },
+        (Shape::Scalar, _) => scaled(g, x.node(), y),
+        (_, Shape::Scalar) => scaled(g, y.node(), x),
         // Needle triangles: each component to about one rounding.
         _ if g.form() == Form::Robust => {
             let components = super::angle::accurate_cross(g, &x.parts, &y.parts);
-            g.note_cross(&components, &x.parts, &y.parts);
+            g.note_origin(&components, Origin::Cross([x.parts.clone(), y.parts.clone()]));
             Lowered::vector(components)
         }
         _ => Lowered::vector(g.cross(&x.parts, &y.parts)),

@@ -13,6 +13,7 @@ mod logic;
 mod loss;
 mod parallelogram;
 mod quaternion;
+mod rotated;
 mod shape;
 mod sinc;
 mod trigonometric;

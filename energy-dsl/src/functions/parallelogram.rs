@@ -3,11 +3,11 @@
 //! move in its plane, and by the square of how far they leave it.
 
 use super::length::upper;
-use crate::graph::{Graph, NodeId, Product, symmetric_index};
+use crate::graph::{Graph, NodeId, Origin, Product, symmetric_index};
 
 /// a and b where `d` is their cross product, all of whose components move on their own.
 pub(super) fn edges(g: &Graph, d: &[NodeId]) -> Option<[Vec<NodeId>; 2]> {
-    let [a, b] = g.cross_factors(d)?;
+    let Origin::Cross([a, b]) = g.origin(d)? else { return None };
     let all = [&a[..], b].concat();
     let distinct = all.iter().enumerate().all(|(i, x)| !all[..i].contains(x));
     (distinct && all.iter().all(|&x| g.varies(x))).then(|| [a.clone(), b.clone()])

@@ -6,7 +6,7 @@
 use super::length::{direction, upper};
 use super::sinc::{assume_at_most_a_quarter_turn, cos_sqrt, sinc_sqrt};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule};
 use crate::runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -209,6 +209,12 @@ pub(super) fn product(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
 
 /// v + 2 (w t + u × t) with q = (w, u), t = u × v.
 fn rotate(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
+    let rotated = rotated(g, q, v);
+    g.note_origin(&rotated, Origin::Rotated { quaternion: q.to_vec(), vector: v.to_vec() });
+    rotated
+}
+
+fn rotated(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
     let t = if g.form() == Form::Textbook { g.cross(&q[1..], v) } else { g.fused_cross(&q[1..], v) };
     let (two, along) = (g.constant(2.0), g.scaled(q[0], &t));
     let half = plus_cross(g, &along, &q[1..], &t);
@@ -219,17 +225,31 @@ fn rotate(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
 /// Turned, and shifted by w e − w′ u + u × e with the real part (w, u) and twice the dual one, (w′, e).
 fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (q, dual) = a[0].parts.split_at(4);
-    let turned = rotate(g, q, &a[1].parts);
+    let turned = rotated(g, q, &a[1].parts);
     let two = g.constant(2.0);
     let dual = g.scaled(two, dual);
+    let moved = plus_translation(g, &turned, q, &dual);
+    let origin = Origin::Transformed { quaternion: q.to_vec(), dual, vector: a[1].parts.clone() };
+    g.note_origin(&moved, origin);
+    Lowered::vector(moved)
+}
+
+/// By how much a dual quaternion shifts what it has turned, of its real part and twice its dual one.
+pub(super) fn translation(g: &mut Graph, q: &[NodeId], dual: &[NodeId]) -> Vec<NodeId> {
+    let null = g.constant(0.0);
+    plus_translation(g, &[null; 3], q, dual)
+}
+
+/// s + w e − w′ u + u × e.
+fn plus_translation(g: &mut Graph, s: &[NodeId], q: &[NodeId], dual: &[NodeId]) -> Vec<NodeId> {
     let along: Vec<_> = (0..3)
         .map(|i| {
             let (plus, minus) = (g.mul(q[0], dual[i + 1]), g.mul(dual[0], q[i + 1]));
-            let sum = g.add(turned[i], plus);
+            let sum = g.add(s[i], plus);
             g.sub(sum, minus)
         })
         .collect();
-    Lowered::vector(plus_cross(g, &along, &q[1..], &dual[1..]))
+    plus_cross(g, &along, &q[1..], &dual[1..]).to_vec()
 }
 
 fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {
@@ -245,24 +265,49 @@ fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {
 
 /// (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
 fn rotation(g: &mut Graph, theta: &[NodeId]) -> Vec<NodeId> {
-    let square = g.sum_of_squares(theta);
-    let (cosine, sinc) = (cos_sqrt(g, square), sinc_sqrt(g, square));
-    assume_at_most_a_quarter_turn(g, square);
+    let (cosine, sinc) = cosine_and_sinc(g, theta);
     let mut parts = vec![cosine];
     parts.extend(g.scaled(sinc, theta));
+    g.note_origin(&parts, Origin::UnitQuaternion);
     parts
+}
+
+/// cos ‖θ‖ and sin ‖θ‖/‖θ‖.
+fn cosine_and_sinc(g: &mut Graph, theta: &[NodeId]) -> (NodeId, NodeId) {
+    let square = g.sum_of_squares(theta);
+    let both = (cos_sqrt(g, square), sinc_sqrt(g, square));
+    assume_at_most_a_quarter_turn(g, square);
+    both
 }
 
 /// exp of a twist: the rotation q of θ, and ½ (0, t) q.
 pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
     let (theta, t) = twist.parts.split_at(3);
-    let mut parts = rotation(g, theta);
+    let real = rotation(g, theta);
+    let parts = with_shift(g, real, t);
+    let (cosine, sinc) = cosine_and_sinc(g, theta);
+    let (turn, shift) = (theta.to_vec(), t.to_vec());
+    g.note_origin(&parts, Origin::Exponential { cosine, sinc, turn, shift });
+    Lowered { shape: Shape::DualQuat, parts }
+}
+
+/// w q + ε ½ (0, t) (w q) if `parts` are the exponential q + ε ½ (0, t) q: five products with w instead of eight, and one instead of
+/// eight in what flows back.
+pub(super) fn scaled_exponential(g: &mut Graph, w: NodeId, parts: &[NodeId]) -> Option<Vec<NodeId>> {
+    let Origin::Exponential { cosine, sinc, turn, shift } = g.origin(parts)?.clone() else { return None };
+    let (mut real, weight) = (vec![g.mul(w, cosine)], g.mul(w, sinc));
+    real.extend(g.scaled(weight, &turn));
+    Some(with_shift(g, real, &shift))
+}
+
+/// q + ε ½ (0, t) q.
+fn with_shift(g: &mut Graph, mut real: Vec<NodeId>, t: &[NodeId]) -> Vec<NodeId> {
     let half = g.constant(0.5);
     let mut halved = vec![g.constant(0.0)];
     halved.extend(g.scaled(half, t));
-    let dual = hamilton(g, &halved, &parts);
-    parts.extend(dual);
-    Lowered { shape: Shape::DualQuat, parts }
+    let dual = hamilton(g, &halved, &real);
+    real.extend(dual);
+    real
 }
 
 /// All of a dual quaternion times ρ = 1/‖q‖, q its real part: with n = q/‖q‖, ∇ρ = −ρ² n and ∇²ρ = ρ³ (3 n nᵀ − I).
@@ -275,7 +320,7 @@ pub(super) fn unit_dual(g: &mut Graph, dual: &Lowered) -> Lowered {
     } else {
         let at = direction(g, q);
         let value = g.mul(at.reciprocal, at.scale);
-        let square = g.mul(value, value);
+        let square = g.product(None, &[at.scale, at.scale, at.per_square]);
         let slope = g.neg(square);
         let cube = g.mul(slope, value);
         let minus_three = g.constant(-3.0);
@@ -290,5 +335,7 @@ pub(super) fn unit_dual(g: &mut Graph, dual: &Lowered) -> Lowered {
         let rule = Rule::factored(Primitive::ReciprocalNorm, q.to_vec(), value, first, second);
         g.add_rule(rule.flagged(0, Flag::Degenerate, at.zero), &[])
     };
-    Lowered { shape: Shape::DualQuat, parts: g.scaled(reciprocal, &dual.parts) }
+    let parts = g.scaled(reciprocal, &dual.parts);
+    g.note_origin(&parts[..4], Origin::UnitQuaternion);
+    Lowered { shape: Shape::DualQuat, parts }
 }

@@ -100,18 +100,21 @@ pub(super) fn assume_at_most_a_quarter_turn(g: &mut Graph, y: NodeId) {
     g.assume(shared.cosine, cosine, small);
     let curvature = shared.curvature(g);
     for (node, order) in [(shared.sinc, 0), (shared.slope, 1), (curvature, 2)] {
-        let series = series(g, y, BELOW, order);
+        let series = polynomial(g, y, coefficients(BELOW, order));
         g.assume(node, series, small);
     }
 }
 
-/// cos √y = Σ (−y)ᵏ/(2k)! for y ≤ `below`.
+/// cos √y = S + 2y S₁ = 1 + y (R + 2 S₁) with S = 1 + y R, for y ≤ `below`: two operations where S and S₁ are computed anyway, and
+/// only the last rounds at the size of the result.
 fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
-    let coefficient = |k: i32| {
-        let factorial: f64 = (1..=2 * k).map(f64::from).product();
-        (if k % 2 == 0 { 1.0 } else { -1.0 }) / factorial
-    };
-    polynomial(g, y, economised(coefficient, below))
+    let (one, two) = (g.constant(1.0), g.constant(2.0));
+    let rest = polynomial(g, y, coefficients(below, 0).split_off(1));
+    let slope = polynomial(g, y, coefficients(below, 1));
+    let doubled = g.mul(two, slope);
+    let sum = g.add(rest, doubled);
+    let product = g.mul(y, sum);
+    g.add(one, product)
 }
 
 /// Σ cₖ yᵏ by Horner's rule.
@@ -167,14 +170,14 @@ fn shifted_chebyshev(n: usize, b: f64) -> Vec<f64> {
 
 /// The series of Sₘ where y < `below`, else `direct`.
 fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -> NodeId {
-    let series = series(g, y, below, order);
+    let series = polynomial(g, y, coefficients(below, order));
     let below = g.constant(below);
     let near = g.less(y, below);
     g.select(near, series, direct)
 }
 
-/// The series of Sₘ for y ≤ `below`.
-fn series(g: &mut Graph, y: NodeId, below: f64, order: i32) -> NodeId {
+/// Those of the series of Sₘ for y ≤ `below`.
+fn coefficients(below: f64, order: i32) -> Vec<f64> {
     // (−1)ᵏ k!/(k−m)!/(2k+1)!, from k = m on.
     let coefficient = |power: i32| {
         let k = power + order;
@@ -182,7 +185,7 @@ fn series(g: &mut Graph, y: NodeId, below: f64, order: i32) -> NodeId {
         let factorial: f64 = (1..=2 * k + 1).map(f64::from).product();
         (if k % 2 == 0 { 1.0 } else { -1.0 }) * falling / factorial
     };
-    polynomial(g, y, economised(coefficient, below))
+    economised(coefficient, below)
 }
 
 /// S₁ as a rule of y, so that it can be differentiated.

@@ -7,6 +7,7 @@ mod fuse;
 mod mask;
 mod node;
 mod ordinary;
+mod origin;
 mod rounding;
 mod rule;
 mod signs;
@@ -15,6 +16,7 @@ mod sums;
 pub use count::{count, reachable};
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
+pub(crate) use origin::Origin;
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 pub use signs::with_signs_inside;
 
@@ -41,12 +43,12 @@ pub struct Graph {
     rules: Vec<Rule>,
     rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
     assumptions: Vec<Assumption>,
-    /// The factors of cross products, by their components.
-    crosses: HashMap<Vec<NodeId>, [Vec<NodeId>; 2]>,
+    /// What was made of what, by components; see `origin.rs`.
+    origins: HashMap<Vec<NodeId>, Origin>,
     /// Nodes that no sum takes along unrounded; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
     /// Differences of products that a weight goes into; see `sums.rs`.
-    weighable: BTreeMap<NodeId, [[NodeId; 2]; 2]>,
+    weighable: BTreeMap<NodeId, [Product; 2]>,
     /// Whether powers of two move out of products and sums, to meet and cancel.
     outward: bool,
     /// Whether rounding errors are computed, to be added where they matter.
@@ -66,7 +68,7 @@ impl Graph {
             rules: Vec::new(),
             rule_index: HashMap::new(),
             assumptions: Vec::new(),
-            crosses: HashMap::new(),
+            origins: HashMap::new(),
             rounded: BTreeSet::new(),
             weighable: BTreeMap::new(),
             outward: false,
@@ -121,16 +123,6 @@ impl Graph {
             Op::Rule(id) => Some(&self.rules[id as usize]),
             _ => None,
         }
-    }
-
-    /// Notes that `components` are those of a × b.
-    pub(crate) fn note_cross(&mut self, components: &[NodeId], a: &[NodeId], b: &[NodeId]) {
-        self.crosses.insert(components.to_vec(), [a.to_vec(), b.to_vec()]);
-    }
-
-    /// a and b, if `components` are those of a × b.
-    pub(crate) fn cross_factors(&self, components: &[NodeId]) -> Option<&[Vec<NodeId>; 2]> {
-        self.crosses.get(components)
     }
 
     /// The node that computes the value: a rule's own expression, or the node itself.

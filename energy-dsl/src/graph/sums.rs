@@ -55,21 +55,28 @@ impl Graph {
         }
     }
 
-    /// The [difference](Self::difference_of_products) of a scalar times a component and another, as the leading factor of a
-    /// product: what weighs that weighs the two scalars, once for all components.
-    pub fn weighable_difference(&mut self, plus: [NodeId; 2], minus: [NodeId; 2]) -> NodeId {
-        let node = self.difference_of_products(plus, minus);
+    /// The difference of two products, as a factor of others: what weighs that weighs what leads the two, once for all
+    /// components that share it.
+    pub fn weighable_difference(&mut self, plus: &[NodeId], minus: &[NodeId]) -> NodeId {
+        let node = self.fused_product_difference(None, plus, minus);
         let (unsigned, negative) = self.magnitude(node);
-        self.weighable.entry(unsigned).or_insert(if negative { [minus, plus] } else { [plus, minus] });
+        let (plus, minus) = if negative { (minus, plus) } else { (plus, minus) };
+        self.weighable.entry(unsigned).or_insert_with(|| [plus.to_vec(), minus.to_vec()]);
         node
     }
 
     fn weighed(&mut self, weight: NodeId, factor: NodeId) -> NodeId {
         let (unsigned, negative) = self.magnitude(factor);
-        let Some(&[[a, x], [b, y]]) = self.weighable.get(&unsigned) else { return self.mul(weight, factor) };
-        let (a, b) = (self.mul(weight, a), self.mul(weight, b));
-        let difference = self.difference_of_products([a, x], [b, y]);
+        let Some([plus, minus]) = self.weighable.get(&unsigned).cloned() else { return self.mul(weight, factor) };
+        let difference = self.fused_product_difference(Some(weight), &plus, &minus);
         self.signed(difference, negative)
+    }
+
+    /// weight · (the product of `plus` − that of `minus`), the second fused.
+    fn fused_product_difference(&mut self, weight: Option<NodeId>, plus: &[NodeId], minus: &[NodeId]) -> NodeId {
+        let (last, leading) = minus.split_last().expect("a product has factors");
+        let (plus, leading) = (self.product(weight, plus), self.product(weight, leading));
+        self.neg_mul_add(leading, *last, plus)
     }
 
     /// weight · Σ products, the weight going into each. Products that follow each other and end in the same factor are added
