@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+pub mod accuracy;
 mod assembled;
 pub mod check;
 pub mod contenders;

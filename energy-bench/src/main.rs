@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Parser;
+use energy_bench::accuracy::near_rest;
 use energy_bench::contenders::contenders;
 use energy_bench::measure::{Measured, measure};
 use energy_bench::{Subject, check, for_each_kernel, run_script, samples, table, write_inputs};
@@ -117,8 +118,9 @@ fn measure_one<K: Subject>(arguments: &Arguments) -> anyhow::Result<Measured> {
     bar.set_message("comparing results");
     let difference = check::agreement::<K>(&samples).map_err(anyhow::Error::msg)?;
     bar.inc(1);
-    bar.set_message("timing");
     let mut measured = Measured::new::<K>(difference);
+    measured.near_rest = near_rest::<K>(&samples);
+    bar.set_message("timing");
     measured.times = measure(&mut contenders::<K>(&samples), samples.len(), arguments.repetitions, || bar.inc(1));
     bar.finish_and_clear();
     Ok(measured)

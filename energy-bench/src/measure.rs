@@ -5,6 +5,7 @@ use std::time::Instant;
 use energy_dsl::OperationCount;
 use serde::Serialize;
 
+use crate::accuracy::NearRest;
 use crate::contenders::Contender;
 use crate::run::Work;
 
@@ -45,6 +46,8 @@ pub struct Measured {
     pub divisions_and_roots: usize,
     /// The largest relative difference of any contender's results from the library's.
     pub difference: f64,
+    /// Errors near rest, where there is one.
+    pub near_rest: Option<NearRest>,
     /// All times.
     pub times: Vec<Time>,
 }
@@ -61,6 +64,7 @@ impl Measured {
             instructions: count.instructions(),
             divisions_and_roots: count.divisions_and_roots,
             difference,
+            near_rest: None,
             times: Vec::new(),
         }
     }

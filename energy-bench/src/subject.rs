@@ -62,6 +62,12 @@ pub trait Subject: Debug + 'static {
         None
     }
 
+    /// The element moved to within [`STRAIN`](crate::accuracy::STRAIN) of its rest, if it has one where differences cancel.
+    #[must_use]
+    fn near_rest(_sample: &Sample) -> Option<Sample> {
+        None
+    }
+
     /// All elements by way of vertices, where the kernel is a potential of points.
     fn assembled(samples: &[Sample]) -> Option<Assembled>;
 

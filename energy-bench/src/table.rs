@@ -1,6 +1,7 @@
 use comfy_table::{CellAlignment, Table, presets};
 use energy_dsl::LevelName;
 
+use crate::accuracy::NearRest;
 use crate::contenders::Contender;
 use crate::measure::Measured;
 
@@ -65,6 +66,10 @@ pub fn table(kernels: &[Measured]) -> Table {
     rows.row("instructions (fused as one)", |kernel| Some(kernel.instructions.to_string()));
     rows.row("divisions and roots", |kernel| Some(kernel.divisions_and_roots.to_string()));
     rows.row("largest relative difference", |kernel| Some(format!("{:.0e}", kernel.difference)));
+    rows.error("library", |errors| errors.library);
+    rows.error("uncompensated", |errors| errors.uncompensated);
+    rows.error("hand", |errors| errors.hand);
+    rows.error("num-dual", |errors| errors.dual);
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }
@@ -92,5 +97,12 @@ impl Rows<'_> {
 
     fn ratio(&mut self, title: &str, ratio: impl Fn(&Measured) -> Option<f64>) {
         self.row(title, |kernel| ratio(kernel).map(|ratio| format!("× {ratio:.2}")));
+    }
+
+    fn error(&mut self, of: &str, error: fn(&NearRest) -> f64) {
+        self.row(&format!("error near rest, {of}"), |kernel| {
+            let roundoffs = error(kernel.near_rest.as_ref()?);
+            Some(if roundoffs < 1e3 { format!("{roundoffs:.1} u") } else { format!("{roundoffs:.0e} u") })
+        });
     }
 }

@@ -1,16 +1,23 @@
-use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
+use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
 use energy_elements::HairBend;
 
+use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
 use crate::dual;
 use crate::random::Random;
 use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
 use crate::uncompensated::{Uncompensated, UncompensatedHairBend, uncompensated};
-use crate::vector::{block, dot, negative, negative_block, scale, scale_add, sub, symmetric};
+use crate::vector::{add, block, dot, negative, negative_block, scale, scale_add, sub, symmetric};
 
 /// K2, the bending k/2 (1 − â·b̂) of a hair at the middle one of three points.
 #[derive(Clone, Copy, Debug)]
 pub struct HairBendKernel;
+
+/// An element, in the form each contender reads.
+fn element_on(stiffness: f64, unknowns: &[f64]) -> Sample {
+    let all = [&[stiffness], unknowns].concat();
+    Sample::new(&HairBend { k: stiffness }, unknowns, all.clone(), all)
+}
 
 impl Subject for HairBendKernel {
     const KEY: &'static str = "K2";
@@ -30,9 +37,7 @@ impl Subject for HairBendKernel {
         let (sine, cosine) = angle.sin_cos();
         let p1: [f64; 3] = std::array::from_fn(|i| p0[i] + first * x[i]);
         let p2: [f64; 3] = std::array::from_fn(|i| p1[i] + second * (cosine * x[i] + sine * y[i]));
-        let unknowns = [p0, p1, p2].concat();
-        let all = [&[stiffness], unknowns.as_slice()].concat();
-        Sample::new(&HairBend { k: stiffness }, &unknowns, all.clone(), all)
+        element_on(stiffness, &[p0, p1, p2].concat())
     }
 
     /// With C = −k/2 and s = 1/(‖a‖ ‖b‖): the cosine c = s a·b has c_a = s b − c a/‖a‖², c_ab = s − a/‖a‖² c_bᵀ − s b bᵀ/‖b‖², and
@@ -107,6 +112,13 @@ impl Subject for HairBendKernel {
 
     fn uncompensated(samples: &[Sample]) -> Option<Uncompensated> {
         Some(uncompensated::<UncompensatedHairBend, 3>(samples))
+    }
+
+    fn near_rest(sample: &Sample) -> Option<Sample> {
+        let [p0, p1, p2]: &[_; 3] = points(&sample.unknowns);
+        let (a, b) = (sub(*p1, *p0), sub(*p2, *p1));
+        let straight = add(*p1, scale_add::<f64, Baseline>(STRAIN, b, a));
+        Some(element_on(sample.textbook[0], &[*p0, *p1, straight].concat()))
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

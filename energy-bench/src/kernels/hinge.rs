@@ -1,6 +1,7 @@
-use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
+use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
 use energy_elements::QuadraticHinge;
 
+use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
 use crate::dual;
 use crate::random::Random;
@@ -11,6 +12,12 @@ use crate::vector::{add, block, cross, dot, negative_block, scale, scale_add, su
 /// K3, a hinge k (θ − θ₀)² of two triangles over a shared edge; the weight ‖e‖²/A is in k.
 #[derive(Clone, Copy, Debug)]
 pub struct HingeKernel;
+
+/// An element, in the form each contender reads.
+fn element_on([stiffness, rest]: [f64; 2], unknowns: &[f64]) -> Sample {
+    let all = [&[stiffness, rest], unknowns].concat();
+    Sample::new(&QuadraticHinge { k: stiffness, θ0: rest }, unknowns, all.clone(), all)
+}
 
 impl Subject for HingeKernel {
     const KEY: &'static str = "K3";
@@ -35,9 +42,7 @@ impl Subject for HingeKernel {
         };
         let (x1, x2) = (apex(0.0), apex(std::f64::consts::PI + angle));
         let x4: [f64; 3] = std::array::from_fn(|i| x3[i] + edge * x[i]);
-        let unknowns = [x1, x2, x3, x4].concat();
-        let all = [&[stiffness, rest], unknowns.as_slice()].concat();
-        Sample::new(&QuadraticHinge { k: stiffness, θ0: rest }, &unknowns, all.clone(), all)
+        element_on([stiffness, rest], &[x1, x2, x3, x4].concat())
     }
 
     /// By the edge e and the apexes a, b from its start: θ_a = g₁ = −‖e‖ N₁/‖N₁‖², N₁ = e × a, and θ_b = g₂ likewise; with the feet
@@ -136,6 +141,18 @@ impl Subject for HingeKernel {
 
     fn uncompensated(samples: &[Sample]) -> Option<Uncompensated> {
         Some(uncompensated::<UncompensatedHinge, 4>(samples))
+    }
+
+    /// The first apex is moved across the edge from the second.
+    fn near_rest(sample: &Sample) -> Option<Sample> {
+        let [x1, x2, x3, x4]: &[_; 4] = points(&sample.unknowns);
+        let (e, a, b) = (sub(*x4, *x3), sub(*x1, *x3), sub(*x2, *x3));
+        let product = |v, w| dot::<f64, Baseline>(v, w);
+        let ee = product(e, e);
+        let height = scale_add::<f64, Baseline>(-product(b, e) / ee, e, b);
+        let up = scale(STRAIN / ee.sqrt(), cross::<f64, Baseline>(e, height));
+        let flat = add(scale(product(a, e) / ee, e), sub(up, height));
+        Some(element_on([sample.textbook[0], 0.0], &[add(*x3, flat), *x2, *x3, *x4].concat()))
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -1,6 +1,7 @@
-use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
+use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
 use energy_elements::HookeSpring;
 
+use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
 use crate::dual;
 use crate::random::Random;
@@ -11,6 +12,12 @@ use crate::vector::{dot, negative, negative_block, scale, sub, symmetric};
 /// K1, a spring ½ k (‖d‖ − L)² between two points.
 #[derive(Clone, Copy, Debug)]
 pub struct SpringKernel;
+
+/// An element, in the form each contender reads.
+fn element_on([stiffness, rest]: [f64; 2], unknowns: &[f64]) -> Sample {
+    let all = [&[stiffness, rest], unknowns].concat();
+    Sample::new(&HookeSpring { K: stiffness, L: rest }, unknowns, all.clone(), all)
+}
 
 impl Subject for SpringKernel {
     const KEY: &'static str = "K1";
@@ -28,9 +35,7 @@ impl Subject for SpringKernel {
         let (p, direction) = (random.vector(1.0), random.direction());
         let stretched = rest * random.between(0.7, 1.4);
         let q: [f64; 3] = std::array::from_fn(|axis| p[axis] + stretched * direction[axis]);
-        let unknowns = [p, q].concat();
-        let all = [&[stiffness, rest], unknowns.as_slice()].concat();
-        Sample::new(&HookeSpring { K: stiffness, L: rest }, &unknowns, all.clone(), all)
+        element_on([stiffness, rest], &[p, q].concat())
     }
 
     #[inline(always)]
@@ -84,6 +89,13 @@ impl Subject for SpringKernel {
 
     fn uncompensated(samples: &[Sample]) -> Option<Uncompensated> {
         Some(uncompensated::<UncompensatedSpring, 2>(samples))
+    }
+
+    fn near_rest(sample: &Sample) -> Option<Sample> {
+        let [p, q]: &[_; 2] = points(&sample.unknowns);
+        let d = sub(*q, *p);
+        let (stiffness, rest) = (sample.textbook[0], dot::<f64, Baseline>(d, d).sqrt() * (1.0 - STRAIN));
+        Some(element_on([stiffness, rest], &sample.unknowns))
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {
