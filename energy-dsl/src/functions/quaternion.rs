@@ -266,8 +266,7 @@ fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {
 /// (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
 fn rotation(g: &mut Graph, theta: &[NodeId]) -> Vec<NodeId> {
     let (cosine, sinc) = cosine_and_sinc(g, theta);
-    let mut parts = vec![cosine];
-    parts.extend(g.scaled(sinc, theta));
+    let parts = about(g, cosine, sinc, theta);
     g.note_origin(&parts, Origin::UnitQuaternion);
     parts
 }
@@ -280,13 +279,21 @@ fn cosine_and_sinc(g: &mut Graph, theta: &[NodeId]) -> (NodeId, NodeId) {
     both
 }
 
+/// (c, s θ).
+fn about(g: &mut Graph, c: NodeId, s: NodeId, theta: &[NodeId]) -> Vec<NodeId> {
+    let mut parts = vec![c];
+    parts.extend(g.scaled(s, theta));
+    parts
+}
+
 /// exp of a twist: the rotation q of θ, and ½ (0, t) q.
 pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
     let (theta, t) = twist.parts.split_at(3);
-    let real = rotation(g, theta);
-    let parts = with_shift(g, real, t);
     let (cosine, sinc) = cosine_and_sinc(g, theta);
+    let real = about(g, cosine, sinc, theta);
+    let parts = with_shift(g, real, t);
     let (turn, shift) = (theta.to_vec(), t.to_vec());
+    g.note_origin(&parts[..4], Origin::UnitQuaternion);
     g.note_origin(&parts, Origin::Exponential { cosine, sinc, turn, shift });
     Lowered { shape: Shape::DualQuat, parts }
 }
@@ -295,8 +302,8 @@ pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
 /// eight in what flows back.
 pub(super) fn scaled_exponential(g: &mut Graph, w: NodeId, parts: &[NodeId]) -> Option<Vec<NodeId>> {
     let Origin::Exponential { cosine, sinc, turn, shift } = g.origin(parts)?.clone() else { return None };
-    let (mut real, weight) = (vec![g.mul(w, cosine)], g.mul(w, sinc));
-    real.extend(g.scaled(weight, &turn));
+    let (cosine, sinc) = (g.mul(w, cosine), g.mul(w, sinc));
+    let real = about(g, cosine, sinc, &turn);
     Some(with_shift(g, real, &shift))
 }
 
