@@ -25,10 +25,9 @@ where
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
     // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as elements, a few more than
-    // in a mesh of triangles.
-    let ends = std::iter::repeat_n(samples.last().expect("there are elements"), N);
+    // in a mesh of triangles. It ends where it began, so that no element's vertices meet.
     let last_point = |sample: &Sample| points::<N>(&sample.unknowns)[N - 1];
-    let positions: Vec<Vector3<f64>> = samples.iter().chain(ends).map(last_point).collect();
+    let positions: Vec<Vector3<f64>> = samples.iter().chain(&samples[..N - 1]).map(last_point).collect();
     let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| i + p)).collect();
     let short: Vec<[u32; N]> = stencils.iter().map(|s| s.map(|v| u32::try_from(v).expect("few vertices"))).collect();
 

@@ -334,15 +334,20 @@ impl PackEnergies<'_> {
         if next == BLOCK || batch.first + batch.count == self.elements {
             // What no element has written is left over from others.
             self.lanes[place + batch.count..].fill(0.0);
-            let mut sums = self.lanes;
-            for width in [8, 4, 2, 1] {
-                for lane in 0..width {
-                    sums[lane] += sums[lane + width];
-                }
-            }
-            self.found[batch.first / BLOCK].store(sums[0].to_bits(), Relaxed);
+            let sum = in_pairs::<4, 2>(in_pairs::<8, 4>(in_pairs::<BLOCK, 8>(self.lanes)));
+            self.found[batch.first / BLOCK].store((sum[0] + sum[1]).to_bits(), Relaxed);
         }
     }
+}
+
+/// Sums of numbers half of them apart.
+#[inline(always)]
+fn in_pairs<const ALL: usize, const HALF: usize>(numbers: [f64; ALL]) -> [f64; HALF] {
+    let mut sums = [0.0; HALF];
+    for place in 0..HALF {
+        sums[place] = numbers[place] + numbers[place + HALF];
+    }
+    sums
 }
 
 /// Σ U.

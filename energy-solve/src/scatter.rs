@@ -85,11 +85,12 @@ impl TriangleRoom {
         first_block: usize,
         matrix: &mut [Block<T>],
     ) {
+        let ninths = &self.ninths[..pairs];
         let elements = slots.chunks_exact(pairs).zip(self.eights.chunks_exact(pairs)).enumerate().take(BLOCK);
         for (lane, (slots, eights)) in elements {
             for pair in 0..pairs {
                 if let Some(block) = matrix.get_mut((slots[pair] as usize).wrapping_sub(first_block)) {
-                    add_block(block, &eights[pair], self.ninths[pair][lane]);
+                    add_block(block, &eights[pair], ninths[pair][lane]);
                 }
             }
         }

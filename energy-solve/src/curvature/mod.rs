@@ -118,7 +118,8 @@ impl Kernel for Indefinite<'_> {
         }
         let (upper, vectors) = numbers.split_at_mut(entries);
         let vectors = vectors.as_chunks::<3>().0;
-        let changed = change(upper, self.n, self.curvature, self.orthonormal, &vectors[..self.vectors], self.open);
+        let changed =
+            change::<L, _>(upper, self.n, self.curvature, self.orthonormal, &vectors[..self.vectors], self.open);
         for (number, stored) in upper.iter().zip(self.numbers.chunks_exact_mut(lanes)) {
             number.store(stored);
         }
@@ -127,7 +128,7 @@ impl Kernel for Indefinite<'_> {
 }
 
 #[inline(always)]
-fn change<V: Lane<f64>>(
+fn change<L: Level, V: Lane<f64>>(
     upper: &mut [V],
     n: usize,
     curvature: Curvature,
@@ -148,7 +149,7 @@ fn change<V: Lane<f64>>(
             open = open & !radial;
         }
         [first, second] => {
-            let (planar, also) = planar::change(upper, curvature, orthonormal, [*first, *second], open);
+            let (planar, also) = planar::change::<L, V>(upper, curvature, orthonormal, [*first, *second], open);
             changed = also;
             open = open & !planar;
         }
@@ -156,16 +157,16 @@ fn change<V: Lane<f64>>(
     }
     changed
         | match n {
-            3 => change_rest::<V, 3>(upper, curvature, orthonormal, open),
-            6 => change_rest::<V, 6>(upper, curvature, orthonormal, open),
-            9 => change_rest::<V, 9>(upper, curvature, orthonormal, open),
-            _ => change_rest::<V, MOST>(upper, curvature, orthonormal, open),
+            3 => change_rest::<L, V, 3>(upper, curvature, orthonormal, open),
+            6 => change_rest::<L, V, 6>(upper, curvature, orthonormal, open),
+            9 => change_rest::<L, V, 9>(upper, curvature, orthonormal, open),
+            _ => change_rest::<L, V, MOST>(upper, curvature, orthonormal, open),
         }
 }
 
 /// [`change`] without knowledge of any structure.
 #[inline(always)]
-fn change_rest<V: Lane<f64>, const N: usize>(
+fn change_rest<L: Level, V: Lane<f64>, const N: usize>(
     upper: &mut [V],
     curvature: Curvature,
     orthonormal: &Orthonormal,
@@ -176,7 +177,7 @@ fn change_rest<V: Lane<f64>, const N: usize>(
     }
     let (mut a, scale) = scaled_square::<V, N>(upper);
     orthonormal.make_orthonormal(&mut a);
-    let (mut difference, changed) = jacobi::difference(&mut a, curvature);
+    let (mut difference, changed) = jacobi::difference::<L, V, N>(&mut a, curvature);
     let changed = changed & open;
     orthonormal.make_differences(&mut difference);
     add_to(upper, &difference, scale, changed);

@@ -1,4 +1,4 @@
-use energy_dsl::{Lane, Mask};
+use energy_dsl::{Lane, Level, Mask};
 
 use super::definite::is_semi_definite;
 use super::{Curvature, Orthonormal, Square, add_to, jacobi, scaled_square, upper_index};
@@ -11,7 +11,7 @@ const TOLERANCE: f64 = 1e-10;
 /// former, and the latter is mostly definite. Changes the Hessians of the `open` lanes in which it is so (it is tested, not assumed).
 /// Returns these lanes, and which changed.
 #[inline(always)]
-pub(super) fn change<V: Lane<f64>>(
+pub(super) fn change<L: Level, V: Lane<f64>>(
     upper: &mut [V],
     curvature: Curvature,
     orthonormal: &Orthonormal,
@@ -53,7 +53,7 @@ pub(super) fn change<V: Lane<f64>>(
             out[i][j] = a[row][column];
         }
     }
-    let (part, mut changed) = jacobi::difference(&mut out, curvature);
+    let (part, mut changed) = jacobi::difference::<L, V, 2>(&mut out, curvature);
     for (i, row) in [2, 5].into_iter().enumerate() {
         for (j, column) in [2, 5].into_iter().enumerate() {
             difference[row][column] = part[i][j];
@@ -72,7 +72,7 @@ pub(super) fn change<V: Lane<f64>>(
     }
     let indefinite = planar & !is_semi_definite(&within_upper, 4);
     if indefinite.any() {
-        let (part, also) = jacobi::difference(&mut within, curvature);
+        let (part, also) = jacobi::difference::<L, V, 4>(&mut within, curvature);
         changed = changed | (also & indefinite);
         for i in 0..4 {
             for j in 0..4 {
