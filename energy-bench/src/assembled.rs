@@ -2,7 +2,9 @@
 
 use std::hint::black_box;
 
-use energy_dsl::{Batch, BatchWork, Lane, Level, Packed, PackedPotential, Potential, Vector3, for_each_batch};
+use energy_dsl::{
+    Batch, BatchWork, Block, Kernel, Lane, Level, Packed, PackedPotential, Potential, Vector3, dispatch, for_each_batch,
+};
 use energy_solve::{BlockMatrix, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
 
 use crate::run::{TOGETHER, Work};
@@ -14,6 +16,8 @@ pub struct Assembled {
     pub batches: Work,
     /// Elements and vertices in, matrix of blocks out, by [`System::linearise`].
     pub exact: Work,
+    /// The same without evaluating anything: matrix and forces cleared, finished blocks and gradients added.
+    pub sums: Work,
     /// The same with [`Curvature::Clamped`].
     pub clamped: Work,
 }
@@ -38,15 +42,23 @@ where
 
     let list = ElementList::new("elements", elements, &stencils).expect("as many stencils as elements");
     let linearise = |curvature| linearise(list.clone(), positions.clone(), curvature);
-    Assembled { batches, exact: linearise(Curvature::Exact), clamped: linearise(Curvature::Clamped) }
+    let mut sums = Sums::new(&stencils, system(list.clone(), positions.len()).matrix(), positions.len());
+    let sums = Box::new(move || dispatch(&mut sums));
+    Assembled { batches, sums, exact: linearise(Curvature::Exact), clamped: linearise(Curvature::Clamped) }
+}
+
+fn system<E>(list: ElementList<E>, vertices: usize) -> System
+where
+    E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
+{
+    System::new(vec![Box::new(PotentialTerm::new(list))], &vec![false; vertices]).expect("the vertices exist")
 }
 
 fn linearise<E>(list: ElementList<E>, positions: Vec<Vector3<f64>>, curvature: Curvature) -> Work
 where
     E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
 {
-    let pinned = vec![false; positions.len()];
-    let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &pinned).expect("the vertices exist");
+    let mut system = system(list, positions.len());
     let mut matrix: BlockMatrix = system.matrix();
     let velocities = vec![[0.0; 3]; positions.len()];
     let weights = Weights { position: 1.0, velocity: 0.0 };
@@ -55,6 +67,60 @@ where
         let forces = system.linearise(State { x: &positions, v: &velocities }, options, &mut matrix);
         black_box((forces.expect("finite elements"), &mut matrix));
     })
+}
+
+/// Finished blocks and gradients of a few elements, which stay in the cache, added to a matrix and to forces over and over: what assembly
+/// costs when there is nothing to compute.
+struct Sums<const N: usize> {
+    stencils: Vec<[usize; N]>,
+    /// By element, pair of its points.
+    places: Vec<usize>,
+    matrix: BlockMatrix,
+    forces: Vec<Vector3<f64>>,
+    gradient: [Vector3<f64>; N],
+    triangle: Vec<Block<f64>>,
+}
+
+impl<const N: usize> Sums<N> {
+    fn new(stencils: &[[usize; N]], matrix: BlockMatrix, vertices: usize) -> Self {
+        let pairs = stencils.iter().flat_map(|s| (0..N).flat_map(move |i| (i..N).map(move |j| (s[i], s[j]))));
+        let places =
+            pairs.map(|(row, column)| matrix.pattern().place(row, column).expect("all are coupled").0).collect();
+        let triangle = vec![[[1.0; 3]; 3]; N * (N + 1) / 2 * TOGETHER];
+        let forces = vec![[0.0; 3]; vertices];
+        Self { stencils: stencils.to_vec(), places, matrix, forces, gradient: [[1.0; 3]; N], triangle }
+    }
+}
+
+impl<const N: usize> Kernel for &mut Sums<N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let pairs = N * (N + 1) / 2;
+        let matrix = self.matrix.values_mut();
+        matrix.fill([[0.0; 3]; 3]);
+        self.forces.fill([0.0; 3]);
+        let elements = self.stencils.iter().zip(self.places.chunks_exact(pairs)).enumerate();
+        for (element, (stencil, places)) in elements {
+            let triangle = &self.triangle[element % TOGETHER * pairs..][..pairs];
+            for pair in 0..pairs {
+                let block = &mut matrix[places[pair]];
+                *block = sum(block, &triangle[pair]);
+            }
+            for point in 0..N {
+                let force = &mut self.forces[stencil[point]];
+                *force = std::array::from_fn(|axis| force[axis] - self.gradient[point][axis]);
+            }
+        }
+        black_box((&mut self.matrix, &mut self.forces));
+    }
+}
+
+/// A + B.
+#[inline(always)]
+fn sum(a: &Block<f64>, b: &Block<f64>) -> Block<f64> {
+    std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] + b[row][column]))
 }
 
 /// Results of a few elements, one after the other, soon written over.

@@ -41,7 +41,9 @@ pub enum Contender {
     Batches,
     /// The library in a sum of elements: vertices in, matrix of blocks out.
     System,
-    /// The same, each element's Hessian made positive semi-definite.
+    /// Finished blocks and gradients added to a matrix and forces: assembly with nothing to evaluate.
+    Sums,
+    /// The library in a sum of elements, each element's Hessian made positive semi-definite.
     Clamped,
 }
 
@@ -63,6 +65,7 @@ impl Display for Contender {
             Self::CasADi => write!(f, "CasADi, C"),
             Self::Batches => write!(f, "library, batches"),
             Self::System => write!(f, "library, assembled"),
+            Self::Sums => write!(f, "sums alone"),
             Self::Clamped => write!(f, "library, clamped, assembled"),
         }
     }
@@ -96,6 +99,7 @@ pub fn contenders<K: Subject>(samples: &[Sample]) -> Vec<(Contender, Work)> {
         all.extend([
             (Contender::Batches, assembled.batches),
             (Contender::System, assembled.exact),
+            (Contender::Sums, assembled.sums),
             (Contender::Clamped, assembled.clamped),
         ]);
     }

@@ -28,7 +28,7 @@ pub fn table(kernels: &[Measured]) -> Table {
     for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi] {
         rows.time(contender);
     }
-    for contender in [Contender::Batches, Contender::System, Contender::Clamped] {
+    for contender in [Contender::Batches, Contender::Sums, Contender::System, Contender::Clamped] {
         rows.time(contender);
     }
 
@@ -59,6 +59,7 @@ pub fn table(kernels: &[Measured]) -> Table {
     }
     let lanes = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::LibraryLanes(_)));
     rows.ratio("batches/library, lanes", |kernel| Some(kernel.time(Contender::Batches)? / lanes(kernel)?));
+    rows.ratio("sums alone/library, lanes", |kernel| Some(kernel.time(Contender::Sums)? / lanes(kernel)?));
     rows.ratio("assembled/library, lanes", |kernel| Some(kernel.time(Contender::System)? / lanes(kernel)?));
     rows.ratio("assembled/library, scalar", |kernel| Some(kernel.time(Contender::System)? / library(kernel)?));
 

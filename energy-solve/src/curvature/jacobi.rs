@@ -88,11 +88,11 @@ const fn rounds(n: usize) -> usize {
 /// outside, if there is one.
 #[inline(always)]
 const fn pair(n: usize, round: usize, meeting: usize) -> (usize, usize) {
-    let circle = rounds(n);
-    let (p, q) = if n % 2 == 0 && meeting == 0 {
+    let (circle, odd) = (rounds(n), n % 2);
+    let (p, q) = if odd + meeting == 0 {
         (round, circle)
     } else {
-        let distance = meeting + n % 2;
+        let distance = meeting + odd;
         ((round + distance) % circle, (round + circle - distance) % circle)
     };
     if p < q { (p, q) } else { (q, p) }
