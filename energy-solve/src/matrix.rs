@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
-use energy_dsl::{Block, Vector3};
+use energy_dsl::{BLOCK_NUMBERS, Block, BlockSum, Kernel, Level, Number, Vector3, dispatch};
 
 use crate::constant::Constant;
 use crate::pattern::{Pattern, Storage};
 use crate::precision::{Precision, doubled};
-use crate::vector::{block_times, transposed, transposed_times};
+use crate::vector::transposed;
 
 /// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle. Entries are stored in `T`, `f32` or `f64`.
 #[derive(Clone, Debug)]
@@ -91,40 +91,86 @@ impl<T: Precision> BlockMatrix<T> {
 
     /// y ← A x.
     pub fn multiply(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
-        match self.pattern.storage() {
-            Storage::Whole => self.multiply_whole(x, y),
-            Storage::Upper => self.multiply_upper(x, y),
-        }
+        dispatch(Product { matrix: self, x, y });
     }
 
-    fn multiply_whole(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
-        for (row, sum) in y.iter_mut().enumerate() {
-            *sum = [0.0; 3];
-            for (slot, column) in self.pattern.row(row) {
-                add(sum, block_times(&doubled(&self.values[slot]), &x[column]));
-            }
+    /// A block in double precision, and what follows it, which means nothing: after the last comes the one that belongs nowhere.
+    #[inline(always)]
+    fn numbers_from(&self, slot: usize) -> [f64; BLOCK_NUMBERS] {
+        let stored = &self.values.as_flattened().as_flattened()[9 * slot..][..BLOCK_NUMBERS];
+        let mut numbers = [0.0; BLOCK_NUMBERS];
+        for (number, &stored) in numbers.iter_mut().zip(stored) {
+            *number = stored.into();
         }
+        numbers
     }
+}
 
-    /// Each block of the triangle acts twice, also as its own mirror image.
-    fn multiply_upper(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
-        y.fill([0.0; 3]);
-        for row in 0..self.pattern.rows() {
-            let here = x[row];
-            let mut sum = block_times(&doubled(self.diagonal(row)), &here);
-            for (slot, column) in self.pattern.row(row).skip(1) {
-                let block = doubled(&self.values[slot]);
-                add(&mut sum, block_times(&block, &x[column]));
-                add(&mut y[column], transposed_times(&block, &here));
-            }
-            add(&mut y[row], sum);
+/// y ← A x.
+struct Product<'a, T> {
+    matrix: &'a BlockMatrix<T>,
+    x: &'a [Vector3<f64>],
+    y: &'a mut [Vector3<f64>],
+}
+
+impl<T: Precision> Kernel for Product<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        match self.matrix.pattern.storage() {
+            Storage::Whole => self.whole::<L>(),
+            Storage::Upper => self.upper::<L>(),
         }
     }
 }
 
-#[inline(always)]
-fn add(sum: &mut Vector3<f64>, part: Vector3<f64>) {
-    for axis in 0..3 {
-        sum[axis] += part[axis];
+impl<T: Precision> Product<'_, T> {
+    #[inline(always)]
+    fn whole<L: Level>(self) {
+        for row in 0..self.matrix.pattern.rows() {
+            let mut sum = L::Sum64::zero();
+            for (slot, column) in self.matrix.pattern.row(row) {
+                sum.add(&self.matrix.numbers_from(slot), &widened(&self.x[column]));
+            }
+            let [u, v, w, _] = sum.total();
+            self.y[row] = [u, v, w];
+        }
     }
+
+    /// Each block of the triangle acts twice, also as its own mirror image.
+    #[inline(always)]
+    fn upper<L: Level>(self) {
+        self.y.fill([0.0; 3]);
+        for row in 0..self.matrix.pattern.rows() {
+            let mut sum = L::Sum64::zero();
+            for (slot, column) in self.matrix.pattern.row(row) {
+                let block = self.matrix.numbers_from(slot);
+                sum.add(&block, &widened(&self.x[column]));
+                if column != row {
+                    add_transposed::<L>(&mut self.y[column], &block, &self.x[row]);
+                }
+            }
+            let ([u, v, w, _], [a, b, c]) = (sum.total(), self.y[row]);
+            self.y[row] = [a + u, b + v, c + w];
+        }
+    }
+}
+
+/// A vector with a fourth component that means nothing.
+#[inline(always)]
+fn widened(&[u, v, w]: &Vector3<f64>) -> [f64; 4] {
+    [u, v, w, 0.0]
+}
+
+/// y ← y + Bᵀ v.
+#[inline(always)]
+fn add_transposed<L: Level>(y: &mut Vector3<f64>, block: &[f64; BLOCK_NUMBERS], v: &Vector3<f64>) {
+    let mut sum = *y;
+    for row in 0..3 {
+        for column in 0..3 {
+            sum[column] = Number::mul_add::<L>(block[3 * row + column], v[row], sum[column]);
+        }
+    }
+    *y = sum;
 }

@@ -27,13 +27,9 @@ pub(crate) fn scale_and_add(y: &mut [Vector3<f64>], s: f64, x: &[Vector3<f64>]) 
 }
 
 /// B v.
+#[inline]
 pub(crate) fn block_times(block: &Block<f64>, v: &Vector3<f64>) -> Vector3<f64> {
     std::array::from_fn(|row| block[row][0] * v[0] + block[row][1] * v[1] + block[row][2] * v[2])
-}
-
-/// Bᵀ v.
-pub(crate) fn transposed_times(block: &Block<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    std::array::from_fn(|column| block[0][column] * v[0] + block[1][column] * v[1] + block[2][column] * v[2])
 }
 
 /// Bᵀ.
