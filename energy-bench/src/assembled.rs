@@ -9,6 +9,7 @@ use energy_solve::{BlockMatrix, Curvature, ElementList, LinearisationOptions, Po
 
 use crate::run::{TOGETHER, Work};
 use crate::subject::{Sample, points};
+use crate::vector::{add, sub};
 
 /// The work of all elements by way of vertices.
 pub struct Assembled {
@@ -106,21 +107,17 @@ impl<const N: usize> Kernel for &mut Sums<N> {
             let triangle = &self.triangle[element % TOGETHER * pairs..][..pairs];
             for pair in 0..pairs {
                 let block = &mut matrix[places[pair]];
-                *block = sum(block, &triangle[pair]);
+                let rows = *block;
+                // Rows are read before any is written, so that they are added in registers.
+                *block = [0, 1, 2].map(|row| add(rows[row], triangle[pair][row]));
             }
             for point in 0..N {
                 let force = &mut self.forces[stencil[point]];
-                *force = std::array::from_fn(|axis| force[axis] - self.gradient[point][axis]);
+                *force = sub(*force, self.gradient[point]);
             }
         }
         black_box((&mut self.matrix, &mut self.forces));
     }
-}
-
-/// A + B.
-#[inline(always)]
-fn sum(a: &Block<f64>, b: &Block<f64>) -> Block<f64> {
-    std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] + b[row][column]))
 }
 
 /// Results of a few elements, one after the other, soon written over.

@@ -5,7 +5,7 @@ use energy_dsl::{BLOCK_NUMBERS, Block, BlockSum, Kernel, Level, Number, Vector3,
 use crate::constant::Constant;
 use crate::pattern::{Pattern, Storage};
 use crate::precision::{Precision, doubled};
-use crate::vector::transposed;
+use crate::vector::{transposed, widened};
 
 /// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle. Entries are stored in `T`, `f32` or `f64`.
 #[derive(Clone, Debug)]
@@ -131,7 +131,7 @@ impl<T: Precision> Product<'_, T> {
         for row in 0..self.matrix.pattern.rows() {
             let mut sum = L::Sum64::zero();
             for (slot, column) in self.matrix.pattern.row(row) {
-                sum.add(&self.matrix.numbers_from(slot), &widened(&self.x[column]));
+                sum.add(&self.matrix.numbers_from(slot), &widened(self.x[column]));
             }
             let [u, v, w, _] = sum.total();
             self.y[row] = [u, v, w];
@@ -146,7 +146,7 @@ impl<T: Precision> Product<'_, T> {
             let mut sum = L::Sum64::zero();
             for (slot, column) in self.matrix.pattern.row(row) {
                 let block = self.matrix.numbers_from(slot);
-                sum.add(&block, &widened(&self.x[column]));
+                sum.add(&block, &widened(self.x[column]));
                 if column != row {
                     add_transposed::<L>(&mut self.y[column], &block, &self.x[row]);
                 }
@@ -155,12 +155,6 @@ impl<T: Precision> Product<'_, T> {
             self.y[row] = [a + u, b + v, c + w];
         }
     }
-}
-
-/// A vector with a fourth component that means nothing.
-#[inline(always)]
-fn widened(&[u, v, w]: &Vector3<f64>) -> [f64; 4] {
-    [u, v, w, 0.0]
 }
 
 /// y ← y + Bᵀ v.

@@ -3,6 +3,8 @@
 
 use energy_dsl::{Block, Level, Number, Vector3};
 
+use crate::vector::widened;
+
 /// Numbers after the last block, so that four can be read where its last column begins.
 const SLACK: usize = 1;
 
@@ -36,7 +38,7 @@ pub(crate) type Wide = [f64; 4];
 
 /// Vectors as [`Wide`] ones.
 pub(crate) fn widen(vectors: &[Vector3<f64>]) -> Vec<Wide> {
-    vectors.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
+    vectors.iter().copied().map(widened).collect()
 }
 
 /// Back again.

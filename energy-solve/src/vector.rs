@@ -2,6 +2,8 @@
 
 use energy_dsl::{Block, Vector3};
 
+use crate::precision::Precision;
+
 /// Σ aᵢ · bᵢ over all vertices.
 #[must_use]
 pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
@@ -24,6 +26,12 @@ pub(crate) fn scale_and_add(y: &mut [Vector3<f64>], s: f64, x: &[Vector3<f64>]) 
             yi[axis] = xi[axis] + s * yi[axis];
         }
     }
+}
+
+/// A vector in a register of four, with a last component that means nothing.
+#[inline(always)]
+pub(crate) fn widened<T: Precision>([u, v, w]: Vector3<f64>) -> [T; 4] {
+    [T::from_f64(u), T::from_f64(v), T::from_f64(w), T::from_f64(0.0)]
 }
 
 /// B v.

@@ -61,7 +61,7 @@ fn diagonalise<L: Level, V: Lane<f64>, const N: usize>(a: &mut Square<V, N>, vec
     for _ in 0..MOST_SWEEPS {
         let mut turned = V::Mask::none();
         for round in 0..rounds(N) {
-            let mut rotations = [Rotation { turn: V::Mask::none(), tangent: zero, sine: zero, half: zero }; MOST / 2];
+            let mut rotations = [Rotation::none(); MOST / 2];
             for meeting in 0..N / 2 {
                 let (p, q) = pair(N, round, meeting);
                 rotations[meeting] = Rotation::between::<L>(a[p][p], a[q][q], a[p][q], negligible);
@@ -112,6 +112,13 @@ struct Rotation<V: Lane<f64>> {
 }
 
 impl<V: Lane<f64>> Rotation<V> {
+    /// Nothing is turned.
+    #[inline(always)]
+    fn none() -> Self {
+        let zero = V::splat(0.0);
+        Self { turn: V::Mask::none(), tangent: zero, sine: zero, half: zero }
+    }
+
     /// With d and o the differences of the diagonal and twice the entry beside it, h = √(d² + o²) and n = |d| + h, tan φ is o/n up to the sign of d,
     /// and with r = n/cos φ = √(2 h n) all that is needed has the divisor n r (n + r): dividing is what takes longest.
     #[inline(always)]
@@ -119,7 +126,7 @@ impl<V: Lane<f64>> Rotation<V> {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let turn = negligible.less(off * off);
         if !turn.any() {
-            return Self { turn, tangent: zero, sine: zero, half: zero };
+            return Self::none();
         }
         let (d, o) = (qq - pp, off + off);
         let h = d.mul_add::<L>(d, o * o).sqrt();

@@ -6,10 +6,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::galerkin::GalerkinProduct;
 use super::interpolation::Interpolation;
-use super::smoother::{Inversion, Smoother, widened};
+use super::smoother::{Inversion, Smoother};
 use crate::domains::{InverseFactor, Precision, Scaling, Wide, divided, scaled, unscaled};
 use crate::matrix::BlockMatrix;
 use crate::pattern::Pattern;
+use crate::vector::widened;
 
 /// Rows of the coarsest level, at most, unless they cannot be joined any further: there the matrix is factored as a dense one.
 const COARSEST: usize = 24;

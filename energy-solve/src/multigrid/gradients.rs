@@ -3,10 +3,11 @@ use std::sync::RwLock;
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
 use super::coarse::Coarse;
-use super::smoother::{Smoother, widened};
+use super::smoother::Smoother;
 use crate::domains::{InverseFactor, Meeting, Precision, Shared, Unit, Wide, add_products, of_three, scaled, unscaled};
 use crate::pattern::Pattern;
 use crate::solve::{SolveOptions, SolveReport, StopReason};
+use crate::vector::widened;
 
 /// How much larger a residual may be than after over-relaxation. What is left then is smooth, and the norm, in which what is smooth counts for
 /// little, is half of the error relative to the solution; here it is rough, and the norm is a little more than the error.

@@ -1,6 +1,6 @@
 use std::sync::RwLock;
 
-use energy_dsl::{Block, Kernel, Level, Vector3};
+use energy_dsl::{Block, Kernel, Level};
 
 use crate::domains::{
     Couplings, InverseFactor, Precision, Triangle, Wide, inverse_factor, invert, less_products, rounded, scaled_block,
@@ -215,10 +215,4 @@ fn plus<T: Precision, L: Level>(mut v: Wide<T>, scale: f64, u: &Wide<T>) -> Wide
         v[lane] = u[lane].mul_add::<L>(scale, v[lane]);
     }
     v
-}
-
-/// A vector in a register.
-#[inline(always)]
-pub(super) fn widened<T: Precision>([u, v, w]: Vector3<f64>) -> Wide<T> {
-    [T::from_f64(u), T::from_f64(v), T::from_f64(w), T::from_f64(0.0)]
 }
