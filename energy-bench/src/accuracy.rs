@@ -1,6 +1,7 @@
 //! How exact gradients are near rest, where strains and angles are differences of nearly equal numbers.
 
-use energy_dsl::{Array, Baseline, Textbook};
+use energy_compiler::Textbook;
+use energy_dsl::{Array, Baseline};
 use serde::Serialize;
 use verify::BlockName;
 use verify::multiprecision::{TrueBlock, truth};

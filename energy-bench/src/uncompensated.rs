@@ -2,8 +2,8 @@
 
 use std::marker::PhantomData;
 
+use energy_dsl::energy;
 use energy_dsl::{Array, Kernel, Lane, Level, LevelName, PackedPotential, Potential, Vector3, available, dispatch_at};
-use energy_macros::energy;
 
 use crate::contenders::Contender;
 use crate::run::{Doubles, Work, call_each, each_block, lanes, packed};

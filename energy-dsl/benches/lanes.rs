@@ -5,8 +5,8 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use energy_dsl::energy;
 use energy_dsl::{Kernel, Lane, Level, Potential, Real, available, dispatch_at};
-use energy_macros::energy;
 
 energy! {
     energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) { k / 2 * (norm(p - q) - L)^2 }

@@ -1,124 +1,59 @@
-//! A small language for energies, constraints, forces and residuals of points, and its compiler.
+//! Write an energy, a constraint, a force or a residual once, as a formula. Get Rust code for its value and its exact
+//! first and second derivatives.
 //!
-//! A declaration is a formula with typed inputs. The compiler (feature `compiler`, used by the macro `energy!` of the crate
-//! `energy-macros`) turns it into Rust code for its value and its exact first and second derivatives:
-//!
-//! ```text
-//! text ─ syntax ─► tree ─ check ─► typed program ─ lower ─► graph ─ diff ─► routines ─ emit ─► Rust
-//! ```
-//!
-//! Without that feature the crate is the small runtime that generated code calls: number types ([`Real`]), the traits of
-//! elements ([`Potential`], [`ForceLaw`], [`Constraint`], [`Residual`]) and their self-description ([`Declaration`]).
+//! [`energy!`] compiles the formula while your crate compiles. The generated type implements the trait of its kind:
+//! [`Potential`], [`Constraint`], [`ForceLaw`] or [`Residual`]. Many elements at once run over SIMD lanes: see [`Packed`].
 //!
 #![doc = include_str!("../LANGUAGE.md")]
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 
-extern crate self as energy_dsl;
+pub use energy_runtime::*;
 
-mod runtime;
-
-#[cfg(feature = "compiler")]
-mod check;
-#[cfg(feature = "compiler")]
-mod diagnostic;
-#[cfg(feature = "compiler")]
-mod diff;
-#[cfg(feature = "compiler")]
-mod emit;
-#[cfg(feature = "compiler")]
-mod functions;
-#[cfg(feature = "compiler")]
-mod graph;
-#[cfg(feature = "compiler")]
-mod interpret;
-#[cfg(feature = "compiler")]
-mod interpreted;
-#[cfg(feature = "compiler")]
-mod listing;
-#[cfg(feature = "compiler")]
-mod lower;
-#[cfg(feature = "compiler")]
-mod mathml;
-#[cfg(feature = "compiler")]
-mod mutation;
-#[cfg(feature = "compiler")]
-mod properties;
-#[cfg(feature = "compiler")]
-mod routines;
-#[cfg(feature = "compiler")]
-mod syntax;
-#[cfg(feature = "compiler")]
-mod tape;
-#[cfg(feature = "compiler")]
-mod textbook;
-#[cfg(feature = "compiler")]
-mod tower;
-
-pub use runtime::*;
-
-#[cfg(feature = "compiler")]
-pub use check::unit_exponents;
-#[cfg(feature = "compiler")]
-pub use diagnostic::{Diagnostic, Diagnostics};
-#[cfg(feature = "compiler")]
-pub use functions::{Function, all as functions};
-#[cfg(feature = "compiler")]
-pub use interpreted::Interpreted;
-#[cfg(feature = "compiler")]
-pub use listing::{Listing, Path};
-#[cfg(feature = "compiler")]
-pub use mathml::mathml;
-#[cfg(feature = "compiler")]
-pub use mutation::{Fault, Mutation};
-#[cfg(feature = "compiler")]
-pub use syntax::canonical as canonical_name;
-#[cfg(feature = "compiler")]
-pub use textbook::Textbook;
-
-/// Compiles declarations to Rust: the whole of what `energy!` does. Errors become `compile_error!` at their places, beside
-/// stubs of what was declared. Where the environment variable `ENERGY_DUMP_DIR` names a folder, the code of each declaration is
-/// also written to a file there, laid out for reading.
+/// Declares energies, constraints, forces and residuals in the [language](crate) of this crate.
 ///
 /// ```
-/// let code = energy_dsl::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());
-/// assert!(code.to_string().contains("struct Spring"));
+/// use energy_dsl::{Potential, energy};
+///
+/// energy! {
+///     /// A spring of rest length L.
+///     pub energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) = "k/2 (‖p − q‖ − L)²";
+/// }
+///
+/// let spring: Spring = Spring::new(8.0, 1.0);
+/// let at = spring.gradient(&[[0.0, 0.0, 0.0], [3.0, 0.0, 4.0]]);
+/// assert_eq!(at.value, 64.0);
+/// assert!((at.gradient[1][2] - 8.0 * 4.0 * 0.8).abs() < 1e-14);
 /// ```
-#[cfg(feature = "compiler")]
-#[must_use]
-pub fn compile(declarations: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
-    let mut diagnostics = Diagnostics::default();
-    let items = syntax::parse(declarations, &mut diagnostics);
-    compile_items(&items, diagnostics)
-}
+pub use energy_macros::energy;
 
-/// Compiles the declarations of a file, whose text this is. `file` is what messages call it, `at` the place in Rust code that
-/// errors are reported at.
-#[cfg(feature = "compiler")]
-#[must_use]
-pub fn compile_file(text: &str, file: &str, at: proc_macro2::Span) -> proc_macro2::TokenStream {
-    let mut diagnostics = Diagnostics::default();
-    let items = syntax::parse_file(text, file, &diagnostic::Span::of(at), &mut diagnostics);
-    compile_items(&items, diagnostics)
-}
+/// Declares the contents of a file, as [`energy!`] does.
+///
+/// The path is relative to the root of the crate. Strings in the file are raw: a backslash is written once. Errors name
+/// file, line and column.
+///
+/// ```
+/// use energy_dsl::{Potential, include_energy};
+///
+/// include_energy!("tests/springs.energy");
+///
+/// let spring: Spring = Spring::new(8.0, 1.0);
+/// assert_eq!(spring.value(&[[0.0, 0.0, 0.0], [3.0, 0.0, 4.0]]).value, 64.0);
+/// ```
+pub use energy_macros::include_energy;
 
-#[cfg(feature = "compiler")]
-fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> proc_macro2::TokenStream {
-    let programs = check::check(items, &mut diagnostics);
-    let folder = std::env::var_os("ENERGY_DUMP_DIR").map(std::path::PathBuf::from);
-    let mut code = proc_macro2::TokenStream::new();
-    for program in &programs {
-        let routines = routines::differentiate(program);
-        properties::prove(program, &routines, &mut diagnostics);
-        let items = emit::emit(program, &routines);
-        if let Some(folder) = &folder
-            && let Err(error) = listing::dump(folder, &program.name, &items)
-        {
-            let message = format!("ENERGY_DUMP_DIR: cannot write {} to {}: {error}", program.name, folder.display());
-            diagnostics.push(Diagnostic::new(&program.span, message));
-        }
-        code.extend(items);
-    }
-    let errors: proc_macro2::TokenStream =
-        diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error()).collect();
-    quote::quote!(#code #errors)
+/// Everything that code around declared elements usually needs: the macros, the traits, and what results and inputs are
+/// made of.
+///
+/// ```
+/// use energy_dsl::prelude::*;
+///
+/// energy! { energy Pull(p, q: Point; k: Scalar) = "k/2 ‖p − q‖²"; }
+///
+/// assert_eq!(Pull::new(2.0).value(&[[0.0; 3], [3.0, 0.0, 4.0]]).value, 25.0);
+/// ```
+pub mod prelude {
+    pub use crate::{
+        Constraint, Element, Flags, ForceLaw, Inputs, Potential, ReducedPotential, Residual, Vector3, energy,
+        include_energy,
+    };
 }

@@ -2,8 +2,9 @@
 #![allow(missing_docs)]
 
 use approx::assert_relative_eq;
-use energy_dsl::{Constraint, Element, ForceLaw, Inputs, Potential, Residual, Textbook};
-use energy_macros::energy;
+use energy_compiler::Textbook;
+use energy_dsl::energy;
+use energy_dsl::{Constraint, Element, ForceLaw, Inputs, Potential, Residual};
 
 energy! {
     const COUNT: Scalar = 2 + 2;

@@ -2,8 +2,8 @@
 
 #![allow(mixed_script_confusables)]
 
+use energy_dsl::energy;
 use energy_dsl::{Batches, Hessians, Packed, PackedPotential, Potential, available, dispatch_at};
-use energy_macros::energy;
 
 energy! {
     energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) { k / 2 * (norm(p - q) - L)^2 }

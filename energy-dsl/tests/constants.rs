@@ -1,8 +1,9 @@
 //! Constants and fixed parameters fold: what they switch off leaves no operations.
 #![allow(missing_docs)]
 
-use energy_dsl::{Constraint, Element, Inputs, Potential, Textbook};
-use energy_macros::energy;
+use energy_compiler::Textbook;
+use energy_dsl::energy;
+use energy_dsl::{Constraint, Element, Inputs, Potential};
 
 energy! {
     const NONE: Scalar = 0;

@@ -2,8 +2,9 @@
 #![allow(missing_docs)]
 
 use approx::assert_relative_eq;
-use energy_dsl::{Constraint, Element, Flags, ForceLaw, Inputs, Mask, Number, Potential, Residual, Textbook};
-use energy_macros::energy;
+use energy_compiler::Textbook;
+use energy_dsl::energy;
+use energy_dsl::{Constraint, Element, Flags, ForceLaw, Inputs, Mask, Number, Potential, Residual};
 
 energy! {
     fn spring_energy(k, C) { k / 2 * C^2 }
@@ -148,4 +149,15 @@ fn generated_code_runs_over_single_precision_and_any_other_number() {
     assert_relative_eq!(f64::from(single.value), Chain::new(3.0, 0.5).value(&[P, Q, R]).value, max_relative = 1e-6);
     let flags = Flags::<f64>::clear();
     assert!(!flags.any() && !Mask::any(flags.kink) && !1.0_f64.less(0.5));
+}
+
+/// With p pinned, only the block of q with itself is left of three.
+#[test]
+fn blocks_of_pinned_points_are_left_out() {
+    use energy_dsl::{Baseline, ReducedPotential};
+
+    let (chain, x) = (Chain::new(5.0, 0.5), [P, Q, R]);
+    let (free, whole) = (chain.hessian_free_at::<Baseline, 0b110>(&x), chain.hessian(&x));
+    assert_eq!(free.hessian[3..], whole.hessian[3..]);
+    assert_eq!(free.hessian[..3], [[[0.0; 3]; 3]; 3]);
 }

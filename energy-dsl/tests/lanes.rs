@@ -4,11 +4,11 @@
 
 use std::fmt::Debug;
 
+use energy_dsl::energy;
 use energy_dsl::{
     Array, BLOCK_NUMBERS, Block, BlockSum, Hessian, Kernel, Lane, Level, LevelName, Mask, Number, Potential, Vector3,
     available, dispatch, dispatch_at, level,
 };
-use energy_macros::energy;
 
 /// A scalar whose bits can be compared.
 trait Bits: Lane<Self> + Number<Mask = bool> + Into<f64> {

@@ -1,8 +1,8 @@
 //! Where a function has a limit it is returned, where it has none the documented value and a flag; never a silent NaN.
 #![allow(missing_docs)]
 
+use energy_dsl::energy;
 use energy_dsl::{Potential, Residual};
-use energy_macros::energy;
 
 energy! {
     energy Log1p(p: Point) { log1p(p.x) }

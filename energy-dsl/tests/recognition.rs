@@ -2,8 +2,9 @@
 //! same bits.
 #![allow(missing_docs)]
 
-use energy_dsl::{Potential, compile};
-use energy_macros::energy;
+use energy_compiler::compile;
+use energy_dsl::Potential;
+use energy_dsl::energy;
 
 /// The primitives that a formula of vectors and numbers compiles to, and the operations of each routine.
 fn plan(formula: &str) -> String {

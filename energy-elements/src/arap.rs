@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// As-rigid-as-possible membrane on a triangle: A μ/2 ((s₁ − 1)² + (s₂ − 1)²), s the singular values of F = D D_m⁻¹ (Sorkine &

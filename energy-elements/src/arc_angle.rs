@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// The dihedral angle θ as a smooth surface through the vertices has it: √8 sin(θ/√8), which is θ − θ³/48 + …

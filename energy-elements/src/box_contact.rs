@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Contact of a point with a box, rounded by r: all points within r of those whose distances from the centre c along the unit vectors

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// The potential whose force on point i is K′ (sin θ/2 − sin θ₀/2) uᵢ, uᵢ = −∂θ/∂xᵢ (after Bridson et al. 2003), with K′ a constant of

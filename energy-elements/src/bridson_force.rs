@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Bridson's bending force as printed (Bridson et al. 2003): F_i = K ‖E‖²/(‖N₁‖ + ‖N₂‖) (sin θ/2 − sin θ₀/2) u_i with u_i = −∂θ/∂x_i.

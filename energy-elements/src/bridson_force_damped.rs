@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Bridson's bending force with damping (Bridson et al. 2003): `BridsonForce` and −k_d ‖E‖ (Σ u_j·v_j) u_i. Written so, the damping needs

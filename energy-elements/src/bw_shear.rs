@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Shear of a triangle, k/2 A² (w_u·w_v)², [w_u w_v] = D D_m⁻¹ (Baraff & Witkin 1998: the condition carries the area A). A

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Stretch of a triangle along warp and weft, k/2 A² ((‖w_u‖ − b_u)² + (‖w_v‖ − b_v)²), [w_u w_v] = D D_m⁻¹ (Baraff & Witkin 1998:

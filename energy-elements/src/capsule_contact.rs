@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Contact of a point with a capsule, all points within r of the segment from a to b: k/(3δ) max(δ − d, 0)³ of the signed distance

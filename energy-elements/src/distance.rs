@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Distance of two points (Khungurn 2019, §4). Where they coincide the derivatives are 0 and flagged.

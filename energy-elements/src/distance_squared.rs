@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Squared distance of two points (Khungurn 2019, §4): a polynomial, regular everywhere.

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Bending of two triangles that are flat at rest, for motions that change no lengths: 3 k/(4 (A₁ + A₂)) ‖Σ cᵢ xᵢ‖², the weights c

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Bending of a hair at the middle one of three points: 0 when its two segments are in line, k when it is folded back

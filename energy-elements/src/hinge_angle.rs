@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// The dihedral angle θ itself, of the triangles x1x3x4 and x2x3x4: a building block, and what the audits look at first.

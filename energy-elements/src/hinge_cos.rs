@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// cos θ of a hinge.

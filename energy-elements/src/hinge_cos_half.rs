@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// cos θ/2 ≥ 0 of a hinge. At the exact fold it has a kink: the derivatives of the side θ → π are returned and flagged.

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Damping of a hinge in proportion to the rate of its angle, −c θ̇ ∂θ/∂xᵢ: it takes no part in rigid motions. With c = β times the

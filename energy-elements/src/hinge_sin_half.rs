@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// sin θ/2 of a hinge, with the sign of θ; +1 at the exact fold.

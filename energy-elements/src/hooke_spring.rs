@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Hooke's spring of the mass–spring cloth model: F_P = K (PQ − L P̂Q), PQ = Q − P (the source prints the opposite sign). It is the

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Logarithmic barrier of incremental potential contact on a distance: −κ (r − d̂)² ln(r/d̂) for r = ‖p_k − p_l‖ < d̂, else 0 (Li

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Logarithmic barrier of incremental potential contact on a squared distance: −κ (y − ŷ)² ln(y/ŷ) for y = ‖p_k − p_l‖² < ŷ = d̂²,

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Stable neo-Hookean membrane on a triangle with logarithm (Smith et al. 2018), stable at rest in two dimensions:

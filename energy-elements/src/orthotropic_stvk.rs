@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Orthotropic St. Venant–Kirchhoff membrane on a triangle: A (½ C_u E_uu² + ½ C_v E_vv² + ½ C_uv (E_uu + E_vv)² + 2 C_ss E_uv²),

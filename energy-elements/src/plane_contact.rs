@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Contact of a point with a half-space, n the unit normal out of it and c a point of its surface: k/(3δ) max(δ − d, 0)³ of the signed

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Bending of an isotropic plate on a triangle x0x1x2 whose neighbours' far corners are y0, y1, y2 (y0 across the edge x1x2, and so

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Power of the distance of two points (Khungurn 2019, §4). Where they coincide the value is its limit; the gradient is for

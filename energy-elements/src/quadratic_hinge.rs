@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Quadratic bending of a hinge, k (θ − θ₀)² without the half and without wrap-around at ±π (Grinspun et al. 2003, with the

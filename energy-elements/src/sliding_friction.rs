@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Coulomb's friction of a point on a surface with unit normal n, made smooth (Kikuchi and Oden 1988, §10.3): λ (√(‖t‖² + ε²) − ε) of the

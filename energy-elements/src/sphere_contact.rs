@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Contact of a point with a ball of radius r: k/(3δ) max(δ − d, 0)³ of the signed distance d = ‖x − c‖ − r. Nothing from the thickness

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Witkin's spring of rest length L: C = ‖p_k − p_l‖ − L (Witkin & Baraff 1997; Khungurn 2019, §5). Its energy is ½ k_s C², its

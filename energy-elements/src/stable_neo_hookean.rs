@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Stable neo-Hookean membrane on a triangle without logarithm: A (μ/2 (I − 2) − μ (J − 1) + λ/2 (J − 1)²) (after Smith et al.

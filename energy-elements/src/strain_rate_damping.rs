@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Damping of a membrane on a triangle in proportion to its rate of strain: minus the derivative by velocities of

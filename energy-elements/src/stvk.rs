@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// St. Venant–Kirchhoff membrane on a triangle: A (μ ‖E‖² + λ/2 tr² E), E = (FᵀF − 1)/2 the Green strain. λ and μ are per length: for

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Strain limiting along warp and weft: A k/3 (o_u³ + o_v³), o = max(‖F u‖ − s, 0) the stretch of a thread beyond its limit s > 1.

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Drag in proportion to velocity, −c v (the damping of the mass–spring cloth model).

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Drag of a triangle with unit normal n in an even wind, by the independence of the flow across and along a surface (cross-flow

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Witkin's spring without rest length: C = p_k − p_l, a vector, so that neither energy nor damping has a singular point

@@ -3,8 +3,8 @@
 #![allow(missing_docs, mixed_script_confusables)]
 
 use energy_dsl::Element;
+use energy_dsl::energy;
 use energy_elements::find;
-use energy_macros::energy;
 
 energy! {
     /// The membrane as a function of F's columns.

@@ -1,9 +1,9 @@
 //! Twists, their exponential and the blend of four motions against multi-precision values.
 #![allow(missing_docs, confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
+use energy_dsl::energy;
 use energy_dsl::{Element, Residual};
 use energy_elements::PointToPlane;
-use energy_macros::energy;
 
 energy! {
     residual Exponential(ξ: Twist) {

@@ -9,7 +9,7 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let at = input.clone().into_iter().next().map_or_else(Span::call_site, |token| token.span());
     match path(input).and_then(|path| read(&path).map(|text| (path, text))) {
         Ok((path, text)) => {
-            let code = energy_dsl::compile_file(&text, &path, at);
+            let code = energy_compiler::compile_file(&text, &path, at);
             let path = Literal::string(&format!("/{path}"));
             // Named in the code, so that a change of the file compiles it anew.
             quote::quote! {
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn a_change_of_the_file_compiles_it_anew() {
-        let code = expand("\"tests/springs.energy\"".parse().unwrap()).to_string();
-        assert!(code.contains("include_bytes") && code.contains("\"/tests/springs.energy\""), "{code}");
+        let code = expand("\"src/pull.energy\"".parse().unwrap()).to_string();
+        assert!(code.contains("include_bytes") && code.contains("\"/src/pull.energy\""), "{code}");
     }
 }

@@ -108,7 +108,7 @@ pub enum GaussNewtonError {
 /// ```
 /// use std::sync::Arc;
 /// use energy_solve::{Couplings, GaussNewton, GaussNewtonOptions, NormalPattern, Placed, ResidualTerm};
-/// use energy_macros::energy;
+/// use energy_dsl::energy;
 ///
 /// energy! {
 ///     /// Rosenbrock's valley as two residuals.

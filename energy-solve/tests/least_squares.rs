@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use energy_macros::energy;
+use energy_dsl::energy;
 use energy_solve::{
     Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, LeastSquaresTerm, Loss, NormalPattern,
     NormalSolverKind, Outcome, Placed, ResidualTerm,

@@ -1,6 +1,7 @@
 //! A formula as written, evaluated and differentiated by arithmetic that is independent of the generated code.
 
-use energy_dsl::{Declaration, Inputs, Kind, Number, Textbook};
+use energy_compiler::Textbook;
+use energy_dsl::{Declaration, Inputs, Kind, Number};
 
 use crate::blocks::{Block, BlockName};
 use crate::dual::Hyper;

@@ -44,7 +44,7 @@ pub use sample::Sample;
 /// [`assert_derivatives`](fn@assert_derivatives) for what a failure says.
 ///
 /// ```
-/// use energy_macros::energy;
+/// use energy_dsl::energy;
 ///
 /// energy! { energy Pull(p, q: Point; k: Scalar[N/m]) = "k/2 ‖p − q‖²"; }
 ///

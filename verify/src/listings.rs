@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use energy_dsl::Listing;
+use energy_compiler::Listing;
 
 /// What the compiler makes of an element of the catalogue, or of the declarations of an `.energy` file.
 ///

@@ -5,7 +5,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use energy_dsl::Potential;
-use energy_macros::energy;
+use energy_dsl::energy;
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive};
 

@@ -1,7 +1,7 @@
 //! Every function of the language is differentiated rightly, alone and in company.
 #![allow(missing_docs, mixed_script_confusables)]
 
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     #[audit(samples = 50)]

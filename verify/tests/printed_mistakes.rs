@@ -6,8 +6,8 @@
 #![allow(missing_docs, confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
 use energy_dsl::Residual;
+use energy_dsl::energy;
 use energy_elements::{BlendedMotion4, GraphEdge, HuberLoss, NonrigidPlane4, TwistMotion};
-use energy_macros::energy;
 
 energy! {
     fn numbers(q) { [real(q).w, imaginary(real(q)), dual(q).w, imaginary(dual(q))] }

@@ -1,7 +1,8 @@
 //! Random well-typed programs: what the compiler makes of them agrees with hyper-dual numbers and with multi-precision numbers
 //! run through the text, by every routine and on both paths. `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
 
-use energy_dsl::{Inputs, Interpreted, Listing, Path, Textbook};
+use energy_compiler::{Interpreted, Listing, Path, Textbook};
+use energy_dsl::Inputs;
 use proptest::prelude::*;
 use verify::dual::Hyper;
 use verify::{Sample, multiprecision};

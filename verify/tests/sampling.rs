@@ -1,7 +1,7 @@
 //! What the audit draws its inputs from must not make it fail, or run forever, on sound elements.
 #![allow(missing_docs)]
 
-use energy_macros::energy;
+use energy_dsl::energy;
 use verify::assert_derivatives;
 
 energy! {

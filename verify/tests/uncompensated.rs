@@ -1,7 +1,7 @@
 //! What `#[uncompensated]` gives up, against multi-precision: near rest its errors are those of rounding the points, and not of the result.
 #![allow(missing_docs)]
 
-use energy_dsl::{Interpreted, Textbook};
+use energy_compiler::{Interpreted, Textbook};
 use verify::multiprecision::truth;
 use verify::{BlockName, Sample, evaluate};
 

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use energy_dsl::{Declaration, Interpreted, Kind, Vector3, canonical_name};
+use energy_compiler::{Interpreted, canonical_name};
+use energy_dsl::{Declaration, Kind, Vector3};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

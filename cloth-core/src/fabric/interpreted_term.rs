@@ -1,4 +1,5 @@
-use energy_dsl::{Block, Declaration, Flags, Inputs, Interpreted, Mask, RestError, Vector3, triangle_index};
+use energy_compiler::Interpreted;
+use energy_dsl::{Block, Declaration, Flags, Inputs, Mask, RestError, Vector3, triangle_index};
 use energy_solve::{
     Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, TrianglePlaces,
     change_dense, index,

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Huber's loss of one number, ρ = y²/2 for |y| ≤ δ, else δ (|y| − δ/2); its derivative is ρ′, and the weight of a row in iteratively

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     fn motion(ξ, turn) { exp(twist(turn * angular(ξ), linear(ξ))) }

@@ -1,4 +1,4 @@
-use energy_macros::energy;
+use energy_dsl::energy;
 
 energy! {
     /// Distance of a moved surface point to a measured one along the moved normal, n̂·(v̂ − u): the data term of tracking a body

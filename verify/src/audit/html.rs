@@ -71,7 +71,7 @@ fn element(page: &mut String, report: &Report, section: &Section) {
     let name = escaped(section.element);
     let _ = writeln!(page, "<section id=\"{name}\"><h2>{name} <small>{}</small></h2>", section.kind);
     let _ = writeln!(page, "<p>{}</p>", escaped(section.docs));
-    match energy_dsl::mathml(section.source) {
+    match energy_compiler::mathml(section.source) {
         Some(formula) => page.push_str(&formula),
         None => {
             let _ = writeln!(page, "<pre>{}</pre>", escaped(section.source));

@@ -1,6 +1,7 @@
 //! What a block must be whatever the formula: finite, symmetric, in balance, the same elsewhere and in other units.
 
-use energy_dsl::{Kind, unit_exponents};
+use energy_compiler::unit_exponents;
+use energy_dsl::Kind;
 
 use super::auditor::{Auditor, Case, Finding};
 use super::entry::entry_name;

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use energy_dsl::{Fault, Inputs, Interpreted, Mutation, Number, Outputs};
+use energy_compiler::{Fault, Interpreted, Mutation};
+use energy_dsl::{Inputs, Number, Outputs};
 use fastrand::Rng;
 
 use super::amplification;

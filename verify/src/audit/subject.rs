@@ -1,7 +1,8 @@
 use std::path::Path;
 
 use anyhow::Context;
-use energy_dsl::{Declaration, Inputs, Interpreted, Kind, Outputs, RestError, Textbook};
+use energy_compiler::{Interpreted, Textbook};
+use energy_dsl::{Declaration, Inputs, Kind, Outputs, RestError};
 use energy_elements::CatalogueEntry;
 
 use crate::blocks::{Answer, NoAnswer, evaluate};
@@ -31,7 +32,7 @@ impl Target {
     ///
     /// # Errors
     /// Whatever is wrong with the text.
-    pub fn of_text(text: &str, name: &str) -> Result<Vec<Self>, energy_dsl::Diagnostics> {
+    pub fn of_text(text: &str, name: &str) -> Result<Vec<Self>, energy_compiler::Diagnostics> {
         // A declaration's own source brings along what it uses, and stands alone.
         let target = |element: &Interpreted| Self {
             source: element.declaration().source.into(),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use energy_dsl::{Interpreted, Listing, compile};
+use energy_compiler::{Interpreted, Listing, compile};
 
 /// What reads the inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -1,4 +1,5 @@
-use energy_dsl::{Declaration, Number, Textbook};
+use energy_compiler::Textbook;
+use energy_dsl::{Declaration, Number};
 
 use super::Big;
 use super::big::with_precision;
@@ -57,7 +58,7 @@ pub(crate) fn worse(a: f64, b: f64) -> f64 {
 /// nothing but rounding are exactly zero.
 ///
 /// ```
-/// use energy_dsl::Textbook;
+/// use energy_compiler::Textbook;
 /// use verify::{BlockName, Sample, multiprecision::truth};
 ///
 /// let bend = energy_elements::find("HairBend").unwrap().declaration;

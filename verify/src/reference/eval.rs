@@ -1,6 +1,7 @@
 use std::path::Path;
 
-use energy_dsl::{Flags, Textbook};
+use energy_compiler::Textbook;
+use energy_dsl::Flags;
 use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};

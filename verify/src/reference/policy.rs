@@ -1,7 +1,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use energy_dsl::{Declaration, Textbook};
+use energy_compiler::Textbook;
+use energy_dsl::Declaration;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

@@ -1,0 +1,90 @@
+//! Units: every input has a dimension, known or unknown; every operator gives equations between them. What finite
+//! differences cannot see, a wrong formula, this can.
+
+mod dimension;
+mod infer;
+mod rules;
+mod solver;
+
+use super::typed::{Binding, Input, Program, Typed, TypedKind};
+use crate::diagnostic::{Diagnostic, Diagnostics, Span};
+use crate::syntax::ElementType;
+use dimension::{Dimension, ENERGY, FORCE, LENGTH, VELOCITY};
+use energy_runtime::Kind;
+use infer::Inference;
+
+/// Checks the units of a declaration whose shapes are right. Without any unit of a quantity there is nothing to check: all
+/// inputs may be numbers.
+pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
+    let inputs = program.moving.iter().chain(&program.rest).chain(&program.parameters);
+    let mut annotated = false;
+    for input in inputs {
+        annotated |= read(&input.unit, &input.span, diagnostics);
+    }
+    for Binding { unit, .. } in &program.bindings {
+        if let Some((text, span)) = unit.as_ref().and_then(|u| Some((&u.text, u.span.as_ref()?))) {
+            annotated |= read(text, span, diagnostics);
+        }
+    }
+    if !annotated || !diagnostics.0.is_empty() {
+        return;
+    }
+    let mut inference = Inference::new(program, diagnostics);
+    let results: &[Typed] = match &program.result.kind {
+        TypedKind::Array(rows) => rows,
+        // Rows may be of different kinds.
+        TypedKind::Call(f, rows) if f.name == "vector" && program.kind != Kind::Energy => rows,
+        _ => std::slice::from_ref(&program.result),
+    };
+    for result in results {
+        let found = inference.expression(result).main();
+        let (what, wanted) = match program.kind {
+            Kind::Energy => ("an energy must come out in J", ENERGY),
+            Kind::Force => ("a force must come out in N", FORCE),
+            Kind::Constraint | Kind::Residual => continue,
+        };
+        inference.result(&found, &Dimension::of(wanted), &result.span, what);
+    }
+}
+
+/// The exponents of kg, m and s in a unit as written, as in `N/m`; nothing for what is not one.
+///
+/// ```
+/// assert_eq!(energy_compiler::unit_exponents("N/m"), Some([1.0, 0.0, -2.0]));
+/// assert_eq!(energy_compiler::unit_exponents("stone"), None);
+/// ```
+#[must_use]
+pub fn unit_exponents(unit: &str) -> Option<[f64; 3]> {
+    dimension::parse(unit).ok().map(|dimension| dimension.base)
+}
+
+/// Whether a unit is that of a quantity, and not of a number. Reports what cannot be read.
+fn read(unit: &str, span: &Span, diagnostics: &mut Diagnostics) -> bool {
+    if unit.is_empty() {
+        return false;
+    }
+    match dimension::parse(unit) {
+        Ok(dimension) => !dimension.is_number(),
+        Err(message) => {
+            let known = dimension::known();
+            let help = format!("units are products, quotients and powers of {known}, as in N/m, kg m^2/s^2");
+            let repeated = diagnostics.0.iter().any(|d| d.message == message);
+            if !repeated {
+                diagnostics.push(Diagnostic::new(span, message).help(help));
+            }
+            false
+        }
+    }
+}
+
+/// The dimension of an input that is known without an equation: points are in metres.
+fn declared(input: &Input) -> Option<Dimension> {
+    if !input.unit.is_empty() {
+        return dimension::parse(&input.unit).ok();
+    }
+    match input.input_type.element {
+        ElementType::Point | ElementType::Twist => Some(Dimension::of(LENGTH)),
+        ElementType::Velocity => Some(Dimension::of(VELOCITY)),
+        _ => None,
+    }
+}

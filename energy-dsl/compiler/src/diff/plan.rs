@@ -1,0 +1,172 @@
+//! Which route to derivatives a routine takes: all are built, the cheapest is kept.
+
+use std::collections::BTreeMap;
+
+use super::coordinates::Coordinates;
+use super::local::Order;
+use super::{adjoint, cut, forward};
+use crate::graph::{Graph, NodeId, count, ordinary, symmetric_index};
+use energy_runtime::OperationCount;
+
+/// U, ∇U and the upper triangle of ∇²U in reduced coordinates.
+#[derive(Clone, Debug)]
+pub struct SecondOrder {
+    /// U.
+    pub value: NodeId,
+    /// ∇U.
+    pub gradient: Vec<NodeId>,
+    /// ∇²U, upper triangle row by row.
+    pub hessian: Vec<NodeId>,
+}
+
+/// A way to derivatives, and what it comes to.
+#[derive(Clone, Copy, Debug)]
+pub struct Route {
+    /// What it is called.
+    pub name: &'static str,
+    /// Its arithmetic, value included.
+    pub count: OperationCount,
+    /// Its cost by [`OperationCount::cost`].
+    pub cost: usize,
+}
+
+/// The routes to a routine's derivatives, the chosen one first.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What was planned.
+    pub routine: &'static str,
+    /// In ascending cost.
+    pub routes: Vec<Route>,
+}
+
+/// A route to derivatives.
+struct Alternative {
+    name: &'static str,
+    /// The derivatives.
+    nodes: Vec<NodeId>,
+    /// Whether it is right everywhere, and not on the ordinary path only.
+    safe: bool,
+}
+
+/// The derivatives by the cheapest route (the first of equals) on the ordinary path; where that route is not safe everywhere,
+/// with caution those by the cheapest that is.
+fn choose(
+    g: &mut Graph,
+    routine: &'static str,
+    values: &[NodeId],
+    alternatives: &[Alternative],
+) -> (Vec<NodeId>, Plan) {
+    let mut order: Vec<(usize, Route)> = Vec::with_capacity(alternatives.len());
+    for (number, alternative) in alternatives.iter().enumerate() {
+        let nodes = [values, &alternative.nodes].concat();
+        let count = match ordinary(g, &nodes) {
+            Some((nodes, guard)) => count(g, &[&nodes[..], &[guard]].concat()),
+            None => count(g, &nodes),
+        };
+        order.push((number, Route { name: alternative.name, count, cost: count.cost() }));
+    }
+    order.sort_by_key(|(number, route)| (route.cost, *number));
+    let best = &alternatives[order.first().expect("a route exists").0];
+    let safe = order.iter().map(|(number, _)| &alternatives[*number]).find(|a| a.safe).expect("one route is safe");
+    let cautious = g.cautious();
+    let nodes = best.nodes.iter().zip(&safe.nodes).map(|(&best, &safe)| g.select(cautious, safe, best)).collect();
+    (nodes, Plan { routine, routes: order.into_iter().map(|(_, route)| route).collect() })
+}
+
+/// First and second derivatives of a scalar by the cheapest route.
+pub fn second_order(
+    g: &mut Graph,
+    routine: &'static str,
+    value: NodeId,
+    coordinates: &Coordinates,
+) -> (SecondOrder, Plan) {
+    let n = coordinates.len();
+    let zero = g.constant(0.0);
+    let dense = |entries: BTreeMap<usize, NodeId>| {
+        let mut hessian = vec![zero; n * (n + 1) / 2];
+        for (place, entry) in entries {
+            hessian[symmetric_index(n, place / n, place % n)] = entry;
+        }
+        hessian
+    };
+    let whole = adjoint::alone(g, value);
+    let safe = adjoint::is_safe(g, &[value], Order::Second, true);
+    let forward_gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
+    let reverse_gradient = adjoint::gradient(g, &whole, coordinates, Order::Second);
+    let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
+    let mut alternatives = Vec::new();
+    let mut offer = |name, gradient: &[NodeId], hessian: &[NodeId], safe| {
+        alternatives.push(Alternative { name, nodes: [gradient, hessian].concat(), safe });
+    };
+    offer("forward over forward", &forward_gradient, &forward_hessian, true);
+    if let Some(gradient) = &reverse_gradient {
+        offer("forward over forward, reverse gradient", gradient, &forward_hessian, safe);
+    }
+    if let Some(entries) = adjoint::second_derivatives(g, &whole, coordinates) {
+        let hessian = dense(entries);
+        offer("adjoint-weighted, forward gradient", &forward_gradient, &hessian, safe);
+        if let Some(gradient) = &reverse_gradient {
+            offer("adjoint-weighted, reverse gradient", gradient, &hessian, safe);
+        }
+    }
+    if let Some((gradient, entries)) = cut::derivatives(g, value, coordinates) {
+        offer("gathered at primitives", &gradient, &dense(entries), safe);
+    }
+    let (mut gradient, plan) = choose(g, routine, &[value], &alternatives);
+    let hessian = gradient.split_off(n);
+    (SecondOrder { value, gradient, hessian }, plan)
+}
+
+/// ∇²U · w, w the rates of the coordinates, by second-order reverse accumulation or from ∇²U.
+pub fn hessian_vector(
+    g: &mut Graph,
+    routine: &'static str,
+    energy: &SecondOrder,
+    coordinates: &Coordinates,
+) -> (Vec<NodeId>, Plan) {
+    let n = coordinates.len();
+    let rates = coordinates.rates(g);
+    let formed = (0..n)
+        .map(|i| {
+            let row: Vec<_> = (0..n).map(|j| energy.hessian[symmetric_index(n, i, j)]).collect();
+            g.dot(&row, &rates)
+        })
+        .collect();
+    // What ∇²U does with caution, its product does.
+    let mut alternatives = vec![Alternative { name: "from the Hessian", nodes: formed, safe: true }];
+    let safe = adjoint::is_safe(g, &[energy.value], Order::Second, true);
+    if let Some(nodes) = adjoint::hessian_vector(g, energy.value, coordinates, &rates) {
+        alternatives.push(Alternative { name: "second-order reverse", nodes, safe });
+    }
+    choose(g, routine, &[], &alternatives)
+}
+
+/// First derivatives of each output by the cheaper of the forward and the reverse route; `known` is a further alternative.
+pub fn first_order(
+    g: &mut Graph,
+    routine: &'static str,
+    outputs: &[NodeId],
+    coordinates: &Coordinates,
+    known: Option<Vec<NodeId>>,
+) -> (Vec<Vec<NodeId>>, Plan) {
+    let forward = forward::first_derivatives(g, outputs, coordinates, Order::First).concat();
+    let mut alternatives = vec![Alternative { name: "forward", nodes: forward, safe: true }];
+    let safe = adjoint::is_safe(g, outputs, Order::First, true);
+    let reverse: Option<Vec<_>> = outputs
+        .iter()
+        .map(|&output| {
+            let whole = adjoint::alone(g, output);
+            adjoint::gradient(g, &whole, coordinates, Order::First)
+        })
+        .collect();
+    if let Some(rows) = reverse {
+        alternatives.push(Alternative { name: "reverse", nodes: rows.concat(), safe });
+    }
+    if let Some(nodes) = known {
+        // It decides by itself what to do with caution.
+        alternatives.push(Alternative { name: "as with second derivatives", nodes, safe: true });
+    }
+    let (nodes, plan) = choose(g, routine, outputs, &alternatives);
+    let n = coordinates.len();
+    ((0..outputs.len()).map(|row| nodes[row * n..(row + 1) * n].to_vec()).collect(), plan)
+}

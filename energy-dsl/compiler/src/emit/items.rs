@@ -1,0 +1,301 @@
+use proc_macro2::{Ident, TokenStream};
+use quote::{format_ident, quote};
+
+use super::declaration::declaration;
+use super::methods::component;
+use super::schedule::Schedule;
+use super::traits::traits;
+use crate::check::{Input as DeclaredInput, Program};
+use crate::graph::{Input, count};
+use crate::routines::Routines;
+use energy_runtime::Kind;
+
+/// The type, its constructor, its traits, and its test if one was asked for.
+#[must_use]
+pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
+    let name = format_ident!("{}", program.name, span = program.span.token);
+    let structure = structure(&name, program, routines);
+    let constructor = constructor(&name, program, routines);
+    let element = element(&name, program, routines);
+    let traits = traits(&name, program, routines);
+    let packed = packed(&name, program, routines);
+    let test = audit_test(&name, program);
+    quote!(#structure #constructor #element #traits #packed #test)
+}
+
+fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let docs = documentation(program, routines);
+    let visibility: TokenStream = program.visibility.parse().unwrap_or_default();
+    let fields = program.parameters.iter().map(|parameter| {
+        let (field, field_type) = (format_ident!("{}", parameter.name), input_type(parameter));
+        let doc = match parameter.unit.as_str() {
+            "" => format!("The parameter {}.", parameter.name),
+            unit => format!("The parameter {} in {unit}.", parameter.name),
+        };
+        quote!(#[doc = #doc] pub #field: #field_type,)
+    });
+    let precomputed = (!routines.rest.outputs.is_empty()).then(|| {
+        let stored = routines.rest.outputs.len();
+        quote!(precomputed: [T; #stored],)
+    });
+    // Nothing to hold, but the number type to remember.
+    let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData<T>,));
+    quote! {
+        #(#[doc = #docs])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[allow(non_snake_case, mixed_script_confusables, confusable_idents, uncommon_codepoints)]
+        #visibility struct #name<T = f64> {
+            #(#fields)*
+            #precomputed
+            #marker
+        }
+    }
+}
+
+fn holds_nothing(program: &Program, routines: &Routines) -> bool {
+    program.parameters.is_empty() && routines.rest.outputs.is_empty()
+}
+
+/// The doc comment, and what was made of the formula.
+fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
+    let mut lines = program.docs.clone();
+    let list = |inputs: &[DeclaredInput]| inputs.iter().map(|i| i.name.clone()).collect::<Vec<_>>().join(", ");
+    lines.extend(["".into(), "# Formula".into(), "```text".into(), program.formula.clone(), "```".into()]);
+    let moving = if program.kind == Kind::Residual { "unknowns" } else { "points" };
+    lines.push(format!("A declared {} of the {moving} {}.", program.kind.keyword(), list(&program.moving)));
+    if !routines.primitives.is_empty() {
+        lines.push(format!("Compiled to the robust primitives: {}.", routines.primitives.join("; ")));
+    }
+    if program.uncompensated {
+        lines.push(
+            "Uncompensated: differences of points, and what cancels, are accurate to the rounding of the points themselves.".into(),
+        );
+    }
+    lines.extend(["".into(), "| routine | operations | in reduced coordinates |".into(), "|---|---|---|".into()]);
+    for routine in &routines.list {
+        let (full, reduced) = (
+            count(&routines.graph, &routine.outputs()).total(),
+            count(&routines.graph, &routine.reduced_outputs()).total(),
+        );
+        lines.push(format!("| `{}` | {full} | {reduced} |", routine.name));
+    }
+    lines
+}
+
+fn input_type(input: &DeclaredInput) -> TokenStream {
+    input.input_type.dimensions().into_iter().rev().fold(quote!(T), |entry, length| quote!([#entry; #length]))
+}
+
+/// `new` with the rest shape and then the parameters, and the same from flat slices.
+fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let argument = |input: &DeclaredInput| {
+        let (name, input_type) = (format_ident!("{}", input.name), input_type(input));
+        quote!(#name: #input_type)
+    };
+    let arguments: Vec<_> = program.rest.iter().chain(&program.parameters).map(argument).collect();
+    let fields: Vec<_> = program.parameters.iter().map(|p| format_ident!("{}", p.name)).collect();
+    let flat = |inputs: &[DeclaredInput], list: Ident| -> Vec<TokenStream> {
+        inputs
+            .iter()
+            .map(|input| {
+                let mut numbers: Vec<TokenStream> =
+                    (input.first..input.first + input.input_type.size()).map(|i| quote!(#list[#i])).collect();
+                for length in input.input_type.dimensions().into_iter().rev() {
+                    numbers = numbers.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
+                }
+                numbers.into_iter().collect()
+            })
+            .collect()
+    };
+    let mut values = flat(&program.rest, format_ident!("rest"));
+    values.extend(flat(&program.parameters, format_ident!("parameters")));
+    let element = &program.name;
+    let (result, body, from_flat) = if routines.rest.outputs.is_empty() {
+        let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData));
+        (quote!(Self), quote!(Self { #(#fields,)* #marker }), quote!(Ok(Self::new(#(#values),*))))
+    } else {
+        let read = |input: Input| read_input(&program.rest, &program.parameters, input);
+        let mut schedule = Schedule::new(&routines.rest.graph, &read);
+        let precomputed = schedule.array(&routines.rest.outputs);
+        let degenerate = schedule.mask(routines.rest_flags[0]);
+        let statements = schedule.statements();
+        let inputs = || program.rest.iter().chain(&program.parameters);
+        let names: Vec<_> = inputs().map(|input| format_ident!("{}", input.name)).collect();
+        let types = inputs().map(input_type);
+        // At the level of the routines: what the rest shape and the moving points both determine must come out equal.
+        let body = quote! {
+            struct New<T>(#(#types),*);
+            impl<T: ::energy_dsl::Real> ::energy_dsl::Kernel for New<T> {
+                type Output = ::core::result::Result<#name<T>, ::energy_dsl::RestError>;
+
+                #[inline(always)]
+                fn run<L: ::energy_dsl::Level>(self) -> Self::Output {
+                    let New(#(#names),*) = self;
+                    #statements
+                    let precomputed = #precomputed;
+                    let mut sound = !(#degenerate);
+                    for value in precomputed {
+                        // Neither infinite nor NaN.
+                        sound = sound & (value - value).equal(T::from_f64(0.0));
+                    }
+                    if ::energy_dsl::Mask::any(!sound) {
+                        return Err(::energy_dsl::RestError { element: #element });
+                    }
+                    Ok(#name { #(#fields,)* precomputed })
+                }
+            }
+            T::dispatch(New(#(#names),*))
+        };
+        let result = quote!(::core::result::Result<Self, ::energy_dsl::RestError>);
+        (result, body, quote!(Self::new(#(#values),*)))
+    };
+    let errors = (!routines.rest.outputs.is_empty()).then(|| {
+        quote!(#[doc = ""] #[doc = "# Errors"] #[doc = "When the rest shape is degenerate: zero length or area, or not finite."])
+    });
+    quote! {
+        #[allow(non_snake_case, mixed_script_confusables, confusable_idents, unused_parens, clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> #name<T> {
+            /// The element, from its rest shape (if any) and its parameters in declared order.
+            #errors
+            #[inline]
+            #[must_use]
+            pub fn new(#(#arguments),*) -> #result {
+                #body
+            }
+
+            #[allow(unused_variables)]
+            fn from_flat(rest: &[T], parameters: &[T]) -> ::core::result::Result<Self, ::energy_dsl::RestError> {
+                #from_flat
+            }
+        }
+    }
+}
+
+/// Inside `new`: rest shape and parameters are its arguments.
+fn read_input(rest: &[DeclaredInput], parameters: &[DeclaredInput], input: Input) -> TokenStream {
+    let (list, number) = match input {
+        Input::Rest(i) => (rest, usize::from(i)),
+        Input::Parameter(i) => (parameters, usize::from(i)),
+        _ => unreachable!("compiler bug: the rest block reads rest shape and parameters only"),
+    };
+    component(list, number, &quote!())
+}
+
+fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    let declaration = declaration(program, routines);
+    let evaluate = format_ident!(
+        "evaluate_{}",
+        match program.kind {
+            Kind::Energy => "potential",
+            Kind::Constraint => "constraint",
+            Kind::Force => "force_law",
+            Kind::Residual => "residual",
+        }
+    );
+    quote! {
+        impl<S: ::energy_dsl::Real> ::energy_dsl::Element for #name<S> {
+            const DECLARATION: &'static ::energy_dsl::Declaration = &#declaration;
+            type Over<T: ::energy_dsl::Real> = #name<T>;
+
+            fn evaluate<T: ::energy_dsl::Real>(
+                inputs: &::energy_dsl::Inputs<'_, T>,
+            ) -> ::core::result::Result<::energy_dsl::Outputs<T>, ::energy_dsl::RestError> {
+                let element = #name::<T>::from_flat(inputs.rest, inputs.parameters)?;
+                Ok(::energy_dsl::#evaluate(&element, inputs))
+            }
+        }
+    }
+}
+
+/// Elements as plain numbers, and side by side in lanes.
+fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+    // The fields with their places, number by number.
+    let mut stores = Vec::new();
+    let mut loads = Vec::new();
+    let mut number = 0usize;
+    let mut field = |field: &Ident, dimensions: &[usize]| {
+        let size: usize = dimensions.iter().product();
+        let mut reads = Vec::with_capacity(size);
+        for place in 0..size {
+            let (mut rest, mut left) = (place, size);
+            let mut indices = TokenStream::new();
+            for length in dimensions {
+                left /= length;
+                let index = rest / left;
+                indices.extend(quote!([#index]));
+                rest %= left;
+            }
+            stores.push(quote!(numbers[#number * stride] = self.#field #indices;));
+            reads.push(quote!(V::load(&numbers[#number * stride..])));
+            number += 1;
+        }
+        for &length in dimensions.iter().rev() {
+            reads = reads.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
+        }
+        loads.push(quote!(#field: #(#reads)*,));
+    };
+    for parameter in &program.parameters {
+        field(&format_ident!("{}", parameter.name), &parameter.input_type.dimensions());
+    }
+    if !routines.rest.outputs.is_empty() {
+        field(&format_ident!("precomputed"), &[routines.rest.outputs.len()]);
+    }
+    let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData,));
+    let traits = match program.kind {
+        Kind::Energy => vec!["PackedPotential"],
+        Kind::Constraint => vec!["PackedPotential", "PackedForce"],
+        Kind::Force => vec!["PackedForce"],
+        Kind::Residual => vec!["PackedResidual"],
+    };
+    let over_lanes = traits.into_iter().map(|packed| {
+        let packed = format_ident!("{packed}");
+        quote! {
+            #[allow(unused_variables, clippy::all, clippy::pedantic)]
+            impl<S: ::energy_dsl::Real> ::energy_dsl::#packed<S> for #name<S> {
+                type Wide<V: ::energy_dsl::Lane<S>> = #name<V>;
+
+                #[inline(always)]
+                fn load<V: ::energy_dsl::Lane<S>>(numbers: &[S], stride: usize) -> #name<V> {
+                    #name { #(#loads)* #marker }
+                }
+            }
+        }
+    });
+    quote! {
+        #[allow(unused_variables, clippy::all, clippy::pedantic)]
+        impl<S: ::energy_dsl::Real> ::energy_dsl::Stored<S> for #name<S> {
+            const NUMBERS: usize = #number;
+
+            fn store(&self, numbers: &mut [S], stride: usize) {
+                #(#stores)*
+            }
+        }
+        #(#over_lanes)*
+    }
+}
+
+/// The test that `#[audit]` asks for.
+fn audit_test(name: &Ident, program: &Program) -> TokenStream {
+    let Some(samples) = program.audit_samples else { return TokenStream::new() };
+    let test = format_ident!("derivatives_of_{}", snake_case(&program.name));
+    quote! {
+        #[cfg(test)]
+        #[test]
+        fn #test() {
+            ::verify::assert_derivatives!(#name<f64>, samples = #samples);
+        }
+    }
+}
+
+fn snake_case(name: &str) -> String {
+    let mut snake = String::new();
+    let mut previous_lower = false;
+    for c in name.chars() {
+        if c.is_uppercase() && previous_lower {
+            snake.push('_');
+        }
+        previous_lower = !c.is_uppercase();
+        snake.extend(c.to_lowercase());
+    }
+    snake
+}

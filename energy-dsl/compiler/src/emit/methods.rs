@@ -1,0 +1,312 @@
+//! The routines as methods of the traits that the declaration's kind implements.
+//!
+//! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L, and `f`, which runs it at the machine's best
+//! level. Where precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general` by `f_is_ordinary`.
+
+use std::cell::RefCell;
+
+use proc_macro2::{Ident, TokenStream};
+use quote::{format_ident, quote};
+
+use super::schedule::Schedule;
+use crate::check::{Input as DeclaredInput, Program};
+use crate::graph::{Graph, Input, NodeId};
+use crate::routines::{General, Routines};
+use energy_runtime::Kind;
+
+/// What turns a group of outputs into an expression.
+pub(super) type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
+
+pub(super) const NUMBER: Layout = |schedule, nodes| schedule.value(nodes[0]);
+pub(super) const NUMBERS: Layout = |schedule, nodes| schedule.array(nodes);
+pub(super) const VECTORS: Layout = |schedule, nodes| schedule.vectors(nodes);
+pub(super) const BLOCKS: Layout = |schedule, nodes| schedule.blocks(nodes);
+
+/// How a routine appears in its trait.
+pub(super) struct Method {
+    pub(super) routine: &'static str,
+    /// The kernel that calls it.
+    pub(super) call: &'static str,
+    /// The struct it returns, that struct's fields, the types it is generic over, and those of its fields.
+    pub(super) result: &'static str,
+    pub(super) fields: &'static [(&'static str, Layout)],
+    pub(super) generics: Vec<TokenStream>,
+    pub(super) field_types: Vec<TokenStream>,
+    /// Arguments after `self`.
+    pub(super) arguments: Vec<(&'static str, TokenStream)>,
+}
+
+/// A trait's implementation, and beside it the routines with all precautions.
+pub(super) fn implementation(
+    name: &Ident,
+    of: &str,
+    types: &TokenStream,
+    methods: &[Method],
+    program: &Program,
+    routines: &Routines,
+) -> TokenStream {
+    let of = format_ident!("{of}");
+    let (levelled, general): (Vec<_>, Vec<_>) = methods.iter().map(|m| method(m, name, program, routines)).unzip();
+    let general = general.iter().any(|g| !g.is_empty()).then(|| {
+        quote! {
+            #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+            impl<T: ::energy_dsl::Real> #name<T> {
+                #(#general)*
+            }
+        }
+    });
+    // Generated arithmetic is not written to be read by lints.
+    quote! {
+        #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> ::energy_dsl::#of<T> for #name<T> {
+            #types
+            #(#levelled)*
+        }
+        #general
+    }
+}
+
+/// The method and its levelled form; the form with all precautions, if they were split off.
+fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
+    let routine = routines
+        .list
+        .iter()
+        .find(|r| r.name == method.routine)
+        .expect("compiler bug: a routine of another kind of declaration");
+    let (plain, call, result) =
+        (format_ident!("{}", method.routine), format_ident!("{}", method.call), format_ident!("{}", method.result));
+    let levelled = format_ident!("{plain}_at");
+    let generics = &method.generics;
+    let result_type = quote!(::energy_dsl::#result<#(#generics),*>);
+    let names: Vec<_> = method.arguments.iter().map(|(name, _)| format_ident!("{name}")).collect();
+    let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
+    let arguments = quote!(&self, #(#names: &#types),*);
+    let ordinary = body(method, program, routines, &routine.groups, routine.flags);
+    let (body, general) = match &routine.general {
+        None => (ordinary, TokenStream::new()),
+        Some(general) => {
+            let [is_ordinary, if_ordinary, in_general] =
+                ["is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
+            // Apart, and in another order: handed on as it is, the struct would live in memory whichever way it was made.
+            let fields: Vec<_> = ["flags"]
+                .into_iter()
+                .chain(method.fields.iter().rev().map(|(field, _)| *field))
+                .map(|field| format_ident!("{field}"))
+                .collect();
+            let field_types = method.field_types.iter().rev();
+            let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
+            // Lanes are computed before it is known whether they suffice, while they are at the level: those that need more are
+            // replaced afterwards. A scalar is not. What is handed on is copied there: a reference to what was read would keep it
+            // in memory for all.
+            let WithCare { inputs, outputs, reads, returns, summed, code } =
+                with_care(method, name, program, routines, general);
+            let select = quote! {
+                let ordinary = self.#is_ordinary::<L>(#(#names),*);
+                if T::WIDE {
+                    let here = self.#if_ordinary::<L>(#(#names),*);
+                    if ::energy_dsl::Mask::all(ordinary) {
+                        return here;
+                    }
+                    let here = ::core::option::Option::Some((#(here.#fields),*));
+                    let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
+                    return ::energy_dsl::#result { #(#fields),* };
+                }
+                if ::energy_dsl::Mask::all(ordinary) {
+                    self.#if_ordinary::<L>(#(#names),*)
+                } else {
+                    let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, ::core::option::Option::None);
+                    ::energy_dsl::#result { #(#fields),* }
+                }
+            };
+            let guard = mask(program, routines, general.ordinary);
+            let general = quote! {
+                /// Where `_if_ordinary` suffices.
+                #[inline(always)]
+                fn #is_ordinary<L: ::energy_dsl::Level>(#arguments) -> T::Mask {
+                    #guard
+                }
+
+                #[inline(always)]
+                fn #if_ordinary<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+                    #ordinary
+                }
+
+                /// With all precautions, in numbers whose exponents do not end; lanes that need none stay as they are.
+                #[cold]
+                #[inline(never)]
+                fn #in_general(inputs: &[T; #reads], ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
+                    #code
+                    let (numbers, flags) =
+                        ::energy_dsl::with_care::<WithCare, T, #reads, #returns>(inputs, !ordinary, #summed);
+                    let mut general = ::energy_dsl::#result { #outputs flags };
+                    if let ::core::option::Option::Some((#(#fields),*)) = here {
+                        let here = ::energy_dsl::#result { #(#fields),* };
+                        general = ::energy_dsl::Choose::choose(ordinary, &here, &general);
+                    }
+                    (#(general.#fields),*)
+                }
+            };
+            (select, general)
+        }
+    };
+    let methods = quote! {
+        #[inline]
+        fn #plain(#arguments) -> #result_type {
+            T::dispatch(::energy_dsl::#call(self, #(#names),*))
+        }
+
+        #[inline(always)]
+        fn #levelled<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+            #body
+        }
+    };
+    (methods, general)
+}
+
+/// A routine with all precautions: over any number, from what it reads to what it returns.
+struct WithCare {
+    /// What it reads, as the element's method reads it.
+    inputs: Vec<TokenStream>,
+    /// The fields of the result, out of `numbers`.
+    outputs: TokenStream,
+    /// How many numbers it reads.
+    reads: usize,
+    /// How many numbers it returns.
+    returns: usize,
+    /// From which number on results are added to each other.
+    summed: usize,
+    code: TokenStream,
+}
+
+fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routines, general: &General) -> WithCare {
+    let inputs = RefCell::new(Vec::new());
+    let read = |input: Input| {
+        let mut inputs = inputs.borrow_mut();
+        inputs.push(read_input(program, input));
+        let number = inputs.len() - 1;
+        quote!(inputs[#number])
+    };
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let all: Vec<NodeId> = general.groups.concat();
+    let results = schedule.array(&all);
+    let (degenerate, kink) = (schedule.mask(general.flags[0]), schedule.mask(general.flags[1]));
+    let statements = schedule.statements();
+    let mut first = 0;
+    let outputs = method.fields.iter().zip(&general.groups).map(|((field, layout), nodes)| {
+        let field = format_ident!("{field}");
+        // The layout of numbers that stand one after the other.
+        let mut graph = Graph::textbook();
+        let places = first..first + nodes.len();
+        first = places.end;
+        let places: Vec<NodeId> =
+            places.map(|i| graph.input(Input::Precomputed(u16::try_from(i).expect("few numbers")))).collect();
+        let read = |input: Input| {
+            let Input::Precomputed(number) = input else { unreachable!("compiler bug: numbers only") };
+            let number = usize::from(number);
+            quote!(numbers[#number])
+        };
+        let value = layout(&mut Schedule::new(&graph, &read), &places);
+        quote!(#field: #value,)
+    });
+    let outputs = outputs.collect();
+    let inputs = inputs.into_inner();
+    let (reads, returns) = (inputs.len(), all.len());
+    let what = format!("`{}` of [`{name}`].", method.routine);
+    let code = quote! {
+        #[doc = #what]
+        struct WithCare;
+
+        impl ::energy_dsl::WithCare<#reads, #returns> for WithCare {
+            fn compiled() -> &'static ::energy_dsl::Precautions<#reads, #returns> {
+                static COMPILED: ::energy_dsl::Precautions<#reads, #returns> =
+                    ::energy_dsl::Precautions::of::<WithCare>();
+                &COMPILED
+            }
+
+            fn run_at<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(
+                inputs: &[T; #reads],
+            ) -> ([T; #returns], ::energy_dsl::Flags<T>) {
+                #statements
+                (#results, ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink })
+            }
+        }
+    };
+    // Derivatives by several difference vectors are summed up to those by points.
+    let is_summed = method.routine == "reduced_hessian" && routines.vectors.len() > 1;
+    let summed = if is_summed { general.groups[0].len() } else { returns };
+    WithCare { inputs, outputs, reads, returns, summed, code }
+}
+
+/// Statements, then a mask.
+fn mask(program: &Program, routines: &Routines, node: NodeId) -> TokenStream {
+    let read = |input: Input| read_input(program, input);
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let mask = schedule.value(node);
+    let statements = schedule.statements();
+    quote!(#statements #mask)
+}
+
+/// Statements, then the struct returned.
+fn body(
+    method: &Method,
+    program: &Program,
+    routines: &Routines,
+    groups: &[Vec<NodeId>],
+    flags: [Option<NodeId>; 2],
+) -> TokenStream {
+    let read = |input: Input| read_input(program, input);
+    let mut schedule = Schedule::new(&routines.graph, &read);
+    let mut values = Vec::new();
+    for ((field, layout), nodes) in method.fields.iter().zip(groups) {
+        let (field, value) = (format_ident!("{field}"), layout(&mut schedule, nodes));
+        values.push(quote!(#field: #value));
+    }
+    let (degenerate, kink) = (schedule.mask(flags[0]), schedule.mask(flags[1]));
+    let statements = schedule.statements();
+    let result = format_ident!("{}", method.result);
+    quote! {
+        #statements
+        ::energy_dsl::#result { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }
+    }
+}
+
+/// How a routine reads an input.
+fn read_input(program: &Program, input: Input) -> TokenStream {
+    let coordinate = |list: &str, i: u16| {
+        let (list, point, axis) = (format_ident!("{list}"), usize::from(i) / 3, usize::from(i) % 3);
+        quote!(#list[#point][#axis])
+    };
+    match input {
+        Input::Position(i) if program.kind == Kind::Residual => {
+            let i = usize::from(i);
+            quote!(u[#i])
+        }
+        Input::Position(i) => coordinate("x", i),
+        Input::Velocity(i) => coordinate("v", i),
+        Input::Parameter(i) => component(&program.parameters, usize::from(i), &quote!(self.)),
+        Input::Precomputed(i) => {
+            let i = usize::from(i);
+            quote!(self.precomputed[#i])
+        }
+        Input::Rest(_) => unreachable!("compiler bug: the rest shape is read when an element is made"),
+    }
+}
+
+/// The component with a number among the inputs, each read as `prefix name`.
+pub(super) fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenStream) -> TokenStream {
+    let input = inputs
+        .iter()
+        .find(|i| (i.first..i.first + i.input_type.size()).contains(&number))
+        .expect("compiler bug: inputs are numbered without gaps");
+    let name = format_ident!("{}", input.name);
+    let mut place = number - input.first;
+    let mut size = input.input_type.size();
+    let mut read = quote!(#prefix #name);
+    for length in input.input_type.dimensions() {
+        size /= length;
+        let index = place / size;
+        read.extend(quote!([#index]));
+        place %= size;
+    }
+    read
+}

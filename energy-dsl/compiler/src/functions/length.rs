@@ -1,0 +1,319 @@
+//! Lengths: ‖d‖, d/‖d‖, ‖d‖^α, ‖d‖ − L and its square, with their own derivatives.
+//!
+//! Vectors are scaled by a power of two first, so that no square overflows or vanishes. With n = d/‖d‖, r = ‖d‖ and
+//! P = I − n nᵀ: ∇r = n and ∇²r = P/r, the diagonal of P being the sum of the *other* squares, never 1 − nᵢ².
+
+use super::inner_product::inner_product;
+use super::{Function, Lowered, Shape, parallelogram};
+use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule};
+use energy_runtime::Flag;
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
+        name: "norm",
+        usage: "norm(d) or ‖d‖",
+        docs: "Length of a vector or quaternion. At 0 its derivatives are taken as 0 and flagged. `norm(d) - L` is the elongation, one robust primitive, and so is its square.",
+        shape: vector_to_scalar,
+        lower: norm,
+        accuracy: "2 / 2 / 6",
+    },
+    Function {
+        name: "norm_squared",
+        usage: "norm_squared(d) or ‖d‖²",
+        docs: "d·d.",
+        shape: vector_to_scalar,
+        lower: norm_squared,
+        accuracy: "3 / 1 / 0",
+    },
+    Function {
+        name: "unit",
+        usage: "unit(d) or â",
+        docs: "d/‖d‖ of a vector or quaternion; of a dual quaternion, both parts over the norm of the real one. At 0 it is taken as 0 and flagged.",
+        shape: unit_shape,
+        lower: unit,
+        accuracy: "2 / 5 / 8",
+    },
+];
+
+fn vector_to_scalar(shapes: &[Shape]) -> Result<Shape, String> {
+    match shapes {
+        [Shape::DualQuat] => Err("takes a vector, but this is a dual quaternion; did you mean norm(real(q))?".into()),
+        _ => unit_shape(shapes).map(|_| Shape::Scalar),
+    }
+}
+
+fn unit_shape(shapes: &[Shape]) -> Result<Shape, String> {
+    match *shapes {
+        [v @ (Shape::Vector(_) | Shape::Quat | Shape::DualQuat)] => Ok(v),
+        [other] => Err(format!("takes a vector, but this is {other}")),
+        _ => Err(format!("takes one vector, but there are {} arguments", shapes.len())),
+    }
+}
+
+/// A vector d, scaled, with its length and direction.
+pub(super) struct Direction {
+    /// The power of two.
+    pub(super) scale: NodeId,
+    /// scale · d.
+    pub(super) scaled: Vec<NodeId>,
+    /// ‖scale · d‖².
+    pub(super) square: NodeId,
+    /// ‖scale · d‖.
+    pub(super) length: NodeId,
+    /// Whether d = 0.
+    pub(super) zero: NodeId,
+    /// 1/‖scale · d‖², or 0 where d = 0.
+    pub(super) per_square: NodeId,
+    /// 1/‖scale · d‖, or 0 where d = 0.
+    pub(super) reciprocal: NodeId,
+    /// d/‖d‖, or 0 where d = 0.
+    pub(super) unit: Vec<NodeId>,
+}
+
+/// A power of two that brings the largest of the numbers near 1.
+pub(super) fn common_scale(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
+    let largest = largest_magnitude(g, numbers);
+    g.power_of_two_scale(largest)
+}
+
+fn largest_magnitude(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
+    let magnitudes: Vec<_> = numbers.iter().map(|&x| g.abs(x)).collect();
+    magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components")
+}
+
+/// Notes that where d·d (which scaling brings near 1) is moderate, d needs no scaling and is not 0.
+pub(super) fn assume_moderate(g: &mut Graph, square: NodeId, scale: NodeId, zero: NodeId) {
+    let moderate = g.is_moderate(square, 2);
+    let (one, never) = (g.constant(1.0), g.truth(false));
+    g.assume(scale, one, moderate);
+    g.assume(zero, never, moderate);
+}
+
+/// Scales `d` by `scale` and finds its direction.
+pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Direction {
+    let scaled = g.scaled(scale, d);
+    let square = g.sum_of_squares(&scaled);
+    let length = g.sqrt(square);
+    let (null, one) = (g.constant(0.0), g.constant(1.0));
+    let zero = g.equal(square, null);
+    // 1/‖d‖ = √s/s, so that root and division do not wait for each other.
+    let per_square = g.div(one, square);
+    let per_square = g.select(zero, null, per_square);
+    let reciprocal = g.mul(length, per_square);
+    let unit = g.scaled(reciprocal, &scaled);
+    Direction { scale, scaled, square, length, zero, per_square, reciprocal, unit }
+}
+
+/// Finds the direction of `d`.
+pub(super) fn direction(g: &mut Graph, d: &[NodeId]) -> Direction {
+    let scale = common_scale(g, d);
+    let at = direction_scaled(g, d, scale);
+    assume_moderate(g, at.square, scale, at.zero);
+    at
+}
+
+/// The entries of P = I − n nᵀ, each by `entry(i, j)`: off the diagonal −nᵢ nⱼ, on it the other squares.
+pub(super) fn projector(g: &mut Graph, n: &[NodeId], i: usize, j: usize) -> NodeId {
+    if i == j {
+        let others: Vec<_> = n.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, &x)| x).collect();
+        return g.sum_of_squares(&others);
+    }
+    let product = g.mul(n[i], n[j]);
+    g.neg(product)
+}
+
+/// All (i, j) with i ≤ j < n.
+pub(super) fn upper(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
+}
+
+fn norm(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    Lowered::scalar(length(g, &args[0].parts))
+}
+
+fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
+    if g.form() == Form::Textbook {
+        let square = g.sum_of_squares(d);
+        return g.sqrt(square);
+    }
+    let at = direction(g, d);
+    let value = g.div(at.length, at.scale);
+    // By a and b where d = a × b.
+    let curvature = g.mul(at.reciprocal, at.scale);
+    let (arguments, (first, second)) = match parallelogram::edges(g, d) {
+        Some(edges) => (edges.concat(), parallelogram::derivatives(g, &edges, &at.unit, curvature)),
+        None => {
+            let first = at.unit.iter().map(|&n| vec![n]).collect();
+            let second = upper(d.len()).map(|(i, j)| vec![vec![curvature, projector(g, &at.unit, i, j)]]).collect();
+            (d.to_vec(), (first, second))
+        }
+    };
+    let rule = Rule::factored(Primitive::Norm, arguments, value, first, second);
+    let rule = Rule { vector: Some(d.to_vec()), ..rule.flagged(1, Flag::Degenerate, at.zero) };
+    g.add_rule(rule, d)
+}
+
+fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    Lowered::scalar(inner_product(g, &args[0].parts, &args[0].parts))
+}
+
+fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    let (q, shape) = (&args[0], args[0].shape);
+    if shape == Shape::DualQuat {
+        return super::quaternion::unit_dual(g, q);
+    }
+    let parts = unit_parts(g, &q.parts);
+    if shape == Shape::Quat {
+        g.note_origin(&parts, Origin::UnitQuaternion);
+    }
+    Lowered { shape, parts }
+}
+
+fn unit_parts(g: &mut Graph, d: &[NodeId]) -> Vec<NodeId> {
+    if g.form() == Form::Textbook {
+        let square = g.sum_of_squares(d);
+        let length = g.sqrt(square);
+        return d.iter().map(|&x| g.div(x, length)).collect();
+    }
+    let at = direction(g, d);
+    let (n, m) = (&at.unit, d.len());
+    let curvature = g.mul(at.reciprocal, at.scale);
+    let square = g.mul(curvature, curvature);
+    let component = |g: &mut Graph, i: usize| {
+        let first = (0..m)
+            .map(|j| {
+                let entry = projector(g, n, i, j);
+                g.mul(curvature, entry)
+            })
+            .collect();
+        // ∂²nᵢ/∂dⱼ∂dₖ = −(Pᵢⱼ nₖ + Pᵢₖ nⱼ + Pⱼₖ nᵢ)/r².
+        let second = upper(m)
+            .map(|(j, k)| {
+                let p = [projector(g, n, i, j), projector(g, n, i, k), projector(g, n, j, k)];
+                let sum = g.dot(&p, &[n[k], n[j], n[i]]);
+                let entry = g.mul(square, sum);
+                g.neg(entry)
+            })
+            .collect();
+        let rule = Rule::smooth(Primitive::Unit(i as u8), d.to_vec(), n[i], first, second);
+        g.add_rule(rule.flagged(0, Flag::Degenerate, at.zero), &[])
+    };
+    (0..m).map(|i| component(g, i)).collect()
+}
+
+/// ‖d‖^α with α a parameter or a constant: gradient g n, Hessian (g/r) (I + (α − 2) n nᵀ), g = α ‖d‖^(α−1). An even constant
+/// power is a polynomial of d·d. At d = 0 both are their limits, or 0 and flagged where there is none.
+pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId) -> Option<NodeId> {
+    let rule = g.rule(base)?;
+    let (d, length) = (rule.vector.clone()?, rule.value);
+    if g.varies(exponent) {
+        return None;
+    }
+    if let Some(power) = g.as_constant(exponent).filter(|power| *power > 0.0 && power % 2.0 == 0.0) {
+        let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
+        return Some(g.plain_pow(square, half));
+    }
+    let at = direction(g, &d);
+    let (null, one, two) = (g.constant(0.0), g.constant(1.0), g.constant(2.0));
+    let value = g.plain_pow(length, exponent);
+    let less_one = g.sub(exponent, one);
+    let power = g.plain_pow(length, less_one);
+    let slope = g.mul(exponent, power);
+    let slope = g.select(at.zero, null, slope);
+    let first = at.unit.iter().map(|&n| vec![slope, n]).collect();
+
+    let reciprocal = g.mul(at.reciprocal, at.scale);
+    let ratio = g.mul(slope, reciprocal);
+    let quadratic = g.equal(exponent, two);
+    let at_zero = g.select(quadratic, two, null);
+    let ratio = g.select(at.zero, at_zero, ratio);
+    let less_two = g.sub(exponent, two);
+    let second = upper(d.len())
+        .map(|(i, j)| {
+            let along = g.product(None, &[less_two, at.unit[i], at.unit[j]]);
+            // Not as a sum of two products: where the power overflows they could be opposite infinities.
+            let entry = if i == j { g.add(one, along) } else { along };
+            vec![vec![ratio, entry]]
+        })
+        .collect();
+    let (at_most_one, below_two) = (g.less_or_equal(exponent, one), g.less(exponent, two));
+    let (cone, singular) = (g.and(at.zero, at_most_one), g.and(at.zero, below_two));
+    let rule = Rule::factored(Primitive::NormPower, d, value, first, second);
+    let rule = rule.flagged(1, Flag::Degenerate, cone).flagged(2, Flag::Degenerate, singular);
+    Some(g.add_rule(rule, &[exponent]))
+}
+
+/// ‖d‖ − L with L a length that does not move: C = (r − L) + ρ, r the rounded length, ρ = (d·d − r²)/2r what rounding it lost,
+/// with the rounding errors of the edge itself: near rest r − L is exact, and ρ most of the strain. Its half square ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ,
+/// which are right at d = 0 too where L = 0.
+pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: NodeId) -> Option<NodeId> {
+    let d = g.rule(norm)?.vector.clone()?;
+    if g.varies(rest_length) {
+        return None;
+    }
+    // A length is not negative, so the largest size is found without its magnitude.
+    let largest = largest_magnitude(g, &d);
+    let largest = g.max(largest, rest_length);
+    let scale = g.power_of_two_scale(largest);
+    let at = direction_scaled(g, &d, scale);
+    assume_moderate(g, at.square, scale, at.zero);
+    let length = g.mul(scale, rest_length);
+    let (null, one, half) = (g.constant(0.0), g.constant(1.0), g.constant(0.5));
+    let slack = g.equal(length, null);
+    let rounding = rounding_of_length(g, &d, &at);
+    let (reciprocal, per_square) = if g.is(rounding, 0.0) {
+        (at.reciprocal, at.per_square)
+    } else {
+        // Below a strain of u the correction nearly cancels r − L: it takes 1/r of the rounded length itself, rounded once.
+        let reciprocal = g.div(one, at.length);
+        (reciprocal, g.mul(reciprocal, reciprocal))
+    };
+    let [reciprocal, per_square] = [reciprocal, per_square].map(|factor| g.select(at.zero, one, factor));
+    let correction = g.mul(rounding, reciprocal);
+    let rounded = g.sub(at.length, length);
+    let scaled_value = g.add(rounded, correction);
+    let value = g.div(scaled_value, scale);
+
+    // C/r, at d = 0 its limit 1 for a spring without rest length, else 0. What both derivatives have, 1/r, leads.
+    let at_zero = g.select(slack, one, null);
+    let elongation = g.select(at.zero, at_zero, scaled_value);
+    // (L/r) n nᵀ = (L/r³) d dᵀ, of the scaled vector.
+    let square = g.mul(value, value);
+    let half_value = g.mul(half, square);
+    let half_first = d.iter().map(|&x| vec![reciprocal, elongation, x]).collect();
+    let half_second = upper(d.len())
+        .map(|(i, j)| {
+            let stretching = vec![reciprocal, length, per_square, at.scaled[i], at.scaled[j]];
+            if i == j { vec![vec![reciprocal, elongation], stretching] } else { vec![stretching] }
+        })
+        .collect();
+    let not_slack = g.not(slack);
+    let collapsed = g.and(at.zero, not_slack);
+    let half_square = Rule::factored(Primitive::HalfElongationSquared, d.clone(), half_value, half_first, half_second)
+        .flagged(1, Flag::Degenerate, collapsed);
+    let half_square = g.add_rule(half_square, &[rest_length]);
+
+    // By ‖d‖, so that what depends on both gathers their derivatives.
+    let rule = Rule::smooth(Primitive::Elongation, vec![norm], value, vec![one], vec![null]);
+    Some(g.add_rule(Rule { half_square: Some(half_square), ..rule }, &[rest_length]))
+}
+
+/// ‖d‖ (‖d‖ − r) for r, the length of the scaled vector as it was rounded: half of d·d − r² as if in twice the precision,
+/// including what rounding d lost.
+fn rounding_of_length(g: &mut Graph, d: &[NodeId], at: &Direction) -> NodeId {
+    let squares: Vec<_> = at.scaled.iter().map(|&e| g.mul(e, e)).collect();
+    let mut errors: Vec<_> = at.scaled.iter().map(|&e| g.product_error(e, e)).collect();
+    let mut sum = squares[0];
+    for &square in &squares[1..] {
+        errors.push(g.sum_error(sum, square));
+        sum = g.add(sum, square);
+    }
+    errors.push(g.root_error(sum, at.length));
+    let errors = g.sum(errors);
+    let half = g.constant(0.5);
+    let errors = g.mul(half, errors);
+    let tails: Vec<_> = d.iter().map(|&x| g.rounding_tail(x)).collect();
+    let along = g.dot(&at.scaled, &tails);
+    let along = g.mul(at.scale, along);
+    g.add(errors, along)
+}

@@ -1,0 +1,105 @@
+//! The functions of the language, one row each: name, what it is, its rule of shapes, its lowering, and its bound of
+//! accuracy stand together. Operators are functions too. A robust primitive's own derivatives stand beside its lowering.
+
+mod angle;
+mod arithmetic;
+mod dihedral;
+mod elementary;
+mod exponential;
+mod inner_product;
+mod length;
+mod linear_algebra;
+mod logic;
+mod loss;
+mod parallelogram;
+mod quaternion;
+mod rotated;
+mod shape;
+mod sinc;
+mod trigonometric;
+
+pub use shape::{Lowered, Shape};
+
+use crate::graph::{Ending, Graph, Recogniser};
+
+/// One function of the language.
+pub struct Function {
+    /// Name, or the operator's symbol.
+    pub name: &'static str,
+    /// How a call looks, for messages and documentation.
+    pub usage: &'static str,
+    /// What it is.
+    pub docs: &'static str,
+    /// The shape of the result, or what was expected.
+    pub shape: fn(&[Shape]) -> Result<Shape, String>,
+    /// Nodes of the result.
+    pub lower: fn(&mut Graph, &[Lowered]) -> Lowered,
+    /// Bound on the relative rounding error of value, first and second derivative in units of roundoff, for exact arguments;
+    /// empty for what composes by the ordinary rules.
+    pub accuracy: &'static str,
+}
+
+impl std::fmt::Debug for Function {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+/// Every function and operator.
+pub fn all() -> impl Iterator<Item = &'static Function> {
+    [
+        arithmetic::FUNCTIONS,
+        elementary::FUNCTIONS,
+        exponential::FUNCTIONS,
+        trigonometric::FUNCTIONS,
+        sinc::FUNCTIONS,
+        loss::FUNCTIONS,
+        linear_algebra::FUNCTIONS,
+        length::FUNCTIONS,
+        angle::FUNCTIONS,
+        dihedral::FUNCTIONS,
+        quaternion::FUNCTIONS,
+        logic::FUNCTIONS,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// The function of that name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Function> {
+    all().find(|f| f.name == name)
+}
+
+/// The naive spellings that compile to robust forms. Where several end in the same operation, the first match counts.
+pub const RECOGNISERS: &[Recogniser] = &[
+    Recogniser {
+        spelling: "1 - dot(unit(a), unit(b))",
+        ending: Ending::Difference,
+        recognise: angle::recognise_one_minus_cosine,
+    },
+    Recogniser { spelling: "norm(d) - L", ending: Ending::Difference, recognise: length::recognise_elongation },
+    Recogniser {
+        spelling: "sin(dihedral(a, b, c, d) / 2) - sin(y / 2)",
+        ending: Ending::Difference,
+        recognise: dihedral::recognise_sine_difference,
+    },
+    Recogniser { spelling: "1 - cos(x)", ending: Ending::Difference, recognise: elementary::recognise_versine },
+    Recogniser { spelling: "exp(x) - 1", ending: Ending::Difference, recognise: exponential::recognise_expm1 },
+    Recogniser {
+        spelling: "sqrt(c * (1 - dot(unit(a), unit(b))))",
+        ending: Ending::Root,
+        recognise: angle::recognise_root,
+    },
+    Recogniser {
+        spelling: "sin(dihedral(a, b, c, d)), and of half the angle",
+        ending: Ending::Sine,
+        recognise: dihedral::recognise_sine,
+    },
+    Recogniser {
+        spelling: "cos(dihedral(a, b, c, d)), and of half the angle",
+        ending: Ending::Cosine,
+        recognise: dihedral::recognise_cosine,
+    },
+    Recogniser { spelling: "norm(d)^α", ending: Ending::Power, recognise: length::recognise_norm_power },
+];

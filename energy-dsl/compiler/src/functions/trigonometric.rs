@@ -1,0 +1,81 @@
+//! Tangent, and the inverses of sine and cosine.
+
+use super::elementary::one_scalar;
+use super::{Function, Lowered};
+use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
+use energy_runtime::Flag;
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
+        name: "tan",
+        usage: "tan(x)",
+        docs: "Tangent of an angle in radians.",
+        shape: one_scalar,
+        lower: |g, a| Lowered::scalar(tan(g, a[0].node())),
+        accuracy: "3 / 5 / 7",
+    },
+    Function {
+        name: "asin",
+        usage: "asin(x)",
+        docs: "The angle in [−π/2, π/2] whose sine is x, clamped to [−1, 1]: beyond it is ±π/2, and flagged. Where |x| ≥ 1 its derivatives are taken as 0 and flagged.",
+        shape: one_scalar,
+        lower: |g, a| Lowered::scalar(arc(g, a[0].node(), Primitive::ArcSine)),
+        accuracy: "3 / 3 / 8",
+    },
+    Function {
+        name: "acos",
+        usage: "acos(x)",
+        docs: "The angle in [0, π] whose cosine is x, clamped to [−1, 1] and flagged like asin. `acos(dot(unit(a), unit(b)))` is `angle(a, b)`.",
+        shape: one_scalar,
+        lower: |g, a| Lowered::scalar(acos(g, a[0].node())),
+        accuracy: "3 / 3 / 8",
+    },
+];
+
+/// sin x / cos x: first derivative 1/cos² x, second 2 tan x / cos² x.
+fn tan(g: &mut Graph, x: NodeId) -> NodeId {
+    let (sine, cosine) = (g.sin(x), g.cos(x));
+    let value = g.div(sine, cosine);
+    if g.form() == Form::Textbook {
+        return value;
+    }
+    let (one, two) = (g.constant(1.0), g.constant(2.0));
+    let reciprocal = g.div(one, cosine);
+    let first = g.mul(reciprocal, reciprocal);
+    let second = g.product(None, &[two, value, first]);
+    g.add_rule(Rule::smooth(Primitive::Tangent, vec![x], value, vec![first], vec![second]), &[])
+}
+
+fn acos(g: &mut Graph, x: NodeId) -> NodeId {
+    if g.form() == Form::Robust
+        && let Some(rule) = g.rule(x).filter(|r| r.primitive == Primitive::Cosine)
+    {
+        let vectors = rule.arguments.clone();
+        return super::angle::between(g, &vectors[..3], &vectors[3..]);
+    }
+    arc(g, x, Primitive::ArcCosine)
+}
+
+/// With c = √((1 − x)(1 + x)), asin x = atan2(x, c) and acos x = atan2(c, x): first derivatives ±1/c, second ±x/c³.
+fn arc(g: &mut Graph, x: NodeId, primitive: Primitive) -> NodeId {
+    let (null, one, minus_one) = (g.constant(0.0), g.constant(1.0), g.constant(-1.0));
+    let is_sine = primitive == Primitive::ArcSine;
+    let below = g.max(x, minus_one);
+    let clamped = g.min(below, one);
+    let (left, right) = (g.sub(one, clamped), g.add(one, clamped));
+    let square = g.mul(left, right);
+    let other = g.sqrt(square);
+    let value = if is_sine { g.atan2(clamped, other) } else { g.atan2(other, clamped) };
+    if g.form() == Form::Textbook {
+        return value;
+    }
+    let reciprocal = g.div(one, other);
+    let end = g.equal(square, null);
+    let reciprocal = g.select(end, null, reciprocal);
+    let second = g.product(None, &[clamped, reciprocal, reciprocal, reciprocal]);
+    let magnitude = g.abs(x);
+    let outside = g.less(one, magnitude);
+    let (first, second) = if is_sine { (reciprocal, second) } else { (g.neg(reciprocal), g.neg(second)) };
+    let rule = Rule::smooth(primitive, vec![x], value, vec![first], vec![second]);
+    g.add_rule(rule.flagged(0, Flag::Degenerate, outside).flagged(1, Flag::Degenerate, end), &[])
+}

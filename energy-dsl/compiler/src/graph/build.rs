@@ -1,0 +1,406 @@
+//! Constructors of nodes. They fold constants, zeros and ones, move signs outwards, and order the operands of what commutes,
+//! so that equal expressions meet. No rewrite here changes how a result is rounded, save that a product with constants
+//! that are powers of two is regrouped, which is exact.
+
+use super::recognise::Ending;
+use super::{Form, Graph, Input, NodeId, Op};
+use energy_runtime::Number;
+
+impl Graph {
+    pub(crate) fn push(&mut self, op: Op, varies: bool) -> NodeId {
+        let id = NodeId(u32::try_from(self.nodes.len()).expect("fewer than 2³² nodes"));
+        for operand in op.operands() {
+            self.users[operand.0 as usize] += 1;
+        }
+        self.nodes.push(op);
+        self.varies.push(varies);
+        self.users.push(0);
+        id
+    }
+
+    pub(super) fn node(&mut self, op: Op) -> NodeId {
+        if let Some(&id) = self.index.get(&op) {
+            return id;
+        }
+        let varies = match op {
+            Op::Input(Input::Position(_) | Input::Velocity(_)) => true,
+            _ => op.operands().any(|o| self.varies(o)),
+        };
+        let id = self.push(op, varies);
+        self.index.insert(op, id);
+        id
+    }
+
+    /// A constant.
+    pub fn constant(&mut self, value: f64) -> NodeId {
+        // One zero: where its sign matters, code asks for it by a selection.
+        self.node(Op::Constant((value + 0.0).to_bits()))
+    }
+
+    /// π.
+    pub fn pi(&mut self) -> NodeId {
+        self.node(Op::Pi)
+    }
+
+    /// An input.
+    pub fn input(&mut self, input: Input) -> NodeId {
+        self.node(Op::Input(input))
+    }
+
+    /// The number a node always is, if it is one.
+    #[must_use]
+    pub fn as_constant(&self, node: NodeId) -> Option<f64> {
+        match self.op(node) {
+            Op::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// Whether the node is the constant `value`.
+    #[must_use]
+    pub fn is(&self, node: NodeId, value: f64) -> bool {
+        self.as_constant(node) == Some(value)
+    }
+
+    /// The node without its leading minus sign, and whether it had one.
+    pub(super) fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
+        match self.op(node) {
+            Op::Neg(a) => (a, true),
+            _ => (node, false),
+        }
+    }
+
+    pub(super) fn signed(&mut self, node: NodeId, negative: bool) -> NodeId {
+        if negative { self.neg(node) } else { node }
+    }
+
+    /// −a.
+    pub fn neg(&mut self, a: NodeId) -> NodeId {
+        match self.op(a) {
+            Op::Constant(bits) => self.constant(-f64::from_bits(bits)),
+            Op::Neg(b) => b,
+            Op::Sub(b, c) => self.node(Op::Sub(c, b)),
+            _ => self.node(Op::Neg(a)),
+        }
+    }
+
+    /// Whether an operation on constants is done here: always where doubles compute, but the textbook form, which is also
+    /// evaluated to more digits, only takes results that are exact.
+    fn folds(&self, exact: bool) -> bool {
+        exact || self.form() == Form::Robust
+    }
+
+    /// a + b.
+    pub fn add(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
+            && self.folds(x.sum_error(y) == 0.0)
+        {
+            return self.constant(x + y);
+        }
+        if self.is(a, 0.0) {
+            return b;
+        }
+        if self.is(b, 0.0) {
+            return a;
+        }
+        if a == b {
+            let two = self.constant(2.0);
+            return self.mul(two, a);
+        }
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => {
+                let sum = self.add(x, y);
+                self.neg(sum)
+            }
+            ((x, true), (y, false)) => self.sub(y, x),
+            ((x, false), (y, true)) => self.sub(x, y),
+            _ if self.outward
+                && let Some((c, x, y)) = self.common_power_of_two(a, b) =>
+            {
+                let (c, sum) = (self.constant(c), self.add(x, y));
+                self.mul(c, sum)
+            }
+            // One order for both, that written first: it decides which product a sum takes along.
+            _ if self.index.contains_key(&Op::Add(b, a)) => self.node(Op::Add(b, a)),
+            _ => self.node(Op::Add(a, b)),
+        }
+    }
+
+    /// a − b. With a = 1 and b a cosine between vectors, 1 − cos of the angle; with a = ‖d‖ and b a length, the elongation.
+    pub fn sub(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
+            && self.folds(x.sum_error(-y) == 0.0)
+        {
+            return self.constant(x - y);
+        }
+        if a == b {
+            return self.constant(0.0);
+        }
+        if self.is(a, 0.0) {
+            return self.neg(b);
+        }
+        if self.is(b, 0.0) {
+            return a;
+        }
+        if let Some(recognised) = self.recognised(Ending::Difference, a, b) {
+            return recognised;
+        }
+        match (self.magnitude(a), self.magnitude(b)) {
+            ((x, true), (y, true)) => self.sub(y, x),
+            ((x, true), (y, false)) => {
+                let sum = self.add(x, y);
+                self.neg(sum)
+            }
+            ((x, false), (y, true)) => self.add(x, y),
+            _ if self.outward
+                && let Some((c, x, y)) = self.common_power_of_two(a, b) =>
+            {
+                let (c, difference) = (self.constant(c), self.sub(x, y));
+                self.mul(c, difference)
+            }
+            _ => {
+                // The opposite difference may be there already.
+                if let Some(&opposite) = self.index.get(&Op::Sub(b, a)) {
+                    return self.node(Op::Neg(opposite));
+                }
+                self.node(Op::Sub(a, b))
+            }
+        }
+    }
+
+    /// a − b without recognition.
+    pub(crate) fn plain_difference(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Sub(a, b))
+    }
+
+    /// a · b. A squared elongation becomes its own primitive.
+    pub fn mul(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
+            && self.folds(x.mul_add(y, -(x * y)) == 0.0)
+        {
+            return self.constant(x * y);
+        }
+        let (a, b) = if self.as_constant(b).is_some() { (b, a) } else { (a, b) };
+        if let Some(x) = self.as_constant(a) {
+            if x == 0.0 || x == 1.0 || x == -1.0 {
+                return if x == 0.0 { a } else { self.signed(b, x < 0.0) };
+            }
+            if let Some(regrouped) = self.regroup(x, b) {
+                return regrouped;
+            }
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        if a == b
+            && self.form() == Form::Robust
+            && let Some(half_square) = self.rule(a).and_then(|r| r.half_square)
+        {
+            let two = self.constant(2.0);
+            let square = self.mul(two, half_square);
+            return self.signed(square, minus_a != minus_b);
+        }
+        // (2ⁿ x)(2ᵐ y) = 2ⁿ⁺ᵐ (x y), exactly.
+        let ((c, x), (d, y)) = (self.power_of_two_times(a), self.power_of_two_times(b));
+        let outward = self.outward && [(x, a), (y, b)].into_iter().any(|(x, a)| x != a && self.varies(x));
+        if outward && self.as_constant(a).is_none() || x != a && y != b {
+            let (constant, product) = (self.constant(c * d), self.mul(x, y));
+            let product = self.mul(constant, product);
+            return self.signed(product, minus_a != minus_b);
+        }
+        for (scale, scaled) in [(a, b), (b, a)] {
+            if self.is_scale(scale) {
+                self.round(scaled);
+            }
+        }
+        let product = self.node(Op::Mul(a.min(b), a.max(b)));
+        self.signed(product, minus_a != minus_b)
+    }
+
+    /// a · b with a sign left before a factor.
+    pub(super) fn signed_product(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Mul(a.min(b), a.max(b)))
+    }
+
+    /// The constant and the other factor of a product.
+    fn scaled_by_constant(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
+        match self.op(node) {
+            Op::Mul(c, y) if self.as_constant(c).is_some() => Some((c, y)),
+            Op::Mul(y, c) if self.as_constant(c).is_some() => Some((c, y)),
+            _ => None,
+        }
+    }
+
+    /// The power of two that leads a product, and what it multiplies; 1 and the node itself if there is none.
+    fn power_of_two_times(&self, node: NodeId) -> (f64, NodeId) {
+        let scaled = self.scaled_by_constant(node);
+        let scaled = scaled.and_then(|(c, x)| Some((self.as_constant(c).filter(|&c| is_power_of_two(c))?, x)));
+        scaled.unwrap_or((1.0, node))
+    }
+
+    /// The power of two that leads both terms of a sum, and what it multiplies.
+    fn common_power_of_two(&self, a: NodeId, b: NodeId) -> Option<(f64, NodeId, NodeId)> {
+        let ((c, x), (d, y)) = (self.power_of_two_times(a), self.power_of_two_times(b));
+        (c == d && c != 1.0).then_some((c, x, y))
+    }
+
+    /// x · (c · y) with both constants powers of two.
+    fn regroup(&mut self, x: f64, b: NodeId) -> Option<NodeId> {
+        let (c, y) = self.scaled_by_constant(b)?;
+        let c = self.as_constant(c)?;
+        if !(is_power_of_two(x) && is_power_of_two(c)) {
+            return None;
+        }
+        let factor = self.constant(x * c);
+        Some(self.mul(factor, y))
+    }
+
+    /// a / b; by a power of two, a product.
+    pub fn div(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if self.is(a, 0.0) {
+            return a;
+        }
+        if let Some(y) = self.as_constant(b) {
+            if let Some(x) = self.as_constant(a)
+                && self.folds((x / y).mul_add(y, -x) == 0.0)
+            {
+                return self.constant(x / y);
+            }
+            if is_power_of_two(y) {
+                let reciprocal = self.constant(1.0 / y);
+                return self.mul(reciprocal, a);
+            }
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.magnitude(a), self.magnitude(b));
+        if self.is_scale(b) {
+            self.round(a);
+        }
+        let quotient = self.node(Op::Div(a, b));
+        self.signed(quotient, minus_a != minus_b)
+    }
+
+    fn unary(&mut self, a: NodeId, fold: fn(f64) -> f64, op: fn(NodeId) -> Op) -> NodeId {
+        match self.as_constant(a) {
+            Some(x) if self.folds(is_exact(x, fold(x))) => self.constant(fold(x)),
+            _ => self.node(op(a)),
+        }
+    }
+
+    /// √a; of 1 − cos between vectors, its own primitive.
+    pub fn sqrt(&mut self, a: NodeId) -> NodeId {
+        if let Some(recognised) = self.recognised(Ending::Root, a, a) {
+            return recognised;
+        }
+        self.plain_sqrt(a)
+    }
+
+    /// √a without recognition.
+    pub(crate) fn plain_sqrt(&mut self, a: NodeId) -> NodeId {
+        self.unary(a, f64::sqrt, Op::Sqrt)
+    }
+
+    /// |a|.
+    pub fn abs(&mut self, a: NodeId) -> NodeId {
+        let (a, _) = self.magnitude(a);
+        self.unary(a, f64::abs, Op::Abs)
+    }
+
+    /// sin a; of a dihedral angle or its half, without the angle.
+    pub fn sin(&mut self, a: NodeId) -> NodeId {
+        if let Some(recognised) = self.recognised(Ending::Sine, a, a) {
+            return recognised;
+        }
+        self.unary(a, f64::sin, Op::Sin)
+    }
+
+    /// cos a; of a dihedral angle or its half, without the angle.
+    pub fn cos(&mut self, a: NodeId) -> NodeId {
+        if let Some(recognised) = self.recognised(Ending::Cosine, a, a) {
+            return recognised;
+        }
+        self.unary(a, f64::cos, Op::Cos)
+    }
+
+    /// eᵃ.
+    pub fn exp(&mut self, a: NodeId) -> NodeId {
+        self.unary(a, f64::exp, Op::Exp)
+    }
+
+    /// ln a.
+    pub fn ln(&mut self, a: NodeId) -> NodeId {
+        self.unary(a, f64::ln, Op::Ln)
+    }
+
+    /// atan2(y, x).
+    pub fn atan2(&mut self, y: NodeId, x: NodeId) -> NodeId {
+        self.node(Op::Atan2(y, x))
+    }
+
+    /// atan2(y, x) where y² + x² is moderate.
+    pub fn moderate_atan2(&mut self, y: NodeId, x: NodeId) -> NodeId {
+        self.node(Op::ModerateAtan2(y, x))
+    }
+
+    /// min(a, b).
+    pub fn min(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if a == b { a } else { self.node(Op::Min(a.min(b), a.max(b))) }
+    }
+
+    /// max(a, b).
+    pub fn max(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if a == b { a } else { self.node(Op::Max(a.min(b), a.max(b))) }
+    }
+
+    /// a^b: products for integers, a root for halves, `powf` for what is left. A power of a norm is its own primitive.
+    pub fn pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        if let Some(recognised) = self.recognised(Ending::Power, a, b) {
+            return recognised;
+        }
+        self.plain_pow(a, b)
+    }
+
+    /// a^b without recognition.
+    pub(crate) fn plain_pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        let Some(exponent) = self.as_constant(b) else { return self.node(Op::Pow(a, b)) };
+        if let Some(x) = self.as_constant(a)
+            && self.folds(false)
+        {
+            return self.constant(x.powf(exponent));
+        }
+        let doubled = 2.0 * exponent;
+        if doubled.fract() != 0.0 || doubled.abs() > 64.0 {
+            return self.node(Op::Pow(a, b));
+        }
+        let whole = exponent.abs().floor();
+        let mut power = self.integer_power(a, whole as u32);
+        if exponent.fract() != 0.0 {
+            let root = self.sqrt(a);
+            power = self.mul(power, root);
+        }
+        if exponent < 0.0 {
+            let one = self.constant(1.0);
+            power = self.div(one, power);
+        }
+        power
+    }
+
+    fn integer_power(&mut self, a: NodeId, exponent: u32) -> NodeId {
+        match exponent {
+            0 => self.constant(1.0),
+            1 => a,
+            n => {
+                let half = self.integer_power(a, n / 2);
+                let square = self.mul(half, half);
+                if n % 2 == 1 { self.mul(square, a) } else { square }
+            }
+        }
+    }
+}
+
+/// Whether a function of one number is known to have an exact result: |x|, a root that is a double, or at 0 and 1 what are
+/// integers there.
+fn is_exact(x: f64, result: f64) -> bool {
+    result == x.abs() || result.mul_add(result, -x) == 0.0 || (result.fract() == 0.0 && (x == 0.0 || x == 1.0))
+}
+
+pub(super) fn is_power_of_two(value: f64) -> bool {
+    value != 0.0 && value.is_normal() && value.to_bits() & ((1 << 52) - 1) == 0
+}

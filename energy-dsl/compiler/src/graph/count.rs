@@ -1,0 +1,44 @@
+use std::collections::BTreeSet;
+
+use super::{Graph, NodeId, Op};
+use energy_runtime::OperationCount;
+
+/// The nodes that must be computed for `outputs`, in ascending (hence topological) order, rules replaced by their values.
+#[must_use]
+pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
+    let mut seen = BTreeSet::new();
+    let mut stack: Vec<NodeId> = outputs.iter().map(|&o| graph.resolve(o)).collect();
+    while let Some(node) = stack.pop() {
+        if seen.insert(node) {
+            stack.extend(graph.fused(node).operands().map(|o| graph.resolve(o)));
+        }
+    }
+    seen
+}
+
+/// The arithmetic needed for `outputs`.
+#[must_use]
+pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
+    let mut count = OperationCount::default();
+    for node in reachable(graph, outputs) {
+        match graph.fused(node) {
+            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => {}
+            Op::Rule(_) => unreachable!("resolved"),
+            Op::Div(..) | Op::Sqrt(_) => count.divisions_and_roots += 1,
+            Op::Sin(_) | Op::Cos(_) | Op::Exp(_) | Op::Ln(_) | Op::Atan2(..) | Op::ModerateAtan2(..) | Op::Pow(..) => {
+                count.transcendental += 1
+            }
+            Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) | Op::RootError(..) => {
+                count.error_terms += 1
+            }
+            // Its product alone, beside an error term.
+            Op::FusedMulSub(..) => {
+                count.basic += 1;
+                count.error_terms += 1;
+            }
+            Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) | Op::NegMulSub(..) => count.fused += 1,
+            _ => count.basic += 1,
+        }
+    }
+    count
+}

@@ -1,0 +1,278 @@
+use super::node::NodeId;
+use super::{Graph, Op};
+use energy_runtime::Flag;
+
+/// A robust primitive of the language; each output of a vector-valued one is a primitive of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Primitive {
+    /// x·y.
+    InnerProduct,
+    /// 1/‖d‖.
+    ReciprocalNorm,
+    /// ‖d‖.
+    Norm,
+    /// A component of d/‖d‖.
+    Unit(u8),
+    /// ‖d‖^α.
+    NormPower,
+    /// ‖d‖ − L.
+    Elongation,
+    /// ½ (‖d‖ − L)².
+    HalfElongationSquared,
+    /// cos of the angle between two vectors.
+    Cosine,
+    /// 1 − cos of the angle between two vectors.
+    OneMinusCosine,
+    /// The unsigned angle between two vectors.
+    Angle,
+    /// The signed dihedral angle θ of a hinge.
+    Dihedral,
+    /// sin θ of a dihedral angle.
+    DihedralSine,
+    /// cos θ of a dihedral angle.
+    DihedralCosine,
+    /// sin θ/2 of a dihedral angle.
+    DihedralSineHalf,
+    /// cos θ/2 of a dihedral angle.
+    DihedralCosineHalf,
+    /// sin θ/2 − sin θ₀/2 of a dihedral angle and its rest angle.
+    DihedralSineDifference,
+    /// 1 − cos x.
+    Versine,
+    /// x − sin x.
+    SineRemainder,
+    /// cos √y.
+    CosSqrt,
+    /// sin √y / √y.
+    SincSqrt,
+    /// The derivative of sin √y / √y.
+    SincSqrtSlope,
+    /// sin x / x.
+    Sinc,
+    /// √(c (1 − cos)) of the angle between two vectors.
+    RootOneMinusCosine,
+    /// ln(1 + x).
+    Log1p,
+    /// ln(1 + x) − x.
+    Log1pmx,
+    /// eˣ − 1.
+    Expm1,
+    /// ln(1 + eˣ).
+    Softplus,
+    /// Quadratic up to a threshold, then linear.
+    Huber,
+    /// A smooth one.
+    PseudoHuber,
+    /// tan x.
+    Tangent,
+    /// asin x.
+    ArcSine,
+    /// acos x.
+    ArcCosine,
+    /// A first partial derivative of another rule's output.
+    Partial {
+        /// The node differentiated.
+        of: u32,
+        /// By which argument.
+        by: u8,
+    },
+}
+
+impl Primitive {
+    /// What the documentation of generated code calls it.
+    #[must_use]
+    pub const fn label(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Norm => "norm ‖d‖",
+            Self::Unit(_) => "unit vector d/‖d‖",
+            Self::NormPower => "power of a norm ‖d‖^α",
+            Self::Elongation => "elongation ‖d‖ − L",
+            Self::HalfElongationSquared => "squared elongation ½(‖d‖ − L)²",
+            Self::Cosine => "cosine between vectors",
+            Self::OneMinusCosine => "1 − cosine between vectors",
+            Self::Angle => "angle between vectors",
+            Self::Dihedral => "dihedral angle θ",
+            Self::DihedralSine => "sin θ of a dihedral angle",
+            Self::DihedralCosine => "cos θ of a dihedral angle",
+            Self::DihedralSineHalf => "sin θ/2 of a dihedral angle",
+            Self::DihedralCosineHalf => "cos θ/2 of a dihedral angle",
+            Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
+            Self::Versine => "1 − cos x",
+            Self::SineRemainder => "x − sin x",
+            Self::ReciprocalNorm => "reciprocal norm 1/‖d‖",
+            Self::CosSqrt => "cos √y",
+            Self::SincSqrt => "sin √y / √y",
+            Self::Sinc => "sin x / x",
+            Self::RootOneMinusCosine => "√(1 − cosine between vectors)",
+            Self::Log1p => "log1p",
+            Self::Log1pmx => "log1pmx",
+            Self::Expm1 => "expm1",
+            Self::Softplus => "softplus",
+            Self::Huber => "Huber loss",
+            Self::PseudoHuber => "pseudo-Huber loss",
+            Self::Tangent => "tan x",
+            Self::ArcSine => "asin x",
+            Self::ArcCosine => "acos x",
+            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
+        })
+    }
+}
+
+/// A condition that the caller is told of, from a given order of derivative on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RuleFlag {
+    /// 0: already the value is a convention; 1: first derivatives are; 2: second derivatives are.
+    pub order: u8,
+    /// What is met.
+    pub flag: Flag,
+    /// The mask node.
+    pub mask: NodeId,
+}
+
+/// A primitive's value and its own derivatives, each an expression of the same graph.
+#[derive(Clone, Debug)]
+pub struct Rule {
+    /// Which primitive.
+    pub primitive: Primitive,
+    /// What it is differentiated by.
+    pub arguments: Vec<NodeId>,
+    /// The expression that computes it.
+    pub value: NodeId,
+    /// ∂value/∂argument.
+    pub first: Vec<Product>,
+    /// ∂²value/∂argument², upper triangle row by row (see [`symmetric_index`]), each a sum of products; `None`: differentiate
+    /// `value` instead.
+    pub second: Option<Vec<Vec<Product>>>,
+    /// Conditions.
+    pub flags: Vec<RuleFlag>,
+    /// Of a dihedral angle: the pieces its sine and cosine are made of.
+    pub dihedral: Option<DihedralParts>,
+    /// Of an elongation: its rule's square.
+    pub half_square: Option<NodeId>,
+    /// Of a length: the vector.
+    pub vector: Option<Vec<NodeId>>,
+}
+
+/// Factors, to be multiplied from left to right: what weighs the product multiplies the first, so that entries that share
+/// their leading factors share those products too.
+pub type Product = Vec<NodeId>;
+
+/// The functions of a dihedral angle that are better computed without it.
+#[derive(Clone, Copy, Debug)]
+pub struct DihedralParts {
+    /// sin θ.
+    pub sine: NodeId,
+    /// cos θ.
+    pub cosine: NodeId,
+    /// sin θ/2.
+    pub sine_half: NodeId,
+    /// cos θ/2.
+    pub cosine_half: NodeId,
+    /// Where θ is a convention.
+    pub degenerate: NodeId,
+}
+
+/// The place of (i, j), i ≤ j < n, in an upper triangle stored row by row.
+#[must_use]
+pub const fn symmetric_index(n: usize, i: usize, j: usize) -> usize {
+    let (i, j) = if i <= j { (i, j) } else { (j, i) };
+    i * n - i * (i + 1) / 2 + j
+}
+
+impl Graph {
+    /// The node of a rule. `extra` tells apart rules whose primitive and arguments agree but whose constants do not.
+    pub(crate) fn add_rule(&mut self, rule: Rule, extra: &[NodeId]) -> NodeId {
+        let mut key = rule.arguments.clone();
+        key.extend_from_slice(extra);
+        let key = (rule.primitive, key);
+        if let Some(&node) = self.rule_index.get(&key) {
+            return node;
+        }
+        let varies = rule.arguments.iter().any(|&a| self.varies(a));
+        if !varies {
+            // Nothing will differentiate it; its value stands for itself, unless the caller must hear of a condition.
+            if rule.flags.is_empty() && rule.dihedral.is_none() && rule.half_square.is_none() {
+                return rule.value;
+            }
+        }
+        self.rules.push(rule);
+        let id = u32::try_from(self.rules.len() - 1).expect("fewer than 2³² rules");
+        let node = self.push(Op::Rule(id), varies);
+        self.rule_index.insert(key, node);
+        node
+    }
+
+    /// Node of ∂(rule output)/∂(its `by`-th argument), itself a rule where second derivatives are known.
+    pub(crate) fn partial(&mut self, of: NodeId, by: usize) -> NodeId {
+        let rule = self.rule(of).expect("only rules have partials of their own").clone();
+        let value = self.product(None, &rule.first[by]);
+        let n = rule.arguments.len();
+        let Some(second) = &rule.second else { return value };
+        if self.rule(value).is_some() || !self.varies(value) {
+            return value;
+        }
+        let first = (0..n).map(|j| vec![self.sum_of_products(None, &second[symmetric_index(n, by, j)])]).collect();
+        let flags = rule.flags.iter().map(|f| RuleFlag { order: f.order.saturating_sub(1), ..*f }).collect();
+        let by = u8::try_from(by).expect("few arguments");
+        self.add_rule(
+            Rule {
+                primitive: Primitive::Partial { of: of.0, by },
+                arguments: rule.arguments,
+                value,
+                first,
+                second: None,
+                flags,
+                dihedral: None,
+                half_square: None,
+                vector: None,
+            },
+            &[],
+        )
+    }
+}
+
+impl Rule {
+    /// A rule without conditions.
+    #[must_use]
+    pub fn smooth(
+        primitive: Primitive,
+        arguments: Vec<NodeId>,
+        value: NodeId,
+        first: Vec<NodeId>,
+        second: Vec<NodeId>,
+    ) -> Self {
+        let first = first.into_iter().map(|entry| vec![entry]).collect();
+        let second = second.into_iter().map(|entry| vec![vec![entry]]).collect();
+        Self::factored(primitive, arguments, value, first, second)
+    }
+
+    /// A rule without conditions whose derivatives are products.
+    #[must_use]
+    pub fn factored(
+        primitive: Primitive,
+        arguments: Vec<NodeId>,
+        value: NodeId,
+        first: Vec<Product>,
+        second: Vec<Vec<Product>>,
+    ) -> Self {
+        let second = Some(second);
+        Self {
+            primitive,
+            arguments,
+            value,
+            first,
+            second,
+            flags: Vec::new(),
+            dihedral: None,
+            half_square: None,
+            vector: None,
+        }
+    }
+
+    /// The same with a condition.
+    #[must_use]
+    pub fn flagged(mut self, order: u8, flag: Flag, mask: NodeId) -> Self {
+        self.flags.push(RuleFlag { order, flag, mask });
+        self
+    }
+}

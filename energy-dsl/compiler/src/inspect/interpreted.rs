@@ -1,0 +1,365 @@
+use crate::check::{Input, Program};
+use crate::diagnostic::Diagnostics;
+use crate::emit::{Character, character};
+use crate::graph::{self, NodeId, Op, count};
+use crate::inspect::mutation::{Mutation, faults};
+use crate::inspect::tape::Tape;
+use crate::inspect::textbook::{file_programs, programs};
+use crate::lower::lower;
+use crate::routines::{Routines, differentiate};
+use energy_runtime::{
+    Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, RestError, Routine, settle, triangle_index,
+};
+
+/// An element whose compiled routines are interpreted, not emitted as Rust: what a text read at run time can be evaluated and
+/// audited by. Its numbers are those of the generated code where products and sums do not fuse.
+///
+/// ```
+/// use energy_compiler::{Inputs, Interpreted};
+///
+/// let pull = Interpreted::from_source("energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }").unwrap().remove(0);
+/// let x = [3.0, 0.0, 4.0, 0.0, 0.0, 0.0];
+/// let outputs = pull.evaluate(&Inputs { parameters: &[2.0], rest: &[], positions: &x, velocities: &[] }).unwrap();
+/// assert_eq!(outputs.blocks[0], ("energy", vec![25.0]));
+/// assert_eq!(outputs.blocks[1].1[..3], [6.0, 0.0, 8.0]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Interpreted {
+    declaration: &'static Declaration,
+    rest: Tape,
+    routines: Vec<InterpretedRoutine>,
+}
+
+/// The routines that blocks come from.
+const EVALUATED: [&str; 8] =
+    ["value", "gradient", "hessian", "force", "jacobians", "constraint_jacobian", "residual", "jacobian"];
+
+#[derive(Clone, Debug)]
+struct InterpretedRoutine {
+    name: &'static str,
+    ordinary: Tape,
+    /// Which of the two flags each mask of the tape stands for.
+    ordinary_flags: [bool; 2],
+    general: Option<GeneralPath>,
+}
+
+#[derive(Clone, Debug)]
+struct GeneralPath {
+    guard: Tape,
+    tape: Tape,
+    flags: [bool; 2],
+}
+
+impl Interpreted {
+    /// Compiles the declarations of a text.
+    ///
+    /// Their descriptions stay in memory until the program ends, as those of generated elements do.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text.
+    pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
+        Ok(programs(source)?
+            .iter()
+            .map(|program| Self::new(program, &differentiate(program, lower(program))))
+            .collect())
+    }
+
+    /// Compiles the declarations of a file, whose text this is.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, at its places in the file.
+    pub fn from_file(text: &str, file: &str) -> Result<Vec<Self>, Diagnostics> {
+        Ok(file_programs(text, file)?
+            .iter()
+            .map(|program| Self::new(program, &differentiate(program, lower(program))))
+            .collect())
+    }
+
+    fn new(program: &Program, routines: &Routines) -> Self {
+        let masks = |flags: [Option<NodeId>; 2]| flags.into_iter().flatten().collect::<Vec<_>>();
+        let present = |flags: [Option<NodeId>; 2]| flags.map(|flag| flag.is_some());
+        let graph = &routines.graph;
+        let list = routines.list.iter().map(|routine| InterpretedRoutine {
+            name: routine.name,
+            ordinary: Tape::new(graph, &routine.groups, &masks(routine.flags)),
+            ordinary_flags: present(routine.flags),
+            general: routine.general.as_ref().map(|general| GeneralPath {
+                guard: Tape::new(graph, &[], &[general.ordinary]),
+                tape: Tape::new(graph, &general.groups, &masks(general.flags)),
+                flags: present(general.flags),
+            }),
+        });
+        let degenerate: Vec<NodeId> = routines.rest_flags[0].into_iter().collect();
+        Self {
+            declaration: Box::leak(Box::new(describe(program, routines))),
+            rest: Tape::new(&routines.rest.graph, std::slice::from_ref(&routines.rest.outputs), &degenerate),
+            routines: list.collect(),
+        }
+    }
+
+    /// What was declared.
+    #[must_use]
+    pub fn declaration(&self) -> &'static Declaration {
+        self.declaration
+    }
+
+    /// Every block, as generated code's `Element::evaluate` gives them.
+    ///
+    /// # Errors
+    /// When the rest shape is degenerate.
+    ///
+    /// # Panics
+    /// When an input slice other than that of velocities is shorter than declared.
+    pub fn evaluate<T: Number>(&self, inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
+        let rest = self.precomputed(inputs)?;
+        let run = |name: &str| {
+            let routine = self.routines.iter().find(|r| r.name == name);
+            routine.expect("compiler bug: the kind decides the routines").run(inputs, &rest)
+        };
+        let points = self.declaration.points.len();
+        let (mut blocks, mut repeats) = (Vec::new(), Vec::new());
+        let mut flags = [Flags::clear(), Flags::clear(), Flags::clear()];
+        if matches!(self.declaration.kind, Kind::Energy | Kind::Constraint) {
+            let (value, gradient, hessian) = (run("value"), run("gradient"), run("hessian"));
+            blocks.push(("energy", value.group(0)));
+            blocks.push(("grad", gradient.group(1)));
+            blocks.push(("hess", full_triangle(points, &hessian.group(2))));
+            repeats.push(("gradient", "energy", gradient.group(0)));
+            repeats.extend([("hessian", "energy", hessian.group(0)), ("hessian", "grad", hessian.group(1))]);
+            flags = [value.flags, gradient.flags, hessian.flags];
+        }
+        if matches!(self.declaration.kind, Kind::Force | Kind::Constraint) {
+            let (force, jacobians) = (run("force"), run("jacobians"));
+            blocks.push(("force", force.group(0)));
+            blocks.push(("dfdx", full_square(points, &jacobians.group(1))));
+            blocks.push(("dfdv", full_square(points, &jacobians.group(2))));
+            repeats.push(("jacobians", "force", jacobians.group(0)));
+            if self.declaration.kind == Kind::Force {
+                flags = [force.flags, jacobians.flags.clone(), jacobians.flags];
+            }
+        }
+        match self.declaration.kind {
+            Kind::Constraint => {
+                let jacobian = run("constraint_jacobian");
+                blocks.extend([("constraint", jacobian.group(0)), ("jacobian", jacobian.group(1))]);
+            }
+            Kind::Residual => {
+                let (residual, jacobian) = (run("residual"), run("jacobian"));
+                blocks.extend([("residual", residual.group(0)), ("jacobian", jacobian.group(1))]);
+                repeats.push(("jacobian", "residual", jacobian.group(0)));
+                flags = [residual.flags, jacobian.flags, Flags::clear()];
+            }
+            Kind::Energy | Kind::Force => {}
+        }
+        Ok(Outputs { blocks, repeats, flags })
+    }
+
+    /// One routine alone (`value`, `gradient`, `hessian`, …), from what [`Self::precomputed`] made of the rest shape: its numbers by group, a
+    /// Hessian as its triangle of blocks, and whether a condition was met. `None` where the kind has no such routine.
+    ///
+    /// ```
+    /// use energy_compiler::{Inputs, Interpreted};
+    ///
+    /// let pull = Interpreted::from_source("energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }").unwrap().remove(0);
+    /// let inputs = Inputs { parameters: &[2.0], rest: &[], positions: &[3.0, 0.0, 4.0, 0.0, 0.0, 0.0], velocities: &[] };
+    /// let rest = pull.precomputed(&inputs).unwrap();
+    /// assert_eq!(pull.routine("value", &inputs, &rest).unwrap().0, [[25.0]]);
+    /// ```
+    #[must_use]
+    pub fn routine<T: Number>(
+        &self,
+        name: &str,
+        inputs: &Inputs<'_, T>,
+        precomputed: &[T],
+    ) -> Option<(Vec<Vec<T>>, Flags<T>)> {
+        let routine = self.routines.iter().find(|routine| routine.name == name)?;
+        let Results { groups, flags } = routine.run(inputs, precomputed);
+        Some((groups, flags))
+    }
+
+    /// What the rest shape alone determines, for [`Self::routine`].
+    ///
+    /// # Errors
+    /// When the rest shape is degenerate.
+    pub fn precomputed<T: Number>(&self, inputs: &Inputs<'_, T>) -> Result<Vec<T>, RestError> {
+        let (mut groups, degenerate) = self.rest.run(inputs, &[]);
+        let numbers = groups.remove(0);
+        // Neither infinite nor NaN.
+        let sound = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
+        if degenerate.iter().any(|mask| mask.any()) || !numbers.iter().all(sound) {
+            return Err(RestError { element: self.declaration.name });
+        }
+        Ok(numbers)
+    }
+
+    /// The outcome of every comparison in what computes ordinary configurations: which branches an input takes.
+    ///
+    /// # Errors
+    /// When the rest shape is degenerate.
+    pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Result<Vec<bool>, RestError> {
+        let rest = self.precomputed(inputs)?;
+        let routines = self.routines.iter().filter(|r| EVALUATED.contains(&r.name));
+        Ok(routines.flat_map(|routine| routine.ordinary.comparisons(inputs, &rest)).collect())
+    }
+
+    /// Every fault that can be planted in what computes the numbers of ordinary configurations. Operations that only decide
+    /// which of two forms of the same number is computed are left alone: either is right.
+    #[must_use]
+    pub fn mutations(&self) -> Vec<Mutation> {
+        let tapes = std::iter::once(("rest", &self.rest))
+            .chain(self.routines.iter().filter(|r| EVALUATED.contains(&r.name)).map(|r| (r.name, &r.ordinary)));
+        // A residual's unknowns need not come by threes: what is no input cannot be read by mistake.
+        let unknowns: usize = self.declaration.points.iter().map(|field| field.size).sum();
+        let exists = |op: Op| !matches!(op, Op::Input(graph::Input::Position(i)) if usize::from(i) >= unknowns);
+        let mut list = Vec::new();
+        for (routine, tape) in tapes {
+            let is_number = tape.are_numbers_of_results();
+            for (place, &before) in tape.ops().iter().enumerate().filter(|(place, _)| is_number[*place]) {
+                let planted = faults(before).into_iter().filter(|(_, after)| *after != before && exists(*after));
+                list.extend(planted.map(|(fault, after)| Mutation { fault, routine, place, before, after }));
+            }
+        }
+        list
+    }
+
+    /// The same with a fault.
+    #[must_use]
+    pub fn mutated(&self, mutation: &Mutation) -> Self {
+        let mut broken = self.clone();
+        *broken.tape(mutation.routine) = self.clone().tape(mutation.routine).with(mutation.place, mutation.after);
+        broken
+    }
+
+    /// Whether the routine with that fault is the same function in exact arithmetic: proved by building both into one graph where
+    /// equal expressions are one node, rounding errors are 0, and 0 and 1 fold. `false` where that proves nothing.
+    #[must_use]
+    pub fn is_proved_equivalent(&self, mutation: &Mutation) -> bool {
+        let before = self.clone().tape(mutation.routine).clone();
+        before.is_proved_equal(&before.with(mutation.place, mutation.after))
+    }
+
+    fn tape(&mut self, routine: &str) -> &mut Tape {
+        let named = self.routines.iter_mut().find(|r| r.name == routine);
+        named.map_or(&mut self.rest, |routine| &mut routine.ordinary)
+    }
+}
+
+/// What a routine returns.
+struct Results<T: Number> {
+    groups: Vec<Vec<T>>,
+    flags: Flags<T>,
+}
+
+impl<T: Number> Results<T> {
+    fn group(&self, number: usize) -> Vec<T> {
+        self.groups[number].clone()
+    }
+}
+
+impl InterpretedRoutine {
+    fn run<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> Results<T> {
+        if let Some(general) = self.general.as_ref().filter(|g| !g.guard.run(inputs, rest).1[0].all()) {
+            return general.run(inputs, rest);
+        }
+        let (tape, present) = (&self.ordinary, self.ordinary_flags);
+        let (groups, masks) = tape.run(inputs, rest);
+        let mut masks = masks.into_iter();
+        let mut mask = |is_there: bool| if is_there { masks.next() } else { None }.unwrap_or_else(T::Mask::none);
+        let flags = Flags { degenerate: mask(present[0]), kink: mask(present[1]) };
+        Results { groups, flags }
+    }
+}
+
+impl GeneralPath {
+    /// In numbers whose exponents do not end.
+    fn run<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> Results<T> {
+        let unbounded = |numbers: &[T]| numbers.iter().map(|x| x.unbounded(0)).collect::<Vec<_>>();
+        let inputs = Inputs {
+            parameters: &unbounded(inputs.parameters),
+            rest: &unbounded(inputs.rest),
+            positions: &unbounded(inputs.positions),
+            velocities: &unbounded(inputs.velocities),
+        };
+        let rest = unbounded(rest);
+        let (mut groups, masks) = self.tape.run(&inputs, &rest);
+        let number = |value: T::Unbounded| {
+            let mut number = T::from_f64(0.0);
+            number.set_lane(0, value);
+            number
+        };
+        let mut masks = masks.into_iter();
+        let mut mask = |is_there| if is_there { masks.next() } else { None }.unwrap_or_else(Mask::none);
+        let mut flags = Flags { degenerate: mask(self.flags[0]), kink: mask(self.flags[1]) };
+        let read = [inputs.parameters, inputs.rest, inputs.positions, inputs.velocities, &rest].concat();
+        groups.iter_mut().for_each(|group| settle(&read, group, &mut flags));
+        let groups = groups.into_iter().map(|group| group.into_iter().map(number).collect()).collect();
+        let mask = |mask: <T::Unbounded as Number>::Mask| T::Mask::from_bits(u32::from(mask.any()));
+        let flags = Flags { degenerate: mask(flags.degenerate), kink: mask(flags.kink) };
+        Results { groups, flags }
+    }
+}
+
+/// A triangle of 3×3 blocks as a full matrix, row by row.
+fn full_triangle<T: Number>(points: usize, triangle: &[T]) -> Vec<T> {
+    entries(points)
+        .map(|(row, column)| {
+            let (row, column) = if row / 3 <= column / 3 { (row, column) } else { (column, row) };
+            triangle[9 * triangle_index(points, row / 3, column / 3) + row % 3 * 3 + column % 3].clone()
+        })
+        .collect()
+}
+
+/// A square of 3×3 blocks as a full matrix, row by row.
+fn full_square<T: Number>(points: usize, square: &[T]) -> Vec<T> {
+    entries(points)
+        .map(|(row, column)| square[9 * (row / 3 * points + column / 3) + row % 3 * 3 + column % 3].clone())
+        .collect()
+}
+
+fn entries(points: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..3 * points).flat_map(move |row| (0..3 * points).map(move |column| (row, column)))
+}
+
+/// What generated code would say of itself.
+fn describe(program: &Program, routines: &Routines) -> Declaration {
+    let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
+    let declared = &program.parameters[..program.parameters.len() - implied];
+    let docs: Vec<&str> = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect();
+    let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
+    let vectors = routines.vectors.iter().map(|vector| &*vector.clone().leak()).collect::<Vec<_>>();
+    let list = routines.list.iter().map(|routine| Routine {
+        name: routine.name,
+        reduced: count(&routines.graph, &routine.reduced_outputs()),
+        full: count(&routines.graph, &routine.outputs()),
+    });
+    Declaration {
+        name: program.name.clone().leak(),
+        kind: program.kind,
+        docs: docs.join("\n").leak(),
+        formula: program.formula.clone().leak(),
+        source: program.source.clone().leak(),
+        points: fields(&program.moving),
+        rest: fields(&program.rest),
+        parameters: fields(declared),
+        rows: program.rows(),
+        properties: program.properties.iter().map(|(property, _)| *property).collect::<Vec<_>>().leak(),
+        translation_invariant: routines.translation_invariant,
+        curved,
+        quadratic,
+        velocity_dependent,
+        symmetric,
+        reduced_coordinates: routines.coordinates,
+        reduced_vectors: vectors.leak(),
+        primitives: routines.primitives.clone().leak(),
+        routines: list.collect::<Vec<_>>().leak(),
+    }
+}
+
+fn fields(inputs: &[Input]) -> &'static [Field] {
+    let field = |input: &Input| Field {
+        name: input.name.clone().leak(),
+        size: input.input_type.size(),
+        unit: input.unit.clone().leak(),
+    };
+    inputs.iter().map(field).collect::<Vec<_>>().leak()
+}

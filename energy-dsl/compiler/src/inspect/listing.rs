@@ -1,0 +1,202 @@
+use std::fmt::Write as _;
+
+use proc_macro2::TokenStream;
+
+use crate::diagnostic::Diagnostics;
+use crate::emit::emit;
+use crate::graph::{NodeId, count};
+use crate::inspect::interpret::{interpret, interpret_mask};
+use crate::inspect::textbook::programs;
+use crate::lower::lower;
+use crate::routines::{Routines, differentiate};
+use energy_runtime::{Inputs, Mask, Number, OperationCount};
+
+/// Which of a routine's two forms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// As generated code chooses: that for ordinary configurations where they are.
+    Chosen,
+    /// That with all precautions.
+    General,
+}
+
+/// What the compiler makes of a declaration: its code, and how it got there.
+///
+/// ```
+/// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
+/// let listing = energy_compiler::Listing::from_source(source).unwrap().remove(0);
+/// assert!(listing.routine("hessian").unwrap().contains("fn hessian_at<L: ::energy_dsl::Level>"));
+/// assert!(listing.plans().contains("adjoint-weighted"));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Listing {
+    name: String,
+    code: TokenStream,
+    routines: Routines,
+}
+
+impl Listing {
+    /// Compiles the declarations of a text.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text.
+    pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
+        let programs = programs(source)?;
+        let listing = |program| {
+            let routines = differentiate(program, lower(program));
+            Self { name: program.name.clone(), code: emit(program, &routines), routines }
+        };
+        Ok(programs.iter().map(listing).collect())
+    }
+
+    /// The declaration's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// All generated code.
+    #[must_use]
+    pub fn code(&self) -> String {
+        pretty(self.code.clone())
+    }
+
+    /// The method of a routine (`value`, `hessian`, …), and those it calls where inputs are ordinary and where they are not.
+    #[must_use]
+    pub fn routine(&self, name: &str) -> Option<String> {
+        let wanted = ["at", "is_ordinary", "if_ordinary", "in_general"].map(|part| format!("{name}_{part}"));
+        let methods: Vec<String> = methods(&self.code)
+            .into_iter()
+            .filter(|method| wanted.contains(&method.sig.ident.to_string()))
+            .map(|method| pretty(quote::quote!(#method)))
+            .collect();
+        (!methods.is_empty()).then(|| methods.join("\n"))
+    }
+
+    /// The names that [`Self::routine`] knows.
+    #[must_use]
+    pub fn routines(&self) -> Vec<String> {
+        methods(&self.code)
+            .iter()
+            .filter_map(|m| m.sig.ident.to_string().strip_suffix("_at").map(str::to_owned))
+            .collect()
+    }
+
+    /// What a routine of a declaration without rest shape returns, group by group, by interpretation. `None` for an
+    /// unknown routine.
+    ///
+    /// # Panics
+    /// When an input slice is shorter than declared.
+    #[must_use]
+    pub fn evaluate<T: Number>(&self, routine: &str, path: Path, inputs: &Inputs<'_, T>) -> Option<Vec<Vec<T>>> {
+        let routine = self.routines.list.iter().find(|r| r.name == routine)?;
+        let graph = &self.routines.graph;
+        let groups = match &routine.general {
+            Some(general) if path == Path::General || !interpret_mask(graph, general.ordinary, inputs).all() => {
+                &general.groups
+            }
+            _ => &routine.groups,
+        };
+        Some(groups.iter().map(|group| interpret(graph, group, inputs)).collect())
+    }
+
+    /// Whether a routine of a declaration without rest shape meets a condition of its flags. `None` for an unknown routine.
+    #[must_use]
+    pub fn is_flagged<T: Number>(&self, routine: &str, inputs: &Inputs<'_, T>) -> Option<bool> {
+        let routine = self.routines.list.iter().find(|r| r.name == routine)?;
+        let flags = routine.general.as_ref().map_or(routine.flags, |general| general.flags);
+        Some(flags.into_iter().flatten().any(|mask| interpret_mask(&self.routines.graph, mask, inputs).any()))
+    }
+
+    /// What each routine costs in ordinary configurations, and what is left of the Hessian where a point is pinned: operations in
+    /// all, and instructions where products and sums fuse.
+    #[must_use]
+    pub fn counts(&self) -> String {
+        let mut text = format!("{:<34} operations  instructions\n", self.name);
+        let mut row = |name: &str, count: OperationCount| {
+            writeln!(text, "  {name:<32} {:>10}  {:>12}", count.total(), count.instructions())
+                .expect("writing to a string succeeds");
+        };
+        let graph = &self.routines.graph;
+        for routine in &self.routines.list {
+            row(routine.name, count(graph, &routine.outputs()));
+        }
+        let hessian = self.routines.list.iter().find(|routine| routine.name == "hessian");
+        let Some([value, gradient, triangle]) = hessian.map(|routine| &routine.groups[..]) else { return text };
+        let points = gradient.len() / 3;
+        for pinned in 0..points {
+            let mut outputs: Vec<NodeId> = value.clone();
+            outputs.extend((0..3 * points).filter(|i| i / 3 != pinned).map(|i| gradient[i]));
+            let pairs = (0..points).flat_map(|i| (i..points).map(move |j| (i, j)));
+            for (_, block) in pairs.zip(triangle.chunks(9)).filter(|((i, j), _)| *i != pinned && *j != pinned) {
+                outputs.extend(block);
+            }
+            row(&format!("hessian, point {pinned} pinned"), count(graph, &outputs));
+        }
+        text
+    }
+
+    /// The routes to each routine's derivatives with their operations in ordinary configurations and reduced coordinates; the
+    /// first of each was taken.
+    #[must_use]
+    pub fn plans(&self) -> String {
+        let mut text = String::new();
+        for plan in &self.routines.plans {
+            writeln!(text, "{} {}", self.name, plan.routine).expect("writing to a string succeeds");
+            let best = plan.routes.first().map_or(0, |route| route.cost);
+            for (place, route) in plan.routes.iter().enumerate() {
+                let why = match place {
+                    0 => "taken: costs least".to_owned(),
+                    _ if route.cost == best => "as cheap, but listed later".to_owned(),
+                    _ => format!("costs {:.2}×", route.cost as f64 / best as f64),
+                };
+                writeln!(
+                    text,
+                    "  {:<42} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} error terms)  {why}",
+                    route.name,
+                    route.cost,
+                    route.count.total(),
+                    route.count.fused,
+                    route.count.divisions_and_roots,
+                    route.count.transcendental,
+                    route.count.error_terms,
+                )
+                .expect("writing to a string succeeds");
+            }
+        }
+        text
+    }
+}
+
+fn methods(code: &TokenStream) -> Vec<syn::ImplItemFn> {
+    let file: syn::File = syn::parse2(code.clone()).expect("compiler bug: generated code parses");
+    let implementations = file.items.into_iter().filter_map(|item| match item {
+        syn::Item::Impl(implementation) => Some(implementation),
+        _ => None,
+    });
+    let items = implementations.flat_map(|implementation| implementation.items);
+    items.filter_map(|item| if let syn::ImplItem::Fn(method) = item { Some(method) } else { None }).collect()
+}
+
+/// Code as `rustfmt` would lay it out, more or less.
+fn pretty(code: TokenStream) -> String {
+    if let Ok(file) = syn::parse2::<syn::File>(code.clone()) {
+        return prettyplease::unparse(&file);
+    }
+    // A method stands in an implementation only.
+    let wrapped: syn::File = syn::parse2(quote::quote!(impl Element { #code })).expect("compiler bug: a method parses");
+    let text = prettyplease::unparse(&wrapped);
+    let inner = text.trim_start_matches("impl Element {\n").trim_end().trim_end_matches('}');
+    inner.lines().map(|line| format!("{}\n", line.strip_prefix("    ").unwrap_or(line))).collect()
+}
+
+/// Writes the code of a declaration to `folder/name.rs`.
+///
+/// # Errors
+/// When the folder cannot be made or the file not be written; then no file stands under that name that was not there before.
+pub(crate) fn write_code(folder: &std::path::Path, name: &str, code: &TokenStream) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let unfinished = folder.join(format!(".{name}.{}.rs", std::process::id()));
+    std::fs::write(&unfinished, pretty(code.clone()))?;
+    std::fs::rename(&unfinished, folder.join(format!("{name}.rs")))
+}

@@ -1,0 +1,151 @@
+use proc_macro2::TokenStream;
+
+use crate::check::{Program, check};
+use crate::diagnostic::{Diagnostic, Diagnostics, Span};
+use crate::graph::{Input, NodeId, Op, reachable};
+use crate::inspect::interpret::interpret_with;
+use crate::inspect::tower::Tower;
+use crate::lower::{TextbookFormula, lower_textbook};
+use crate::syntax::{parse, parse_file};
+use energy_runtime::{Inputs, Number};
+
+/// A declaration in its printed form, without robust primitives and rewrites, to be evaluated over any number type: what an
+/// audit holds generated code against.
+///
+/// ```
+/// use energy_compiler::{Inputs, Textbook};
+/// let spring = Textbook::from_source("energy Spring(p, q: Point; k, L: Scalar) { k / 2 * (norm(p - q) - L)^2 }").unwrap();
+/// let inputs = Inputs { parameters: &[8.0, 1.0], rest: &[], positions: &[0.0, 0.0, 0.0, 3.0, 0.0, 4.0], velocities: &[] };
+/// assert_eq!(spring.evaluate(&inputs), [64.0]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Textbook {
+    program: Program,
+    formula: TextbookFormula,
+}
+
+impl Textbook {
+    /// Reads the first declaration of a text.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text.
+    pub fn from_source(source: &str) -> Result<Self, Diagnostics> {
+        let program = programs(source)?.into_iter().next().ok_or_else(|| {
+            let here = Span::of(proc_macro2::Span::call_site());
+            Diagnostics::from(Diagnostic::new(&here, "expected a declaration, found none"))
+        })?;
+        let formula = lower_textbook(&program);
+        Ok(Self { program, formula })
+    }
+
+    /// The checked declaration.
+    #[must_use]
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// The value, row by row: U; C; the forces, three numbers to a point; or r. A constraint's stiffness and damping are not read.
+    ///
+    /// A derivative that the formula names (`gradient(U, p)`) is had by dual numbers over `T`: nothing of the compiler's own
+    /// differentiation is used.
+    ///
+    /// # Panics
+    /// When an input slice is shorter than declared.
+    pub fn evaluate<T: Number>(&self, inputs: &Inputs<'_, T>) -> Vec<T> {
+        let formula = &self.formula.formula;
+        if self.formula.gradients.is_empty() {
+            return interpret_with(&formula.graph, &formula.outputs, inputs, &[]);
+        }
+        let inputs = TowerInputs::of(inputs);
+        let gradients = self.gradients(&formula.outputs, &inputs, 1);
+        let rows = interpret_with(&formula.graph, &formula.outputs, &inputs.borrow(), &gradients);
+        rows.into_iter().map(Tower::into_plain).collect()
+    }
+
+    /// The named derivatives that `outputs` read, three numbers to each (0 for those they do not read), each moved by an ε of
+    /// its own depth.
+    fn gradients<T: Number>(&self, outputs: &[NodeId], inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
+        let graph = &self.formula.formula.graph;
+        let mut numbers = vec![Tower::from_f64(0.0); 3 * self.formula.gradients.len()];
+        for node in reachable(graph, outputs) {
+            let Op::Input(Input::Precomputed(number)) = graph.op(node) else { continue };
+            let number = usize::from(number);
+            let (of, point) = self.formula.gradients[number / 3];
+            let moved = inputs.raised(3 * point + number % 3, depth);
+            let within = self.gradients(&[of], &moved, depth + 1);
+            numbers[number] = interpret_with(graph, &[of], &moved.borrow(), &within).remove(0).slope(depth);
+        }
+        numbers
+    }
+}
+
+/// Inputs as towers of dual numbers.
+struct TowerInputs<T> {
+    parameters: Vec<Tower<T>>,
+    rest: Vec<Tower<T>>,
+    positions: Vec<Tower<T>>,
+    velocities: Vec<Tower<T>>,
+}
+
+impl<T: Number> TowerInputs<T> {
+    fn of(inputs: &Inputs<'_, T>) -> Self {
+        let plain = |numbers: &[T]| numbers.iter().cloned().map(Tower::Plain).collect::<Vec<_>>();
+        Self {
+            parameters: plain(inputs.parameters),
+            rest: plain(inputs.rest),
+            positions: plain(inputs.positions),
+            velocities: plain(inputs.velocities),
+        }
+    }
+
+    /// One coordinate moved by the ε of this depth.
+    fn raised(&self, coordinate: usize, depth: usize) -> Self {
+        let mut positions = self.positions.clone();
+        positions[coordinate] = positions[coordinate].clone().raised(depth);
+        Self {
+            parameters: self.parameters.clone(),
+            rest: self.rest.clone(),
+            positions,
+            velocities: self.velocities.clone(),
+        }
+    }
+
+    fn borrow(&self) -> Inputs<'_, Tower<T>> {
+        Inputs {
+            parameters: &self.parameters,
+            rest: &self.rest,
+            positions: &self.positions,
+            velocities: &self.velocities,
+        }
+    }
+}
+
+/// Parses and checks a text.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
+    let mut diagnostics = Diagnostics::default();
+    let stream: TokenStream = source.parse().map_err(|error| {
+        let here = Span::of(proc_macro2::Span::call_site());
+        Diagnostics::from(
+            Diagnostic::new(&here, format!("the text does not split into tokens: {error}"))
+                .help("mathematical notation stands in a string: \"‖p − q‖ − L\""),
+        )
+    })?;
+    let items = parse(stream, &mut diagnostics);
+    let programs = check(&items, &mut diagnostics);
+    diagnostics.finish(programs)
+}
+
+/// The same of a file, where mathematical notation stands in strings without escapes. Messages name the file.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn file_programs(text: &str, file: &str) -> Result<Vec<Program>, Diagnostics> {
+    let mut diagnostics = Diagnostics::default();
+    let here = Span::of(proc_macro2::Span::call_site());
+    let items = parse_file(text, file, &here, &mut diagnostics);
+    let programs = check(&items, &mut diagnostics);
+    diagnostics.finish(programs)
+}

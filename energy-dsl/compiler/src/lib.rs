@@ -1,0 +1,30 @@
+//! The compiler of `energy-dsl`: turns declarations of energies, constraints, forces and residuals into Rust code for their
+//! values and their exact first and second derivatives.
+//!
+//! ```text
+//! text ─ syntax ─► tree ─ check ─► typed program ─ lower ─► graph ─ diff ─► routines ─ prove ─► ─ emit ─► Rust
+//! ```
+//!
+//! Users declare elements with `energy!` of the crate `energy-dsl`. This crate is for tools: [`compile`] is all that the
+//! macro does; [`Interpreted`], [`Textbook`] and [`Listing`] look at a declaration that is read at run time.
+#![forbid(unsafe_code)]
+
+mod check;
+mod diagnostic;
+mod diff;
+mod emit;
+mod functions;
+mod graph;
+mod inspect;
+mod lower;
+mod passes;
+mod properties;
+mod routines;
+mod syntax;
+
+pub use check::unit_exponents;
+pub use diagnostic::{Diagnostic, Diagnostics};
+pub use functions::{Function, all as functions};
+pub use inspect::{Fault, Interpreted, Listing, Mutation, Path, Textbook, mathml};
+pub use passes::{compile, compile_file};
+pub use syntax::canonical as canonical_name;

@@ -1,0 +1,187 @@
+//! Typed program to scalar graph.
+
+use std::collections::BTreeMap;
+
+use crate::check::{Program, Source, Typed, TypedKind};
+use crate::diff::{Coordinates, Moving, Order, first_derivatives};
+use crate::functions::{Lowered, RECOGNISERS, Shape};
+use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
+
+/// A program as a graph.
+#[derive(Clone, Debug)]
+pub struct Formula {
+    /// The graph.
+    pub graph: Graph,
+    /// The result, row by row.
+    pub outputs: Vec<NodeId>,
+}
+
+/// A program's `rest` block as a graph: what it computes once for an element.
+#[derive(Clone, Debug)]
+pub struct RestFormula {
+    /// The graph.
+    pub graph: Graph,
+    /// The numbers to store, in the order of [`Input::Precomputed`].
+    pub outputs: Vec<NodeId>,
+}
+
+/// The robust form, split into what the rest shape decides and what moves.
+#[must_use]
+pub fn lower(program: &Program) -> (RestFormula, Formula) {
+    let mut rest = Lowering::new(program, Form::Robust, None);
+    let stored = stored_bindings(program);
+    let mut outputs = Vec::new();
+    let mut slots = BTreeMap::new();
+    for &binding in &stored {
+        slots.insert(binding, outputs.len());
+        outputs.extend(rest.binding(binding).parts);
+    }
+    let rest = RestFormula { graph: rest.graph, outputs };
+    let formula = |outward: bool| {
+        let mut moving = Lowering::new(program, Form::Robust, Some(slots.clone()));
+        moving.graph.move_outward(outward);
+        let outputs = moving.expression(&program.result).parts;
+        moving.graph.move_outward(false);
+        Formula { graph: moving.graph, outputs }
+    };
+    // Outside, powers of two may meet and cancel, or may have to be multiplied in more often.
+    let [inward, outward] = [false, true].map(formula);
+    let formula = if outward.cost() < inward.cost() { outward } else { inward };
+    (rest, formula)
+}
+
+impl Formula {
+    /// What the result costs on the ordinary path.
+    fn cost(&self) -> usize {
+        let mut graph = self.graph.clone();
+        let outputs = ordinary(&mut graph, &self.outputs).map_or_else(|| self.outputs.clone(), |(outputs, _)| outputs);
+        count(&graph, &outputs).cost()
+    }
+}
+
+/// A program as it is printed, nothing differentiated.
+#[derive(Clone, Debug)]
+pub struct TextbookFormula {
+    /// The formula, where the derivatives that it names are [`Input::Precomputed`], three to each.
+    pub formula: Formula,
+    /// The derivatives it names: of which node by which point. A later one may read earlier ones.
+    pub gradients: Vec<(NodeId, usize)>,
+}
+
+/// The whole program in its textbook form.
+#[must_use]
+pub fn lower_textbook(program: &Program) -> TextbookFormula {
+    let mut lowering = Lowering::new(program, Form::Textbook, None);
+    let outputs = lowering.expression(&program.result).parts;
+    TextbookFormula { formula: Formula { graph: lowering.graph, outputs }, gradients: lowering.gradients }
+}
+
+/// The bindings of the `rest` block that the moving part reads, in order.
+fn stored_bindings(program: &Program) -> Vec<usize> {
+    fn visit(program: &Program, expression: &Typed, seen: &mut [bool]) {
+        match &expression.kind {
+            TypedKind::Binding(number) => {
+                if !std::mem::replace(&mut seen[*number], true) && !program.bindings[*number].rest {
+                    visit(program, &program.bindings[*number].value, seen);
+                }
+            }
+            TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().for_each(|e| visit(program, e, seen)),
+            TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|e| visit(program, e, seen)),
+            TypedKind::Gradient(of, _) => visit(program, of, seen),
+            TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
+        }
+    }
+    let mut seen = vec![false; program.bindings.len()];
+    visit(program, &program.result, &mut seen);
+    (0..seen.len()).filter(|&b| seen[b] && program.bindings[b].rest).collect()
+}
+
+struct Lowering<'a> {
+    program: &'a Program,
+    graph: Graph,
+    done: BTreeMap<usize, Lowered>,
+    /// Where the stored bindings start, when they are read and not computed.
+    slots: Option<BTreeMap<usize, usize>>,
+    /// In the textbook form, the derivatives left to whoever evaluates it.
+    gradients: Vec<(NodeId, usize)>,
+}
+
+impl<'a> Lowering<'a> {
+    fn new(program: &'a Program, form: Form, slots: Option<BTreeMap<usize, usize>>) -> Self {
+        let mut graph = match form {
+            Form::Robust => Graph::robust(RECOGNISERS),
+            Form::Textbook => Graph::textbook(),
+        };
+        graph.compensate(!program.uncompensated);
+        Self { program, graph, done: BTreeMap::new(), slots, gradients: Vec::new() }
+    }
+
+    fn inputs(&mut self, shape: Shape, first: usize, input: fn(u16) -> Input) -> Lowered {
+        let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
+        Lowered { shape, parts: (0..shape.size()).map(|i| self.graph.input(input(number(i)))).collect() }
+    }
+
+    fn binding(&mut self, number: usize) -> Lowered {
+        if let Some(value) = self.done.get(&number) {
+            return value.clone();
+        }
+        let binding = &self.program.bindings[number];
+        let slot = self.slots.as_ref().filter(|_| binding.rest).map(|slots| slots[&number]);
+        let value = match slot {
+            Some(slot) => self.inputs(binding.value.shape, slot, Input::Precomputed),
+            None => self.expression(&binding.value),
+        };
+        self.done.insert(number, value.clone());
+        value
+    }
+
+    fn expression(&mut self, expression: &Typed) -> Lowered {
+        match &expression.kind {
+            TypedKind::Constant(value) => Lowered::scalar(self.graph.constant(*value)),
+            TypedKind::Pi => Lowered::scalar(self.graph.pi()),
+            TypedKind::Input(source, first) => {
+                let input = match source {
+                    Source::Position => Input::Position,
+                    Source::Velocity => Input::Velocity,
+                    Source::Rest => Input::Rest,
+                    Source::Parameter => Input::Parameter,
+                };
+                self.inputs(expression.shape, *first, input)
+            }
+            TypedKind::Binding(number) => self.binding(*number),
+            TypedKind::Call(function, arguments) => {
+                let arguments: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
+                (function.lower)(&mut self.graph, &arguments)
+            }
+            TypedKind::Select(condition, yes, no) => {
+                let mask = self.expression(condition).node();
+                let (yes, no) = (self.expression(yes), self.expression(no));
+                let parts = yes.parts.iter().zip(&no.parts).map(|(&y, &n)| self.graph.select(mask, y, n)).collect();
+                Lowered { shape: expression.shape, parts }
+            }
+            TypedKind::Array(list) => {
+                let parts = list.iter().flat_map(|f| self.expression(f).parts).collect();
+                Lowered { shape: expression.shape, parts }
+            }
+            TypedKind::Gradient(of, point) => {
+                let of = self.expression(of).node();
+                Lowered::vector(self.gradient(of, *point))
+            }
+        }
+    }
+
+    fn gradient(&mut self, of: NodeId, point: usize) -> Vec<NodeId> {
+        if self.graph.form() == Form::Textbook {
+            let known = self.gradients.iter().position(|&known| known == (of, point));
+            let number = known.unwrap_or_else(|| {
+                self.gradients.push((of, point));
+                self.gradients.len() - 1
+            });
+            return self.inputs(Shape::Vector(3), 3 * number, Input::Precomputed).parts;
+        }
+        let g = &mut self.graph;
+        let coordinates = Coordinates::of_points(g, &[of], Moving::Positions);
+        let reduced = first_derivatives(g, &[of], &coordinates, Order::FirstToDifferentiate).remove(0);
+        coordinates.expand(g, &reduced, point)
+    }
+}

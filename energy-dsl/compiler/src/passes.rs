@@ -1,0 +1,63 @@
+//! The passes of the compiler, in order.
+
+use std::path::PathBuf;
+
+use proc_macro2::{Span, TokenStream};
+use quote::quote;
+
+use crate::check::check;
+use crate::diagnostic::{self, Diagnostic, Diagnostics};
+use crate::emit::emit;
+use crate::inspect::write_code;
+use crate::lower::lower;
+use crate::properties::prove;
+use crate::routines::differentiate;
+use crate::syntax;
+
+/// Compiles declarations to Rust. This is all that `energy!` does.
+///
+/// Each error becomes a `compile_error!` at its place. A broken declaration also becomes a stub of its type, so that one
+/// mistake gives one error. If the environment variable `ENERGY_DUMP_DIR` names a folder, the formatted code of each
+/// declaration is also written there.
+///
+/// ```
+/// let code = energy_compiler::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());
+/// assert!(code.to_string().contains("struct Spring"));
+/// ```
+#[must_use]
+pub fn compile(declarations: TokenStream) -> TokenStream {
+    let mut diagnostics = Diagnostics::default();
+    let items = syntax::parse(declarations, &mut diagnostics);
+    compile_items(&items, diagnostics)
+}
+
+/// Compiles the declarations in the `text` of a file.
+///
+/// `file` is the file's name in messages; `at` is the place in Rust code where errors are reported.
+#[must_use]
+pub fn compile_file(text: &str, file: &str, at: Span) -> TokenStream {
+    let mut diagnostics = Diagnostics::default();
+    let items = syntax::parse_file(text, file, &diagnostic::Span::of(at), &mut diagnostics);
+    compile_items(&items, diagnostics)
+}
+
+fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> TokenStream {
+    let programs = check(items, &mut diagnostics);
+    let folder = std::env::var_os("ENERGY_DUMP_DIR").map(PathBuf::from);
+    let mut code = TokenStream::new();
+    for program in &programs {
+        let formulas = lower(program);
+        let routines = differentiate(program, formulas);
+        prove(program, &routines, &mut diagnostics);
+        let items = emit(program, &routines);
+        if let Some(folder) = &folder
+            && let Err(error) = write_code(folder, &program.name, &items)
+        {
+            let message = format!("ENERGY_DUMP_DIR: cannot write {} to {}: {error}", program.name, folder.display());
+            diagnostics.push(Diagnostic::new(&program.span, message));
+        }
+        code.extend(items);
+    }
+    let errors = diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error());
+    quote!(#code #(#errors)*)
+}

@@ -1,0 +1,91 @@
+//! Claims of a declaration that can be decided here: translation invariance is proved on the graph; what the audit must check
+//! needs an audit.
+
+use crate::check::Program;
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::graph::{Graph, Input, NodeId, Op};
+use crate::routines::Routines;
+use crate::syntax::ElementType;
+use energy_runtime::{Kind, Property};
+
+/// Reports each claim that is wrong, or that nothing would check.
+pub fn prove(program: &Program, routines: &Routines, diagnostics: &mut Diagnostics) {
+    for (property, span) in &program.properties {
+        let problem = match property {
+            Property::TranslationInvariant => translation(program, routines),
+            Property::RotationInvariant if program.kind == Kind::Residual => Some((
+                "a residual's unknowns need not be points, so it has no invariance of points".into(),
+                "remove the claim",
+            )),
+            Property::ZeroForceAtRest => rest_state(program),
+            Property::RotationInvariant | Property::Even => None,
+        };
+        let audited = program.audit_samples.is_some() || *property == Property::TranslationInvariant;
+        let problem = problem.or_else(|| {
+            (!audited).then(|| {
+                (format!("nothing checks the claim `{}`", property.attribute()), "the audit does: add #[audit]")
+            })
+        });
+        if let Some((message, help)) = problem {
+            diagnostics.push(Diagnostic::new(span, message).help(help));
+        }
+    }
+}
+
+fn translation(program: &Program, routines: &Routines) -> Option<(String, &'static str)> {
+    if program.kind == Kind::Residual {
+        let message = "a residual's unknowns need not be points, so it has no invariance of points";
+        return Some((message.into(), "remove the claim"));
+    }
+    if routines.translation_invariant {
+        return None;
+    }
+    let values = routines.list.first().and_then(|r| r.groups.first()).cloned().unwrap_or_default();
+    let by_itself = used_by_itself(&routines.graph, &values);
+    let name = by_itself.and_then(|point| program.moving.get(point)).map_or("a point", |input| input.name.as_str());
+    let message =
+        format!("translation invariance cannot be proved: `{name}` is used by itself, not in a difference of points");
+    Some((message, "form the difference first, as in dot(n, p - q) for dot(n, p) - dot(n, q)"))
+}
+
+/// The first point that is not in a difference of two.
+fn used_by_itself(graph: &Graph, outputs: &[NodeId]) -> Option<usize> {
+    let coordinate = |node: NodeId| match graph.op(node) {
+        Op::Input(Input::Position(c)) => Some((usize::from(c) / 3, usize::from(c) % 3)),
+        _ => None,
+    };
+    let mut seen = std::collections::BTreeSet::new();
+    let mut found = None;
+    let mut stack = outputs.to_vec();
+    while let Some(node) = stack.pop() {
+        if !seen.insert(node) {
+            continue;
+        }
+        if let Some((point, _)) = coordinate(node) {
+            found = Some(found.map_or(point, |other: usize| other.min(point)));
+            continue;
+        }
+        match graph.op(node) {
+            Op::Sub(a, b) if matches!((coordinate(a), coordinate(b)), (Some((_, i)), Some((_, j))) if i == j) => {}
+            op => match graph.rule(node) {
+                Some(rule) => stack.extend(&rule.arguments),
+                None => stack.extend(op.operands()),
+            },
+        }
+    }
+    found
+}
+
+/// The rest shape must say where each point rests.
+fn rest_state(program: &Program) -> Option<(String, &'static str)> {
+    let places = program.rest.iter().filter(|input| {
+        let element = input.input_type.element;
+        matches!(element, ElementType::Point | ElementType::Vector(2 | 3))
+    });
+    let count: usize = places.map(|input| input.input_type.length.unwrap_or(1)).sum();
+    let all: usize = program.rest.iter().map(|input| input.input_type.length.unwrap_or(1)).sum();
+    (count != program.points() || all != count || program.kind == Kind::Residual).then(|| {
+        let message = "the rest shape does not say where each point rests".into();
+        (message, "declare one rest Point, Vec3 or Vec2 for each point, in the same order")
+    })
+}

@@ -1,0 +1,477 @@
+//! One parser for both spellings.
+
+use proc_macro2::TokenStream;
+
+use super::ast::{
+    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Section, Unit,
+    UserFunction,
+};
+use super::attribute::Attributes;
+use super::name::Name;
+use super::specialise::{Specialisation, specialise};
+use super::text;
+use super::tokens::{self, Kind as TokenKind, Token};
+use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
+use energy_runtime::Kind;
+
+/// Parses all items. After an error in one item it goes on with the next.
+pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
+    let tokens = tokens::from_rust(stream, diagnostics);
+    items(&tokens, diagnostics)
+}
+
+/// The same of a file's text. `at` is where Rust code names the file.
+pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Item> {
+    let tokens = text::tokens(text, file, at, diagnostics);
+    items(&tokens, diagnostics)
+}
+
+fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
+    let user_functions = tokens
+        .windows(2)
+        .filter(|pair| pair[0].kind == TokenKind::Name("fn".into()))
+        .filter_map(|pair| if let TokenKind::Name(name) = &pair[1].kind { Some(name.clone()) } else { None })
+        .collect();
+    let end = tokens.last().map_or_else(|| Span::of(proc_macro2::Span::call_site()), |t| t.span.clone());
+    let mut parser = Parser { tokens, at: 0, end, bars: Vec::new(), depth: 0, user_functions, errors: Vec::new() };
+    let mut items = Vec::new();
+    while parser.at < tokens.len() {
+        match parser.item() {
+            Ok(item) => items.push(item),
+            Err(diagnostic) => {
+                diagnostics.push(*diagnostic);
+                parser.skip_item();
+            }
+        }
+    }
+    parser.errors.into_iter().for_each(|error| diagnostics.push(error));
+    specialise(items, diagnostics)
+}
+
+pub(super) type Parsed<T> = Result<T, Box<Diagnostic>>;
+
+pub(super) struct Parser<'a> {
+    pub(super) tokens: &'a [Token],
+    pub(super) at: usize,
+    /// Where the text ends.
+    pub(super) end: Span,
+    /// Open bars `‖` and `|`; a bracket between hides those outside it.
+    pub(super) bars: Vec<String>,
+    /// How deep the expression at hand is nested.
+    pub(super) depth: usize,
+    pub(super) user_functions: Vec<String>,
+    /// Errors after which the declaration could still be made out.
+    pub(super) errors: Vec<Diagnostic>,
+}
+
+const KINDS: [Kind; 4] = [Kind::Energy, Kind::Constraint, Kind::Force, Kind::Residual];
+const TYPES: &[(&str, ElementType)] = &[
+    ("Point", ElementType::Point),
+    ("Velocity", ElementType::Velocity),
+    ("Scalar", ElementType::Scalar),
+    ("Vec2", ElementType::Vector(2)),
+    ("Vec3", ElementType::Vector(3)),
+    ("Vec4", ElementType::Vector(4)),
+    ("Mat2x2", ElementType::Matrix(2, 2)),
+    ("Mat3x2", ElementType::Matrix(3, 2)),
+    ("Mat3x3", ElementType::Matrix(3, 3)),
+    ("Mat4x4", ElementType::Matrix(4, 4)),
+    ("Quat", ElementType::Quat),
+    ("DualQuat", ElementType::DualQuat),
+    ("Twist", ElementType::Twist),
+];
+
+impl<'a> Parser<'a> {
+    pub(super) fn peek(&self) -> Option<&'a Token> {
+        self.tokens.get(self.at)
+    }
+
+    pub(super) fn span(&self) -> Span {
+        self.peek().map_or_else(|| self.end.clone(), |t| t.span.clone())
+    }
+
+    pub(super) fn is(&self, symbol: &str) -> bool {
+        matches!(self.peek(), Some(Token { kind: TokenKind::Symbol(s), .. }) if s == symbol)
+    }
+
+    pub(super) fn is_word(&self, word: &str) -> bool {
+        matches!(self.peek(), Some(Token { kind: TokenKind::Name(n), .. }) if n == word)
+    }
+
+    pub(super) fn take(&mut self, symbol: &str) -> bool {
+        let found = self.is(symbol);
+        self.at += usize::from(found);
+        found
+    }
+
+    pub(super) fn take_word(&mut self, word: &str) -> bool {
+        let found = self.is_word(word);
+        self.at += usize::from(found);
+        found
+    }
+
+    pub(super) fn found(&self) -> String {
+        match self.peek() {
+            None => "the end".into(),
+            Some(token) => format!("`{}`", token.text),
+        }
+    }
+
+    pub(super) fn fail<T>(&self, expected: &str) -> Parsed<T> {
+        Err(Box::new(Diagnostic::new(&self.span(), format!("expected {expected}, found {}", self.found()))))
+    }
+
+    pub(super) fn expect(&mut self, symbol: &str, context: &str) -> Parsed<()> {
+        if self.take(symbol) { Ok(()) } else { self.fail(&format!("`{symbol}` {context}")) }
+    }
+
+    pub(super) fn name(&mut self, what: &str) -> Parsed<Name> {
+        match self.peek() {
+            Some(Token { kind: TokenKind::Name(text), span, .. }) if !is_keyword(text) => {
+                self.at += 1;
+                Ok(Name { text: text.clone(), span: span.clone() })
+            }
+            _ => self.fail(what),
+        }
+    }
+
+    /// Goes on after the next `;` or closing brace that ends an item.
+    fn skip_item(&mut self) {
+        let mut depth = 0_i32;
+        self.bars.clear();
+        while let Some(token) = self.peek() {
+            self.at += 1;
+            let TokenKind::Symbol(symbol) = &token.kind else { continue };
+            match symbol.as_str() {
+                "{" | "(" | "[" => depth += 1,
+                "}" | ")" | "]" => {
+                    depth -= 1;
+                    if depth <= 0 && symbol == "}" {
+                        return;
+                    }
+                }
+                ";" if depth <= 0 => return,
+                _ => {}
+            }
+        }
+    }
+
+    fn item(&mut self) -> Parsed<Item> {
+        let mut attributes = Attributes::default();
+        while self.take("#") {
+            self.attribute(&mut attributes)?;
+        }
+        let Attributes { docs, audit_samples, properties, uncompensated } = attributes;
+        let prefix = if uncompensated { "#[uncompensated] " } else { "" };
+        let visibility_start = self.at;
+        if self.take_word("pub") && self.take("(") {
+            while !self.take(")") {
+                self.at += 1;
+                if self.peek().is_none() {
+                    return self.fail("`)`");
+                }
+            }
+        }
+        let visibility = tokens::text(&self.tokens[visibility_start..self.at]);
+        let claims = audit_samples.is_some() || uncompensated || !properties.is_empty();
+        if claims && (self.is_word("fn") || self.is_word("const")) {
+            return self.fail("a declaration after its attributes (functions and constants have only documentation)");
+        }
+        if self.take_word("fn") {
+            return self.user_function().map(Item::Function);
+        }
+        if self.take_word("const") {
+            return self.constant().map(Item::Constant);
+        }
+        let start = self.at;
+        let kind = self.kind()?;
+        let name = self.name("a name for the declaration")?;
+        if self.is("=") {
+            let declaration = Declaration {
+                docs,
+                visibility,
+                audit_samples,
+                properties,
+                uncompensated,
+                kind,
+                name,
+                inputs: Vec::new(),
+                body: None,
+                source: String::new(),
+                formula: String::new(),
+            };
+            let mut specialisation = self.specialisation(start, declaration)?;
+            specialisation.declaration.source.insert_str(0, prefix);
+            return Ok(Item::Specialisation(Box::new(specialisation)));
+        }
+        let inputs = self.inputs()?;
+        let body_start = self.at;
+        let body = match self.declaration_body() {
+            Ok(body) => Some(body),
+            Err(error) => {
+                self.errors.push(*error);
+                self.at = body_start;
+                self.skip_item();
+                None
+            }
+        };
+        let formula = formula(&self.tokens[body_start..self.at]);
+        let source = format!("{prefix}{}", tokens::text(&self.tokens[start..self.at]));
+        Ok(Item::Declaration(Declaration {
+            docs,
+            visibility,
+            audit_samples,
+            properties,
+            uncompensated,
+            kind,
+            name,
+            inputs,
+            body,
+            source,
+            formula,
+        }))
+    }
+
+    /// `= Other(k = 100, L = 0.1);`.
+    fn specialisation(&mut self, start: usize, mut declaration: Declaration) -> Parsed<Specialisation> {
+        const FORM: &str = "as in energy Stiff = Spring(k = 100);";
+        self.expect("=", FORM)?;
+        let of = self.name(&format!("the name of another declaration, {FORM}"))?;
+        self.expect("(", FORM)?;
+        let values_start = self.at;
+        let mut values = Vec::new();
+        while !self.take(")") {
+            let name = self.name(&format!("the name of a parameter, {FORM}"))?;
+            self.expect("=", FORM)?;
+            values.push((name, self.expression()?));
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after a value");
+            }
+        }
+        declaration.formula = tokens::text(&self.tokens[values_start..self.at - 1]);
+        self.expect(";", "after the parameters")?;
+        declaration.source = tokens::text(&self.tokens[start..self.at]);
+        Ok(Specialisation { declaration, of, values })
+    }
+
+    fn kind(&mut self) -> Parsed<Kind> {
+        if let Some(kind) = KINDS.into_iter().find(|k| self.is_word(k.keyword())) {
+            self.at += 1;
+            return Ok(kind);
+        }
+        let found = self.found();
+        let mut diagnostic = Diagnostic::new(
+            &self.span(),
+            format!("expected energy, constraint, force, residual, fn or const, found {found}"),
+        );
+        if let Some(Token { kind: TokenKind::Name(name), .. }) = self.peek()
+            && let Some(near) = nearest(name, KINDS.map(Kind::keyword))
+        {
+            diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
+        }
+        Err(Box::new(diagnostic))
+    }
+
+    fn inputs(&mut self) -> Parsed<Vec<InputGroup>> {
+        self.expect("(", "and the inputs, as in (p0, p1: Point; k: Scalar[N/m])")?;
+        let mut groups = Vec::new();
+        let mut section = Section::Moving;
+        let mut rest = self.take_word("rest");
+        while !self.take(")") {
+            let mut names = vec![self.name("the name of an input")?];
+            while self.take(",") {
+                names.push(self.name("the name of an input")?);
+            }
+            self.expect(":", "and the type of the input")?;
+            let type_span = self.span();
+            let (element, unit, length) = self.input_type()?;
+            let place = if rest { Section::Rest } else { section_of(section, element) };
+            groups.push(InputGroup { section: place, names, element, length, type_span, unit });
+            if self.take(";") {
+                section = Section::Parameter;
+                rest = self.take_word("rest");
+            } else if !self.take(",") && !self.is(")") {
+                return self.fail("`,`, `;` or `)` after an input");
+            }
+        }
+        Ok(groups)
+    }
+
+    /// `Type[unit]` or `[Type[unit]; length]`.
+    fn input_type(&mut self) -> Parsed<(ElementType, Unit, Option<Expression>)> {
+        if !self.take("[") {
+            let element = self.element_type()?;
+            return Ok((element, self.unit()?, None));
+        }
+        let element = self.element_type()?;
+        let unit = self.unit()?;
+        self.expect(";", "and the length of the array, as in [Point; 4]")?;
+        let length = self.expression()?;
+        self.expect("]", "after the length of the array")?;
+        Ok((element, unit, Some(length)))
+    }
+
+    fn element_type(&mut self) -> Parsed<ElementType> {
+        let known = TYPES.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+        let name = self.name(&format!("one of the types {}", known.join(", ")))?;
+        TYPES.iter().find(|(known, _)| *known == name.text).map(|&(_, t)| t).ok_or_else(|| {
+            let message = format!("unknown type `{}`; expected one of {}", name.text, known.join(", "));
+            let mut diagnostic = Diagnostic::new(&name.span, message);
+            if let Some(near) = nearest(&name.text, known) {
+                diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
+            }
+            Box::new(diagnostic)
+        })
+    }
+
+    /// `[unit]`, or nothing.
+    fn unit(&mut self) -> Parsed<Unit> {
+        if !self.take("[") {
+            return Ok(Unit::default());
+        }
+        let (start, span) = (self.at, self.span());
+        while !self.is("]") {
+            if self.peek().is_none() {
+                return self.fail("`]` to close the unit");
+            }
+            self.at += 1;
+        }
+        let text = tokens::unit_text(&self.tokens[start..self.at]);
+        self.at += 1;
+        Ok(Unit { text, span: Some(span) })
+    }
+
+    /// `name: Scalar[unit] = value;`, after the `const`.
+    fn constant(&mut self) -> Parsed<Constant> {
+        let start = self.at - 1;
+        let name = self.name("the name of the constant")?;
+        let unit = if self.take(":") {
+            let span = self.span();
+            if self.element_type()? != ElementType::Scalar {
+                return Err(Box::new(
+                    Diagnostic::new(&span, "a constant is a Scalar").help("as in const K: Scalar = 4;"),
+                ));
+            }
+            self.unit()?
+        } else {
+            Unit::default()
+        };
+        self.expect("=", "and the value of the constant, as in const K: Scalar = 4;")?;
+        let value = self.expression()?;
+        self.expect(";", "after the value")?;
+        Ok(Constant { name, unit, value, source: tokens::text(&self.tokens[start..self.at]) })
+    }
+
+    fn user_function(&mut self) -> Parsed<UserFunction> {
+        let start = self.at - 1;
+        let name = self.name("the name of the function")?;
+        self.expect("(", "and the parameters of the function")?;
+        let mut parameters = Vec::new();
+        while !self.take(")") {
+            parameters.push(self.name("the name of a parameter")?);
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after a parameter");
+            }
+        }
+        let body = self.braced_body()?;
+        Ok(UserFunction { name, parameters, body, source: tokens::text(&self.tokens[start..self.at]) })
+    }
+
+    fn declaration_body(&mut self) -> Parsed<Body> {
+        if self.take("=") {
+            let result = self.expression()?;
+            self.expect(";", "after the formula")?;
+            return Ok(match result.kind {
+                ExpressionKind::Body(body) => *body,
+                _ => Body::of(result),
+            });
+        }
+        if !self.is("{") {
+            return self.fail("`{` and the formula, or `= \"…\";`");
+        }
+        self.braced_body()
+    }
+
+    pub(super) fn braced_body(&mut self) -> Parsed<Body> {
+        self.expect("{", "to open the body")?;
+        let body = self.body(true)?;
+        self.expect("}", "after the result")?;
+        Ok(body)
+    }
+
+    /// Statements and a result, up to the closing brace or the end of a string.
+    pub(super) fn body(&mut self, braced: bool) -> Parsed<Body> {
+        let mut constants = Vec::new();
+        let mut body = (Vec::new(), Vec::new());
+        loop {
+            if self.take_word("fn") {
+                body.0.push(self.user_function()?);
+            } else if self.take_word("const") {
+                constants.push(self.constant()?);
+            } else if self.is_word("rest") && self.tokens.get(self.at + 1).is_some_and(|t| t.text == "{") {
+                self.at += 2;
+                while !self.take("}") {
+                    let statement = self.statement(true)?;
+                    body.1.push(statement);
+                }
+            } else if self.is_word("let") || (!braced && self.next_is_definition()) {
+                let statement = self.statement(false)?;
+                body.1.push(statement);
+            } else {
+                break;
+            }
+        }
+        if (braced && self.is("}")) || self.peek().is_none() {
+            return self.fail("the result of the body, an expression without `;`");
+        }
+        let result = self.expression()?;
+        if self.is(";") {
+            return Err(Box::new(
+                Diagnostic::new(&self.span(), "expected the result to be the last expression, found `;`")
+                    .help("the result stands last and without `;`; name intermediate values with `let name = …;`"),
+            ));
+        }
+        Ok(Body { constants, functions: body.0, lets: body.1, result: Box::new(result) })
+    }
+
+    fn next_is_definition(&self) -> bool {
+        matches!(self.peek(), Some(Token { kind: TokenKind::Name(_), .. }))
+            && self.tokens.get(self.at + 1).is_some_and(|t| t.kind == TokenKind::Symbol("=".into()))
+    }
+
+    fn statement(&mut self, rest: bool) -> Parsed<Let> {
+        let has_let = self.take_word("let");
+        if !has_let && !self.next_is_definition() {
+            return self.fail("`let name = …;`");
+        }
+        let name = self.name("a name after `let`")?;
+        self.expect("=", "after the name")?;
+        let value = self.expression()?;
+        self.expect(";", "after the value")?;
+        Ok(Let { name, value, rest })
+    }
+}
+
+fn section_of(section: Section, element: ElementType) -> Section {
+    match element {
+        ElementType::Point | ElementType::Velocity => Section::Moving,
+        _ => section,
+    }
+}
+
+/// Words that cannot name anything.
+pub(super) fn is_keyword(word: &str) -> bool {
+    matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub" | "const")
+}
+
+/// The body as a reader would write it: a string's content, or the statements without the braces.
+fn formula(tokens: &[Token]) -> String {
+    match tokens {
+        [equals, Token { kind: TokenKind::Notation(_), text, .. }, _] if equals.text == "=" => {
+            syn::parse_str::<syn::LitStr>(text).map_or_else(|_| text.clone(), |s| s.value())
+        }
+        [equals, inner @ .., _] if equals.text == "=" => tokens::text(inner),
+        [_, inner @ .., _] => tokens::text(inner),
+        _ => String::new(),
+    }
+}

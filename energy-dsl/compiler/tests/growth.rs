@@ -1,0 +1,96 @@
+//! Operations and compile time grow polynomially with the size of a formula. The test prints the curve:
+//! `cargo test --release -p energy-compiler --test growth -- --nocapture`.
+#![allow(missing_docs)]
+
+use std::fmt::Write as _;
+use std::time::{Duration, Instant};
+
+use energy_compiler::Listing;
+
+/// A small generator of numbers (xorshift).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % n as u64) as usize
+    }
+}
+
+/// A chain of `size` lets over `points` points, each a random operation on two of the values before it.
+fn program(size: usize, points: usize, seed: u64) -> String {
+    let mut random = Random(seed);
+    let names: Vec<String> = (0..points).map(|i| format!("p{i}")).collect();
+    let mut text = format!("energy Growth({}: Point; k: Scalar) {{ let s0 = k; ", names.join(", "));
+    for i in 1..=points {
+        write!(text, "let s{i} = norm_squared(p{} - p{}); ", i % points, i - 1).expect("writing to a string succeeds");
+    }
+    for i in points + 1..=points + size {
+        // The value before is always used, so that nothing is dead.
+        let (a, b) = (i - 1, random.below(i));
+        let value = match random.below(7) {
+            0 => format!("s{a} * s{b}"),
+            1 => format!("s{a} + s{b}"),
+            2 => format!("sin(s{a}) * s{b}"),
+            3 => format!("sqrt(1 + s{a}^2)"),
+            4 => format!("s{a} / (1 + s{b}^2)"),
+            5 => format!("s{a} - k * s{b}"),
+            _ => format!("log(2 + s{a}^2) + s{b}"),
+        };
+        write!(text, "let s{i} = {value}; ").expect("writing to a string succeeds");
+    }
+    write!(text, "s{} }}", points + size).expect("writing to a string succeeds");
+    text
+}
+
+/// Operations of the Hessian, and the time to compile.
+fn compiled(size: usize, points: usize, seed: u64) -> (usize, Duration) {
+    let source = program(size, points, seed);
+    let start = Instant::now();
+    let listing = Listing::from_source(&source).expect("a sound program").remove(0);
+    let elapsed = start.elapsed();
+    let counts = listing.counts();
+    let line = counts.lines().find(|line| line.trim_start().starts_with("hessian ")).expect("it has a Hessian");
+    (line.split_whitespace().nth(1).expect("a count").parse().expect("a number"), elapsed)
+}
+
+#[test]
+fn operations_grow_with_the_formula_and_the_square_of_its_coordinates() {
+    println!("{:>6} {:>12} {:>12} {:>10}", "lets", "coordinates", "operations", "ms");
+    for points in [2, 4, 8] {
+        let coordinates = 3 * (points - 1);
+        let mut before: Option<usize> = None;
+        for size in [10, 20, 40, 80, 160] {
+            let runs: Vec<_> = (1..4).map(|seed| compiled(size, points, 0x9e37_79b9 + seed)).collect();
+            let operations = runs.iter().map(|(operations, _)| operations).sum::<usize>() / runs.len();
+            let time = runs.iter().map(|(_, time)| *time).max().expect("three runs");
+            println!("{size:>6} {coordinates:>12} {operations:>12} {:>10.1}", time.as_secs_f64() * 1e3);
+            // Each let adds at most a constant number of operations per entry of the Hessian.
+            let most = 6 * (size + 4) * (coordinates + 2) * (coordinates + 2);
+            assert!(
+                operations <= most,
+                "{size} lets, {coordinates} coordinates: {operations} operations, at most {most}"
+            );
+            if let Some(before) = before {
+                assert!(operations <= 3 * before, "from {before} to {operations} operations when the formula doubled");
+            }
+            before = Some(operations);
+        }
+    }
+}
+
+/// Compile time is at most quadratic in the number of lets: four times as many take at most 16 times as long. The fastest of
+/// three runs counts, so that a busy machine does not decide.
+#[test]
+fn compile_time_is_at_most_quadratic_in_the_length_of_a_formula() {
+    let fastest = |size: usize| {
+        let runs = (0..3).map(|_| compiled(size, 4, 0x9e37_79b9).1);
+        runs.min().expect("three runs").as_secs_f64()
+    };
+    let (short, long) = (fastest(40), fastest(160));
+    let ratio = long / short;
+    println!("40 lets: {:.1} ms, 160 lets: {:.1} ms, ratio {ratio:.1}", 1e3 * short, 1e3 * long);
+    assert!(ratio <= 16.0, "160 lets take {ratio:.1} times as long to compile as 40");
+}

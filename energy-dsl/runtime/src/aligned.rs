@@ -1,0 +1,63 @@
+use std::ops::{Deref, DerefMut};
+
+/// The bytes of the widest register and of a cache line.
+const LINE: usize = 64;
+
+/// Numbers that begin with a cache line: a register that begins elsewhere is loaded from two.
+///
+/// ```
+/// use energy_runtime::Aligned;
+/// let mut numbers = Aligned::new(100, 0.0);
+/// numbers[99] = 1.0;
+/// assert_eq!(numbers.as_ptr() as usize % 64, 0);
+/// assert_eq!(numbers.clone()[99], 1.0);
+/// ```
+#[derive(Debug)]
+pub struct Aligned<S> {
+    /// Some that are not used, then those that are.
+    numbers: Vec<S>,
+    start: usize,
+}
+
+impl<S: Clone> Aligned<S> {
+    /// `count` equal numbers.
+    #[must_use]
+    pub fn new(count: usize, number: S) -> Self {
+        let spare = LINE / size_of::<S>().max(1);
+        let mut numbers: Vec<S> = Vec::with_capacity(count + spare);
+        let start = numbers.as_ptr().align_offset(LINE).min(spare);
+        numbers.resize(start + count, number);
+        Self { numbers, start }
+    }
+}
+
+impl<S> Deref for Aligned<S> {
+    type Target = [S];
+
+    #[inline]
+    fn deref(&self) -> &[S] {
+        &self.numbers[self.start..]
+    }
+}
+
+impl<S> DerefMut for Aligned<S> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [S] {
+        &mut self.numbers[self.start..]
+    }
+}
+
+impl<S: Clone> From<&[S]> for Aligned<S> {
+    fn from(numbers: &[S]) -> Self {
+        let Some(first) = numbers.first() else { return Self { numbers: Vec::new(), start: 0 } };
+        let mut aligned = Self::new(numbers.len(), first.clone());
+        aligned.clone_from_slice(numbers);
+        aligned
+    }
+}
+
+impl<S: Clone> Clone for Aligned<S> {
+    fn clone(&self) -> Self {
+        Self::from(&**self)
+    }
+}

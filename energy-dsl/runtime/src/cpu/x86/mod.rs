@@ -1,0 +1,196 @@
+//! The levels of x86-64. All unsafe code of the crate is in this tree: calls into code compiled for features that were
+//! detected, and the intrinsics that need those features.
+//!
+//! Why it is sound: [`Avx2`] and [`Avx512`] cannot be named outside the crate, and neither can their lanes. The only way to
+//! them is the type parameter of a kernel, which [`run_at`] instantiates; so a register of a level exists only after the
+//! level's features were detected, and a processor does not lose them.
+#![allow(unsafe_code)]
+
+mod avx2;
+mod avx512;
+mod block_sum;
+mod transpose;
+
+use super::block_sum::Rows;
+use super::lanes::Lanes;
+use super::{Baseline, Kernel, Level, LevelName};
+use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
+
+/// AVX2 and FMA.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2;
+
+impl Level for Avx2 {
+    const NAME: &'static str = LevelName::Avx2.as_str();
+    const FUSED: bool = true;
+    type F64 = Lanes<__m256d>;
+    type F32 = Lanes<__m256>;
+    type Sum64 = Rows<f64, Self>;
+    type Sum32 = Rows<f32, Self>;
+}
+
+/// AVX-512 F, DQ, VL and BW.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512;
+
+impl Level for Avx512 {
+    const NAME: &'static str = LevelName::Avx512.as_str();
+    const FUSED: bool = true;
+    type F64 = Lanes<__m512d>;
+    type F32 = Lanes<__m512>;
+    type Sum64 = Rows<f64, Self>;
+    type Sum32 = block_sum::Nine;
+}
+
+/// The best level of this machine. The standard library remembers what it detected.
+pub fn detected() -> LevelName {
+    let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+    let avx512 = is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512bw");
+    match (avx2, avx512) {
+        (true, true) => LevelName::Avx512,
+        (true, false) => LevelName::Avx2,
+        (false, _) => LevelName::Baseline,
+    }
+}
+
+/// Runs a kernel at a level, which must not be better than [`detected`] said.
+#[inline(always)]
+pub(super) fn run_at<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
+    debug_assert!(name <= detected(), "{name} is not available");
+    match name {
+        // SAFETY: callers, all in the parent module, pass what `detected` allows or what the program was compiled to require.
+        LevelName::Avx512 => unsafe { run_avx512(kernel) },
+        // SAFETY: as above.
+        LevelName::Avx2 => unsafe { run_avx2(kernel) },
+        LevelName::Baseline => kernel.run::<Baseline>(),
+    }
+}
+
+/// Runs scalar code at AVX2 where the level, which must not be better than [`detected`] said, has it.
+#[inline(never)]
+pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
+    if name >= LevelName::Avx2 {
+        // SAFETY: as for `run_at`.
+        unsafe { run_avx2(kernel) }
+    } else {
+        run_plain(kernel)
+    }
+}
+
+/// A number, by a load of its own: volatile loads are not merged to wider ones.
+#[inline(always)]
+pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
+    // SAFETY: a reference is valid for reads, aligned and initialised, and what it refers to is `Copy`.
+    unsafe { std::ptr::read_volatile(number) }
+}
+
+/// Out of line: a scalar routine at a lesser level should not swell its callers.
+#[inline(never)]
+fn run_plain<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Baseline>()
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx2>()
+}
+
+#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+#[inline]
+fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx512>()
+}
+
+/// Functions of a register, each one expression of intrinsics.
+macro_rules! intrinsics {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) -> $output:ty = $body:expr;)*) => {
+        $(
+            #[inline(always)]
+            fn $name($($argument: $type),*) -> $output {
+                // SAFETY: there are registers of this type only where their level's features were detected; see `super`.
+                unsafe { $body }
+            }
+        )*
+    };
+}
+
+/// A mask that registers hold as an integer or a register, with its logic.
+macro_rules! mask {
+    ($mask:ident($inner:ty), none: $none:expr, bits: |$m:ident| $bits:expr, from_bits: |$b:ident| $from_bits:expr, and: $and:expr, or: $or:expr, not: $not:expr) => {
+        #[doc = "The outcome of a comparison of registers."]
+        #[derive(Clone, Copy, Debug)]
+        pub struct $mask($inner);
+
+        impl std::ops::BitAnd for $mask {
+            type Output = Self;
+
+            #[inline(always)]
+            fn bitand(self, other: Self) -> Self {
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    Self($and(self.0, other.0))
+                }
+            }
+        }
+
+        impl std::ops::BitOr for $mask {
+            type Output = Self;
+
+            #[inline(always)]
+            fn bitor(self, other: Self) -> Self {
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    Self($or(self.0, other.0))
+                }
+            }
+        }
+
+        impl std::ops::Not for $mask {
+            type Output = Self;
+
+            #[inline(always)]
+            fn not(self) -> Self {
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    Self($not(self.0))
+                }
+            }
+        }
+
+        impl crate::real::Mask for $mask {
+            #[inline(always)]
+            fn none() -> Self {
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    Self($none)
+                }
+            }
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                let $m = self.0;
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    $bits
+                }
+            }
+            #[inline(always)]
+            fn from_bits($b: u32) -> Self {
+                // SAFETY: as for registers.
+                #[allow(unused_unsafe)]
+                unsafe {
+                    Self($from_bits)
+                }
+            }
+        }
+    };
+}
+use {intrinsics, mask};

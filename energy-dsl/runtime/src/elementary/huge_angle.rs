@@ -1,0 +1,97 @@
+//! Reduction of angles of any size by the method of Payne and Hanek: of the product with 2/π only the bits about the binary
+//! point are computed, in integers.
+
+use crate::cpu::Baseline;
+use crate::real::Number;
+
+use super::{ROUND, power_of_two};
+
+/// The first bits of 2/π.
+const TWO_OVER_PI: [u64; 20] = [
+    0xa2f9836e4e441529,
+    0xfc2757d1f534ddc0,
+    0xdb6295993c439041,
+    0xfe5163abdebbc561,
+    0xb7246e3a424dd2e0,
+    0x06492eea09d1921c,
+    0xfe1deb1cb129a73e,
+    0xe88235f52ebb4484,
+    0xe99c7026b45f7e41,
+    0x3991d639835339f4,
+    0x9c845f8bbdf9283b,
+    0x1ff897ffde05980f,
+    0xef2f118b5a0a6d1f,
+    0x6d367ecf27cb09b7,
+    0x4f463f669e5fea2d,
+    0x7527bac7ebe5f17b,
+    0x3d0739f78a5292ea,
+    0x6bfb5fb11f8d5d08,
+    0x56033046fc7b6bab,
+    0xf0cfbc209af4361d,
+];
+
+/// π/2 in two parts.
+const HALF_PI: (f64, f64) = (std::f64::consts::FRAC_PI_2, 6.123233995736766e-17);
+
+/// Reduces the marked angles: quadrant (in the low bits), high and low part of the rest.
+#[cold]
+#[inline(never)]
+pub fn reduce(angles: &[f64], marked: u32, parts: &mut [[f64; 8]; 3]) {
+    for (lane, &angle) in angles.iter().enumerate().filter(|(lane, _)| marked >> lane & 1 != 0) {
+        let (quadrant, high, low) = if angle.is_finite() { reduce_one(angle) } else { (0, f64::NAN, f64::NAN) };
+        parts[0][lane] = ROUND + f64::from(quadrant);
+        parts[1][lane] = high;
+        parts[2][lane] = low;
+    }
+}
+
+/// Reduces an angle of at least 2²⁰.
+fn reduce_one(angle: f64) -> (u8, f64, f64) {
+    // angle = mantissa · 2^exponent
+    let mantissa = (angle.to_bits() & ((1 << 52) - 1)) | 1 << 52;
+    let exponent = (angle.to_bits() >> 52) as i32 - 1075;
+    // Bits of 2/π whose products are multiples of 4 are left out: 192 bits follow those.
+    let (skipped, shift) = ((exponent - 2).max(0) as usize, (2 - exponent).max(0) as u32);
+    let word = |i: usize| {
+        let (word, bit) = (skipped / 64 + i, skipped % 64);
+        if bit == 0 { TWO_OVER_PI[word] } else { TWO_OVER_PI[word] << bit | TWO_OVER_PI[word + 1] >> (64 - bit) }
+    };
+    // The product modulo 2^192, after a shift that makes 2^190 stand for 1; shifts are below 64.
+    let mut product = [0u64; 4];
+    let mut carry = 0u128;
+    for i in 0..3 {
+        let sum = u128::from(mantissa) * u128::from(word(2 - i)) + carry;
+        product[i] = sum as u64;
+        carry = sum >> 64;
+    }
+    product[3] = carry as u64;
+    let shifted = |i: usize| if shift == 0 { product[i] } else { product[i] >> shift | product[i + 1] << (64 - shift) };
+    let [mut low, mut middle, mut top] = [shifted(0), shifted(1), shifted(2)];
+    let mut quadrant = (top >> 62) as u8;
+    // The fraction, with its binary point before the first bit; from one half on it counts back from the next quadrant.
+    let negative = top >> 61 & 1 == 1;
+    top = top << 2 | middle >> 62;
+    middle = middle << 2 | low >> 62;
+    low <<= 2;
+    if negative {
+        quadrant = (quadrant + 1) & 3;
+        // Two's complement but for the last bit, which does not matter.
+        (top, middle, low) = (!top, !middle, !low);
+    }
+    // At most 62 or so bits cancel: 128 bits from the first that is set.
+    let zeros = if top != 0 { top.leading_zeros() } else { 64 + middle.leading_zeros() };
+    let fraction = match zeros {
+        0 => u128::from(top) << 64 | u128::from(middle),
+        1..64 => (u128::from(top) << 64 | u128::from(middle)) << zeros | u128::from(low) >> (64 - zeros),
+        _ => (u128::from(middle) << 64 | u128::from(low)) << (zeros - 64),
+    };
+    let scale = power_of_two(-(zeros as i32));
+    let high = (fraction >> 75) as f64 * power_of_two(-53) * scale;
+    let rest = (fraction & ((1 << 75) - 1)) as f64 * power_of_two(-128) * scale;
+    let product = high * HALF_PI.0;
+    // Split without fused operations, so that it is the same at every level.
+    let error = high.product_error::<Baseline>(HALF_PI.0) + (high * HALF_PI.1 + rest * HALF_PI.0);
+    let sum = product + error;
+    let sign = if negative { -1.0 } else { 1.0 };
+    (quadrant, sign * sum, sign * (error - (sum - product)))
+}

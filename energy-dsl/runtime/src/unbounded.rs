@@ -1,0 +1,501 @@
+//! Numbers whose exponent does not end.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::cpu::{Fused, Level, Scalar};
+use super::flags::Flags;
+use super::real::{Mask, Number, Real};
+
+/// significand · 2^exponent: rounded as the floating-point type rounds, but nothing overflows or vanishes on the way to a result
+/// that has a place in that type. Extraordinary configurations are computed with it: edges of 1e-160, whose squares have no
+/// place among doubles, keep all their digits.
+///
+/// Where the plain type neither overflows nor underflows, the bits are the same.
+#[derive(Clone, Copy, Debug)]
+pub struct Unbounded<S> {
+    /// 0, infinite, NaN, or of a magnitude in [1/`S::SPAN`, `S::SPAN`).
+    significand: S,
+    exponent: i32,
+}
+
+/// Beyond these exponents numbers are infinite, or 0: far enough that no formula gets there, near enough that sums of exponents
+/// fit.
+const LAST_EXPONENT: i32 = 1 << 28;
+
+impl<S: Scalar> Unbounded<S> {
+    /// The same number.
+    pub(crate) fn of(value: S) -> Self {
+        Self::new(value, 0)
+    }
+
+    fn new(significand: S, exponent: i32) -> Self {
+        let magnitude = significand.abs();
+        if S::SPAN.0 <= magnitude && magnitude < S::SPAN.1 && exponent.abs() < LAST_EXPONENT {
+            return Self { significand, exponent };
+        }
+        Self::normalised(significand, exponent)
+    }
+
+    fn normalised(significand: S, exponent: i32) -> Self {
+        let magnitude = significand.abs();
+        let is_plain = magnitude < S::INFINITY && S::default() < magnitude;
+        if !is_plain {
+            return Self { significand, exponent: 0 };
+        }
+        if magnitude < S::LEAST_NORMAL {
+            return Self::normalised(significand * S::power_of_two(S::REACH), exponent - S::REACH);
+        }
+        let own = significand.exponent();
+        // 2^−own may itself be no normal number.
+        let significand = significand * S::power_of_two(-own / 2) * S::power_of_two(-own - -own / 2);
+        match exponent + own {
+            e if e >= LAST_EXPONENT => Self { significand: significand * S::INFINITY, exponent: 0 },
+            e if e <= -LAST_EXPONENT => Self { significand: significand * S::default(), exponent: 0 },
+            exponent => Self { significand, exponent },
+        }
+    }
+
+    /// With a significand in [1, 2), if it is a plain number.
+    fn split(self) -> (S, i32) {
+        let Self { significand, exponent } = Self::normalised(self.significand, self.exponent);
+        (significand, exponent)
+    }
+
+    fn is_plain(self) -> bool {
+        let magnitude = self.significand.abs();
+        S::default() < magnitude && magnitude < S::INFINITY
+    }
+
+    /// The nearest number of the type: infinite or 0 where it has none.
+    pub(crate) fn to_scalar(self) -> S {
+        if !self.is_plain() {
+            return self.significand;
+        }
+        let (significand, exponent) = self.split();
+        match exponent {
+            e if e > S::LAST => significand * S::INFINITY,
+            e if e < S::FIRST - 80 => significand * S::default(),
+            // The first product is exact, so that a subnormal result is rounded once.
+            e if e < S::FIRST => significand * S::power_of_two(S::FIRST) * S::power_of_two(e - S::FIRST),
+            e => significand * S::power_of_two(e),
+        }
+    }
+
+    /// Whether the number has a place in the type, normal or 0.
+    fn fits(self) -> bool {
+        let (_, exponent) = self.split();
+        (S::FIRST..=S::LAST).contains(&exponent)
+    }
+
+    /// Both as multiples of one power of two. What is too small to change a sum but by its sign stays that small.
+    fn aligned(self, other: Self) -> (S, S, i32) {
+        let lift = |from: i32, to: i32| S::power_of_two((from - to).max(-S::REACH));
+        if self.exponent == other.exponent || !self.is_plain() || !other.is_plain() {
+            let exponent = if self.is_plain() { self.exponent } else { other.exponent };
+            (self.significand, other.significand, exponent)
+        } else if self.exponent > other.exponent {
+            (self.significand, other.significand * lift(other.exponent, self.exponent), self.exponent)
+        } else {
+            (self.significand * lift(self.exponent, other.exponent), other.significand, other.exponent)
+        }
+    }
+
+    /// self · factor + addend, rounded once.
+    fn fused<L: Level>(self, factor: Self, addend: Self) -> Self {
+        let (a, b, c) = (self.significand, factor.significand, addend.significand);
+        let exponent = self.exponent + factor.exponent;
+        if !addend.is_plain() || !self.is_plain() || !factor.is_plain() {
+            let exponent = if addend.is_plain() { addend.exponent } else { exponent };
+            return Self::new(a.mul_add::<L>(b, c), exponent);
+        }
+        let shift = addend.exponent - exponent;
+        if shift > S::REACH {
+            return Self::new((a * S::power_of_two(-S::REACH)).mul_add::<L>(b, c), addend.exponent);
+        }
+        Self::new(a.mul_add::<L>(b, c * S::power_of_two(shift.max(-S::REACH))), exponent)
+    }
+
+    /// A function of a number that need not be exact to the bit beyond the type's range: in double precision.
+    fn by_double(significand: f64, exponent: i32) -> Self {
+        let double = Unbounded::<f64>::new(significand, exponent);
+        let (significand, exponent) = double.split();
+        Self::new(S::nearest(significand), exponent)
+    }
+
+    fn to_double(self) -> (f64, i32) {
+        let (significand, exponent) = self.split();
+        (significand.to_f64(), exponent)
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, |$a:ident, $b:ident| $result:expr) => {
+        impl<S: Scalar> $trait for Unbounded<S> {
+            type Output = Self;
+            // Routines are thousands of operations, and cold: calls compile soon and stay small.
+            #[inline(never)]
+            fn $method(self, other: Self) -> Self {
+                let ($a, $b) = (self, other);
+                $result
+            }
+        }
+    };
+}
+
+operator!(Add, add, |a, b| {
+    let (x, y, exponent) = a.aligned(b);
+    Self::new(x + y, exponent)
+});
+operator!(Sub, sub, |a, b| a + -b);
+operator!(Mul, mul, |a, b| Self::new(a.significand * b.significand, a.exponent + b.exponent));
+operator!(Div, div, |a, b| Self::new(a.significand / b.significand, a.exponent - b.exponent));
+
+impl<S: Scalar> Neg for Unbounded<S> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { significand: -self.significand, ..self }
+    }
+}
+
+impl<S: Scalar> Number for Unbounded<S> {
+    type Mask = bool;
+    type Unbounded = Self;
+
+    fn unbounded(&self, _lane: usize) -> Self {
+        *self
+    }
+    fn set_lane(&mut self, _lane: usize, value: Self) {
+        *self = value;
+    }
+
+    #[inline(never)]
+    fn from_f64(value: f64) -> Self {
+        Self::new(S::nearest(value), 0)
+    }
+    #[inline(never)]
+    fn sqrt(self) -> Self {
+        if self.exponent % 2 == 0 {
+            return Self::new(self.significand.sqrt(), self.exponent / 2);
+        }
+        Self::new((self.significand + self.significand).sqrt(), (self.exponent - 1) / 2)
+    }
+    fn abs(self) -> Self {
+        Self { significand: self.significand.abs(), ..self }
+    }
+    #[inline(never)]
+    fn min(self, other: Self) -> Self {
+        if other.less(self) { other } else { self }
+    }
+    #[inline(never)]
+    fn max(self, other: Self) -> Self {
+        if self.less(other) { other } else { self }
+    }
+    #[inline(never)]
+    fn sin<L: Level>(self) -> Self {
+        // So near 0 it is x.
+        if self.is_plain() && self.split().1 < -60 { self } else { Self::new(self.to_scalar().sin::<L>(), 0) }
+    }
+    #[inline(never)]
+    fn cos<L: Level>(self) -> Self {
+        Self::new(self.to_scalar().cos::<L>(), 0)
+    }
+    #[inline(never)]
+    fn exp<L: Level>(self) -> Self {
+        let plain = self.to_scalar();
+        let result = plain.exp::<L>();
+        let is_normal = S::LEAST_NORMAL <= result && result < S::INFINITY;
+        if is_normal || !self.is_plain() || self.split().1 > 24 {
+            return Self::new(result, 0);
+        }
+        // eˣ = 2ᵏ e^(x − k ln 2), ln 2 in two parts, the first of few enough bits for k times it.
+        const HIGH: f64 = 0.693_147_180_369_123_8;
+        const LOW: f64 = 1.908_214_929_270_587_7e-10;
+        let x = plain.to_f64();
+        let k = (x / std::f64::consts::LN_2).round();
+        Self::by_double(Number::exp::<L>((x - k * HIGH) - k * LOW), k as i32)
+    }
+    #[inline(never)]
+    fn ln<L: Level>(self) -> Self {
+        if !self.is_plain() || self.fits() {
+            return Self::new(self.to_scalar().ln::<L>(), 0);
+        }
+        let (significand, exponent) = self.to_double();
+        Self::by_double(Number::ln::<L>(significand) + f64::from(exponent) * std::f64::consts::LN_2, 0)
+    }
+    #[inline(never)]
+    fn atan2<L: Level>(self, x: Self) -> Self {
+        let (y, x_aligned, _) = self.aligned(x);
+        // Where y is less than the last bit of x > 0, the angle is their quotient.
+        let is_slight = self.is_plain() && x.is_plain() && S::default() < x.significand;
+        let quotient = self / x;
+        if is_slight && quotient.split().1 < -80 { quotient } else { Self::new(y.atan2::<L>(x_aligned), 0) }
+    }
+    #[inline(never)]
+    fn powf<L: Level>(self, exponent: Self) -> Self {
+        let power = exponent.to_scalar();
+        let (_, own) = self.split();
+        let estimate = f64::from(own) * power.to_f64();
+        let within = f64::from(S::FIRST + 2) < estimate - power.to_f64().abs()
+            && estimate + power.to_f64().abs() < f64::from(S::LAST - 1);
+        if !self.is_plain() || (self.fits() && within) {
+            return Self::new(self.to_scalar().powf::<L>(power), 0);
+        }
+        // (m 2ᵉ)ᵖ = mᵖ 2^(frac eᵖ) 2^(whole eᵖ).
+        let (significand, own) = self.to_double();
+        let power = power.to_f64();
+        let whole = (f64::from(own) * power).round();
+        let fraction = f64::from(own).mul_add(power, -whole);
+        let significand = Number::powf::<L>(significand, power) * Number::powf::<L>(2.0, fraction);
+        Self::by_double(significand, whole as i32)
+    }
+    #[inline(never)]
+    fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
+        if L::FUSED { self.fused::<L>(factor, addend) } else { self * factor + addend }
+    }
+    #[inline(never)]
+    fn sum_error(self, other: Self) -> Self {
+        let is_far = self.is_plain() && other.is_plain() && (self.exponent - other.exponent).abs() > S::REACH;
+        if is_far {
+            return if self.exponent > other.exponent { other } else { self };
+        }
+        let (x, y, exponent) = self.aligned(other);
+        Self::new(x.sum_error(y), exponent)
+    }
+    #[inline(never)]
+    fn product_error<L: Level>(self, other: Self) -> Self {
+        Self::new(self.significand.product_error::<L>(other.significand), self.exponent + other.exponent)
+    }
+    #[inline(never)]
+    fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
+        if L::FUSED {
+            return self.fused::<L>(factor, -subtrahend);
+        }
+        (self * factor - subtrahend) + self.product_error::<L>(factor)
+    }
+    #[inline(never)]
+    fn root_error<L: Level>(self, root: Self) -> Self {
+        if L::FUSED {
+            return (-root).fused::<L>(root, self);
+        }
+        (self - root * root) - root.product_error::<L>(root)
+    }
+    #[inline(never)]
+    fn power_of_two_scale(self) -> Self {
+        let exponent = if self.is_plain() { -self.split().1 } else { 0 };
+        Self { significand: S::ONE, exponent }
+    }
+    #[inline(never)]
+    fn less(self, other: Self) -> bool {
+        let (x, y, _) = self.aligned(other);
+        x < y
+    }
+    #[inline(never)]
+    fn less_or_equal(self, other: Self) -> bool {
+        let (x, y, _) = self.aligned(other);
+        x <= y
+    }
+    #[inline(never)]
+    fn equal(self, other: Self) -> bool {
+        let (x, y, _) = self.aligned(other);
+        x == y
+    }
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask { yes } else { no }
+    }
+    fn saturated(self) -> Self {
+        if !self.is_plain() || self.to_scalar().abs() < S::INFINITY {
+            return self;
+        }
+        let large = S::power_of_two(S::LAST - 8);
+        Self::of(if S::default() < self.significand { large } else { -large })
+    }
+    fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+        inputs: &[Self; INPUTS],
+    ) -> ([Self; OUTPUTS], Flags<Self>) {
+        S::precautions(W::compiled())(inputs)
+    }
+}
+
+/// A routine with all precautions, of numbers read to numbers returned.
+///
+/// It runs with fused operations whatever the level: what depends on it is so rare that their time does not matter, and all
+/// levels give the same bits.
+#[doc(hidden)]
+pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
+    /// Runs it at a level.
+    fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+
+    /// The routine as the crate that declares it compiled it.
+    fn compiled() -> &'static Precautions<INPUTS, OUTPUTS>;
+
+    /// Runs it.
+    fn run<T: Real>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>) {
+        Self::run_at::<T, Fused>(inputs)
+    }
+}
+
+/// A routine over a type of numbers.
+pub(crate) type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+
+/// A routine with all precautions in each precision. A `static` of it is compiled where it stands, and not again in every crate
+/// that evaluates the element.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
+    pub(crate) double: Routine<Unbounded<f64>, INPUTS, OUTPUTS>,
+    pub(crate) single: Routine<Unbounded<f32>, INPUTS, OUTPUTS>,
+}
+
+impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
+    /// Those of a routine.
+    #[must_use]
+    pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
+        Self { double: W::run::<Unbounded<f64>>, single: W::run::<Unbounded<f32>> }
+    }
+}
+
+/// Runs a routine with all precautions in the lanes where `extraordinary` holds; the others are 0. Scalar and lanes give the same
+/// bits, for it is one code that runs. Outputs from number `summed` on will be added to each other: they are [`Number::saturated`].
+#[doc(hidden)]
+#[cold]
+#[inline(never)]
+#[must_use]
+pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
+    inputs: &[T; INPUTS],
+    extraordinary: T::Mask,
+    summed: usize,
+) -> ([T; OUTPUTS], Flags<T>) {
+    let mut outputs = [T::from_f64(0.0); OUTPUTS];
+    let (mut degenerate, mut kink) = (0, 0);
+    for lane in 0..u32::BITS as usize {
+        if extraordinary.bits() >> lane & 1 == 0 {
+            continue;
+        }
+        let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
+        let (mut results, mut flags) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(&own);
+        settle(&own, &mut results, &mut flags);
+        for (number, (output, result)) in outputs.iter_mut().zip(results).enumerate() {
+            output.set_lane(lane, if number < summed { result } else { result.saturated() });
+        }
+        degenerate |= u32::from(flags.degenerate.any()) << lane;
+        kink |= u32::from(flags.kink.any()) << lane;
+    }
+    let mask = <T::Mask as Mask>::from_bits;
+    (outputs, Flags { degenerate: mask(degenerate), kink: mask(kink) })
+}
+
+/// A result that is not a number though all that was read are (0/0 at a singularity, say) is taken as 0, and flagged.
+pub fn settle<T: Number>(inputs: &[T], results: &mut [T], flags: &mut Flags<T>) {
+    let is_number = |x: &T| x.clone().equal(x.clone()).all();
+    if !inputs.iter().all(is_number) {
+        return;
+    }
+    for result in results.iter_mut().filter(|x| !is_number(x)) {
+        *result = T::from_f64(0.0);
+        flags.degenerate = !T::Mask::none();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cpu::Baseline;
+    use super::*;
+
+    fn of<S: Scalar>(value: S) -> Unbounded<S> {
+        Unbounded::of(value)
+    }
+
+    /// The same bits, but for the sign of 0 and the kind of NaN.
+    fn assert_same<S: Scalar>(got: Unbounded<S>, plain: S, what: &str) {
+        let got = got.to_scalar();
+        assert!(
+            got == plain || [got, plain].iter().all(|number| number.partial_cmp(number).is_none()),
+            "{what}: {got:?} but plainly {plain:?}"
+        );
+    }
+
+    fn agree_with_plain_numbers<S: Scalar>(spread: i32) {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut draw = || {
+            let size = S::power_of_two(random.i32(-spread..=spread));
+            S::nearest(random.f64() * 2.0 - 1.0) * size
+        };
+        for _ in 0..20_000 {
+            let (a, b, c) = (draw(), draw(), draw());
+            let (x, y, z) = (of(a), of(b), of(c));
+            assert_same(x + y, a + b, "sum");
+            assert_same(x - y, a - b, "difference");
+            assert_same(x * y, a * b, "product");
+            assert_same(x / y, a / b, "quotient");
+            assert_same(x.abs().sqrt(), a.abs().sqrt(), "root");
+            assert_same(x.sum_error(y), a.sum_error(b), "what a sum lost");
+            assert_same(x.mul_add::<Fused>(y, z), a.mul_add::<Fused>(b, c), "fused product and sum");
+            assert_same(x.mul_add::<Baseline>(y, z), a.mul_add::<Baseline>(b, c), "product and sum");
+            assert_same(x.product_error::<Fused>(y), a.product_error::<Fused>(b), "what a product lost");
+            assert_same(x.fused_mul_sub::<Fused>(y, z), a.fused_mul_sub::<Fused>(b, c), "fused difference");
+            assert_eq!((x.less(y), x.equal(y), x.equal(x)), (a < b, a == b, true));
+            assert_same(x.atan2::<Baseline>(y), a.atan2::<Baseline>(b), "angle");
+        }
+    }
+
+    #[test]
+    fn where_nothing_overflows_the_bits_are_those_of_the_plain_type() {
+        agree_with_plain_numbers::<f64>(60);
+        agree_with_plain_numbers::<f64>(300);
+        agree_with_plain_numbers::<f32>(6);
+        agree_with_plain_numbers::<f32>(24);
+    }
+
+    #[test]
+    fn what_overflows_on_the_way_comes_back() {
+        for size in [1e-300, 1e-160, 1e160, 1e300] {
+            let (a, b) = (of(3.0 * size), of(4.0 * size));
+            let length = (a * a + b * b).sqrt();
+            assert!((length.to_scalar() / (5.0 * size) - 1.0).abs() < 1e-15);
+            let sixth = length * length * length * length * length * length;
+            assert!(((sixth / (a * a * a * a * a * a)).to_scalar() / (15625.0 / 729.0) - 1.0).abs() < 1e-14);
+            let third = length * length * length;
+            assert!((sixth.powf::<Baseline>(of(0.5)) / third - of(1.0)).abs().to_scalar() < 1e-14);
+            let expected = 6.0 * f64::ln(5.0 * size);
+            assert!((sixth.ln::<Baseline>().to_scalar() / expected - 1.0).abs() < 1e-15);
+        }
+        let tiny = of(-1000.0).exp::<Baseline>();
+        assert_eq!(tiny.to_scalar(), 0.0);
+        assert!(((tiny * of(500.0).exp::<Baseline>()).to_scalar() / (-500.0_f64).exp() - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn what_is_no_number_is_0_and_flagged_unless_it_was_read() {
+        let (nan, one) = (of(f64::NAN), of(1.0));
+        let mut results = [one, one / of(0.0) - one / of(0.0)];
+        let mut flags = Flags::clear();
+        settle(&[one, nan], &mut results, &mut flags);
+        assert!(!flags.any() && f64::is_nan(results[1].to_scalar()));
+        settle(&[one, one], &mut results, &mut flags);
+        assert!(flags.degenerate && results.map(Unbounded::to_scalar) == [1.0, 0.0]);
+    }
+
+    #[test]
+    fn results_too_large_are_large_and_infinite_ones_infinite() {
+        let large = (of(1e200) * of(1e200)).saturated().to_scalar();
+        assert!(large > 1e305 && large + 4.0 * large - large > large);
+        assert_eq!((of(-1e200) * of(1e200)).saturated().to_scalar(), -large);
+        assert_eq!((of(1.0) / of(0.0)).saturated().to_scalar(), f64::INFINITY);
+        assert_eq!(of(3.5).saturated().to_scalar(), 3.5);
+        assert!((of(1e30_f32) * of(1e30)).saturated().to_scalar() >= f32::MAX / 1024.0);
+    }
+
+    #[test]
+    fn numbers_without_a_place_are_infinite_or_rounded_once() {
+        assert_eq!((of(1e200) * of(1e200)).to_scalar(), f64::INFINITY);
+        assert_eq!((of(-1e200) * of(1e200)).to_scalar(), f64::NEG_INFINITY);
+        assert_eq!((of(1e-200) * of(1e-200)).to_scalar(), 0.0);
+        assert_eq!((of(3e-200) * of(7e-120)).to_scalar(), 3e-200 * 7e-120);
+        let least = f64::from_bits(1);
+        assert_eq!(of(least).to_scalar(), least);
+        assert_eq!((of(least) * of(0.5)).to_scalar(), 0.0);
+        assert!(f64::is_nan((of(0.0) / of(0.0)).to_scalar()));
+        assert_eq!((of(1.0) / of(0.0)).to_scalar(), f64::INFINITY);
+        assert_eq!((of(f64::INFINITY) + of(1e-300)).to_scalar(), f64::INFINITY);
+    }
+}
