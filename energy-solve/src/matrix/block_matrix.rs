@@ -5,7 +5,6 @@ use energy_dsl::{BLOCK_NUMBERS, Block, BlockSum, Kernel, Level, Number, Vector3,
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::matrix::precision::{Precision, doubled};
 use crate::matrix::vector::{transposed, widened};
-use crate::system::constant::Constant;
 
 /// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle. Entries are stored in `T`, `f32` or `f64`.
 #[derive(Clone, Debug)]
@@ -13,16 +12,20 @@ pub struct BlockMatrix<T = f64> {
     pattern: Arc<Pattern>,
     /// The blocks of the pattern, and one more that takes what belongs nowhere.
     values: Vec<Block<T>>,
-    /// What a system knows to be constant of it; nothing, after others changed it.
-    pub(crate) constant: Option<Constant<T>>,
+    /// What a system wrote to the matrix; `None` once an entry was changed by others.
+    contents: Option<Arc<Contents>>,
 }
+
+/// Identifies the contents that a system wrote to a matrix and its clones.
+#[derive(Debug)]
+pub(crate) struct Contents;
 
 impl<T: Precision> BlockMatrix<T> {
     /// The zero matrix of a pattern.
     #[must_use]
     pub fn zeros(pattern: Arc<Pattern>) -> Self {
         let values = vec![[[T::from_f64(0.0); 3]; 3]; pattern.blocks() + 1];
-        Self { pattern, values, constant: None }
+        Self { pattern, values, contents: None }
     }
 
     /// The pattern.
@@ -39,7 +42,7 @@ impl<T: Precision> BlockMatrix<T> {
 
     /// The diagonal block of a row, to be changed.
     pub fn diagonal_mut(&mut self, row: usize) -> &mut Block<T> {
-        self.constant = None;
+        self.contents = None;
         &mut self.values[self.pattern.diagonal(row)]
     }
 
@@ -59,9 +62,19 @@ impl<T: Precision> BlockMatrix<T> {
 
     /// The stored blocks, to be changed.
     pub fn values_mut(&mut self) -> &mut [Block<T>] {
-        self.constant = None;
+        self.contents = None;
         let stored = self.pattern.blocks();
         &mut self.values[..stored]
+    }
+
+    /// Returns the identity of the contents and forgets it: the caller is about to change entries.
+    pub(crate) fn take_contents(&mut self) -> Option<Arc<Contents>> {
+        self.contents.take()
+    }
+
+    /// Sets the identity of the contents.
+    pub(crate) fn set_contents(&mut self, contents: Option<Arc<Contents>>) {
+        self.contents = contents;
     }
 
     /// The stored blocks, and the one at [`Pattern::nowhere`].

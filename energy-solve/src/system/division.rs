@@ -3,10 +3,10 @@
 
 use energy_dsl::{Block, Vector3};
 
+use super::constant::ConstantPart;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
 use crate::matrix::precision::Precision;
-use crate::system::constant::Constant;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::Curvature;
 use crate::terms::term::{Divisible, Linearisation, Share, State, Weights};
@@ -93,7 +93,7 @@ pub(crate) fn linearisations<T: Precision>(
     terms: &Terms<'_>,
     shares: &[Share],
     state: State<'_>,
-    constant: Option<&Constant<T>>,
+    constant: Option<&ConstantPart>,
     sums: &mut Sums<'_, T>,
 ) -> Vec<Option<Tally>> {
     let vertices = || shares.iter().map(|share| share.vertices.len());
@@ -107,7 +107,7 @@ pub(crate) fn linearisations<T: Precision>(
     let parts = shares.iter().zip(matrices).zip(forces).zip(products);
     let tallies = for_each(shares.len(), parts.collect(), |(((share, matrix), force), product)| {
         match constant {
-            Some(constant) => constant.restore(share.blocks.start, matrix),
+            Some(constant) => constant.restore(share.blocks.start, T::blocks(matrix)),
             None => matrix.fill([[T::from_f64(0.0); 3]; 3]),
         }
         let mut sums = Sums { weights, curvature, matrix, force, product };

@@ -1,4 +1,4 @@
-pub(crate) mod constant;
+mod constant;
 mod division;
 
 use std::ops::Range;
@@ -6,15 +6,16 @@ use std::sync::Arc;
 
 use energy_dsl::{Block, Vector3};
 
+use self::constant::{ConstantPart, coupled_runs};
+use self::division::Sums;
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::block_matrix::Contents;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Precision;
-use crate::system::constant::{Constant, coupled_runs};
 use crate::terms::counts::{Counts, Tally};
 use crate::terms::curvature::Curvature;
 use crate::terms::term::{Character, Divisible, Linearisation, Quantity, Share, State, StepStart, Term, Weights};
-use division::Sums;
 
 /// Terms that do not fit the vertices.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -117,6 +118,10 @@ pub struct System {
     shares: Vec<Share>,
     /// Where forces were evaluated last, and some energies with them.
     evaluated_at: Vec<Vector3<f64>>,
+    /// The blocks that terms write whose Jacobians are not constant; found when first needed.
+    changing: Option<Arc<[Range<u32>]>>,
+    /// The constant parts of the matrices in use.
+    constants: Vec<ConstantPart>,
 }
 
 /// A term, and what it did.
@@ -151,7 +156,16 @@ impl System {
             Counted { term, counts: Counts::default() }
         };
         let terms = terms.into_iter().map(placed).collect();
-        let mut system = Self { dofs, pattern, terms, threads: 1, shares: Vec::new(), evaluated_at: Vec::new() };
+        let mut system = Self {
+            dofs,
+            pattern,
+            terms,
+            threads: 1,
+            shares: Vec::new(),
+            evaluated_at: Vec::new(),
+            changing: None,
+            constants: Vec::new(),
+        };
         system.set_threads(1);
         Ok(system)
     }
@@ -334,11 +348,11 @@ impl System {
         if !with_constant {
             self.terms.iter_mut().for_each(|counted| counted.term.place_blocks(&self.dofs, &self.pattern));
         }
-        // Without it the matrix will hold something else.
-        let known = matrix.constant.take();
+        let contents = matrix.take_contents();
+        let known = contents.and_then(|contents| Some((self.take_constant(&contents)?, contents)));
         let constant = with_constant.then(|| match known {
-            Some(known) if known.serves(weights, curvature, masses) => known,
-            known => self.constant(known, state, (weights, curvature), masses, matrix),
+            Some((known, contents)) if known.matches(weights, curvature, masses) => (known, contents),
+            _ => self.constant(state, (weights, curvature), masses, matrix),
         });
         let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
         let mut product = if wanted { force.clone() } else { Vec::new() };
@@ -346,8 +360,8 @@ impl System {
         state.x.clone_into(&mut self.evaluated_at);
         let values = matrix.values_and_nowhere();
         let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
-        let divided =
-            division::linearisations(&self.divisible(linear), &self.shares, state, constant.as_ref(), &mut sums);
+        let part = constant.as_ref().map(|(part, _)| part);
+        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, part, &mut sums);
         let mut sum = sums.linearisation();
         for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
             if linear(&**term) {
@@ -358,7 +372,10 @@ impl System {
                 counts.gradient += tally;
             }
         }
-        matrix.constant = constant;
+        if let Some((part, contents)) = constant {
+            self.constants.push(part);
+            matrix.set_contents(Some(contents));
+        }
         if force.iter().flatten().any(|component| !component.is_finite()) {
             return Err(self.find_non_finite_force(state));
         }
@@ -368,16 +385,22 @@ impl System {
         Ok(LinearisedForces { force, stiffness_times_velocity: product })
     }
 
+    /// Removes and returns the constant part of a matrix with these contents.
+    fn take_constant(&mut self, contents: &Arc<Contents>) -> Option<ConstantPart> {
+        let found = self.constants.iter().position(|part| part.is_in(contents))?;
+        Some(self.constants.swap_remove(found))
+    }
+
     /// Evaluates the masses and the Jacobians of the quadratic terms.
     fn constant<T: Precision>(
         &mut self,
-        known: Option<Constant<T>>,
         state: State<'_>,
         (weights, curvature): (Weights, Curvature),
         masses: &[f64],
         matrix: &mut BlockMatrix<T>,
-    ) -> Constant<T> {
-        let runs = known.map_or_else(|| self.changing_places(), Constant::into_runs);
+    ) -> (ConstantPart, Arc<Contents>) {
+        self.constants.retain(ConstantPart::is_in_use);
+        let runs = self.changing_places();
         // What need not be changed is found by changing it.
         let mut treated = Curvature::Clamped;
         let projected = self.evaluate_constant(state, weights, treated, masses, matrix);
@@ -385,7 +408,9 @@ impl System {
             treated = curvature;
             self.evaluate_constant(state, weights, treated, masses, matrix);
         }
-        Constant::new((weights, treated), masses, projected, runs, matrix.values())
+        let contents = Arc::new(Contents);
+        let part = (weights, treated);
+        (ConstantPart::new(&contents, part, masses, projected, runs, T::blocks(matrix.values_mut())), contents)
     }
 
     /// Writes them to the matrix; returns whether some element's curvature was changed.
@@ -419,10 +444,14 @@ impl System {
     }
 
     /// The blocks to which terms are added that are not constant.
-    fn changing_places(&self) -> Vec<Range<u32>> {
+    fn changing_places(&mut self) -> Arc<[Range<u32>]> {
+        if let Some(known) = &self.changing {
+            return Arc::clone(known);
+        }
         let terms = self.terms.iter().map(|counted| &*counted.term);
         let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
-        coupled_runs(&self.pattern, |vertex| self.dofs.place(vertex as usize), changing.map(Term::stencils))
+        let runs = coupled_runs(&self.pattern, |vertex| self.dofs.place(vertex as usize), changing.map(Term::stencils));
+        Arc::clone(self.changing.insert(runs))
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
