@@ -53,6 +53,7 @@ pub use linear::{
 pub use matrix::{BlockMatrix, Blocks, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
-    Character, Counts, Curvature, Divisible, ElementList, ForceTerm, Linearisation, ListError, PotentialTerm, Quantity,
-    Share, State, Stencils, StepStart, Tally, Term, TrianglePlaces, Weights, change_dense,
+    Character, Counts, Curvature, Divisible, ElementList, ForceTerm, Linearisation, ListError, PlacedTerm,
+    PotentialTerm, Quantity, Share, State, Stencils, StepStart, Tally, Term, TermDescription, TrianglePlaces, Weights,
+    change_dense,
 };

@@ -9,8 +9,8 @@ use crate::matrix::block_matrix::Contents;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Blocks;
 use crate::terms::curvature::Curvature;
+use crate::terms::linearisation::Weights;
 use crate::terms::stencils::Stencils;
-use crate::terms::term::Weights;
 
 /// The constant part of a matrix M + α ∂f/∂x + β ∂f/∂v: masses and quadratic terms, evaluated once for all steps of one size.
 ///

@@ -9,7 +9,9 @@ use crate::matrix::pattern::Pattern;
 use crate::matrix::precision::Precision;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::Curvature;
-use crate::terms::term::{Divisible, Linearisation, Share, State, Weights};
+use crate::terms::linearisation::{Linearisation, Weights};
+use crate::terms::share::{Divisible, Share};
+use crate::terms::state::State;
 use crate::threads::{for_each, split_mut};
 
 /// Free vertices that are worth a thread of their own.

@@ -8,14 +8,16 @@ use energy_dsl::{Block, Vector3};
 
 use self::constant::{ConstantPart, coupled_runs};
 use self::division::Sums;
-use crate::matrix::block_matrix::BlockMatrix;
-use crate::matrix::block_matrix::Contents;
+use crate::matrix::block_matrix::{BlockMatrix, Contents};
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Precision;
 use crate::terms::counts::{Counts, Tally};
 use crate::terms::curvature::Curvature;
-use crate::terms::term::{Character, Divisible, Linearisation, Quantity, Share, State, StepStart, Term, Weights};
+use crate::terms::linearisation::{Linearisation, Weights};
+use crate::terms::share::{Divisible, Share};
+use crate::terms::state::{State, StepStart};
+use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
 
 /// Terms that do not fit the vertices.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -127,7 +129,7 @@ pub struct System {
 /// A term, and what it did.
 #[derive(Debug)]
 struct Counted {
-    term: Box<dyn Term>,
+    term: Box<dyn PlacedTerm>,
     counts: Counts,
 }
 
@@ -151,10 +153,7 @@ impl System {
         }
         let stencils = ends.windows(2).map(|ends| &coupled[ends[0]..ends[1]]);
         let pattern = Arc::new(Pattern::from_stencils(storage, dofs.free().len(), stencils));
-        let placed = |mut term: Box<dyn Term>| {
-            term.place(&dofs, &pattern);
-            Counted { term, counts: Counts::default() }
-        };
+        let placed = |term: Box<dyn Term>| Counted { term: term.place(&dofs, &pattern), counts: Counts::default() };
         let terms = terms.into_iter().map(placed).collect();
         let mut system = Self {
             dofs,
@@ -186,7 +185,7 @@ impl System {
     }
 
     /// The terms that threads can divide, each with whether its Jacobians are wanted.
-    fn divisible(&self, wanted: impl Fn(&dyn Term) -> bool) -> Vec<Option<(&dyn Divisible, bool)>> {
+    fn divisible(&self, wanted: impl Fn(&dyn PlacedTerm) -> bool) -> Vec<Option<(&dyn Divisible, bool)>> {
         let terms = self.terms.iter().map(|counted| &*counted.term);
         terms.map(|term| term.divisible().map(|divisible| (divisible, wanted(term)))).collect()
     }
@@ -228,7 +227,7 @@ impl System {
     }
 
     /// The terms in order, each with what it evaluated so far.
-    pub fn terms(&self) -> impl Iterator<Item = (&dyn Term, Counts)> {
+    pub fn terms(&self) -> impl Iterator<Item = (&dyn PlacedTerm, Counts)> {
         self.terms.iter().map(|counted| (&*counted.term, counted.counts))
     }
 
@@ -243,7 +242,7 @@ impl System {
         if !known {
             self.evaluated_at.clear();
         }
-        let found = |term: &dyn Term| if known { term.energy_found() } else { None };
+        let found = |term: &dyn PlacedTerm| if known { term.energy_found() } else { None };
         let found: Vec<Option<f64>> = self.terms.iter().map(|counted| found(&*counted.term)).collect();
         let mut divisible = self.divisible(|_| false);
         divisible.iter_mut().zip(&found).filter(|(_, found)| found.is_some()).for_each(|(term, _)| *term = None);
@@ -261,7 +260,7 @@ impl System {
         Ok(energies)
     }
 
-    /// Tells every term that a step begins; see [`Term::begin_step`].
+    /// Tells every term that a step begins; see [`PlacedTerm::begin_step`].
     ///
     /// # Errors
     /// When the state is incomplete or not finite.
@@ -354,7 +353,7 @@ impl System {
             Some((known, contents)) if known.matches(weights, curvature, masses) => (known, contents),
             _ => self.constant(state, (weights, curvature), masses, matrix),
         });
-        let linear = |term: &dyn Term| term.character().curved && !(with_constant && is_constant(term));
+        let linear = |term: &dyn PlacedTerm| term.character().curved && !(with_constant && is_constant(term));
         let mut product = if wanted { force.clone() } else { Vec::new() };
         let product_wanted = wanted.then_some(&mut product[..]);
         state.x.clone_into(&mut self.evaluated_at);
@@ -450,7 +449,11 @@ impl System {
         }
         let terms = self.terms.iter().map(|counted| &*counted.term);
         let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
-        let runs = coupled_runs(&self.pattern, |vertex| self.dofs.place(vertex as usize), changing.map(Term::stencils));
+        let runs = coupled_runs(
+            &self.pattern,
+            |vertex| self.dofs.place(vertex as usize),
+            changing.map(TermDescription::stencils),
+        );
         Arc::clone(self.changing.insert(runs))
     }
 
@@ -488,13 +491,13 @@ fn add_masses<T: Precision>(dofs: &DofMap, pattern: &Pattern, masses: &[f64], bl
 }
 
 /// Whether a term's Jacobians are evaluated only once.
-fn is_constant(term: &dyn Term) -> bool {
+fn is_constant(term: &dyn PlacedTerm) -> bool {
     let Character { quadratic, curved, .. } = term.character();
     quadratic && curved
 }
 
 /// Evaluates element by element until one is found whose energy or force is not finite.
-fn blame<'a>(terms: impl Iterator<Item = &'a dyn Term>, what: Quantity, state: State<'_>) -> EvaluationError {
+fn blame<'a>(terms: impl Iterator<Item = &'a dyn PlacedTerm>, what: Quantity, state: State<'_>) -> EvaluationError {
     for term in terms {
         if let Some(element) = term.find_non_finite(what, state) {
             let vertices = term.stencils().stencil(element).map(|vertex| vertex as usize).collect();

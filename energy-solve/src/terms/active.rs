@@ -24,7 +24,7 @@ impl Active {
     }
 
     /// Whether there are no others.
-    pub(crate) fn are_all(&self) -> bool {
+    pub(crate) fn is_all(&self) -> bool {
         self.chosen.is_none()
     }
 

@@ -93,14 +93,9 @@ impl<E: Element> ElementList<E> {
         &self.elements
     }
 
-    /// The elements, which the list is left without.
-    pub(crate) fn take_elements(&mut self) -> Vec<E> {
-        std::mem::take(&mut self.elements)
-    }
-
-    /// Leaves the list without stencils.
-    pub(crate) fn forget_stencils(&mut self) {
-        self.vertices = Vec::new();
+    /// Returns the name and the vertices of all stencils, and drops the elements.
+    pub(crate) fn into_name_and_vertices(self) -> (String, Vec<u32>) {
+        (self.name, self.vertices)
     }
 
     /// The stencils of all elements.

@@ -9,9 +9,11 @@ use crate::matrix::vector::block_times;
 use crate::terms::active::{Active, points_of};
 use crate::terms::counts::Tally;
 use crate::terms::element_list::ElementList;
+use crate::terms::linearisation::Linearisation;
 use crate::terms::places::Places;
+use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
-use crate::terms::term::{Character, Linearisation, Quantity, State, Term};
+use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
 
 /// A method that evaluates an element's energy.
 type ValueOf<E> = fn(&E, &<E as ForceLaw<f64>>::Points) -> Value<f64>;
@@ -21,21 +23,16 @@ type ValueOf<E> = fn(&E, &<E as ForceLaw<f64>>::Points) -> Value<f64>;
 pub struct ForceTerm<E: ForceLaw<f64>> {
     list: ElementList<E>,
     energy: Option<ValueOf<E>>,
-    active: Active,
-    places: Places,
-    /// The pairs of points whose blocks are stored.
-    pairs: Vec<(usize, usize)>,
 }
 
 impl<E: ForceLaw<f64>> ForceTerm<E> {
-    /// The sum of the forces of a list. What they depend on, and whether conjugate gradients may be used, is what the declaration
-    /// proves.
+    /// Creates the sum of the forces of a list. Its [`Character`] is what the declaration proves.
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
-        Self { list, energy: None, active: Active::default(), places: Places::default(), pairs: Vec::new() }
+        Self { list, energy: None }
     }
 
-    /// Reports the potential of the elements (damped springs have one) as the term's energy.
+    /// Reports the potential of the elements as the term's energy, for elements that have both (damped springs).
     #[must_use]
     pub fn with_energy(mut self) -> Self
     where
@@ -43,16 +40,6 @@ impl<E: ForceLaw<f64>> ForceTerm<E> {
     {
         self.energy = Some(<E as Potential<f64>>::value);
         self
-    }
-
-    fn tally(&self, flagged: u64) -> Tally {
-        let evaluated = self.active.len() as u64;
-        Tally { evaluated, skipped: self.list.elements().len() as u64 - evaluated, flagged, projected: 0 }
-    }
-
-    fn value(&self, element: usize, x: &[Vector3<f64>]) -> Option<Value<f64>> {
-        let value = self.energy?;
-        Some(value(&self.list.elements()[element], &points_of(self.list.stencil(element), x)))
     }
 }
 
@@ -62,7 +49,7 @@ impl<E: ForceLaw<f64> + Debug> Debug for ForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug> TermDescription for ForceTerm<E> {
     fn name(&self) -> &str {
         self.list.name()
     }
@@ -79,23 +66,88 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     fn stencils(&self) -> Stencils<'_> {
         self.list.stencils()
     }
+}
 
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+impl<E: ForceLaw<f64> + Debug + 'static> Term for ForceTerm<E> {
+    fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let n = self.list.arity();
-        self.active = Active::new(self.list.stencils(), dofs);
+        let active = Active::new(self.list.stencils(), dofs);
+        let (mut pairs, mut places) = (Vec::new(), Places::default());
         if self.character().curved {
-            self.pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
-            self.places = Places::new(&self.active, self.list.stencils(), &self.pairs, dofs, pattern);
+            pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
+            places = Places::new(&active, self.list.stencils(), &pairs, dofs, pattern);
         }
+        Box::new(PlacedForceTerm { term: *self, active, places, pairs })
+    }
+}
+
+/// A [`ForceTerm`] within a system.
+#[derive(Debug)]
+struct PlacedForceTerm<E: ForceLaw<f64>> {
+    term: ForceTerm<E>,
+    active: Active,
+    places: Places,
+    /// The pairs of points whose blocks are stored.
+    pairs: Vec<(usize, usize)>,
+}
+
+impl<E: ForceLaw<f64>> PlacedForceTerm<E> {
+    fn elements(&self) -> &[E] {
+        self.term.list.elements()
     }
 
+    fn stencil(&self, element: usize) -> &[u32] {
+        self.term.list.stencil(element)
+    }
+
+    fn tally(&self, flagged: u64) -> Tally {
+        let evaluated = self.active.len() as u64;
+        Tally { evaluated, skipped: self.elements().len() as u64 - evaluated, flagged, projected: 0 }
+    }
+
+    fn value(&self, element: usize, x: &[Vector3<f64>]) -> Option<Value<f64>> {
+        let value = self.term.energy?;
+        Some(value(&self.elements()[element], &points_of(self.stencil(element), x)))
+    }
+
+    /// Adds an element's blocks to the matrix. If the pattern stores a pair of blocks as one, adds only the block that is
+    /// not transposed.
+    fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
+        let slots = self.places.of(number..number + 1);
+        for (pair, block) in blocks.iter().enumerate() {
+            if self.places.transposed(number, pair) & 1 == 0 {
+                matrix.add(slots[pair] as usize, weight, block);
+            }
+        }
+    }
+}
+
+impl<E: ForceLaw<f64> + Debug> TermDescription for PlacedForceTerm<E> {
+    fn name(&self) -> &str {
+        self.term.name()
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        self.term.declaration()
+    }
+
+    fn character(&self) -> Character {
+        self.term.character()
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        self.term.stencils()
+    }
+}
+
+impl<E: ForceLaw<f64> + Debug> PlacedTerm for PlacedForceTerm<E> {
     fn dissipation(&self, state: State<'_>) -> Option<(f64, Tally)> {
         let evaluated = E::DECLARATION.velocity_dependent.then(|| dispatch(Dissipation { term: self, state }));
         evaluated.map(|(sum, flagged)| (sum, self.tally(flagged)))
     }
 
     fn has_energy(&self) -> bool {
-        self.energy.is_some()
+        self.term.energy.is_some()
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
@@ -105,11 +157,11 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
             sum += result.value;
             flagged += u64::from(result.flags.any());
         }
-        self.energy.is_some().then(|| (sum, self.tally(flagged)))
+        self.has_energy().then(|| (sum, self.tally(flagged)))
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        self.active.iter().map(|number| Some((number, self.value(number, x)?.value))).collect()
+        self.active.iter().map(|element| Some((element, self.value(element, x)?.value))).collect()
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -119,8 +171,8 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
         let mut flagged = 0;
         for (number, element) in self.active.iter().enumerate() {
-            let stencil = self.list.stencil(element);
-            let result = self.list.elements()[element].jacobians(&points_of(stencil, x), &points_of(stencil, v));
+            let stencil = self.stencil(element);
+            let result = self.elements()[element].jacobians(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), sum.force);
             let by_position = result.by_position.as_ref();
             if E::DECLARATION.curved {
@@ -143,8 +195,8 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
         let is_finite = |element: usize| match quantity {
             Quantity::Energy => self.value(element, x).is_none_or(|result| result.value.is_finite()),
             Quantity::Force => {
-                let stencil = self.list.stencil(element);
-                let result = self.list.elements()[element].force(&points_of(stencil, x), &points_of(stencil, v));
+                let stencil = self.stencil(element);
+                let result = self.elements()[element].force(&points_of(stencil, x), &points_of(stencil, v));
                 result.force.as_ref().as_flattened().iter().all(|number| number.is_finite())
             }
         };
@@ -152,9 +204,9 @@ impl<E: ForceLaw<f64> + Debug> Term for ForceTerm<E> {
     }
 }
 
-/// Σ ½ (f(x, 0) − f(x, v)) · v, and how many elements were flagged: a loop compiled for the level.
+/// Computes Σ ½ (f(x, 0) − f(x, v)) · v and the number of flagged elements, in one loop per SIMD level.
 struct Dissipation<'a, E: ForceLaw<f64>> {
-    term: &'a ForceTerm<E>,
+    term: &'a PlacedForceTerm<E>,
     state: State<'a>,
 }
 
@@ -167,7 +219,7 @@ impl<E: ForceLaw<f64>> Kernel for Dissipation<'_, E> {
         let still = <E::Points as Array<Vector3<f64>>>::repeat([0.0; 3]);
         let (mut sum, mut flagged) = (0.0, 0);
         for element in term.active.iter() {
-            let (law, stencil) = (&term.list.elements()[element], term.list.stencil(element));
+            let (law, stencil) = (&term.elements()[element], term.stencil(element));
             let (points, rates): (E::Points, E::Points) = (points_of(stencil, x), points_of(stencil, v));
             let (moving, at_rest) = (law.force_at::<L>(&points, &rates), law.force_at::<L>(&points, &still));
             let mut power = 0.0;
@@ -183,9 +235,9 @@ impl<E: ForceLaw<f64>> Kernel for Dissipation<'_, E> {
     }
 }
 
-/// Adds forces, and returns how many elements were flagged.
+/// Adds forces and returns the number of flagged elements.
 struct Forces<'a, 'b, E: ForceLaw<f64>> {
-    term: &'a ForceTerm<E>,
+    term: &'a PlacedForceTerm<E>,
     state: State<'a>,
     force: &'b mut [Vector3<f64>],
 }
@@ -198,24 +250,12 @@ impl<E: ForceLaw<f64>> Kernel for Forces<'_, '_, E> {
         let Self { term, state: State { x, v }, force } = self;
         let mut flagged = 0;
         for element in term.active.iter() {
-            let (law, stencil) = (&term.list.elements()[element], term.list.stencil(element));
+            let (law, stencil) = (&term.elements()[element], term.stencil(element));
             let result = law.force_at::<L>(&points_of(stencil, x), &points_of(stencil, v));
             add_vectors(stencil, result.force.as_ref(), force);
             flagged += u64::from(result.flags.any());
         }
         flagged
-    }
-}
-
-impl<E: ForceLaw<f64>> ForceTerm<E> {
-    /// Adds an element's blocks to the matrix: of two that are stored as one, the one that is not turned.
-    fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
-        let slots = self.places.of(number..number + 1);
-        for (pair, block) in blocks.iter().enumerate() {
-            if self.places.turned(number, pair) & 1 == 0 {
-                matrix.add(slots[pair] as usize, weight, block);
-            }
-        }
     }
 }
 

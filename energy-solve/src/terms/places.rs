@@ -8,14 +8,14 @@ use crate::terms::active::Active;
 use crate::terms::stencils::Stencils;
 
 /// Where the blocks of elements go: for each pair of an element's points one place in the matrix, for which block (i, j) may have to be
-/// turned to block (j, i).
+/// transposed to block (j, i).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Places {
     pairs: usize,
     /// By element, pair.
     slots: Vec<u32>,
-    /// By block of elements, pair: bit e is set where the pair of element e is turned.
-    turned: Vec<u16>,
+    /// By block of elements, pair: bit e is set where the pair of element e is transposed.
+    transposed: Vec<u16>,
 }
 
 impl Places {
@@ -28,17 +28,17 @@ impl Places {
         pattern: &Pattern,
     ) -> Self {
         let mut slots = Vec::with_capacity(active.len() * pairs.len());
-        let mut turned = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
+        let mut transposed = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
         for (number, element) in active.iter().enumerate() {
             let row = |point: usize| dofs.place(stencils.vertex(element, point) as usize);
             for (pair, &(i, j)) in pairs.iter().enumerate() {
                 let place = row(i).zip(row(j)).and_then(|(row, column)| pattern.place(row, column));
                 let (slot, flipped) = place.unwrap_or((pattern.nowhere(), false));
                 slots.push(index(slot));
-                turned[number / BLOCK * pairs.len() + pair] |= u16::from(flipped) << (number % BLOCK);
+                transposed[number / BLOCK * pairs.len() + pair] |= u16::from(flipped) << (number % BLOCK);
             }
         }
-        Self { pairs: pairs.len(), slots, turned }
+        Self { pairs: pairs.len(), slots, transposed }
     }
 
     /// Whether there are none.
@@ -52,9 +52,9 @@ impl Places {
         &self.slots[elements.start * self.pairs..elements.end * self.pairs]
     }
 
-    /// Bit e is set where the pair of element `first` + e is turned.
+    /// Bit e is set where the pair of element `first` + e is transposed.
     #[inline(always)]
-    pub(crate) fn turned(&self, first: usize, pair: usize) -> u32 {
-        u32::from(self.turned[first / BLOCK * self.pairs + pair] >> (first % BLOCK))
+    pub(crate) fn transposed(&self, first: usize, pair: usize) -> u32 {
+        u32::from(self.transposed[first / BLOCK * self.pairs + pair] >> (first % BLOCK))
     }
 }

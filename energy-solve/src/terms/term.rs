@@ -1,96 +1,27 @@
-use std::ops::Range;
-
 use energy_dsl::{Declaration, Vector3};
 
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
-use crate::matrix::precision::Blocks;
 use crate::terms::counts::Tally;
-use crate::terms::curvature::Curvature;
+use crate::terms::linearisation::Linearisation;
+use crate::terms::share::{Divisible, Share};
+use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
 
-/// What a term's force is like, so that what is absent costs nothing.
+/// Properties of a term's force that let a system skip work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Character {
-    /// ∂f/∂x and ∂f/∂v are symmetric: conjugate gradients will do.
+    /// Whether ∂f/∂x and ∂f/∂v are symmetric, so that conjugate gradients apply.
     pub symmetric: bool,
-    /// f depends on velocities.
+    /// Whether f depends on velocities.
     pub velocity_dependent: bool,
-    /// ∂f/∂x and ∂f/∂v are the same at all positions and velocities: they are computed once for all steps of one size.
+    /// Whether ∂f/∂x and ∂f/∂v are constant. They are then evaluated once for all steps of one size.
     pub quadratic: bool,
-    /// f depends on positions or velocities at all; gravity does not, and has no Jacobians to assemble.
+    /// Whether f depends on positions or velocities at all. Gravity does not, and has no Jacobians to assemble.
     pub curved: bool,
 }
 
-/// Positions (m) and velocities (m/s) of all vertices.
-#[derive(Clone, Copy, Debug)]
-pub struct State<'a> {
-    /// Positions.
-    pub x: &'a [Vector3<f64>],
-    /// Velocities.
-    pub v: &'a [Vector3<f64>],
-}
-
-/// Where a step starts.
-#[derive(Clone, Copy, Debug)]
-pub struct StepStart<'a> {
-    /// When, in s.
-    pub time: f64,
-    /// Its size, in s.
-    pub dt: f64,
-    /// Positions and velocities then.
-    pub state: State<'a>,
-}
-
-/// What one of several threads sums up: consecutive vertices, and the blocks in their rows of the matrix.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Share {
-    /// Its number among all shares.
-    pub number: usize,
-    /// Its vertices.
-    pub vertices: Range<usize>,
-    /// Its blocks, by [`Pattern::place`].
-    pub blocks: Range<usize>,
-}
-
-/// A term that can be summed up by shares, all at the same time: elements that act across their border are evaluated for both. Every entry is a sum in
-/// the order of the elements, whatever the shares.
-pub trait Divisible: Sync {
-    /// The number of parts that its energy is the sum of, in their order. It depends on the elements alone.
-    fn energy_parts(&self) -> usize;
-    /// One part of the energy.
-    fn energy_part(&self, part: usize, x: &[Vector3<f64>]) -> (f64, Tally);
-    /// Adds f of the vertices of a share.
-    fn add_force_of(&self, share: &Share, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally;
-    /// Adds f and its Jacobians: `sum` holds vertices and blocks of a share.
-    fn add_linearisation_of(&self, share: &Share, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally;
-}
-
-/// The factors α and β of α ∂f/∂x + β ∂f/∂v.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weights {
-    /// α.
-    pub position: f64,
-    /// β.
-    pub velocity: f64,
-}
-
-/// Where a linearised term is added.
-#[derive(Debug)]
-pub struct Linearisation<'a> {
-    /// α and β.
-    pub weights: Weights,
-    /// How to treat negative curvature.
-    pub curvature: Curvature,
-    /// Blocks of α ∂f/∂x + β ∂f/∂v, by [`Pattern::place`], and one more at [`Pattern::nowhere`] for those of pinned vertices.
-    pub matrix: Blocks<'a>,
-    /// f, of all vertices.
-    pub force: &'a mut [Vector3<f64>],
-    /// (∂f/∂x) v, of all vertices, if it is asked for.
-    pub stiffness_times_velocity: Option<&'a mut [Vector3<f64>]>,
-}
-
-/// What may turn out not to be finite.
+/// A quantity that may turn out to be infinite or NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// U.
@@ -108,53 +39,66 @@ impl std::fmt::Display for Quantity {
     }
 }
 
-/// Elements of one type within a [`crate::System`].
-///
-/// Nothing is evaluated before [`Term::place`]; from then on all elements but those on pinned vertices only are.
-pub trait Term: std::fmt::Debug {
-    /// What it stands for.
+/// The properties of a term that do not depend on the vertices' state.
+pub trait TermDescription: std::fmt::Debug {
+    /// The term's name, for people: "structural springs".
     fn name(&self) -> &str;
-    /// The declaration of its elements.
+    /// The declaration of the term's elements.
     fn declaration(&self) -> &'static Declaration;
-    /// What its force is like.
+    /// The properties of the term's force.
     fn character(&self) -> Character;
-    /// The vertices of its elements.
+    /// The vertices of each element.
     fn stencils(&self) -> Stencils<'_>;
-    /// Finds out which elements have a free vertex, and where their blocks are stored; of constant ones that may wait for [`Term::place_blocks`].
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern);
-    /// Finds out where its blocks are stored, if it does not know. Called before constant Jacobians are evaluated.
+}
+
+/// Elements of one type, to become part of a [`System`](crate::System).
+///
+/// A term cannot be evaluated until [`Term::place`] turns it into a [`PlacedTerm`].
+pub trait Term: TermDescription {
+    /// Returns the term bound to a system: it evaluates the elements with a free vertex, and knows where their blocks are
+    /// stored.
+    fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm>;
+}
+
+/// A term of a [`System`](crate::System), ready for evaluation.
+///
+/// Elements whose vertices are all pinned are skipped.
+pub trait PlacedTerm: TermDescription {
+    /// Looks up where the blocks are stored, if the term does not know. Terms with constant Jacobians may delay this
+    /// until a system calls it, just before [`PlacedTerm::add_linearisation`].
     fn place_blocks(&mut self, _dofs: &DofMap, _pattern: &Pattern) {}
-    /// May forget where its blocks are stored, until [`Term::place_blocks`] is called: its Jacobians are constant, and were evaluated.
+    /// Lets a term with constant Jacobians free the memory that [`PlacedTerm::place_blocks`] filled.
     fn forget_blocks(&mut self) {}
-    /// Finds out what elements each share needs, if it can be divided. Called after [`Term::place`], and whenever the number of threads changes.
+    /// Assigns elements to the shares of several threads, if the term is [`Divisible`].
     fn divide(&mut self, _shares: &[Share]) {}
-    /// Its shares; `None` if one thread has to do it all.
+    /// The term as one that several threads can sum; `None` if a single thread must.
     fn divisible(&self) -> Option<&dyn Divisible> {
         None
     }
-    /// Called before each step: what a term holds fixed over a step (the normal force of friction, where an obstacle is) it takes from here.
+    /// Updates what stays fixed over a step, such as the normal force of friction or the pose of an obstacle.
     fn begin_step(&mut self, _start: StepStart<'_>) {}
-    /// Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v: half the power that a force takes that grows in proportion to
-    /// velocity. `None` for a force that does not depend on velocity.
+    /// Returns Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v. For a force proportional
+    /// to velocity, R is half the dissipated power. `None` if the force does not depend on velocity.
     fn dissipation(&self, _state: State<'_>) -> Option<(f64, Tally)> {
         None
     }
-    /// Whether it has an energy.
+    /// Whether the term has an energy.
     fn has_energy(&self) -> bool;
-    /// Σ U; `None` for a force law.
+    /// Returns Σ U, in J; `None` for a force law.
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)>;
-    /// Σ U at the positions where forces or Jacobians were evaluated last, if it came with them.
+    /// Returns Σ U at the positions where forces or Jacobians were last evaluated; `None` if they do not yield it.
     fn energy_found(&self) -> Option<f64> {
         None
     }
-    /// U of each evaluated element, with its number among the stencils: for pictures of where energy is. `None` where it is not known by elements.
+    /// Returns U of each evaluated element with the element's index, for plots of the energy density. `None` if the
+    /// energy is not known by element.
     fn element_energies(&self, _x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
         None
     }
-    /// Adds f.
+    /// Adds f to `force`.
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally;
-    /// Adds f and its Jacobians.
+    /// Adds f and its Jacobians to `sum`.
     fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally;
-    /// The first evaluated element for which something is infinite or NaN.
+    /// Returns the index of the first evaluated element with an infinite or NaN quantity.
     fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize>;
 }
