@@ -1,7 +1,7 @@
 //! What one island has and received: the ledger is their sum.
 
 use energy_dsl::Vector3;
-use energy_solve::{EvaluationError, State, Term};
+use energy_solve::{EvaluationError, PlacedTerm, State};
 use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
@@ -90,13 +90,13 @@ impl Account {
 }
 
 /// Whether a term does work that is no change of its potential.
-pub(crate) fn works(term: &dyn Term) -> bool {
+pub(crate) fn works(term: &dyn PlacedTerm) -> bool {
     !term.has_energy() || term.character().velocity_dependent
 }
 
 /// The energy of each term that has one.
 fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
-    let energy = |term: &dyn Term| term.energy(&body.x).map(|(energy, _)| energy);
+    let energy = |term: &dyn PlacedTerm| term.energy(&body.x).map(|(energy, _)| energy);
     let all: Vec<f64> = body.system.terms().filter_map(|(term, _)| energy(term)).collect();
     match all.iter().all(|energy| energy.is_finite()) {
         true => Ok(all),
@@ -107,7 +107,7 @@ fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
 /// The power of each force that is no gradient on the free vertices, in W.
 fn powers(body: &Body) -> Vec<f64> {
     let still = vec![[0.0; 3]; body.v.len()];
-    let power = |term: &dyn Term| {
+    let power = |term: &dyn PlacedTerm| {
         let mut force = still.clone();
         term.add_force(body.state(), &mut force);
         let mut power = dot_of_free(body, &force);

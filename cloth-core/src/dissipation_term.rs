@@ -2,7 +2,8 @@
 
 use energy_dsl::{Array, Declaration, Element, Potential, Vector3};
 use energy_solve::{
-    Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term, TrianglePlaces, index,
+    Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, State, Stencils, StepStart, Tally, Term,
+    TermDescription, TrianglePlaces, index,
 };
 
 /// Which elements act over a step: everything but velocities is held as it was at its start.
@@ -48,7 +49,7 @@ impl<L: DissipationLaw> DissipativeTerm<L> {
     }
 }
 
-impl<L: DissipationLaw> Term for DissipativeTerm<L> {
+impl<L: DissipationLaw> TermDescription for DissipativeTerm<L> {
     fn name(&self) -> &str {
         &self.name
     }
@@ -64,14 +65,19 @@ impl<L: DissipationLaw> Term for DissipativeTerm<L> {
     fn stencils(&self) -> Stencils<'_> {
         Stencils::new(self.arity, &self.stencils)
     }
+}
 
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+impl<L: DissipationLaw + 'static> Term for DissipativeTerm<L> {
+    fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
         self.acting.clear();
         self.is_free = self.stencils().iter().map(|mut stencil| stencil.any(is_free)).collect();
         self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);
+        self
     }
+}
 
+impl<L: DissipationLaw> PlacedTerm for DissipativeTerm<L> {
     fn begin_step(&mut self, start: StepStart<'_>) {
         self.acting = self.law.elements(&start, &self.is_free);
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use energy_dsl::Vector3;
-use energy_solve::{EvaluationError, Term};
+use energy_solve::{EvaluationError, PlacedTerm};
 use plotters::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +93,7 @@ impl Ledger {
     /// When an energy is not finite.
     pub(crate) fn new(islands: &[Island], labels: &[TermLabel], time: f64) -> Result<Self, EvaluationError> {
         // The columns of labels.
-        let columns = |keep: fn(&dyn Term) -> bool| -> Vec<Option<usize>> {
+        let columns = |keep: fn(&dyn PlacedTerm) -> bool| -> Vec<Option<usize>> {
             let mut kept = vec![false; labels.len()];
             for island in islands {
                 let terms = island.body().system.terms().zip(island.labels());

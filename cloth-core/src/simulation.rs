@@ -2,7 +2,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{Counts, EvaluationError, State, SystemError, Term};
+use energy_solve::{Counts, EvaluationError, PlacedTerm, State, SystemError};
 
 use crate::body::Body;
 use crate::checkpoint::{CheckpointError, SavedState};
@@ -195,7 +195,7 @@ impl Simulation {
     }
 
     /// The terms of all islands.
-    pub fn terms(&self) -> impl Iterator<Item = &dyn Term> {
+    pub fn terms(&self) -> impl Iterator<Item = &dyn PlacedTerm> {
         self.islands.iter().flat_map(|island| island.body().system.terms().map(|(term, _)| term))
     }
 

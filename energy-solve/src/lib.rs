@@ -34,69 +34,26 @@
 
 #![forbid(unsafe_code)]
 
-mod active;
-mod bicgstab;
-mod block_cholesky;
-mod block_jacobi;
-mod conjugate_gradients;
-mod constant;
-mod counts;
-mod curvature;
-mod division;
-mod dofs;
-mod domains;
-mod force_term;
-mod gauss_newton;
-mod incomplete_cholesky;
-mod list;
-mod loss;
+mod least_squares;
+mod linear;
 mod matrix;
-mod multigrid;
-mod normal_matrix;
-mod normal_solver;
-mod over_relaxation;
-mod pattern;
-mod places;
-mod potential_term;
-mod precision;
-mod preconditioner;
-mod residual_term;
-mod rounded_block;
-mod scatter;
-mod solve;
-mod sparse_factor;
-mod stencils;
 mod system;
-mod term;
+mod terms;
 mod threads;
-mod triangle_places;
-mod vector;
 
-pub use bicgstab::bicgstab;
-pub use block_cholesky::{BlockCholesky, CholeskyError};
-pub use block_jacobi::BlockJacobi;
-pub use conjugate_gradients::conjugate_gradients;
-pub use counts::{Counts, Tally};
-pub use curvature::{Curvature, change_dense};
-pub use dofs::DofMap;
-pub use force_term::ForceTerm;
-pub use gauss_newton::{GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, Outcome, TermCost};
-pub use incomplete_cholesky::IncompleteCholesky;
-pub use list::{ElementList, ListError};
-pub use loss::Loss;
-pub use matrix::BlockMatrix;
-pub use multigrid::Multigrid;
-pub use normal_matrix::{CouplingError, Couplings, NormalMatrix, NormalPattern};
-pub use normal_solver::{NormalSolution, NormalSolver, NormalSolverKind, SolverError};
-pub use over_relaxation::OverRelaxation;
-pub use pattern::{Pattern, Storage, index};
-pub use potential_term::PotentialTerm;
-pub use precision::{Blocks, Precision};
-pub use preconditioner::{Preconditioner, SingularBlock};
-pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm, TermSum};
-pub use solve::{SolveOptions, SolveReport, StopReason};
-pub use stencils::Stencils;
+pub use least_squares::{
+    CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
+    Loss, NormalEquations, NormalMatrix, NormalPattern, NormalSolution, NormalSolver, NormalSolverKind, Outcome,
+    Placed, ResidualTerm, SolverError, TermCost, TermSum,
+};
+pub use linear::{
+    BlockCholesky, BlockJacobi, CholeskyError, IncompleteCholesky, Multigrid, OverRelaxation, Preconditioner,
+    SingularBlock, SolveOptions, SolveReport, StopReason, bicgstab, conjugate_gradients,
+};
+pub use matrix::{BlockMatrix, Blocks, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
-pub use term::{Character, Divisible, Linearisation, Quantity, Share, State, StepStart, Term, Weights};
-pub use triangle_places::TrianglePlaces;
-pub use vector::dot;
+pub use terms::{
+    Character, Counts, Curvature, Divisible, ElementList, ForceTerm, Linearisation, ListError, PlacedTerm,
+    PotentialTerm, Quantity, Share, State, Stencils, StepStart, Tally, Term, TermDescription, TrianglePlaces, Weights,
+    change_dense,
+};

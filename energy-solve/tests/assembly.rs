@@ -255,6 +255,47 @@ fn energies_that_came_with_forces_are_not_evaluated_again() {
 }
 
 #[test]
+fn constant_jacobians_are_evaluated_once_for_each_matrix() {
+    let mut system = System::new(vec![springs(), slack_springs()], &[false; 5]).unwrap();
+    let (x, v) = (positions(), velocities());
+    let state = State { x: &x, v: &v };
+    let weights = Weights { position: -1e-2, velocity: 0.0 };
+    let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
+    let other = LinearisationOptions { weights: Weights { position: -2e-2, velocity: 0.0 }, ..options };
+    let mut evaluated = 0;
+    let mut added = |system: &mut System, options: LinearisationOptions, matrix: &mut BlockMatrix| {
+        system.linearise(state, options, matrix).unwrap();
+        let counts = system.terms().nth(1).unwrap().1;
+        let before = std::mem::replace(&mut evaluated, counts.hessian.evaluated);
+        evaluated - before
+    };
+    let (mut one, mut two) = (system.matrix(), system.matrix());
+    assert_eq!(added(&mut system, options, &mut one), 3);
+    assert_eq!(added(&mut system, other, &mut two), 3);
+    // In turns, each matrix keeps its own constant part. Clones share it.
+    let mut copy = one.clone();
+    for _ in 0..2 {
+        assert_eq!(added(&mut system, options, &mut one), 0);
+        assert_eq!(added(&mut system, other, &mut two), 0);
+        assert_eq!(added(&mut system, options, &mut copy), 0);
+    }
+    assert_eq!(one.values(), copy.values());
+    // Other weights and changed entries need another evaluation, and both give what a new matrix gets.
+    two.values_mut()[0] = [[7.0; 3]; 3];
+    for matrix in [&mut one, &mut two] {
+        let weights = Weights { position: -3e-2, velocity: 0.0 };
+        assert_eq!(added(&mut system, LinearisationOptions { weights, ..options }, matrix), 3);
+    }
+    assert_eq!(one.values(), two.values());
+    assert_eq!(added(&mut system, options, &mut system_matrix(&copy)), 3);
+}
+
+/// A zero matrix of the same pattern.
+fn system_matrix(matrix: &BlockMatrix) -> BlockMatrix {
+    BlockMatrix::zeros(matrix.pattern().clone())
+}
+
+#[test]
 fn what_is_pinned_altogether_is_counted_as_skipped() {
     let mut pinned = system(&[0, 1, 2, 3, 4]);
     assert_eq!(pinned.energies(&positions()).unwrap()[0].energy, Some(0.0));

@@ -1,6 +1,7 @@
 use energy_dsl::{Block, Declaration, Element, Potential, Vector3};
 use energy_solve::{
-    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, StepStart, Tally, Term, index,
+    Character, Curvature, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, State, Stencils, StepStart, Tally,
+    Term, TermDescription, index,
 };
 
 use super::solid::Solid;
@@ -59,7 +60,7 @@ impl<S: Solid> ContactTerm<S> {
     }
 }
 
-impl<S: Solid> Term for ContactTerm<S> {
+impl<S: Solid> TermDescription for ContactTerm<S> {
     fn name(&self) -> &str {
         &self.name
     }
@@ -75,11 +76,16 @@ impl<S: Solid> Term for ContactTerm<S> {
     fn stencils(&self) -> Stencils<'_> {
         Stencils::new(1, &self.stencils)
     }
+}
 
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+impl<S: Solid + 'static> Term for ContactTerm<S> {
+    fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         self.free = dofs.free().iter().enumerate().map(|(row, &vertex)| (vertex, pattern.diagonal(row))).collect();
+        self
     }
+}
 
+impl<S: Solid> PlacedTerm for ContactTerm<S> {
     /// The solid is where it will be at the end of the step.
     fn begin_step(&mut self, start: StepStart<'_>) {
         self.move_to(start.time + start.dt);

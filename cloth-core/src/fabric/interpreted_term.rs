@@ -1,8 +1,8 @@
 use energy_compiler::Interpreted;
 use energy_dsl::{Block, Declaration, Flags, Inputs, Mask, RestError, Vector3, triangle_index};
 use energy_solve::{
-    Character, Curvature, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, TrianglePlaces,
-    change_dense, index,
+    Character, Curvature, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, State, Stencils, Tally, Term,
+    TermDescription, TrianglePlaces, change_dense, index,
 };
 
 /// Elements of a declaration that was read at run time. Their compiled routines are interpreted, operation by operation: some ten to a hundred times
@@ -98,7 +98,7 @@ impl InterpretedTerm {
     }
 }
 
-impl Term for InterpretedTerm {
+impl TermDescription for InterpretedTerm {
     fn name(&self) -> &str {
         &self.name
     }
@@ -115,15 +115,20 @@ impl Term for InterpretedTerm {
     fn stencils(&self) -> Stencils<'_> {
         Stencils::new(self.arity, &self.stencils)
     }
+}
 
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+impl Term for InterpretedTerm {
+    fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let is_free = |stencil: &[u32]| stencil.iter().any(|&vertex| dofs.place(vertex as usize).is_some());
         self.active = (0..self.bound.len()).filter(|&number| is_free(self.stencil(number))).collect();
         if self.character().curved {
             self.places = TrianglePlaces::new(self.stencils(), dofs, pattern);
         }
+        self
     }
+}
 
+impl PlacedTerm for InterpretedTerm {
     fn has_energy(&self) -> bool {
         true
     }

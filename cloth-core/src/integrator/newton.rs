@@ -3,8 +3,8 @@ use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, Precision, SolveOptions,
-    SolveReport, State, StopReason, System, Term, Weights, dot,
+    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, OverRelaxation, PlacedTerm, Precision, SolveOptions,
+    SolveReport, State, StopReason, System, Weights, dot,
 };
 use serde::{Deserialize, Serialize};
 
@@ -402,7 +402,7 @@ fn if_dependent<'a>(
 
 /// Forces without energy, but drag, have no incremental potential.
 fn refuse_without_energy(system: &System) -> Result<(), StepError> {
-    let fits = |term: &dyn Term| {
+    let fits = |term: &dyn PlacedTerm| {
         let character = term.character();
         character.symmetric && (term.has_energy() || character.velocity_dependent)
     };

@@ -3,7 +3,10 @@ use std::rc::Rc;
 
 use energy_dsl::{Declaration, Element, Potential, Vector3};
 use energy_elements::ZeroLengthSpring;
-use energy_solve::{Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, index};
+use energy_solve::{
+    Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, State, Stencils, Tally, Term, TermDescription,
+    index,
+};
 
 use crate::mesh::dot;
 use crate::scene::{IslandModel, TermLabel};
@@ -86,7 +89,7 @@ impl GripTerm {
     }
 }
 
-impl Term for GripTerm {
+impl TermDescription for GripTerm {
     fn name(&self) -> &str {
         NAME
     }
@@ -102,12 +105,17 @@ impl Term for GripTerm {
     fn stencils(&self) -> Stencils<'_> {
         Stencils::new(1, &self.stencils)
     }
+}
 
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+impl Term for GripTerm {
+    fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         self.slots =
             self.stencils.iter().map(|&vertex| dofs.place(vertex as usize).map(|row| pattern.diagonal(row))).collect();
+        self
     }
+}
 
+impl PlacedTerm for GripTerm {
     fn has_energy(&self) -> bool {
         true
     }

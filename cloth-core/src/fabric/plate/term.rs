@@ -4,8 +4,8 @@ use energy_dsl::{
 };
 use energy_elements::ArcAngle;
 use energy_solve::{
-    Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, Precision, Quantity, State, Stencils,
-    Storage, Tally, Term, TrianglePlaces, index,
+    Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity, State,
+    Stencils, Storage, Tally, Term, TermDescription, TrianglePlaces, index,
 };
 
 use super::assembly::{OuterProducts, Turning};
@@ -308,7 +308,7 @@ fn remove(vector: &mut [f64; 3], unit: &[f64; 3]) {
     (0..3).for_each(|k| vector[k] -= part * unit[k]);
 }
 
-impl Term for PlateTerm {
+impl TermDescription for PlateTerm {
     fn name(&self) -> &str {
         &self.name
     }
@@ -324,8 +324,10 @@ impl Term for PlateTerm {
     fn stencils(&self) -> Stencils<'_> {
         Stencils::new(self.arity, &self.stencils)
     }
+}
 
-    fn place(&mut self, dofs: &DofMap, pattern: &Pattern) {
+impl Term for PlateTerm {
+    fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let is_free = |&vertex: &usize| dofs.place(vertex).is_some();
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
@@ -356,8 +358,11 @@ impl Term for PlateTerm {
             };
             self.places.push(PatchPlaces { slots, mirrored });
         }
+        self
     }
+}
 
+impl PlacedTerm for PlateTerm {
     fn has_energy(&self) -> bool {
         true
     }

@@ -1,0 +1,312 @@
+use std::sync::Arc;
+
+use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
+use crate::least_squares::normal_solver::{NormalSolver, NormalSolverKind, SolverError};
+use crate::least_squares::residual_term::{LeastSquaresTerm, NormalEquations};
+
+/// How steps are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaussNewtonOptions {
+    /// μ of (JᵀJ + μ 1) d = −Jᵀr, in the unit of JᵀJ.
+    pub damping: f64,
+    /// A step is given up when damping beyond this does not help.
+    pub largest_damping: f64,
+    /// How often a step is halved before it is damped ten times more.
+    pub halvings: usize,
+    /// How the normal equations are solved.
+    pub solver: NormalSolverKind,
+}
+
+impl Default for GaussNewtonOptions {
+    /// μ = 10⁻⁴, up to 10⁴; four halvings; Cholesky.
+    fn default() -> Self {
+        Self { damping: 1e-4, largest_damping: 1e4, halvings: 4, solver: NormalSolverKind::Cholesky }
+    }
+}
+
+/// The energy of one term.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TermCost {
+    /// The term's name.
+    pub name: String,
+    /// λ Σ w ρ(‖r‖²).
+    pub energy: f64,
+    /// Its elements.
+    pub elements: usize,
+    /// Those left out because they met a singularity.
+    pub degenerate: usize,
+}
+
+/// How an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The energy went down.
+    Decreased,
+    /// Jᵀr is zero.
+    Stationary,
+    /// No step, however damped, lowers the energy: rounding is all that is left. The unknowns are as before.
+    Stalled,
+}
+
+/// One iteration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IterationReport {
+    /// The terms before the step.
+    pub terms: Vec<TermCost>,
+    /// E before the step.
+    pub before: f64,
+    /// E after it.
+    pub after: f64,
+    /// What E would fall by if residuals were linear and the loss's weights fixed, for the step that was solved for.
+    pub predicted_decrease: f64,
+    /// The fraction of it that was taken.
+    pub fraction: f64,
+    /// The damping it took.
+    pub damping: f64,
+    /// ‖d‖ of the step taken.
+    pub step_length: f64,
+    /// Iterations of the linear solver.
+    pub solver_iterations: usize,
+    /// How it ended.
+    pub outcome: Outcome,
+}
+
+/// A problem that cannot be solved as posed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GaussNewtonError {
+    /// An unknown is not a number.
+    #[error("unknown {unknown} of block {block} is not finite")]
+    NonFiniteUnknown {
+        /// The block.
+        block: usize,
+        /// Which of its unknowns.
+        unknown: usize,
+    },
+    /// There are not as many blocks as the pattern has.
+    #[error("{found} blocks of unknowns, but the pattern is of {expected}")]
+    WrongLength {
+        /// Blocks of the pattern.
+        expected: usize,
+        /// Blocks given.
+        found: usize,
+    },
+    /// An energy is not a number at the start.
+    #[error("the energy of `{term}` is not finite; element {element:?} is the first to blame")]
+    NonFiniteEnergy {
+        /// The term.
+        term: String,
+        /// Its first element that is not finite; none if only the sum overflows.
+        element: Option<usize>,
+    },
+    /// The linear system cannot be solved, however damped.
+    #[error("no step: {0}")]
+    Solver(#[from] SolverError),
+}
+
+/// Gauss–Newton for sums of squared residuals over blocks of D unknowns, with Levenberg's damping and backtracking.
+///
+/// ```
+/// use std::sync::Arc;
+/// use energy_solve::{Couplings, GaussNewton, GaussNewtonOptions, NormalPattern, Placed, ResidualTerm};
+/// use energy_dsl::energy;
+///
+/// energy! {
+///     /// Rosenbrock's valley as two residuals.
+///     residual Valley(x: Vec2) { [10 * (x[1] - x[0]^2), 1 - x[0]] }
+/// }
+///
+/// let pattern = Arc::new(NormalPattern::new(1, [[0].as_slice()]).unwrap());
+/// let couplings = Arc::new(Couplings::new(&pattern, &[[0]]).unwrap());
+/// let mut valley = ResidualTerm::<Valley, 2>::new("valley", couplings, 1.0);
+/// valley.set_elements([Placed { element: Valley::new(), stencil: 0, weight: 1.0 }]);
+///
+/// let mut x = [[-1.2, 1.0]];
+/// let mut solver = GaussNewton::new(pattern, GaussNewtonOptions::default()).unwrap();
+/// let iterations = solver.minimise(&[&valley], &mut x, 50, 1e-12).unwrap();
+/// assert!((x[0][0] - 1.0).abs() < 1e-9 && (x[0][1] - 1.0).abs() < 1e-9);
+/// assert!(iterations.iter().all(|one| one.after <= one.before));
+/// ```
+#[derive(Debug)]
+pub struct GaussNewton<const D: usize> {
+    equations: NormalEquations<D>,
+    solver: NormalSolver<D>,
+    /// How steps are taken.
+    pub options: GaussNewtonOptions,
+}
+
+impl<const D: usize> GaussNewton<D> {
+    /// A solver for problems whose elements couple blocks as the pattern says.
+    ///
+    /// # Errors
+    /// When the factorisation does not fit into memory.
+    pub fn new(pattern: Arc<NormalPattern>, options: GaussNewtonOptions) -> Result<Self, SolverError> {
+        let solver = NormalSolver::new(options.solver, &pattern)?;
+        let right = vec![[0.0; D]; pattern.blocks()];
+        Ok(Self { equations: NormalEquations { matrix: NormalMatrix::zeros(pattern), right }, solver, options })
+    }
+
+    /// JᵀJ and Jᵀr as last linearised.
+    #[must_use]
+    pub fn equations(&self) -> &NormalEquations<D> {
+        &self.equations
+    }
+
+    /// The terms' energies at x; JᵀJ and Jᵀr are renewed.
+    ///
+    /// # Errors
+    /// When unknowns or energies are not finite.
+    pub fn linearise(
+        &mut self,
+        terms: &[&dyn LeastSquaresTerm<D>],
+        x: &[[f64; D]],
+    ) -> Result<Vec<TermCost>, GaussNewtonError> {
+        self.check(x)?;
+        self.equations.clear();
+        let mut costs = Vec::with_capacity(terms.len());
+        for term in terms {
+            let sum = term.linearise(x, &mut self.equations);
+            if !sum.energy.is_finite() {
+                let element = term.find_non_finite(x);
+                return Err(GaussNewtonError::NonFiniteEnergy { term: term.name().to_owned(), element });
+            }
+            costs.push(TermCost {
+                name: term.name().to_owned(),
+                energy: sum.energy,
+                elements: term.len(),
+                degenerate: sum.degenerate,
+            });
+        }
+        Ok(costs)
+    }
+
+    /// The step d of (JᵀJ + μ 1) d = −Jᵀr for the equations as last linearised, and the solver's iterations.
+    ///
+    /// # Errors
+    /// When the matrix is not positive definite, or iterations do not converge.
+    pub fn solve(&mut self, damping: f64) -> Result<(Vec<[f64; D]>, usize), SolverError> {
+        let mut step: Vec<[f64; D]> = self.equations.right.iter().map(|block| block.map(|entry| -entry)).collect();
+        let solution = self.solver.solve(&self.equations.matrix, damping, &mut step)?;
+        Ok((step, solution.iterations))
+    }
+
+    /// E − ‖r + J d‖² = −2 dᵀJᵀr − dᵀJᵀJ d for the equations as last linearised.
+    #[must_use]
+    pub fn predicted_decrease(&self, step: &[[f64; D]]) -> f64 {
+        let mut product = vec![[0.0; D]; step.len()];
+        self.equations.matrix.multiply_damped(0.0, step, &mut product);
+        let (step, product) = (step.as_flattened(), product.as_flattened());
+        let right = self.equations.right.as_flattened();
+        step.iter().zip(product).zip(right).map(|((d, product), right)| -d * (2.0 * right + product)).sum()
+    }
+
+    /// One iteration: linearises at x, solves, and goes as far along the step as the energy goes down.
+    ///
+    /// # Errors
+    /// When unknowns or energies are not finite, or the equations cannot be solved, however damped. The unknowns are then as before.
+    pub fn iterate(
+        &mut self,
+        terms: &[&dyn LeastSquaresTerm<D>],
+        x: &mut [[f64; D]],
+    ) -> Result<IterationReport, GaussNewtonError> {
+        let costs = self.linearise(terms, x)?;
+        let before: f64 = costs.iter().map(|cost| cost.energy).sum();
+        let mut report = IterationReport {
+            terms: costs,
+            before,
+            after: before,
+            predicted_decrease: 0.0,
+            fraction: 0.0,
+            damping: self.options.damping,
+            step_length: 0.0,
+            solver_iterations: 0,
+            outcome: Outcome::Stationary,
+        };
+        if self.equations.right.as_flattened().iter().all(|&entry| entry == 0.0) {
+            return Ok(report);
+        }
+        report.outcome = Outcome::Stalled;
+        loop {
+            match self.solve(report.damping) {
+                Ok((step, iterations)) => {
+                    report.solver_iterations += iterations;
+                    report.predicted_decrease = self.predicted_decrease(&step);
+                    if self.backtrack(terms, x, &step, &mut report) {
+                        return Ok(report);
+                    }
+                }
+                Err(error) if report.damping >= self.options.largest_damping => return Err(error.into()),
+                Err(_) => {}
+            }
+            if report.damping >= self.options.largest_damping {
+                return Ok(report);
+            }
+            report.damping = (10.0 * report.damping).max(1e-12).min(self.options.largest_damping);
+        }
+    }
+
+    /// Takes the whole step, or a half, a quarter, … of it, so that the energy goes down; or none.
+    fn backtrack(
+        &self,
+        terms: &[&dyn LeastSquaresTerm<D>],
+        x: &mut [[f64; D]],
+        step: &[[f64; D]],
+        report: &mut IterationReport,
+    ) -> bool {
+        let start = x.to_vec();
+        let mut fraction = 1.0;
+        for _ in 0..=self.options.halvings {
+            for (x, d) in x.as_flattened_mut().iter_mut().zip(step.as_flattened()) {
+                *x += fraction * d;
+            }
+            let after: f64 = terms.iter().map(|term| term.energy(x).energy).sum();
+            if after < report.before {
+                let length = step.as_flattened().iter().map(|d| d * d).sum::<f64>().sqrt();
+                report.after = after;
+                report.fraction = fraction;
+                report.step_length = fraction * length;
+                report.outcome = Outcome::Decreased;
+                return true;
+            }
+            x.copy_from_slice(&start);
+            fraction /= 2.0;
+        }
+        false
+    }
+
+    /// Iterates until the energy falls by less than that part of itself, at most so many times.
+    ///
+    /// # Errors
+    /// As [`Self::iterate`].
+    pub fn minimise(
+        &mut self,
+        terms: &[&dyn LeastSquaresTerm<D>],
+        x: &mut [[f64; D]],
+        iteration_limit: usize,
+        relative_decrease: f64,
+    ) -> Result<Vec<IterationReport>, GaussNewtonError> {
+        let mut reports = Vec::new();
+        while reports.len() < iteration_limit {
+            let report = self.iterate(terms, x)?;
+            let done = report.outcome != Outcome::Decreased
+                || report.before - report.after <= relative_decrease * report.before;
+            reports.push(report);
+            if done {
+                break;
+            }
+        }
+        Ok(reports)
+    }
+
+    fn check(&self, x: &[[f64; D]]) -> Result<(), GaussNewtonError> {
+        let expected = self.equations.matrix.pattern().blocks();
+        if x.len() != expected {
+            return Err(GaussNewtonError::WrongLength { expected, found: x.len() });
+        }
+        for (block, numbers) in x.iter().enumerate() {
+            if let Some(unknown) = numbers.iter().position(|number| !number.is_finite()) {
+                return Err(GaussNewtonError::NonFiniteUnknown { block, unknown });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,228 @@
+use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
+use crate::linear::sparse_factor::SparseFactor;
+
+/// How (JᵀJ + μ 1) d = −Jᵀr is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NormalSolverKind {
+    /// Sparse Cholesky factorisation; the elimination order is found once for a pattern.
+    Cholesky,
+    /// Conjugate gradients with the blocks on the diagonal as preconditioner.
+    ConjugateGradients {
+        /// The residual's norm in the preconditioner, relative to that of the right-hand side.
+        relative_tolerance: f64,
+        /// Give up after this many iterations.
+        iteration_limit: usize,
+    },
+}
+
+/// Normal equations that cannot be solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SolverError {
+    /// A pivot is not positive.
+    #[error("the damped JᵀJ is not positive definite; a larger damping makes it so")]
+    NotPositiveDefinite,
+    /// Conjugate gradients did not converge.
+    #[error("conjugate gradients did not converge in {iterations} iterations; allow more, or factorise")]
+    NotConverged {
+        /// Iterations done.
+        iterations: usize,
+    },
+    /// The pattern could not be analysed.
+    #[error("the factorisation of {unknowns} unknowns does not fit into memory")]
+    OutOfMemory {
+        /// Unknowns of the system.
+        unknowns: usize,
+    },
+}
+
+/// What a solution took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NormalSolution {
+    /// Iterations of conjugate gradients; 0 for a factorisation.
+    pub iterations: usize,
+}
+
+/// A solver for matrices of one pattern.
+#[derive(Debug)]
+pub struct NormalSolver<const D: usize> {
+    kind: NormalSolverKind,
+    factor: Option<Box<Factor>>,
+}
+
+impl<const D: usize> NormalSolver<D> {
+    /// A solver for matrices of that pattern.
+    ///
+    /// # Errors
+    /// When the memory does not suffice.
+    pub fn new(kind: NormalSolverKind, pattern: &NormalPattern) -> Result<Self, SolverError> {
+        let factor = match kind {
+            NormalSolverKind::Cholesky => Some(Box::new(Factor::new::<D>(pattern)?)),
+            NormalSolverKind::ConjugateGradients { .. } => None,
+        };
+        Ok(Self { kind, factor })
+    }
+
+    /// Solves (A + μ 1) x = b, given b in `x`.
+    ///
+    /// # Errors
+    /// When the matrix is not positive definite, or iterations do not converge.
+    pub fn solve(
+        &mut self,
+        matrix: &NormalMatrix<D>,
+        damping: f64,
+        x: &mut [[f64; D]],
+    ) -> Result<NormalSolution, SolverError> {
+        match (self.kind, &mut self.factor) {
+            (NormalSolverKind::ConjugateGradients { relative_tolerance, iteration_limit }, _) => {
+                conjugate_gradients(matrix, damping, x, relative_tolerance, iteration_limit)
+            }
+            (NormalSolverKind::Cholesky, Some(factor)) => {
+                factor.solve(matrix, damping, x)?;
+                Ok(NormalSolution::default())
+            }
+            (NormalSolverKind::Cholesky, None) => unreachable!("a factor was analysed"),
+        }
+    }
+}
+
+/// A sparse Cholesky factor of matrices of blocks.
+#[derive(Debug)]
+struct Factor(SparseFactor);
+
+impl Factor {
+    fn new<const D: usize>(pattern: &NormalPattern) -> Result<Self, SolverError> {
+        let unknowns = pattern.blocks() * D;
+        let (mut columns, mut rows) = (vec![0], Vec::new());
+        for row in 0..pattern.blocks() {
+            for i in 0..D {
+                for &column in pattern.row(row) {
+                    let first = if column as usize == row { i } else { 0 };
+                    rows.extend((first..D).map(|j| column as usize * D + j));
+                }
+                columns.push(rows.len());
+            }
+        }
+        // An upper block's rows are the lower triangle's columns.
+        SparseFactor::new(columns, rows, None).map(Self).map_err(|_| SolverError::OutOfMemory { unknowns })
+    }
+
+    fn solve<const D: usize>(
+        &mut self,
+        matrix: &NormalMatrix<D>,
+        damping: f64,
+        x: &mut [[f64; D]],
+    ) -> Result<(), SolverError> {
+        self.fill(matrix, damping);
+        self.0.factor().map_err(|_| SolverError::NotPositiveDefinite)?;
+        self.0.solve(x.as_flattened_mut());
+        Ok(())
+    }
+
+    /// The values in the order of the structure, damped.
+    fn fill<const D: usize>(&mut self, matrix: &NormalMatrix<D>, damping: f64) {
+        let pattern = matrix.pattern();
+        let mut rest = self.0.values_mut();
+        for row in 0..pattern.blocks() {
+            let blocks = &matrix.values[pattern.row_start(row)..][..pattern.row(row).len()];
+            for i in 0..D {
+                let (diagonal, others) = rest.split_at_mut(D - i);
+                diagonal.copy_from_slice(&blocks[0][i][i..D]);
+                diagonal[0] += damping;
+                let (others, left) = others.split_at_mut(D * (blocks.len() - 1));
+                for (place, block) in others.chunks_exact_mut(D).zip(&blocks[1..]) {
+                    place.copy_from_slice(&block[i][..D]);
+                }
+                rest = left;
+            }
+        }
+    }
+}
+
+/// Preconditioned conjugate gradients from zero.
+fn conjugate_gradients<const D: usize>(
+    matrix: &NormalMatrix<D>,
+    damping: f64,
+    b: &mut [[f64; D]],
+    relative_tolerance: f64,
+    iteration_limit: usize,
+) -> Result<NormalSolution, SolverError> {
+    let factors: Vec<[[f64; D]; D]> = (0..b.len())
+        .map(|row| lower_factor(matrix.diagonal(row), damping).ok_or(SolverError::NotPositiveDefinite))
+        .collect::<Result<_, _>>()?;
+    let mut x = vec![[0.0; D]; b.len()];
+    let residual = b;
+    let mut preconditioned: Vec<[f64; D]> = residual.iter().zip(&factors).map(|(r, l)| divided(l, r)).collect();
+    let mut direction = preconditioned.clone();
+    let mut product = x.clone();
+    let mut square = dot(residual, &preconditioned);
+    let goal = square * relative_tolerance * relative_tolerance;
+    let mut iterations = 0;
+    while square > goal {
+        if iterations == iteration_limit {
+            return Err(SolverError::NotConverged { iterations });
+        }
+        matrix.multiply_damped(damping, &direction, &mut product);
+        let curvature = dot(&direction, &product);
+        if curvature.is_nan() || curvature <= 0.0 {
+            return Err(SolverError::NotPositiveDefinite);
+        }
+        let step = square / curvature;
+        for row in 0..x.len() {
+            for i in 0..D {
+                x[row][i] += step * direction[row][i];
+                residual[row][i] -= step * product[row][i];
+            }
+            preconditioned[row] = divided(&factors[row], &residual[row]);
+        }
+        let next = dot(residual, &preconditioned);
+        let ratio = next / square;
+        for (direction, preconditioned) in direction.iter_mut().zip(&preconditioned) {
+            for i in 0..D {
+                direction[i] = ratio * direction[i] + preconditioned[i];
+            }
+        }
+        square = next;
+        iterations += 1;
+    }
+    residual.copy_from_slice(&x);
+    Ok(NormalSolution { iterations })
+}
+
+fn dot<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+}
+
+/// L with A + μ 1 = L Lᵀ, its diagonal inverted.
+fn lower_factor<const D: usize>(a: &[[f64; 8]; D], damping: f64) -> Option<[[f64; D]; D]> {
+    let mut l = [[0.0; D]; D];
+    for i in 0..D {
+        for j in 0..=i {
+            let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let left = a[j][i] - known;
+            if i == j {
+                let pivot = left + damping;
+                if pivot.is_nan() || pivot <= 0.0 {
+                    return None;
+                }
+                l[i][i] = 1.0 / pivot.sqrt();
+            } else {
+                l[i][j] = left * l[j][j];
+            }
+        }
+    }
+    Some(l)
+}
+
+/// (L Lᵀ)⁻¹ b, the diagonal of L being inverted.
+fn divided<const D: usize>(l: &[[f64; D]; D], b: &[f64; D]) -> [f64; D] {
+    let mut x = *b;
+    for i in 0..D {
+        let known: f64 = (0..i).map(|j| l[i][j] * x[j]).sum();
+        x[i] = (x[i] - known) * l[i][i];
+    }
+    for i in (0..D).rev() {
+        let known: f64 = (i + 1..D).map(|j| l[j][i] * x[j]).sum();
+        x[i] = (x[i] - known) * l[i][i];
+    }
+    x
+}

@@ -1,0 +1,74 @@
+use energy_dsl::Vector3;
+
+use crate::linear::preconditioner::Preconditioner;
+use crate::linear::solve::{SolveOptions, SolveReport, StopReason, norm, residual};
+use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::precision::Precision;
+use crate::matrix::vector::{add_scaled, dot};
+
+/// Solves A x = b for any invertible A, starting from the given x: BiCGSTAB (van der Vorst 1992) on the left-preconditioned
+/// system D⁻¹A x = D⁻¹b. For force laws, whose Jacobians are not symmetric.
+pub fn bicgstab(
+    matrix: &BlockMatrix<impl Precision>,
+    preconditioner: &impl Preconditioner,
+    b: &[Vector3<f64>],
+    x: &mut [Vector3<f64>],
+    options: &SolveOptions,
+) -> SolveReport {
+    let mut scratch = vec![[0.0; 3]; b.len()];
+    let mut multiply = |v: &[Vector3<f64>], out: &mut [Vector3<f64>]| {
+        matrix.multiply(v, &mut scratch);
+        preconditioner.apply(&scratch, out);
+    };
+    let mut r = vec![[0.0; 3]; b.len()];
+    preconditioner.apply(b, &mut r);
+    let target = options.relative_tolerance * norm(&r);
+    preconditioner.apply(&residual(matrix, b, x), &mut r);
+
+    let shadow = r.clone();
+    let (mut p, mut ap, mut t) = (r.clone(), r.clone(), r.clone());
+    let mut rho = dot(&shadow, &r);
+    let initial_residual = norm(&r);
+    let mut size = initial_residual;
+    let mut iterations = 0;
+    let stopped = loop {
+        if !size.is_finite() || !target.is_finite() {
+            break StopReason::NonFinite;
+        }
+        if size <= target {
+            break StopReason::Converged;
+        }
+        if iterations == options.iteration_limit {
+            break StopReason::IterationLimit;
+        }
+        multiply(&p, &mut ap);
+        let along = dot(&shadow, &ap);
+        if rho == 0.0 || along == 0.0 {
+            break StopReason::Breakdown;
+        }
+        let step = rho / along;
+        add_scaled(&mut r, -step, &ap);
+        add_scaled(x, step, &p);
+        multiply(&r, &mut t);
+        // t = 0 only if the half step already solved the system.
+        let tt = dot(&t, &t);
+        let smoothing = if tt > 0.0 { dot(&t, &r) / tt } else { 0.0 };
+        add_scaled(x, smoothing, &r);
+        add_scaled(&mut r, -smoothing, &t);
+        size = norm(&r);
+        iterations += 1;
+        if size > target && smoothing == 0.0 {
+            break StopReason::Breakdown;
+        }
+
+        let previous = rho;
+        rho = dot(&shadow, &r);
+        let turn = rho / previous * (step / smoothing);
+        for i in 0..p.len() {
+            for axis in 0..3 {
+                p[i][axis] = r[i][axis] + turn * (p[i][axis] - smoothing * ap[i][axis]);
+            }
+        }
+    };
+    SolveReport { iterations, initial_residual, final_residual: size, stopped }
+}

@@ -1,0 +1,152 @@
+use std::ops::Range;
+
+use energy_dsl::{BLOCK_NUMBERS, Block, Level};
+
+use super::{InverseFactor, Precision, Wide, rounded, whole};
+use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::pattern::{Pattern, index};
+
+/// Numbers read after a block's nine, of which nothing comes: see [`BlockSum`](energy_dsl::BlockSum).
+const SLACK: usize = BLOCK_NUMBERS - 9;
+
+/// What couples the rows of a domain with each other: the blocks of L̃ᵀ = C⁻¹ Lᵀ C⁻ᵀ by rows. Rows and columns are counted from its first.
+#[derive(Clone, Debug)]
+pub(crate) struct Triangle<T> {
+    pub(crate) rows: Range<usize>,
+    /// Blocks above the diagonal in the rows before.
+    blocks_before: usize,
+    /// For each row the first place that is no longer coupled within the domain.
+    pub(super) inner_end: Vec<u32>,
+    /// The blocks, each row by row.
+    numbers: Vec<T>,
+}
+
+/// The rows of a [`Triangle`]: what a sweep reads, at hand.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rows<'a, T> {
+    numbers: &'a [T],
+    columns: &'a [u32],
+    /// The first place and the end of each row.
+    diagonals: &'a [u32],
+    inner_end: &'a [u32],
+    /// The first row, and how many blocks there are before it, with those on the diagonal.
+    first: usize,
+    before: usize,
+}
+
+impl<'a, T> Rows<'a, T> {
+    /// What couples a row with later ones of its domain.
+    #[inline(always)]
+    pub(crate) fn blocks(&self, row: usize) -> Blocks<'a, T> {
+        let (diagonal, end) = (self.diagonals[row] as usize, self.inner_end[row] as usize);
+        let columns = &self.columns[diagonal + 1..end];
+        // Before it, there are as many blocks on the diagonal as rows.
+        let numbers = &self.numbers[9 * (diagonal - (self.before + row))..][..9 * columns.len() + SLACK];
+        Blocks { numbers, columns, first: self.first }
+    }
+}
+
+/// The blocks of a row, with as many numbers as are read at once, and their columns.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Blocks<'a, T> {
+    numbers: &'a [T],
+    columns: &'a [u32],
+    first: usize,
+}
+
+impl<'a, T> Iterator for Blocks<'a, T> {
+    type Item = (&'a [T; BLOCK_NUMBERS], usize);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        let (&column, columns) = self.columns.split_first()?;
+        let block = self.numbers.first_chunk()?;
+        (self.columns, self.numbers) = (columns, &self.numbers[9..]);
+        Some((block, column as usize - self.first))
+    }
+}
+
+impl<T: Precision> Triangle<T> {
+    /// Of these rows of a pattern.
+    pub(super) fn new(pattern: &Pattern, rows: Range<usize>) -> Self {
+        let before = |row: usize| pattern.above(row).start - row - 1;
+        let inner_end = rows.clone().map(|row| {
+            let above = pattern.above(row);
+            let inner = pattern.columns()[above.clone()].partition_point(|&column| (column as usize) < rows.end);
+            index(above.start + inner)
+        });
+        let last = rows.end - 1;
+        let blocks = pattern.above(last).end - last - 1 - before(rows.start);
+        let numbers = vec![T::from_f64(0.0); 9 * blocks + SLACK];
+        Self { blocks_before: before(rows.start), inner_end: inner_end.collect(), rows, numbers }
+    }
+
+    /// The places in the pattern of what couples a row with later ones.
+    #[inline(always)]
+    fn places(&self, pattern: &Pattern, local: usize) -> Range<usize> {
+        pattern.above(self.rows.start + local).start..self.inner_end[local] as usize
+    }
+
+    /// Its rows.
+    #[inline(always)]
+    pub(crate) fn by_rows<'a>(&'a self, pattern: &'a Pattern) -> Rows<'a, T> {
+        Rows {
+            numbers: &self.numbers,
+            columns: pattern.columns(),
+            diagonals: &pattern.diagonals()[self.rows.clone()],
+            inner_end: &self.inner_end,
+            first: self.rows.start,
+            before: self.rows.start + self.blocks_before,
+        }
+    }
+
+    /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
+    #[inline(always)]
+    pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
+        let (pattern, values) = (matrix.pattern(), matrix.values());
+        for (local, row) in self.rows.clone().enumerate() {
+            let own = rounded(&inverses[row]);
+            let mut first = 9 * (pattern.diagonal(row) - row - self.blocks_before);
+            for place in self.places(pattern, local) {
+                let other = rounded(&inverses[pattern.columns()[place] as usize]);
+                let rows = scaled_block::<M, L>(&own, &values[place], &other);
+                store(&mut self.numbers[first..][..10], &rows);
+                first += 9;
+            }
+        }
+    }
+}
+
+/// The rows of P B Qᵀ, for lower triangular P and Q given by columns: rows of B Qᵀ are sums of columns of Q, and those of the product sums of these.
+#[inline(always)]
+pub(crate) fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M>, q: &[Wide<M>; 3]) -> [Wide<M>; 3] {
+    let zero = [M::from_f64(0.0); 4];
+    let (mut right, mut scaled) = ([zero; 3], [zero; 3]);
+    for i in 0..3 {
+        for k in 0..3 {
+            for lane in 0..4 {
+                right[i][lane] = q[k][lane].mul_add::<L>(b[i][k], right[i][lane]);
+            }
+        }
+    }
+    let right = whole(right);
+    for i in 0..3 {
+        for k in 0..=i {
+            for lane in 0..4 {
+                scaled[i][lane] = right[k][lane].mul_add::<L>(p[k][i], scaled[i][lane]);
+            }
+        }
+    }
+    whole(scaled)
+}
+
+/// Writes three numbers of each row, and the fourth, which means nothing, where the next is written after it.
+#[inline(always)]
+fn store<T: Precision, M: Precision>(numbers: &mut [T], rows: &[Wide<M>; 3]) {
+    for row in 0..3 {
+        let place = &mut numbers[3 * row..3 * row + 4];
+        for lane in 0..4 {
+            place[lane] = T::from_f64(rows[row][lane].into());
+        }
+    }
+}

@@ -1,0 +1,227 @@
+use std::ops::Range;
+use std::sync::Arc;
+
+use energy_dsl::{Kernel, Level, Vector3, dispatch};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::galerkin::GalerkinProduct;
+use super::interpolation::Interpolation;
+use super::smoother::{Inversion, Smoother};
+use crate::linear::domains::{InverseFactor, Precision, Scaling, Wide, divided, scaled, unscaled};
+use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::pattern::Pattern;
+use crate::matrix::vector::widened;
+
+/// Rows of the coarsest level, at most, unless they cannot be joined any further: there the matrix is factored as a dense one.
+const COARSEST: usize = 24;
+
+/// How often each level calls for the next coarser one: a W-cycle.
+const VISITS: usize = 2;
+
+/// The level below another: its Galerkin product Pᵀ A P, and how systems with that are solved, nearly.
+#[derive(Clone, Debug)]
+pub(super) struct Coarse<T> {
+    pub(super) interpolation: Interpolation<T>,
+    product: GalerkinProduct,
+    /// Pᵀ r and e, both in the unit of the finest level's scaling.
+    pub(super) restricted: Vec<Wide<T>>,
+    pub(super) correction: Vec<Wide<T>>,
+    inverse: Inverse<T>,
+}
+
+#[derive(Clone, Debug)]
+enum Inverse<T> {
+    Dense(Option<Cholesky<f64, Dyn>>),
+    Cycle(Box<Relaxed<T>>),
+}
+
+/// A level that is relaxed, and corrected by a coarser one where its rows are coupled.
+#[derive(Clone, Debug)]
+struct Relaxed<T> {
+    smoother: Smoother<T>,
+    inverses: Vec<InverseFactor<T>>,
+    unit: f64,
+    residual: Vec<Wide<T>>,
+    smoothed: Vec<Wide<T>>,
+    carried: Vec<Wide<T>>,
+    solution: Vec<Wide<T>>,
+    next: Option<Coarse<T>>,
+}
+
+impl<T: Precision> Coarse<T> {
+    /// Below matrices of a pattern, whose rows are summed up in these ranges; `None` where none of its rows are coupled, or one with too many.
+    pub(super) fn below(pattern: &Pattern, ranges: &[Range<usize>]) -> Option<Self> {
+        let interpolation = Interpolation::averaged(pattern);
+        if interpolation.aggregates() == 0 {
+            return None;
+        }
+        let product = GalerkinProduct::new(pattern, &interpolation, ranges)?;
+        let rows = product.pattern().rows();
+        let zeros = vec![[T::from_f64(0.0); 4]; rows];
+        let inverse = if rows <= COARSEST {
+            Inverse::Dense(None)
+        } else {
+            Inverse::Cycle(Box::new(Relaxed::new(product.pattern())))
+        };
+        Some(Self { interpolation, product, restricted: zeros.clone(), correction: zeros, inverse })
+    }
+
+    /// The blocks of this level's matrix and of those below, from here on.
+    pub(super) fn blocks(&self) -> Vec<usize> {
+        let mut blocks = vec![self.product.pattern().blocks()];
+        if let Inverse::Cycle(relaxed) = &self.inverse
+            && let Some(next) = &relaxed.next
+        {
+            blocks.extend(next.blocks());
+        }
+        blocks
+    }
+
+    /// Takes over a matrix of the finer level. Fails where this shows that it is not positive definite.
+    pub(super) fn take_over(&mut self, fine: &BlockMatrix<impl Precision>, unit: f64, threads: usize) -> Option<()> {
+        let matrix = self.product.compute(fine, &self.interpolation, threads);
+        match &mut self.inverse {
+            Inverse::Dense(factor) => {
+                let rows = 3 * matrix.pattern().rows();
+                let entry = |i: usize, j: usize| unit * unit * matrix.block(i / 3, j / 3)[i % 3][j % 3];
+                *factor = Cholesky::new(DMatrix::from_fn(rows, rows, entry));
+                factor.as_ref().map(|_| ())
+            }
+            Inverse::Cycle(relaxed) => relaxed.take_over(&matrix, unit),
+        }
+    }
+
+    /// e ← about (Pᵀ A P)⁻¹ Pᵀ r: by a symmetric and positive definite matrix, always the same.
+    pub(super) fn correct(&mut self) {
+        match &mut self.inverse {
+            Inverse::Dense(factor) => {
+                let factor = factor.as_ref().expect("it was taken over");
+                let numbers = self.restricted.iter().flat_map(|&[u, v, w, _]| [u, v, w]).map(Into::into);
+                let mut e = DVector::from_iterator(3 * self.restricted.len(), numbers);
+                factor.solve_mut(&mut e);
+                for (correction, &[u, v, w]) in self.correction.iter_mut().zip(e.as_slice().as_chunks::<3>().0) {
+                    *correction = widened([u, v, w]);
+                }
+            }
+            Inverse::Cycle(relaxed) => relaxed.cycle(self.product.pattern(), &self.restricted, &mut self.correction),
+        }
+    }
+}
+
+impl<T: Precision> Relaxed<T> {
+    fn new(pattern: &Pattern) -> Self {
+        let ranges = [Range { start: 0, end: pattern.rows() }];
+        let mut domains = divided(pattern, &ranges);
+        let (triangle, couplings) = domains.remove(0);
+        let zeros = vec![[T::from_f64(0.0); 4]; pattern.rows()];
+        Self {
+            smoother: Smoother::new(triangle, couplings),
+            inverses: vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()],
+            unit: 1.0,
+            residual: zeros.clone(),
+            smoothed: zeros.clone(),
+            carried: zeros.clone(),
+            solution: zeros,
+            next: Coarse::below(pattern, &ranges),
+        }
+    }
+
+    fn take_over(&mut self, matrix: &BlockMatrix, unit: f64) -> Option<()> {
+        self.unit = unit;
+        let Self { smoother, inverses, .. } = self;
+        dispatch(Inversion { smoother, inverses, matrix, unit }).ok()?;
+        let Smoother { triangle, couplings, .. } = smoother;
+        dispatch(Scaling { triangle, couplings, inverses, matrix });
+        self.next.as_mut().map_or(Some(()), |next| next.take_over(matrix, unit, 1))
+    }
+
+    fn cycle(&mut self, pattern: &Arc<Pattern>, restricted: &[Wide<T>], correction: &mut [Wide<T>]) {
+        let back = 1.0 / self.unit;
+        for (row, &[u, v, w, _]) in restricted.iter().enumerate() {
+            let r: Vector3<f64> = [u, v, w].map(|component| back * Into::<f64>::into(component));
+            self.residual[row] = widened(scaled(&self.inverses[row], &r));
+        }
+        self.solution.fill([T::from_f64(0.0); 4]);
+        for visit in 1..=VISITS {
+            dispatch(Down { level: self, pattern });
+            if let Some(next) = &mut self.next {
+                next.correct();
+            }
+            dispatch(Up { level: self, pattern, last: visit == VISITS });
+        }
+        for (row, e) in correction.iter_mut().enumerate() {
+            let [u, v, w, _] = self.solution[row];
+            let z: Vector3<f64> = [u, v, w].map(|component| back * Into::<f64>::into(component));
+            *e = widened(unscaled(&self.inverses[row], &z));
+        }
+    }
+}
+
+/// s = (I + L̃)⁻¹ r is added to the solution, r ← −(L̃ᵀ + Ẽ) s, and Pᵀ r passed on.
+struct Down<'a, T> {
+    level: &'a mut Relaxed<T>,
+    pattern: &'a Pattern,
+}
+
+impl<T: Precision> Kernel for Down<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Relaxed { smoother, residual, smoothed, solution, next, .. } = self.level;
+        smoothed.copy_from_slice(residual);
+        smoother.forward::<L>(self.pattern, smoothed);
+        smoother.minus_upper::<L>(self.pattern, smoothed, residual);
+        add(solution, smoothed);
+        let Some(Coarse { interpolation, restricted, .. }) = next else { return };
+        restricted.fill([T::from_f64(0.0); 4]);
+        for row in 0..residual.len() {
+            interpolation.add_restricted::<L>(row, &smoother.unscaled(row, &residual[row]), 0, restricted);
+        }
+    }
+}
+
+/// c = (I + L̃ᵀ)⁻¹ (r − (L̃ + Ẽ) e), e the correction, is added to the solution, and r ← −(L̃ + Ẽ) (c − e) unless this is the last visit.
+struct Up<'a, T> {
+    level: &'a mut Relaxed<T>,
+    pattern: &'a Pattern,
+    last: bool,
+}
+
+impl<T: Precision> Kernel for Up<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Relaxed { smoother, residual, carried, solution, next, .. } = self.level;
+        carried.fill([T::from_f64(0.0); 4]);
+        if let Some(Coarse { interpolation, correction, .. }) = next {
+            for row in 0..carried.len() {
+                carried[row] = smoother.scaled(row, &interpolation.carried::<L>(row, correction));
+            }
+            smoother.subtract_lower::<L>(self.pattern, carried, residual);
+        }
+        smoother.backward::<L>(self.pattern, residual);
+        add(solution, residual);
+        if self.last {
+            return;
+        }
+        for row in 0..carried.len() {
+            for lane in 0..4 {
+                carried[row][lane] = residual[row][lane] - carried[row][lane];
+            }
+        }
+        residual.fill([T::from_f64(0.0); 4]);
+        smoother.subtract_lower::<L>(self.pattern, carried, residual);
+    }
+}
+
+/// a ← a + b.
+#[inline(always)]
+fn add<T: Precision>(a: &mut [Wide<T>], b: &[Wide<T>]) {
+    for row in 0..a.len() {
+        for lane in 0..4 {
+            a[row][lane] = a[row][lane] + b[row][lane];
+        }
+    }
+}

@@ -1,0 +1,387 @@
+use std::sync::RwLock;
+
+use energy_dsl::{Kernel, Level, Vector3, dispatch};
+
+use super::coarse::Coarse;
+use super::smoother::Smoother;
+use crate::linear::domains::{
+    InverseFactor, Meeting, Precision, Shared, Unit, Wide, add_products, of_three, scaled, unscaled,
+};
+use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
+use crate::matrix::pattern::Pattern;
+use crate::matrix::vector::widened;
+
+/// How much larger a residual may be than after over-relaxation. What is left then is smooth, and the norm, in which what is smooth counts for
+/// little, is half of the error relative to the solution; here it is rough, and the norm is a little more than the error.
+const ROUGHNESS: f64 = 2.0;
+
+/// A domain's part of the vectors of conjugate gradients.
+#[derive(Clone, Debug)]
+pub(super) struct Vectors<T> {
+    /// r and s = (I + L̃)⁻¹ r.
+    residual: Vec<Wide<T>>,
+    smoothed: Vec<Wide<T>>,
+    /// p, q = A p and u = (I + L̃)⁻¹ q.
+    direction: Vec<Wide<T>>,
+    product: Vec<Wide<T>>,
+    forth: Vec<Wide<T>>,
+    solution: Vec<Wide<T>>,
+    /// e, what the coarse level corrects; then how far c went beyond it.
+    change: Vec<Wide<T>>,
+    /// The residual after s; then c, by which z = M⁻¹ r = s + c.
+    back: Vec<Wide<T>>,
+}
+
+impl<T: Precision> Vectors<T> {
+    pub(super) fn new(rows: usize) -> Self {
+        let zeros = vec![[T::from_f64(0.0); 4]; rows];
+        Self {
+            residual: zeros.clone(),
+            smoothed: zeros.clone(),
+            direction: zeros.clone(),
+            product: zeros.clone(),
+            forth: zeros.clone(),
+            solution: zeros.clone(),
+            change: zeros.clone(),
+            back: zeros,
+        }
+    }
+}
+
+/// What all threads read that solve a system.
+pub(super) struct Common<'a, T> {
+    pub(super) pattern: &'a Pattern,
+    pub(super) options: &'a SolveOptions,
+    pub(super) smoothers: &'a [Smoother<T>],
+    pub(super) coarse: Option<RwLock<&'a mut Coarse<T>>>,
+    /// Of each domain what it shows of a vector on its border: of s, then of e.
+    borders: Vec<RwLock<Vec<Wide<T>>>>,
+    /// The same of c − e, which is shown while e is still read.
+    changes: Vec<RwLock<Vec<Wide<T>>>>,
+    /// Its part of Pᵀ r, from which aggregate on.
+    restricted: Vec<(usize, RwLock<Vec<Wide<T>>>)>,
+    meeting: Meeting,
+    unit: Unit,
+    /// s · s, r · z and p · q: each is read by all before any thread can have come round to write it again.
+    square: Shared,
+    along: Shared,
+    curvature: Shared,
+}
+
+impl<'a, T: Precision> Common<'a, T> {
+    pub(super) fn new(
+        pattern: &'a Pattern,
+        options: &'a SolveOptions,
+        smoothers: &'a [Smoother<T>],
+        coarse: Option<&'a mut Coarse<T>>,
+        threads: usize,
+    ) -> Self {
+        let zeros = |length: usize| RwLock::new(vec![[T::from_f64(0.0); 4]; length]);
+        let span = |smoother: &Smoother<T>| match &coarse {
+            Some(coarse) => coarse.interpolation.span(smoother.triangle.rows.clone()),
+            None => 0..0,
+        };
+        let spans = smoothers.iter().map(span);
+        let borders = || smoothers.iter().map(|smoother| zeros(smoother.couplings.border().len())).collect();
+        let sum = || Shared::new(smoothers.len());
+        Self {
+            pattern,
+            options,
+            smoothers,
+            borders: borders(),
+            changes: borders(),
+            restricted: spans.map(|span| (span.start, zeros(span.len()))).collect(),
+            coarse: coarse.map(RwLock::new),
+            meeting: Meeting::new(threads.clamp(1, smoothers.len().max(1))),
+            unit: Unit::new(smoothers.len()),
+            square: sum(),
+            along: sum(),
+            curvature: sum(),
+        }
+    }
+
+    /// Sums up the parts of Pᵀ r in the order of the domains, solves, and shows what that corrects on all borders.
+    fn correct(&self) {
+        let Some(coarse) = &self.coarse else { return };
+        let mut coarse = coarse.write().expect("no thread panics");
+        coarse.restricted.fill([T::from_f64(0.0); 4]);
+        for (first, part) in &self.restricted {
+            for (sum, part) in coarse.restricted[*first..].iter_mut().zip(&*part.read().expect("no thread panics")) {
+                (0..4).for_each(|lane| sum[lane] = sum[lane] + part[lane]);
+            }
+        }
+        coarse.correct();
+        for (smoother, border) in self.smoothers.iter().zip(&self.borders) {
+            dispatch(Showing { smoother, coarse: &coarse, border: &mut border.write().expect("no thread panics") });
+        }
+    }
+}
+
+/// A domain, and its rows of b and x.
+pub(super) struct Part<'a, T> {
+    pub(super) number: usize,
+    pub(super) vectors: &'a mut Vectors<T>,
+    pub(super) inverses: &'a [InverseFactor<T>],
+    pub(super) b: &'a [Vector3<f64>],
+    pub(super) x: &'a mut [Vector3<f64>],
+}
+
+/// Conjugate gradients, as one thread sees them. See [`super::Multigrid`] for what is computed.
+pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, common: &Common<'_, T>) -> SolveReport {
+    let Common { options, meeting, unit, square, along, curvature, .. } = common;
+    let leads = parts.iter().any(|part| part.number == 0);
+    for Part { number, inverses, b, .. } in &parts {
+        unit.note(*number, inverses, b);
+    }
+    meeting.wait();
+    let scale = unit.agreed();
+    for part in &mut parts {
+        square.put(part.number, dispatch(Start { part, common, scale }));
+    }
+    meeting.wait();
+    let mut sigma = square.sum();
+    let initial = sigma;
+    let target = (ROUGHNESS * options.relative_tolerance).powi(2) * initial;
+    let mut rho = 0.0;
+    let mut iterations = 0;
+    let stopped = loop {
+        if !sigma.is_finite() || !scale.is_finite() {
+            break StopReason::NonFinite;
+        }
+        if sigma <= target {
+            break StopReason::Converged;
+        }
+        if iterations == options.iteration_limit {
+            break StopReason::IterationLimit;
+        }
+        for part in &mut parts {
+            dispatch(Restriction { part, common });
+        }
+        meeting.wait();
+        if leads {
+            common.correct();
+        }
+        meeting.wait();
+        for part in &mut parts {
+            along.put(part.number, dispatch(Correction { part, common }));
+        }
+        meeting.wait();
+        let previous = std::mem::replace(&mut rho, along.sum());
+        let conjugate = if iterations == 0 { 0.0 } else { rho / previous };
+        for part in &mut parts {
+            curvature.put(part.number, dispatch(Conjugation { part, common, conjugate }));
+        }
+        meeting.wait();
+        let bends = curvature.sum();
+        if rho <= 0.0 || bends <= 0.0 {
+            break StopReason::IndefiniteCurvature;
+        }
+        for part in &mut parts {
+            square.put(part.number, dispatch(Advance { part, common, step: rho / bends }));
+        }
+        meeting.wait();
+        sigma = square.sum();
+        iterations += 1;
+    };
+    for Part { vectors, inverses, x, .. } in &mut parts {
+        for row in 0..x.len() {
+            let [u, v, w, _] = vectors.solution[row].map(|component| Into::<f64>::into(component) * scale);
+            x[row] = unscaled(&inverses[row], &[u, v, w]);
+        }
+    }
+    let [initial_residual, final_residual] = [initial, sigma / ROUGHNESS.powi(2)].map(|square| square.sqrt() * scale);
+    SolveReport { iterations, initial_residual, final_residual, stopped }
+}
+
+/// r ← C⁻¹ b/s, s ← (I + L̃)⁻¹ r, and zeros. Returns s · s.
+struct Start<'a, 'b, 'c, T> {
+    part: &'a mut Part<'b, T>,
+    common: &'a Common<'c, T>,
+    scale: f64,
+}
+
+impl<T: Precision> Kernel for Start<'_, '_, '_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> f64 {
+        let Part { number, vectors, inverses, b, .. } = self.part;
+        let smoother = &self.common.smoothers[*number];
+        let Vectors { residual, smoothed, direction, product, forth, solution, .. } = &mut **vectors;
+        for zeros in [direction, product, forth, solution] {
+            zeros.fill([T::from_f64(0.0); 4]);
+        }
+        for row in 0..residual.len() {
+            let [u, v, w] = scaled(&inverses[row], &b[row]);
+            residual[row] = widened([u / self.scale, v / self.scale, w / self.scale]);
+        }
+        smoothed.copy_from_slice(residual);
+        smoother.forward::<L>(self.common.pattern, smoothed);
+        smoother.couplings.show(smoothed, &self.common.borders[*number]);
+        let mut squares = [0.0; 4];
+        for vector in &*smoothed {
+            add_products(&mut squares, vector, vector);
+        }
+        of_three(squares)
+    }
+}
+
+/// The residual of s, −(L̃ᵀ + Ẽ) s, and its part of Pᵀ.
+struct Restriction<'a, 'b, 'c, T> {
+    part: &'a mut Part<'b, T>,
+    common: &'a Common<'c, T>,
+}
+
+impl<T: Precision> Kernel for Restriction<'_, '_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Common { pattern, smoothers, borders, coarse, restricted, .. } = self.common;
+        let Part { number, vectors, .. } = self.part;
+        let smoother = &smoothers[*number];
+        let Vectors { smoothed, back, .. } = &mut **vectors;
+        smoother.minus_upper::<L>(pattern, smoothed, back);
+        smoother.add_coupled::<L>(-1.0, borders, smoothed, back);
+        let Some(coarse) = coarse else { return };
+        let coarse = coarse.read().expect("no thread panics");
+        let (first, sums) = &restricted[*number];
+        let mut sums = sums.write().expect("no thread panics");
+        sums.fill([T::from_f64(0.0); 4]);
+        let before = smoother.triangle.rows.start;
+        for row in 0..back.len() {
+            let unscaled = smoother.unscaled(row, &back[row]);
+            coarse.interpolation.add_restricted::<L>(before + row, &unscaled, *first, &mut sums);
+        }
+    }
+}
+
+/// What the coarse level corrects on the border of a domain.
+struct Showing<'a, T> {
+    smoother: &'a Smoother<T>,
+    coarse: &'a Coarse<T>,
+    border: &'a mut [Wide<T>],
+}
+
+impl<T: Precision> Kernel for Showing<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { smoother, coarse, border } = self;
+        for (place, &local) in smoother.couplings.border().iter().enumerate() {
+            let row = smoother.triangle.rows.start + local as usize;
+            let carried = coarse.interpolation.carried::<L>(row, &coarse.correction);
+            border[place] = smoother.scaled(local as usize, &carried);
+        }
+    }
+}
+
+/// c = (I + L̃ᵀ)⁻¹ (back − (L̃ + Ẽ) e) and z = s + c; e is replaced by c − e. Returns r · z.
+struct Correction<'a, 'b, 'c, T> {
+    part: &'a mut Part<'b, T>,
+    common: &'a Common<'c, T>,
+}
+
+impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> f64 {
+        let Common { pattern, smoothers, borders, coarse, .. } = self.common;
+        let Part { number, vectors, .. } = self.part;
+        let smoother = &smoothers[*number];
+        let Vectors { residual, smoothed, change, back, .. } = &mut **vectors;
+        let before = smoother.triangle.rows.start;
+        match coarse {
+            Some(coarse) => {
+                let coarse = coarse.read().expect("no thread panics");
+                for row in 0..change.len() {
+                    let carried = coarse.interpolation.carried::<L>(before + row, &coarse.correction);
+                    change[row] = smoother.scaled(row, &carried);
+                }
+            }
+            None => change.fill([T::from_f64(0.0); 4]),
+        }
+        smoother.subtract_lower::<L>(pattern, change, back);
+        smoother.add_coupled::<L>(-1.0, borders, change, back);
+        smoother.backward::<L>(pattern, back);
+        let mut along = [0.0; 4];
+        for row in 0..back.len() {
+            let (c, mut z) = (back[row], smoothed[row]);
+            for lane in 0..4 {
+                z[lane] = z[lane] + c[lane];
+                change[row][lane] = c[lane] - change[row][lane];
+            }
+            add_products(&mut along, &residual[row], &z);
+        }
+        smoother.couplings.show(change, &self.common.changes[*number]);
+        of_three(along)
+    }
+}
+
+/// p ← z + β p, q ← A z + β q with A z = r + (L̃ + Ẽ) (c − e), and u ← (I + L̃)⁻¹ q. Returns p · q.
+struct Conjugation<'a, 'b, 'c, T> {
+    part: &'a mut Part<'b, T>,
+    common: &'a Common<'c, T>,
+    conjugate: f64,
+}
+
+impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> f64 {
+        let Common { pattern, smoothers, changes, .. } = self.common;
+        let Part { number, vectors, .. } = self.part;
+        let smoother = &smoothers[*number];
+        let Vectors { residual, smoothed, direction, product, forth, change, back, .. } = &mut **vectors;
+        let conjugate = T::from_f64(self.conjugate);
+        for row in 0..product.len() {
+            let (mut p, mut q) = (direction[row], product[row]);
+            for lane in 0..4 {
+                p[lane] = p[lane].mul_add::<L>(conjugate, smoothed[row][lane] + back[row][lane]);
+                q[lane] = q[lane].mul_add::<L>(conjugate, residual[row][lane]);
+            }
+            (direction[row], product[row]) = (p, q);
+        }
+        smoother.add_coupled::<L>(1.0, changes, change, product);
+        smoother.add_lower_and_forward::<L>(pattern, change, product, forth);
+        let mut curvature = [0.0; 4];
+        for row in 0..product.len() {
+            add_products(&mut curvature, &direction[row], &product[row]);
+        }
+        of_three(curvature)
+    }
+}
+
+/// x ← x + α p, r ← r − α q, s ← s − α u. Returns s · s.
+struct Advance<'a, 'b, 'c, T> {
+    part: &'a mut Part<'b, T>,
+    common: &'a Common<'c, T>,
+    step: f64,
+}
+
+impl<T: Precision> Kernel for Advance<'_, '_, '_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> f64 {
+        let Part { number, vectors, .. } = self.part;
+        let Vectors { residual, smoothed, direction, product, forth, solution, .. } = &mut **vectors;
+        let step = T::from_f64(self.step);
+        let mut squares = [0.0; 4];
+        for row in 0..residual.len() {
+            let (mut x, mut r, mut s) = (solution[row], residual[row], smoothed[row]);
+            for lane in 0..4 {
+                x[lane] = direction[row][lane].mul_add::<L>(step, x[lane]);
+                r[lane] = product[row][lane].mul_add::<L>(-step, r[lane]);
+                s[lane] = forth[row][lane].mul_add::<L>(-step, s[lane]);
+            }
+            (solution[row], residual[row], smoothed[row]) = (x, r, s);
+            add_products(&mut squares, &s, &s);
+        }
+        self.common.smoothers[*number].couplings.show(smoothed, &self.common.borders[*number]);
+        of_three(squares)
+    }
+}

@@ -1,0 +1,173 @@
+mod coarse;
+mod galerkin;
+mod gradients;
+mod interpolation;
+mod smoother;
+
+use std::sync::Arc;
+
+use energy_dsl::{Number, Vector3, dispatch};
+
+use self::coarse::Coarse;
+use self::gradients::{Common, Part, Vectors, conjugate_gradients};
+use self::smoother::{Inversion, Smoother};
+use crate::linear::domains::{InverseFactor, Precision, Scaling, divided, ranges};
+use crate::linear::preconditioner::SingularBlock;
+use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
+use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::pattern::{Pattern, Storage};
+use crate::threads::{for_each, in_parts, split_mut};
+
+/// Conjugate gradients with algebraic multigrid by smoothed aggregation as preconditioner, for matrices of cloth: a number of iterations that hardly
+/// depends on how fine the mesh is (Tamstorf, Jones and McCormick, "Smoothed aggregation multigrid for cloth simulation", ACM Trans. Graph. 34, 2015).
+///
+/// M⁻¹ r is a cycle: with D the diagonal blocks, A = D + L + Lᵀ, D̂ = D/ω, and P as below,
+///
+/// s = (D̂ + L)⁻¹ r,  e = P A_c⁻¹ Pᵀ (r − A s),  z = s + e + (D̂ + Lᵀ)⁻¹ (r − A (s + e)),  A_c = Pᵀ A P,
+///
+/// where coarse systems are solved nearly, by two such cycles each (a W-cycle), and by Cholesky's factorisation in the end. Products with A are never
+/// computed as such: with D' = D − D̂, r − A s = −(D' + Lᵀ) s, and A z = r + (D' + L) (z − s − e). Blocks above the diagonal are read four times an iteration, where
+/// [`OverRelaxation`](crate::OverRelaxation) reads them twice.
+///
+/// P carries translations: aggregates of vertices and their neighbours, as the pattern couples them, move as wholes, and each vertex by the mean of its own
+/// and its neighbours' aggregates (smoothed aggregation with the graph's averages instead of D⁻¹A). So P is a matter of the pattern alone, its
+/// blocks are multiples of the identity, and A_c, which follows A in every iteration of Newton's method, is a weighted sum of blocks. To carry
+/// rotations too, and to smooth with D⁻¹A, saves one or two iterations on sheets of cloth, but multiplies the price of A_c.
+///
+/// Residuals are measured as √(rᵀ M⁻¹ r), M = (D̂ + L) D̂⁻¹ (D̂ + Lᵀ), the norm of over-relaxation, and may be twice as large in it: as they are rough
+/// then, where those left by over-relaxation are smooth, the same tolerance means the same error of the solution, in the norm √(eᵀ A e).
+///
+/// Numbers are stored, and computed with, in `T`, products of vectors and A_c are summed up in doubles. Large matrices are divided into domains of
+/// consecutive rows for the finest level, each relaxed by itself; how many there are depends on the matrix alone: the solution is the same, to the last
+/// bit, for any number of threads among which they are divided. Coarser levels are relaxed by one thread.
+///
+/// Made for matrices that change and patterns that do not: [`Multigrid::take_over`] reuses everything that the pattern tells.
+///
+/// ```
+/// use energy_solve::{BlockMatrix, Multigrid, Pattern, SolveOptions, Storage};
+///
+/// // A chain of a hundred masses of 0.01 kg with springs of 1 N/m between them, each pulled with 1 N.
+/// let springs: Vec<[u32; 2]> = (1..100).map(|end| [end - 1, end]).collect();
+/// let pattern = Pattern::from_stencils(Storage::Upper, 100, springs.iter().map(<[u32; 2]>::as_slice)).into();
+/// let mut matrix = BlockMatrix::zeros(std::sync::Arc::clone(&pattern));
+/// for axis in 0..3 {
+///     for vertex in 0..100 {
+///         matrix.diagonal_mut(vertex)[axis][axis] += 0.01;
+///     }
+///     for &[a, b] in &springs {
+///         let (place, _) = pattern.place(a as usize, b as usize).unwrap();
+///         matrix.values_mut()[place][axis][axis] = -1.0;
+///         matrix.diagonal_mut(a as usize)[axis][axis] += 1.0;
+///         matrix.diagonal_mut(b as usize)[axis][axis] += 1.0;
+///     }
+/// }
+/// let mut multigrid = Multigrid::<f64>::new(&pattern);
+/// multigrid.take_over(&matrix)?;
+/// let mut x = vec![[0.0; 3]; 100];
+/// let report = multigrid.solve(&[[1.0, 0.0, 0.0]; 100], &mut x, &SolveOptions::default());
+/// assert!(report.converged());
+/// assert!((x[42][0] - 100.0).abs() < 1e-4 && x[42][1] == 0.0);
+/// # Ok::<(), energy_solve::SingularBlock>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Multigrid<T> {
+    pattern: Arc<Pattern>,
+    threads: usize,
+    /// C⁻¹ of each row.
+    inverses: Vec<InverseFactor<T>>,
+    smoothers: Vec<Smoother<T>>,
+    vectors: Vec<Vectors<T>>,
+    coarse: Option<Coarse<T>>,
+    /// Whether no level showed that the matrix is not positive definite.
+    definite: bool,
+}
+
+impl<T: Precision> Multigrid<T> {
+    /// Prepares for matrices of a pattern, to be solved by one thread.
+    ///
+    /// # Panics
+    /// When it is not the upper triangle of a symmetric one.
+    #[must_use]
+    pub fn new(pattern: &Arc<Pattern>) -> Self {
+        Self::with_threads(pattern, 1)
+    }
+
+    /// Prepares for matrices of a pattern, to be solved by at most so many threads.
+    ///
+    /// # Panics
+    /// When it is not the upper triangle of a symmetric one.
+    #[must_use]
+    pub fn with_threads(pattern: &Arc<Pattern>, threads: usize) -> Self {
+        assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices are solved by conjugate gradients");
+        let ranges = ranges(pattern.rows());
+        let smoothers = divided(pattern, &ranges).into_iter();
+        let smoothers = smoothers.map(|(triangle, couplings)| Smoother::new(triangle, couplings));
+        Self {
+            pattern: Arc::clone(pattern),
+            threads,
+            inverses: vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()],
+            smoothers: smoothers.collect(),
+            vectors: ranges.iter().map(|rows| Vectors::new(rows.len())).collect(),
+            coarse: Coarse::below(pattern, &ranges),
+            definite: false,
+        }
+    }
+
+    /// The number of levels, the finest among them.
+    #[must_use]
+    pub fn levels(&self) -> usize {
+        1 + self.coarse.as_ref().map_or(0, |coarse| coarse.blocks().len())
+    }
+
+    /// The blocks of all levels' matrices for one of the finest's.
+    #[must_use]
+    pub fn operator_complexity(&self) -> f64 {
+        let coarse: usize = self.coarse.as_ref().map_or(0, |coarse| coarse.blocks().iter().sum());
+        1.0 + coarse as f64 / self.pattern.blocks().max(1) as f64
+    }
+
+    /// Takes over a matrix of the pattern: its Galerkin products, and what relaxes each of them.
+    ///
+    /// # Errors
+    /// When a diagonal block is not positive definite: then the matrix is not.
+    ///
+    /// # Panics
+    /// When the matrix has another pattern.
+    pub fn take_over(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
+        assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
+        let Self { pattern, threads, inverses, smoothers, coarse, .. } = self;
+        let largest = (0..pattern.rows()).map(|row| matrix.diagonal(row)[0][0].into()).fold(0.0, f64::max);
+        let unit = if largest > 0.0 { largest.sqrt().power_of_two_scale() } else { 1.0 };
+        let lengths: Vec<usize> = smoothers.iter().map(|smoother| smoother.triangle.rows.len()).collect();
+        let parts = smoothers.iter_mut().zip(split_mut(inverses, lengths)).collect();
+        let invert = |(smoother, inverses)| dispatch(Inversion { smoother, inverses, matrix, unit });
+        let inverted: Result<(), usize> = for_each(*threads, parts, invert).into_iter().collect();
+        inverted.map_err(|row| SingularBlock { row })?;
+        let inverses = &**inverses;
+        for_each(*threads, smoothers.iter_mut().collect(), |Smoother { triangle, couplings, .. }| {
+            dispatch(Scaling { triangle, couplings, inverses, matrix });
+        });
+        self.definite = coarse.as_mut().is_none_or(|coarse| coarse.take_over(matrix, unit, *threads).is_some());
+        Ok(())
+    }
+
+    /// Solves A x = b from x = 0. Of a matrix that a coarse level showed not to be positive definite, x = 0.
+    pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
+        let nothing = SolveReport { stopped: StopReason::Converged, ..SolveReport::indefinite() };
+        if !self.definite {
+            x.fill([0.0; 3]);
+            return SolveReport::indefinite();
+        }
+        let Self { pattern, threads, inverses, smoothers, vectors, coarse, .. } = self;
+        let common = Common::new(pattern, options, smoothers, coarse.as_mut(), *threads);
+        let lengths = smoothers.iter().map(|smoother| smoother.triangle.rows.len());
+        let parts = vectors.iter_mut().zip(split_mut(x, lengths)).enumerate();
+        let parts = parts.map(|(number, (vectors, x))| {
+            let rows = smoothers[number].triangle.rows.clone();
+            Part { number, vectors, inverses: &inverses[rows.clone()], b: &b[rows], x }
+        });
+        let solved = in_parts(*threads, parts.collect(), |parts| conjugate_gradients(parts, &common));
+        // All threads come to the same.
+        solved.into_iter().next().unwrap_or(nothing)
+    }
+}

@@ -1,0 +1,28 @@
+//! Terms of a system: elements of one type, evaluated in SIMD lanes and added to forces and matrices.
+
+mod active;
+pub(crate) mod counts;
+pub(crate) mod curvature;
+mod element_list;
+mod force_term;
+pub(crate) mod linearisation;
+mod places;
+mod potential;
+mod scatter;
+pub(crate) mod share;
+pub(crate) mod state;
+pub(crate) mod stencils;
+pub(crate) mod term;
+mod triangle_places;
+
+pub use counts::{Counts, Tally};
+pub use curvature::{Curvature, change_dense};
+pub use element_list::{ElementList, ListError};
+pub use force_term::ForceTerm;
+pub use linearisation::{Linearisation, Weights};
+pub use potential::PotentialTerm;
+pub use share::{Divisible, Share};
+pub use state::{State, StepStart};
+pub use stencils::Stencils;
+pub use term::{Character, PlacedTerm, Quantity, Term, TermDescription};
+pub use triangle_places::TrianglePlaces;

@@ -1,0 +1,279 @@
+use std::fmt::Debug;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use energy_dsl::{
+    Array, BLOCK, Declaration, Packed, PackedPotential, Potential, Vector3, WidePoints, for_each_batch_in,
+};
+
+use super::character;
+use super::pack_energies::PackEnergies;
+use super::work::{Gradients, Hessians, Values};
+use crate::matrix::dof_map::DofMap;
+use crate::matrix::pattern::{Pattern, Storage};
+use crate::terms::active::Active;
+use crate::terms::counts::Tally;
+use crate::terms::curvature::Orthonormal;
+use crate::terms::element_list::ElementList;
+use crate::terms::linearisation::Linearisation;
+use crate::terms::places::Places;
+use crate::terms::share::{Divisible, Share};
+use crate::terms::state::State;
+use crate::terms::stencils::Stencils;
+use crate::terms::term::{Character, PlacedTerm, Quantity, TermDescription};
+
+/// Packs in one part of the energy.
+const ENERGY_PART: usize = 256;
+
+/// A [`PotentialTerm`](crate::PotentialTerm) within a system: the active elements, packed into lanes.
+#[derive(Debug)]
+pub(super) struct PlacedPotentialTerm<E> {
+    name: String,
+    /// Points of an element.
+    arity: usize,
+    /// The number of elements, inactive ones included.
+    count: usize,
+    /// All stencils; empty if every element is active, because the packs hold them too.
+    vertices: Vec<u32>,
+    active: Active,
+    packed: Packed<E>,
+    /// Places of the blocks (i, j), i ≤ j.
+    places: Places,
+    /// Places of the blocks (j, i), i < j, if the pattern stores both halves.
+    mirrored: Places,
+    orthonormal: Option<Orthonormal>,
+    /// The elements that each share needs, in whole packs.
+    shares: Vec<Vec<Range<usize>>>,
+    /// U of each pack at its last evaluation, as bits. Shares that evaluate the same pack write the same value.
+    energies: Vec<AtomicU64>,
+}
+
+impl<E: PackedPotential<f64> + Debug + Sync> PlacedPotentialTerm<E> {
+    pub(super) fn new(list: ElementList<E>, dofs: &DofMap, pattern: &Pattern) -> Self {
+        let active = Active::new(list.stencils(), dofs);
+        let stencils = list.stencils();
+        let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
+        let element = |number: usize| &list.elements()[active.element(number)];
+        let packed = Packed::from_fn(active.len(), list.arity(), element, vertex);
+        let (arity, count) = (list.arity(), list.elements().len());
+        let (name, vertices) = list.into_name_and_vertices();
+        let mut term = Self {
+            name,
+            arity,
+            count,
+            vertices: if active.is_all() && !packed.is_empty() { Vec::new() } else { vertices },
+            energies: (0..active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect(),
+            active,
+            packed,
+            places: Places::default(),
+            mirrored: Places::default(),
+            orthonormal: Orthonormal::new(E::DECLARATION),
+            shares: Vec::new(),
+        };
+        // Constant Jacobians are evaluated once: their places are looked up then and freed afterwards.
+        if !term.character().quadratic {
+            term.place_blocks(dofs, pattern);
+        }
+        term
+    }
+
+    fn tally(&self, flagged: u64) -> Tally {
+        let evaluated = self.active.len() as u64;
+        Tally { evaluated, skipped: self.count as u64 - evaluated, flagged, projected: 0 }
+    }
+
+    /// Returns the tally of a share. The first share counts the evaluated and skipped elements of all.
+    fn tally_of(&self, share: &Share, flagged: u64) -> Tally {
+        if share.number == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
+    }
+
+    /// Returns the points of an active element, by its index among the active ones.
+    fn points(&self, number: usize, x: &[Vector3<f64>]) -> WidePoints<E, f64> {
+        let (stencils, element) = (self.stencils(), self.active.element(number));
+        WidePoints::<E, f64>::from_fn(|point| x[stencils.vertex(element, point) as usize])
+    }
+
+    /// Returns the packs with an element on one of these vertices, as ranges of elements.
+    fn packs_at(&self, vertices: &Range<usize>) -> Vec<Range<usize>> {
+        let mut packs: Vec<Range<usize>> = Vec::new();
+        let (stencils, inside) = (self.stencils(), |vertex: u32| vertices.contains(&(vertex as usize)));
+        let needed = |number| stencils.stencil(self.active.element(number)).any(inside);
+        for start in (0..self.active.len()).step_by(BLOCK) {
+            let end = (start + BLOCK).min(self.active.len());
+            if (start..end).any(needed) {
+                match packs.last_mut() {
+                    Some(last) if last.end == start => last.end = end,
+                    _ => packs.push(start..end),
+                }
+            }
+        }
+        packs
+    }
+
+    /// Adds f of consecutive vertices. Returns how many flagged elements have their first vertex among them.
+    fn forces(
+        &self,
+        packs: &[Range<usize>],
+        first_vertex: usize,
+        x: &[Vector3<f64>],
+        force: &mut [Vector3<f64>],
+    ) -> u64 {
+        let mut gradients = Gradients::new(self.arity, force, first_vertex, self.pack_energies());
+        for pack in packs {
+            for_each_batch_in(&self.packed, pack.clone(), x, &mut gradients);
+        }
+        gradients.flagged
+    }
+
+    /// Adds f and its Jacobians for consecutive vertices and blocks. Returns the numbers of flagged and of projected
+    /// elements.
+    fn linearisation(
+        &self,
+        packs: &[Range<usize>],
+        first: (usize, usize),
+        state: State<'_>,
+        sum: &mut Linearisation<'_>,
+    ) -> (u64, u64) {
+        let places = (&self.places, &self.mirrored);
+        let orthonormal = self.orthonormal.as_ref();
+        let mut hessians = Hessians::new(self.arity, sum, first, state.v, places, orthonormal, self.pack_energies());
+        for pack in packs {
+            for_each_batch_in(&self.packed, pack.clone(), state.x, &mut hessians);
+        }
+        (hessians.flagged, hessians.projected)
+    }
+
+    fn pack_energies(&self) -> PackEnergies<'_> {
+        PackEnergies::new(self.active.len(), &self.energies)
+    }
+
+    /// Returns the energy of a part at its last evaluation.
+    fn found_in(&self, part: usize) -> f64 {
+        let packs = &self.energies[(part * ENERGY_PART).min(self.energies.len())..];
+        packs.iter().take(ENERGY_PART).fold(0.0, |sum, energy| sum + f64::from_bits(energy.load(Relaxed)))
+    }
+
+    /// The range of all active elements.
+    fn all(&self) -> Range<usize> {
+        0..self.active.len()
+    }
+}
+
+impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PlacedPotentialTerm<E> {
+    fn energy_parts(&self) -> usize {
+        // At least one, which reports the skipped elements.
+        self.energies.len().div_ceil(ENERGY_PART).max(1)
+    }
+
+    fn energy_part(&self, part: usize, x: &[Vector3<f64>]) -> (f64, Tally) {
+        let mut values = Values::new(self.pack_energies());
+        let packs = part * ENERGY_PART..(part + 1) * ENERGY_PART;
+        let elements = packs.start * BLOCK..(packs.end * BLOCK).min(self.active.len());
+        for_each_batch_in(&self.packed, elements, x, &mut values);
+        let flagged = values.flagged;
+        let tally = if part == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } };
+        (self.found_in(part), tally)
+    }
+
+    fn add_force_of(&self, share: &Share, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        self.tally_of(share, self.forces(&self.shares[share.number], share.vertices.start, state.x, force))
+    }
+
+    fn add_linearisation_of(&self, share: &Share, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let first = (share.vertices.start, share.blocks.start);
+        let (flagged, projected) = self.linearisation(&self.shares[share.number], first, state, sum);
+        Tally { projected, ..self.tally_of(share, flagged) }
+    }
+}
+
+impl<E: PackedPotential<f64> + Debug + Sync> TermDescription for PlacedPotentialTerm<E> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        E::DECLARATION
+    }
+
+    fn character(&self) -> Character {
+        character(E::DECLARATION)
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        if self.vertices.is_empty() {
+            Stencils::in_lanes(self.count, self.arity, self.packed.stencils())
+        } else {
+            Stencils::new(self.arity, &self.vertices)
+        }
+    }
+}
+
+impl<E: PackedPotential<f64> + Debug + Sync> PlacedTerm for PlacedPotentialTerm<E> {
+    fn place_blocks(&mut self, dofs: &DofMap, pattern: &Pattern) {
+        if !self.character().curved || !self.places.is_empty() {
+            return;
+        }
+        let n = self.arity;
+        let places = |pairs: &[_]| Places::new(&self.active, self.stencils(), pairs, dofs, pattern);
+        let upper = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
+        if pattern.storage() == Storage::Whole {
+            self.mirrored = places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>());
+        }
+        self.places = upper;
+    }
+
+    fn forget_blocks(&mut self) {
+        (self.places, self.mirrored) = (Places::default(), Places::default());
+    }
+
+    fn divide(&mut self, shares: &[Share]) {
+        self.shares = shares.iter().map(|share| self.packs_at(&share.vertices)).collect();
+    }
+
+    fn divisible(&self) -> Option<&dyn Divisible> {
+        Some(self)
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        let (mut sum, mut tally) = (0.0, Tally::default());
+        for part in 0..self.energy_parts() {
+            let (energy, of_part) = self.energy_part(part, x);
+            sum += energy;
+            tally += of_part;
+        }
+        Some((sum, tally))
+    }
+
+    fn energy_found(&self) -> Option<f64> {
+        Some((0..self.energy_parts()).fold(0.0, |sum, part| sum + self.found_in(part)))
+    }
+
+    fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
+        let value = |number: usize| self.packed.element(number).value(&self.points(number, x)).value;
+        Some(self.active.iter().enumerate().map(|(number, element)| (element, value(number))).collect())
+    }
+
+    fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        self.tally(self.forces(&[self.all()], 0, state.x, force))
+    }
+
+    fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let (flagged, projected) = self.linearisation(&[self.all()], (0, 0), state, sum);
+        Tally { projected, ..self.tally(flagged) }
+    }
+
+    fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize> {
+        let is_finite = |number: usize| {
+            let result = self.packed.element(number).gradient(&self.points(number, state.x));
+            match quantity {
+                Quantity::Energy => result.value.is_finite(),
+                Quantity::Force => result.gradient.as_ref().as_flattened().iter().all(|number| number.is_finite()),
+            }
+        };
+        (0..self.active.len()).find(|&number| !is_finite(number)).map(|number| self.active.element(number))
+    }
+}

@@ -1,0 +1,292 @@
+use energy_dsl::{
+    Array, BLOCK, Batch, BatchWork, Lane, Level, Mask, Number, PackedPotential, Potential, ReducedPotential, Vector3,
+    triangle_index,
+};
+
+use super::pack_energies::PackEnergies;
+use crate::matrix::precision::Blocks;
+use crate::terms::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
+use crate::terms::linearisation::Linearisation;
+use crate::terms::places::Places;
+use crate::terms::scatter::{TriangleRoom, VectorRoom, points_of_triangle};
+
+/// In which of the first lanes a mask holds, as bits.
+#[inline(always)]
+fn lanes_in(mask: impl Mask, count: usize) -> u32 {
+    mask.bits() & (u32::MAX >> (32 - count))
+}
+
+/// How many of these lanes belong to elements whose first vertex is one of `count` from `first` on: each element counts for one share.
+#[inline(always)]
+fn count_owned(lanes: u32, vertices: &[u32], first: usize, count: usize) -> u64 {
+    if lanes == 0 {
+        return 0;
+    }
+    let owned = |lane: &usize| (vertices[*lane] as usize).wrapping_sub(first) < count;
+    (0..vertices.len()).filter(|lane| lanes >> lane & 1 == 1).filter(owned).count() as u64
+}
+
+/// Evaluates Σ U.
+pub(super) struct Values<'a> {
+    energies: PackEnergies<'a>,
+    pub(super) flagged: u64,
+}
+
+impl<'a> Values<'a> {
+    pub(super) fn new(energies: PackEnergies<'a>) -> Self {
+        Self { energies, flagged: 0 }
+    }
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Values<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let result = batch.element.value_at::<L>(batch.points);
+        self.energies.note::<E, L>(&batch, result.value);
+        let flags = result.flags.degenerate | result.flags.kink;
+        self.flagged += u64::from(lanes_in(flags, batch.count).count_ones());
+    }
+}
+
+/// f ← f − ∇U of the vertices from the first on.
+pub(super) struct Gradients<'a> {
+    force: &'a mut [Vector3<f64>],
+    first_vertex: usize,
+    room: VectorRoom,
+    energies: PackEnergies<'a>,
+    pub(super) flagged: u64,
+}
+
+impl<'a> Gradients<'a> {
+    pub(super) fn new(
+        arity: usize,
+        force: &'a mut [Vector3<f64>],
+        first_vertex: usize,
+        energies: PackEnergies<'a>,
+    ) -> Self {
+        Self { force, first_vertex, room: VectorRoom::new(arity), energies, flagged: 0 }
+    }
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let result = batch.element.gradient_at::<L>(batch.points);
+        let gradient = result.gradient.as_ref();
+        self.energies.note::<E, L>(&batch, result.value);
+        self.room.subtract::<E, L>(&batch, gradient, self.first_vertex, self.force);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        self.flagged += count_owned(flagged, batch.vertices(0), self.first_vertex, self.force.len());
+    }
+}
+
+/// f ← f − ∇U and A ← A − α ∇²U of the vertices and blocks from the first on.
+pub(super) struct Hessians<'a, 'b> {
+    sum: &'a mut Linearisation<'b>,
+    first_vertex: usize,
+    first_block: usize,
+    velocities: &'a [Vector3<f64>],
+    places: &'a Places,
+    mirrored: &'a Places,
+    orthonormal: Option<&'a Orthonormal>,
+    vectors: VectorRoom,
+    triangles: TriangleRoom,
+    /// What [`Indefinite`] needs.
+    numbers: Vec<f64>,
+    energies: PackEnergies<'a>,
+    pub(super) flagged: u64,
+    pub(super) projected: u64,
+}
+
+impl<'a, 'b> Hessians<'a, 'b> {
+    pub(super) fn new(
+        arity: usize,
+        sum: &'a mut Linearisation<'b>,
+        (first_vertex, first_block): (usize, usize),
+        velocities: &'a [Vector3<f64>],
+        (places, mirrored): (&'a Places, &'a Places),
+        orthonormal: Option<&'a Orthonormal>,
+        energies: PackEnergies<'a>,
+    ) -> Self {
+        Self {
+            sum,
+            first_vertex,
+            first_block,
+            velocities,
+            places,
+            mirrored,
+            orthonormal,
+            vectors: VectorRoom::new(arity),
+            triangles: TriangleRoom::new(arity),
+            numbers: vec![0.0; MOST_NUMBERS * BLOCK],
+            energies,
+            flagged: 0,
+            projected: 0,
+        }
+    }
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
+        let exact = self.sum.curvature == Curvature::Exact;
+        let mut projected = 0;
+        if let Some(orthonormal) = self.orthonormal
+            && !exact
+        {
+            let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
+            let hessian = reduced.hessian.as_mut();
+            let open = (!is_semi_definite(hessian, n)).bits() & (u32::MAX >> (32 - batch.count));
+            if open != 0 {
+                projected = self.change_indefinite::<E, L>(orthonormal, hessian, open, batch.points.as_ref());
+            }
+        }
+        let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
+        if self.orthonormal.is_none() && !exact {
+            projected = change_one_by_one(result.hessian.as_mut(), batch.count, self.sum.curvature);
+        }
+        self.energies.note::<E, L>(&batch, result.value);
+        self.vectors.subtract::<E, L>(&batch, result.gradient.as_ref(), self.first_vertex, self.sum.force);
+        if let Some(product) = &mut self.sum.stiffness_times_velocity {
+            let first_vertex = self.first_vertex;
+            let triangle = result.hessian.as_ref();
+            subtract_product::<E, L>(&batch, triangle, self.velocities, &mut self.vectors, first_vertex, product);
+        }
+        self.turn::<L>(batch.first, result.hessian.as_mut());
+        self.scatter::<L>(batch.first, batch.count, result.hessian.as_ref());
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        let (vertices, first, count) = (batch.vertices(0), self.first_vertex, self.sum.force.len());
+        self.flagged += count_owned(flagged, vertices, first, count);
+        self.projected += count_owned(projected, vertices, first, count);
+    }
+}
+
+impl Hessians<'_, '_> {
+    /// Changes the curvature of Hessians some of which are indefinite; returns as bits which changed.
+    #[inline(always)]
+    fn change_indefinite<E: PackedPotential<f64>, L: Level>(
+        &mut self,
+        orthonormal: &Orthonormal,
+        hessian: &mut [L::F64],
+        open: u32,
+        points: &[Vector3<L::F64>],
+    ) -> u32 {
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        let vectors = E::DECLARATION.reduced_vectors.len();
+        let known = if vectors <= 2 { difference_vectors::<E, L>(points) } else { [[L::F64::splat(0.0); 3]; 2] };
+        for (number, stored) in hessian.iter().chain(known.as_flattened()).zip(self.numbers.chunks_exact_mut(lanes)) {
+            number.store(stored);
+        }
+        let indefinite = Indefinite {
+            n: 3 * vectors,
+            curvature: self.sum.curvature,
+            orthonormal,
+            vectors: if vectors <= 2 { vectors } else { 0 },
+            open,
+            numbers: &mut self.numbers,
+        };
+        let changed = indefinite.change(L::NAME);
+        for (number, stored) in hessian.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
+            *number = L::F64::load(stored);
+        }
+        changed
+    }
+
+    /// Turns the blocks (i, j) that are stored as (j, i).
+    #[inline(always)]
+    fn turn<L: Level>(&self, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
+        for pair in 0..triangle.len() {
+            let bits = self.places.transposed(first, pair);
+            if bits != 0 {
+                let turned = <L::F64 as Number>::Mask::from_bits(bits);
+                let block = &mut triangle[pair];
+                for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+                    let (upper, lower) = (block[i][j], block[j][i]);
+                    block[i][j] = L::F64::select(turned, lower, upper);
+                    block[j][i] = L::F64::select(turned, upper, lower);
+                }
+            }
+        }
+    }
+
+    /// Subtracts α times the blocks from those of the matrix.
+    #[inline(always)]
+    fn scatter<L: Level>(&mut self, first: usize, count: usize, triangle: &[[Vector3<L::F64>; 3]]) {
+        self.triangles.fill::<L>(-self.sum.weights.position, triangle);
+        let (pairs, elements) = (triangle.len(), first..first + count);
+        let (slots, mirrored) = (self.places.of(elements.clone()), self.mirrored.of(elements));
+        match &mut self.sum.matrix {
+            Blocks::Single(matrix) => self.triangles.add_to(pairs, slots, mirrored, self.first_block, matrix),
+            Blocks::Double(matrix) => self.triangles.add_to(pairs, slots, mirrored, self.first_block, matrix),
+        }
+    }
+}
+
+/// The one or two difference vectors of an element.
+#[inline(always)]
+fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
+    let mut vectors = [[L::F64::splat(0.0); 3]; 2];
+    for (vector, terms) in vectors.iter_mut().zip(E::DECLARATION.reduced_vectors) {
+        for &(point, added) in *terms {
+            for axis in 0..3 {
+                let part = points[point][axis];
+                vector[axis] = if added { vector[axis] + part } else { vector[axis] - part };
+            }
+        }
+    }
+    vectors
+}
+
+/// Subtracts ∇²U v.
+#[inline(always)]
+fn subtract_product<E: PackedPotential<f64>, L: Level>(
+    batch: &Batch<'_, E, L::F64>,
+    triangle: &[[Vector3<L::F64>; 3]],
+    velocities: &[Vector3<f64>],
+    room: &mut VectorRoom,
+    first_vertex: usize,
+    product: &mut [Vector3<f64>],
+) {
+    let n = batch.points.as_ref().len();
+    let zero = [L::F64::splat(0.0); 3];
+    let (mut v, mut sums) = (*batch.points, *batch.points);
+    for point in 0..n {
+        v.as_mut()[point] = L::F64::gather(velocities, batch.vertices(point));
+        sums.as_mut()[point] = zero;
+    }
+    let (v, sums) = (v.as_ref(), sums.as_mut());
+    for i in 0..n {
+        for j in i..n {
+            let block = &triangle[triangle_index(n, i, j)];
+            for row in 0..3 {
+                for column in 0..3 {
+                    sums[i][row] = sums[i][row] + block[row][column] * v[j][column];
+                    if i != j {
+                        sums[j][column] = sums[j][column] + block[row][column] * v[i][row];
+                    }
+                }
+            }
+        }
+    }
+    room.subtract::<E, L>(batch, sums, first_vertex, product);
+}
+
+/// The way of elements with many coordinates. Returns as bits which changed.
+#[inline(never)]
+fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usize, curvature: Curvature) -> u32 {
+    let points = points_of_triangle(triangle.len());
+    let mut changed = 0;
+    for lane in 0..count {
+        let mut one: Vec<_> =
+            triangle.iter().map(|block| block.map(|row| row.map(|entry| entry.extract(lane)))).collect();
+        if change_dense(&mut one, points, curvature) {
+            changed |= 1 << lane;
+            for (block, new) in triangle.iter_mut().flatten().flatten().zip(one.iter().flatten().flatten()) {
+                let old = *block;
+                *block = V::from_fn(|other| if other == lane { *new } else { old.extract(other) });
+            }
+        }
+    }
+    changed
+}

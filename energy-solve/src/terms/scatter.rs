@@ -1,0 +1,135 @@
+//! Results for many elements at once, added to the vectors and blocks of their vertices: always element after element, so that sums do not depend on how
+//! many there are at once.
+
+use energy_dsl::{BLOCK, Batch, Block, Lane, Level, PackedPotential, Vector3, triangle_index};
+
+use crate::matrix::precision::Precision;
+
+/// Room for a vector at each point of a batch's elements: number by number for all elements.
+#[derive(Debug)]
+pub(crate) struct VectorRoom {
+    numbers: Vec<[f64; BLOCK]>,
+}
+
+impl VectorRoom {
+    pub(crate) fn new(points: usize) -> Self {
+        Self { numbers: vec![[0.0; BLOCK]; 3 * points] }
+    }
+
+    /// Subtracts vectors of the elements' points from those of the vertices from the first on.
+    #[inline(always)]
+    pub(crate) fn subtract<E: PackedPotential<f64>, L: Level>(
+        &mut self,
+        batch: &Batch<'_, E, L::F64>,
+        vectors: &[Vector3<L::F64>],
+        first_vertex: usize,
+        sums: &mut [Vector3<f64>],
+    ) {
+        let numbers = &mut self.numbers[..3 * vectors.len()];
+        for (stored, number) in numbers.iter_mut().zip(vectors.as_flattened()) {
+            number.store(stored);
+        }
+        for lane in 0..batch.count.min(BLOCK) {
+            for point in 0..vectors.len() {
+                let vertex = (batch.vertices(point)[lane] as usize).wrapping_sub(first_vertex);
+                if let Some(vector) = sums.get_mut(vertex) {
+                    for axis in 0..3 {
+                        vector[axis] -= numbers[3 * point + axis][lane];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Room for the triangles of a batch's elements.
+#[derive(Debug)]
+pub(crate) struct TriangleRoom {
+    /// Blocks of a triangle.
+    pairs: usize,
+    /// By element, pair: the first eight entries of a block, which are added together.
+    eights: Vec<[f64; 8]>,
+    /// By pair, element: the last entry.
+    ninths: Vec<[f64; BLOCK]>,
+}
+
+impl TriangleRoom {
+    pub(crate) fn new(points: usize) -> Self {
+        let pairs = points * (points + 1) / 2;
+        Self { pairs, eights: vec![[0.0; 8]; BLOCK * pairs], ninths: vec![[0.0; BLOCK]; pairs] }
+    }
+
+    /// Takes in the triangles of all lanes.
+    #[inline(always)]
+    pub(crate) fn fill<L: Level>(&mut self, scale: f64, triangle: &[[Vector3<L::F64>; 3]]) {
+        let scale = L::F64::splat(scale);
+        let (stride, eights) = (8 * self.pairs, self.eights.as_flattened_mut());
+        for (pair, (block, ninth)) in triangle.iter().zip(&mut self.ninths).enumerate() {
+            let mut entries = [scale; 9];
+            for (entry, number) in entries.iter_mut().zip(block.as_flattened()) {
+                *entry = *number * scale;
+            }
+            L::F64::store_transposed(&entries[..8], <L::F64 as Lane<f64>>::LANES, &mut eights[8 * pair..], stride);
+            entries[8].store(ninth);
+        }
+    }
+
+    /// Adds the blocks of elements to those of the matrix from the first block on. `pairs` is how many blocks an element has, known where this is
+    /// compiled into.
+    #[inline(always)]
+    pub(crate) fn add_to<T: Precision>(
+        &self,
+        pairs: usize,
+        slots: &[u32],
+        mirrored: &[u32],
+        first_block: usize,
+        matrix: &mut [Block<T>],
+    ) {
+        let ninths = &self.ninths[..pairs];
+        let elements = slots.chunks_exact(pairs).zip(self.eights.chunks_exact(pairs)).enumerate().take(BLOCK);
+        for (lane, (slots, eights)) in elements {
+            for pair in 0..pairs {
+                if let Some(block) = matrix.get_mut((slots[pair] as usize).wrapping_sub(first_block)) {
+                    add_block(block, &eights[pair], ninths[pair][lane]);
+                }
+            }
+        }
+        if !mirrored.is_empty() {
+            self.add_mirrored(mirrored, first_block, matrix);
+        }
+    }
+
+    /// Adds the blocks below the diagonal, where other terms make the matrix one that is not symmetric.
+    #[inline(never)]
+    fn add_mirrored<T: Precision>(&self, slots: &[u32], first_block: usize, matrix: &mut [Block<T>]) {
+        let n = points_of_triangle(self.pairs);
+        let below: Vec<usize> = (0..n).flat_map(|i| (i + 1..n).map(move |j| triangle_index(n, i, j))).collect();
+        for (lane, slots) in slots.chunks_exact(below.len()).enumerate() {
+            for (&slot, &pair) in slots.iter().zip(&below) {
+                let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first_block)) else { continue };
+                let eight = &self.eights[lane * self.pairs + pair];
+                for row in 0..3 {
+                    for column in 0..3 {
+                        let entry = eight.get(3 * column + row).unwrap_or(&self.ninths[pair][lane]);
+                        block[row][column] = block[row][column] + T::from_f64(*entry);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A ← A + B.
+#[inline(always)]
+fn add_block<T: Precision>(sum: &mut Block<T>, eight: &[f64; 8], ninth: f64) {
+    let sum = sum.as_flattened_mut();
+    for entry in 0..8 {
+        sum[entry] = sum[entry] + T::from_f64(eight[entry]);
+    }
+    sum[8] = sum[8] + T::from_f64(ninth);
+}
+
+/// n, of n (n + 1)/2 blocks.
+pub(crate) fn points_of_triangle(blocks: usize) -> usize {
+    (1..).find(|n| n * (n + 1) / 2 >= blocks).expect("there is such a number")
+}
