@@ -5,8 +5,8 @@ use energy_dsl::{Declaration, Element, Potential, Vector3};
 use energy_elements::ZeroLengthSpring;
 use energy_solve::{Character, DofMap, Linearisation, Pattern, Quantity, State, Stencils, Tally, Term, index};
 
-use crate::mesh::dot;
-use crate::scene::{IslandModel, TermLabel};
+use crate::geometry::dot;
+use crate::model::{IslandModel, TermLabel};
 
 /// A hand: a soft pin that holds one vertex while the mouse does, by the declared [`ZeroLengthSpring`] to where the mouse is.
 #[derive(Clone, Debug)]
