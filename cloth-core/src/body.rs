@@ -37,7 +37,7 @@ impl Body {
     /// Σ m x × v of the free vertices about the origin, in kg m²/s.
     #[must_use]
     pub fn angular_momentum(&self) -> Vector3<f64> {
-        self.sum(crate::mesh::cross)
+        self.sum(crate::geometry::cross)
     }
 
     fn sum(&self, of: impl Fn(Vector3<f64>, Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {

@@ -33,41 +33,30 @@
 
 #![forbid(unsafe_code)]
 
-mod account;
 mod body;
 #[cfg(doctest)]
 mod book;
+mod bounded;
 mod dissipation_term;
-mod frame_store;
-mod island;
-mod simulation;
-mod sleep;
-mod summary;
 
 pub mod bench;
-pub mod bench_sleep;
-pub mod checkpoint;
 pub mod contact;
 pub mod demo;
 pub mod fabric;
+pub mod geometry;
 pub mod integrator;
 pub mod ledger;
 pub mod materials;
 pub mod mesh;
+pub mod model;
 pub mod motion;
 pub mod output;
-pub mod progress;
-pub mod record;
-pub mod report;
 pub mod run;
 pub mod scene;
-pub mod stats;
-pub mod trajectory_error;
+pub mod simulation;
 pub mod validate;
 pub mod view;
 pub mod wind;
 
 pub use body::Body;
-pub use island::{Island, SavedIsland};
-pub use simulation::{Simulation, SimulationError};
-pub use summary::Summary;
+pub use simulation::{Island, Simulation, SimulationError, Summary};

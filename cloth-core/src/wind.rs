@@ -8,9 +8,9 @@ use energy_solve::{StepStart, Term};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::bounded::{finite_triple, non_negative, number, positive};
 use crate::dissipation_term::{DissipationLaw, DissipativeTerm};
-use crate::mesh::{cross, norm, subtract};
-use crate::scene::numbers::{finite_triple, non_negative, number, positive};
+use crate::geometry::{cross, norm, subtract};
 
 /// Wind. Each triangle is pushed by ½ ρ C A u² across and along its surface, u the velocity of the air relative to it in that direction: by the
 /// element [`WindDrag`], with normals and areas as at the start of a step. Air that cloth stops or turns is not followed.

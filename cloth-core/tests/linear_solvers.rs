@@ -50,7 +50,7 @@ fn all_solvers_lead_to_the_same_motion() {
                 simulation.step().unwrap();
             }
             let summary = simulation.summary().unwrap();
-            let by = summary.solved_by;
+            let by = summary.totals.solved_by;
             let all = by.over_relaxation + by.multigrid + by.cholesky + by.incomplete_cholesky;
             let asked = match *solver {
                 "multigrid" => by.multigrid,
@@ -58,7 +58,10 @@ fn all_solvers_lead_to_the_same_motion() {
                 "incomplete-cholesky" => by.incomplete_cholesky,
                 _ => by.over_relaxation,
             };
-            assert!(asked == all && (integrator == "implicit-euler" || all == summary.solves), "{solver}: {by:?}");
+            assert!(
+                asked == all && (integrator == "implicit-euler" || all == summary.totals.solves),
+                "{solver}: {by:?}"
+            );
             ends.push(simulation.positions().to_vec());
         }
         for (end, solver) in ends.iter().zip(solvers) {

@@ -1,7 +1,7 @@
 //! Islands: what nothing couples moves by itself, falls asleep when it is still, wakes when it is disturbed, and costs nothing while it sleeps.
 
 use cloth_core::Simulation;
-use cloth_core::bench_sleep::{self, Sizes};
+use cloth_core::bench::sleep::{self, Sizes};
 use cloth_core::scene::Scene;
 
 const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
@@ -136,7 +136,7 @@ fn what_is_still_stays_where_it_is_to_the_last_bit_and_its_last_motion_is_booked
     let entry = simulation.ledger().unwrap().entries().last().unwrap();
     assert_eq!((entry.energy(), entry.total_work()), (last.energy(), last.total_work()));
     let summary = simulation.summary().unwrap();
-    assert_eq!((summary.islands, summary.asleep, summary.slept), (1, 1, 100));
+    assert_eq!((summary.islands, summary.asleep, summary.totals.slept), (1, 1, 100));
     let line = format!("1 island, 1 asleep; 100 of their {} steps slept through", settled + 100);
     assert!(summary.to_string().contains(&line), "{summary}");
     // Something from outside.
@@ -148,7 +148,7 @@ fn what_is_still_stays_where_it_is_to_the_last_bit_and_its_last_motion_is_booked
     let text = format!("{}{}{pin}", HEAD.replace("sleep = true\n", ""), sheet("a", [0.0; 3]));
     let mut simulation = started(&text);
     step(&mut simulation, settled + 10);
-    assert_eq!((awake(&simulation), simulation.summary().unwrap().slept), (vec![true], 0));
+    assert_eq!((awake(&simulation), simulation.summary().unwrap().totals.slept), (vec![true], 0));
 }
 
 /// Three sheets held along their edges: the pins of the first move after 4 s, a ball comes down on the second after 6 s, nothing happens to the third.
@@ -204,7 +204,7 @@ fn what_sleeps_sleeps_on_after_an_interruption() {
             assert_eq!(awake(&whole), awake(&resumed), "step {now}");
         }
         assert_eq!(whole.ledger(), resumed.ledger());
-        assert_eq!(whole.summary().unwrap().slept, resumed.summary().unwrap().slept);
+        assert_eq!(whole.summary().unwrap().totals.slept, resumed.summary().unwrap().totals.slept);
     }
 }
 
@@ -243,7 +243,7 @@ fn scenes_say_when_something_sleeps() {
 #[test]
 fn what_sleeps_or_is_pinned_costs_next_to_nothing() {
     let sizes = Sizes { cells: 10, cloths: 20, pinned_cells: 40, steps: 15 };
-    for ratio in bench_sleep::measure(&sizes, |_| ()).unwrap() {
+    for ratio in sleep::measure(&sizes, |_| ()).unwrap() {
         assert!(ratio.value() < 3.0 * ratio.target, "{}: {}", ratio.question, ratio.value());
     }
 }

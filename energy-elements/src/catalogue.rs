@@ -1,93 +1,108 @@
 use energy_dsl::{Declaration, Element, Inputs, Outputs, RestError};
 
-/// A declared element, for tools that handle all alike.
+/// An element of this crate, for tools that handle all elements in the same way.
 #[derive(Clone, Copy, Debug)]
 pub struct CatalogueEntry {
-    /// What was declared.
+    /// The declaration.
     pub declaration: &'static Declaration,
-    /// Every block in double precision.
+    /// Evaluates every block in double precision.
     pub evaluate: fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,
-    /// Every block in single precision.
-    pub evaluate_f32: fn(&Inputs<'_, f32>) -> Result<Outputs<f32>, RestError>,
 }
 
 impl CatalogueEntry {
     const fn of<E: Element>() -> Self {
-        Self { declaration: E::DECLARATION, evaluate: E::evaluate::<f64>, evaluate_f32: E::evaluate::<f32> }
+        Self { declaration: E::DECLARATION, evaluate: E::evaluate::<f64> }
     }
 }
 
-macro_rules! catalogue {
+/// Calls a macro with the names of all elements of this crate, in alphabetical order.
+///
+/// ```
+/// macro_rules! count {
+///     ($($name:ident),* $(,)?) => { [$(stringify!($name)),*].len() };
+/// }
+/// assert_eq!(energy_elements::for_each_element!(count), energy_elements::catalogue().len());
+/// ```
+#[macro_export]
+macro_rules! for_each_element {
+    ($callback:ident) => {
+        $callback! {
+            ArcAngle,
+            AsRigidAsPossible,
+            BaraffWitkinShear,
+            BaraffWitkinStretch,
+            Binding,
+            BlendedMotion4,
+            BlendedPoint1,
+            BlendedPoint4,
+            BlendedPoint8,
+            BoneBinding,
+            BoxContact,
+            BridsonBending,
+            BridsonForce,
+            BridsonForceDamped,
+            CapsuleContact,
+            Distance,
+            DistanceBarrier,
+            DistanceSquared,
+            FlatBending,
+            FrozenPlane1,
+            FrozenPlane4,
+            FrozenPlane8,
+            GraphEdge,
+            Gravity,
+            HairBend,
+            HingeAngle,
+            HingeCos,
+            HingeCosHalf,
+            HingeDamping,
+            HingeSinHalf,
+            HookeSpring,
+            HuberLoss,
+            NeoHookean,
+            NonrigidPlane1,
+            NonrigidPlane4,
+            NonrigidPlane8,
+            OrthotropicStVK,
+            PlaneContact,
+            PlateBending,
+            PointToPlane,
+            PowerLaw,
+            QuadraticHinge,
+            SkeletonPlane,
+            SkeletonPoint,
+            SlidingFriction,
+            SphereContact,
+            Spring,
+            SquaredDistanceBarrier,
+            StVK,
+            StableNeoHookean,
+            StableNeoHookeanLog,
+            StrainRateDamping,
+            ThreadLimit,
+            TukeyLoss,
+            TwistMotion,
+            ViscousDrag,
+            WindDrag,
+            ZeroLengthSpring,
+        }
+    };
+}
+
+macro_rules! entries {
     ($($name:ident),* $(,)?) => { &[$(CatalogueEntry::of::<crate::$name<f64>>()),*] };
 }
 
-/// All elements of this crate, by name.
+/// All elements of this crate, in alphabetical order.
+// Not inlined: a crate that inlines it compiles every element again.
+#[inline(never)]
 #[must_use]
 pub fn catalogue() -> &'static [CatalogueEntry] {
-    const CATALOGUE: &[CatalogueEntry] = catalogue![
-        ArcAngle,
-        AsRigidAsPossible,
-        BaraffWitkinShear,
-        BaraffWitkinStretch,
-        Binding,
-        BlendedMotion4,
-        BlendedPoint1,
-        BlendedPoint4,
-        BlendedPoint8,
-        BoneBinding,
-        BoxContact,
-        BridsonBending,
-        BridsonForce,
-        BridsonForceDamped,
-        CapsuleContact,
-        Distance,
-        DistanceBarrier,
-        DistanceSquared,
-        FlatBending,
-        FrozenPlane1,
-        FrozenPlane4,
-        FrozenPlane8,
-        GraphEdge,
-        Gravity,
-        HairBend,
-        HingeAngle,
-        HingeCos,
-        HingeCosHalf,
-        HingeDamping,
-        HingeSinHalf,
-        HookeSpring,
-        HuberLoss,
-        NeoHookean,
-        NonrigidPlane1,
-        NonrigidPlane4,
-        NonrigidPlane8,
-        OrthotropicStVK,
-        PlaneContact,
-        PlateBending,
-        PointToPlane,
-        PowerLaw,
-        QuadraticHinge,
-        SkeletonPlane,
-        SkeletonPoint,
-        SlidingFriction,
-        SphereContact,
-        Spring,
-        SquaredDistanceBarrier,
-        StVK,
-        StableNeoHookean,
-        StableNeoHookeanLog,
-        StrainRateDamping,
-        ThreadLimit,
-        TukeyLoss,
-        TwistMotion,
-        ViscousDrag,
-        WindDrag,
-        ZeroLengthSpring,
-    ];
+    const CATALOGUE: &[CatalogueEntry] = for_each_element!(entries);
     CATALOGUE
 }
 
-/// The element of that name.
+/// The element of this name; `None` if the crate has no such element.
 ///
 /// ```
 /// let spring = energy_elements::find("Spring").unwrap();

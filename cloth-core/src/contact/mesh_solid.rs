@@ -8,8 +8,7 @@ use energy_elements::{CapsuleContact, PlaneContact, SphereContact};
 
 use super::solid::Solid;
 use super::surface::{Feature, Nearest, Surface};
-use crate::mesh::{norm, subtract};
-use crate::motion::Pose;
+use crate::geometry::{Pose, norm, subtract};
 
 /// A surface of triangles, somewhere.
 #[derive(Clone, Debug, PartialEq)]

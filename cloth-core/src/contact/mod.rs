@@ -20,8 +20,8 @@ pub use surface::{Feature, Nearest, Surface, SurfaceError};
 
 use crate::body::Body;
 use crate::dissipation_term::DissipativeTerm;
-use crate::mesh::dot;
-use crate::motion::{Motion, Pose};
+use crate::geometry::{Pose, dot};
+use crate::motion::Motion;
 use friction::FrictionLaw;
 use mesh_solid::{Corners, Edges, Faces, Felt};
 use solid::{Shape, Solid};

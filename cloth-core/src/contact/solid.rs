@@ -3,8 +3,7 @@
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{BoxContact, CapsuleContact, PlaneContact, SphereContact};
 
-use crate::mesh::{dot, norm, subtract};
-use crate::motion::Pose;
+use crate::geometry::{Pose, dot, norm, subtract};
 
 /// What keeps cloth out: felt by the vertices that come near.
 pub(super) trait Solid: Clone + std::fmt::Debug + 'static {

@@ -3,7 +3,8 @@ use std::collections::BTreeMap;
 use energy_dsl::Vector3;
 
 use super::hierarchy::{Bounds, Hierarchy};
-use crate::mesh::{TriangleMesh, cross, dot, norm, subtract, vertex_angles};
+use crate::geometry::{cross, dot, norm, subtract};
+use crate::mesh::{TriangleMesh, vertex_angles};
 
 /// Triangles that are no surface of a solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

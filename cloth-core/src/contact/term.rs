@@ -5,8 +5,8 @@ use energy_solve::{
 };
 
 use super::solid::Solid;
-use crate::mesh::{dot, norm};
-use crate::motion::{Motion, Pose};
+use crate::geometry::{Pose, dot, norm};
+use crate::motion::Motion;
 
 /// Contact of all vertices with one solid. Only vertices nearer than the thickness are evaluated; the others count as skipped. Each adds
 /// to its own diagonal block only, so that the matrix keeps its pattern whatever touches.

@@ -10,7 +10,8 @@ use serde::Deserialize;
 
 use super::Bending;
 use super::interpreted_term::InterpretedTerm;
-use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, norm, rest_angle, subtract};
+use crate::geometry::{norm, subtract};
+use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, rest_angle};
 
 /// Elements declared in a `.energy` file of the user's own. Each energy in it acts on every vertex, edge, triangle or hinge, as it has one, two, three
 /// or four points; of a hinge the first two are the apexes and the others the shared edge. They are interpreted, which is slower than

@@ -3,7 +3,7 @@ use serde::Deserialize;
 
 use super::Declared;
 use super::plate::Rigidity;
-use crate::scene::numbers::{all_positive, finite_triple, non_negative, poisson_ratio, positive};
+use crate::bounded::{all_positive, finite_triple, non_negative, poisson_ratio, positive};
 
 /// A fabric.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]

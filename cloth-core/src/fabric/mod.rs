@@ -2,6 +2,7 @@
 
 mod declared;
 mod description;
+mod hair;
 mod interpreted_term;
 mod library;
 pub mod plate;
@@ -11,6 +12,7 @@ pub use declared::{Declared, DeclaredError};
 pub use description::{
     Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Rayleigh, StrainLimit, Woven,
 };
+pub use hair::Hair;
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
 pub use terms::{FabricError, Garment, Place, Surroundings, hair_terms, terms, terms_at};

@@ -4,17 +4,18 @@ use energy_elements::{
     FlatBending, Gravity, HairBend, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK,
     StableNeoHookean, StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
-use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
+use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term, TermDescription};
 
 use super::declared::{Declared, DeclaredError, Ground};
+use super::hair::Hair;
 use super::interpreted_term::InterpretedTerm;
 use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
+use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
-    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, cross, lumped_masses, material_triangle, norm,
-    rest_angle, subtract, thread_triangle,
+    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, lumped_masses, material_triangle, rest_angle,
+    thread_triangle,
 };
-use crate::scene::Hair;
 
 /// A fabric that cannot be laid on a mesh.
 #[derive(Debug, thiserror::Error)]
@@ -499,5 +500,5 @@ fn shape_factor(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
     let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
     let edge = subtract(x4, x3);
     let normals = norm(cross(edge, subtract(x1, x3))) + norm(cross(edge, subtract(x2, x3)));
-    crate::mesh::dot(edge, edge) / normals
+    crate::geometry::dot(edge, edge) / normals
 }

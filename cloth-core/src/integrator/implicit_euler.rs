@@ -97,7 +97,7 @@ impl ImplicitEuler {
         let size = |place: usize| {
             let error: Vector3<f64> = std::array::from_fn(|axis| solution.right[place][axis] - residual[place][axis]);
             // NaN counts as the worst.
-            let size = crate::mesh::norm(error);
+            let size = crate::geometry::norm(error);
             if size.is_nan() { f64::INFINITY } else { size }
         };
         let worst = (0..free.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map_or(0, |place| free[place]);

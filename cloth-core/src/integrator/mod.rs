@@ -275,10 +275,10 @@ impl Scheme {
 #[serde(default, deny_unknown_fields)]
 pub struct Tolerances {
     /// Done when an iteration changes no velocity by more, in m/s. Default 1e-4 for `newton`, 1e-7 for schemes of second order.
-    #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
+    #[serde(deserialize_with = "crate::bounded::some_positive")]
     pub velocity: Option<f64>,
     /// The residual of each linear system relative to its right-hand side. Default 0.01 for `newton`, 1e-3 for schemes of second order.
-    #[serde(deserialize_with = "crate::scene::numbers::some_positive")]
+    #[serde(deserialize_with = "crate::bounded::some_positive")]
     pub linear: Option<f64>,
     /// A step fails after this many iterations. Default 100.
     pub iterations: Option<usize>,

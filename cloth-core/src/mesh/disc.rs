@@ -11,10 +11,10 @@ use super::{MeshError, TriangleMesh};
 #[serde(deny_unknown_fields)]
 pub struct Disc {
     /// The radius, in m.
-    #[serde(deserialize_with = "crate::scene::numbers::positive")]
+    #[serde(deserialize_with = "crate::bounded::positive")]
     pub radius: f64,
     /// Rings of triangles; ring k has 6 k vertices.
-    #[serde(deserialize_with = "crate::scene::numbers::count::<1, _>")]
+    #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
     pub rings: usize,
 }
 

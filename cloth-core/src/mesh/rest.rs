@@ -1,7 +1,8 @@
 use energy_dsl::Vector3;
 
+use super::TriangleMesh;
 use super::topology::Hinge;
-use super::{TriangleMesh, cross, dot, norm, subtract};
+use crate::geometry::{cross, dot, norm, subtract};
 
 /// A triangle at rest, laid in its own plane: the 2-D material coordinates of its corners, in m, anticlockwise.
 pub type MaterialTriangle = [[f64; 2]; 3];
@@ -43,13 +44,17 @@ pub fn thread_triangle([a, b, c]: [Vector3<f64>; 3], warp: Vector3<f64>) -> Opti
     Some([[0.0; 2], [dot(base, u), dot(base, v)], [dot(side, u), dot(side, v)]])
 }
 
+/// The area of a triangle in space: ½ ‖(b − a) × (c − a)‖.
+pub(crate) fn area([a, b, c]: [Vector3<f64>; 3]) -> f64 {
+    0.5 * norm(cross(subtract(b, a), subtract(c, a)))
+}
+
 /// The mass of each vertex, in kg: a third of σ A of every triangle it is a corner of. σ in kg/m².
 #[must_use]
 pub fn lumped_masses(mesh: &TriangleMesh, density: f64) -> Vec<f64> {
     let mut masses = vec![0.0; mesh.vertices().len()];
     for (triangle, corners) in mesh.triangles().iter().enumerate() {
-        let [a, b, c] = mesh.corners(triangle);
-        let area = 0.5 * norm(cross(subtract(b, a), subtract(c, a)));
+        let area = area(mesh.corners(triangle));
         for &corner in corners {
             masses[corner] += density * area / 3.0;
         }

@@ -33,10 +33,10 @@ pub enum Plane {
 #[serde(deny_unknown_fields)]
 pub struct Sheet {
     /// Cells along its two directions.
-    #[serde(deserialize_with = "crate::scene::numbers::cell_counts")]
+    #[serde(deserialize_with = "crate::bounded::cell_counts")]
     pub cells: [usize; 2],
     /// Lengths along its two directions, in m.
-    #[serde(deserialize_with = "crate::scene::numbers::all_positive")]
+    #[serde(deserialize_with = "crate::bounded::all_positive")]
     pub size: [f64; 2],
     /// `regular` (the default) or `alternating`.
     #[serde(default)]
@@ -55,10 +55,10 @@ pub struct Sheet {
 #[serde(deny_unknown_fields)]
 pub struct Pleats {
     /// How many.
-    #[serde(deserialize_with = "crate::scene::numbers::positive")]
+    #[serde(deserialize_with = "crate::bounded::positive")]
     pub count: f64,
     /// Out of the plane to either side, in m.
-    #[serde(deserialize_with = "crate::scene::numbers::non_negative")]
+    #[serde(deserialize_with = "crate::bounded::non_negative")]
     pub depth: f64,
 }
 
@@ -145,7 +145,7 @@ impl Sheet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{norm, subtract};
+    use crate::geometry::{norm, subtract};
 
     #[test]
     fn pleats_narrow_the_sheet_without_stretching_it() {

@@ -8,13 +8,13 @@ use super::{Diagonals, Plane, Sheet};
 #[serde(deny_unknown_fields)]
 pub struct Strip {
     /// Its length along the first axis, in m.
-    #[serde(deserialize_with = "crate::scene::numbers::positive")]
+    #[serde(deserialize_with = "crate::bounded::positive")]
     pub length: f64,
     /// Its width, in m.
-    #[serde(deserialize_with = "crate::scene::numbers::positive")]
+    #[serde(deserialize_with = "crate::bounded::positive")]
     pub width: f64,
     /// Cells along its length.
-    #[serde(deserialize_with = "crate::scene::numbers::count::<1, _>")]
+    #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
     pub segments: usize,
     /// `horizontal` (the default) or `vertical`.
     #[serde(default)]

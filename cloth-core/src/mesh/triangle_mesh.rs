@@ -1,7 +1,6 @@
 use energy_dsl::Vector3;
 
-use super::{cross, norm, subtract};
-use crate::motion::Pose;
+use crate::geometry::{Pose, cross, norm, subtract};
 
 /// What makes vertices and triangles unfit to be a cloth or an obstacle. Vertices and triangles are numbered from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -24,7 +24,7 @@ pub use usd::usd_text;
 
 use energy_dsl::Vector3;
 
-use crate::mesh::{cross, norm, subtract};
+use crate::geometry::{cross, norm, subtract};
 
 /// Unit normals at the vertices, each the mean of its triangles' by area.
 #[must_use]

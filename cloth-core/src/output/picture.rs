@@ -10,7 +10,7 @@ use super::projection::Camera;
 use super::raster::{Canvas, Corner};
 use super::solid_mesh::SolidMesh;
 use super::vertex_normals;
-use crate::mesh::{cross, dot, norm, subtract};
+use crate::geometry::{cross, dot, norm, subtract};
 
 /// Of solids and of hair.
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];

@@ -1,6 +1,6 @@
 use energy_dsl::Vector3;
 
-use crate::mesh::{cross, dot, norm, subtract};
+use crate::geometry::{cross, dot, norm, subtract};
 
 /// A camera that sees a whole set of points: z is up.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@ use energy_dsl::Vector3;
 use super::track::{Joined, Track};
 use super::{Look, PictureError, SolidMesh, View, picture_png};
 use crate::contact::AnySolid;
-use crate::scene::PartKind;
+use crate::model::PartKind;
 use crate::simulation::Simulation;
 
 /// Garments in turn; solids.

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use energy_dsl::Vector3;
 
 use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, RoundedBox};
-use crate::mesh::{cross, norm, subtract};
+use crate::geometry::{cross, norm, subtract};
 
 /// The surface of a solid as vertices and triangles.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ fn across(direction: Vector3<f64>) -> [Vector3<f64>; 2] {
 
 fn plane(solid: &HalfSpace, centre: Vector3<f64>, size: f64) -> SolidMesh {
     let [u, v] = across(solid.normal);
-    let height = crate::mesh::dot(solid.normal, subtract(centre, solid.point));
+    let height = crate::geometry::dot(solid.normal, subtract(centre, solid.point));
     let middle: Vector3<f64> = std::array::from_fn(|axis| centre[axis] - height * solid.normal[axis]);
     let at = |step: usize| size * (step as f64 / CELLS as f64 - 0.5);
     let point = |row: usize, column: usize| -> Vector3<f64> {
@@ -137,7 +137,7 @@ fn rounded_box(solid: &RoundedBox) -> SolidMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::dot;
+    use crate::geometry::dot;
 
     /// ⅓ Σ of the cone volumes over all triangles, which is the volume when the surface is closed and turned outwards.
     fn volume(mesh: &SolidMesh) -> f64 {

@@ -2,8 +2,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
-use super::numbers::{finite_triple, non_negative, positive};
 use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
+use crate::bounded::{finite_triple, non_negative, positive};
 use crate::fabric::Fabric;
 use crate::integrator::{LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;

@@ -4,13 +4,12 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::numbers::{finite_triple, nonzero_triple, number, positive};
+use crate::bounded::{finite_triple, nonzero_triple, number, positive};
 use crate::fabric::Fabric;
+use crate::geometry::{Pose, cross, subtract};
 use crate::mesh::{
-    Disc, MeshError, ObjError, PleatsError, Sheet, SpringNetwork, Strip, Topology, TriangleMesh, cross, read_obj,
-    subtract,
+    Disc, MeshError, ObjError, PleatsError, Sheet, SpringNetwork, Strip, Topology, TriangleMesh, read_obj,
 };
-use crate::motion::Pose;
 
 /// A piece of cloth.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]

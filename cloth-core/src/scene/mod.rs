@@ -1,16 +1,12 @@
 //! Scene files: what to simulate, in TOML. Every key is a field below, with its unit; unknown keys are refused.
 
-mod builder;
 mod error;
 mod fabric_choice;
 mod file;
 mod garment;
-mod hair;
-pub(crate) mod numbers;
 mod obstacle;
 mod output;
 mod own_material;
-mod parts;
 mod pins;
 mod schema;
 mod seam;
@@ -20,16 +16,15 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+pub use crate::fabric::Hair;
 pub use error::SceneError;
 pub use garment::{Garment, Mesh, MeshSourceError, Placement, Shape, Turn};
-pub use hair::Hair;
 pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::OutputChoice;
 pub use own_material::with_material;
-pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
-pub use pins::{Pin, PinBox, PinChoice, PinError};
+pub use pins::{Pin, PinBox, PinChoice};
 pub use schema::schema;
-pub use seam::{Seam, SeamError};
+pub use seam::Seam;
 pub use sleep::Sleep;
 
 use crate::fabric::Material;

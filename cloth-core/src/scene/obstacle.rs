@@ -4,10 +4,11 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Placement, Turn};
-use super::numbers::{all_positive, finite_triple, non_negative, nonzero_triple, positive};
+use crate::bounded::{all_positive, finite_triple, non_negative, nonzero_triple, positive};
 use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError};
-use crate::mesh::{MeshError, ObjError, norm, read_obj};
-use crate::motion::{Motion, Pose};
+use crate::geometry::{Pose, norm};
+use crate::mesh::{MeshError, ObjError, read_obj};
+use crate::motion::Motion;
 
 /// A solid that keeps cloth out: exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]

@@ -2,8 +2,7 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::numbers::finite_triple;
-use crate::mesh::{norm, subtract};
+use crate::bounded::finite_triple;
 use crate::motion::Motion;
 
 /// Vertices that do not move, or move as they are told.
@@ -94,100 +93,10 @@ impl TryFrom<Keys> for Pin {
     }
 }
 
-/// A pin that holds nothing.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PinError {
-    /// No such part.
-    #[error("pins[{pin}]: {0}", .error)]
-    Name {
-        /// Which pin, from 0.
-        pin: usize,
-        /// What is wrong.
-        error: super::UnknownPart,
-    },
-    /// No such vertex.
-    #[error("pins[{pin}]: there is no vertex {vertex}; the mesh has {vertices} (0 to {})", .vertices.saturating_sub(1))]
-    NoSuchVertex {
-        /// Which pin, from 0.
-        pin: usize,
-        /// The vertex it names.
-        vertex: usize,
-        /// The number of vertices.
-        vertices: usize,
-    },
-    /// An empty box.
-    #[error("pins[{pin}]: no vertex lies in the box {min:?} to {max:?} (in m)")]
-    EmptyBox {
-        /// Which pin, from 0.
-        pin: usize,
-        /// Its smallest corner.
-        min: Vector3<f64>,
-        /// Its largest corner.
-        max: Vector3<f64>,
-    },
-    /// Nothing with an edge.
-    #[error("pins[{pin}]: what it chooses from has no edge")]
-    NoBoundary {
-        /// Which pin, from 0.
-        pin: usize,
-    },
-    /// Two pins that want different things.
-    #[error("pins[{pin}]: vertex {vertex} is held by another pin already, which moves it otherwise")]
-    Twice {
-        /// Which pin, from 0.
-        pin: usize,
-        /// The vertex, counted through all garments.
-        vertex: usize,
-    },
-}
-
 impl Pin {
     /// A pin that does not move, on vertices of all parts.
     #[must_use]
     pub fn fixed(choice: PinChoice) -> Self {
         Self { choice, of: None, motion: None }
-    }
-
-    /// The vertices it holds, of those at the start; `edge` are those on the edge of the cloth. `pin` is its number, for messages.
-    ///
-    /// # Errors
-    /// When it chooses no vertex.
-    pub fn chosen(&self, pin: usize, start: &[Vector3<f64>], edge: &[usize]) -> Result<Vec<usize>, PinError> {
-        match self.choice {
-            PinChoice::Vertex(vertex) if vertex < start.len() => Ok(vec![vertex]),
-            PinChoice::Vertex(vertex) => Err(PinError::NoSuchVertex { pin, vertex, vertices: start.len() }),
-            PinChoice::Box(PinBox { min, max }) => {
-                let inside = |p: &Vector3<f64>| (0..3).all(|axis| (min[axis]..=max[axis]).contains(&p[axis]));
-                let chosen: Vec<usize> = (0..start.len()).filter(|&vertex| inside(&start[vertex])).collect();
-                if chosen.is_empty() { Err(PinError::EmptyBox { pin, min, max }) } else { Ok(chosen) }
-            }
-            PinChoice::Nearest(point) => {
-                let distance = |vertex: &usize| norm(subtract(start[*vertex], point));
-                Ok((0..start.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).into_iter().collect())
-            }
-            PinChoice::Boundary if edge.is_empty() => Err(PinError::NoBoundary { pin }),
-            PinChoice::Boundary => Ok(edge.to_vec()),
-            PinChoice::All => Ok((0..start.len()).collect()),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pins_choose_vertices_or_say_why_not() {
-        let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let chosen = |choice| Pin::fixed(choice).chosen(1, &vertices, &[0, 2]);
-        assert_eq!(chosen(PinChoice::Nearest([0.9, 0.2, 0.0])).unwrap(), [1]);
-        let inside = PinBox { min: [-0.1, 0.5, -0.1], max: [0.1, 1.5, 0.1] };
-        assert_eq!(chosen(PinChoice::Box(inside)).unwrap(), [2]);
-        assert_eq!(chosen(PinChoice::Boundary).unwrap(), [0, 2]);
-        assert_eq!(chosen(PinChoice::All).unwrap(), [0, 1, 2]);
-        let error = chosen(PinChoice::Vertex(3)).unwrap_err();
-        assert_eq!(error.to_string(), "pins[1]: there is no vertex 3; the mesh has 3 (0 to 2)");
-        let empty = PinBox { min: [5.0; 3], max: [6.0; 3] };
-        assert!(matches!(chosen(PinChoice::Box(empty)), Err(PinError::EmptyBox { pin: 1, .. })));
     }
 }

@@ -1,11 +1,7 @@
-use std::collections::BTreeSet;
-
-use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::numbers::{non_negative, positive};
-use crate::mesh::{norm, subtract};
+use crate::bounded::{non_negative, positive};
 
 /// Stitches between two garments: springs without rest length, ½ K ‖x_P − x_Q‖². Either `pairs` or `within` says which vertices.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -26,113 +22,4 @@ pub struct Seam {
     /// k_d of the force −k_d (v_P − v_Q) of a stitch, in N s/m. Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     pub damping: f64,
-}
-
-/// A seam that joins nothing.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SeamError {
-    /// No such part.
-    #[error("seams[{seam}]: {0}", .error)]
-    Name {
-        /// Which seam, from 0.
-        seam: usize,
-        /// What is wrong.
-        error: super::UnknownPart,
-    },
-    /// Neither or both ways to choose vertices.
-    #[error("seams[{seam}]: give either `pairs` or `within`")]
-    Choice {
-        /// Which seam, from 0.
-        seam: usize,
-    },
-    /// No such vertex.
-    #[error("seams[{seam}]: {garment} has no vertex {vertex}; it has {vertices} (0 to {})", .vertices.saturating_sub(1))]
-    NoSuchVertex {
-        /// Which seam, from 0.
-        seam: usize,
-        /// The garment.
-        garment: String,
-        /// The vertex it names.
-        vertex: usize,
-        /// The number of vertices.
-        vertices: usize,
-    },
-    /// A vertex joined to itself.
-    #[error("seams[{seam}]: vertex {vertex} of {garment} is joined to itself")]
-    Itself {
-        /// Which seam, from 0.
-        seam: usize,
-        /// The garment.
-        garment: String,
-        /// The vertex.
-        vertex: usize,
-    },
-    /// Nothing within reach.
-    #[error("seams[{seam}]: no edges of {} and {} come within {within} m at the start; the nearest are {nearest:.3e} m apart", .garments[0], .garments[1])]
-    OutOfReach {
-        /// Which seam, from 0.
-        seam: usize,
-        /// The two.
-        garments: [String; 2],
-        /// As given, in m.
-        within: f64,
-        /// How far they are apart, in m.
-        nearest: f64,
-    },
-}
-
-/// One end of a seam: a part of the scene.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Side<'a> {
-    /// Its vertices at the start.
-    pub start: &'a [Vector3<f64>],
-    /// Those on its edge.
-    pub edge: &'a [usize],
-}
-
-impl Seam {
-    /// The pairs of vertices that it joins, each counted within its part.
-    pub(super) fn joined(&self, seam: usize, sides: [Side<'_>; 2]) -> Result<Vec<[usize; 2]>, SeamError> {
-        let same = self.garments[0] == self.garments[1];
-        let pairs = match (&self.pairs, self.within) {
-            (Some(pairs), None) => pairs.clone(),
-            (None, Some(within)) => self.nearby(seam, sides, within, same)?,
-            _ => return Err(SeamError::Choice { seam }),
-        };
-        for pair in &pairs {
-            for (side, &vertex) in pair.iter().enumerate() {
-                let (vertices, garment) = (sides[side].start.len(), self.garments[side].clone());
-                if vertex >= vertices {
-                    return Err(SeamError::NoSuchVertex { seam, garment, vertex, vertices });
-                }
-            }
-            if same && pair[0] == pair[1] {
-                return Err(SeamError::Itself { seam, garment: self.garments[0].clone(), vertex: pair[0] });
-            }
-        }
-        Ok(pairs)
-    }
-
-    fn nearby(
-        &self,
-        seam: usize,
-        [first, second]: [Side<'_>; 2],
-        within: f64,
-        same: bool,
-    ) -> Result<Vec<[usize; 2]>, SeamError> {
-        let (mut pairs, mut nearest) = (BTreeSet::new(), f64::INFINITY);
-        for &p in first.edge {
-            let distance = |q: usize| norm(subtract(first.start[p], second.start[q]));
-            let others = second.edge.iter().copied().filter(|&q| !same || q != p);
-            let Some(q) = others.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) else { continue };
-            nearest = nearest.min(distance(q));
-            if distance(q) <= within {
-                pairs.insert([p, q]);
-            }
-        }
-        if pairs.is_empty() {
-            return Err(SeamError::OutOfReach { seam, garments: self.garments.clone(), within, nearest });
-        }
-        Ok(pairs.into_iter().collect())
-    }
 }

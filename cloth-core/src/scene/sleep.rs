@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
-use super::numbers::{positive, some_positive};
+use crate::bounded::{positive, some_positive};
 
 /// When islands (vertices that nothing couples to others) fall asleep: once each of their vertices was slower than `speed` for the time `after`, and changed
 /// its velocity over that time by no more than half of that, and nothing that acts on them moves. An island that sleeps is not stepped: it stays

@@ -4,10 +4,11 @@ use energy_solve::System;
 use super::{Finding, ValidateError};
 use crate::body::Body;
 use crate::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroundings};
+use crate::geometry::{norm, subtract};
 use crate::integrator::{
     Bdf2, ExplicitEuler, ImplicitMidpoint, Integrator, Newton, NewtonOptions, SymplecticEuler, Trapezoid, Verlet,
 };
-use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork, norm, subtract};
+use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
 
 /// A free sheet of 0.3 m × 0.25 m under gravity, 6 × 5 cells.
 fn sheet(gravity: f64) -> Result<Body, ValidateError> {

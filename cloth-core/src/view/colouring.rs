@@ -5,8 +5,9 @@ use clap::ValueEnum;
 use energy_dsl::Vector3;
 use plotters::style::colors::colormaps::ViridisRGB;
 
-use crate::mesh::{dot, material_triangle, norm, subtract};
-use crate::scene::PartKind;
+use crate::geometry::{dot, norm, subtract};
+use crate::mesh::material_triangle;
+use crate::model::PartKind;
 use crate::simulation::Simulation;
 
 /// What colours show.

@@ -8,8 +8,8 @@ use energy_solve::{
     index,
 };
 
-use crate::mesh::dot;
-use crate::scene::{IslandModel, TermLabel};
+use crate::geometry::dot;
+use crate::model::{IslandModel, TermLabel};
 
 /// A hand: a soft pin that holds one vertex while the mouse does, by the declared [`ZeroLengthSpring`] to where the mouse is.
 #[derive(Clone, Debug)]

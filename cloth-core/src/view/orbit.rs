@@ -1,6 +1,6 @@
 use energy_dsl::Vector3;
 
-use crate::mesh::{cross, dot, norm, subtract};
+use crate::geometry::{cross, dot, norm, subtract};
 
 /// A camera that turns about a point; z is up. Pixels count from the upper left corner of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@ use std::ops::Range;
 use energy_dsl::Vector3;
 
 use super::orbit::{Orbit, Ray};
-use crate::mesh::{cross, dot, subtract};
+use crate::geometry::{cross, dot, subtract};
 
 /// How near a joint of hair must be to the mouse, in pixels.
 const REACH: f64 = 8.0;

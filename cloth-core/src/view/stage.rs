@@ -4,10 +4,11 @@ use energy_dsl::Vector3;
 
 use super::colouring::{Colouring, RestShape, stored_energies};
 use super::grip::Grip;
-use crate::mesh::{norm, subtract};
+use crate::geometry::{norm, subtract};
+use crate::model::{Model, ModelError};
 use crate::output::OutputFolder;
-use crate::record::{Record, RecordError};
-use crate::scene::{Model, ModelError, Scene, SceneError};
+use crate::run::{Record, RecordError};
+use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 
 /// Something that cannot be viewed.
@@ -114,7 +115,7 @@ impl Stage {
             grip.hold_on(island, model.labels.len());
         }
         model.labels.push(Grip::label());
-        let simulation = Simulation::of(&scene, model)?;
+        let simulation = Simulation::from_model(&scene, model)?;
         let rest = RestShape::of(&simulation);
         Ok(Self { scene, simulation, rest, act: Act::Live { grip }, playing: true, due: 0.0 })
     }

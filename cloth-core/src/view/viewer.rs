@@ -5,7 +5,7 @@ use super::orbit::Orbit;
 use super::picking::pick;
 use super::stage::{Stage, ViewError};
 use crate::contact::AnySolid;
-use crate::mesh::norm;
+use crate::geometry::norm;
 use crate::output::SolidMesh;
 
 /// What a person does to the window.
@@ -237,7 +237,7 @@ fn extent(stage: &Stage) -> Vec<Vector3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::subtract;
+    use crate::geometry::subtract;
     use std::path::Path;
 
     const SIZE: [f64; 2] = [900.0, 700.0];

@@ -312,7 +312,7 @@ impl<S: Scalar> Number for Unbounded<S> {
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Self; INPUTS],
     ) -> ([Self; OUTPUTS], Flags<Self>) {
-        S::precautions(W::compiled())(inputs)
+        S::run_unbounded::<W, INPUTS, OUTPUTS>(inputs)
     }
 }
 
@@ -325,7 +325,7 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
     /// Runs it at a level.
     fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
 
-    /// The routine as the crate that declares it compiled it.
+    /// The routine in double precision, as the crate that declares it compiled it.
     fn compiled() -> &'static Precautions<INPUTS, OUTPUTS>;
 
     /// Runs it.
@@ -334,23 +334,22 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
     }
 }
 
-/// A routine over a type of numbers.
-pub(crate) type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
-
-/// A routine with all precautions in each precision. A `static` of it is compiled where it stands, and not again in every crate
-/// that evaluates the element.
+/// A routine with all precautions in double precision. A `static` of it is compiled where it is written, and not again in
+/// every crate that evaluates the element. Single precision is compiled by the crates that use it.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
-    pub(crate) double: Routine<Unbounded<f64>, INPUTS, OUTPUTS>,
-    pub(crate) single: Routine<Unbounded<f32>, INPUTS, OUTPUTS>,
+    pub(crate) double: Routine<INPUTS, OUTPUTS>,
 }
+
+type Routine<const INPUTS: usize, const OUTPUTS: usize> =
+    fn(&[Unbounded<f64>; INPUTS]) -> ([Unbounded<f64>; OUTPUTS], Flags<Unbounded<f64>>);
 
 impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
     /// Those of a routine.
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
-        Self { double: W::run::<Unbounded<f64>>, single: W::run::<Unbounded<f32>> }
+        Self { double: W::run::<Unbounded<f64>> }
     }
 }
 

@@ -78,6 +78,7 @@ mod tests {
     use super::*;
     use crate::multiprecision::truth_of_ordinary;
     use crate::sample::Sampler;
+    use energy_dsl::{Element, Inputs, Outputs, RestError};
 
     const SINGLE_ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
 
@@ -85,11 +86,17 @@ mod tests {
         numbers.iter().map(|&x| x as f32).collect()
     }
 
+    type EvaluateSingle = fn(&Inputs<'_, f32>) -> Result<Outputs<f32>, RestError>;
+
+    macro_rules! single_precision {
+        ($($name:ident),* $(,)?) => { [$(energy_elements::$name::<f32>::evaluate::<f32> as EvaluateSingle),*] };
+    }
+
     /// The blocks of an element in single precision.
-    fn in_single_precision(entry: &energy_elements::CatalogueEntry, sample: &Sample) -> Vec<(&'static str, Vec<f64>)> {
+    fn in_single_precision(evaluate: EvaluateSingle, sample: &Sample) -> Vec<(&'static str, Vec<f64>)> {
         let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| single(list));
         let [parameters, rest, positions, velocities] = lists.each_ref().map(Vec::as_slice);
-        let outputs = (entry.evaluate_f32)(&energy_dsl::Inputs { parameters, rest, positions, velocities }).unwrap();
+        let outputs = evaluate(&Inputs { parameters, rest, positions, velocities }).unwrap();
         let doubles = |numbers: Vec<f32>| numbers.into_iter().map(f64::from).collect();
         outputs.blocks.into_iter().map(|(name, numbers)| (name, doubles(numbers))).collect()
     }
@@ -98,7 +105,8 @@ mod tests {
     #[test]
     fn elements_are_as_accurate_in_single_precision() {
         let mut beyond = Vec::new();
-        for entry in energy_elements::catalogue() {
+        let evaluations = energy_elements::for_each_element!(single_precision);
+        for (entry, evaluate) in energy_elements::catalogue().iter().zip(evaluations) {
             let declaration = entry.declaration;
             let subject = Target::of_catalogue(entry).subject().unwrap();
             let auditor = Auditor::new(&subject);
@@ -109,7 +117,7 @@ mod tests {
                 let [parameters, rest, positions, velocities] = [parameters, rest, positions, velocities].map(rounded);
                 let sample = Sample { parameters, rest, positions, velocities };
                 let answer = subject.answer(&sample).unwrap();
-                let got = in_single_precision(entry, &sample);
+                let got = in_single_precision(evaluate, &sample);
                 for truth in truth_of_ordinary(declaration, &subject.formula, &sample, 12) {
                     let name = truth.block.name;
                     let numbers = &got.iter().find(|(found, _)| *found == name.name()).unwrap().1;

@@ -26,7 +26,7 @@ pub use rigidity::{Rigidity, RigidityError};
 pub use term::{PlateError, PlateTerm};
 pub use tilt::Tilts;
 
-use crate::mesh::{Topology, TriangleMesh, cross, material_triangle, norm, subtract, thread_triangle};
+use crate::mesh::{Topology, TriangleMesh, area, material_triangle, thread_triangle};
 use energy_dsl::Vector3;
 
 /// A mesh whose triangles cannot be given the directions of the threads.
@@ -62,7 +62,7 @@ pub fn curvatures(
     let tilts = Tilts::of(mesh, topology, warp)?;
     let mut curvatures = Vec::with_capacity(mesh.triangles().len());
     for (triangle, sides) in tilts.sides.iter().enumerate() {
-        let area = area_of(mesh.corners(triangle));
+        let area = area(mesh.corners(triangle));
         let mut curvature = Curvature { area, angles: Vec::new(), free: Vec::new() };
         for side in sides {
             let [n, m] = side.normal;
@@ -93,10 +93,6 @@ fn add(angles: &mut Vec<(usize, [f64; 3])>, hinge: usize, scale: f64, weight: [f
         Some((_, sum)) => (0..3).for_each(|component| sum[component] += part[component]),
         None => angles.push((hinge, part)),
     }
-}
-
-fn area_of([a, b, c]: [Vector3<f64>; 3]) -> f64 {
-    0.5 * norm(cross(subtract(b, a), subtract(c, a)))
 }
 
 /// The corners laid in the plane: along warp and weft, or along the first edge.

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::scene::numbers::{non_negative, poisson_ratio, positive};
+use crate::bounded::{non_negative, poisson_ratio, positive};
 
 /// How stiff a plate is against bending.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]

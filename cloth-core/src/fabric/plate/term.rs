@@ -11,7 +11,8 @@ use energy_solve::{
 use super::assembly::{OuterProducts, Turning};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
-use crate::mesh::{Topology, TriangleMesh, dot};
+use crate::geometry::dot;
+use crate::mesh::{Topology, TriangleMesh};
 
 /// Plate bending of a whole mesh: Σ ½ ‖r‖² over the triangles, r = Σ b (θ − θ̄) three combinations of dihedral angles, as arcs have them.
 ///

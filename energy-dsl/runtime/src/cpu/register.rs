@@ -4,8 +4,9 @@ use super::lane::{Lane, check_transposed, gather_by_element, transpose_by_elemen
 use super::lanes::Lanes;
 use super::{Kernel, Level};
 use crate::elementary::{Binary, Unary};
+use crate::flags::Flags;
 use crate::real::{Mask, Number};
-use crate::unbounded::{Precautions, Routine, Unbounded};
+use crate::unbounded::{Unbounded, WithCare};
 
 /// A floating-point number that lanes are made of, with the bit patterns that work on it needs.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
@@ -42,14 +43,14 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     fn power_of_two(exponent: i32) -> Self;
     /// From where to where [`crate::Number::is_moderate`] holds.
     fn moderate_bounds(degree: u8) -> (Self, Self);
-    /// A routine in this precision.
-    fn precautions<const INPUTS: usize, const OUTPUTS: usize>(
-        of: &Precautions<INPUTS, OUTPUTS>,
-    ) -> Routine<Unbounded<Self>, INPUTS, OUTPUTS>;
+    /// Runs a routine with all precautions in this precision.
+    fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+        inputs: &[Unbounded<Self>; INPUTS],
+    ) -> ([Unbounded<Self>; OUTPUTS], Flags<Unbounded<Self>>);
 }
 
 macro_rules! scalar {
-    ($float:ident, $bits:ident, $precision:ident, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal, $span:literal, $reach:literal) => {
+    ($float:ident, $bits:ident, $run_with_care:expr, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal, $span:literal, $reach:literal) => {
         impl Scalar for $float {
             const SIGN: Self = -0.0;
             const MAGNITUDE: Self = $float::from_bits($bits::MAX >> 1);
@@ -85,18 +86,28 @@ macro_rules! scalar {
                 let power = |exponent: $bits| $float::from_bits(exponent << $mantissa_bits);
                 (power($bias - limit), power($bias + limit))
             }
-            fn precautions<const INPUTS: usize, const OUTPUTS: usize>(
-                of: &Precautions<INPUTS, OUTPUTS>,
-            ) -> Routine<Unbounded<Self>, INPUTS, OUTPUTS> {
-                of.$precision
+            fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+                inputs: &[Unbounded<Self>; INPUTS],
+            ) -> ([Unbounded<Self>; OUTPUTS], Flags<Unbounded<Self>>) {
+                $run_with_care(inputs)
             }
         }
     };
 }
 
 // Products of two significands, with all their bits, and a third number shifted by the reach, are normal numbers.
-scalar!(f64, u64, double, 52, 1023, 134_217_729.0, 80, 340_282_366_920_938_463_463_374_607_431_768_211_456.0, 500);
-scalar!(f32, u32, single, 23, 127, 4097.0, 12, 16.0, 95);
+scalar!(
+    f64,
+    u64,
+    |inputs| (W::compiled().double)(inputs),
+    52,
+    1023,
+    134_217_729.0,
+    80,
+    340_282_366_920_938_463_463_374_607_431_768_211_456.0,
+    500
+);
+scalar!(f32, u32, W::run, 23, 127, 4097.0, 12, 16.0, 95);
 
 /// A register of numbers. Where it needs features of the processor, it is used in kernels run at [`Self::Level`] only.
 pub trait Register: Copy {

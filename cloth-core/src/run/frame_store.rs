@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use energy_dsl::Vector3;
 
-use crate::checkpoint::CheckpointError;
+use super::checkpoint::CheckpointError;
 use crate::output::OutputError;
 
 /// Frames, each the positions of all vertices; in the file as double precision, little-endian, one after the other.

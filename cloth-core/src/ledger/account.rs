@@ -122,7 +122,7 @@ fn powers(body: &Body) -> Vec<f64> {
 }
 
 fn dot_of_free(body: &Body, force: &[Vector3<f64>]) -> f64 {
-    let one = |&vertex: &usize| crate::mesh::dot(force[vertex], body.v[vertex]);
+    let one = |&vertex: &usize| crate::geometry::dot(force[vertex], body.v[vertex]);
     body.system.dofs().free().iter().map(one).sum()
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::output::OutputFolder;
-use crate::summary::Summary;
+use crate::simulation::Summary;
 
 /// What a finished run says of itself, in `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

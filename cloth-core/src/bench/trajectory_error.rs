@@ -6,9 +6,9 @@ use std::time::Instant;
 use energy_solve::EvaluationError;
 use verify::plot::{Curve, logarithmic};
 
-use crate::bench::{self, BenchError, Cloth};
+use super::{BenchError, Cloth, hang};
+use crate::geometry::{norm, subtract};
 use crate::integrator::{Scheme, StepError};
-use crate::mesh::{norm, subtract};
 use crate::validate::{ValidateError, runge_kutta};
 
 /// A run of an integrator.
@@ -71,13 +71,13 @@ pub fn compare(cloth: Cloth, mut progress: impl FnMut(usize, usize)) -> Result<V
         .collect::<Result<_, ComparisonError>>()?;
     let total = plan.iter().map(|(_, numbers)| numbers.len()).sum();
     progress(0, total);
-    let mut truth = bench::hang(cloth, CELLS)?;
+    let mut truth = hang(cloth, CELLS)?;
     runge_kutta(&mut truth, TIME, REFERENCE_STEPS)?;
     let mut runs: Vec<Run> = Vec::new();
     for (scheme, numbers) in plan {
         let mut before: Option<f64> = None;
         for steps in numbers {
-            let (mut body, mut scheme) = (bench::hang(cloth, CELLS)?, scheme.integrator());
+            let (mut body, mut scheme) = (hang(cloth, CELLS)?, scheme.integrator());
             let dt = TIME / steps as f64;
             let started = Instant::now();
             let stepped = (0..steps).try_for_each(|_| scheme.step(&mut body, dt).map(|_| ()));
@@ -95,7 +95,7 @@ pub fn compare(cloth: Cloth, mut progress: impl FnMut(usize, usize)) -> Result<V
 
 /// The numbers of steps to run a method with.
 fn numbers_of_steps(scheme: Scheme, cloth: Cloth) -> Result<Vec<usize>, ComparisonError> {
-    let limit = scheme.integrator().stable_step(&mut bench::hang(cloth, CELLS)?)?;
+    let limit = scheme.integrator().stable_step(&mut hang(cloth, CELLS)?)?;
     let halved = |number: u32| FEWEST_STEPS << number;
     let Some(limit) = limit else { return Ok((0..=HALVINGS).map(halved).collect()) };
     let first = (0..LAST_START).find(|&number| TIME / halved(number) as f64 <= limit).unwrap_or(LAST_START);

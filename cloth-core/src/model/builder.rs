@@ -8,9 +8,10 @@ use energy_solve::{ElementList, ForceTerm, PotentialTerm, Term};
 
 use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 use super::seam::Side;
-use super::{Garment, Hair, ObstacleError, Pin, PinError, Scene, SeamError, Shape};
-use crate::fabric::{self, Place, Surroundings};
+use super::{PinError, SeamError, pins, seam};
+use crate::fabric::{self, Hair, Place, Surroundings};
 use crate::mesh::{Groups, SpringNetwork, Topology, TriangleMesh};
+use crate::scene::{Garment, ObstacleError, Pin, Scene, Seam, Shape};
 
 /// A model while it grows.
 pub(super) struct Builder<'a> {
@@ -130,13 +131,13 @@ impl<'a> Builder<'a> {
 
     /// The pairs of vertices that each seam joins.
     fn seams(&self) -> Result<Vec<Vec<[usize; 2]>>, ModelError> {
-        let joined = |(seam, description): (usize, &super::Seam)| {
+        let joined = |(number, description): (usize, &Seam)| {
             let [first, second] = &description.garments;
-            let named = |name: &str| self.part(name).map_err(|error| SeamError::Name { seam, error });
+            let named = |name: &str| self.part(name).map_err(|error| SeamError::Name { seam: number, error });
             let ranges = [named(first)?.vertices.clone(), named(second)?.vertices.clone()];
             let edges = [&ranges[0], &ranges[1]].map(|range| self.edge_within(range));
             let side = |at: usize| Side { start: &self.model.x[ranges[at].clone()], edge: &edges[at] };
-            let joined = description.joined(seam, [side(0), side(1)])?;
+            let joined = seam::joined(description, number, [side(0), side(1)])?;
             Ok(joined.iter().map(|[p, q]| [ranges[0].start + p, ranges[1].start + q]).collect())
         };
         self.scene.seams.iter().enumerate().map(joined).collect()
@@ -352,7 +353,7 @@ impl<'a> Builder<'a> {
             None => 0..self.model.x.len(),
         };
         let edge = self.edge_within(&range);
-        let chosen = description.chosen(pin, &self.model.x[range.clone()], &edge)?;
+        let chosen = pins::chosen(description, pin, &self.model.x[range.clone()], &edge)?;
         Ok(chosen.into_iter().map(|vertex| range.start + vertex).collect())
     }
 

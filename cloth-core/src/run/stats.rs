@@ -6,14 +6,14 @@ use comfy_table::{CellAlignment, Table, presets};
 use energy_solve::Tally;
 
 use crate::integrator::SolvedBy;
-use crate::summary::Summary;
+use crate::simulation::Summary;
 
 /// For each term its elements and, for values, gradients and Hessians, how many were evaluated and skipped (all their vertices are pinned); how many were
 /// flagged or had negative curvature changed, and how many Hessians were known already because they are constant. Then islands, asleep or not, what solved the linear systems, and the
 /// time of each phase, where the integrator tells.
 ///
 /// ```
-/// use cloth_core::{Simulation, scene::Scene, stats};
+/// use cloth_core::{Simulation, run::stats};
 ///
 /// let mut simulation = Simulation::new(&cloth_core::demo::scene()?)?;
 /// simulation.step()?;
@@ -24,8 +24,8 @@ use crate::summary::Summary;
 #[must_use]
 pub fn tables(summary: &Summary) -> String {
     let mut text = format!("{}\n\n{}\n", terms(summary), summary.sleep());
-    if summary.solved_by != SolvedBy::default() {
-        writeln!(text, "linear systems solved by {}", summary.solved_by).expect("writing to a string succeeds");
+    if summary.totals.solved_by != SolvedBy::default() {
+        writeln!(text, "linear systems solved by {}", summary.totals.solved_by).expect("writing to a string succeeds");
     }
     if let Some(phases) = phases(summary) {
         write!(text, "\n{phases}\n").expect("writing to a string succeeds");
@@ -63,7 +63,7 @@ fn phases(summary: &Summary) -> Option<Table> {
     if phases.iter().all(|(_, time)| time.is_zero()) {
         return None;
     }
-    let total = summary.stepping_time;
+    let total = summary.totals.stepping_time;
     let other = total.saturating_sub(phases.iter().map(|(_, time)| *time).sum());
     let mut table = plain(["phase", "s", "ms per step", "%"]);
     for (name, time) in phases.into_iter().chain([("other", other), ("all", total)]) {
@@ -71,7 +71,7 @@ fn phases(summary: &Summary) -> Option<Table> {
         table.add_row([
             name.to_owned(),
             format!("{seconds:.3}"),
-            format!("{:.3}", 1e3 * seconds / summary.steps.max(1) as f64),
+            format!("{:.3}", 1e3 * seconds / summary.totals.steps.max(1) as f64),
             format!("{:.1}", 100.0 * seconds / total.as_secs_f64().max(f64::MIN_POSITIVE)),
         ]);
     }

@@ -1,20 +1,29 @@
 //! A run from start to end: steps, frames, checkpoints, and the files that it leaves.
 
+mod checkpoint;
+mod frame_store;
+mod progress;
+mod record;
+mod report;
+pub mod stats;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use energy_solve::EvaluationError;
 
-use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::frame_store::FrameStore;
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use progress::Progress;
+pub use record::{Record, RecordError};
+pub use report::{ReportError, write_report};
+
 use crate::integrator::StepReport;
 use crate::output::{
     AnimationError, OutputError, OutputFolder, PictureError, Show, animation_glb, obj_text, ply_bytes, usd_text,
 };
-use crate::record::Record;
 use crate::scene::{Scene, SceneError};
-use crate::simulation::{Simulation, SimulationError};
-use crate::summary::Summary;
+use crate::simulation::{Simulation, SimulationError, Summary};
+use frame_store::FrameStore;
 
 /// A run that cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -114,7 +123,7 @@ impl Run {
         let Checkpoint { scene: text, path, every, frames, frames_checksum, state } = Checkpoint::read(&file)?;
         let scene = Scene::parse(&text, &path)?;
         let mut simulation = Simulation::new(&scene)?;
-        simulation.restore(state)?;
+        simulation.restore(state).map_err(CheckpointError::State)?;
         let vertices = simulation.positions().len();
         let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
         let folder = OutputFolder::reopen(output)?;
@@ -220,7 +229,7 @@ impl Run {
             }
         }
         let finished = self.simulation.is_finished();
-        let tables = crate::stats::tables(&summary);
+        let tables = stats::tables(&summary);
         write(OutputFolder::SUMMARY, format!("{summary}\n\n{tables}").as_bytes())?;
         let (scene, path) = (self.text.clone(), self.absolute_path());
         let (version, frames) = (Record::VERSION, frames.len());

@@ -1,5 +1,8 @@
 //! The benchmark: a sheet of a square metre, hung by two corners, on finer and finer meshes.
 
+pub mod sleep;
+pub mod trajectory_error;
+
 use std::time::{Duration, Instant};
 
 use comfy_table::{CellAlignment, Table, presets};

@@ -6,11 +6,12 @@ use energy_dsl::Vector3;
 use energy_solve::{ListError, Term};
 
 use super::builder::Builder;
-use super::{MeshSourceError, ObstacleError, PinError, Scene, SeamError};
+use super::{PinError, SeamError};
 use crate::contact::Obstacle;
 use crate::fabric::FabricError;
 use crate::mesh::TriangleMesh;
 use crate::motion::Motion;
+use crate::scene::{MeshSourceError, ObstacleError, Scene};
 
 /// A garment or hair of a scene.
 #[derive(Clone, Debug, PartialEq)]

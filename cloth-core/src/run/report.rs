@@ -8,11 +8,11 @@ use base64::engine::general_purpose::STANDARD;
 use energy_solve::Tally;
 use verify::audit::{Check, Options, Report, Target, audit_all, describe_failure};
 
+use super::record::{Record, RecordError};
 use crate::fabric::Material;
 use crate::output::{OutputError, OutputFolder};
-use crate::record::{Record, RecordError};
 use crate::scene::Scene;
-use crate::summary::Summary;
+use crate::simulation::Summary;
 
 /// A folder of which no page can be made.
 #[derive(Debug, thiserror::Error)]
@@ -121,7 +121,8 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
     let title = escaped(&record.path.file_name().unwrap_or_default().to_string_lossy());
     add(format_args!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>"));
     add(format_args!("<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>"));
-    let Summary { vertices, pinned, triangles, integrator, dt, steps, .. } = &record.summary;
+    let Summary { vertices, pinned, triangles, integrator, dt, .. } = &record.summary;
+    let steps = record.summary.totals.steps;
     add(format_args!(
         "<p>{vertices} vertices ({pinned} pinned), {triangles} triangles; {steps} steps of {dt} s by {}; {} frames.{}</p>",
         escaped(integrator),
@@ -154,21 +155,21 @@ td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;pad
 .good{color:#176617}.bad{color:#a01818}";
 
 fn times(summary: &Summary) -> String {
-    let total = summary.stepping_time.as_secs_f64();
+    let total = summary.totals.stepping_time.as_secs_f64();
     let named = summary.named_phases();
     let known: f64 = named.iter().map(|(_, time)| time.as_secs_f64()).sum();
     let all = named.map(|(name, time)| (name, time.as_secs_f64())).into_iter().chain([("other", total - known)]);
-    let per_step = 1e3 / summary.steps.max(1) as f64;
+    let per_step = 1e3 / summary.totals.steps.max(1) as f64;
     let row = |name: &str, seconds: f64| {
         let part = 100.0 * seconds / total.max(f64::MIN_POSITIVE);
         format!("<tr><td>{name}</td><td>{seconds:.3}</td><td>{:.3}</td><td>{part:.1}</td></tr>\n", seconds * per_step)
     };
     let rows: String = all.map(|(name, seconds)| row(name, seconds)).chain([row("<b>all</b>", total)]).collect();
-    let mean = summary.iterations as f64 / summary.solves.max(1) as f64;
+    let mean = summary.totals.iterations as f64 / summary.totals.solves.max(1) as f64;
     format!(
         "<table><tr><th>phase</th><th>s</th><th>ms per step</th><th>%</th></tr>\n{rows}</table>\n\
          <p>{} linear solves, {mean:.1} iterations each; {} steps solved again with projected curvature; {} rejected.</p>",
-        summary.solves, summary.projected, summary.rejected
+        summary.totals.solves, summary.totals.projected, summary.totals.rejected
     )
 }
 

@@ -1,92 +1,13 @@
-//! States of a simulation, saved so that it can go on later as if it had not stopped.
-
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-use energy_dsl::Vector3;
-use energy_solve::{Counts, EvaluationError, Tally};
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::{Phases, SolvedBy};
-use crate::island::SavedIsland;
-use crate::ledger::Ledger;
+use crate::simulation::{RestoreError, SavedState};
 
 /// The version of checkpoints that this program writes and reads.
 const VERSION: u32 = 3;
 /// How a checkpoint starts; then follow its version, the length and the CRC-32 of the rest.
 const KEYWORD: &str = "cloth-checkpoint";
-
-/// Everything that the motion from here depends on, and what was done so far.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SavedState {
-    /// The CRC-32 of the masses of all vertices, which tells meshes apart.
-    pub masses_checksum: u32,
-    /// Steps done.
-    pub steps: u64,
-    /// Positions, in m.
-    pub x: Vec<Vector3<f64>>,
-    /// Velocities, in m/s.
-    pub v: Vec<Vector3<f64>>,
-    /// What integrators remember of earlier steps, and what sleeps.
-    pub islands: Vec<SavedIsland>,
-    /// The ledger, if one is kept.
-    pub ledger: Option<Ledger>,
-    /// Linear systems solved.
-    pub solves: u64,
-    /// And by what.
-    #[serde(default)]
-    pub solved_by: SolvedBy,
-    /// Iterations of the linear solver.
-    pub iterations: u64,
-    /// Steps solved again with projected curvature.
-    pub projected: u64,
-    /// Steps rejected and tried again with a smaller size.
-    pub rejected: u64,
-    /// Steps slept through, of all islands.
-    pub slept: u64,
-    /// Time spent in steps.
-    pub stepping_time: Duration,
-    /// The same by phase.
-    pub phases: Phases,
-    /// What each term evaluated.
-    pub counts: Vec<SavedCounts>,
-    /// What each term could use again; see [`Counts::reused`].
-    pub reused: Vec<u64>,
-}
-
-/// What a term evaluated, without what it used again: for value, first and second derivatives the numbers evaluated, skipped, flagged and projected.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SavedCounts([[u64; 4]; 3]);
-
-impl From<Counts> for SavedCounts {
-    fn from(counts: Counts) -> Self {
-        let row = |tally: Tally| [tally.evaluated, tally.skipped, tally.flagged, tally.projected];
-        Self([counts.value, counts.gradient, counts.hessian].map(row))
-    }
-}
-
-impl From<SavedCounts> for Counts {
-    fn from(SavedCounts(rows): SavedCounts) -> Self {
-        let tally =
-            |[evaluated, skipped, flagged, projected]: [u64; 4]| Tally { evaluated, skipped, flagged, projected };
-        let [value, gradient, hessian] = rows.map(tally);
-        Self { value, gradient, hessian, reused: 0 }
-    }
-}
-
-/// How [`Counts`] are written with what holds them.
-pub(crate) mod saved_counts {
-    use super::{Counts, SavedCounts};
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(counts: &Counts, serializer: S) -> Result<S::Ok, S::Error> {
-        SavedCounts::from(*counts).serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Counts, D::Error> {
-        SavedCounts::deserialize(deserializer).map(Counts::from)
-    }
-}
 
 /// A checkpoint of a run: the scene, the state, and how far its output has got.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -146,22 +67,9 @@ pub enum CheckpointError {
         /// Its version.
         version: u32,
     },
-    /// It does not fit the scene.
-    #[error(
-        "the checkpoint is of another scene: its {found} vertices are not the {expected} that the scene has now. Did a mesh or material file change?"
-    )]
-    OtherScene {
-        /// Vertices of the scene.
-        expected: usize,
-        /// Vertices of the checkpoint.
-        found: usize,
-    },
-    /// Its numbers make no state.
-    #[error("the state of the checkpoint: {source}")]
-    Unfit {
-        /// What is wrong.
-        source: EvaluationError,
-    },
+    /// The saved state does not fit the scene.
+    #[error(transparent)]
+    State(#[from] RestoreError),
 }
 
 impl Checkpoint {

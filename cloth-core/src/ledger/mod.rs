@@ -1,5 +1,7 @@
 //! Where energy comes from and goes to, step by step.
 
+mod account;
+
 use std::fmt::Write as _;
 
 use energy_dsl::Vector3;
@@ -7,9 +9,9 @@ use energy_solve::{EvaluationError, PlacedTerm};
 use plotters::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::account::{Account, works};
-use crate::island::Island;
-use crate::scene::TermLabel;
+use crate::body::Body;
+pub(crate) use account::Account;
+use account::works;
 
 /// Energies, work and momenta at the start and after each step.
 ///
@@ -87,16 +89,16 @@ impl Ledger {
     /// The part of the largest energy exchanged that may be unaccounted for before there is a warning.
     pub const TOLERANCE: f64 = 0.02;
 
-    /// A ledger whose first entry is the islands as they are; `labels` are the names of their terms.
+    /// A ledger whose first entry is the bodies as they are, each with the label of each of its terms; `names` are those of labels.
     ///
     /// # Errors
     /// When an energy is not finite.
-    pub(crate) fn new(islands: &[Island], labels: &[TermLabel], time: f64) -> Result<Self, EvaluationError> {
+    pub(crate) fn new(bodies: &[(&Body, &[usize])], names: &[&str], time: f64) -> Result<Self, EvaluationError> {
         // The columns of labels.
         let columns = |keep: fn(&dyn PlacedTerm) -> bool| -> Vec<Option<usize>> {
-            let mut kept = vec![false; labels.len()];
-            for island in islands {
-                let terms = island.body().system.terms().zip(island.labels());
+            let mut kept = vec![false; names.len()];
+            for (body, labels) in bodies {
+                let terms = body.system.terms().zip(*labels);
                 terms.for_each(|((term, _), &label)| kept[label] |= keep(term));
             }
             let mut count = 0..;
@@ -104,15 +106,15 @@ impl Ledger {
         };
         let columns = [columns(|term| term.has_energy()), columns(works)];
         let [potentials, works] = columns.each_ref().map(|columns| {
-            let named = labels.iter().zip(columns).filter(|(_, column)| column.is_some());
-            named.map(|(label, _)| label.name.clone()).collect()
+            let named = names.iter().zip(columns).filter(|(_, column)| column.is_some());
+            named.map(|(name, _)| (*name).to_owned()).collect()
         });
-        let account = |island: &Island| {
+        let account = |(body, labels): &(&Body, &[usize])| {
             let [potentials, works] =
-                columns.each_ref().map(|columns| island.labels().iter().filter_map(|&label| columns[label]).collect());
-            Account::open(island.body(), potentials, works)
+                columns.each_ref().map(|columns| labels.iter().filter_map(|&label| columns[label]).collect());
+            Account::open(body, potentials, works)
         };
-        let accounts = islands.iter().map(account).collect::<Result<_, _>>()?;
+        let accounts = bodies.iter().map(account).collect::<Result<_, _>>()?;
         let mut ledger = Self { potentials, works, entries: Vec::new(), accounts, changed: Vec::new() };
         ledger.enter(time);
         Ok(ledger)

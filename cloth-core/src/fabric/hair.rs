@@ -2,8 +2,8 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::numbers::{count, finite_triple, non_negative, nonzero_triple, positive};
-use crate::mesh::norm;
+use crate::bounded::{count, finite_triple, non_negative, nonzero_triple, positive};
+use crate::geometry::norm;
 
 /// Strands of hair, straight at rest: springs along their segments and bending at the vertices between.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]

@@ -1,0 +1,26 @@
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Args;
+use cloth_core::run::Run;
+use cloth_core::{Simulation, demo};
+
+use super::print;
+use super::run::simulate;
+
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Output folder; replaces the files of an earlier demo.
+    #[arg(short, long, default_value = "out")]
+    output: PathBuf,
+}
+
+impl Demo {
+    pub fn run(self) -> Result<ExitCode> {
+        let scene = demo::scene()?;
+        print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
+        let run = Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &self.output, true, None)?;
+        simulate(run, false)
+    }
+}

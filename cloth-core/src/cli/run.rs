@@ -1,0 +1,105 @@
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use cloth_core::output::OutputFolder;
+use cloth_core::run::{Ending, Progress, Run, RunError, stats};
+use cloth_core::scene::{self, Scene};
+
+use super::print;
+
+#[derive(Debug, Args)]
+pub struct RunScene {
+    /// Scene file (TOML).
+    scene: PathBuf,
+    /// Output folder.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Replace the files of an earlier run.
+    #[arg(long)]
+    overwrite: bool,
+    /// Save the state every STEPS steps, for `cloth resume`.
+    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
+    checkpoint: Option<u64>,
+    /// Replace the material of every fabric by the elements that this file declares. They are interpreted, hence
+    /// slower than built-in ones.
+    #[arg(long, value_name = "FILE.energy")]
+    material: Option<PathBuf>,
+    /// Parameters of these elements, such as `k=20,nu=0.3`, in the units of the declaration.
+    #[arg(long, requires = "material", value_delimiter = ',', value_parser = parameter)]
+    parameters: Vec<(String, f64)>,
+    /// Print what each term evaluated, skipped and reused, how much slept, and the time of each phase.
+    #[arg(long)]
+    stats: bool,
+    /// Maximum number of threads; default: one per core. Results are bit-identical.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl RunScene {
+    pub fn run(self) -> Result<ExitCode> {
+        let Self { scene, output, overwrite, checkpoint, material, parameters, stats, threads } = self;
+        let mut text = Scene::text(&scene)?;
+        if let Some(file) = material {
+            text = scene::with_material(&text, &file, &parameters);
+        }
+        let run = Run::new(text, &scene, &output, overwrite, checkpoint).map_err(|error| match error {
+            RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
+            located => located.into(),
+        })?;
+        simulate(limit_threads(run, threads), stats)
+    }
+}
+
+fn parameter(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or_else(|| "expected a name and a number, such as k=20".to_owned())?;
+    let number = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    let number = number.ok_or_else(|| format!("expected a number for {name}, got `{value}`"))?;
+    Ok((name.trim().to_owned(), number))
+}
+
+pub fn limit_threads(run: Run, threads: Option<u16>) -> Run {
+    match threads {
+        Some(threads) => run.with_threads(usize::from(threads)),
+        None => run,
+    }
+}
+
+/// Simulates until the end or Ctrl-C, and prints the summary and the files written. The exit code is 130 if the run
+/// was interrupted.
+pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
+    run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    let interrupted = interrupt_flag()?;
+    let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
+    let ended = run.go(interrupted, |simulation, report| progress.step(simulation.steps_done(), report));
+    progress.finish();
+    let Ending { summary, files, frames, finished } = ended?;
+    let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    let folder = run.folder().path();
+    let tables = if with_stats { format!("{}\n", stats::tables(&summary)) } else { String::new() };
+    let frame_folder = folder.join(OutputFolder::FRAMES);
+    print(&format!("{summary}\n\n{tables}{files}wrote {frames} frames to {}\n", frame_folder.display()))?;
+    if finished {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let resume = match run.leaves_checkpoints() {
+        true => format!("resume with `cloth resume {}`", folder.display()),
+        false => "pass --checkpoint to be able to resume".to_owned(),
+    };
+    eprintln!("stopped after step {} of {}; {resume}", run.simulation().steps_done(), run.simulation().steps());
+    Ok(ExitCode::from(130))
+}
+
+/// Returns a flag that the first Ctrl-C sets. The second Ctrl-C exits at once.
+fn interrupt_flag() -> Result<&'static AtomicBool> {
+    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+    ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("cannot listen for Ctrl-C")?;
+    Ok(&INTERRUPTED)
+}

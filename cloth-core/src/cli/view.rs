@@ -1,0 +1,72 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use cloth_core::view::{self, Colouring, Moment, Screenshot};
+use indicatif::ProgressBar;
+
+use super::print;
+
+#[derive(Debug, Args)]
+pub struct View {
+    /// Scene file, or folder of a run.
+    shown: PathBuf,
+    /// Quantity shown by the colours; the key c changes it.
+    #[arg(long, value_enum, default_value_t)]
+    colours: Colouring,
+    /// Draw the edges of triangles; the key w changes it.
+    #[arg(long)]
+    wireframe: bool,
+    /// Write a picture to this PNG file instead of opening a window.
+    #[arg(long, value_name = "FILE.png")]
+    screenshot: Option<PathBuf>,
+    /// With --screenshot: the frame to draw, from 0; default: the last.
+    #[arg(long, requires = "screenshot", conflicts_with = "time")]
+    frame: Option<usize>,
+    /// With --screenshot: the time to draw, in s.
+    #[arg(long, requires = "screenshot", value_parser = non_negative)]
+    time: Option<f64>,
+}
+
+impl View {
+    pub fn run(&self) -> Result<()> {
+        match &self.screenshot {
+            Some(file) => self.write_screenshot(file),
+            None => open_window(&self.shown, self.colours, self.wireframe),
+        }
+    }
+
+    fn write_screenshot(&self, file: &Path) -> Result<()> {
+        let moment = match (self.frame, self.time) {
+            (Some(frame), _) => Moment::Frame(frame),
+            (None, Some(time)) => Moment::Time(time),
+            (None, None) => Moment::End,
+        };
+        let progress = ProgressBar::new_spinner();
+        let shot = view::screenshot(&self.shown, moment, self.colours, self.wireframe, || progress.inc(1));
+        progress.finish_and_clear();
+        let Screenshot { png, time, legend } = shot?;
+        verify::write_whole(file, &png).with_context(|| format!("cannot write {}", file.display()))?;
+        print(&format!("wrote {}: t = {time:.4} s, {legend}\n", file.display()))
+    }
+}
+
+#[cfg(feature = "view")]
+fn open_window(shown: &Path, colours: Colouring, wireframe: bool) -> Result<()> {
+    Ok(view::open_window(shown, colours, wireframe)?)
+}
+
+#[cfg(not(feature = "view"))]
+fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
+    anyhow::bail!(
+        "this build has no window; build one with `cargo build --release -p cloth-core --features view`, or write a \
+         picture with --screenshot FILE.png"
+    )
+}
+
+fn non_negative(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x >= 0.0)
+        .ok_or_else(|| "expected a number of at least 0".to_owned())
+}

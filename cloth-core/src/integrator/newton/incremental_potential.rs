@@ -1,0 +1,149 @@
+use std::borrow::Cow;
+use std::time::Instant;
+
+use energy_dsl::Vector3;
+use energy_solve::{BlockMatrix, Curvature, EvaluationError, LinearisationOptions, Precision, State, System, Weights};
+
+use super::super::{StepReport, if_finite, moved_by_velocity};
+use crate::body::Body;
+
+/// The incremental potential E of one step, and a record of its evaluations.
+pub(super) struct IncrementalPotential<'a> {
+    pub(super) body: &'a mut Body,
+    pub(super) dt: f64,
+    pub(super) report: StepReport,
+}
+
+/// E at one point.
+#[derive(Clone, Copy)]
+pub(super) struct Energy {
+    /// E, infinite if an element's energy is.
+    pub value: f64,
+    /// Sum of the absolute values of its summands; bounds the rounding error.
+    pub magnitude: f64,
+}
+
+impl<'a> IncrementalPotential<'a> {
+    pub(super) fn new(body: &'a mut Body, dt: f64) -> Self {
+        Self { body, dt, report: StepReport::default() }
+    }
+
+    /// x̂ of a vertex.
+    fn inertial(&self, vertex: usize) -> Vector3<f64> {
+        moved_by_velocity(&self.body.x[vertex], &self.body.v[vertex], self.dt)
+    }
+
+    /// Evaluates E.
+    pub(super) fn energy(&mut self, x: &[Vector3<f64>]) -> Result<Energy, EvaluationError> {
+        let started = Instant::now();
+        let (mut value, mut magnitude) = (0.0, 0.0);
+        for &vertex in self.body.system.dofs().free() {
+            let inertial = self.inertial(vertex);
+            let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - inertial[axis]);
+            value += 0.5 * self.body.masses[vertex] * away.iter().map(|component| component * component).sum::<f64>();
+        }
+        magnitude += value;
+        let Some(energies) = if_finite(self.body.system.energies(x))? else {
+            return Ok(Energy { value: f64::INFINITY, magnitude: f64::INFINITY });
+        };
+        for energy in energies.iter().filter_map(|term| term.energy) {
+            value += self.dt * self.dt * energy;
+            magnitude += self.dt * self.dt * energy.abs();
+        }
+        if self.body.system.character().velocity_dependent {
+            let v = velocities(x, &self.body.x, self.dt);
+            let dissipation = self.body.system.dissipation(State { x, v: &v })?;
+            value += self.dt.powi(3) * dissipation;
+            magnitude += self.dt.powi(3) * dissipation.abs();
+        }
+        self.report.phases.line_search += started.elapsed();
+        Ok(Energy { value, magnitude })
+    }
+
+    /// Assembles the Hessian M − h² ∂f/∂x − h ∂f/∂v and returns −∇E = M (x̂ − x) + h² f of the free vertices.
+    pub(super) fn linearise<T: Precision>(
+        &mut self,
+        x: &[Vector3<f64>],
+        curvature: Curvature,
+        matrix: &mut BlockMatrix<T>,
+    ) -> Result<Vec<Vector3<f64>>, EvaluationError> {
+        let started = Instant::now();
+        let Body { system, masses, x: start, v: before, .. } = &mut *self.body;
+        let v = velocities_if_needed(system, before, || velocities(x, start, self.dt));
+        let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
+        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+        let linear = system.linearise_with_masses(State { x, v: &v }, options, masses, matrix)?;
+        let downhill = self.downhill(x, linear.force);
+        self.report.phases.assembly += started.elapsed();
+        Ok(downhill)
+    }
+
+    /// Assembles the Hessian and returns E and −∇E; `None` if they are not finite.
+    pub(super) fn linearise_if_finite(
+        &mut self,
+        x: &[Vector3<f64>],
+        curvature: Curvature,
+        matrix: &mut BlockMatrix<f32>,
+    ) -> Result<Option<(Energy, Vec<Vector3<f64>>)>, EvaluationError> {
+        let Some(downhill) = if_finite(self.linearise(x, curvature, matrix))? else { return Ok(None) };
+        let energy = self.energy(x)?;
+        Ok(energy.value.is_finite().then_some((energy, downhill)))
+    }
+
+    /// Returns −∇E.
+    pub(super) fn gradient(&mut self, x: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, EvaluationError> {
+        let started = Instant::now();
+        let Body { system, x: start, v: before, .. } = &mut *self.body;
+        let v = velocities_if_needed(system, before, || velocities(x, start, self.dt));
+        let force = system.forces(State { x, v: &v })?;
+        let downhill = self.downhill(x, force);
+        self.report.phases.assembly += started.elapsed();
+        Ok(downhill)
+    }
+
+    /// Returns M (x̂ − x) + h² f of the free vertices, in place of the forces on all vertices.
+    fn downhill(&self, x: &[Vector3<f64>], mut force: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+        let free = self.body.system.dofs().free();
+        // Free vertices ascend, so row ≤ vertex: no force is overwritten before it is read.
+        for (row, &vertex) in free.iter().enumerate() {
+            let (mass, inertial, pull) = (self.body.masses[vertex], self.inertial(vertex), force[vertex]);
+            force[row] =
+                std::array::from_fn(|axis| mass * (inertial[axis] - x[vertex][axis]) + self.dt * self.dt * pull[axis]);
+        }
+        force.truncate(free.len());
+        force
+    }
+
+    /// Returns x + s d on the free vertices.
+    pub(super) fn moved(&self, x: &[Vector3<f64>], scale: f64, direction: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut moved = x.to_vec();
+        self.advance(&mut moved, scale, direction);
+        moved
+    }
+
+    /// x ← x + s d on the free vertices.
+    pub(super) fn advance(&self, x: &mut [Vector3<f64>], scale: f64, direction: &[Vector3<f64>]) {
+        for (&vertex, d) in self.body.system.dofs().free().iter().zip(direction) {
+            for axis in 0..3 {
+                x[vertex][axis] += scale * d[axis];
+            }
+        }
+    }
+}
+
+/// v = (x − x₀)/h.
+pub(super) fn velocities(x: &[Vector3<f64>], start: &[Vector3<f64>], dt: f64) -> Vec<Vector3<f64>> {
+    let velocity = |(x, start): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
+        std::array::from_fn(|axis| (x[axis] - start[axis]) / dt)
+    };
+    x.iter().zip(start).map(velocity).collect()
+}
+
+/// Computes the velocities if a force depends on them. Otherwise returns those before the step, which are never read.
+fn velocities_if_needed<'a>(
+    system: &System,
+    before: &'a [Vector3<f64>],
+    velocities: impl FnOnce() -> Vec<Vector3<f64>>,
+) -> Cow<'a, [Vector3<f64>]> {
+    if system.character().velocity_dependent { velocities().into() } else { before.into() }
+}

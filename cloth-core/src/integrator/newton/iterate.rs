@@ -1,0 +1,224 @@
+use std::time::Instant;
+
+use energy_dsl::Vector3;
+use energy_solve::{Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
+
+use super::super::projection::Projection;
+use super::super::trial::Trial;
+use super::super::{StepError, StepReport};
+use super::forcing::Forcing;
+use super::incremental_potential::{Energy, IncrementalPotential};
+use super::line_search::{AcceptedStep, Prefetch};
+use super::{Memory, NewtonOptions, largest};
+
+/// The current iterate of a step, with what is known about it.
+pub(super) struct Iterate<'a> {
+    options: NewtonOptions,
+    potential: IncrementalPotential<'a>,
+    memory: &'a mut Memory,
+    trial: &'a mut Trial,
+    projection: Projection,
+    x: Vec<Vector3<f64>>,
+    energy: Energy,
+    /// −∇E at x, if it is known but the Hessian is not.
+    gradient: Option<Vec<Vector3<f64>>>,
+    /// −∇E at x, if the matrix holds the exact Hessian at x.
+    linearised: Option<Vec<Vector3<f64>>>,
+    /// The accuracy of the last linear system.
+    last: Option<Forcing>,
+    /// The largest change of a velocity component in the last iteration, in m/s.
+    change: f64,
+    /// Whether the last line search took a full step; the next one then probably will.
+    took_full_step: bool,
+    converged: bool,
+}
+
+/// A search direction.
+pub(super) struct Direction {
+    /// Displacements of the free vertices.
+    pub vectors: Vec<Vector3<f64>>,
+    /// dᵀ ∇E.
+    pub slope: f64,
+    /// Whether the Hessian was projected.
+    pub is_projected: bool,
+    /// The largest component of the displacements, in m.
+    length: f64,
+    forcing: Forcing,
+    solved: SolveReport,
+}
+
+impl<'a> Iterate<'a> {
+    /// Starts at x, or at the positions before the step if E is not finite at x.
+    pub(super) fn new(
+        options: NewtonOptions,
+        mut potential: IncrementalPotential<'a>,
+        memory: &'a mut Memory,
+        trial: &'a mut Trial,
+        mut x: Vec<Vector3<f64>>,
+    ) -> Result<Self, EvaluationError> {
+        let projection = Projection::on_demand();
+        let (energy, linearised) = match potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)? {
+            Some((energy, downhill)) => (energy, Some(downhill)),
+            None => {
+                let body = &*potential.body;
+                body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = body.x[vertex]);
+                (potential.energy(&x)?, None)
+            }
+        };
+        Ok(Self {
+            options,
+            potential,
+            memory,
+            trial,
+            projection,
+            x,
+            energy,
+            gradient: None,
+            linearised,
+            last: None,
+            change: f64::INFINITY,
+            took_full_step: true,
+            converged: false,
+        })
+    }
+
+    /// Iterates until the step converges.
+    pub(super) fn converge(&mut self) -> Result<(), StepError> {
+        while !self.converged {
+            let iterations = self.potential.report.solves;
+            if iterations == self.options.iteration_limit as u64 {
+                return Err(StepError::NotConverged { iterations, change: self.change });
+            }
+            if self.is_balanced()? {
+                break;
+            }
+            let direction = self.direction()?;
+            match self.search(&direction)? {
+                Some(step) => self.accept(step, &direction),
+                None if direction.is_projected => {
+                    let iterations = self.potential.report.solves;
+                    return Err(StepError::Stuck { iterations, stopped: direction.solved.stopped });
+                }
+                None => self.projection.demand(),
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the positions and the report of the step.
+    pub(super) fn into_result(self) -> (Vec<Vector3<f64>>, StepReport) {
+        (self.x, self.potential.report)
+    }
+
+    /// Whether residual impulses are below the tolerance, if the last solve makes that likely. Never before the first
+    /// iteration: on a fine mesh vertices are so light that even free fall leaves a small residual impulse.
+    fn is_balanced(&mut self) -> Result<bool, EvaluationError> {
+        let dt = self.potential.dt;
+        if !self.last.is_some_and(|last| self.options.may_be_balanced(last, dt)) {
+            return Ok(false);
+        }
+        let downhill = match self.gradient.take() {
+            Some(downhill) => downhill,
+            None => self.potential.gradient(&self.x)?,
+        };
+        Ok(self.options.is_balanced(&downhill, dt))
+    }
+
+    /// Assembles the Hessian, unless it is known, and solves for the search direction.
+    fn direction(&mut self) -> Result<Direction, StepError> {
+        let (curvature, is_projected) = (self.projection.curvature, !self.projection.is_exact());
+        let downhill = match self.linearised.take().filter(|_| !is_projected) {
+            Some(downhill) => downhill,
+            None => self.potential.linearise(&self.x, curvature, &mut self.memory.matrix)?,
+        };
+        let forcing = self.options.forcing(largest(&downhill), self.last);
+        self.last = Some(forcing);
+        let (vectors, solved) = self.solve(&downhill, curvature, forcing.tolerance)?;
+        let (slope, length) = (-dot(&downhill, &vectors), largest(&vectors));
+        Ok(Direction { vectors, slope, is_projected, length, forcing, solved })
+    }
+
+    /// Solves H d = −∇E. If an exact Hessian turns out to be indefinite, returns the truncated direction of conjugate
+    /// gradients: a descent direction, or zero.
+    fn solve(
+        &mut self,
+        downhill: &[Vector3<f64>],
+        curvature: Curvature,
+        relative_tolerance: f64,
+    ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
+        let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
+        let Memory { matrix, solver } = &mut *self.memory;
+        let started = Instant::now();
+        let prepared = solver.prepare(matrix, self.trial);
+        self.potential.report.phases.factorisation += started.elapsed();
+
+        let started = Instant::now();
+        let mut direction = vec![[0.0; 3]; downhill.len()];
+        let mut solved = SolveReport::indefinite();
+        if curvature != Curvature::Exact || prepared.is_ok() {
+            prepared?;
+            let (report, solved_by) = solver.solve(matrix, downhill, &mut direction, &options, self.trial);
+            solved = report;
+            self.potential.report.solved_by += solved_by;
+        }
+        if curvature != Curvature::Exact && !solved.converged() {
+            solved = self.solve_in_double(downhill, curvature, &options, &mut direction)?;
+        }
+        if solved.stopped == StopReason::NonFinite {
+            direction.fill([0.0; 3]);
+        }
+        let report = &mut self.potential.report;
+        report.phases.solve += started.elapsed();
+        report.solves += 1;
+        report.iterations += solved.iterations as u64;
+        report.projected |= curvature == Curvature::Exact && !solved.converged();
+        Ok((direction, solved))
+    }
+
+    /// Solves in double precision. Rounding to single precision can make a very stiff projected Hessian indefinite.
+    fn solve_in_double(
+        &mut self,
+        downhill: &[Vector3<f64>],
+        curvature: Curvature,
+        options: &SolveOptions,
+        direction: &mut [Vector3<f64>],
+    ) -> Result<SolveReport, StepError> {
+        let mut matrix = self.potential.body.system.matrix();
+        self.potential.linearise(&self.x, curvature, &mut matrix)?;
+        let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), self.potential.body.system.threads());
+        solver.scale(&matrix)?;
+        Ok(solver.solve(downhill, direction, options))
+    }
+
+    /// Searches along the direction; `None` if no step lowers E.
+    fn search(&mut self, direction: &Direction) -> Result<Option<AcceptedStep>, EvaluationError> {
+        if direction.length == 0.0 && direction.forcing.gradient > 0.0 {
+            return Ok(None);
+        }
+        let dt = self.potential.dt;
+        let is_last = direction.length < dt * self.options.velocity_tolerance;
+        let prefetch = if self.options.may_be_balanced(direction.forcing, dt) {
+            Prefetch::Gradient
+        } else if direction.is_projected || is_last || !self.took_full_step || !direction.solved.converged() {
+            Prefetch::Nothing
+        } else {
+            Prefetch::Matrix(&mut self.memory.matrix)
+        };
+        self.potential.line_search(&self.x, self.energy, direction, prefetch)
+    }
+
+    /// Moves to the next iterate, tests for convergence, and decides whether the next Hessian is projected.
+    fn accept(&mut self, step: AcceptedStep, direction: &Direction) {
+        self.potential.advance(&mut self.x, step.scale, &direction.vectors);
+        (self.energy, self.gradient, self.linearised) = (step.energy, step.gradient, step.linearised);
+        self.took_full_step = step.scale >= 1.0;
+        let change = step.scale * direction.length / self.potential.dt;
+        let before = std::mem::replace(&mut self.change, change);
+        if direction.is_projected || direction.solved.converged() {
+            self.converged = change < self.options.velocity_tolerance;
+            self.projection.proceed(self.took_full_step && change < before);
+        } else {
+            self.projection.demand();
+        }
+    }
+}

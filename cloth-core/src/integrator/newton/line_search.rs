@@ -1,0 +1,89 @@
+use energy_dsl::Vector3;
+use energy_solve::{BlockMatrix, Curvature, EvaluationError};
+
+use super::super::if_finite;
+use super::incremental_potential::{Energy, IncrementalPotential};
+use super::iterate::Direction;
+
+/// Halvings of a step before it counts as stuck: the last step is 2⁻⁴⁰ of the first.
+const HALVINGS: usize = 40;
+/// The longest step, in units of the search direction.
+const LONGEST: f64 = 1024.0;
+/// The fraction of the decrease predicted by the slope that a step must achieve (Armijo).
+const DECREASE: f64 = 1e-4;
+/// Tolerance for the rounding error of a difference of energies, relative to their magnitude.
+const ROUNDING: f64 = 1e-13;
+
+/// Quantities to evaluate at the full step, before it is known to be accepted. The energy is nearly free with them.
+pub(super) enum Prefetch<'a> {
+    Nothing,
+    /// −∇E, to test for convergence.
+    Gradient,
+    /// −∇E and the Hessian of the next iteration.
+    Matrix(&'a mut BlockMatrix<f32>),
+}
+
+/// The step that a line search accepted.
+pub(super) struct AcceptedStep {
+    /// Length of the step, in units of the search direction.
+    pub scale: f64,
+    /// E after the step.
+    pub energy: Energy,
+    /// −∇E after the step, if it was prefetched without the Hessian.
+    pub gradient: Option<Vec<Vector3<f64>>>,
+    /// −∇E after the step, if it was prefetched with the Hessian.
+    pub linearised: Option<Vec<Vector3<f64>>>,
+}
+
+impl IncrementalPotential<'_> {
+    /// Returns the first of x + d, x + d/2, … that decreases E sufficiently (Armijo); `None` if none does. Directions of
+    /// projected Hessians are too short, if anything: a full step along one is doubled while that lowers E.
+    pub(super) fn line_search(
+        &mut self,
+        x: &[Vector3<f64>],
+        energy: Energy,
+        direction: &Direction,
+        mut prefetch: Prefetch<'_>,
+    ) -> Result<Option<AcceptedStep>, EvaluationError> {
+        let mut scale = 1.0;
+        for _ in 0..=HALVINGS {
+            let moved = self.moved(x, scale, &direction.vectors);
+            let (mut gradient, mut linearised) = (None, None);
+            match std::mem::replace(&mut prefetch, Prefetch::Nothing) {
+                Prefetch::Nothing => {}
+                Prefetch::Gradient => gradient = if_finite(self.gradient(&moved))?,
+                Prefetch::Matrix(matrix) => linearised = if_finite(self.linearise(&moved, Curvature::Exact, matrix))?,
+            }
+            let trial = self.energy(&moved)?;
+            let rounding = ROUNDING * energy.magnitude.min(trial.magnitude);
+            if trial.value <= energy.value + DECREASE * scale * direction.slope + rounding {
+                drop(moved);
+                let accepted = AcceptedStep { scale, energy: trial, gradient, linearised };
+                let may_be_short = direction.is_projected && scale == 1.0;
+                return Ok(Some(if may_be_short { self.lengthen(x, accepted, direction)? } else { accepted }));
+            }
+            scale *= 0.5;
+            self.report.halvings += 1;
+        }
+        Ok(None)
+    }
+
+    /// Doubles a step as long as that lowers E.
+    fn lengthen(
+        &mut self,
+        x: &[Vector3<f64>],
+        mut accepted: AcceptedStep,
+        direction: &Direction,
+    ) -> Result<AcceptedStep, EvaluationError> {
+        while accepted.scale < LONGEST {
+            let scale = 2.0 * accepted.scale;
+            let moved = self.moved(x, scale, &direction.vectors);
+            let energy = self.energy(&moved)?;
+            if energy.value >= accepted.energy.value {
+                break;
+            }
+            accepted = AcceptedStep { scale, energy, gradient: None, linearised: None };
+        }
+        Ok(accepted)
+    }
+}

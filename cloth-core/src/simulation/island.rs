@@ -1,0 +1,192 @@
+use energy_dsl::{Element, Vector3};
+use energy_elements::WindDrag;
+use energy_solve::{EvaluationError, State, StepStart, System, SystemError};
+use serde::{Deserialize, Serialize};
+
+use super::sleep::{BoundingSphere, SleepState, StepContext, Stillness};
+use crate::body::Body;
+use crate::contact::Obstacle;
+use crate::integrator::{Integrator, IntegratorMemory, StepError, StepReport};
+use crate::ledger::Account;
+use crate::model::{IslandModel, Model, MovingPin};
+use crate::scene::Scene;
+
+/// A set of vertices that no force couples to the others. It moves on its own, and can sleep while others move.
+#[derive(Debug)]
+pub struct Island {
+    vertices: Vec<usize>,
+    labels: Vec<usize>,
+    body: Body,
+    integrator: Box<dyn Integrator>,
+    /// Pinned vertices that move, with indices within the island.
+    moving: Vec<MovingPin>,
+    /// Indices of the motions of these pins, without duplicates.
+    motions: Vec<usize>,
+    /// Whether wind with gusts acts on the island; it then never sleeps.
+    in_gusts: bool,
+    /// `None` if islands never sleep.
+    stillness: Option<Stillness>,
+    sleep: SleepState,
+}
+
+/// The state of an island that its motion depends on, other than positions and velocities.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedIsland {
+    integrator: IntegratorMemory,
+    #[serde(rename = "rest")]
+    sleep: SleepState,
+}
+
+impl Island {
+    /// Creates an island of the model, awake.
+    pub(super) fn new(scene: &Scene, model: &Model, island: IslandModel) -> Result<Self, SystemError> {
+        let IslandModel { vertices, terms, labels } = island;
+        let gather =
+            |all: &[Vector3<f64>]| -> Vec<Vector3<f64>> { vertices.iter().map(|&vertex| all[vertex]).collect() };
+        let pinned: Vec<bool> = vertices.iter().map(|&vertex| model.pinned[vertex]).collect();
+        let masses = vertices.iter().map(|&vertex| model.masses[vertex]).collect();
+        let (x, v, system) = (gather(&model.x), gather(&model.v), System::new(terms, &pinned)?);
+        let body = Body { x, v, masses, system };
+        let stillness = scene.sleep.map(|sleep| Stillness::new(&sleep, &body.x));
+        let in_wind =
+            body.system.terms().any(|(term, _)| term.declaration().name == <WindDrag as Element>::DECLARATION.name);
+        let in_gusts = in_wind && scene.wind.as_ref().is_some_and(|wind| !wind.gusts.is_empty());
+        let (integrator, sleep) = (scene.stepper(), SleepState::AWAKE);
+        let (moving, motions) = (Vec::new(), Vec::new());
+        Ok(Self { vertices, labels, body, integrator, moving, motions, in_gusts, stillness, sleep })
+    }
+
+    /// Adds a moving pin, whose vertex is an index within the island.
+    pub(super) fn add_moving_pin(&mut self, pin: MovingPin) {
+        if !self.motions.contains(&pin.motion) {
+            self.motions.push(pin.motion);
+        }
+        self.moving.push(pin);
+    }
+
+    /// The vertices of the island, as indices into the scene.
+    #[must_use]
+    pub fn vertices(&self) -> &[usize] {
+        &self.vertices
+    }
+
+    /// The label of each term: its index among the terms that the summary lists.
+    #[must_use]
+    pub fn labels(&self) -> &[usize] {
+        &self.labels
+    }
+
+    /// The current state of the vertices, and the forces on them.
+    #[must_use]
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    pub(super) fn body_mut(&mut self) -> &mut Body {
+        &mut self.body
+    }
+
+    /// The largest stable step now, in s; see [`Integrator::stable_step`].
+    pub(super) fn stable_step(&mut self) -> Result<Option<f64>, EvaluationError> {
+        self.integrator.stable_step(&mut self.body)
+    }
+
+    /// Whether the island sleeps.
+    #[must_use]
+    pub fn is_asleep(&self) -> bool {
+        self.sleep.is_asleep()
+    }
+
+    pub(super) fn wake(&mut self) {
+        if self.is_asleep() {
+            self.sleep = SleepState::AWAKE;
+        }
+    }
+
+    /// Wakes a sleeping island that is disturbed during the step. Returns whether the island skips the step.
+    pub(super) fn sleeps_through(&mut self, context: &StepContext<'_>) -> bool {
+        let SleepState::Asleep(bounds) = self.sleep else { return false };
+        if self.is_disturbed(context, &bounds) {
+            self.wake();
+        }
+        self.is_asleep()
+    }
+
+    /// Whether gusts, a moving pin or a nearby moving obstacle act on the island.
+    fn is_disturbed(&self, context: &StepContext<'_>, bounds: &BoundingSphere) -> bool {
+        self.in_gusts || context.moves_any_of(&self.motions) || context.may_touch(bounds)
+    }
+
+    /// Takes one step. If an account is given, returns the account after the step.
+    pub(super) fn step(
+        &mut self,
+        context: &StepContext<'_>,
+        account: Option<&Account>,
+    ) -> Result<(StepReport, Option<Account>), StepError> {
+        let dt = context.dt;
+        for pin in &self.moving {
+            let target = context.motions[pin.motion].pose(context.end).applied(pin.drawn);
+            let here = self.body.x[pin.vertex];
+            self.body.v[pin.vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / dt);
+        }
+        self.begin_step(context.time, dt)?;
+        let opening = account.map(|_| Account::begin(&self.body, self.obstacle_power(context, false)));
+        let report = self.integrator.step(&mut self.body, dt)?;
+        let after = account
+            .zip(opening)
+            .map(|(account, opening)| account.after(&self.body, &opening, self.obstacle_power(context, true), dt));
+        Ok((report, after.transpose()?))
+    }
+
+    /// The power of moving obstacles on the island at the start or the end of the step, in W.
+    fn obstacle_power(&self, context: &StepContext<'_>, at_end: bool) -> f64 {
+        let span = [context.time, context.time + context.dt];
+        context.obstacles.iter().map(|obstacle: &Obstacle| obstacle.power(span, at_end, &self.body)).sum()
+    }
+
+    /// Passes the state at the start of a step to the terms.
+    pub(super) fn begin_step(&mut self, time: f64, dt: f64) -> Result<(), EvaluationError> {
+        let Body { x, v, system, .. } = &mut self.body;
+        system.begin_step(StepStart { time, dt, state: State { x, v } })
+    }
+
+    /// Puts the island to sleep if it has been still for long enough and nothing disturbs it. Returns whether it
+    /// fell asleep.
+    pub(super) fn try_to_sleep(&mut self, context: &StepContext<'_>) -> bool {
+        let Some(stillness) = &self.stillness else { return false };
+        if !self.sleep.update(&self.body.v, context.dt, stillness) {
+            return false;
+        }
+        let bounds = BoundingSphere::around(&self.body.x);
+        if self.is_disturbed(context, &bounds) {
+            return false;
+        }
+        self.sleep = SleepState::Asleep(bounds);
+        self.body.v.fill([0.0; 3]);
+        true
+    }
+
+    pub(super) fn save(&self) -> SavedIsland {
+        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone() }
+    }
+
+    pub(super) fn restore(&mut self, saved: SavedIsland) {
+        self.integrator.restore(saved.integrator);
+        self.sleep = saved.sleep;
+    }
+
+    /// Copies positions and velocities from the scene.
+    pub(super) fn gather(&mut self, x: &[Vector3<f64>], v: &[Vector3<f64>]) {
+        let Self { vertices, body, .. } = self;
+        for (local, &vertex) in vertices.iter().enumerate() {
+            (body.x[local], body.v[local]) = (x[vertex], v[vertex]);
+        }
+    }
+
+    /// Copies positions and velocities to the scene.
+    pub(super) fn scatter(&self, x: &mut [Vector3<f64>], v: &mut [Vector3<f64>]) {
+        for (local, &vertex) in self.vertices.iter().enumerate() {
+            (x[vertex], v[vertex]) = (self.body.x[local], self.body.v[local]);
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! Steps a scene through time: cloth and hair, divided into islands that may sleep.
+
+mod island;
+mod saved;
+mod sleep;
+mod summary;
+mod totals;
+
+use std::ops::Range;
+use std::time::Instant;
+
+use energy_dsl::Vector3;
+use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError};
+
+pub use island::{Island, SavedIsland};
+pub use saved::{RestoreError, SavedCounts, SavedState};
+pub use summary::{Summary, TermSummary};
+pub use totals::Totals;
+
+use crate::body::Body;
+use crate::contact::Obstacle;
+use crate::integrator::{StepError, StepReport};
+use crate::ledger::Ledger;
+use crate::mesh::TriangleMesh;
+use crate::model::{Model, ModelError, MovingPin, Part, PartKind, TermLabel};
+use crate::motion::Motion;
+use crate::scene::Scene;
+use sleep::StepContext;
+
+/// A scene that cannot be set up, or a step that failed.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The parts of the scene do not fit together.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The terms cannot be assembled into a system.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// The initial state cannot be evaluated.
+    #[error("at the start: {0}")]
+    Start(#[from] EvaluationError),
+    /// A step failed.
+    #[error("step {step} (t = {time:.4} s): {source}")]
+    Step {
+        /// The step that failed, from 1.
+        step: u64,
+        /// The time at the end of that step, in s.
+        time: f64,
+        /// Why it failed.
+        source: StepError,
+    },
+}
+
+/// The state of a scene and its history so far.
+///
+/// Vertices that no force couples fall into separate [`Island`]s. Each island is stepped on its own and can sleep on
+/// its own. The simulation also keeps positions and velocities of all vertices, in the numbering of the scene that
+/// pins, frames and pictures use.
+#[derive(Debug)]
+pub struct Simulation {
+    parts: Vec<Part>,
+    triangles: Vec<[usize; 3]>,
+    strands: Vec<Range<usize>>,
+    obstacles: Vec<Obstacle>,
+    motions: Vec<Motion>,
+    x: Vec<Vector3<f64>>,
+    v: Vec<Vector3<f64>>,
+    masses: Vec<f64>,
+    pinned: Vec<bool>,
+    islands: Vec<Island>,
+    labels: Vec<TermLabel>,
+    may_sleep: bool,
+    dt: f64,
+    steps: u64,
+    summary: Summary,
+    ledger: Option<Ledger>,
+    /// Evaluation counts per label up to the checkpoint that this simulation resumed from.
+    earlier: Vec<Counts>,
+}
+
+impl Simulation {
+    /// Creates a simulation of a scene, at time 0.
+    ///
+    /// # Errors
+    /// Returns an error if a mesh, a fabric, a pin, a seam or an obstacle of the scene is invalid.
+    pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
+        Self::from_model(scene, Model::new(scene)?)
+    }
+
+    /// Creates a simulation from the assembled model of a scene.
+    pub(crate) fn from_model(scene: &Scene, mut model: Model) -> Result<Self, SimulationError> {
+        let strands = model.strands().collect();
+        let islands = create_islands(scene, &mut model)?;
+        let summary = Summary::at_start(scene, &model, islands.len());
+        let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, .. } = model;
+        let mut simulation = Self {
+            parts,
+            triangles,
+            strands,
+            obstacles,
+            motions,
+            x,
+            v,
+            masses,
+            pinned,
+            islands,
+            may_sleep: scene.sleep.is_some(),
+            dt: scene.dt,
+            steps: scene.steps(),
+            summary,
+            ledger: None,
+            earlier: vec![Counts::default(); labels.len()],
+            labels,
+        };
+        simulation.warn_of_unstable_step()?;
+        simulation.warn_of_vertices_inside_obstacles();
+        Ok(simulation)
+    }
+
+    /// Limits the number of threads of each step; the default is one per core. Small islands use fewer.
+    /// Results are bit-identical for every number of threads.
+    #[must_use]
+    pub fn with_threads(mut self, threads: usize) -> Self {
+        self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
+        self
+    }
+
+    /// The garments and hair of the scene.
+    #[must_use]
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// The rest mesh of a garment, by its index among the parts; `None` for hair.
+    #[must_use]
+    pub fn mesh(&self, part: usize) -> Option<&TriangleMesh> {
+        match &self.parts.get(part)?.kind {
+            PartKind::Cloth(mesh) => Some(mesh),
+            PartKind::Hair { .. } => None,
+        }
+    }
+
+    /// The triangles of all garments, as vertex indices.
+    #[must_use]
+    pub fn triangles(&self) -> &[[usize; 3]] {
+        &self.triangles
+    }
+
+    /// The vertex range of each strand of hair.
+    #[must_use]
+    pub fn strands(&self) -> &[Range<usize>] {
+        &self.strands
+    }
+
+    /// The obstacles of the scene.
+    #[must_use]
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
+    }
+
+    /// The current positions of all vertices, in m.
+    #[must_use]
+    pub fn positions(&self) -> &[Vector3<f64>] {
+        &self.x
+    }
+
+    /// The current velocities of all vertices, in m/s. For a pinned vertex, the velocity of its pin.
+    #[must_use]
+    pub fn velocities(&self) -> &[Vector3<f64>] {
+        &self.v
+    }
+
+    /// The masses of all vertices, in kg.
+    #[must_use]
+    pub fn masses(&self) -> &[f64] {
+        &self.masses
+    }
+
+    /// Whether a vertex is pinned.
+    #[must_use]
+    pub fn is_pinned(&self, vertex: usize) -> bool {
+        self.pinned[vertex]
+    }
+
+    /// The islands of the scene.
+    #[must_use]
+    pub fn islands(&self) -> &[Island] {
+        &self.islands
+    }
+
+    /// The terms of all islands.
+    pub fn terms(&self) -> impl Iterator<Item = &dyn PlacedTerm> {
+        self.islands.iter().flat_map(|island| island.body().system.terms().map(|(term, _)| term))
+    }
+
+    /// Wakes the island of a vertex. Call this when an external force on the vertex begins, changes or ends.
+    pub fn wake(&mut self, vertex: usize) {
+        let island = self.islands.iter_mut().find(|island| island.vertices().contains(&vertex));
+        island.into_iter().for_each(Island::wake);
+    }
+
+    /// The simulated time, in s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.steps_done() as f64 * self.dt
+    }
+
+    /// The number of completed steps.
+    #[must_use]
+    pub fn steps_done(&self) -> u64 {
+        self.summary.totals.steps
+    }
+
+    /// The number of steps of the whole scene.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Whether all steps are completed.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.steps_done() >= self.steps
+    }
+
+    /// Warnings about the scene, found during setup.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.summary.warnings
+    }
+
+    /// Starts a ledger; every later step adds an entry.
+    ///
+    /// # Errors
+    /// Returns an error if an energy is not finite.
+    pub fn keep_ledger(&mut self) -> Result<(), EvaluationError> {
+        let bodies: Vec<_> = self.islands.iter().map(|island| (island.body(), island.labels())).collect();
+        let names: Vec<_> = self.labels.iter().map(|label| label.name.as_str()).collect();
+        self.ledger = Some(Ledger::new(&bodies, &names, self.time())?);
+        Ok(())
+    }
+
+    /// The ledger; `None` if none is kept.
+    #[must_use]
+    pub fn ledger(&self) -> Option<&Ledger> {
+        self.ledger.as_ref()
+    }
+
+    /// Advances by one time step.
+    ///
+    /// # Errors
+    /// Returns an error if an island cannot complete the step with finite numbers. The state is then unchanged.
+    pub fn step(&mut self) -> Result<StepReport, SimulationError> {
+        let start = Instant::now();
+        let step = self.steps_done() + 1;
+        let (report, slept) = self.step_islands(step).map_err(|source| {
+            self.roll_back();
+            SimulationError::Step { step, time: step as f64 * self.dt, source }
+        })?;
+        self.summary.totals.add(&report, slept, start.elapsed());
+        Ok(report)
+    }
+
+    /// Steps the islands that are awake and returns how many sleep. Positions, velocities and the ledger change only
+    /// after every island has succeeded.
+    fn step_islands(&mut self, step: u64) -> Result<(StepReport, u64), StepError> {
+        let Self { islands, x, v, ledger, .. } = self;
+        let context = StepContext::new(step, self.dt, &self.motions, &self.obstacles, self.may_sleep);
+        let (mut total, mut slept) = (StepReport::default(), 0);
+        for (number, island) in islands.iter_mut().enumerate() {
+            if island.sleeps_through(&context) {
+                slept += 1;
+                continue;
+            }
+            let account = ledger.as_ref().map(|ledger| ledger.account(number));
+            let stepped = island.step(&context, account).map_err(|error| error.on_vertices(island.vertices()));
+            let (report, account) = stepped?;
+            total += report;
+            ledger.iter_mut().zip(account).for_each(|(ledger, account)| ledger.note(number, account));
+        }
+        for (number, island) in islands.iter_mut().enumerate().filter(|(_, island)| !island.is_asleep()) {
+            if island.try_to_sleep(&context) {
+                ledger.iter_mut().for_each(|ledger| ledger.note_sleep(number));
+            }
+            island.scatter(x, v);
+        }
+        ledger.iter_mut().for_each(|ledger| ledger.enter(context.end));
+        Ok((total, slept))
+    }
+
+    /// Discards the changes of a failed step.
+    fn roll_back(&mut self) {
+        let Self { islands, x, v, ledger, .. } = self;
+        islands.iter_mut().filter(|island| !island.is_asleep()).for_each(|island| island.gather(x, v));
+        ledger.iter_mut().for_each(Ledger::forget);
+    }
+
+    /// Evaluation counts per label, including those before a checkpoint.
+    fn counts(&self) -> Vec<Counts> {
+        let mut all = self.earlier.clone();
+        for island in &self.islands {
+            for ((_, counts), &label) in island.body().system.terms().zip(island.labels()) {
+                let sum = &mut all[label];
+                sum.value += counts.value;
+                sum.gradient += counts.gradient;
+                sum.hessian += counts.hessian;
+                sum.reused += counts.reused;
+            }
+        }
+        all
+    }
+
+    /// Warns if the time step exceeds the stability limit of any island.
+    fn warn_of_unstable_step(&mut self) -> Result<(), EvaluationError> {
+        let limits = self.islands.iter_mut().map(Island::stable_step).collect::<Result<Vec<_>, _>>()?;
+        if let Some(limit) = limits.into_iter().flatten().reduce(f64::min)
+            && self.dt > limit
+        {
+            self.summary.warnings.push(format!(
+                "dt = {:.3e} s exceeds {limit:.3e} s, the estimated stability limit of {} here; the motion may blow up",
+                self.dt, self.summary.integrator,
+            ));
+        }
+        Ok(())
+    }
+
+    /// Warns of free vertices that start inside an obstacle.
+    fn warn_of_vertices_inside_obstacles(&mut self) {
+        for obstacle in &self.obstacles {
+            let solid = obstacle.at(0.0);
+            let inside = |body: &Body| {
+                let free = body.system.dofs().free().iter();
+                free.filter(|&&vertex| solid.signed_distance(body.x[vertex]) < 0.0).count()
+            };
+            let count: usize = self.islands.iter().map(|island| inside(island.body())).sum();
+            if count > 0 {
+                self.summary
+                    .warnings
+                    .push(format!("{count} vertices start inside {}; contact will throw them out", obstacle.name));
+            }
+        }
+    }
+}
+
+/// Creates the islands of a model, with their moving pins, on all cores.
+fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, SystemError> {
+    let islands = std::mem::take(&mut model.islands).into_iter();
+    let mut islands = islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, _>>()?;
+    distribute_moving_pins(&mut islands, model);
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
+    Ok(islands)
+}
+
+/// Hands each moving pin to the island of its vertex.
+fn distribute_moving_pins(islands: &mut [Island], model: &Model) {
+    if model.moving.is_empty() {
+        return;
+    }
+    // For each vertex of the scene: its island, and its index within the island.
+    let mut homes = vec![(0, 0); model.x.len()];
+    for (number, island) in islands.iter().enumerate() {
+        island.vertices().iter().enumerate().for_each(|(local, &vertex)| homes[vertex] = (number, local));
+    }
+    for pin in &model.moving {
+        let (island, vertex) = homes[pin.vertex];
+        islands[island].add_moving_pin(MovingPin { vertex, ..pin.clone() });
+    }
+}

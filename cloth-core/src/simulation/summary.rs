@@ -1,0 +1,213 @@
+use std::fmt;
+use std::time::Duration;
+
+use energy_dsl::Vector3;
+use energy_solve::{Counts, EvaluationError, State, Tally};
+use serde::{Deserialize, Serialize};
+
+use super::{Simulation, Totals};
+use crate::body::Body;
+use crate::integrator::{Phases, SolvedBy};
+use crate::model::{Model, TermLabel};
+use crate::scene::Scene;
+
+/// The outcome of a simulation. `Display` prints it as a report.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of pinned vertices.
+    pub pinned: usize,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Number of islands.
+    #[serde(default)]
+    pub islands: usize,
+    /// Number of islands asleep at the end.
+    #[serde(default)]
+    pub asleep: usize,
+    /// The integrator's name.
+    pub integrator: String,
+    /// Time step, in s.
+    pub dt: f64,
+    /// Totals over all steps.
+    #[serde(flatten)]
+    pub totals: Totals,
+    /// One entry per term of the scene.
+    pub terms: Vec<TermSummary>,
+    /// Terms that were left out, with the reason.
+    pub left_out: Vec<String>,
+    /// Warnings about the scene and the run.
+    pub warnings: Vec<String>,
+    /// ½ Σ m v², in J.
+    pub kinetic_energy: f64,
+    /// Σ m v, in kg m/s.
+    pub momentum: Vector3<f64>,
+    /// Σ m x × v about the origin, in kg m²/s.
+    pub angular_momentum: Vector3<f64>,
+    /// The total force of the cloth on its pins, in N.
+    pub pin_force: Vector3<f64>,
+}
+
+/// The work done by one term, and its energy at the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TermSummary {
+    /// The term's name.
+    pub name: String,
+    /// The name of its declared element.
+    pub element: String,
+    /// Number of elements.
+    #[serde(default)]
+    pub elements: usize,
+    /// Energy at the end, in J; `None` for a force law.
+    pub energy: Option<f64>,
+    /// Numbers of evaluated and skipped elements, per routine.
+    #[serde(with = "super::saved::saved_counts")]
+    pub counts: Counts,
+    /// Constant Hessians that were reused instead of evaluated.
+    #[serde(default)]
+    pub reused: u64,
+}
+
+impl Summary {
+    /// The summary before the first step.
+    pub(super) fn at_start(scene: &Scene, model: &Model, islands: usize) -> Self {
+        Self {
+            vertices: model.pinned.len(),
+            pinned: model.pinned.iter().filter(|&&pinned| pinned).count(),
+            triangles: model.triangles.len(),
+            islands,
+            integrator: scene.stepper().name().to_owned(),
+            dt: scene.dt,
+            left_out: model.left_out.clone(),
+            warnings: model.warnings.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// The phases of a step, in order, with the total time of each.
+    #[must_use]
+    pub fn named_phases(&self) -> [(&'static str, Duration); 4] {
+        let Phases { assembly, factorisation, solve, line_search } = self.totals.phases;
+        [
+            ("assembly", assembly),
+            ("factorisation", factorisation),
+            ("linear solves", solve),
+            ("line search", line_search),
+        ]
+    }
+
+    /// Describes the number of islands and the steps that they slept through.
+    #[must_use]
+    pub fn sleep(&self) -> String {
+        let all = self.totals.steps * self.islands as u64;
+        let islands = if self.islands == 1 { "1 island".to_owned() } else { format!("{} islands", self.islands) };
+        match (self.totals.slept, self.asleep) {
+            (0, 0) => islands,
+            (slept, asleep) => format!("{islands}, {asleep} asleep; {slept} of their {all} steps slept through"),
+        }
+    }
+}
+
+impl Simulation {
+    /// Returns the totals so far and the current energies, forces and momenta.
+    ///
+    /// # Errors
+    /// Returns an error if an energy is not finite.
+    pub fn summary(&mut self) -> Result<Summary, EvaluationError> {
+        let mut summary = self.summary.clone();
+        let mut energies: Vec<Option<f64>> = vec![None; self.labels.len()];
+        let mut elements = vec![0; self.labels.len()];
+        let add = |sum: &mut Vector3<f64>, part: Vector3<f64>| (0..3).for_each(|axis| sum[axis] += part[axis]);
+        for island in &mut self.islands {
+            let labels = island.labels().to_vec();
+            let body = island.body_mut();
+            for (&label, term) in labels.iter().zip(body.system.energies(&body.x)?) {
+                energies[label] = term.energy.map(|energy| energies[label].unwrap_or(0.0) + energy).or(energies[label]);
+            }
+            for (&label, (term, _)) in labels.iter().zip(body.system.terms()) {
+                elements[label] += term.stencils().len();
+            }
+            let force = body.system.forces(State { x: &body.x, v: &body.v })?;
+            summary.kinetic_energy += body.kinetic_energy();
+            add(&mut summary.momentum, body.momentum());
+            add(&mut summary.angular_momentum, body.angular_momentum());
+            add(&mut summary.pin_force, pin_force(body, &force));
+            summary.asleep += usize::from(island.is_asleep());
+        }
+        let term = |(number, counts): (usize, Counts)| {
+            let TermLabel { name, element } = self.labels[number].clone();
+            let (element, energy) = (element.to_owned(), energies[number]);
+            TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
+        };
+        summary.terms = self.counts().into_iter().enumerate().map(term).collect();
+        summary.warnings.extend(self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator)));
+        Ok(summary)
+    }
+}
+
+/// Returns the total force of the cloth on its pins, in N.
+fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
+    let mut total = [0.0; 3];
+    for (vertex, force) in force.iter().enumerate() {
+        if body.system.dofs().place(vertex).is_none() {
+            (0..3).for_each(|axis| total[axis] += force[axis]);
+        }
+    }
+    total
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{} vertices ({} pinned), {} triangles", self.vertices, self.pinned, self.triangles)?;
+        let Totals { steps, solves, solved_by, iterations, projected, rejected, stepping_time, .. } = &self.totals;
+        let simulated = *steps as f64 * self.dt;
+        writeln!(f, "{}: {steps} steps of {} s = {simulated:.3} s", self.integrator, self.dt)?;
+        writeln!(f, "{}", self.sleep())?;
+        let seconds = stepping_time.as_secs_f64();
+        writeln!(f, "{seconds:.2} s of computing, {:.2} ms per step", 1e3 * seconds / (*steps).max(1) as f64)?;
+        if *solves > 0 {
+            let mean = *iterations as f64 / *solves as f64;
+            writeln!(f, "{solves} linear solves, {iterations} iterations ({mean:.1} each)")?;
+            if *solved_by != SolvedBy::default() {
+                writeln!(f, "by {solved_by}")?;
+            }
+            writeln!(f, "{projected} steps with projected Hessians")?;
+        }
+        if *rejected > 0 {
+            writeln!(f, "{rejected} steps rejected and retried with a smaller step size")?;
+        }
+        writeln!(f)?;
+        writeln!(f, "{:<20} {:<20} {:>12}   evaluated (skipped) per routine", "term", "element", "energy, J")?;
+        for term in &self.terms {
+            let energy = term.energy.map_or("–".to_owned(), |energy| format!("{energy:.4e}"));
+            writeln!(f, "{:<20} {:<20} {energy:>12}   {}", term.name, term.element, routines(&term.counts))?;
+        }
+        for reason in &self.left_out {
+            writeln!(f, "left out: {reason}")?;
+        }
+        writeln!(f)?;
+        writeln!(f, "kinetic energy     {:.4e} J", self.kinetic_energy)?;
+        writeln!(f, "momentum           {} kg m/s", vector(&self.momentum))?;
+        writeln!(f, "angular momentum   {} kg m²/s", vector(&self.angular_momentum))?;
+        write!(f, "force on the pins  {} N", vector(&self.pin_force))?;
+        for warning in &self.warnings {
+            write!(f, "\nwarning: {warning}")?;
+        }
+        Ok(())
+    }
+}
+
+fn routines(counts: &Counts) -> String {
+    let one = |name: &str, tally: &Tally| {
+        let flagged = if tally.flagged > 0 { format!(", {} flagged", tally.flagged) } else { String::new() };
+        (tally.evaluated + tally.skipped > 0)
+            .then(|| format!("{name} {} ({}{flagged})", tally.evaluated, tally.skipped))
+    };
+    let all = [("value", &counts.value), ("first", &counts.gradient), ("second", &counts.hessian)];
+    all.iter().filter_map(|(name, tally)| one(name, tally)).collect::<Vec<_>>().join(" · ")
+}
+
+fn vector(v: &Vector3<f64>) -> String {
+    format!("({:.4e}, {:.4e}, {:.4e})", v[0], v[1], v[2])
+}

@@ -1,0 +1,45 @@
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::integrator::{Phases, SolvedBy, StepReport};
+
+/// Running totals over all steps. Summaries and checkpoints hold these as keys of their own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Totals {
+    /// Completed steps.
+    pub steps: u64,
+    /// Linear systems solved.
+    pub solves: u64,
+    /// Solves of symmetric systems, by linear solver.
+    #[serde(default)]
+    pub solved_by: SolvedBy,
+    /// Iterations of the linear solver.
+    pub iterations: u64,
+    /// Steps that needed Hessians projected to positive semi-definite; see [`crate::integrator::Newton`].
+    pub projected: u64,
+    /// Steps rejected and retried with a smaller step size; see [`crate::integrator::Adaptive`].
+    pub rejected: u64,
+    /// Steps skipped by sleeping islands, summed over the islands.
+    #[serde(default)]
+    pub slept: u64,
+    /// Wall time of all steps.
+    pub stepping_time: Duration,
+    /// Wall time by phase; zero for integrators that do not report it.
+    pub phases: Phases,
+}
+
+impl Totals {
+    /// Adds one completed step, during which `slept` islands were asleep.
+    pub(super) fn add(&mut self, report: &StepReport, slept: u64, elapsed: Duration) {
+        self.steps += 1;
+        self.solves += report.solves;
+        self.solved_by += report.solved_by;
+        self.iterations += report.iterations;
+        self.projected += u64::from(report.projected);
+        self.rejected += report.rejected;
+        self.slept += slept;
+        self.stepping_time += elapsed;
+        self.phases += report.phases;
+    }
+}
