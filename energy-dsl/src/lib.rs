@@ -2,7 +2,8 @@
 //! first and second derivatives.
 //!
 //! [`energy!`] compiles the formula while your crate compiles. The generated type implements the trait of its kind:
-//! [`Potential`], [`Constraint`], [`ForceLaw`] or [`Residual`]. Many elements at once run over SIMD lanes: see [`Packed`].
+//! [`Potential`], [`Constraint`], [`ForceLaw`] or [`Residual`]. Many elements at once run over SIMD lanes: see
+//! [`Packed`].
 //!
 #![doc = include_str!("../LANGUAGE.md")]
 #![forbid(unsafe_code)]

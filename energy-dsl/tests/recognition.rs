@@ -1,5 +1,5 @@
-//! Naive spellings compile to the robust form: they and the robust spelling give the same primitives, the same operations and the
-//! same bits.
+//! Naive spellings compile to the robust form: they and the robust spelling give the same primitives, the same
+//! operations and the same bits.
 #![allow(missing_docs)]
 
 use energy_compiler::compile;
@@ -20,7 +20,8 @@ fn plan(formula: &str) -> String {
     plan_of(&source)
 }
 
-/// The same of a residual of a motion Q by a unit dual quaternion, and of the vectors n, v and u and a quaternion h of any length.
+/// The same of a residual of a motion Q by a unit dual quaternion, and of the vectors n, v and u and a quaternion h of
+/// any length.
 fn plan_of_motion(formula: &str) -> String {
     plan_of(&format!(
         "residual Test(ξ: [Twist; 2]; w: [Scalar; 2], h: Quat, n, v, u: Vec3) {{

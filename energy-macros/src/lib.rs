@@ -1,5 +1,5 @@
-//! The macros of `energy-dsl`. They hand their tokens to the crate `energy-compiler`; `energy-dsl` re-exports and documents
-//! them.
+//! The macros of `energy-dsl`. They hand their tokens to the crate `energy-compiler`; `energy-dsl` re-exports and
+//! documents them.
 #![forbid(unsafe_code)]
 
 mod include;

@@ -1,34 +1,34 @@
-//! Errors as values: what was expected, what was found, where, and what would fix it.
+//! Errors as values: what was expected, what was found, where, and how to fix it.
 
 use std::fmt;
 use std::rc::Rc;
 
 use proc_macro2::Span as TokenSpan;
 
-/// A place in the declaration. Inside a string literal, where the compiler has no spans, also the characters of the literal.
+/// A place in a declaration. Inside a string literal, where the compiler has no spans, it also records the characters.
 #[derive(Clone, Debug)]
 pub struct Span {
-    /// The token.
+    /// Span of the token.
     pub token: TokenSpan,
-    /// Characters start..end of a text, if the place is inside one.
+    /// Characters within a text; `None` outside of texts.
     pub excerpt: Option<Excerpt>,
 }
 
-/// Part of a text.
+/// A range of a text.
 #[derive(Clone, Debug)]
 pub struct Excerpt {
     /// The whole text.
     pub text: Rc<str>,
-    /// First byte.
+    /// Offset of the first byte.
     pub start: usize,
-    /// Past the last byte.
+    /// Offset past the last byte.
     pub end: usize,
-    /// The file that the text is, if it is one.
+    /// File name of the text; `None` if it does not come from a file.
     pub file: Option<Rc<str>>,
 }
 
 impl Excerpt {
-    /// The line of the place, and its line and column from 0.
+    /// Returns the line that contains the range, and its line and column numbers from 0.
     fn line(&self) -> (&str, usize, usize) {
         let before = &self.text[..self.start];
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
@@ -38,20 +38,20 @@ impl Excerpt {
 }
 
 impl Span {
-    /// The place of a token.
+    /// Creates the place of a token.
     #[must_use]
     pub fn of(token: TokenSpan) -> Self {
         Self { token, excerpt: None }
     }
 
-    /// A part of the text that this is the place of.
+    /// Creates a place within the text of this one.
     #[must_use]
     pub fn within(&self, start: usize, end: usize) -> Self {
         let excerpt = self.excerpt.as_ref().map(|e| Excerpt { start, end, ..e.clone() });
         Self { token: self.token, excerpt }
     }
 
-    /// The file that it is in, with line and column, if it is in one.
+    /// Returns `file:line:column` if the place is in a file.
     fn place_in_file(&self) -> Option<String> {
         let excerpt = self.excerpt.as_ref()?;
         let (file, (_, line, column)) = (excerpt.file.as_ref()?, excerpt.line());
@@ -59,24 +59,24 @@ impl Span {
     }
 }
 
-/// One error.
+/// An error in a text.
 #[derive(Clone, Debug)]
 pub struct Diagnostic {
-    /// What is wrong: what was expected and what was found.
+    /// What was expected, and what was found.
     pub message: String,
-    /// What would fix it.
+    /// How to fix it; `None` if unknown.
     pub help: Option<String>,
-    /// Where.
+    /// Place of the error.
     pub span: Span,
 }
 
 impl Diagnostic {
-    /// An error at a place.
+    /// Creates an error at a place.
     pub fn new(span: &Span, message: impl Into<String>) -> Self {
         Self { message: message.into(), help: None, span: span.clone() }
     }
 
-    /// Adds what would fix it.
+    /// Adds how to fix it.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
@@ -103,17 +103,17 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// All errors of a text, in the order they were found. Displayed with line:column in the text.
+/// All errors of a text, in the order they were found. They are displayed with line:column.
 #[derive(Clone, Debug, Default)]
 pub struct Diagnostics(pub Vec<Diagnostic>);
 
 impl Diagnostics {
-    /// Notes an error.
+    /// Adds an error.
     pub fn push(&mut self, diagnostic: Diagnostic) {
         self.0.push(diagnostic);
     }
 
-    /// `value` if there was no error.
+    /// Returns `value` if there are no errors.
     ///
     /// # Errors
     /// Whatever was noted.
@@ -147,10 +147,10 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
-/// The name among `known` that `name` was likely meant to be.
+/// Returns the known name that `name` is probably a misspelling of.
 #[must_use]
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // A single letter is like every other single letter.
+    // Single letters are excluded: each is similar to every other.
     let length = name.chars().count();
     let limit = (1 + length / 4).min(length.saturating_sub(1));
     known.into_iter().map(|k| (edit_distance(name, k), k)).filter(|&(d, _)| d <= limit).min().map(|(_, k)| k)

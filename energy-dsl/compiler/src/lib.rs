@@ -1,12 +1,12 @@
-//! The compiler of `energy-dsl`: turns declarations of energies, constraints, forces and residuals into Rust code for their
-//! values and their exact first and second derivatives.
+//! The compiler of `energy-dsl`: turns declarations of energies, constraints, forces and residuals into Rust code for
+//! their values and their exact first and second derivatives.
 //!
 //! ```text
 //! text ─ syntax ─► tree ─ check ─► typed program ─ lower ─► graph ─ diff ─► routines ─ prove ─► ─ emit ─► Rust
 //! ```
 //!
-//! Users declare elements with `energy!` of the crate `energy-dsl`. This crate is for tools: [`compile`] is all that the
-//! macro does; [`Interpreted`], [`Textbook`] and [`Listing`] look at a declaration that is read at run time.
+//! Users declare elements with `energy!` of the crate `energy-dsl`. This crate is for tools: [`compile`] is all that
+//! the macro does; [`Interpreted`], [`Textbook`] and [`Listing`] look at a declaration that is read at run time.
 #![forbid(unsafe_code)]
 
 mod check;

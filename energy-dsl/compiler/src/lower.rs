@@ -1,4 +1,4 @@
-//! Typed program to scalar graph.
+//! Lowers typed programs to scalar graphs.
 
 use std::collections::BTreeMap;
 
@@ -10,22 +10,22 @@ use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
 /// A program as a graph.
 #[derive(Clone, Debug)]
 pub struct Formula {
-    /// The graph.
+    /// Graph of the program.
     pub graph: Graph,
-    /// The result, row by row.
+    /// Result, row by row.
     pub outputs: Vec<NodeId>,
 }
 
-/// A program's `rest` block as a graph: what it computes once for an element.
+/// The `rest` block of a program as a graph, evaluated once for each element.
 #[derive(Clone, Debug)]
 pub struct RestFormula {
-    /// The graph.
+    /// Graph of the block.
     pub graph: Graph,
-    /// The numbers to store, in the order of [`Input::Precomputed`].
+    /// Numbers to store, in the order of [`Input::Precomputed`].
     pub outputs: Vec<NodeId>,
 }
 
-/// The robust form, split into what the rest shape decides and what moves.
+/// Lowers to the robust form, split into the part that the rest shape determines and the part that moves.
 #[must_use]
 pub fn lower(program: &Program) -> (RestFormula, Formula) {
     let mut rest = Lowering::new(program, Form::Robust, None);
@@ -44,14 +44,14 @@ pub fn lower(program: &Program) -> (RestFormula, Formula) {
         moving.graph.move_outward(false);
         Formula { graph: moving.graph, outputs }
     };
-    // Outside, powers of two may meet and cancel, or may have to be multiplied in more often.
+    // Moved outwards, powers of two may meet and cancel, but may also have to be multiplied more often.
     let [inward, outward] = [false, true].map(formula);
     let formula = if outward.cost() < inward.cost() { outward } else { inward };
     (rest, formula)
 }
 
 impl Formula {
-    /// What the result costs on the ordinary path.
+    /// Returns the cost of the result on the ordinary path.
     fn cost(&self) -> usize {
         let mut graph = self.graph.clone();
         let outputs = ordinary(&mut graph, &self.outputs).map_or_else(|| self.outputs.clone(), |(outputs, _)| outputs);
@@ -59,16 +59,16 @@ impl Formula {
     }
 }
 
-/// A program as it is printed, nothing differentiated.
+/// A program in its textbook form, without derivatives.
 #[derive(Clone, Debug)]
 pub struct TextbookFormula {
-    /// The formula, where the derivatives that it names are [`Input::Precomputed`], three to each.
+    /// The formula. The derivatives that it uses are [`Input::Precomputed`], three numbers each.
     pub formula: Formula,
-    /// The derivatives it names: of which node by which point. A later one may read earlier ones.
+    /// Derivatives that the formula uses: node and point. Later ones may use earlier ones.
     pub gradients: Vec<(NodeId, usize)>,
 }
 
-/// The whole program in its textbook form.
+/// Lowers the whole program to its textbook form.
 #[must_use]
 pub fn lower_textbook(program: &Program) -> TextbookFormula {
     let mut lowering = Lowering::new(program, Form::Textbook, None);
@@ -76,7 +76,7 @@ pub fn lower_textbook(program: &Program) -> TextbookFormula {
     TextbookFormula { formula: Formula { graph: lowering.graph, outputs }, gradients: lowering.gradients }
 }
 
-/// The bindings of the `rest` block that the moving part reads, in order.
+/// Returns the bindings of the `rest` block that the moving part reads, in order.
 fn stored_bindings(program: &Program) -> Vec<usize> {
     fn visit(program: &Program, expression: &Typed, seen: &mut [bool]) {
         match &expression.kind {
@@ -100,9 +100,9 @@ struct Lowering<'a> {
     program: &'a Program,
     graph: Graph,
     done: BTreeMap<usize, Lowered>,
-    /// Where the stored bindings start, when they are read and not computed.
+    /// Where stored bindings start; `None` if they are computed.
     slots: Option<BTreeMap<usize, usize>>,
-    /// In the textbook form, the derivatives left to whoever evaluates it.
+    /// Derivatives that the evaluation of the textbook form must supply.
     gradients: Vec<(NodeId, usize)>,
 }
 

@@ -16,9 +16,9 @@ use crate::syntax;
 
 /// Compiles declarations to Rust. This is all that `energy!` does.
 ///
-/// Each error becomes a `compile_error!` at its place. A broken declaration also becomes a stub of its type, so that one
-/// mistake gives one error. If the environment variable `ENERGY_DUMP_DIR` names a folder, the formatted code of each
-/// declaration is also written there.
+/// Each error becomes a `compile_error!` at its place. A broken declaration also becomes a stub of its type, so that
+/// one mistake gives one error. If the environment variable `ENERGY_DUMP_DIR` names a folder, the formatted code of
+/// each declaration is also written there.
 ///
 /// ```
 /// let code = energy_compiler::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());

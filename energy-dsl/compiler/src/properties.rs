@@ -1,5 +1,5 @@
-//! Claims of a declaration that can be decided here: translation invariance is proved on the graph; what the audit must check
-//! needs an audit.
+//! Checks claims of a declaration. Translation invariance is proved on the graph; claims for the audit require an
+//! audit.
 
 use crate::check::Program;
 use crate::diagnostic::{Diagnostic, Diagnostics};
@@ -8,7 +8,7 @@ use crate::routines::Routines;
 use crate::syntax::ElementType;
 use energy_runtime::{Kind, Property};
 
-/// Reports each claim that is wrong, or that nothing would check.
+/// Reports claims that are wrong, or that nothing would check.
 pub fn prove(program: &Program, routines: &Routines, diagnostics: &mut Diagnostics) {
     for (property, span) in &program.properties {
         let problem = match property {
@@ -48,7 +48,7 @@ fn translation(program: &Program, routines: &Routines) -> Option<(String, &'stat
     Some((message, "form the difference first, as in dot(n, p - q) for dot(n, p) - dot(n, q)"))
 }
 
-/// The first point that is not in a difference of two.
+/// Returns the first point that is used outside of a difference of two points.
 fn used_by_itself(graph: &Graph, outputs: &[NodeId]) -> Option<usize> {
     let coordinate = |node: NodeId| match graph.op(node) {
         Op::Input(Input::Position(c)) => Some((usize::from(c) / 3, usize::from(c) % 3)),
@@ -76,7 +76,7 @@ fn used_by_itself(graph: &Graph, outputs: &[NodeId]) -> Option<usize> {
     found
 }
 
-/// The rest shape must say where each point rests.
+/// Checks that the rest shape has one place for each point.
 fn rest_state(program: &Program) -> Option<(String, &'static str)> {
     let places = program.rest.iter().filter(|input| {
         let element = input.input_type.element;

@@ -81,8 +81,8 @@ fn operations_grow_with_the_formula_and_the_square_of_its_coordinates() {
     }
 }
 
-/// Compile time is at most quadratic in the number of lets: four times as many take at most 16 times as long. The fastest of
-/// three runs counts, so that a busy machine does not decide.
+/// Compile time is at most quadratic in the number of lets: four times as many take at most 16 times as long. The
+/// fastest of three runs counts, so that a busy machine does not decide.
 #[test]
 fn compile_time_is_at_most_quadratic_in_the_length_of_a_formula() {
     let fastest = |size: usize| {

@@ -2,7 +2,7 @@
 
 use approx::assert_relative_eq;
 use energy_compiler::Textbook;
-use energy_dsl::Inputs;
+use energy_runtime::Inputs;
 
 /// The value of a formula of the points p = (1, 2, 2), q = (3, −1, 4) and the parameters k = 3, L = 0.5, θ₀ = 0.25.
 fn value(body: &str) -> f64 {

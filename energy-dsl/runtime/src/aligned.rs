@@ -1,9 +1,9 @@
 use std::ops::{Deref, DerefMut};
 
-/// The bytes of the widest register and of a cache line.
+/// Bytes of the widest register, and of a cache line.
 const LINE: usize = 64;
 
-/// Numbers that begin with a cache line: a register that begins elsewhere is loaded from two.
+/// A slice that starts at a cache line. A register that straddles two cache lines takes two loads.
 ///
 /// ```
 /// use energy_runtime::Aligned;
@@ -14,13 +14,13 @@ const LINE: usize = 64;
 /// ```
 #[derive(Debug)]
 pub struct Aligned<S> {
-    /// Some that are not used, then those that are.
+    /// Padding up to the cache line, then the numbers.
     numbers: Vec<S>,
     start: usize,
 }
 
 impl<S: Clone> Aligned<S> {
-    /// `count` equal numbers.
+    /// Creates `count` copies of `number`.
     #[must_use]
     pub fn new(count: usize, number: S) -> Self {
         let spare = LINE / size_of::<S>().max(1);

@@ -1,12 +1,12 @@
-/// A fixed-length array whose length a trait leaves open: `[Item; N]` for every `N`.
+/// A fixed-length array of generic length: `[Item; N]` for every `N`.
 pub trait Array<Item>: Copy + AsRef<[Item]> + AsMut<[Item]> {
-    /// The number of items.
+    /// Number of items.
     const LEN: usize;
 
-    /// The array whose `i`-th item is `item(i)`.
+    /// Creates the array whose `i`-th item is `item(i)`.
     fn from_fn(item: impl FnMut(usize) -> Item) -> Self;
 
-    /// The array of equal items.
+    /// Creates an array of equal items.
     fn repeat(item: Item) -> Self;
 }
 

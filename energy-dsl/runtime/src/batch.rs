@@ -1,7 +1,8 @@
-//! Many elements of one type at once: parameters and stencils packed into lanes once, points gathered, results unpacked.
+//! Evaluation of many elements of one type: parameters and stencils are packed into lanes once, points are gathered,
+//! results unpacked.
 //!
-//! A *batch* holds as many elements as the level has lanes. In the last one lanes may be left over: they repeat the last
-//! element, so that they compute, and flag, nothing that it does not, and their results are not written.
+//! A *batch* holds one element per lane. Surplus lanes of the last batch repeat the last element, so they add no flags;
+//! their results are not written.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -13,15 +14,15 @@ use super::element::{Element, ForceLaw, Potential, ReducedPotential, Residual, V
 use super::flags::Flags;
 use super::real::{Mask, Real};
 
-/// Lanes a packed block has room for: the widest register's, of single-precision numbers.
+/// Elements in a packed block: the number of `f32` lanes in the widest register.
 pub const BLOCK: usize = 16;
 
-/// Elements as plain numbers.
+/// Elements that can be stored as plain numbers.
 pub trait Stored<S: Real>: Element {
-    /// How many numbers an element holds: its parameters, and what its rest shape determined.
+    /// Numbers per element: its parameters and what its rest shape determines.
     const NUMBERS: usize;
 
-    /// Writes the numbers to places 0, `stride`, 2 `stride`, ….
+    /// Writes the numbers to indices 0, `stride`, 2 `stride`, ….
     fn store(&self, numbers: &mut [S], stride: usize);
 }
 
@@ -29,10 +30,11 @@ macro_rules! packed {
     ($(#[$docs:meta])* $name:ident: $of:ident, $wide:ident) => {
         $(#[$docs])*
         pub trait $name<S: Real>: Stored<S> + $of<S> {
-            /// The element over lanes.
+            /// The element over lanes `V`.
             type Wide<V: Lane<S>>: $wide<V>;
 
-            /// Reads the numbers of as many elements as there are lanes, side by side at 0, `stride`, 2 `stride`, ….
+            /// Reads one element per lane. The numbers of consecutive elements are adjacent; those of one element are
+            /// `stride` apart.
             fn load<V: Lane<S>>(numbers: &[S], stride: usize) -> Self::Wide<V>;
         }
     };
@@ -51,19 +53,20 @@ packed!(
     PackedResidual: Residual, Residual
 );
 
-/// The points of a potential over lanes.
+/// The points of a potential over lanes `V`.
 pub type WidePoints<E, V, S = f64> = <<E as PackedPotential<S>>::Wide<V> as Potential<V>>::Points;
 
-/// Elements of one type on their stencils, as struct of arrays: blocks of [`BLOCK`] elements, number by number.
+/// Elements of one type with their stencils, as a structure of arrays. Blocks hold [`BLOCK`] elements, number by
+/// number.
 #[derive(Clone, Debug)]
 pub struct Packed<E, S = f64> {
     elements: usize,
     points: usize,
-    /// One more than the largest index of a point.
+    /// One more than the largest vertex index.
     reach: usize,
-    /// By block, number, element.
+    /// Indexed by block, number, element.
     numbers: Aligned<S>,
-    /// By block, point, element.
+    /// Indexed by block, point, element.
     stencils: Vec<u32>,
     of: PhantomData<E>,
 }
@@ -79,7 +82,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         Self::from_fn(elements.len(), N, |element| &elements[element], |element, point| stencils[element][point])
     }
 
-    /// Packs `count` elements of so many `points`: element i is `element(i)`, and its point p is `vertex(i, p)`.
+    /// Packs `count` elements with `points` points each. Element i is `element(i)`; its point p is `vertex(i, p)`.
     pub fn from_fn<'a>(
         count: usize,
         points: usize,
@@ -110,31 +113,32 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         packed
     }
 
-    /// The number of elements.
+    /// Returns the number of elements.
     #[must_use]
     pub fn len(&self) -> usize {
         self.elements
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no elements.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.elements == 0
     }
 
-    /// The points of all elements, in blocks of [`BLOCK`] elements, by point; the last block is filled up with the last element.
+    /// Returns the vertex indices of all elements, in blocks of [`BLOCK`] elements, point by point. The last block is
+    /// padded with its last element.
     #[must_use]
     pub fn stencils(&self) -> &[u32] {
         &self.stencils
     }
 
-    /// The numbers of an element and those beside it; there are none of elements without parameters.
+    /// Returns the numbers from lane `offset` of a block on; an empty slice if elements have no parameters.
     #[inline(always)]
     fn numbers_from(&self, block: usize, offset: usize) -> &[S] {
         if E::NUMBERS == 0 { &[] } else { &self.numbers[block * E::NUMBERS * BLOCK + offset..] }
     }
 
-    /// Replaces an element, on the same stencil.
+    /// Replaces an element and keeps its stencil.
     ///
     /// # Panics
     /// When there is no such element.
@@ -156,7 +160,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
 }
 
 impl<S: Real + Lane<S>, E: PackedPotential<S>> Packed<E, S> {
-    /// One element, taken out again.
+    /// Returns one element, unpacked.
     ///
     /// # Panics
     /// When there is no such element.
@@ -167,22 +171,22 @@ impl<S: Real + Lane<S>, E: PackedPotential<S>> Packed<E, S> {
     }
 }
 
-/// Elements in lanes, with their points.
+/// One element per lane, with its points.
 pub struct Batch<'a, E: PackedPotential<f64>, V: Lane<f64>> {
-    /// The index of the first element.
+    /// Index of the first element.
     pub first: usize,
-    /// How many elements there are: all lanes, or fewer in the last batch.
+    /// Number of elements: one per lane, or fewer in the last batch.
     pub count: usize,
-    /// The elements.
+    /// The elements, one per lane.
     pub element: &'a E::Wide<V>,
-    /// Their points.
+    /// The points of the elements.
     pub points: &'a WidePoints<E, V>,
-    /// The stencils of the block they are in, from the first of them on.
+    /// Vertex indices of the block, from the first element of the batch on.
     stencils: &'a [u32],
 }
 
 impl<'a, E: PackedPotential<f64>, V: Lane<f64>> Batch<'a, E, V> {
-    /// The indices of point `point` of the elements, one a lane.
+    /// Returns the vertex index of point `point` of each element.
     #[inline(always)]
     #[must_use]
     pub fn vertices(&self, point: usize) -> &'a [u32] {
@@ -190,14 +194,14 @@ impl<'a, E: PackedPotential<f64>, V: Lane<f64>> Batch<'a, E, V> {
     }
 }
 
-/// What is done with every batch.
+/// Work on each batch of a list of elements.
 pub trait BatchWork<E: PackedPotential<f64>> {
-    /// Does it. Mark implementations `#[inline(always)]`, and use no closures for the main work: only what is inlined is
-    /// compiled for the level.
+    /// Processes one batch. Mark implementations `#[inline(always)]` and avoid closures in hot code: only inlined code
+    /// is compiled for the SIMD level.
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>);
 }
 
-/// Does work with all elements, in batches, at the best level of the machine.
+/// Runs `work` on all elements, in batches, at the best SIMD level of the machine.
 ///
 /// # Panics
 /// When a stencil has a point that is not among `positions`.
@@ -209,10 +213,11 @@ pub fn for_each_batch<E: PackedPotential<f64>>(
     for_each_batch_in(elements, 0..elements.len(), positions, work);
 }
 
-/// Does work with the elements of a range, which begins at a multiple of [`BLOCK`].
+/// Runs `work` on a range of elements. The range starts at a multiple of [`BLOCK`].
 ///
 /// # Panics
-/// When a stencil has a point that is not among `positions`, or the range begins elsewhere, or ends after the last element.
+/// When a stencil has a point that is not among `positions`, or the range begins elsewhere, or ends after the last
+/// element.
 pub fn for_each_batch_in<E: PackedPotential<f64>>(
     elements: &Packed<E>,
     range: Range<usize>,
@@ -222,16 +227,16 @@ pub fn for_each_batch_in<E: PackedPotential<f64>>(
     dispatch(Batches { elements, range, positions, work });
 }
 
-/// The kernel of [`for_each_batch`], for those who run it at a level of their choice.
+/// The kernel behind [`for_each_batch`], for callers that choose the SIMD level themselves.
 #[derive(Debug)]
 pub struct Batches<'a, E, W> {
-    /// The elements on their stencils.
+    /// The elements with their stencils.
     pub elements: &'a Packed<E>,
-    /// Which of them, from a multiple of [`BLOCK`] on.
+    /// The elements to process; the range starts at a multiple of [`BLOCK`].
     pub range: Range<usize>,
-    /// All points.
+    /// Positions of all vertices.
     pub positions: &'a [Vector3<f64>],
-    /// What is done.
+    /// Called for each batch.
     pub work: &'a mut W,
 }
 
@@ -262,9 +267,9 @@ impl<E: PackedPotential<f64>, W: BatchWork<E>> Kernel for Batches<'_, E, W> {
     }
 }
 
-/// Energies, gradients and Hessians of all elements, one after the other: work for [`for_each_batch`].
+/// Work that stores energies, gradients and Hessians element by element, for [`for_each_batch`].
 ///
-/// Slices of arrays become slices of numbers by `as_flattened_mut`.
+/// To get slices of numbers from slices of arrays, use `as_flattened_mut`.
 #[derive(Debug)]
 pub struct Hessians<'a> {
     /// U of each element.
@@ -273,7 +278,7 @@ pub struct Hessians<'a> {
     pub gradients: &'a mut [f64],
     /// The triangle of ∂²U/∂x² of each element: 9 · N (N + 1)/2 numbers.
     pub triangles: &'a mut [f64],
-    /// The elements that met a condition, with which.
+    /// Index and flags of each flagged element.
     pub flagged: Vec<(usize, Flags<f64>)>,
 }
 
@@ -295,7 +300,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_> {
     }
 }
 
-/// Out of line: flags are rare.
+/// Not inlined: flags are rare.
 #[cold]
 #[inline(never)]
 fn note_flags<M: Mask>(flagged: &mut Vec<(usize, Flags<f64>)>, first: usize, count: usize, degenerate: M, kink: M) {

@@ -1,7 +1,7 @@
-//! Calls of routines as kernels: the plain methods of generated elements run the levelled ones through these.
+//! Kernels that call one routine. The plain methods of generated elements run `*_at::<L>` through them.
 //!
-//! A caller has often just gathered the points it passes, number by number. Read several at once, they would have to wait until
-//! all that writing reached the cache, and every call for the one before it; read one by one, they are at hand.
+//! A caller has often just stored the points one number at a time. A vector load of them would stall until these stores
+//! retire (failed store forwarding), so the points are read one number at a time, too.
 
 use super::array::Array;
 use super::cpu::{Kernel, Level, read_alone};
@@ -12,7 +12,7 @@ use super::results::{
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
 
-/// A call with its element and arguments.
+/// Declares a kernel that holds an element and the arguments of one routine.
 macro_rules! call {
     ($name:ident: $element:ident, $routine:ident($($argument:tt $read:ident $points:ty),+) -> $output:ty) => {
         #[doc(hidden)]
@@ -31,7 +31,7 @@ macro_rules! call {
 
 type Points<E, T> = <E as Potential<T>>::Points;
 
-/// Vectors, read number by number.
+/// Copies vectors, one scalar load each.
 #[inline(always)]
 fn vectors<T: Real, A: Array<Vector3<T>>>(vectors: &A) -> A {
     let mut read = A::repeat([T::from_f64(0.0); 3]);
@@ -43,7 +43,7 @@ fn vectors<T: Real, A: Array<Vector3<T>>>(vectors: &A) -> A {
     read
 }
 
-/// Numbers, one by one.
+/// Copies numbers, one scalar load each.
 #[inline(always)]
 fn numbers<T: Real, A: Array<T>>(numbers: &A) -> A {
     let mut read = A::repeat(T::from_f64(0.0));
@@ -69,7 +69,7 @@ call!(GaussNewtonCall: Constraint, gauss_newton_at(1 vectors Points<E, T>) -> He
 call!(ResidualCall: Residual, residual_at(1 numbers E::Unknowns) -> ResidualValue<T, E::Rows>);
 call!(ResidualJacobianCall: Residual, jacobian_at(1 numbers E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
 
-/// Another kernel, whose output is written to where it is wanted.
+/// Runs another kernel and writes its output to the referenced place.
 pub(super) struct WrittenTo<'a, K: Kernel>(pub K, pub &'a mut K::Output);
 
 impl<K: Kernel> Kernel for WrittenTo<'_, K> {

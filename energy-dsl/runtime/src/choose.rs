@@ -7,10 +7,10 @@ use super::results::{
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
 
-/// Of two results, lane by lane one or the other.
+/// Selects between two results, lane by lane.
 #[doc(hidden)]
 pub trait Choose<T: Real>: Sized {
-    /// `yes` where the mask holds, `no` elsewhere.
+    /// Returns `yes` where the mask holds, `no` elsewhere.
     fn choose(mask: T::Mask, yes: &Self, no: &Self) -> Self;
 }
 
@@ -33,7 +33,7 @@ fn blocks<T: Real, A: Array<Block<T>>>(mask: T::Mask, yes: &A, no: &A) -> A {
     A::from_fn(|i| vectors(mask, &yes.as_ref()[i], &no.as_ref()[i]))
 }
 
-/// Field by field, each by the function for its shape.
+/// Implements [`Choose`] field by field, each by the function for its shape.
 macro_rules! choose {
     ($result:ident<T $(, $parameter:ident: $of:ident)*> { $($field:ident: $shape:ident),* }) => {
         impl<T: Real $(, $parameter: Array<$of<T>>)*> Choose<T> for $result<T $(, $parameter)*> {
@@ -47,7 +47,7 @@ macro_rules! choose {
     };
 }
 
-/// A number, as the macro names the shapes of vectors.
+/// Alias under which the macro names the shape of a scalar field.
 type Number<T> = T;
 
 fn number<T: Real>(mask: T::Mask, yes: &T, no: &T) -> T {

@@ -1,9 +1,12 @@
-//! The traits that generated elements implement. An element's value holds its parameters and whatever its rest shape
-//! alone determines; its methods take the moving points.
+//! The traits of generated elements. An element stores its parameters and what its rest shape determines; its methods
+//! take the moving points.
 //!
-//! Storage: a block is 3×3, row = component of the first point. A *triangle* of an N-point element holds the blocks
-//! (i, j) with i ≤ j in the order (0,0), (0,1), …, (0,N−1), (1,1), …; see [`triangle_index`]. A *square* holds all
-//! N×N blocks row by row.
+//! Storage of second derivatives:
+//!
+//! - A block is 3×3; its rows are the components of the first point.
+//! - A *triangle* holds the blocks (i, j) with i ≤ j of an N-point element, in the order (0,0), (0,1), …, (0,N−1),
+//!   (1,1), …; see [`triangle_index`].
+//! - A *square* holds all N×N blocks, row by row.
 
 use super::array::Array;
 use super::call::{HessianCall, ResidualJacobianCall, WrittenTo};
@@ -16,12 +19,12 @@ use super::results::{
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
 
-/// A point or vector.
+/// A point or vector in space.
 pub type Vector3<T> = [T; 3];
 /// A 3×3 block, row by row.
 pub type Block<T> = [[T; 3]; 3];
 
-/// The place of block (i, j), i ≤ j < `points`, in a triangle.
+/// Returns the index of block (i, j), i ≤ j < `points`, in a triangle.
 ///
 /// ```
 /// use energy_runtime::triangle_index;
@@ -32,10 +35,10 @@ pub const fn triangle_index(points: usize, i: usize, j: usize) -> usize {
     i * points - i * (i + 1) / 2 + j
 }
 
-/// A rest shape from which an element cannot be made.
+/// The rest shape is degenerate: no element can be made from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RestError {
-    /// The element's name.
+    /// Name of the element.
     pub element: &'static str,
 }
 
@@ -47,41 +50,46 @@ impl std::fmt::Display for RestError {
 
 impl std::error::Error for RestError {}
 
-/// The numbers an element is evaluated on, flattened in declared order: the way in for tools that handle every element
-/// alike. The typed traits are the fast way.
+/// The inputs of an element, flattened in declared order. Tools use them to treat all elements in the same way; the
+/// typed traits are faster.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a, T> {
-    /// Parameters; of a constraint, its stiffness k_s and damping k_d follow the declared ones.
+    /// Parameters. For a constraint, its stiffness k_s and damping k_d come last.
     pub parameters: &'a [T],
-    /// Rest shape.
+    /// Rest-shape inputs.
     pub rest: &'a [T],
-    /// Positions, three to a point, or a residual's unknowns.
+    /// Positions, three numbers per point, or the unknowns of a residual.
     pub positions: &'a [T],
-    /// Velocities, three to a point; empty means zero.
+    /// Velocities, three numbers per point; empty means zero.
     pub velocities: &'a [T],
 }
 
-/// Every block of an element, flattened row-major over all coordinates (no triangle, nothing left out).
+/// All blocks of an element as full matrices, row by row.
 #[derive(Clone, Debug)]
 pub struct Outputs<T: Number> {
-    /// Block name and its numbers. Energies: `energy`, `grad`, `hess`. Forces: `force`, `dfdx`, `dfdv`. Constraints: all six and
-    /// `constraint`, `jacobian`. Residuals: `residual`, `jacobian`.
+    /// Names and numbers of the blocks:
+    ///
+    /// - energies: `energy`, `grad`, `hess`
+    /// - forces: `force`, `dfdx`, `dfdv`
+    /// - constraints: all six, `constraint` and `jacobian`
+    /// - residuals: `residual` and `jacobian`
     pub blocks: Vec<(&'static str, Vec<T>)>,
-    /// What routines return beside the block they are for: the routine, which block it is, and its numbers, to be held against that.
+    /// Lower-order results that a routine also returns: routine, name of the block, numbers. They must equal that
+    /// block.
     pub repeats: Vec<(&'static str, &'static str, Vec<T>)>,
-    /// Conditions met, by order of derivative: value, first, second.
+    /// Flags of the value, the first and the second derivatives.
     pub flags: [Flags<T>; 3],
 }
 
-/// What every generated element offers, whatever its kind.
+/// The interface that all kinds of generated elements share.
 pub trait Element: Copy {
-    /// What was declared, and what it costs.
+    /// The declaration and the cost of its routines.
     const DECLARATION: &'static Declaration;
 
     /// The same element over another number type.
     type Over<T: Real>: Element;
 
-    /// Evaluates every block on flattened inputs.
+    /// Evaluates all blocks on flattened inputs.
     ///
     /// # Errors
     /// When the rest shape is degenerate.
@@ -95,36 +103,36 @@ pub trait Potential<T: Real>: Element {
     /// The blocks on and above the diagonal: `[Block<T>; N (N + 1) / 2]`.
     type Triangle: Array<Block<T>>;
 
-    /// U.
+    /// Returns U.
     fn value(&self, x: &Self::Points) -> Value<T>;
-    /// [`Self::value`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::value`] for callers that run at SIMD level `L`: it is inlined, so a loop over elements is one kernel.
     #[inline(always)]
     fn value_at<L: Level>(&self, x: &Self::Points) -> Value<T> {
         self.value(x)
     }
-    /// U and ∇U.
+    /// Returns U and ∇U.
     fn gradient(&self, x: &Self::Points) -> Gradient<T, Self::Points>;
-    /// [`Self::gradient`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::gradient`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn gradient_at<L: Level>(&self, x: &Self::Points) -> Gradient<T, Self::Points> {
         self.gradient(x)
     }
-    /// U, ∇U and ∇²U.
+    /// Returns U, ∇U and ∇²U.
     fn hessian(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle>;
-    /// [`Self::hessian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::hessian`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn hessian_at<L: Level>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
         self.hessian(x)
     }
 
-    /// [`Self::hessian`], written to `result` where it is: `*result = element.hessian(x)` would first make it elsewhere and copy some hundred
-    /// numbers, at about the cost of computing them.
+    /// Writes [`Self::hessian`] to `result`. This avoids copying some hundred numbers, which costs about as much as
+    /// computing them.
     #[inline]
     fn hessian_into(&self, x: &Self::Points, result: &mut Hessian<T, Self::Points, Self::Triangle>) {
         T::dispatch(WrittenTo(HessianCall(self, x), result));
     }
 
-    /// ∇²U v, for one vector per point in `v`, without forming ∇²U where that is cheaper.
+    /// Returns ∇²U v for one vector per point in `v`, without forming ∇²U where that is cheaper.
     fn hessian_vector(&self, x: &Self::Points, v: &Self::Points) -> HessianVector<T, Self::Points> {
         let Hessian { hessian, flags, .. } = self.hessian(x);
         let n = Self::Points::LEN;
@@ -147,57 +155,57 @@ pub trait Potential<T: Real>: Element {
         });
         HessianVector { product, flags }
     }
-    /// [`Self::hessian_vector`] compiled into a caller that runs at level `L`.
+    /// [`Self::hessian_vector`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn hessian_vector_at<L: Level>(&self, x: &Self::Points, v: &Self::Points) -> HessianVector<T, Self::Points> {
         self.hessian_vector(x, v)
     }
 }
 
-/// A potential whose derivatives can be had before their expansion to points: there the Hessian is smaller, and cheaper to
-/// make positive semi-definite.
+/// A potential with derivatives in reduced coordinates: the differences of points that the formula forms. There the
+/// Hessian is smaller and cheaper to make positive semi-definite.
 pub trait ReducedPotential<T: Real>: Potential<T> {
     /// One number per coordinate: `[T; n]`.
     type Coordinates: Array<T>;
     /// The upper triangle: `[T; n (n + 1) / 2]`.
     type Upper: Array<T>;
 
-    /// U, ∂U/∂q and ∂²U/∂q².
+    /// Returns U, ∂U/∂q and ∂²U/∂q².
     fn reduced_hessian(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper>;
-    /// [`Self::reduced_hessian`] compiled into a caller that runs at level `L`.
+    /// [`Self::reduced_hessian`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn reduced_hessian_at<L: Level>(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper> {
         self.reduced_hessian(x)
     }
-    /// The derivatives by the points: sums of those by the coordinates with signs. Blocks of points whose bit in `FREE` is not
-    /// set are left out, that is, 0: what only they need is not computed.
+    /// Expands reduced derivatives to points: signed sums of the reduced ones. Bit i of `FREE` marks point i as free;
+    /// blocks of other points are 0 and cost nothing.
     fn expand<const FREE: u32>(
         reduced: &ReducedHessian<T, Self::Coordinates, Self::Upper>,
     ) -> Hessian<T, Self::Points, Self::Triangle>;
-    /// [`Potential::hessian_at`] with the blocks of free points only: point i is free where bit i of `FREE` is set.
+    /// [`Potential::hessian_at`] with blocks of free points only. Bit i of `FREE` marks point i as free.
     #[inline(always)]
     fn hessian_free_at<L: Level, const FREE: u32>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
         Self::expand::<FREE>(&self.reduced_hessian_at::<L>(x))
     }
 }
 
-/// A force f(x, v), not necessarily the gradient of anything.
+/// A force f(x, v), which need not be the gradient of an energy.
 pub trait ForceLaw<T: Real>: Element {
     /// One vector per point: `[Vector3<T>; N]`.
     type Points: Array<Vector3<T>>;
     /// All blocks: `[Block<T>; N * N]`.
     type Square: Array<Block<T>>;
 
-    /// f.
+    /// Returns f.
     fn force(&self, x: &Self::Points, v: &Self::Points) -> ForceValue<T, Self::Points>;
-    /// [`Self::force`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::force`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn force_at<L: Level>(&self, x: &Self::Points, v: &Self::Points) -> ForceValue<T, Self::Points> {
         self.force(x, v)
     }
-    /// f, ∂f/∂x and ∂f/∂v.
+    /// Returns f, ∂f/∂x and ∂f/∂v.
     fn jacobians(&self, x: &Self::Points, v: &Self::Points) -> ForceJacobians<T, Self::Points, Self::Square>;
-    /// [`Self::jacobians`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::jacobians`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn jacobians_at<L: Level>(
         &self,
@@ -208,8 +216,8 @@ pub trait ForceLaw<T: Real>: Element {
     }
 }
 
-/// A constraint C(x) with its compliant forms: as a [`Potential`] it is ½ k_s CᵀC, as a [`ForceLaw`] the force
-/// −Jᵀ (k_s C + k_d Ċ), Ċ = J v (Witkin).
+/// A constraint C(x) and its compliant forms: the [`Potential`] ½ k_s CᵀC and the [`ForceLaw`] −Jᵀ (k_s C + k_d Ċ) with
+/// Ċ = J v (Witkin).
 pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
     /// One number per row of C: `[T; M]`.
     type Rows: Array<T>;
@@ -218,12 +226,12 @@ pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
     /// One triangle per row: `[Block<T>; M * N (N + 1) / 2]`.
     type Triangles: Array<Block<T>>;
 
-    /// C and J.
+    /// Returns C and J.
     fn constraint_jacobian(
         &self,
         x: &<Self as Potential<T>>::Points,
     ) -> ConstraintJacobian<T, Self::Rows, Self::Jacobian>;
-    /// [`Self::constraint_jacobian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::constraint_jacobian`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn constraint_jacobian_at<L: Level>(
         &self,
@@ -231,12 +239,12 @@ pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
     ) -> ConstraintJacobian<T, Self::Rows, Self::Jacobian> {
         self.constraint_jacobian(x)
     }
-    /// C, J and ∂²C.
+    /// Returns C, J and ∂²C.
     fn constraint_hessian(
         &self,
         x: &<Self as Potential<T>>::Points,
     ) -> ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles>;
-    /// [`Self::constraint_hessian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::constraint_hessian`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn constraint_hessian_at<L: Level>(
         &self,
@@ -244,12 +252,12 @@ pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
     ) -> ConstraintHessian<T, Self::Rows, Self::Jacobian, Self::Triangles> {
         self.constraint_hessian(x)
     }
-    /// The always positive semi-definite part k_s JᵀJ of the Hessian of ½ k_s CᵀC, with value and gradient.
+    /// Returns value, gradient and the Gauss–Newton Hessian k_s JᵀJ of ½ k_s CᵀC. It is always positive semi-definite.
     fn gauss_newton(
         &self,
         x: &<Self as Potential<T>>::Points,
     ) -> Hessian<T, <Self as Potential<T>>::Points, <Self as Potential<T>>::Triangle>;
-    /// [`Self::gauss_newton`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::gauss_newton`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn gauss_newton_at<L: Level>(
         &self,
@@ -259,31 +267,31 @@ pub trait Constraint<T: Real>: Potential<T> + ForceLaw<T> {
     }
 }
 
-/// A residual r(u) of unknowns that need not be points.
+/// A residual r(u) of arbitrary unknowns.
 pub trait Residual<T: Real>: Element {
-    /// All unknowns, in declared order: `[T; U]`.
+    /// All unknowns in declared order: `[T; U]`.
     type Unknowns: Array<T>;
     /// One number per row: `[T; M]`.
     type Rows: Array<T>;
-    /// Row-major: `[T; M * U]`.
+    /// All entries, row by row: `[T; M * U]`.
     type Jacobian: Array<T>;
 
-    /// r.
+    /// Returns r.
     fn residual(&self, u: &Self::Unknowns) -> ResidualValue<T, Self::Rows>;
-    /// [`Self::residual`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::residual`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn residual_at<L: Level>(&self, u: &Self::Unknowns) -> ResidualValue<T, Self::Rows> {
         self.residual(u)
     }
-    /// r and J.
+    /// Returns r and J.
     fn jacobian(&self, u: &Self::Unknowns) -> ResidualJacobian<T, Self::Rows, Self::Jacobian>;
-    /// [`Self::jacobian`] compiled into a caller that runs at level `L`, so that a loop over elements is one kernel.
+    /// [`Self::jacobian`] for callers that run at SIMD level `L`.
     #[inline(always)]
     fn jacobian_at<L: Level>(&self, u: &Self::Unknowns) -> ResidualJacobian<T, Self::Rows, Self::Jacobian> {
         self.jacobian(u)
     }
 
-    /// [`Self::jacobian`], written to `result` where it is and not made elsewhere and copied.
+    /// Writes [`Self::jacobian`] to `result`, which avoids a copy.
     #[inline]
     fn jacobian_into(&self, u: &Self::Unknowns, result: &mut ResidualJacobian<T, Self::Rows, Self::Jacobian>) {
         T::dispatch(WrittenTo(ResidualJacobianCall(self, u), result));

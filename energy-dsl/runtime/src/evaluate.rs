@@ -1,4 +1,4 @@
-//! Every block of an element on flattened inputs: what tools that handle all elements alike call.
+//! Evaluation of all blocks on flattened inputs, for tools that treat all elements in the same way.
 
 use super::array::Array;
 use super::element::{Block, Constraint, ForceLaw, Inputs, Outputs, Potential, Residual, Vector3, triangle_index};
@@ -13,7 +13,7 @@ fn flat<T: Real>(vectors: &[Vector3<T>]) -> Vec<T> {
     vectors.iter().flatten().copied().collect()
 }
 
-/// A triangle as a full matrix, row by row.
+/// Expands a triangle to a full matrix, row by row.
 fn full_triangle<T: Real>(points: usize, triangle: &[Block<T>]) -> Vec<T> {
     let mut full = Vec::with_capacity(9 * points * points);
     for row in 0..3 * points {
@@ -29,13 +29,13 @@ fn full_triangle<T: Real>(points: usize, triangle: &[Block<T>]) -> Vec<T> {
     full
 }
 
-/// A square as a full matrix, row by row.
+/// Expands a square to a full matrix, row by row.
 fn full_square<T: Real>(points: usize, square: &[Block<T>]) -> Vec<T> {
     let entries = (0..3 * points).flat_map(|row| (0..3 * points).map(move |column| (row, column)));
     entries.map(|(row, column)| square[row / 3 * points + column / 3][row % 3][column % 3]).collect()
 }
 
-/// Blocks `energy`, `grad`, `hess`.
+/// Evaluates the blocks `energy`, `grad` and `hess`.
 #[doc(hidden)]
 pub fn evaluate_potential<T: Real, E: Potential<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
     let x: E::Points = points(inputs.positions);
@@ -55,7 +55,7 @@ pub fn evaluate_potential<T: Real, E: Potential<T>>(element: &E, inputs: &Inputs
     }
 }
 
-/// Blocks `force`, `dfdx`, `dfdv`.
+/// Evaluates the blocks `force`, `dfdx` and `dfdv`.
 #[doc(hidden)]
 pub fn evaluate_force_law<T: Real, E: ForceLaw<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
     let (x, v): (E::Points, E::Points) = (points(inputs.positions), points(inputs.velocities));
@@ -72,7 +72,7 @@ pub fn evaluate_force_law<T: Real, E: ForceLaw<T>>(element: &E, inputs: &Inputs<
     }
 }
 
-/// The blocks of both, and `constraint`, `jacobian`.
+/// Evaluates the blocks of the potential and the force, `constraint` and `jacobian`.
 #[doc(hidden)]
 pub fn evaluate_constraint<T: Real, E: Constraint<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
     let mut outputs = evaluate_potential(element, inputs);
@@ -86,7 +86,7 @@ pub fn evaluate_constraint<T: Real, E: Constraint<T>>(element: &E, inputs: &Inpu
     outputs
 }
 
-/// Blocks `residual`, `jacobian`.
+/// Evaluates the blocks `residual` and `jacobian`.
 #[doc(hidden)]
 pub fn evaluate_residual<T: Real, E: Residual<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
     let u = E::Unknowns::from_fn(|i| inputs.positions[i]);

@@ -1,37 +1,37 @@
 use super::real::{Mask, Number};
 
-/// Why a result is a documented convention and not the limit of a formula.
+/// The reason why a result is a documented convention instead of the limit of a formula.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Flag {
-    /// A true singularity (coincident points, a zero-area triangle, …): the primitive's documented value was returned.
+    /// A true singularity (coincident points, a triangle without area). The primitive's documented value was returned.
     Degenerate,
-    /// One-sided derivatives differ here: those of one documented side were returned.
+    /// One-sided derivatives differ. Those of one documented side were returned.
     Kink,
 }
 
-/// The conditions met while evaluating a routine, one mask per [`Flag`]. For lanes each lane has its own.
+/// Flags of one evaluation: one mask per [`Flag`], with one entry per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Flags<T: Number> {
-    /// Where [`Flag::Degenerate`] holds.
+    /// Lanes with [`Flag::Degenerate`].
     pub degenerate: T::Mask,
-    /// Where [`Flag::Kink`] holds.
+    /// Lanes with [`Flag::Kink`].
     pub kink: T::Mask,
 }
 
 impl<T: Number> Flags<T> {
-    /// No condition met.
+    /// Returns flags that are not set.
     #[must_use]
     pub fn clear() -> Self {
         Self { degenerate: T::Mask::none(), kink: T::Mask::none() }
     }
 
-    /// Both conditions, each where either of the two has it.
+    /// Returns the union of two sets of flags.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { degenerate: self.degenerate | other.degenerate, kink: self.kink | other.kink }
     }
 
-    /// Whether any condition was met (in any lane).
+    /// Returns whether any flag is set in any lane.
     #[must_use]
     pub fn any(self) -> bool {
         (self.degenerate | self.kink).any()

@@ -1,5 +1,5 @@
-//! What generated code calls, and what calls generated code: number types, lanes and levels, element traits and the
-//! self-description that every generated element carries.
+//! Code that generated elements call, and code that calls them: number types, SIMD lanes and levels, element traits,
+//! batches, and the self-description of every generated element.
 
 mod aligned;
 mod array;

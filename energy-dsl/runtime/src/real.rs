@@ -6,28 +6,28 @@ use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Un
 use super::flags::Flags;
 use super::unbounded::{Unbounded, WithCare};
 
-/// The outcome of a comparison: `bool`, or one per lane.
+/// The outcome of a comparison: a `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
-    /// False everywhere.
+    /// Returns the mask that is false in all lanes.
     fn none() -> Self;
-    /// Bit `i` is set where lane `i` is true.
+    /// Returns the lanes as bits: bit `i` is lane `i`.
     fn bits(self) -> u32;
-    /// True in lane `i` where bit `i` is set; further bits are ignored.
+    /// Creates a mask from bits: lane `i` is bit `i`. Surplus bits are ignored.
     fn from_bits(bits: u32) -> Self;
 
-    /// Whether it is true anywhere.
+    /// Returns whether the mask is true in some lane.
     #[inline(always)]
     fn any(self) -> bool {
         self.bits() != 0
     }
 
-    /// Whether it is true everywhere.
+    /// Returns whether the mask is true in all lanes.
     #[inline(always)]
     fn all(self) -> bool {
         !(!self).any()
     }
 
-    /// Whether it is true in a lane.
+    /// Returns the mask in one lane.
     #[inline(always)]
     fn lane(self, lane: usize) -> bool {
         self.bits() >> lane & 1 != 0
@@ -51,105 +51,108 @@ impl Mask for bool {
     }
 }
 
-/// The arithmetic that a formula needs. Generated code runs over any [`Real`]; the interpreter over any `Number`, which
-/// need not be `Copy` (multi-precision numbers are not).
+/// The arithmetic that formulas need. Generated code runs over any [`Real`]; the interpreter runs over any `Number`,
+/// which need not be `Copy` (multi-precision numbers are not).
 ///
-/// What depends on the processor takes the [`Level`] it runs at: whether products and sums fuse, and so how elementary
-/// functions are evaluated.
+/// Operations that depend on the processor take the SIMD [`Level`]: it decides whether products fuse with sums, and so
+/// how elementary functions are evaluated.
 pub trait Number:
     Clone + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// What a comparison yields.
+    /// The outcome of a comparison.
     type Mask: Mask;
-    /// Whether there are several lanes, so that a mask may hold for some and not for others.
+    /// Whether the type has several lanes, so that a mask may differ between them.
     const WIDE: bool = false;
-    /// What extraordinary configurations are computed with: numbers of one lane, of the same precision, whose exponents do not
-    /// end. A type whose numbers neither overflow nor vanish, or that has no such counterpart, names itself.
+    /// Single-lane numbers with the same significand and an extended exponent, used for extraordinary configurations. A
+    /// type that cannot overflow, or that has no such counterpart, names itself.
     type Unbounded: Number<Unbounded = Self::Unbounded>;
 
-    /// One lane (of which a scalar has one, number 0).
+    /// Returns one lane. A scalar has one, number 0.
     fn unbounded(&self, lane: usize) -> Self::Unbounded;
     /// Replaces one lane by the number nearest to `value`.
     fn set_lane(&mut self, lane: usize, value: Self::Unbounded);
 
-    /// The number nearest to a double.
+    /// Returns the number nearest to a double.
     fn from_f64(value: f64) -> Self;
-    /// √self.
+    /// Returns √self.
     fn sqrt(self) -> Self;
-    /// |self|.
+    /// Returns |self|.
     fn abs(self) -> Self;
-    /// The smaller of the two.
+    /// Returns the smaller of the two.
     fn min(self, other: Self) -> Self;
-    /// The larger of the two.
+    /// Returns the larger of the two.
     fn max(self, other: Self) -> Self;
-    /// Sine of an angle in radians.
+    /// Returns the sine of an angle in radians.
     fn sin<L: Level>(self) -> Self;
-    /// Cosine of an angle in radians.
+    /// Returns the cosine of an angle in radians.
     fn cos<L: Level>(self) -> Self;
-    /// Sine and cosine of an angle in radians.
+    /// Returns sine and cosine of an angle in radians.
     fn sin_cos<L: Level>(self) -> (Self, Self) {
         (self.clone().sin::<L>(), self.cos::<L>())
     }
-    /// eˣ.
+    /// Returns eˣ.
     fn exp<L: Level>(self) -> Self;
-    /// Natural logarithm.
+    /// Returns the natural logarithm.
     fn ln<L: Level>(self) -> Self;
-    /// The angle of the point (`x`, `self`), in (−π, π].
+    /// Returns the angle of the point (`x`, `self`), in (−π, π].
     fn atan2<L: Level>(self, x: Self) -> Self;
-    /// The same where `self`² + `x`² [is moderate](Self::is_moderate), of degree 8 at most; elsewhere anything.
+    /// [`Self::atan2`] where `self`² + `x`² [is moderate](Self::is_moderate), of degree 8 at most. Elsewhere the result
+    /// is arbitrary.
     fn moderate_atan2<L: Level>(self, x: Self) -> Self {
         self.atan2::<L>(x)
     }
-    /// self to a real power.
+    /// Returns self to a real power.
     fn powf<L: Level>(self, exponent: Self) -> Self;
-    /// self · factor + addend, rounded once where the level has fused operations and twice elsewhere.
+    /// Returns self · factor + addend, rounded once where the level has fused operations and twice elsewhere.
     fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
         self * factor + addend
     }
-    /// What rounding `self + other` lost: (self + other) − fl(self + other), exactly. Zero in exact arithmetic.
+    /// Returns the rounding error of `self + other`: (self + other) − fl(self + other), exactly. Zero in exact
+    /// arithmetic.
     fn sum_error(self, other: Self) -> Self;
-    /// What rounding `self - other` lost: (self − other) − fl(self − other), exactly. Zero in exact arithmetic.
+    /// Returns the rounding error of `self - other`: (self − other) − fl(self − other), exactly. Zero in exact
+    /// arithmetic.
     fn difference_error(self, other: Self) -> Self {
         self.sum_error(-other)
     }
-    /// What rounding `self · other` lost: self·other − fl(self·other), exactly unless it underflows. Zero in exact arithmetic.
+    /// Returns the rounding error of `self · other`: self·other − fl(self·other), exactly unless it underflows. Zero in
+    /// exact arithmetic.
     fn product_error<L: Level>(self, other: Self) -> Self;
-    /// self · factor − subtrahend as if rounded once.
+    /// Returns self · factor − subtrahend as if rounded once.
     fn fused_mul_sub<L: Level>(self, factor: Self, subtrahend: Self) -> Self {
         let error = self.clone().product_error::<L>(factor.clone());
         (self * factor - subtrahend) + error
     }
-    /// What rounding the square root of `self` to `root` lost: self − root², exactly but for one last rounding. Zero in exact
-    /// arithmetic.
+    /// Returns the rounding error of `root` = fl(√self): self − root², rounded once. Zero in exact arithmetic.
     fn root_error<L: Level>(self, root: Self) -> Self {
         let square = root.clone() * root.clone();
         (self - square) - root.clone().product_error::<L>(root)
     }
-    /// A power of two s with 1 ≤ s·|self| < 2, for |self| a normal number; 1 for zero, infinity and NaN. Multiplying by it
-    /// is exact. Its derivative is taken as zero: formulas that use it are invariant to it.
+    /// Returns the power of two s with 1 ≤ s·|self| < 2 if |self| is a normal number; 1 for zero, infinity and NaN.
+    /// Multiplying by s is exact. Its derivative is taken as zero: formulas that use it do not depend on it.
     fn power_of_two_scale(self) -> Self;
-    /// Whether 2^(−80·`degree`) ≤ self < 2^(80·`degree`) (12 for 80 in single precision): a power `degree` of a length for
-    /// which products of up to eight such lengths neither overflow nor vanish. Generated code then leaves scaling out; a type
-    /// that cannot tell says no.
+    /// Returns whether 2^(−80·`degree`) ≤ self < 2^(80·`degree`) (12 instead of 80 in single precision). Such a number
+    /// is a product of `degree` moderate lengths: products of up to eight moderate lengths neither overflow nor
+    /// underflow, and generated code skips scaling. A type that cannot tell returns false.
     #[allow(clippy::wrong_self_convention)] // numbers are taken by value throughout
     fn is_moderate(self, _degree: u8) -> Self::Mask {
         Self::Mask::none()
     }
-    /// self < other.
+    /// Returns self < other.
     fn less(self, other: Self) -> Self::Mask;
-    /// self ≤ other.
+    /// Returns self ≤ other.
     fn less_or_equal(self, other: Self) -> Self::Mask;
-    /// self = other.
+    /// Returns self = other.
     fn equal(self, other: Self) -> Self::Mask;
-    /// `yes` where the mask holds, `no` elsewhere.
+    /// Returns `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// The number itself. Of [`Number::Unbounded`] numbers, one that is too large for the bounded type though not infinite becomes
-    /// a large one instead, that a few more such can be added to or subtracted from: sums of what overflows are then numbers.
+    /// Returns the number itself, except that a [`Number::Unbounded`] number beyond the bounded type's range, but not
+    /// infinite, becomes a large finite one. A few of these can still be added to or subtracted from each other.
     #[must_use]
     fn saturated(self) -> Self {
         self
     }
-    /// Runs a routine with all precautions over this type.
+    /// Runs the general path of a routine over this type.
     #[doc(hidden)]
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Self; INPUTS],
@@ -159,7 +162,7 @@ pub trait Number:
     {
         W::run(inputs)
     }
-    /// Runs a kernel over this type at the level that suits it: the best this machine has for `f64` and `f32`.
+    /// Runs a kernel over this type at the level that suits it: the best level of the machine for `f64` and `f32`.
     fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Baseline>()
     }
@@ -243,14 +246,14 @@ macro_rules! number_for_float {
             }
             #[inline(always)]
             fn sum_error(self, other: Self) -> Self {
-                // Knuth's TwoSum.
+                // Knuth's 2Sum.
                 let sum = self + other;
                 let virtual_other = sum - self;
                 (self - (sum - virtual_other)) + (other - virtual_other)
             }
             #[inline(always)]
             fn difference_error(self, other: Self) -> Self {
-                // The same without −other: one instruction less.
+                // 2Sum without forming −other: one instruction less.
                 let difference = self - other;
                 let virtual_other = self - difference;
                 (self - (difference + virtual_other)) + (virtual_other - other)
@@ -261,7 +264,7 @@ macro_rules! number_for_float {
                 if L::FUSED {
                     return $float::mul_add(self, other, -product);
                 }
-                // Dekker's product: `mul_add` is a slow library call where the target has no fused instruction.
+                // Dekker's product. Without a fused instruction, `mul_add` is a slow library call.
                 let halves = |value: $float| {
                     let shifted = <$float as Scalar>::SPLITTER * value;
                     let high = shifted - (shifted - value);

@@ -1,126 +1,127 @@
-//! What routines return.
+//! Results of routines.
 
 use super::flags::Flags;
 use super::real::Number;
 
-/// A scalar routine's result without derivatives.
+/// The value of an energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Value<T: Number> {
-    /// U.
+    /// The energy U.
     pub value: T,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// U and ∇U.
+/// Value and gradient of an energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Gradient<T: Number, Points> {
-    /// U.
+    /// The energy U.
     pub value: T,
     /// ∂U/∂x, one vector per point. The force is its negative.
     pub gradient: Points,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// U, ∇U and ∇²U.
+/// Value, gradient and Hessian of an energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Hessian<T: Number, Points, Triangle> {
-    /// U.
+    /// The energy U.
     pub value: T,
     /// ∂U/∂x, one vector per point.
     pub gradient: Points,
-    /// ∂²U/∂x², one triangle of blocks; the diagonal blocks are exactly symmetric.
+    /// ∂²U/∂x², one triangle of blocks. The diagonal blocks are exactly symmetric.
     pub hessian: Triangle,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// ∇²U v.
+/// The product of a Hessian with a vector.
 #[derive(Clone, Copy, Debug)]
 pub struct HessianVector<T: Number, Points> {
     /// ∂²U/∂x² v, one vector per point.
     pub product: Points,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// U, ∇U and ∇²U by the coordinates that derivatives are taken in: the differences of points through which U sees them, three
-/// numbers to a difference, as [`crate::Declaration::reduced_vectors`] lists them.
+/// Value, gradient and Hessian in reduced coordinates: the differences of points that the energy depends on, three
+/// numbers each, listed in [`crate::Declaration::reduced_vectors`].
 #[derive(Clone, Copy, Debug)]
 pub struct ReducedHessian<T: Number, Coordinates, Upper> {
-    /// U.
+    /// The energy U.
     pub value: T,
-    /// ∂U/∂q.
+    /// ∂U/∂q, one number per coordinate.
     pub gradient: Coordinates,
     /// ∂²U/∂q², the upper triangle row by row.
     pub hessian: Upper,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// f.
+/// The value of a force law.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceValue<T: Number, Points> {
     /// The force on each point.
     pub force: Points,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// f, ∂f/∂x and ∂f/∂v.
+/// Value and Jacobians of a force law.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceJacobians<T: Number, Points, Square> {
     /// The force on each point.
     pub force: Points,
-    /// ∂f/∂x: block (i, j), at i·N + j, is the derivative of the force on point i by point j. Not symmetric in general.
+    /// ∂f/∂x. Block (i, j) at index i·N + j is the derivative of the force on point i by point j. Not symmetric in
+    /// general.
     pub by_position: Square,
-    /// ∂f/∂v, laid out likewise.
+    /// ∂f/∂v, with the same layout.
     pub by_velocity: Square,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// C and J = ∂C/∂x.
+/// Value and Jacobian of a constraint.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstraintJacobian<T: Number, Rows, Jacobian> {
-    /// C.
+    /// The constraint C, one number per row.
     pub value: Rows,
     /// ∂C/∂x, row by row, one vector per point.
     pub jacobian: Jacobian,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// C, J and ∂²C/∂x².
+/// Value, Jacobian and second derivatives of a constraint.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstraintHessian<T: Number, Rows, Jacobian, Triangles> {
-    /// C.
+    /// The constraint C, one number per row.
     pub value: Rows,
     /// ∂C/∂x, row by row, one vector per point.
     pub jacobian: Jacobian,
     /// ∂²C/∂x², one triangle of blocks per row of C.
     pub hessians: Triangles,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// r.
+/// The value of a residual.
 #[derive(Clone, Copy, Debug)]
 pub struct ResidualValue<T: Number, Rows> {
-    /// The residual.
+    /// The residual r, one number per row.
     pub value: Rows,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
 
-/// r and J = ∂r/∂(unknowns).
+/// Value and Jacobian of a residual.
 #[derive(Clone, Copy, Debug)]
 pub struct ResidualJacobian<T: Number, Rows, Jacobian> {
-    /// The residual.
+    /// The residual r, one number per row.
     pub value: Rows,
-    /// ∂r/∂u, row-major: row of r, then unknown in declared order.
+    /// ∂r/∂u, row by row; columns are the unknowns in declared order.
     pub jacobian: Jacobian,
-    /// Conditions met.
+    /// Flags of this evaluation.
     pub flags: Flags<T>,
 }

@@ -1,4 +1,4 @@
-//! Numbers whose exponent does not end.
+//! Numbers with an extended exponent.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -6,24 +6,24 @@ use super::cpu::{Fused, Level, Scalar};
 use super::flags::Flags;
 use super::real::{Mask, Number, Real};
 
-/// significand · 2^exponent: rounded as the floating-point type rounds, but nothing overflows or vanishes on the way to a result
-/// that has a place in that type. Extraordinary configurations are computed with it: edges of 1e-160, whose squares have no
-/// place among doubles, keep all their digits.
+/// The number significand · 2^exponent. It rounds as the floating-point type does, but intermediate results neither
+/// overflow nor underflow. Extraordinary configurations are computed with it: edges of length 1e-160, whose squares
+/// underflow in doubles, keep all their digits.
 ///
 /// Where the plain type neither overflows nor underflows, the bits are the same.
 #[derive(Clone, Copy, Debug)]
 pub struct Unbounded<S> {
-    /// 0, infinite, NaN, or of a magnitude in [1/`S::SPAN`, `S::SPAN`).
+    /// Zero, infinite, NaN, or of a magnitude in [1/`S::SPAN`, `S::SPAN`).
     significand: S,
     exponent: i32,
 }
 
-/// Beyond these exponents numbers are infinite, or 0: far enough that no formula gets there, near enough that sums of exponents
-/// fit.
+/// Numbers with larger exponents are infinite; those with smaller ones are 0. The bound is out of reach of formulas,
+/// and sums of exponents fit in an `i32`.
 const LAST_EXPONENT: i32 = 1 << 28;
 
 impl<S: Scalar> Unbounded<S> {
-    /// The same number.
+    /// Converts a number of the type, exactly.
     pub(crate) fn of(value: S) -> Self {
         Self::new(value, 0)
     }
@@ -46,7 +46,7 @@ impl<S: Scalar> Unbounded<S> {
             return Self::normalised(significand * S::power_of_two(S::REACH), exponent - S::REACH);
         }
         let own = significand.exponent();
-        // 2^−own may itself be no normal number.
+        // Two factors, because 2^−own itself may not be a normal number.
         let significand = significand * S::power_of_two(-own / 2) * S::power_of_two(-own - -own / 2);
         match exponent + own {
             e if e >= LAST_EXPONENT => Self { significand: significand * S::INFINITY, exponent: 0 },
@@ -55,7 +55,7 @@ impl<S: Scalar> Unbounded<S> {
         }
     }
 
-    /// With a significand in [1, 2), if it is a plain number.
+    /// Returns significand and exponent, with the significand of a finite nonzero number in [1, 2).
     fn split(self) -> (S, i32) {
         let Self { significand, exponent } = Self::normalised(self.significand, self.exponent);
         (significand, exponent)
@@ -66,7 +66,7 @@ impl<S: Scalar> Unbounded<S> {
         S::default() < magnitude && magnitude < S::INFINITY
     }
 
-    /// The nearest number of the type: infinite or 0 where it has none.
+    /// Returns the nearest number of the type: infinite or 0 if it is out of range.
     pub(crate) fn to_scalar(self) -> S {
         if !self.is_plain() {
             return self.significand;
@@ -75,19 +75,20 @@ impl<S: Scalar> Unbounded<S> {
         match exponent {
             e if e > S::LAST => significand * S::INFINITY,
             e if e < S::FIRST - 80 => significand * S::default(),
-            // The first product is exact, so that a subnormal result is rounded once.
+            // The first product is exact, so a subnormal result is rounded once.
             e if e < S::FIRST => significand * S::power_of_two(S::FIRST) * S::power_of_two(e - S::FIRST),
             e => significand * S::power_of_two(e),
         }
     }
 
-    /// Whether the number has a place in the type, normal or 0.
+    /// Returns whether the number is 0 or a normal number of the type.
     fn fits(self) -> bool {
         let (_, exponent) = self.split();
         (S::FIRST..=S::LAST).contains(&exponent)
     }
 
-    /// Both as multiples of one power of two. What is too small to change a sum but by its sign stays that small.
+    /// Returns both significands for one common exponent. A number too small to change a sum, except by its sign, stays
+    /// that small.
     fn aligned(self, other: Self) -> (S, S, i32) {
         let lift = |from: i32, to: i32| S::power_of_two((from - to).max(-S::REACH));
         if self.exponent == other.exponent || !self.is_plain() || !other.is_plain() {
@@ -100,7 +101,7 @@ impl<S: Scalar> Unbounded<S> {
         }
     }
 
-    /// self · factor + addend, rounded once.
+    /// Returns self · factor + addend, rounded once.
     fn fused<L: Level>(self, factor: Self, addend: Self) -> Self {
         let (a, b, c) = (self.significand, factor.significand, addend.significand);
         let exponent = self.exponent + factor.exponent;
@@ -115,7 +116,8 @@ impl<S: Scalar> Unbounded<S> {
         Self::new(a.mul_add::<L>(b, c * S::power_of_two(shift.max(-S::REACH))), exponent)
     }
 
-    /// A function of a number that need not be exact to the bit beyond the type's range: in double precision.
+    /// Creates the result of a function that was evaluated in double precision. Beyond the range of the type it need
+    /// not be exact to the last bit.
     fn by_double(significand: f64, exponent: i32) -> Self {
         let double = Unbounded::<f64>::new(significand, exponent);
         let (significand, exponent) = double.split();
@@ -132,7 +134,8 @@ macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $result:expr) => {
         impl<S: Scalar> $trait for Unbounded<S> {
             type Output = Self;
-            // Routines are thousands of operations, and cold: calls compile soon and stay small.
+            // Not inlined: general paths are thousands of operations and cold, so calls keep them small and quick to
+            // compile.
             #[inline(never)]
             fn $method(self, other: Self) -> Self {
                 let ($a, $b) = (self, other);
@@ -192,7 +195,7 @@ impl<S: Scalar> Number for Unbounded<S> {
     }
     #[inline(never)]
     fn sin<L: Level>(self) -> Self {
-        // So near 0 it is x.
+        // For |x| < 2⁻⁶⁰ the result is x.
         if self.is_plain() && self.split().1 < -60 { self } else { Self::new(self.to_scalar().sin::<L>(), 0) }
     }
     #[inline(never)]
@@ -207,7 +210,7 @@ impl<S: Scalar> Number for Unbounded<S> {
         if is_normal || !self.is_plain() || self.split().1 > 24 {
             return Self::new(result, 0);
         }
-        // eˣ = 2ᵏ e^(x − k ln 2), ln 2 in two parts, the first of few enough bits for k times it.
+        // eˣ = 2ᵏ e^(x − k ln 2). ln 2 is split in two; the first part has so few bits that k times it is exact.
         const HIGH: f64 = 0.693_147_180_369_123_8;
         const LOW: f64 = 1.908_214_929_270_587_7e-10;
         let x = plain.to_f64();
@@ -225,7 +228,7 @@ impl<S: Scalar> Number for Unbounded<S> {
     #[inline(never)]
     fn atan2<L: Level>(self, x: Self) -> Self {
         let (y, x_aligned, _) = self.aligned(x);
-        // Where y is less than the last bit of x > 0, the angle is their quotient.
+        // If y is less than the last bit of x > 0, the angle is y/x.
         let is_slight = self.is_plain() && x.is_plain() && S::default() < x.significand;
         let quotient = self / x;
         if is_slight && quotient.split().1 < -80 { quotient } else { Self::new(y.atan2::<L>(x_aligned), 0) }
@@ -316,26 +319,25 @@ impl<S: Scalar> Number for Unbounded<S> {
     }
 }
 
-/// A routine with all precautions, of numbers read to numbers returned.
+/// The general path of a routine: all precautions, flattened inputs and outputs.
 ///
-/// It runs with fused operations whatever the level: what depends on it is so rare that their time does not matter, and all
-/// levels give the same bits.
+/// It always uses fused operations. It is so rare that their cost does not matter, and all levels give the same bits.
 #[doc(hidden)]
 pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
-    /// Runs it at a level.
+    /// Runs the path at a SIMD level.
     fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
 
-    /// The routine in double precision, as the crate that declares it compiled it.
+    /// Returns the path in double precision, as compiled by the declaring crate.
     fn compiled() -> &'static Precautions<INPUTS, OUTPUTS>;
 
-    /// Runs it.
+    /// Runs the path with fused operations.
     fn run<T: Real>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>) {
         Self::run_at::<T, Fused>(inputs)
     }
 }
 
-/// A routine with all precautions in double precision. A `static` of it is compiled where it is written, and not again in
-/// every crate that evaluates the element. Single precision is compiled by the crates that use it.
+/// The general path of a routine in double precision. As a `static` it is compiled once, in the crate that declares the
+/// element. Crates that use single precision compile that path themselves.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
@@ -346,15 +348,16 @@ type Routine<const INPUTS: usize, const OUTPUTS: usize> =
     fn(&[Unbounded<f64>; INPUTS]) -> ([Unbounded<f64>; OUTPUTS], Flags<Unbounded<f64>>);
 
 impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
-    /// Those of a routine.
+    /// Creates the table of a routine.
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
         Self { double: W::run::<Unbounded<f64>> }
     }
 }
 
-/// Runs a routine with all precautions in the lanes where `extraordinary` holds; the others are 0. Scalar and lanes give the same
-/// bits, for it is one code that runs. Outputs from number `summed` on will be added to each other: they are [`Number::saturated`].
+/// Runs the general path in the lanes where `extraordinary` holds; the other lanes are 0. Scalars and lanes run the
+/// same code and give the same bits. Outputs from index `summed` on are [`Number::saturated`], because they are added
+/// to each other later.
 #[doc(hidden)]
 #[cold]
 #[inline(never)]
@@ -383,7 +386,7 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
     (outputs, Flags { degenerate: mask(degenerate), kink: mask(kink) })
 }
 
-/// A result that is not a number though all that was read are (0/0 at a singularity, say) is taken as 0, and flagged.
+/// Replaces NaN results by 0 and flags them as degenerate, unless an input was NaN.
 pub fn settle<T: Number>(inputs: &[T], results: &mut [T], flags: &mut Flags<T>) {
     let is_number = |x: &T| x.clone().equal(x.clone()).all();
     if !inputs.iter().all(is_number) {
@@ -404,7 +407,7 @@ mod tests {
         Unbounded::of(value)
     }
 
-    /// The same bits, but for the sign of 0 and the kind of NaN.
+    /// Asserts equal bits, except for the sign of 0 and the payload of NaN.
     fn assert_same<S: Scalar>(got: Unbounded<S>, plain: S, what: &str) {
         let got = got.to_scalar();
         assert!(

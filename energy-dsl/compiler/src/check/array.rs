@@ -1,4 +1,5 @@
-//! Arrays, their entries, components of vectors, and sums over indices. All of it is unrolled: an array is its entries.
+//! Arrays, their entries, components of vectors, and sums over indices. All of them are unrolled: an array is the list
+//! of its entries.
 
 use super::expression::{Checker, Meaning, constant};
 use super::typed::{Typed, TypedKind};
@@ -6,11 +7,11 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::functions::{self, Shape};
 use crate::syntax::{Expression, Name, Sum};
 
-/// How many terms the sums of a declaration may unroll to.
+/// Maximum number of terms that the sums of a declaration unroll to.
 const MOST_TERMS: usize = 1024;
 
 impl<'a> Checker<'a> {
-    /// `[a, b, …]`.
+    /// Checks `[a, b, …]`.
     pub(super) fn list(&mut self, items: &'a [Expression], span: &Span) -> Option<Typed> {
         let checked: Vec<_> = items.iter().map(|item| self.expression(item)).collect();
         let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
@@ -23,7 +24,7 @@ impl<'a> Checker<'a> {
         Some(Typed { kind: TypedKind::Array(checked), shape: Shape::Array(length), span: span.clone() })
     }
 
-    /// `a[i]`: an entry of an array, or a component.
+    /// Checks `a[i]`: an entry of an array, or a component of a vector.
     pub(super) fn index(&mut self, of: &'a Expression, index: &'a Expression) -> Option<Typed> {
         let value = self.expression(of)?;
         let number = self.whole_number(index, "an index")?;
@@ -43,7 +44,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// `v.x`, `q.w`.
+    /// Checks `v.x` and `q.w`.
     pub(super) fn component(&mut self, of: &'a Expression, name: &Name) -> Option<Typed> {
         let value = self.expression(of)?;
         let letters = match value.shape {
@@ -74,7 +75,7 @@ impl<'a> Checker<'a> {
         Some(Typed { kind: TypedKind::Call(function, arguments), shape: Shape::Scalar, span: span.clone() })
     }
 
-    /// `sum(j in first..end, term)`.
+    /// Checks and unrolls `sum(j in first..end, term)`.
     pub(super) fn sum(&mut self, sum: &'a Sum, span: &Span) -> Option<Typed> {
         let (first, end) = (self.whole_number(&sum.first, "a range"), self.whole_number(&sum.end, "a range"));
         let (first, end) = (first?, end?);

@@ -1,4 +1,4 @@
-//! Constants: named numbers, and what of a formula is one.
+//! Constants, and constant values of expressions.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions::Shape;
 use crate::syntax::{Constant, Expression, Name};
 
-/// The constants beside the declarations, which every declaration sees.
+/// Constants outside declarations, visible in all of them.
 #[derive(Default)]
 pub(super) struct Globals {
     pub(super) bindings: Vec<Binding>,
@@ -17,7 +17,7 @@ pub(super) struct Globals {
 }
 
 impl Globals {
-    /// Checks each in the sight of those before it.
+    /// Checks the constants in order. Each one sees those before it.
     pub(super) fn of<'a>(constants: impl Iterator<Item = &'a Constant>, diagnostics: &mut Diagnostics) -> Self {
         let signature = Signature::empty();
         let mut globals = Self::default();
@@ -37,7 +37,7 @@ impl Globals {
 }
 
 impl<'a> Checker<'a> {
-    /// A constant is a binding whose value needs no input.
+    /// Checks a constant. It is a binding whose value needs no input.
     pub(super) fn constant(&mut self, constant: &'a Constant) -> Option<Meaning> {
         let value = self.expression(&constant.value)?;
         if value.shape != Shape::Scalar || evaluate(&self.bindings, &value).is_none() {
@@ -50,7 +50,7 @@ impl<'a> Checker<'a> {
         Some(Meaning::Binding(self.bindings.len() - 1, Shape::Scalar))
     }
 
-    /// The whole number that an expression always is.
+    /// Returns the constant whole number that an expression equals.
     pub(super) fn whole_number(&mut self, expression: &'a Expression, what: &str) -> Option<usize> {
         let typed = self.expression(expression)?;
         match evaluate(&self.bindings, &typed) {
@@ -65,7 +65,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// The length of an array.
+    /// Returns the length of an array.
     pub(super) fn array_length(&mut self, name: &Name, expression: &'a Expression) -> Option<usize> {
         let length = self.whole_number(expression, &format!("the length of `{}`", name.text))?;
         if (1..=MOST_ENTRIES).contains(&length) {
@@ -77,10 +77,10 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// A formula is unrolled: longer arrays are data, not a formula.
+/// Maximum length of an array. Formulas are unrolled; longer arrays are data.
 const MOST_ENTRIES: usize = 256;
 
-/// The number that a value always is.
+/// Returns the constant that a value equals; `None` if it is not constant.
 pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
     match &typed.kind {
         TypedKind::Constant(value) => Some(*value),
@@ -105,7 +105,7 @@ pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
     }
 }
 
-/// What a comparison always is.
+/// Returns the constant outcome of a comparison; `None` if it is not constant.
 pub(super) fn truth(bindings: &[Binding], typed: &Typed) -> Option<bool> {
     let TypedKind::Call(function, arguments) = &typed.kind else { return None };
     let [a, b] = arguments.as_slice() else { return None };

@@ -7,29 +7,29 @@ use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
 use crate::functions::{self, Shape};
 use crate::syntax::{Body, Expression, ExpressionKind, Name, UserFunction, canonical};
 
-/// What a name stands for.
+/// The meaning of a name.
 #[derive(Clone)]
 pub(super) enum Meaning {
     Input(Source, usize, Shape, Option<usize>),
     Binding(usize, Shape),
     /// The entries of an array.
     Entries(Vec<Meaning>),
-    /// What counts in a sum.
+    /// The index variable of a `sum`.
     Index(usize),
 }
 
-/// Checks the expressions of one declaration. An erroneous expression is reported once and yields `None`; its neighbours are
-/// still checked.
+/// Checks the expressions of one declaration. An invalid expression is reported once and yields `None`; its siblings
+/// are still checked.
 pub(super) struct Checker<'a> {
     signature: &'a Signature,
     functions: Vec<&'a UserFunction>,
     pub(super) diagnostics: &'a mut Diagnostics,
-    /// Constants beside the declaration, inputs, then bodies.
+    /// Scopes: global constants, inputs, then bodies.
     pub(super) scopes: Vec<BTreeMap<String, Option<Meaning>>>,
     calls: Vec<String>,
     used: BTreeSet<String>,
     in_rest: bool,
-    /// Terms that sums were unrolled to.
+    /// Number of terms that sums were unrolled to.
     pub(super) terms: usize,
     pub(super) bindings: Vec<Binding>,
     pub(super) reads_velocities: bool,
@@ -66,7 +66,7 @@ impl<'a> Checker<'a> {
         None
     }
 
-    /// Reports inputs that the formula never reads.
+    /// Reports inputs that the formula does not read.
     pub(super) fn report_unused(&mut self, declaration: &Name) {
         for input in &self.signature.names {
             let name = &input.name;
@@ -148,7 +148,7 @@ impl<'a> Checker<'a> {
                 if matches!(yes.shape, Shape::Array(_) | Shape::Truth) {
                     return self.error(span, format!("a branch must be a value, but it is {}", yes.shape));
                 }
-                // A condition of constants is decided here: the other branch leaves nothing.
+                // A constant condition is decided here. The other branch leaves no operations.
                 if let Some(truth) = super::constant::truth(&self.bindings, &condition_shape) {
                     return Some(if truth { yes } else { no });
                 }
@@ -171,7 +171,7 @@ impl<'a> Checker<'a> {
         if matches!(name.text.as_str(), "π" | "pi" | "PI") {
             return Some(Typed { kind: TypedKind::Pi, shape: Shape::Scalar, span: name.span.clone() });
         }
-        // â is the unit vector of a, also among Rust tokens, where it is one identifier.
+        // `â` is the unit vector of `a`. Among Rust tokens it is one identifier.
         if let Some(plain) = without_hat(&name.text).filter(|plain| self.find(plain).is_some()) {
             let vector = self.name(&Name { text: plain, span: name.span.clone() })?;
             return self.apply("unit", &name.span, vec![vector]);
@@ -197,7 +197,7 @@ impl<'a> Checker<'a> {
             Meaning::Index(number) => return Some(constant(number as f64, &span)),
             Meaning::Input(source, first, shape, None) => return self.input(name, source, first, shape),
             Meaning::Input(source, first, shape, Some(length)) => {
-                // One error for all entries.
+                // Reports one error for all entries.
                 self.input(name, source, first, shape)?;
                 let entry = |i: usize| Meaning::Input(source, first + i * shape.size(), shape, None);
                 (0..length).map(entry).collect()
@@ -250,7 +250,7 @@ impl<'a> Checker<'a> {
         if let Some(function) = user {
             return self.inline(name, function, checked);
         }
-        // M⁻¹, as printed.
+        // `M⁻¹` as printed.
         if let (
             "^",
             Some(Typed { shape: Shape::Matrix(..), .. }),
@@ -298,7 +298,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// A user's function is its body with the arguments bound.
+    /// Inlines a function of the text: its body with the arguments bound.
     fn inline(&mut self, name: &Name, function: &'a UserFunction, arguments: Vec<Typed>) -> Option<Typed> {
         if function.parameters.len() != arguments.len() {
             let message =
@@ -329,7 +329,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// `gradient(U, p)`, the derivative of a scalar by a point.
+    /// Checks `gradient(U, p)`, the derivative of a scalar with respect to a point.
     fn gradient(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
         let [of, by] = arguments else {
             return self.error(&name.span, "`gradient` takes a scalar and a point, as in gradient(θ, x1)");

@@ -1,4 +1,5 @@
-//! Syntax tree to typed program: names, shapes, and what each kind of declaration must yield.
+//! Converts the syntax tree to typed programs: names, shapes, units, and the result that each kind of declaration
+//! needs.
 
 mod array;
 mod constant;
@@ -17,8 +18,8 @@ use constant::Globals;
 use expression::Checker;
 use signature::Signature;
 
-/// Checks all declarations. A broken one yields its errors and a stub with the same inputs whose value is zero, so that
-/// code which uses it raises no further errors.
+/// Checks all declarations. A broken one yields its errors and a stub with the same inputs and value zero, so that code
+/// which uses it causes no further errors.
 pub fn check(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Program> {
     let functions: Vec<&UserFunction> =
         items.iter().filter_map(|i| if let Item::Function(f) = i { Some(f) } else { None }).collect();
@@ -35,7 +36,7 @@ pub fn check(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Program> {
         .collect()
 }
 
-/// A declaration's text after those of the functions and constants beside it that it names, so that it stands alone.
+/// Prepends the functions and constants that a declaration uses, so that its text is self-contained.
 fn with_what_it_uses(source: &str, items: &[Item]) -> String {
     let others: Vec<(String, &str)> = items
         .iter()

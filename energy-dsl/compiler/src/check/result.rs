@@ -1,4 +1,4 @@
-//! What each kind of declaration must yield.
+//! The result that each kind of declaration must have.
 
 use super::expression::constant;
 use super::signature::Signature;
@@ -8,7 +8,7 @@ use crate::functions::{self, Shape};
 use crate::syntax::Declaration;
 use energy_runtime::Kind;
 
-/// The zero of what the kind must yield.
+/// Returns a zero result of the kind.
 pub(super) fn stub(kind: Kind, signature: &Signature, span: &Span) -> Typed {
     let zero = constant(0.0, span);
     if kind != Kind::Force {
@@ -20,14 +20,14 @@ pub(super) fn stub(kind: Kind, signature: &Signature, span: &Span) -> Typed {
     rows(vec![null; signature.moving.len()], span)
 }
 
-/// Values one after the other.
+/// Concatenates values.
 fn rows(values: Vec<Typed>, span: &Span) -> Typed {
     let count = values.iter().map(|v| v.shape.size()).sum::<usize>();
     let shape = Shape::Rows(u16::try_from(count).unwrap_or(u16::MAX));
     Typed { kind: TypedKind::Array(values), shape, span: span.clone() }
 }
 
-/// The result as the kind of declaration wants it.
+/// Converts the result to the form that its kind requires.
 pub(super) fn expected(
     declaration: &Declaration,
     signature: &Signature,
@@ -64,7 +64,7 @@ pub(super) fn expected(
     }
 }
 
-/// The entries of an array as forces, or as rows.
+/// Converts the entries of an array to forces or rows.
 fn entries(result: Typed, kind: Kind, diagnostics: &mut Diagnostics) -> Option<Typed> {
     let TypedKind::Array(values) = result.kind else { return None };
     let wrong = values.iter().find(|v| match kind {

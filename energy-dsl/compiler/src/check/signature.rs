@@ -6,7 +6,7 @@ use crate::functions::Shape;
 use crate::syntax::{Declaration, ElementType, InputGroup, InputType, Name, Section, Unit};
 use energy_runtime::Kind;
 
-/// The inputs of a declaration, numbered, and the names they go by.
+/// The numbered inputs of a declaration, and their names.
 pub(super) struct Signature {
     pub(super) moving: Vec<Input>,
     pub(super) rest: Vec<Input>,
@@ -14,20 +14,20 @@ pub(super) struct Signature {
     pub(super) names: Vec<InputName>,
 }
 
-/// A name that stands for an input.
+/// A name that denotes an input.
 #[derive(Clone)]
 pub(super) struct InputName {
     pub(super) name: Name,
     pub(super) source: Source,
     pub(super) first: usize,
-    /// Of one, or of each entry.
+    /// Shape of the input, or of the entries of the array.
     pub(super) shape: Shape,
-    /// How many, if it is an array.
+    /// Length of the array; `None` if the input is not an array.
     pub(super) length: Option<usize>,
 }
 
 impl Signature {
-    /// No inputs.
+    /// Creates a signature without inputs.
     pub(super) fn empty() -> Self {
         Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), names: Vec::new() }
     }
@@ -89,7 +89,7 @@ impl Signature {
                 let name = Name { text: implied.into(), span: span.clone() };
                 let scalar = InputType { element: ElementType::Scalar, length: None };
                 signature.add(&name, Section::Parameter, scalar, &Unit::default(), &mut velocities, diagnostics);
-                // The formula has no use for it: it cannot be named there.
+                // The formula cannot use it, so it is not nameable.
                 signature.names.pop();
             }
         }
@@ -137,7 +137,7 @@ impl Signature {
             let span = unit.span.as_ref().unwrap_or(&name.span).clone();
             let input = Input { name: name.text.clone(), input_type, unit: unit.text.clone(), span, first };
             match length.filter(|_| section == Section::Moving) {
-                // What moves is told apart entry by entry.
+                // Moving inputs are listed entry by entry.
                 Some(length) => list.extend((0..length).map(|i| entry(&input, i))),
                 None => list.push(input),
             }
@@ -147,10 +147,10 @@ impl Signature {
     }
 }
 
-/// More would be data, not a formula.
+/// Maximum count of numbers in an input; more are data.
 const MOST_NUMBERS: usize = 4096;
 
-/// The type of a group of inputs; of a broken length, an array of one.
+/// Returns the type of a group of inputs. An array with an invalid length gets length one.
 fn input_type(group: &InputGroup, globals: &Globals, diagnostics: &mut Diagnostics) -> InputType {
     let length = group.length.as_ref().map(|length| {
         let signature = Signature::empty();
@@ -160,7 +160,7 @@ fn input_type(group: &InputGroup, globals: &Globals, diagnostics: &mut Diagnosti
     InputType { element: group.element, length }
 }
 
-/// Entry `number` of an array as an input of its own.
+/// Returns entry `number` of an array as a separate input.
 fn entry(array: &Input, number: usize) -> Input {
     let input_type = InputType { element: array.input_type.element, length: None };
     let first = array.first + number * input_type.size();
@@ -179,7 +179,7 @@ fn shape(element: ElementType) -> Shape {
     }
 }
 
-/// Names that would clash in the generated constructor, where inputs stand beside temporaries, and Rust's own words.
+/// Returns whether a name would clash in the generated constructor: a Rust keyword, or the name of a temporary.
 fn is_reserved(name: &str) -> bool {
     let temporary = name.strip_prefix('t').is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
     temporary || matches!(name, "precomputed" | "sound" | "number") || syn::parse_str::<syn::Ident>(name).is_err()

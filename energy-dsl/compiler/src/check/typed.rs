@@ -8,64 +8,64 @@ use energy_runtime::{Kind, Property};
 pub struct Program {
     /// Name of the type to generate.
     pub name: String,
-    /// Where it is named.
+    /// Place of the name.
     pub span: Span,
-    /// Doc comment, line by line.
+    /// Lines of the doc comment.
     pub docs: Vec<String>,
-    /// `pub`, `pub(crate)` or nothing.
+    /// `pub`, `pub(crate)` or empty.
     pub visibility: String,
-    /// Samples of the generated test, if wanted.
+    /// Samples of the generated audit test; `None` without `#[audit]`.
     pub audit_samples: Option<usize>,
-    /// What it claims of itself, and where.
+    /// Claimed properties, and where they are claimed.
     pub properties: Vec<(Property, Span)>,
-    /// Whether rounding errors are left uncorrected.
+    /// Whether rounding errors are not compensated.
     pub uncompensated: bool,
-    /// What it describes.
+    /// Kind of the declaration.
     pub kind: Kind,
-    /// The declaration as text.
+    /// Text of the declaration.
     pub source: String,
-    /// The body as text.
+    /// Text of the body.
     pub formula: String,
-    /// Points or unknowns.
+    /// Points, or the unknowns of a residual.
     pub moving: Vec<Input>,
-    /// Rest shape.
+    /// Inputs of the rest shape.
     pub rest: Vec<Input>,
-    /// Parameters; a constraint's end with stiffness and damping.
+    /// Parameters. Those of a constraint end with stiffness and damping.
     pub parameters: Vec<Input>,
     /// Whether the body reads velocities.
     pub has_velocities: bool,
-    /// Intermediate values and constants in order.
+    /// Intermediate values and constants, in order.
     pub bindings: Vec<Binding>,
-    /// The value.
+    /// Result of the body.
     pub result: Typed,
 }
 
 impl Program {
-    /// The number of points, of a declaration whose moving inputs are points.
+    /// Returns the number of points of a declaration whose moving inputs are points.
     #[must_use]
     pub fn points(&self) -> usize {
         self.moving.len()
     }
 
-    /// The same without its test, which a broken declaration would fail once more.
+    /// Removes the audit test, which would report a broken declaration a second time.
     #[must_use]
     pub fn without_audit(self) -> Self {
         Self { audit_samples: None, properties: Vec::new(), ..self }
     }
 
-    /// How many numbers move.
+    /// Returns the count of moving numbers.
     #[must_use]
     pub fn moving_size(&self) -> usize {
         self.moving.iter().map(|i| i.input_type.size()).sum()
     }
 
-    /// Rows of C or r, 1 for an energy, components of the forces.
+    /// Returns the number of rows: those of C or r, 1 for an energy, the force components.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.result.shape.size()
     }
 
-    /// How many parameters there are, in numbers.
+    /// Returns the count of parameter numbers.
     #[must_use]
     pub fn parameters_size(&self) -> usize {
         self.parameters.iter().map(|i| i.input_type.size()).sum()
@@ -75,70 +75,70 @@ impl Program {
 /// A declared input.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// As written.
+    /// Name as written.
     pub name: String,
-    /// Its type.
+    /// Type of the input.
     pub input_type: InputType,
-    /// Its unit as written.
+    /// Unit as written.
     pub unit: String,
-    /// Where its unit or else its name is written.
+    /// Place of the unit, or of the name if there is no unit.
     pub span: Span,
-    /// The number of its first component in its section.
+    /// Index of the first component within its section.
     pub first: usize,
 }
 
 /// An intermediate value.
 #[derive(Clone, Debug)]
 pub struct Binding {
-    /// The value.
+    /// Value of the binding.
     pub value: Typed,
-    /// Computed once for the element: it stands in the `rest` block.
+    /// Whether the binding is in the `rest` block, and so computed once for each element.
     pub rest: bool,
-    /// Of a constant: the unit its number is in.
+    /// Unit of a constant's value.
     pub unit: Option<Unit>,
 }
 
-/// Which inputs a name stands for.
+/// The section of inputs that a value is read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Positions or unknowns.
     Position,
-    /// Velocities.
+    /// Velocities of points.
     Velocity,
-    /// Rest shape.
+    /// Inputs of the rest shape.
     Rest,
-    /// Parameters.
+    /// Parameters of the declaration.
     Parameter,
 }
 
 /// An expression with its shape.
 #[derive(Clone, Debug)]
 pub struct Typed {
-    /// What it is.
+    /// Kind of the expression.
     pub kind: TypedKind,
-    /// Its shape.
+    /// Shape of the value.
     pub shape: Shape,
-    /// Where it is written; of a call, the function's name or the operator.
+    /// Place of the expression. For a call, the function's name or the operator.
     pub span: Span,
 }
 
 /// The kinds of checked expression.
 #[derive(Clone, Debug)]
 pub enum TypedKind {
-    /// A number.
+    /// A constant number.
     Constant(f64),
-    /// π.
+    /// The number π.
     Pi,
-    /// An input: the number of its first component.
+    /// An input, by the index of its first component.
     Input(Source, usize),
-    /// An intermediate value.
+    /// An intermediate value, by index.
     Binding(usize),
-    /// A function applied.
+    /// A function with its arguments.
     Call(&'static Function, Vec<Typed>),
-    /// One value where a comparison holds, another elsewhere.
+    /// Condition, value where it holds, value elsewhere.
     Select(Box<Typed>, Box<Typed>, Box<Typed>),
-    /// An array, or rows, one after the other.
+    /// Concatenated entries of an array, or rows.
     Array(Vec<Typed>),
-    /// The derivative of a scalar by a point.
+    /// The derivative of a scalar with respect to a point.
     Gradient(Box<Typed>, usize),
 }

@@ -1,4 +1,4 @@
-//! Derivatives that flow back from the outputs.
+//! Reverse accumulation: derivatives flow back from the outputs.
 
 use std::collections::BTreeMap;
 
@@ -8,15 +8,15 @@ use super::local::{Order, local};
 use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
-/// Nodes and what each is weighed by.
+/// Nodes and their weights.
 pub(super) type Weighted = BTreeMap<NodeId, NodeId>;
 
-/// Σ weight · output as one weighted node.
+/// Combines Σ weight · output into one weighted node.
 pub(super) fn alone(g: &mut Graph, output: NodeId) -> Weighted {
     BTreeMap::from([(output, g.constant(1.0))])
 }
 
-/// Derivatives of Σ weight · output by every node the outputs are made of.
+/// Returns the derivatives of Σ weight · output with respect to every node that the outputs depend on.
 fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, order: Order) -> Weighted {
     let mut adjoints = outputs.clone();
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
@@ -37,8 +37,9 @@ fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, order:
     adjoints
 }
 
-/// Whether reverse accumulation is right, on the ordinary path or everywhere. Through a selection it multiplies the derivative of
-/// the other branch, which may be infinite, by zero; unless it is known which branch is taken, or both are constant (a sign).
+/// Returns whether reverse accumulation is right, on the ordinary path or everywhere. Through a selection it multiplies
+/// the derivative of the unused branch, which may be infinite, by zero. It is right if the branch is known, or both are
+/// constant (a sign).
 pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], order: Order, everywhere: bool) -> bool {
     let nodes = differentiable(g, roots, order);
     nodes.into_iter().all(|node| match g.op(node) {
@@ -49,7 +50,7 @@ pub(super) fn is_safe(g: &mut Graph, roots: &[NodeId], order: Order, everywhere:
     })
 }
 
-/// Σ weight · ∇output by reverse accumulation. `None` where it is not safe on the ordinary path.
+/// Returns Σ weight · ∇output by reverse accumulation; `None` if that is not safe on the ordinary path.
 pub(super) fn gradient(
     g: &mut Graph,
     outputs: &Weighted,
@@ -64,8 +65,8 @@ pub(super) fn gradient(
     Some(gathered(g, &adjoints, coordinates))
 }
 
-/// Σ weight · ∇²output = Σ over nodes v of the adjoint of v times Σ φ_ab ∇a ∇bᵀ, φ the node's own second derivatives. `None` where
-/// it is not safe on the ordinary path.
+/// Returns Σ weight · ∇²output as a sum over nodes v: the adjoint of v times Σ φ_ab ∇a ∇bᵀ, where φ are the second
+/// derivatives of the operation at v. `None` if that is not safe on the ordinary path.
 pub(super) fn second_derivatives(
     g: &mut Graph,
     outputs: &Weighted,
@@ -91,7 +92,7 @@ pub(super) fn second_derivatives(
             let a = tangents.get(&local.operands[i]).unwrap_or(&none);
             let b = tangents.get(&local.operands[j]).unwrap_or(&none);
             let weight = g.sum_of_products(Some(weight), &products_of);
-            // The weight goes into the shorter factor, which is multiplied least often.
+            // Weights the shorter factor, which takes fewer products.
             let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
             let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();
             let terms = products(g, &weighted, longer, i == j, n);
@@ -103,8 +104,8 @@ pub(super) fn second_derivatives(
     Some(hessian)
 }
 
-/// ∇²output · w by second-order reverse accumulation, w given by its dual part in every coordinate: beside each adjoint flows
-/// its derivative along w. `None` where it is not safe on the ordinary path.
+/// Returns ∇²output · w by second-order reverse accumulation: with each adjoint flows its derivative along w. The
+/// direction w is given by its dual part in every coordinate. `None` if that is not safe on the ordinary path.
 pub(super) fn hessian_vector(
     g: &mut Graph,
     output: NodeId,
@@ -152,7 +153,7 @@ pub(super) fn hessian_vector(
     Some(gathered(g, &turning, coordinates))
 }
 
-/// What flowed back to the seeds, by coordinate.
+/// Collects what flowed back to the seeds, by coordinate.
 fn gathered(g: &mut Graph, adjoints: &Weighted, coordinates: &Coordinates) -> Vec<NodeId> {
     let mut sums = vec![g.constant(0.0); coordinates.len()];
     for (node, seeds) in &coordinates.seeds {

@@ -5,40 +5,40 @@ use super::forward::Sparse;
 use super::local::Order;
 use crate::graph::{Graph, Input, NodeId, Op};
 
-/// What the derivatives are taken by.
+/// The inputs that derivatives are taken with respect to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moving {
-    /// Positions.
+    /// Positions of points, or unknowns.
     Positions,
-    /// Velocities.
+    /// Velocities of points.
     Velocities,
 }
 
-/// Reduced coordinates: a forest over the points whose edges are the differences that the formula forms. A point used by
-/// itself hangs on the ground, so a tree without ground proves translation invariance.
+/// Reduced coordinates: a forest over the points whose edges are the differences that the formula forms. A point used
+/// outside of a difference is connected to the ground, so a forest without ground proves translation invariance.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
-    /// Dual parts (±1) of the nodes that differentiation starts from.
+    /// Dual parts (±1) of the nodes where differentiation starts.
     pub(super) seeds: BTreeMap<NodeId, Sparse>,
-    /// Of each coordinate vector: the points it is made of, with sign. Coordinate c is component c % 3 of vector c / 3.
+    /// Points of each coordinate vector, with signs. Coordinate c is component c % 3 of vector c / 3.
     pub vectors: Vec<Vec<(usize, bool)>>,
-    /// How many numbers one vector has.
+    /// Components of a vector.
     pub components: usize,
-    /// Whether no point is used by itself.
+    /// Whether every point is used in differences only.
     pub translation_invariant: bool,
 }
 
-/// The ground's number in the forest.
+/// Index of the ground in the forest.
 const GROUND: usize = usize::MAX;
 
 impl Coordinates {
-    /// The number of coordinates.
+    /// Returns the number of coordinates.
     #[must_use]
     pub fn len(&self) -> usize {
         self.vectors.len() * self.components
     }
 
-    /// Each of `unknowns` numbers is its own coordinate.
+    /// Creates one coordinate for each unknown.
     pub fn of_unknowns(g: &mut Graph, unknowns: usize) -> Self {
         let one = g.constant(1.0);
         let seeds = (0..unknowns)
@@ -48,7 +48,7 @@ impl Coordinates {
         Self { seeds, vectors, components: 1, translation_invariant: false }
     }
 
-    /// Each of `nodes` is its own coordinate.
+    /// Creates one coordinate for each node.
     pub(super) fn of_nodes(g: &mut Graph, nodes: &[NodeId]) -> Self {
         let one = g.constant(1.0);
         let seeds = nodes.iter().enumerate().map(|(number, &node)| (node, vec![(number, one)])).collect();
@@ -56,7 +56,7 @@ impl Coordinates {
         Self { seeds, vectors, components: 1, translation_invariant: false }
     }
 
-    /// One coordinate only: the distance along a direction, given by its part in each of these coordinates.
+    /// Creates a single coordinate, the distance along a direction that is given in these coordinates.
     pub(super) fn along(&self, g: &mut Graph, direction: &[NodeId]) -> Self {
         let mut seeds = BTreeMap::new();
         for (&node, entries) in &self.seeds {
@@ -66,7 +66,7 @@ impl Coordinates {
         Self { seeds, vectors: vec![vec![(0, true)]], components: 1, translation_invariant: false }
     }
 
-    /// The derivative of each coordinate by time, of the points' velocities (or along any other direction).
+    /// Returns the rates of all coordinates, given the velocities of the points or any other direction.
     pub fn rates(&self, g: &mut Graph) -> Vec<NodeId> {
         let mut rates = Vec::with_capacity(self.len());
         for vector in &self.vectors {
@@ -83,7 +83,7 @@ impl Coordinates {
         rates
     }
 
-    /// Finds the differences of points through which `outputs` see them.
+    /// Finds the differences of points that `outputs` depend on.
     pub fn of_points(g: &mut Graph, outputs: &[NodeId], moving: Moving) -> Self {
         let coordinate = |g: &Graph, node: NodeId| match (g.op(node), moving) {
             (Op::Input(Input::Position(c)), Moving::Positions)
@@ -127,7 +127,7 @@ impl Coordinates {
     }
 
     fn from_differences(g: &mut Graph, used: &[(usize, usize)], fronts: &[(NodeId, usize, usize, usize)]) -> Self {
-        // Kruskal: an edge that joins two trees is a coordinate vector.
+        // Kruskal's algorithm: an edge that joins two trees is a coordinate vector.
         let mut trees: Vec<Vec<usize>> = Vec::new();
         let mut vectors: Vec<(usize, usize)> = Vec::new();
         for &(from, to) in used {
@@ -169,7 +169,7 @@ impl Coordinates {
     }
 }
 
-/// The edges from `from` to `to` in the forest, with the sense they are walked in: x_from − x_to = Σ ±(edge vectors).
+/// Returns the edges from `from` to `to` in the forest, with directions: x_from − x_to = Σ ±(edge vectors).
 fn path(edges: &[(usize, usize)], from: usize, to: usize) -> Vec<(usize, bool)> {
     fn walk(
         edges: &[(usize, usize)],

@@ -1,5 +1,6 @@
-//! Second derivatives gathered at a cut: where all that moves enters U through a few robust primitives c,
-//! ∇²U = Σ ∂U/∂c ∇²c + Σ (Σ ∂²U/∂c∂c′ ∇c′) ∇cᵀ. U's derivatives by c are few; each ∇c appears in one outer product.
+//! Second derivatives gathered at a cut. If everything that moves enters U through a few robust primitives c, then ∇²U
+//! = Σ ∂U/∂c ∇²c + Σ (Σ ∂²U/∂c∂c′ ∇c′) ∇cᵀ. There are few derivatives with respect to c, and each ∇c appears in one
+//! outer product.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,10 +11,11 @@ use super::local::Order;
 use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
-/// ∇U, and the upper triangle of ∇²U by place.
+/// ∇U, and the upper triangle of ∇²U by index.
 pub(super) type Derivatives = (Vec<NodeId>, BTreeMap<usize, NodeId>);
 
-/// Derivatives through the primitives closest to the coordinates; `None` if they are no cut, or one without any gain.
+/// Returns the derivatives through the primitives closest to the coordinates; `None` if these are not a cut, or bring
+/// no gain.
 pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> Option<Derivatives> {
     let cut = primitives_by_coordinates(g, output, coordinates)?;
     let n = coordinates.len();
@@ -45,7 +47,7 @@ pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinat
     Some((gradient, hessian))
 }
 
-/// U's first and second derivatives by the nodes of the cut.
+/// Returns the first and second derivatives of U with respect to the nodes of the cut.
 fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeMap<usize, NodeId>) {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
@@ -60,10 +62,11 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeM
     (slopes, curvatures)
 }
 
-/// The robust primitives that no other one feeds, if every path from the coordinates to U leads through them.
+/// Returns the robust primitives that depend on no other one, if every path from the coordinates to U leads through
+/// them.
 fn primitives_by_coordinates(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
     let nodes = differentiable(g, &[output], Order::Second);
-    // Nodes above some primitive.
+    // Nodes that depend on some primitive.
     let mut above: BTreeSet<NodeId> = BTreeSet::new();
     let mut cut = Vec::new();
     for &node in &nodes {
@@ -80,7 +83,7 @@ fn primitives_by_coordinates(g: &Graph, output: NodeId, coordinates: &Coordinate
             above.insert(node);
         }
     }
-    // A path round the primitives ends in a node above them that also reads one below.
+    // A path around the primitives ends in a node above them that also reads a node below.
     let bypassed = nodes.iter().filter(|&&node| above.contains(&node) && !cut.contains(&node)).any(|&node| {
         let operands: Vec<NodeId> = match g.rule(node) {
             Some(rule) => rule.arguments.clone(),

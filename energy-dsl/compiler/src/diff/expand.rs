@@ -1,15 +1,16 @@
-//! From reduced coordinates back to points: x-derivatives are constant ±1 combinations of those by differences.
+//! Expands reduced derivatives to points. Derivatives with respect to points are ±1 combinations of those with respect
+//! to differences.
 
 use super::coordinates::Coordinates;
 use crate::graph::{Graph, NodeId, symmetric_index};
 
 impl Coordinates {
-    /// With which sign coordinate vector `vector` contains `point`, if it does.
+    /// Returns the sign of `point` in a coordinate vector; `None` if it is not part of it.
     fn sign(&self, vector: usize, point: usize) -> Option<bool> {
         self.vectors[vector].iter().find(|&&(p, _)| p == point).map(|&(_, positive)| positive)
     }
 
-    /// Σ over the vectors that contain `point`, with its sign, of what `entry` gives for them.
+    /// Returns the signed sum of `entry` over the vectors that contain `point`.
     fn signed_sum(&self, g: &mut Graph, point: usize, mut entry: impl FnMut(&mut Graph, usize) -> NodeId) -> NodeId {
         let mut sum = g.constant(0.0);
         for vector in 0..self.vectors.len() {
@@ -20,18 +21,18 @@ impl Coordinates {
         sum
     }
 
-    /// The derivative by one point, of its derivatives by the coordinates.
+    /// Returns the derivative with respect to one point, given those with respect to the coordinates.
     pub fn expand(&self, g: &mut Graph, reduced: &[NodeId], point: usize) -> Vec<NodeId> {
         let n = self.components;
         (0..n).map(|axis| self.signed_sum(g, point, |_, vector| reduced[n * vector + axis])).collect()
     }
 
-    /// The derivatives by all points.
+    /// Returns the derivatives with respect to all points.
     pub fn expand_all(&self, g: &mut Graph, reduced: &[NodeId], points: usize) -> Vec<NodeId> {
         (0..points).flat_map(|point| self.expand(g, reduced, point)).collect()
     }
 
-    /// The blocks on and above the diagonal, each row by row, of the upper triangle in reduced coordinates.
+    /// Returns the blocks on and above the diagonal, row by row, given the reduced upper triangle.
     pub fn expand_triangle(&self, g: &mut Graph, reduced: &[NodeId], points: usize) -> Vec<NodeId> {
         let n = self.len();
         let entry = |i: usize, j: usize| reduced[symmetric_index(n, i, j)];
@@ -54,7 +55,7 @@ impl Coordinates {
         triangle
     }
 
-    /// All blocks, each row by row, of a square matrix in reduced coordinates.
+    /// Returns all blocks, row by row, given the reduced square matrix.
     pub fn expand_square(&self, g: &mut Graph, reduced: &[NodeId], points: usize) -> Vec<NodeId> {
         let n = self.len();
         let mut square = Vec::with_capacity(9 * points * points);
@@ -77,7 +78,7 @@ impl Coordinates {
         (j, column): (usize, usize),
         entry: impl Fn(usize, usize) -> NodeId,
     ) -> NodeId {
-        // The inner sum runs over the column's vectors, so that points in the same row share it.
+        // The inner sum runs over the vectors of the column, so that points in the same row share it.
         self.signed_sum(g, i, |g, a| self.signed_sum(g, j, |_, b| entry(3 * a + row, 3 * b + column)))
     }
 }

@@ -5,10 +5,10 @@ use super::local::{Order, local};
 use super::{accumulate, differentiable};
 use crate::graph::{Graph, NodeId, Op};
 
-/// Dual parts that are not identically zero, by ascending coordinate.
+/// Dual parts that are not identically zero, by increasing coordinate.
 pub type Sparse = Vec<(usize, NodeId)>;
 
-/// Σ factorᵢ · partsᵢ.
+/// Returns Σ factorᵢ · partsᵢ.
 pub(super) fn combine(g: &mut Graph, terms: &[(NodeId, &Sparse)]) -> Sparse {
     let mut sums: BTreeMap<usize, NodeId> = BTreeMap::new();
     for &(factor, parts) in terms {
@@ -20,7 +20,7 @@ pub(super) fn combine(g: &mut Graph, terms: &[(NodeId, &Sparse)]) -> Sparse {
     sums.into_iter().filter(|&(_, sum)| !g.is(sum, 0.0)).collect()
 }
 
-/// mask ? a : b, part by part.
+/// Returns mask ? a : b for each dual part.
 pub(super) fn choose(g: &mut Graph, mask: NodeId, a: &Sparse, b: &Sparse) -> Sparse {
     let zero = g.constant(0.0);
     let mut places: Vec<usize> = a.iter().chain(b).map(|&(c, _)| c).collect();
@@ -30,7 +30,7 @@ pub(super) fn choose(g: &mut Graph, mask: NodeId, a: &Sparse, b: &Sparse) -> Spa
     places.into_iter().map(|c| (c, g.select(mask, find(a, c), find(b, c)))).collect()
 }
 
-/// First derivatives of all nodes between the coordinates and `outputs`.
+/// Returns the first derivatives of all nodes between the coordinates and `outputs`.
 pub(super) fn tangents(
     g: &mut Graph,
     outputs: &[NodeId],
@@ -61,7 +61,8 @@ pub(super) fn tangents(
     tangents
 }
 
-/// First derivatives of each output by each coordinate, zeros included; `order` says what becomes of them.
+/// Returns the first derivatives of each output with respect to each coordinate, including zeros. `order` says whether
+/// they are differentiated again.
 pub fn first_derivatives(
     g: &mut Graph,
     outputs: &[NodeId],
@@ -82,7 +83,7 @@ pub fn first_derivatives(
         .collect()
 }
 
-/// Second dual parts: entries (i, j), i ≤ j, at i·n + j.
+/// Returns the second dual parts: entry (i, j), i ≤ j, at index i·n + j.
 pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<usize, NodeId> {
     let n = coordinates.len();
     let tangents = tangents(g, &[output], coordinates, Order::Second);
@@ -117,7 +118,7 @@ pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Co
     curvatures.remove(&output).unwrap_or_default().into_iter().collect()
 }
 
-/// The upper triangle of a aᵀ, or of a bᵀ + b aᵀ.
+/// Returns the upper triangle of a aᵀ, or of a bᵀ + b aᵀ.
 pub(super) fn products(g: &mut Graph, a: &Sparse, b: &Sparse, same: bool, n: usize) -> Sparse {
     let mut sums: BTreeMap<usize, NodeId> = BTreeMap::new();
     for &(i, x) in a {

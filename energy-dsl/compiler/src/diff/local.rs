@@ -1,23 +1,23 @@
 use crate::graph::{Graph, NodeId, Op, Product, symmetric_index};
 
-/// Which derivatives are taken.
+/// The orders of derivatives to take.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// First ones.
+    /// First derivatives, final.
     First,
-    /// First ones that the formula goes on with, so that they will be differentiated: those of rules are rules too.
+    /// First derivatives that the formula uses, so they are differentiated again. Those of rules are rules too.
     FirstToDifferentiate,
-    /// First and second ones.
+    /// First and second derivatives.
     Second,
 }
 
-/// An operation's derivatives by its own operands.
+/// Derivatives of an operation with respect to its operands.
 pub(super) struct Local {
-    /// The operands, each once.
+    /// Operands, each listed once.
     pub(super) operands: Vec<NodeId>,
-    /// First derivatives.
+    /// First derivatives, one product per operand.
     pub(super) first: Vec<Product>,
-    /// Second derivatives that are not identically zero: operands i ≤ j.
+    /// Second derivatives that are not identically zero, for operands i ≤ j.
     pub(super) second: Vec<(usize, usize, Vec<Product>)>,
 }
 
@@ -37,7 +37,7 @@ impl Local {
     }
 }
 
-/// The derivatives of `node` by its operands, of the orders asked for.
+/// Returns the derivatives of `node` with respect to its operands.
 pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
     let one = g.constant(1.0);
     let zero = g.constant(0.0);
@@ -55,7 +55,7 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
             Local::linear(vec![a, b], vec![one, minus])
         }
         Op::Mul(a, b) if a == b => {
-            // The weight takes the 2, which squares that are added then share.
+            // The weight absorbs the 2, so that squares in a sum share it.
             Local { operands: vec![a], first: vec![vec![two, a]], second: vec![(0, 0, vec![vec![two]])] }
         }
         Op::Mul(a, b) => Local::new(vec![a, b], vec![b, a], vec![(0, 1, one)]),
@@ -157,7 +157,7 @@ fn of_rule(g: &mut Graph, node: NodeId, order: Order) -> Local {
     Local { operands: rule.arguments, first: rule.first, second }
 }
 
-/// sign · a · b + factor · c.
+/// Returns the derivatives of sign · a · b + factor · c.
 fn of_product_and_sum(g: &mut Graph, (a, b): (NodeId, NodeId), sign: NodeId, c: NodeId, factor: f64) -> Local {
     let factor = g.constant(factor);
     if a == b {
@@ -170,7 +170,7 @@ fn of_product_and_sum(g: &mut Graph, (a, b): (NodeId, NodeId), sign: NodeId, c: 
     Local::new(vec![a, b, c], vec![by_a, by_b, factor], vec![(0, 1, sign)])
 }
 
-/// `mask ? a : b`, whose derivative chooses likewise.
+/// Returns the derivatives of `mask ? a : b`; they select in the same way.
 fn choose(g: &mut Graph, mask: NodeId, a: NodeId, b: NodeId) -> Local {
     let (one, zero) = (g.constant(1.0), g.constant(0.0));
     let (by_a, by_b) = (g.select(mask, one, zero), g.select(mask, zero, one));

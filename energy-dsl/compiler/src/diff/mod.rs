@@ -1,9 +1,9 @@
-//! Derivatives of graph nodes, as nodes of the same graph.
+//! Differentiates nodes of a graph. Derivatives are nodes of the same graph.
 //!
-//! Inputs are first *reduced*: where points enter only through differences, derivatives are taken by those differences
-//! (`coordinates.rs`). First derivatives go forward as sparse dual parts (`forward.rs`) or back from the outputs
-//! (`adjoint.rs`); second derivatives forward too, weighted by adjoints, or gathered at a few primitives (`cut.rs`):
-//! `plan.rs` takes whichever costs least.
+//! Inputs are first *reduced*: if points enter only as differences, derivatives are taken with respect to these
+//! (`coordinates.rs`). First derivatives flow forward as sparse dual parts (`forward.rs`) or back from the outputs
+//! (`adjoint.rs`). Second derivatives flow forward, weighted by adjoints, or are gathered at a few primitives
+//! (`cut.rs`). `plan.rs` takes the cheapest route.
 
 mod adjoint;
 mod coordinates;
@@ -22,8 +22,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::{Graph, NodeId, Op};
 
-/// The nodes through which `outputs` depend on what moves, in topological order. A rule leads on to its arguments, or to its
-/// value where only that can be differentiated; masks and rounding errors have no derivatives.
+/// Returns the nodes through which `outputs` depend on moving inputs, in topological order. A rule leads to its
+/// arguments, or to its value if only that can be differentiated. Masks and rounding errors have no derivatives.
 fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack: Vec<NodeId> = outputs.to_vec();
@@ -44,7 +44,7 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<N
     seen
 }
 
-/// Adds a term to the sum of a place.
+/// Adds a term to the sum at an index.
 fn accumulate<P: Ord>(g: &mut Graph, sums: &mut BTreeMap<P, NodeId>, place: P, term: NodeId) {
     let sum = match sums.get(&place) {
         Some(&sum) => g.accumulate(sum, term),

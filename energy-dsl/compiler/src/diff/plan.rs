@@ -1,4 +1,4 @@
-//! Which route to derivatives a routine takes: all are built, the cheapest is kept.
+//! Chooses the route to the derivatives of a routine. All routes are built; the cheapest is kept.
 
 use std::collections::BTreeMap;
 
@@ -11,45 +11,45 @@ use energy_runtime::OperationCount;
 /// U, ∇U and the upper triangle of ∇²U in reduced coordinates.
 #[derive(Clone, Debug)]
 pub struct SecondOrder {
-    /// U.
+    /// The energy U.
     pub value: NodeId,
-    /// ∇U.
+    /// The gradient ∇U.
     pub gradient: Vec<NodeId>,
-    /// ∇²U, upper triangle row by row.
+    /// The upper triangle of ∇²U, row by row.
     pub hessian: Vec<NodeId>,
 }
 
-/// A way to derivatives, and what it comes to.
+/// A route to derivatives, and its cost.
 #[derive(Clone, Copy, Debug)]
 pub struct Route {
-    /// What it is called.
+    /// Name of the route.
     pub name: &'static str,
-    /// Its arithmetic, value included.
+    /// Operations, including those of the value.
     pub count: OperationCount,
-    /// Its cost by [`OperationCount::cost`].
+    /// Cost according to [`OperationCount::cost`].
     pub cost: usize,
 }
 
-/// The routes to a routine's derivatives, the chosen one first.
+/// The routes to the derivatives of a routine. The first one was chosen.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What was planned.
+    /// Name of the routine.
     pub routine: &'static str,
-    /// In ascending cost.
+    /// Routes by increasing cost.
     pub routes: Vec<Route>,
 }
 
-/// A route to derivatives.
+/// A candidate route.
 struct Alternative {
     name: &'static str,
-    /// The derivatives.
+    /// Its derivatives.
     nodes: Vec<NodeId>,
-    /// Whether it is right everywhere, and not on the ordinary path only.
+    /// Whether it is right everywhere, not only on the ordinary path.
     safe: bool,
 }
 
-/// The derivatives by the cheapest route (the first of equals) on the ordinary path; where that route is not safe everywhere,
-/// with caution those by the cheapest that is.
+/// Returns the derivatives by the cheapest route on the ordinary path (the first of equals). If that route is not safe
+/// everywhere, the general path uses the cheapest safe one.
 fn choose(
     g: &mut Graph,
     routine: &'static str,
@@ -73,7 +73,7 @@ fn choose(
     (nodes, Plan { routine, routes: order.into_iter().map(|(_, route)| route).collect() })
 }
 
-/// First and second derivatives of a scalar by the cheapest route.
+/// Returns the first and second derivatives of a scalar by the cheapest route.
 pub fn second_order(
     g: &mut Graph,
     routine: &'static str,
@@ -117,7 +117,7 @@ pub fn second_order(
     (SecondOrder { value, gradient, hessian }, plan)
 }
 
-/// ∇²U · w, w the rates of the coordinates, by second-order reverse accumulation or from ∇²U.
+/// Returns ∇²U · w, where w are the rates of the coordinates, by second-order reverse accumulation or from ∇²U.
 pub fn hessian_vector(
     g: &mut Graph,
     routine: &'static str,
@@ -132,7 +132,7 @@ pub fn hessian_vector(
             g.dot(&row, &rates)
         })
         .collect();
-    // What ∇²U does with caution, its product does.
+    // On the general path the product does what ∇²U does.
     let mut alternatives = vec![Alternative { name: "from the Hessian", nodes: formed, safe: true }];
     let safe = adjoint::is_safe(g, &[energy.value], Order::Second, true);
     if let Some(nodes) = adjoint::hessian_vector(g, energy.value, coordinates, &rates) {
@@ -141,7 +141,7 @@ pub fn hessian_vector(
     choose(g, routine, &[], &alternatives)
 }
 
-/// First derivatives of each output by the cheaper of the forward and the reverse route; `known` is a further alternative.
+/// Returns the first derivatives of each output by the cheapest route: forward, reverse, or the `known` derivatives.
 pub fn first_order(
     g: &mut Graph,
     routine: &'static str,
@@ -163,7 +163,7 @@ pub fn first_order(
         alternatives.push(Alternative { name: "reverse", nodes: rows.concat(), safe });
     }
     if let Some(nodes) = known {
-        // It decides by itself what to do with caution.
+        // The known derivatives handle the general path themselves.
         alternatives.push(Alternative { name: "as with second derivatives", nodes, safe: true });
     }
     let (nodes, plan) = choose(g, routine, outputs, &alternatives);

@@ -6,7 +6,7 @@ use crate::graph::{Graph, NodeId, count};
 use crate::routines::{Routine, Routines};
 use energy_runtime::{Kind, OperationCount};
 
-/// The `Declaration` that generated code carries.
+/// Emits the `Declaration` of the generated type.
 pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream {
     let name = &program.name;
     let kind = match program.kind {
@@ -17,7 +17,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     };
     let docs = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect::<Vec<_>>().join("\n");
     let (formula, source) = (&program.formula, &program.source);
-    // A constraint's stiffness and damping are implied by its kind.
+    // The stiffness and damping of a constraint are implied by its kind.
     let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
     let declared = &program.parameters[..program.parameters.len() - implied];
     let (points, rest, parameters) = (fields(&program.moving), fields(&program.rest), fields(declared));
@@ -56,7 +56,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     }
 }
 
-/// What a solver may rely on.
+/// Properties that solvers rely on.
 pub(crate) struct Character {
     pub(crate) curved: bool,
     pub(crate) quadratic: bool,

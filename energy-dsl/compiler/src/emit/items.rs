@@ -10,7 +10,7 @@ use crate::graph::{Input, count};
 use crate::routines::Routines;
 use energy_runtime::Kind;
 
-/// The type, its constructor, its traits, and its test if one was asked for.
+/// Emits the type, its constructor, its traits, and the audit test if requested.
 #[must_use]
 pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
     let name = format_ident!("{}", program.name, span = program.span.token);
@@ -38,7 +38,7 @@ fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
         let stored = routines.rest.outputs.len();
         quote!(precomputed: [T; #stored],)
     });
-    // Nothing to hold, but the number type to remember.
+    // A type without fields still needs to name its number type.
     let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData<T>,));
     quote! {
         #(#[doc = #docs])*
@@ -56,7 +56,7 @@ fn holds_nothing(program: &Program, routines: &Routines) -> bool {
     program.parameters.is_empty() && routines.rest.outputs.is_empty()
 }
 
-/// The doc comment, and what was made of the formula.
+/// Returns the doc comment and a description of the compiled form.
 fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
     let mut lines = program.docs.clone();
     let list = |inputs: &[DeclaredInput]| inputs.iter().map(|i| i.name.clone()).collect::<Vec<_>>().join(", ");
@@ -86,7 +86,7 @@ fn input_type(input: &DeclaredInput) -> TokenStream {
     input.input_type.dimensions().into_iter().rev().fold(quote!(T), |entry, length| quote!([#entry; #length]))
 }
 
-/// `new` with the rest shape and then the parameters, and the same from flat slices.
+/// Emits `new`, which takes the rest shape and then the parameters, and its counterpart for flat slices.
 fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     let argument = |input: &DeclaredInput| {
         let (name, input_type) = (format_ident!("{}", input.name), input_type(input));
@@ -122,7 +122,8 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         let inputs = || program.rest.iter().chain(&program.parameters);
         let names: Vec<_> = inputs().map(|input| format_ident!("{}", input.name)).collect();
         let types = inputs().map(input_type);
-        // At the level of the routines: what the rest shape and the moving points both determine must come out equal.
+        // Runs at the level of the routines: a number that both the rest shape and the moving points determine must be
+        // equal.
         let body = quote! {
             struct New<T>(#(#types),*);
             impl<T: ::energy_dsl::Real> ::energy_dsl::Kernel for New<T> {
@@ -135,7 +136,7 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
                     let precomputed = #precomputed;
                     let mut sound = !(#degenerate);
                     for value in precomputed {
-                        // Neither infinite nor NaN.
+                        // False for infinite numbers and NaN.
                         sound = sound & (value - value).equal(T::from_f64(0.0));
                     }
                     if ::energy_dsl::Mask::any(!sound) {
@@ -155,7 +156,7 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
     quote! {
         #[allow(non_snake_case, mixed_script_confusables, confusable_idents, unused_parens, clippy::all, clippy::pedantic)]
         impl<T: ::energy_dsl::Real> #name<T> {
-            /// The element, from its rest shape (if any) and its parameters in declared order.
+            /// Creates the element from its rest shape (if any) and its parameters, in declared order.
             #errors
             #[inline]
             #[must_use]
@@ -171,7 +172,7 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
     }
 }
 
-/// Inside `new`: rest shape and parameters are its arguments.
+/// Reads an input inside `new`, where rest shape and parameters are arguments.
 fn read_input(rest: &[DeclaredInput], parameters: &[DeclaredInput], input: Input) -> TokenStream {
     let (list, number) = match input {
         Input::Rest(i) => (rest, usize::from(i)),
@@ -207,9 +208,9 @@ fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream 
     }
 }
 
-/// Elements as plain numbers, and side by side in lanes.
+/// Emits the packed form: elements as plain numbers, and one element per lane.
 fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    // The fields with their places, number by number.
+    // Fields and their indices, number by number.
     let mut stores = Vec::new();
     let mut loads = Vec::new();
     let mut number = 0usize;
@@ -274,7 +275,7 @@ fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     }
 }
 
-/// The test that `#[audit]` asks for.
+/// Emits the test that `#[audit]` requests.
 fn audit_test(name: &Ident, program: &Program) -> TokenStream {
     let Some(samples) = program.audit_samples else { return TokenStream::new() };
     let test = format_ident!("derivatives_of_{}", snake_case(&program.name));

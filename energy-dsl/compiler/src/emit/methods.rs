@@ -1,7 +1,8 @@
-//! The routines as methods of the traits that the declaration's kind implements.
+//! Emits routines as trait methods.
 //!
-//! Each routine `f` becomes `f_at::<L>`, to be compiled into a caller of level L, and `f`, which runs it at the machine's best
-//! level. Where precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general` by `f_is_ordinary`.
+//! A routine `f` becomes `f_at::<L>`, which is inlined into a caller at SIMD level L, and `f`, which runs it at the
+//! best level of the machine. If precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general`
+//! by `f_is_ordinary`.
 
 use std::cell::RefCell;
 
@@ -14,7 +15,7 @@ use crate::graph::{Graph, Input, NodeId};
 use crate::routines::{General, Routines};
 use energy_runtime::Kind;
 
-/// What turns a group of outputs into an expression.
+/// Converts a group of outputs to an expression.
 pub(super) type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
 
 pub(super) const NUMBER: Layout = |schedule, nodes| schedule.value(nodes[0]);
@@ -22,12 +23,12 @@ pub(super) const NUMBERS: Layout = |schedule, nodes| schedule.array(nodes);
 pub(super) const VECTORS: Layout = |schedule, nodes| schedule.vectors(nodes);
 pub(super) const BLOCKS: Layout = |schedule, nodes| schedule.blocks(nodes);
 
-/// How a routine appears in its trait.
+/// A routine as a method of its trait.
 pub(super) struct Method {
     pub(super) routine: &'static str,
-    /// The kernel that calls it.
+    /// Kernel that calls the routine.
     pub(super) call: &'static str,
-    /// The struct it returns, that struct's fields, the types it is generic over, and those of its fields.
+    /// Returned struct, its fields, its type arguments, and the types of its fields.
     pub(super) result: &'static str,
     pub(super) fields: &'static [(&'static str, Layout)],
     pub(super) generics: Vec<TokenStream>,
@@ -36,7 +37,7 @@ pub(super) struct Method {
     pub(super) arguments: Vec<(&'static str, TokenStream)>,
 }
 
-/// A trait's implementation, and beside it the routines with all precautions.
+/// Emits the implementation of a trait, and the general paths of its routines.
 pub(super) fn implementation(
     name: &Ident,
     of: &str,
@@ -55,7 +56,7 @@ pub(super) fn implementation(
             }
         }
     });
-    // Generated arithmetic is not written to be read by lints.
+    // Lints do not apply to generated arithmetic.
     quote! {
         #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
         impl<T: ::energy_dsl::Real> ::energy_dsl::#of<T> for #name<T> {
@@ -66,7 +67,7 @@ pub(super) fn implementation(
     }
 }
 
-/// The method and its levelled form; the form with all precautions, if they were split off.
+/// Emits a method with its levelled form, and its general path if there is one.
 fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
     let routine = routines
         .list
@@ -87,7 +88,7 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
         Some(general) => {
             let [is_ordinary, if_ordinary, in_general] =
                 ["is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
-            // Apart, and in another order: handed on as it is, the struct would live in memory whichever way it was made.
+            // Field by field in reverse order: passed on as a whole, the struct would live in memory on both paths.
             let fields: Vec<_> = ["flags"]
                 .into_iter()
                 .chain(method.fields.iter().rev().map(|(field, _)| *field))
@@ -95,9 +96,9 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 .collect();
             let field_types = method.field_types.iter().rev();
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
-            // Lanes are computed before it is known whether they suffice, while they are at the level: those that need more are
-            // replaced afterwards. A scalar is not. What is handed on is copied there: a reference to what was read would keep it
-            // in memory for all.
+            // Lanes are computed first, while they are in registers of the level; lanes that need the general path are
+            // replaced afterwards. A scalar branches first. Values are passed by copy: a reference would force them
+            // into memory on both paths.
             let WithCare { inputs, outputs, reads, returns, summed, code } =
                 with_care(method, name, program, routines, general);
             let select = quote! {
@@ -120,7 +121,7 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
             };
             let guard = mask(program, routines, general.ordinary);
             let general = quote! {
-                /// Where `_if_ordinary` suffices.
+                /// Whether the ordinary path suffices.
                 #[inline(always)]
                 fn #is_ordinary<L: ::energy_dsl::Level>(#arguments) -> T::Mask {
                     #guard
@@ -131,7 +132,8 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                     #ordinary
                 }
 
-                /// With all precautions, in numbers whose exponents do not end; lanes that need none stay as they are.
+                /// The general path, over numbers with an extended exponent. Lanes that do not need it stay as they
+                /// are.
                 #[cold]
                 #[inline(never)]
                 fn #in_general(inputs: &[T; #reads], ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
@@ -163,17 +165,17 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
     (methods, general)
 }
 
-/// A routine with all precautions: over any number, from what it reads to what it returns.
+/// The general path of a routine: inputs, outputs and code.
 struct WithCare {
-    /// What it reads, as the element's method reads it.
+    /// Inputs, as read by the method of the element.
     inputs: Vec<TokenStream>,
-    /// The fields of the result, out of `numbers`.
+    /// Fields of the result, taken from `numbers`.
     outputs: TokenStream,
-    /// How many numbers it reads.
+    /// Number of inputs.
     reads: usize,
-    /// How many numbers it returns.
+    /// Number of outputs.
     returns: usize,
-    /// From which number on results are added to each other.
+    /// Index from which outputs are added to each other.
     summed: usize,
     code: TokenStream,
 }
@@ -194,7 +196,7 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
     let mut first = 0;
     let outputs = method.fields.iter().zip(&general.groups).map(|((field, layout), nodes)| {
         let field = format_ident!("{field}");
-        // The layout of numbers that stand one after the other.
+        // The layout of consecutive numbers.
         let mut graph = Graph::textbook();
         let places = first..first + nodes.len();
         first = places.end;
@@ -231,13 +233,13 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
             }
         }
     };
-    // Derivatives by several difference vectors are summed up to those by points.
+    // Derivatives by several difference vectors are summed when they are expanded to points.
     let is_summed = method.routine == "reduced_hessian" && routines.vectors.len() > 1;
     let summed = if is_summed { general.groups[0].len() } else { returns };
     WithCare { inputs, outputs, reads, returns, summed, code }
 }
 
-/// Statements, then a mask.
+/// Emits statements and a mask.
 fn mask(program: &Program, routines: &Routines, node: NodeId) -> TokenStream {
     let read = |input: Input| read_input(program, input);
     let mut schedule = Schedule::new(&routines.graph, &read);
@@ -246,7 +248,7 @@ fn mask(program: &Program, routines: &Routines, node: NodeId) -> TokenStream {
     quote!(#statements #mask)
 }
 
-/// Statements, then the struct returned.
+/// Emits statements and the returned struct.
 fn body(
     method: &Method,
     program: &Program,
@@ -270,7 +272,7 @@ fn body(
     }
 }
 
-/// How a routine reads an input.
+/// Reads an input in a method.
 fn read_input(program: &Program, input: Input) -> TokenStream {
     let coordinate = |list: &str, i: u16| {
         let (list, point, axis) = (format_ident!("{list}"), usize::from(i) / 3, usize::from(i) % 3);
@@ -292,7 +294,7 @@ fn read_input(program: &Program, input: Input) -> TokenStream {
     }
 }
 
-/// The component with a number among the inputs, each read as `prefix name`.
+/// Reads one component of the inputs, as `prefix name`.
 pub(super) fn component(inputs: &[DeclaredInput], number: usize, prefix: &TokenStream) -> TokenStream {
     let input = inputs
         .iter()

@@ -1,4 +1,4 @@
-//! Routines to Rust.
+//! Emits routines as Rust.
 
 mod declaration;
 mod items;

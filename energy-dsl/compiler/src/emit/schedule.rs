@@ -5,20 +5,20 @@ use quote::{ToTokens, format_ident, quote};
 
 use crate::graph::{Graph, Input, NodeId, Op};
 
-/// How generated code reads an input.
+/// Emits the expression that reads an input.
 pub(super) type Reader<'a> = &'a dyn Fn(Input) -> TokenStream;
 
-/// Straight-line code for some nodes: each is computed just before its first use.
+/// Straight-line code. Each node is computed just before its first use.
 pub(super) struct Schedule<'a> {
     graph: &'a Graph,
     read: Reader<'a>,
     places: BTreeMap<NodeId, TokenStream>,
     statements: Vec<Statement>,
-    /// The statement that reads a node last; [`RETURNED`] for what is returned.
+    /// Last statement that reads each node; [`RETURNED`] if it is returned.
     last_use: BTreeMap<NodeId, usize>,
 }
 
-/// `let name = expression;`
+/// A statement `let name = expression;`.
 struct Statement {
     name: Ident,
     node: NodeId,
@@ -27,8 +27,8 @@ struct Statement {
 
 const RETURNED: usize = usize::MAX;
 
-/// Each `let` opens a scope inside the one before it, and the Rust compiler recurses over scopes: long routines are cut
-/// into blocks of this many statements, which hand on what later ones read.
+/// Statements per block. Each `let` opens a scope within the previous one, and rustc recurses over scopes, so long
+/// routines are split into blocks that return what later ones read.
 const BLOCK: usize = 128;
 
 impl<'a> Schedule<'a> {
@@ -36,7 +36,7 @@ impl<'a> Schedule<'a> {
         Self { graph, read, places: BTreeMap::new(), statements: Vec::new(), last_use: BTreeMap::new() }
     }
 
-    /// The statements so far.
+    /// Returns the statements so far.
     pub(super) fn statements(self) -> TokenStream {
         if self.statements.len() <= 2 * BLOCK {
             return lets(&self.statements);
@@ -56,10 +56,10 @@ impl<'a> Schedule<'a> {
             .collect()
     }
 
-    /// The expression that stands for a node, after whatever statements compute it.
+    /// Returns the expression of a node, after the statements that compute it.
     pub(super) fn value(&mut self, node: NodeId) -> TokenStream {
         let node = self.graph.resolve(node);
-        // An explicit stack: expressions may be deep.
+        // Uses an explicit stack, because expressions may be deep.
         let mut stack = vec![node];
         while let Some(&next) = stack.last() {
             if self.places.contains_key(&next) {
@@ -84,25 +84,25 @@ impl<'a> Schedule<'a> {
         self.places[&node].clone()
     }
 
-    /// An array of nodes.
+    /// Returns an array of nodes.
     pub(super) fn array(&mut self, nodes: &[NodeId]) -> TokenStream {
         let values: Vec<_> = nodes.iter().map(|&n| self.value(n)).collect();
         quote!([#(#values),*])
     }
 
-    /// An array of 3-vectors.
+    /// Returns an array of 3-vectors.
     pub(super) fn vectors(&mut self, nodes: &[NodeId]) -> TokenStream {
         let vectors: Vec<_> = nodes.chunks(3).map(|v| self.array(v)).collect();
         quote!([#(#vectors),*])
     }
 
-    /// An array of 3×3 blocks.
+    /// Returns an array of 3×3 blocks.
     pub(super) fn blocks(&mut self, nodes: &[NodeId]) -> TokenStream {
         let blocks: Vec<_> = nodes.chunks(9).map(|b| self.vectors(b)).collect();
         quote!([#(#blocks),*])
     }
 
-    /// A mask, false if there is none.
+    /// Returns a mask; false if there is none.
     pub(super) fn mask(&mut self, node: Option<NodeId>) -> TokenStream {
         match node {
             Some(node) => self.value(node),
@@ -136,7 +136,7 @@ impl<'a> Schedule<'a> {
             let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
             quote!(#a.#name(#(#rest),*))
         };
-        // What depends on the level takes it as `L`.
+        // Functions that depend on the level take it as `L`.
         let levelled = |name: &str, a: NodeId, rest: &[NodeId]| {
             let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
             quote!(#a.#name::<L>(#(#rest),*))
@@ -144,7 +144,7 @@ impl<'a> Schedule<'a> {
         match self.graph.fused(node) {
             Op::Constant(bits) => {
                 let magnitude = f64::from_bits(bits).abs();
-                // 1/0 and 0/0 of constants are no literals.
+                // Constants such as 1/0 and 0/0 cannot be literals.
                 let literal = if magnitude.is_finite() {
                     Literal::f64_suffixed(magnitude).into_token_stream()
                 } else if magnitude.is_nan() {

@@ -1,4 +1,4 @@
-//! Which methods the traits of each kind of declaration have.
+//! Lists the methods of each kind's traits.
 
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
@@ -10,7 +10,7 @@ use crate::graph::Input;
 use crate::routines::Routines;
 use energy_runtime::Kind;
 
-/// The implementations of all traits of the declaration's kind.
+/// Emits all traits of the declaration's kind.
 pub(super) fn traits(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     match program.kind {
         Kind::Energy => potential(name, program, routines),
@@ -87,7 +87,7 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
     quote!(#potential #reduced)
 }
 
-/// The Hessian by coordinates, and what it is by points.
+/// Emits the Hessian in reduced coordinates and its expansion to points.
 fn reduced_potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     let (n, points_number) = (routines.coordinates, program.points());
     let entries = n * (n + 1) / 2;

@@ -1,6 +1,6 @@
-//! Angles between two vectors, with their own derivatives. With w = a × b, the part of b̂ across â is
-//! p = b̂ − c â = (w × a)/(‖a‖²‖b‖), and that of â across b̂ is q = â − c b̂ = (b × w)/(‖b‖²‖a‖): neither subtracts
-//! what nearly cancels when the vectors align.
+//! Angles between two vectors, with their own derivatives. Let w = a × b. The part of b̂ orthogonal to â is p = b̂ − c
+//! â = (w × a)/(‖a‖²‖b‖); that of â orthogonal to b̂ is q = â − c b̂ = (b × w)/(‖b‖²‖a‖). Neither subtracts nearly
+//! equal vectors when a and b align.
 
 use super::length::{Direction, assume_moderate, common_scale, direction, upper};
 use super::{Function, Lowered, Shape};
@@ -24,7 +24,7 @@ fn two_vectors(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
-/// a × b with each 2×2 determinant rounded about once: high parts, and what they lack.
+/// Returns a × b with each 2×2 determinant rounded about once: high parts, and their errors.
 pub(super) fn exact_cross(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> [(NodeId, NodeId); 3] {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -37,7 +37,7 @@ pub(super) fn exact_cross(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> [(NodeId
     })
 }
 
-/// a × b, each component to about one rounding: of the two products one is kept with its error (Kahan).
+/// Returns a × b with each component rounded about once. One of the two products keeps its error (Kahan's method).
 pub(super) fn accurate_cross(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -48,7 +48,7 @@ pub(super) fn accurate_cross(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> [Node
     })
 }
 
-/// Two directions and what their angle needs of them.
+/// Two directions, and the quantities that their angle needs.
 struct Pair {
     a: Direction,
     b: Direction,
@@ -69,7 +69,7 @@ fn pair(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Pair {
     Pair { a: a_at, b: b_at, cross, dot, lengths, degenerate, arguments }
 }
 
-/// The vector behind three components of its unit vector.
+/// Returns the vector whose unit vector has these three components.
 fn vector_of_unit(g: &Graph, components: &[NodeId]) -> Option<Vec<NodeId>> {
     let arguments = g.rule(*components.first()?)?.arguments.clone();
     let all = components.len() == 3
@@ -79,8 +79,8 @@ fn vector_of_unit(g: &Graph, components: &[NodeId]) -> Option<Vec<NodeId>> {
     all.then_some(arguments)
 }
 
-/// The cosine c of the angle between a and b, and what it and 1 − c need of them, w = a × b. The root in γ = √P/P, P = ‖a‖²‖b‖², and
-/// the division in 1/P do not wait for each other; 1/‖a‖² = ‖b‖²/P and 1/‖b‖² = ‖a‖²/P.
+/// The cosine c of the angle between a and b, with what it and 1 − c need; w = a × b. The root in γ = √P/P and the
+/// division in 1/P, P = ‖a‖²‖b‖², are independent and overlap; 1/‖a‖² = ‖b‖²/P and 1/‖b‖² = ‖a‖²/P.
 struct Aligned {
     a: Vec<NodeId>,
     b: Vec<NodeId>,
@@ -88,9 +88,9 @@ struct Aligned {
     cross: [NodeId; 3],
     cosine: NodeId,
     one_minus: NodeId,
-    /// γ.
+    /// γ = 1/(‖a‖‖b‖).
     per_both: NodeId,
-    /// 1/‖a‖², 1/‖b‖².
+    /// 1/‖a‖² and 1/‖b‖².
     per_square: [NodeId; 2],
     degenerate: NodeId,
 }
@@ -115,7 +115,7 @@ fn aligned(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Aligned {
     let lengths = g.sqrt(product);
     let per_both = g.mul(lengths, per_product);
     let cosine = g.mul(dot, per_both);
-    // 1 − |c| = ‖w‖²γ/(m + |a·b|), m = ‖a‖‖b‖; to which (|a·b| − a·b) γ adds 0 or 2 |c|.
+    // 1 − |c| = ‖w‖²γ/(m + |a·b|) with m = ‖a‖‖b‖. Adding (|a·b| − a·b) γ, which is 0 or 2 |c|, gives 1 − c.
     let size = g.abs(dot);
     let cross_squared = g.sum_of_squares(&cross);
     let numerator = g.mul(cross_squared, per_both);
@@ -128,7 +128,7 @@ fn aligned(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Aligned {
     Aligned { a: x, b: y, scales, cross, cosine, one_minus, per_both, per_square, degenerate }
 }
 
-/// â·b̂ as one primitive.
+/// Creates â·b̂ as one primitive.
 pub(super) fn recognise_cosine(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
     let (a, b) = (vector_of_unit(g, x)?, vector_of_unit(g, y)?);
     let at = aligned(g, &a, &b);
@@ -137,7 +137,7 @@ pub(super) fn recognise_cosine(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Opt
     Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
-/// 1 − â·b̂ as one primitive.
+/// Recognises 1 − â·b̂.
 pub(super) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: NodeId) -> Option<NodeId> {
     if !g.is(one, 1.0) {
         return None;
@@ -149,7 +149,7 @@ pub(super) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
     Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
 }
 
-/// What the derivatives by one of the two vectors, a, are made of.
+/// Parts of the derivatives with respect to a, one of the two vectors.
 struct Side {
     /// p.
     gradient: [NodeId; 3],
@@ -161,13 +161,18 @@ struct Side {
     minus_per_square: NodeId,
 }
 
-/// Derivatives by a and b of c, or of −c with `negative`: κ = ±c and μ = ±γ. With a′ = a/‖a‖², b′ = b/‖b‖², p = μ w × a′ and
-/// q = μ b′ × w the gradient is (p, q); the second derivatives have the blocks −κ/‖a‖² I − a′ sᵀ − s a′ᵀ, s = p − ½ κ a′
-/// (likewise for b), and μ (I − a a′ᵀ) − p b′ᵀ. Weighed, p and q are parts of the gradient, which is computed anyway.
+/// Returns the derivatives of c, or of −c if `negative`, with respect to a and b. Let κ = ±c, μ = ±γ, a′ = a/‖a‖² and
+/// b′ = b/‖b‖².
+///
+/// - The gradient is (p, q) with p = μ w × a′ and q = μ b′ × w.
+/// - The diagonal block of a is −κ/‖a‖² I − a′ sᵀ − s a′ᵀ with s = p − ½ κ a′; that of b is analogous.
+/// - The mixed block is μ (I − a a′ᵀ) − p b′ᵀ.
+///
+/// Weighted p and q are part of the gradient, so they are computed anyway.
 fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Product>, Vec<Vec<Product>>) {
     let half = g.constant(0.5);
     let [kappa, mixed] = [at.cosine, at.per_both].map(|node| if negative { g.neg(node) } else { node });
-    // Scalars lead the products and vectors follow, so that what weighs a product weighs a scalar.
+    // Scalars come first in the products, so that a weight multiplies a scalar.
     let mut first = Vec::new();
     let mut sides = Vec::new();
     for (own, vector) in [&at.a, &at.b].into_iter().enumerate() {
@@ -191,7 +196,7 @@ fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Produ
             let (row, column) = (i % 3, j % 3);
             let mut products: Vec<Product> = if own == other {
                 let Side { minus_inverse, slant, minus_per_square, .. } = &sides[own];
-                // The diagonal's own term leads: it is computed once, and the others fuse with it.
+                // The term of the diagonal comes first: it is computed once, and the others fuse with it.
                 let round = (row == column).then(|| vec![kappa, *minus_per_square]);
                 let slanted = [vec![slant[row], minus_inverse[column]], vec![slant[column], minus_inverse[row]]];
                 round.into_iter().chain(slanted).collect()
@@ -215,7 +220,7 @@ fn cosine_derivatives(g: &mut Graph, at: &Aligned, negative: bool) -> (Vec<Produ
     (first, second)
 }
 
-/// Entry of x yᵀ + y xᵀ.
+/// Returns an entry of x yᵀ + y xᵀ.
 pub(super) fn symmetric_product(g: &mut Graph, x: &[NodeId], y: &[NodeId], i: usize, j: usize) -> NodeId {
     let one = g.mul(x[i], y[j]);
     if i == j {
@@ -226,8 +231,8 @@ pub(super) fn symmetric_product(g: &mut Graph, x: &[NodeId], y: &[NodeId], i: us
     g.add(one, other)
 }
 
-/// φ = atan2(‖a×b‖, a·b). With ŵ = a×b/‖a×b‖ and m_a = â×ŵ, m_b = ŵ×b̂: ∇φ = (m_a/‖a‖, m_b/‖b‖);
-/// ∇²φ = (cot φ ŵŵᵀ − â m_aᵀ − m_a âᵀ)/‖a‖² and likewise for b, −ŵŵᵀ/(sin φ ‖a‖‖b‖) between them.
+/// φ = atan2(‖a×b‖, a·b). With ŵ = a×b/‖a×b‖, m_a = â×ŵ and m_b = ŵ×b̂: ∇φ = (m_a/‖a‖, m_b/‖b‖). The diagonal block of
+/// a is (cot φ ŵŵᵀ − â m_aᵀ − m_a âᵀ)/‖a‖², that of b is analogous, and the mixed block is −ŵŵᵀ/(sin φ ‖a‖‖b‖).
 fn angle(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let (a, b) = (&args[0].parts, &args[1].parts);
     if g.form() == Form::Textbook {
@@ -239,7 +244,7 @@ fn angle(g: &mut Graph, args: &[Lowered]) -> Lowered {
     Lowered::scalar(between(g, a, b))
 }
 
-/// The robust form of the angle between two vectors.
+/// Creates the robust form of the angle between two vectors.
 pub(super) fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
     let pair = pair(g, a, b);
     let (null, one) = (g.constant(0.0), g.constant(1.0));
@@ -281,8 +286,8 @@ pub(super) fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
     g.add_rule(rule, &[])
 }
 
-/// √(c (1 − â·b̂)) with a constant c: v = 0 is the tip of a cone, where derivatives are taken as 0. Of ω = 1 − â·b̂, first
-/// derivative c/(2v), second −c²/(4v³).
+/// Recognises v = √(c (1 − â·b̂)) with a constant c. At v = 0, the tip of a cone, derivatives are taken as 0. With
+/// respect to ω = 1 − â·b̂ the first derivative is c/(2v), the second −c²/(4v³).
 pub(super) fn recognise_root(g: &mut Graph, x: NodeId, _: NodeId) -> Option<NodeId> {
     let (factor, omega) = match g.op(x) {
         Op::Mul(c, y) if g.as_constant(c).is_some() => (c, y),

@@ -1,4 +1,4 @@
-//! `+ − · / ^` and their likes, on numbers, vectors and matrices.
+//! Arithmetic operators on numbers, vectors and matrices.
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
@@ -109,7 +109,7 @@ fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
     by_parts(g, args, Graph::sub)
 }
 
-/// x² − y² as (x − y)(x + y), where one of them may be a constant with an exact root.
+/// Recognises x² − y² as (x − y)(x + y). One of the squares may be a constant with an exact root.
 fn recognise_squares(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
     let (x, y) = (root_of_square(g, a)?, root_of_square(g, b)?);
     if g.as_constant(a).is_some() && g.as_constant(b).is_some() {
@@ -159,7 +159,7 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
     }
 }
 
-/// factor · a.
+/// Returns factor · a.
 pub(super) fn scaled(g: &mut Graph, factor: NodeId, a: &Lowered) -> Lowered {
     let parts = super::quaternion::scaled_exponential(g, factor, &a.parts);
     Lowered { shape: a.shape, parts: parts.unwrap_or_else(|| g.scaled(factor, &a.parts)) }

@@ -1,8 +1,10 @@
-//! The dihedral angle of a hinge, and its sine and cosine and theirs of its half, with their own derivatives.
+//! The dihedral angle of a hinge, its sine and cosine, and those of half the angle, with their own derivatives.
 //!
-//! Points x₁, x₂ are the apexes, x₃x₄ the shared edge; E = x₄ − x₃, a = x₁ − x₃, b = x₂ − x₃, N₁ = E × a, N₂ = −E × b.
-//! Flat is 0, sin θ = (n₁ × n₂)·Ê. θ = atan2(−‖E‖ b·(E×a), −(E×a)·(E×b)): the triple product is computed as if in twice
-//! the precision, including what rounding the edges lost, so a nearly flat hinge has a relatively exact angle.
+//! Points x₁ and x₂ are the apexes, x₃x₄ is the shared edge. With E = x₄ − x₃, a = x₁ − x₃, b = x₂ − x₃, N₁ = E × a and
+//! N₂ = −E × b, a flat hinge has angle 0 and sin θ = (n₁ × n₂)·Ê.
+//!
+//! θ = atan2(−‖E‖ b·(E×a), −(E×a)·(E×b)). The triple product is computed as if in doubled precision, with the rounding
+//! errors of the edges, so the angle of a nearly flat hinge has a small relative error.
 
 use super::angle::{accurate_cross, exact_cross};
 use super::length::{common_scale, direction_scaled, upper};
@@ -38,7 +40,7 @@ fn dihedral(g: &mut Graph, x: &[Lowered]) -> Lowered {
     Lowered::scalar(if g.form() == Form::Textbook { textbook(g, &edge, &a, &b) } else { robust(g, &edge, &a, &b) })
 }
 
-/// atan2 of the unit normals' cross product along the edge and of their dot product.
+/// The textbook form: atan2 of the unit normals' cross product along the edge and of their dot product.
 fn textbook(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId {
     let unit = |g: &mut Graph, v: &[NodeId]| {
         let square = g.sum_of_squares(v);
@@ -53,13 +55,13 @@ fn textbook(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeI
     g.atan2(sine, cosine)
 }
 
-/// One triangle of the hinge, in scaled lengths: apex a, normal N = E × a.
+/// One triangle of the hinge, in scaled lengths, with apex a and normal N = E × a.
 struct Wing {
-    /// u = ±‖E‖ N/‖N‖², minus the gradient of the angle by the apex.
+    /// u = ±‖E‖ N/‖N‖², the negative gradient of the angle with respect to the apex.
     slope: Vec<NodeId>,
-    /// s = ±t/‖N‖², with t = N × E; not as ‖E‖² (a − τ E), which cancels in a needle.
+    /// s = ±t/‖N‖² with t = N × E. The form ‖E‖² (a − τ E) cancels in needle triangles.
     tangent: Vec<NodeId>,
-    /// τ = a·E/‖E‖², where along the edge the apex stands.
+    /// τ = a·E/‖E‖², the position of the apex along the edge.
     along: NodeId,
     /// ½ ‖N‖²/‖E‖⁴.
     aspect: NodeId,
@@ -78,7 +80,7 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     let folded = g.dot(&n1, &n2);
     let y = g.mul(e.length, volume);
-    // −0 and +0 are the same fold: +π.
+    // −0 and +0 denote the same fold: +π.
     let y = g.minus_or_plus_zero(y);
     let x = g.neg(folded);
     // ‖N₁‖²‖N₂‖² = x² + y².
@@ -125,7 +127,8 @@ fn robust(g: &mut Graph, edge: &[NodeId], a: &[NodeId], b: &[NodeId]) -> NodeId 
     g.add_rule(rule, &[])
 }
 
-/// b·(E×a) of the scaled edges: the determinant in double-double, and its change by the edges' rounding errors.
+/// Returns b·(E×a) of the scaled edges: the determinant in double-double, plus its change by the rounding errors of the
+/// edges.
 fn triple_product(
     g: &mut Graph,
     (edge, a, b): (&[NodeId], &[NodeId], &[NodeId]),
@@ -156,13 +159,13 @@ fn triple_product(
     g.add(sum, errors)
 }
 
-/// sin and cos of θ/2 from those of θ: each by whichever form does not cancel.
+/// Returns sin and cos of θ/2 from those of θ, each by the form that does not cancel.
 fn half_angles(g: &mut Graph, sine: NodeId, cosine: NodeId, degenerate: NodeId) -> DihedralParts {
     let (null, one, half, two) = (g.constant(0.0), g.constant(1.0), g.constant(0.5), g.constant(2.0));
     let obtuse = g.less(cosine, null);
     let magnitude = g.abs(cosine);
     let sum = g.add(one, magnitude);
-    // The larger of the two halves' functions; the smaller is |sin θ| / (2 · larger).
+    // The larger of the two half-angle functions. The smaller one is |sin θ| / (2 · larger).
     let halved = g.mul(half, sum);
     let larger = g.sqrt(halved);
     let doubled = g.mul(two, larger);
@@ -177,9 +180,14 @@ fn half_angles(g: &mut Graph, sine: NodeId, cosine: NodeId, degenerate: NodeId) 
     DihedralParts { sine, cosine, sine_half, cosine_half, degenerate }
 }
 
-/// Of each triangle, over (apex, E), with F = E/‖E‖² and S = u sᵀ + s uᵀ: gradient −(u, −τ u); Hessian S for the apex,
-/// u Fᵀ − τ S between edge and apex, u zᵀ + z uᵀ with z = (τ² + ½‖N‖²/‖E‖⁴) s − τ F for the edge. Their sum is θ's. In each
-/// product u leads: weighed it is part of the gradient, which is computed anyway.
+/// Returns the derivatives, summed over both triangles. For one triangle, over (apex, E) with F = E/‖E‖² and S = u sᵀ +
+/// s uᵀ:
+///
+/// - The gradient is −(u, −τ u).
+/// - The Hessian has the blocks S for the apex, u Fᵀ − τ S between edge and apex, and u zᵀ + z uᵀ with z = (τ² +
+///   ½‖N‖²/‖E‖⁴) s − τ F for the edge.
+///
+/// In each product u comes first: weighted, it is part of the gradient, which is computed anyway.
 fn derivatives(
     g: &mut Graph,
     scale: NodeId,
@@ -201,7 +209,7 @@ fn derivatives(
             first[apex + i] = vec![g.mul(minus_scale, u[i])];
             by_edge[i].push(g.mul(*tau, u[i]));
         }
-        // Entry (i, j) of u vᵀ + v uᵀ, times what follows.
+        // Returns entry (i, j) of u vᵀ + v uᵀ, times the other factors.
         let symmetric = |v: &[NodeId], i: usize, j: usize, more: &[NodeId]| -> [Product; 2] {
             [(i, j), (j, i)].map(|(i, j)| [&[u[i], v[j]], more].concat())
         };
@@ -211,7 +219,7 @@ fn derivatives(
         }
         for i in 0..3 {
             for j in 0..3 {
-                // Row: component i of the edge; column: component j of the apex.
+                // Row: component i of the edge. Column: component j of the apex.
                 let at = place(i, apex + j);
                 second[at].extend(symmetric(s, i.min(j), i.max(j), &[minus_tau]));
                 second[at].push(vec![u[i], per_edge[j]]);
@@ -227,17 +235,17 @@ fn derivatives(
     (first, second)
 }
 
-/// The sine of a dihedral angle or of its half.
+/// Recognises the sine of a dihedral angle or of its half.
 pub(super) fn recognise_sine(g: &mut Graph, x: NodeId, _: NodeId) -> Option<NodeId> {
     without_angle(g, x, Primitive::DihedralSine)
 }
 
-/// The cosine of a dihedral angle or of its half.
+/// Recognises the cosine of a dihedral angle or of its half.
 pub(super) fn recognise_cosine(g: &mut Graph, x: NodeId, _: NodeId) -> Option<NodeId> {
     without_angle(g, x, Primitive::DihedralCosine)
 }
 
-/// The sine or cosine (`primitive` says which) of a dihedral angle or of its half, computed without the angle.
+/// Returns the sine or cosine (`primitive` says which) of a dihedral angle or of its half, computed without the angle.
 fn without_angle(g: &mut Graph, x: NodeId, primitive: Primitive) -> Option<NodeId> {
     let (angle, halved) = match g.op(x) {
         crate::graph::Op::Mul(c, y) if g.is(c, 0.5) => (y, true),
@@ -265,8 +273,9 @@ fn without_angle(g: &mut Graph, x: NodeId, primitive: Primitive) -> Option<NodeI
     Some(g.add_rule(rule, &[]))
 }
 
-/// sin(θ/2) − sin(y/2) for a dihedral angle θ and a y that does not move. Where |sin| > |cos|, which is near folded, the difference
-/// is that of the cosines' squares over the sum of the sines: the cosines are small there, and so is what rounding them costs.
+/// Recognises sin(θ/2) − sin(y/2) for a dihedral angle θ and a constant y. Near folded, where |sin| > |cos|, the
+/// difference is that of the squared cosines over the sum of the sines. The cosines are small there, and so are their
+/// rounding errors.
 pub(super) fn recognise_sine_difference(g: &mut Graph, sine: NodeId, rest: NodeId) -> Option<NodeId> {
     let rule = g.rule(sine).filter(|r| r.primitive == Primitive::DihedralSineHalf)?.clone();
     let crate::graph::Op::Sin(half_rest) = g.op(rest) else { return None };

@@ -1,4 +1,4 @@
-//! Functions of one number, and of two.
+//! Functions of one or two numbers.
 
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
@@ -175,7 +175,7 @@ fn half(g: &mut Graph, x: NodeId) -> NodeId {
     g.mul(half, x)
 }
 
-/// 1 − cos x, written so.
+/// Recognises 1 − cos x.
 pub(super) fn recognise_versine(g: &mut Graph, one: NodeId, cosine: NodeId) -> Option<NodeId> {
     let angle = match g.op(cosine) {
         Op::Cos(angle) => angle,
@@ -184,7 +184,7 @@ pub(super) fn recognise_versine(g: &mut Graph, one: NodeId, cosine: NodeId) -> O
     g.is(one, 1.0).then(|| versine(g, angle))
 }
 
-/// 1 − cos x: first derivative sin x, second cos x.
+/// Creates 1 − cos x. The first derivative is sin x, the second cos x.
 fn versine(g: &mut Graph, x: NodeId) -> NodeId {
     let cosine = g.cos(x);
     if g.form() == Form::Textbook {
@@ -199,7 +199,7 @@ fn versine(g: &mut Graph, x: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::Versine, vec![x], value, vec![sine], vec![cosine]), &[])
 }
 
-/// x − sin x: first derivative 1 − cos x, second sin x.
+/// Creates x − sin x. The first derivative is 1 − cos x, the second sin x.
 fn sine_remainder(g: &mut Graph, x: NodeId) -> NodeId {
     let sine = g.sin(x);
     let direct = g.sub(x, sine);

@@ -1,4 +1,4 @@
-//! ln(1 + x), eˣ − 1 and their kin, without cancellation at 0.
+//! ln(1 + x), eˣ − 1 and related functions, without cancellation at 0.
 
 use super::elementary::{one_scalar, two_scalars};
 use super::sinc::polynomial;
@@ -48,7 +48,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
 ];
 
-/// ln x, of 1 + x as a primitive.
+/// Creates ln x. For 1 + x it is a primitive.
 fn log(g: &mut Graph, x: NodeId) -> NodeId {
     if g.form() == Form::Robust && g.as_constant(x).is_none() {
         match g.op(x) {
@@ -64,8 +64,8 @@ fn log(g: &mut Graph, x: NodeId) -> NodeId {
     g.ln(x)
 }
 
-/// With u = 1 + x rounded, ln(u) x/(u − 1): the errors of logarithm and quotient undo each other. Where the rounding was exact
-/// it is ln u itself.
+/// Creates ln(1 + x) as ln(u) x/(u − 1), where u = 1 + x is rounded: the errors of logarithm and quotient cancel. If u
+/// is exact, it is ln u.
 fn log1p(g: &mut Graph, x: NodeId) -> NodeId {
     let one = g.constant(1.0);
     let u = g.add(one, x);
@@ -85,7 +85,7 @@ fn log1p(g: &mut Graph, x: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::Log1p, vec![x], value, vec![first], vec![second]), &[])
 }
 
-/// x, and 1 + x if it is known by other means.
+/// The shape rule of x, or of x and 1 + x.
 fn with_successor(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.len() {
         1 => one_scalar(shapes),
@@ -94,7 +94,7 @@ fn with_successor(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
-/// A function of x by the way of one argument or of two.
+/// Creates a function of x, from one argument or from two.
 fn of_successor(
     g: &mut Graph,
     arguments: &[Lowered],
@@ -107,7 +107,7 @@ fn of_successor(
     }
 }
 
-/// ln u for u = 1 + x, which moves as x does: near 1, where u has lost the digits of x, by a series.
+/// Creates ln u for u = 1 + x, where u and x move together. Near 1, where u has lost digits of x, it uses a series.
 fn log1p_of(g: &mut Graph, x: NodeId, u: NodeId) -> NodeId {
     let direct = g.ln(u);
     if g.form() == Form::Textbook {
@@ -123,7 +123,7 @@ fn log1p_of(g: &mut Graph, x: NodeId, u: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::Log1p, vec![x], value, vec![first], vec![second]), &[u])
 }
 
-/// ln(1 + x) − x.
+/// Creates ln(1 + x) − x.
 fn log1pmx(g: &mut Graph, x: NodeId) -> NodeId {
     let (one, logarithm) = (g.constant(1.0), log1p(g, x));
     let u = g.add(one, x);
@@ -131,14 +131,14 @@ fn log1pmx(g: &mut Graph, x: NodeId) -> NodeId {
     log1pmx_rule(g, x, u, direct)
 }
 
-/// ln u − x for u = 1 + x, which moves as x does.
+/// Creates ln u − x for u = 1 + x, where u and x move together.
 fn log1pmx_of(g: &mut Graph, x: NodeId, u: NodeId) -> NodeId {
     let logarithm = g.ln(u);
     let direct = g.sub(logarithm, x);
     log1pmx_rule(g, x, u, direct)
 }
 
-/// Near 0 by a series. The derivatives −x/(1 + x) and −1/(1 + x)² cancel nowhere.
+/// Uses a series near 0. The derivatives −x/(1 + x) and −1/(1 + x)² do not cancel.
 fn log1pmx_rule(g: &mut Graph, x: NodeId, u: NodeId, direct: NodeId) -> NodeId {
     if g.form() == Form::Textbook {
         return direct;
@@ -153,17 +153,17 @@ fn log1pmx_rule(g: &mut Graph, x: NodeId, u: NodeId, direct: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::Log1pmx, vec![x], value, vec![first], vec![second]), &[u])
 }
 
-/// `series` where |x| < ½.
+/// Selects `series` where |x| < ½.
 fn near_0(g: &mut Graph, x: NodeId, series: NodeId, direct: NodeId) -> NodeId {
     let (magnitude, half) = (g.abs(x), g.constant(0.5));
     let near = g.less(magnitude, half);
     g.select(near, series, direct)
 }
 
-/// With z = x/(2 + x), y = z²: ln(1 + x) = 2 artanh z = 2z (1 + y/3 + y²/5 + …) and x − 2z = x z; what is left is
+/// With z = x/(2 + x) and y = z²: ln(1 + x) = 2 artanh z = 2z (1 + y/3 + y²/5 + …) and x − 2z = x z. The difference is
 /// z (2y (1/3 + y/5 + …) − x).
 fn log1pmx_near_0(g: &mut Graph, x: NodeId) -> NodeId {
-    // Terms until the next is below 2⁻⁵⁶ of the first at the largest y, that of x = −½.
+    // Adds terms until the next one is below 2⁻⁵⁶ of the first, at the largest y (x = −½).
     const LARGEST: f64 = 1.0 / 9.0;
     let last = (0..).find(|&k| LARGEST.powi(k + 1) * 3.0 / f64::from(2 * k + 5) < 2.0_f64.powi(-56)).unwrap_or(0);
     let two = g.constant(2.0);
@@ -176,10 +176,10 @@ fn log1pmx_near_0(g: &mut Graph, x: NodeId) -> NodeId {
     g.mul(z, difference)
 }
 
-/// With u = eˣ rounded, (u − 1) x/ln u for |x| < 1: again the errors undo each other.
+/// Creates eˣ − 1. For |x| < 1 it is (u − 1) x/ln u with u = eˣ rounded: the errors cancel.
 fn expm1(g: &mut Graph, x: NodeId) -> NodeId {
     let u = g.exp(x);
-    // Not `sub`, which would come back here.
+    // Plain addition: `sub` would be recognised as this function again.
     let minus_one = g.constant(-1.0);
     let plain = g.add(u, minus_one);
     if g.form() == Form::Textbook {
@@ -194,7 +194,7 @@ fn expm1(g: &mut Graph, x: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::Expm1, vec![x], value, vec![u], vec![u]), &[])
 }
 
-/// eˣ − 1 and 1 − eˣ, written so.
+/// Recognises eˣ − 1 and 1 − eˣ.
 pub(super) fn recognise_expm1(g: &mut Graph, a: NodeId, b: NodeId) -> Option<NodeId> {
     match (g.op(a), g.op(b)) {
         (Op::Exp(x), _) if g.is(b, 1.0) => Some(expm1(g, x)),
@@ -206,7 +206,7 @@ pub(super) fn recognise_expm1(g: &mut Graph, a: NodeId, b: NodeId) -> Option<Nod
     }
 }
 
-/// First derivative 1/(1 + e⁻ˣ), second e^(−|x|)/(1 + e^(−|x|))².
+/// Creates ln(1 + eˣ). The first derivative is 1/(1 + e⁻ˣ), the second e^(−|x|)/(1 + e^(−|x|))².
 fn softplus(g: &mut Graph, x: NodeId) -> NodeId {
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     if g.form() == Form::Textbook {

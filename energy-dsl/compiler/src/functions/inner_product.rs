@@ -1,15 +1,15 @@
-//! x·y as one primitive, so that derivatives can be gathered at inner products: a membrane's nine or six coordinates enter its
-//! strain through three of them.
+//! Inner products as primitives, so that derivatives are gathered at them: the six or nine coordinates of a membrane
+//! enter its strain through three inner products.
 
 use crate::graph::{Form, Graph, NodeId, Primitive, Product, Rule, symmetric_index};
 
-/// Σ xᵢ yᵢ. Of a vector with itself the primitive is half of it: its derivatives, x and 1, need no factors.
+/// Creates Σ xᵢ yᵢ. For a vector with itself the primitive is half of it, whose derivatives x and 1 need no factors.
 pub(super) fn inner_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId {
-    // One order for x·y and y·x.
+    // x·y and y·x are the same node.
     let (x, y) = if y < x { (y, x) } else { (x, y) };
     let value = g.dot(x, y);
     let square = x == y;
-    // Shared arguments would have to be summed: such products are left to the ordinary rules.
+    // Shared arguments would have to be summed, so such products follow the ordinary rules.
     let distinct = square || x.iter().all(|part| !y.contains(part));
     let moving = x.len() > 1 && x.iter().chain(y).all(|&part| g.varies(part));
     if g.form() == Form::Textbook || !moving || !distinct {

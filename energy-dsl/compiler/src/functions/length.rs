@@ -1,7 +1,7 @@
 //! Lengths: ‖d‖, d/‖d‖, ‖d‖^α, ‖d‖ − L and its square, with their own derivatives.
 //!
-//! Vectors are scaled by a power of two first, so that no square overflows or vanishes. With n = d/‖d‖, r = ‖d‖ and
-//! P = I − n nᵀ: ∇r = n and ∇²r = P/r, the diagonal of P being the sum of the *other* squares, never 1 − nᵢ².
+//! Vectors are first scaled by a power of two, so that no square overflows or vanishes. With n = d/‖d‖, r = ‖d‖ and P =
+//! I − n nᵀ: ∇r = n and ∇²r = P/r. The diagonal of P is the sum of the *other* squares, never 1 − nᵢ².
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape, parallelogram};
@@ -50,11 +50,11 @@ fn unit_shape(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
-/// A vector d, scaled, with its length and direction.
+/// A scaled vector d, with its length and direction.
 pub(super) struct Direction {
-    /// The power of two.
+    /// The scale, a power of two.
     pub(super) scale: NodeId,
-    /// scale · d.
+    /// The scaled vector, scale · d.
     pub(super) scaled: Vec<NodeId>,
     /// ‖scale · d‖².
     pub(super) square: NodeId,
@@ -70,7 +70,7 @@ pub(super) struct Direction {
     pub(super) unit: Vec<NodeId>,
 }
 
-/// A power of two that brings the largest of the numbers near 1.
+/// Creates a power of two that scales the largest of the numbers to near 1.
 pub(super) fn common_scale(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
     let largest = largest_magnitude(g, numbers);
     g.power_of_two_scale(largest)
@@ -81,7 +81,7 @@ fn largest_magnitude(g: &mut Graph, numbers: &[NodeId]) -> NodeId {
     magnitudes.into_iter().reduce(|a, b| g.max(a, b)).expect("a vector has components")
 }
 
-/// Notes that where d·d (which scaling brings near 1) is moderate, d needs no scaling and is not 0.
+/// Records the assumption: if d·d is moderate, d is not 0 and needs no scaling.
 pub(super) fn assume_moderate(g: &mut Graph, square: NodeId, scale: NodeId, zero: NodeId) {
     let moderate = g.is_moderate(square, 2);
     let (one, never) = (g.constant(1.0), g.truth(false));
@@ -89,14 +89,14 @@ pub(super) fn assume_moderate(g: &mut Graph, square: NodeId, scale: NodeId, zero
     g.assume(zero, never, moderate);
 }
 
-/// Scales `d` by `scale` and finds its direction.
+/// Scales `d` by `scale` and computes its direction.
 pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Direction {
     let scaled = g.scaled(scale, d);
     let square = g.sum_of_squares(&scaled);
     let length = g.sqrt(square);
     let (null, one) = (g.constant(0.0), g.constant(1.0));
     let zero = g.equal(square, null);
-    // 1/‖d‖ = √s/s, so that root and division do not wait for each other.
+    // 1/‖d‖ = √s/s, so that root and division overlap.
     let per_square = g.div(one, square);
     let per_square = g.select(zero, null, per_square);
     let reciprocal = g.mul(length, per_square);
@@ -104,7 +104,7 @@ pub(super) fn direction_scaled(g: &mut Graph, d: &[NodeId], scale: NodeId) -> Di
     Direction { scale, scaled, square, length, zero, per_square, reciprocal, unit }
 }
 
-/// Finds the direction of `d`.
+/// Computes the direction of `d`.
 pub(super) fn direction(g: &mut Graph, d: &[NodeId]) -> Direction {
     let scale = common_scale(g, d);
     let at = direction_scaled(g, d, scale);
@@ -112,7 +112,7 @@ pub(super) fn direction(g: &mut Graph, d: &[NodeId]) -> Direction {
     at
 }
 
-/// The entries of P = I − n nᵀ, each by `entry(i, j)`: off the diagonal −nᵢ nⱼ, on it the other squares.
+/// Returns entry (i, j) of P = I − n nᵀ: −nᵢ nⱼ off the diagonal, the sum of the other squares on it.
 pub(super) fn projector(g: &mut Graph, n: &[NodeId], i: usize, j: usize) -> NodeId {
     if i == j {
         let others: Vec<_> = n.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, &x)| x).collect();
@@ -122,7 +122,7 @@ pub(super) fn projector(g: &mut Graph, n: &[NodeId], i: usize, j: usize) -> Node
     g.neg(product)
 }
 
-/// All (i, j) with i ≤ j < n.
+/// Returns all (i, j) with i ≤ j < n.
 pub(super) fn upper(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
 }
@@ -138,7 +138,7 @@ fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
     }
     let at = direction(g, d);
     let value = g.div(at.length, at.scale);
-    // By a and b where d = a × b.
+    // By a and b if d = a × b.
     let curvature = g.mul(at.reciprocal, at.scale);
     let (arguments, (first, second)) = match parallelogram::edges(g, d) {
         Some(edges) => (edges.concat(), parallelogram::derivatives(g, &edges, &at.unit, curvature)),
@@ -201,8 +201,9 @@ fn unit_parts(g: &mut Graph, d: &[NodeId]) -> Vec<NodeId> {
     (0..m).map(|i| component(g, i)).collect()
 }
 
-/// ‖d‖^α with α a parameter or a constant: gradient g n, Hessian (g/r) (I + (α − 2) n nᵀ), g = α ‖d‖^(α−1). An even constant
-/// power is a polynomial of d·d. At d = 0 both are their limits, or 0 and flagged where there is none.
+/// Recognises ‖d‖^α, where α is a parameter or a constant. With g = α ‖d‖^(α−1), the gradient is g n and the Hessian
+/// (g/r) (I + (α − 2) n nᵀ). An even constant power is a polynomial of d·d. At d = 0 both are their limits, or 0 and
+/// flagged if there is none.
 pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId) -> Option<NodeId> {
     let rule = g.rule(base)?;
     let (d, length) = (rule.vector.clone()?, rule.value);
@@ -231,7 +232,7 @@ pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
     let second = upper(d.len())
         .map(|(i, j)| {
             let along = g.product(None, &[less_two, at.unit[i], at.unit[j]]);
-            // Not as a sum of two products: where the power overflows they could be opposite infinities.
+            // Two products could be opposite infinities where the power overflows.
             let entry = if i == j { g.add(one, along) } else { along };
             vec![vec![ratio, entry]]
         })
@@ -243,15 +244,17 @@ pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
     Some(g.add_rule(rule, &[exponent]))
 }
 
-/// ‖d‖ − L with L a length that does not move: C = (r − L) + ρ, r the rounded length, ρ = (d·d − r²)/2r what rounding it lost,
-/// with the rounding errors of the edge itself: near rest r − L is exact, and ρ most of the strain. Its half square ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ,
-/// which are right at d = 0 too where L = 0.
+/// Recognises C = ‖d‖ − L, where L does not move. C = (r − L) + ρ, where r is the rounded length and ρ = (d·d − r²)/2r
+/// its rounding error, including the rounding errors of the edge. Near rest r − L is exact, and ρ is most of the
+/// strain.
+///
+/// ½C² has the gradient (C/r) d and the Hessian (C/r) I + (L/r) n nᵀ. Both are right at d = 0, too, if L = 0.
 pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: NodeId) -> Option<NodeId> {
     let d = g.rule(norm)?.vector.clone()?;
     if g.varies(rest_length) {
         return None;
     }
-    // A length is not negative, so the largest size is found without its magnitude.
+    // A length is not negative, so it needs no absolute value.
     let largest = largest_magnitude(g, &d);
     let largest = g.max(largest, rest_length);
     let scale = g.power_of_two_scale(largest);
@@ -264,7 +267,7 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let (reciprocal, per_square) = if g.is(rounding, 0.0) {
         (at.reciprocal, at.per_square)
     } else {
-        // Below a strain of u the correction nearly cancels r − L: it takes 1/r of the rounded length itself, rounded once.
+        // Below a strain of u, the correction nearly cancels r − L. It uses 1/r of the rounded length, rounded once.
         let reciprocal = g.div(one, at.length);
         (reciprocal, g.mul(reciprocal, reciprocal))
     };
@@ -274,10 +277,10 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
     let scaled_value = g.add(rounded, correction);
     let value = g.div(scaled_value, scale);
 
-    // C/r, at d = 0 its limit 1 for a spring without rest length, else 0. What both derivatives have, 1/r, leads.
+    // C/r; at d = 0 its limit 1 for a spring without rest length, else 0. The common factor 1/r comes first.
     let at_zero = g.select(slack, one, null);
     let elongation = g.select(at.zero, at_zero, scaled_value);
-    // (L/r) n nᵀ = (L/r³) d dᵀ, of the scaled vector.
+    // (L/r) n nᵀ = (L/r³) d dᵀ of the scaled vector.
     let square = g.mul(value, value);
     let half_value = g.mul(half, square);
     let half_first = d.iter().map(|&x| vec![reciprocal, elongation, x]).collect();
@@ -293,13 +296,13 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
         .flagged(1, Flag::Degenerate, collapsed);
     let half_square = g.add_rule(half_square, &[rest_length]);
 
-    // By ‖d‖, so that what depends on both gathers their derivatives.
+    // Differentiated with respect to ‖d‖, so that everything that depends on both gathers there.
     let rule = Rule::smooth(Primitive::Elongation, vec![norm], value, vec![one], vec![null]);
     Some(g.add_rule(Rule { half_square: Some(half_square), ..rule }, &[rest_length]))
 }
 
-/// ‖d‖ (‖d‖ − r) for r, the length of the scaled vector as it was rounded: half of d·d − r² as if in twice the precision,
-/// including what rounding d lost.
+/// Returns ‖d‖ (‖d‖ − r) for the rounded length r of the scaled vector: half of d·d − r² as if in doubled precision,
+/// including the rounding errors of d.
 fn rounding_of_length(g: &mut Graph, d: &[NodeId], at: &Direction) -> NodeId {
     let squares: Vec<_> = at.scaled.iter().map(|&e| g.mul(e, e)).collect();
     let mut errors: Vec<_> = at.scaled.iter().map(|&e| g.product_error(e, e)).collect();

@@ -1,4 +1,4 @@
-//! Products, transposes and inverses of vectors and matrices, and how they are put together.
+//! Products, transposes and inverses of vectors and matrices, and their construction.
 
 use super::angle::recognise_cosine;
 use super::arithmetic::scaled;
@@ -164,7 +164,7 @@ fn square_to_scalar(shapes: &[Shape]) -> Result<Shape, String> {
     square_to_square(shapes).map(|_| Shape::Scalar)
 }
 
-/// The checker has turned `identity(n)` into n numbers: the shape follows from their count.
+/// The checker has expanded `identity(n)` to n numbers; the shape follows from their count.
 fn identity_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.len() {
         n @ (2 | 3) => Ok(Shape::Matrix(n as u8, n as u8)),
@@ -190,7 +190,7 @@ fn vector_shape(shapes: &[Shape]) -> Result<Shape, String> {
     }
 }
 
-/// The checker has seen to it that the second is a constant in range.
+/// The checker ensures that the second argument is a constant in range.
 fn component_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(_) | Shape::Quat | Shape::DualQuat | Shape::Twist, Shape::Scalar] => Ok(Shape::Scalar),
@@ -216,7 +216,7 @@ fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
     match (x.shape, y.shape) {
         (Shape::Scalar, _) => scaled(g, x.node(), y),
         (_, Shape::Scalar) => scaled(g, y.node(), x),
-        // Needle triangles: each component to about one rounding.
+        // For needle triangles, each component is rounded about once.
         _ if g.form() == Form::Robust => {
             let components = super::angle::accurate_cross(g, &x.parts, &y.parts);
             g.note_origin(&components, Origin::Cross([x.parts.clone(), y.parts.clone()]));
@@ -251,7 +251,7 @@ fn minor(g: &mut Graph, m: &Lowered, (i, j): (usize, usize), (k, l): (usize, usi
     g.sub(plus, minus)
 }
 
-/// Cofactors of a 3×3 matrix, row by row; of a 2×2 matrix likewise.
+/// Returns the cofactors of a 2×2 or 3×3 matrix, row by row.
 fn cofactors(g: &mut Graph, m: &Lowered) -> Vec<NodeId> {
     if m.dimensions().0 == 2 {
         let (b, c) = (g.neg(m.at(0, 1)), g.neg(m.at(1, 0)));

@@ -1,4 +1,4 @@
-//! Comparisons, for the condition of `if`.
+//! Comparisons for the condition of `if`.
 
 use super::{Function, Lowered, Shape};
 use crate::graph::Graph;

@@ -1,4 +1,4 @@
-//! Robust losses: quadratic near 0, linear far away.
+//! Robust losses, quadratic near 0 and linear far away.
 
 use super::elementary::two_scalars;
 use super::{Function, Lowered};
@@ -24,7 +24,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
 ];
 
-/// c (x − c/2) with c = x clamped to ±δ. First derivatives: c by x; 0 inside and |x| − δ outside by δ.
+/// Creates c (x − c/2) with c = x clamped to ±δ. The first derivatives are c with respect to x; 0 inside and |x| − δ
+/// outside with respect to δ.
 fn huber(g: &mut Graph, x: NodeId, delta: NodeId) -> NodeId {
     let (null, one, half) = (g.constant(0.0), g.constant(1.0), g.constant(0.5));
     let magnitude = g.abs(x);
@@ -55,7 +56,8 @@ fn huber(g: &mut Graph, x: NodeId, delta: NodeId) -> NodeId {
     g.add_rule(rule.flagged(2, Flag::Kink, corner), &[])
 }
 
-/// x²/(1 + s), s = √(1 + (x/δ)²): first derivative x/s, second 1/s³. A threshold that moves is differentiated as it is written.
+/// Creates x²/(1 + s) with s = √(1 + (x/δ)²). The first derivative is x/s, the second 1/s³. With a moving threshold the
+/// formula is differentiated as written.
 fn pseudo_huber(g: &mut Graph, x: NodeId, delta: NodeId) -> NodeId {
     let one = g.constant(1.0);
     let ratio = g.div(x, delta);

@@ -1,5 +1,5 @@
-//! The functions of the language, one row each: name, what it is, its rule of shapes, its lowering, and its bound of
-//! accuracy stand together. Operators are functions too. A robust primitive's own derivatives stand beside its lowering.
+//! The functions of the language, one row each: name, description, shape rule, lowering and accuracy. Operators are
+//! functions, too. The derivatives of a robust primitive are next to its lowering.
 
 mod angle;
 mod arithmetic;
@@ -22,20 +22,20 @@ pub use shape::{Lowered, Shape};
 
 use crate::graph::{Ending, Graph, Recogniser};
 
-/// One function of the language.
+/// A function of the language.
 pub struct Function {
-    /// Name, or the operator's symbol.
+    /// Name, or symbol of the operator.
     pub name: &'static str,
-    /// How a call looks, for messages and documentation.
+    /// Form of a call, for messages and documentation.
     pub usage: &'static str,
-    /// What it is.
+    /// Description.
     pub docs: &'static str,
-    /// The shape of the result, or what was expected.
+    /// Returns the shape of the result, or a message that says what was expected.
     pub shape: fn(&[Shape]) -> Result<Shape, String>,
-    /// Nodes of the result.
+    /// Returns the nodes of the result.
     pub lower: fn(&mut Graph, &[Lowered]) -> Lowered,
-    /// Bound on the relative rounding error of value, first and second derivative in units of roundoff, for exact arguments;
-    /// empty for what composes by the ordinary rules.
+    /// Bound on the relative rounding error of value, first and second derivatives in units of roundoff, for exact
+    /// arguments. Empty if the ordinary rules apply.
     pub accuracy: &'static str,
 }
 
@@ -45,7 +45,7 @@ impl std::fmt::Debug for Function {
     }
 }
 
-/// Every function and operator.
+/// Returns all functions and operators.
 pub fn all() -> impl Iterator<Item = &'static Function> {
     [
         arithmetic::FUNCTIONS,
@@ -65,13 +65,13 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
     .flatten()
 }
 
-/// The function of that name.
+/// Returns the function of this name.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static Function> {
     all().find(|f| f.name == name)
 }
 
-/// The naive spellings that compile to robust forms. Where several end in the same operation, the first match counts.
+/// Naive spellings that compile to robust forms. If several end in the same operation, the first match counts.
 pub const RECOGNISERS: &[Recogniser] = &[
     Recogniser {
         spelling: "1 - dot(unit(a), unit(b))",

@@ -1,11 +1,10 @@
-//! ‖a × b‖, the area of the parallelogram of a and b, by a and b. With r = ‖a × b‖ and n = (a × b)/r, ∂r/∂a = b × n, ∂r/∂b = n × a,
-//! ∂²r/∂a² = (b·b/r) n nᵀ, ∂²r/∂b² = (a·a/r) n nᵀ and ∂²r/∂aᵢ∂bⱼ = εᵢⱼₖ nₖ − (a·b/r) nᵢ nⱼ: an area grows in proportion to how far its edges
-//! move in its plane, and by the square of how far they leave it.
+//! ‖a × b‖, the area of the parallelogram of a and b. With r = ‖a × b‖ and n = (a × b)/r: ∂r/∂a = b × n, ∂r/∂b = n × a,
+//! ∂²r/∂a² = (b·b/r) n nᵀ, ∂²r/∂b² = (a·a/r) n nᵀ and ∂²r/∂aᵢ∂bⱼ = εᵢⱼₖ nₖ − (a·b/r) nᵢ nⱼ.
 
 use super::length::upper;
 use crate::graph::{Graph, NodeId, Origin, Product, symmetric_index};
 
-/// a and b where `d` is their cross product, all of whose components move on their own.
+/// Returns a and b if `d` is their cross product and all their components are independent.
 pub(super) fn edges(g: &Graph, d: &[NodeId]) -> Option<[Vec<NodeId>; 2]> {
     let Origin::Cross([a, b]) = g.origin(d)? else { return None };
     let all = [&a[..], b].concat();
@@ -13,7 +12,7 @@ pub(super) fn edges(g: &Graph, d: &[NodeId]) -> Option<[Vec<NodeId>; 2]> {
     (distinct && all.iter().all(|&x| g.varies(x))).then(|| [a.clone(), b.clone()])
 }
 
-/// First and second derivatives of r by the components of a, then b; `per_length` is 1/r.
+/// Returns the first and second derivatives of r with respect to the components of a, then b; `per_length` is 1/r.
 pub(super) fn derivatives(
     g: &mut Graph,
     [a, b]: &[Vec<NodeId>; 2],

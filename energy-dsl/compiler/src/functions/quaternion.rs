@@ -1,7 +1,8 @@
 //! Quaternions (w, x, y, z), dual quaternions (real part, dual part) and twists (rotation vector θ, translation t).
 //!
-//! A rotation is a unit quaternion q, which turns v into q v q*. A rigid motion is a dual quaternion with a unit real part q and
-//! the dual part ½ t q, which takes p to q p q* + t. The exponential of a twist has the angle 2‖θ‖: q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
+//! A rotation is a unit quaternion q; it takes v to q v q*. A rigid motion is a dual quaternion with a unit real part q
+//! and the dual part ½ t q; it takes p to q p q* + t. The exponential of a twist rotates by the angle 2‖θ‖: q = (cos
+//! ‖θ‖, θ sin ‖θ‖/‖θ‖).
 
 use super::length::{direction, upper};
 use super::sinc::{assume_at_most_a_quarter_turn, cos_sqrt, sinc_sqrt};
@@ -177,7 +178,7 @@ fn conjugate(g: &mut Graph, a: &[Lowered]) -> Lowered {
     Lowered { shape: a[0].shape, parts }
 }
 
-/// p q = (p₀ q₀ − p·q, p₀ q + q₀ p + p × q).
+/// Returns p q = (p₀ q₀ − p·q, p₀ q + q₀ p + p × q).
 fn hamilton(g: &mut Graph, p: &[NodeId], q: &[NodeId]) -> Vec<NodeId> {
     let (real, along) = (g.mul(p[0], q[0]), g.dot(&p[1..], &q[1..]));
     let sums: Vec<_> = (1..4).map(|i| g.dot(&[p[0], q[0]], &[q[i], p[i]])).collect();
@@ -186,7 +187,7 @@ fn hamilton(g: &mut Graph, p: &[NodeId], q: &[NodeId]) -> Vec<NodeId> {
     product
 }
 
-/// s + a × b, product by product, so that each fuses with the sum before it.
+/// Returns s + a × b, one product at a time, so that each fuses with the sum so far.
 fn plus_cross(g: &mut Graph, s: &[NodeId], a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -196,7 +197,7 @@ fn plus_cross(g: &mut Graph, s: &[NodeId], a: &[NodeId], b: &[NodeId]) -> [NodeI
     })
 }
 
-/// The product of two quaternions, or of two dual quaternions: p q + ε (p q′ + p′ q).
+/// Returns the product of two quaternions, or of two dual quaternions: p q + ε (p q′ + p′ q).
 pub(super) fn product(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
     let (p, q) = (&a.parts, &b.parts);
     let mut parts = hamilton(g, &p[..4], &q[..4]);
@@ -207,7 +208,7 @@ pub(super) fn product(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
     Lowered { shape: a.shape, parts }
 }
 
-/// v + 2 (w t + u × t) with q = (w, u), t = u × v.
+/// Returns v + 2 (w t + u × t) with q = (w, u) and t = u × v.
 fn rotate(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
     let rotated = rotated(g, q, v);
     g.note_origin(&rotated, Origin::Rotated { quaternion: q.to_vec(), vector: v.to_vec() });
@@ -222,7 +223,7 @@ fn rotated(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
     v.iter().zip(added).map(|(&v, added)| g.add(v, added)).collect()
 }
 
-/// Turned, and shifted by w e − w′ u + u × e with the real part (w, u) and twice the dual one, (w′, e).
+/// Rotates, and translates by w e − w′ u + u × e, with the real part (w, u) and twice the dual part, (w′, e).
 fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (q, dual) = a[0].parts.split_at(4);
     let turned = rotated(g, q, &a[1].parts);
@@ -234,13 +235,13 @@ fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
     Lowered::vector(moved)
 }
 
-/// By how much a dual quaternion shifts what it has turned, of its real part and twice its dual one.
+/// Returns the translation of a dual quaternion, given its real part and twice its dual part.
 pub(super) fn translation(g: &mut Graph, q: &[NodeId], dual: &[NodeId]) -> Vec<NodeId> {
     let null = g.constant(0.0);
     plus_translation(g, &[null; 3], q, dual)
 }
 
-/// s + w e − w′ u + u × e.
+/// Returns s + w e − w′ u + u × e.
 fn plus_translation(g: &mut Graph, s: &[NodeId], q: &[NodeId], dual: &[NodeId]) -> Vec<NodeId> {
     let along: Vec<_> = (0..3)
         .map(|i| {
@@ -263,7 +264,7 @@ fn rotation_matrix(g: &mut Graph, a: &[Lowered]) -> Lowered {
     Lowered::matrix(3, 3, (0..9).map(|e| columns[e % 3][e / 3]).collect())
 }
 
-/// (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
+/// Returns (cos ‖θ‖, θ sin ‖θ‖/‖θ‖).
 fn rotation(g: &mut Graph, theta: &[NodeId]) -> Vec<NodeId> {
     let (cosine, sinc) = cosine_and_sinc(g, theta);
     let parts = about(g, cosine, sinc, theta);
@@ -271,7 +272,7 @@ fn rotation(g: &mut Graph, theta: &[NodeId]) -> Vec<NodeId> {
     parts
 }
 
-/// cos ‖θ‖ and sin ‖θ‖/‖θ‖.
+/// Returns cos ‖θ‖ and sin ‖θ‖/‖θ‖.
 fn cosine_and_sinc(g: &mut Graph, theta: &[NodeId]) -> (NodeId, NodeId) {
     let square = g.sum_of_squares(theta);
     let both = (cos_sqrt(g, square), sinc_sqrt(g, square));
@@ -279,14 +280,14 @@ fn cosine_and_sinc(g: &mut Graph, theta: &[NodeId]) -> (NodeId, NodeId) {
     both
 }
 
-/// (c, s θ).
+/// Returns (c, s θ).
 fn about(g: &mut Graph, c: NodeId, s: NodeId, theta: &[NodeId]) -> Vec<NodeId> {
     let mut parts = vec![c];
     parts.extend(g.scaled(s, theta));
     parts
 }
 
-/// exp of a twist: the rotation q of θ, and ½ (0, t) q.
+/// Returns the exponential of a twist: the rotation q of θ, and ½ (0, t) q.
 pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
     let (theta, t) = twist.parts.split_at(3);
     let (cosine, sinc) = cosine_and_sinc(g, theta);
@@ -298,8 +299,8 @@ pub(super) fn exp(g: &mut Graph, twist: &Lowered) -> Lowered {
     Lowered { shape: Shape::DualQuat, parts }
 }
 
-/// w q + ε ½ (0, t) (w q) if `parts` are the exponential q + ε ½ (0, t) q: five products with w instead of eight, and one instead of
-/// eight in what flows back.
+/// Returns w q + ε ½ (0, t) (w q) if `parts` are an exponential q + ε ½ (0, t) q. This takes five products with w
+/// instead of eight, and one instead of eight in reverse.
 pub(super) fn scaled_exponential(g: &mut Graph, w: NodeId, parts: &[NodeId]) -> Option<Vec<NodeId>> {
     let Origin::Exponential { cosine, sinc, turn, shift } = g.origin(parts)?.clone() else { return None };
     let (cosine, sinc) = (g.mul(w, cosine), g.mul(w, sinc));
@@ -307,7 +308,7 @@ pub(super) fn scaled_exponential(g: &mut Graph, w: NodeId, parts: &[NodeId]) -> 
     Some(with_shift(g, real, &shift))
 }
 
-/// q + ε ½ (0, t) q.
+/// Returns q + ε ½ (0, t) q.
 fn with_shift(g: &mut Graph, mut real: Vec<NodeId>, t: &[NodeId]) -> Vec<NodeId> {
     let half = g.constant(0.5);
     let mut halved = vec![g.constant(0.0)];
@@ -317,7 +318,8 @@ fn with_shift(g: &mut Graph, mut real: Vec<NodeId>, t: &[NodeId]) -> Vec<NodeId>
     real
 }
 
-/// All of a dual quaternion times ρ = 1/‖q‖, q its real part: with n = q/‖q‖, ∇ρ = −ρ² n and ∇²ρ = ρ³ (3 n nᵀ − I).
+/// Returns a dual quaternion times ρ = 1/‖q‖, where q is its real part. With n = q/‖q‖: ∇ρ = −ρ² n and ∇²ρ = ρ³ (3 n nᵀ
+/// − I).
 pub(super) fn unit_dual(g: &mut Graph, dual: &Lowered) -> Lowered {
     let q = &dual.parts[..4];
     let reciprocal = if g.form() == Form::Textbook {

@@ -1,12 +1,12 @@
-//! Inner products of rotated vectors. A rotation keeps them: with a unit quaternion q,
-//! (q a q*)·(q b q* + τ − c) = a·b + (q a q*)·(τ − c), so that b need not be rotated, nor its rotation differentiated.
+//! Inner products of rotated vectors. Rotations keep inner products: with a unit quaternion q, (q a q*)·(q b q* + τ −
+//! c) = a·b + (q a q*)·(τ − c). So b need not be rotated, nor its rotation differentiated.
 
 use super::inner_product::inner_product;
 use super::quaternion::translation;
 use crate::graph::{Graph, NodeId, Op, Origin};
 
-/// The product where one factor is a rotated vector, and the other one that the same unit quaternion moved, or the difference of
-/// such a one and a third.
+/// Recognises the product of a rotated vector with a vector that the same unit quaternion transformed, or with the
+/// difference of such a vector and another one.
 pub(super) fn recognise_rotated_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
     with_rotated(g, x, y).or_else(|| with_rotated(g, y, x))
 }
@@ -30,7 +30,7 @@ fn with_rotated(g: &mut Graph, rotated: &[NodeId], other: &[NodeId]) -> Option<N
     Some(g.neg(product))
 }
 
-/// b and τ of q b q* + τ, τ left out where nothing is added.
+/// Returns b and τ of q b q* + τ; τ is `None` if nothing is added.
 fn moved_by(g: &mut Graph, by: &[NodeId], components: &[NodeId]) -> Option<(Vec<NodeId>, Option<Vec<NodeId>>)> {
     match g.origin(components)?.clone() {
         Origin::Rotated { quaternion, vector } if quaternion == by => Some((vector, None)),
@@ -41,7 +41,7 @@ fn moved_by(g: &mut Graph, by: &[NodeId], components: &[NodeId]) -> Option<(Vec<
     }
 }
 
-/// a·b + (q a q*)·rest.
+/// Returns a·b + (q a q*)·rest.
 fn product(g: &mut Graph, [a, b]: [&[NodeId]; 2], rotated: &[NodeId], rest: Option<Vec<NodeId>>) -> NodeId {
     let kept = inner_product(g, a, b);
     match rest {
@@ -53,7 +53,7 @@ fn product(g: &mut Graph, [a, b]: [&[NodeId]; 2], rotated: &[NodeId], rest: Opti
     }
 }
 
-/// shift − off.
+/// Returns shift − off.
 fn difference(g: &mut Graph, shift: Option<Vec<NodeId>>, off: Vec<NodeId>) -> Vec<NodeId> {
     match shift {
         Some(shift) => shift.into_iter().zip(off).map(|(shift, off)| g.sub(shift, off)).collect(),
@@ -61,7 +61,7 @@ fn difference(g: &mut Graph, shift: Option<Vec<NodeId>>, off: Vec<NodeId>) -> Ve
     }
 }
 
-/// Minuends and subtrahends, if all components are differences.
+/// Returns minuends and subtrahends if all components are differences.
 fn differences(g: &Graph, components: &[NodeId]) -> Option<[Vec<NodeId>; 2]> {
     let pairs: Option<Vec<_>> = components
         .iter()

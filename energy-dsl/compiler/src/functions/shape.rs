@@ -2,31 +2,31 @@ use std::fmt;
 
 use crate::graph::NodeId;
 
-/// What a value is made of.
+/// The shape of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shape {
-    /// A number.
+    /// One number.
     Scalar,
-    /// A vector of 2, 3 or 4.
+    /// A vector of 2, 3 or 4 numbers.
     Vector(u8),
     /// A matrix, rows × columns.
     Matrix(u8, u8),
     /// A quaternion: w, x, y, z.
     Quat,
-    /// A dual quaternion: the real part, then the dual one.
+    /// A dual quaternion: real part, then dual part.
     DualQuat,
-    /// A rotation vector, then a translation.
+    /// A twist: rotation vector, then translation.
     Twist,
-    /// The outcome of a comparison.
+    /// A truth value: the outcome of a comparison.
     Truth,
-    /// So many values one after the other. No function takes one: its entries are its own values.
+    /// An array of this many values. No function takes one; its entries are values of their own.
     Array(u16),
-    /// One vector per point, the body of a force; or the rows of a constraint or residual, given one by one.
+    /// One vector per point, the result of a force; or the rows of a constraint or residual.
     Rows(u16),
 }
 
 impl Shape {
-    /// How many numbers it holds.
+    /// Returns the count of numbers.
     #[must_use]
     pub fn size(self) -> usize {
         match self {
@@ -57,29 +57,29 @@ impl fmt::Display for Shape {
     }
 }
 
-/// A value in the graph: its shape and its numbers, row by row.
+/// A lowered value: its shape, and its numbers row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lowered {
-    /// Its shape.
+    /// Shape of the value.
     pub shape: Shape,
-    /// Its numbers.
+    /// Nodes of its numbers.
     pub parts: Vec<NodeId>,
 }
 
 impl Lowered {
-    /// A scalar.
+    /// Creates a scalar.
     #[must_use]
     pub fn scalar(node: NodeId) -> Self {
         Self { shape: Shape::Scalar, parts: vec![node] }
     }
 
-    /// A truth value.
+    /// Creates a truth value.
     #[must_use]
     pub fn truth(node: NodeId) -> Self {
         Self { shape: Shape::Truth, parts: vec![node] }
     }
 
-    /// A vector.
+    /// Creates a vector.
     #[must_use]
     pub fn vector(parts: impl Into<Vec<NodeId>>) -> Self {
         let parts = parts.into();
@@ -87,21 +87,21 @@ impl Lowered {
         Self { shape: Shape::Vector(n), parts }
     }
 
-    /// A matrix.
+    /// Creates a matrix.
     #[must_use]
     pub fn matrix(rows: usize, columns: usize, parts: Vec<NodeId>) -> Self {
         debug_assert_eq!(parts.len(), rows * columns);
         Self { shape: Shape::Matrix(rows as u8, columns as u8), parts }
     }
 
-    /// The only number of a scalar.
+    /// Returns the node of a scalar.
     #[must_use]
     pub fn node(&self) -> NodeId {
         debug_assert_eq!(self.parts.len(), 1);
         self.parts[0]
     }
 
-    /// Rows and columns, a vector being a column.
+    /// Returns rows and columns. A vector is a column.
     #[must_use]
     pub fn dimensions(&self) -> (usize, usize) {
         match self.shape {
@@ -110,7 +110,7 @@ impl Lowered {
         }
     }
 
-    /// Entry (i, j).
+    /// Returns entry (i, j).
     #[must_use]
     pub fn at(&self, i: usize, j: usize) -> NodeId {
         self.parts[i * self.dimensions().1 + j]

@@ -1,6 +1,7 @@
-//! sin x / x and its kin, whose limits at 0 are removable. S(y) = sin √y / √y and cos √y are even entire functions of x = √y:
-//! by y no derivative divides by x. With Sₘ the m-th derivative of S, (cos √y)′ = −S/2 and
-//! 2y Sₘ₊₂ + (2m + 3) Sₘ₊₁ + Sₘ/2 = 0; where that cancels, the power series Sₘ = Σ (−1)ᵏ k!/(k−m)! yᵏ⁻ᵐ/(2k+1)!.
+//! sin x / x and related functions with removable singularities at 0. S(y) = sin √y / √y and cos √y are even entire
+//! functions of x = √y: as functions of y, no derivative divides by x. With Sₘ the m-th derivative of S, (cos √y)′ =
+//! −S/2 and 2y Sₘ₊₂ + (2m + 3) Sₘ₊₁ + Sₘ/2 = 0. Where that cancels, the power series Sₘ = Σ (−1)ᵏ k!/(k−m)!
+//! yᵏ⁻ᵐ/(2k+1)! is used.
 
 use super::elementary::one_scalar;
 use super::{Function, Lowered};
@@ -41,7 +42,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
 ];
 
-/// What the functions of one argument share: one sine, one cosine, one division.
+/// Shared parts of the functions of one argument: one sine, one cosine, one division.
 struct Shared {
     y: NodeId,
     cosine: NodeId,
@@ -53,11 +54,11 @@ struct Shared {
     half_inverse: NodeId,
 }
 
-/// Below these, cos x − S and S/2 + 3 S₁ lose more than the series.
+/// Below these bounds, cos x − S and S/2 + 3 S₁ lose more digits than the series.
 const SLOPE_SERIES_BELOW: f64 = 2.0;
 const CURVATURE_SERIES_BELOW: f64 = 6.0;
 
-/// Of x and y = x².
+/// Computes the shared parts from x and y = x².
 fn shared(g: &mut Graph, x: NodeId, y: NodeId) -> Shared {
     let (null, one, half) = (g.constant(0.0), g.constant(1.0), g.constant(0.5));
     let (sine, cosine) = (g.sin(x), g.cos(x));
@@ -74,7 +75,7 @@ fn shared(g: &mut Graph, x: NodeId, y: NodeId) -> Shared {
 }
 
 impl Shared {
-    /// S₂ = −(S/2 + 3 S₁)/(2y).
+    /// Returns S₂ = −(S/2 + 3 S₁)/(2y).
     fn curvature(&self, g: &mut Graph) -> NodeId {
         let (half, three) = (g.constant(0.5), g.constant(3.0));
         let (a, b) = (g.mul(half, self.sinc), g.mul(three, self.slope));
@@ -85,8 +86,8 @@ impl Shared {
     }
 }
 
-/// Notes that x = √y is nearly always at most a quarter turn, π/2: of half a rotation vector that is all there is to tell apart.
-/// There series in y take the place of root, sine, cosine and division.
+/// Records the assumption that x = √y is at most a quarter turn, π/2. As half of a rotation vector it nearly always is.
+/// Then series in y replace root, sine, cosine and division.
 pub(super) fn assume_at_most_a_quarter_turn(g: &mut Graph, y: NodeId) {
     const BELOW: f64 = 2.5;
     if g.form() == Form::Textbook {
@@ -105,8 +106,8 @@ pub(super) fn assume_at_most_a_quarter_turn(g: &mut Graph, y: NodeId) {
     }
 }
 
-/// cos √y = S + 2y S₁ = 1 + y (R + 2 S₁) with S = 1 + y R, for y ≤ `below`: two operations where S and S₁ are computed anyway, and
-/// only the last rounds at the size of the result.
+/// Returns cos √y = S + 2y S₁ = 1 + y (R + 2 S₁) with S = 1 + y R, for y ≤ `below`. If S and S₁ are computed anyway,
+/// this takes two operations, and only the last one rounds at the size of the result.
 fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
     let (one, two) = (g.constant(1.0), g.constant(2.0));
     let rest = polynomial(g, y, coefficients(below, 0).split_off(1));
@@ -117,7 +118,7 @@ fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
     g.add(one, product)
 }
 
-/// Σ cₖ yᵏ by Horner's rule.
+/// Returns Σ cₖ yᵏ by Horner's rule.
 pub(super) fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -> NodeId {
     let mut sum = g.constant(coefficients.pop().expect("a polynomial has coefficients"));
     for coefficient in coefficients.into_iter().rev() {
@@ -127,9 +128,10 @@ pub(super) fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -
     sum
 }
 
-/// A power series on [0, `below`] as a polynomial of low degree (Lanczos' economisation): the term of highest degree is replaced,
-/// as long as that changes the sum by no more than 2⁻⁵⁶ of its first term, by the lower ones of y² times the Chebyshev polynomial
-/// with the same leading coefficient. The first two terms stay as they are: rounding them anew would cost more than that.
+/// Returns a power series on [0, `below`] as a polynomial of low degree (Lanczos' economisation). The term of highest
+/// degree is replaced by lower ones, using y² times the Chebyshev polynomial with the same leading coefficient, while
+/// this changes the sum by at most 2⁻⁵⁶ of its first term. The first two terms stay: rounding them again would cost
+/// more.
 fn economised(coefficient: impl Fn(i32) -> f64, below: f64) -> Vec<f64> {
     let budget = coefficient(0).abs() * 2.0_f64.powi(-56);
     let negligible = |k: i32| coefficient(k).abs() * below.powi(k) < budget * 2.0_f64.powi(-10);
@@ -150,7 +152,7 @@ fn economised(coefficient: impl Fn(i32) -> f64, below: f64) -> Vec<f64> {
     coefficients
 }
 
-/// The coefficients of T_n(2y/b − 1), which on [0, b] stays within ±1.
+/// Returns the coefficients of T_n(2y/b − 1), which stays within ±1 on [0, b].
 fn shifted_chebyshev(n: usize, b: f64) -> Vec<f64> {
     // T₀ and T₋₁ = T₁, then T_{m+1}(x) = 2x T_m(x) − T_{m−1}(x).
     let (mut before, mut at) = (vec![-1.0, 2.0 / b], vec![1.0]);
@@ -168,7 +170,7 @@ fn shifted_chebyshev(n: usize, b: f64) -> Vec<f64> {
     at
 }
 
-/// The series of Sₘ where y < `below`, else `direct`.
+/// Selects the series of Sₘ where y < `below`, else `direct`.
 fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -> NodeId {
     let series = polynomial(g, y, coefficients(below, order));
     let below = g.constant(below);
@@ -176,7 +178,7 @@ fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -
     g.select(near, series, direct)
 }
 
-/// Those of the series of Sₘ for y ≤ `below`.
+/// Returns the coefficients of the series of Sₘ for y ≤ `below`.
 fn coefficients(below: f64, order: i32) -> Vec<f64> {
     // (−1)ᵏ k!/(k−m)!/(2k+1)!, from k = m on.
     let coefficient = |power: i32| {
@@ -188,7 +190,7 @@ fn coefficients(below: f64, order: i32) -> Vec<f64> {
     economised(coefficient, below)
 }
 
-/// S₁ as a rule of y, so that it can be differentiated.
+/// Returns S₁ as a rule of y, so that it can be differentiated.
 fn slope(g: &mut Graph, shared: &Shared) -> NodeId {
     let curvature = shared.curvature(g);
     let mut rule = Rule::smooth(Primitive::SincSqrtSlope, vec![shared.y], shared.slope, vec![curvature], Vec::new());
@@ -196,7 +198,7 @@ fn slope(g: &mut Graph, shared: &Shared) -> NodeId {
     g.add_rule(rule, &[])
 }
 
-/// cos √y.
+/// Creates cos √y.
 pub(super) fn cos_sqrt(g: &mut Graph, y: NodeId) -> NodeId {
     let x = g.sqrt(y);
     if g.form() == Form::Textbook {
@@ -209,7 +211,7 @@ pub(super) fn cos_sqrt(g: &mut Graph, y: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::CosSqrt, vec![y], shared.cosine, vec![first], vec![second]), &[])
 }
 
-/// sin √y / √y.
+/// Creates sin √y / √y.
 pub(super) fn sinc_sqrt(g: &mut Graph, y: NodeId) -> NodeId {
     let x = g.sqrt(y);
     if g.form() == Form::Textbook {
@@ -221,7 +223,7 @@ pub(super) fn sinc_sqrt(g: &mut Graph, y: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::SincSqrt, vec![y], shared.sinc, vec![first], vec![second]), &[])
 }
 
-/// sin x / x: first derivative 2x S₁, second −(S + 4 S₁).
+/// Creates sin x / x. The first derivative is 2x S₁, the second −(S + 4 S₁).
 fn sinc(g: &mut Graph, x: NodeId) -> NodeId {
     if g.form() == Form::Textbook {
         let sine = g.sin(x);
@@ -237,7 +239,7 @@ fn sinc(g: &mut Graph, x: NodeId) -> NodeId {
     g.add_rule(Rule::smooth(Primitive::Sinc, vec![x], shared.sinc, vec![first], vec![second]), &[])
 }
 
-/// (1 − cos x)/x² = ½ sinc²(x/2).
+/// Creates (1 − cos x)/x² = ½ sinc²(x/2).
 fn cosc(g: &mut Graph, x: NodeId) -> NodeId {
     if g.form() == Form::Textbook {
         let (one, cosine, square) = (g.constant(1.0), g.cos(x), g.mul(x, x));

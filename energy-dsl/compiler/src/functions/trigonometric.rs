@@ -1,4 +1,4 @@
-//! Tangent, and the inverses of sine and cosine.
+//! The tangent, and the inverse sine and cosine.
 
 use super::elementary::one_scalar;
 use super::{Function, Lowered};
@@ -32,7 +32,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
 ];
 
-/// sin x / cos x: first derivative 1/cos² x, second 2 tan x / cos² x.
+/// Creates sin x / cos x. The first derivative is 1/cos² x, the second 2 tan x / cos² x.
 fn tan(g: &mut Graph, x: NodeId) -> NodeId {
     let (sine, cosine) = (g.sin(x), g.cos(x));
     let value = g.div(sine, cosine);
@@ -56,7 +56,8 @@ fn acos(g: &mut Graph, x: NodeId) -> NodeId {
     arc(g, x, Primitive::ArcCosine)
 }
 
-/// With c = √((1 − x)(1 + x)), asin x = atan2(x, c) and acos x = atan2(c, x): first derivatives ±1/c, second ±x/c³.
+/// Creates asin x = atan2(x, c) or acos x = atan2(c, x) with c = √((1 − x)(1 + x)). The first derivatives are ±1/c, the
+/// second ±x/c³.
 fn arc(g: &mut Graph, x: NodeId, primitive: Primitive) -> NodeId {
     let (null, one, minus_one) = (g.constant(0.0), g.constant(1.0), g.constant(-1.0));
     let is_sine = primitive == Primitive::ArcSine;

@@ -1,6 +1,7 @@
-//! Constructors of nodes. They fold constants, zeros and ones, move signs outwards, and order the operands of what commutes,
-//! so that equal expressions meet. No rewrite here changes how a result is rounded, save that a product with constants
-//! that are powers of two is regrouped, which is exact.
+//! Constructors of nodes. They fold constants, zeros and ones, move signs outwards, and order commutative operands, so
+//! that equal expressions become one node.
+//!
+//! No rewrite changes how a result is rounded. Products with powers of two are regrouped, which is exact.
 
 use super::recognise::Ending;
 use super::{Form, Graph, Input, NodeId, Op};
@@ -31,23 +32,23 @@ impl Graph {
         id
     }
 
-    /// A constant.
+    /// Creates a constant.
     pub fn constant(&mut self, value: f64) -> NodeId {
-        // One zero: where its sign matters, code asks for it by a selection.
+        // There is one zero. Code that depends on the sign of zero uses a selection.
         self.node(Op::Constant((value + 0.0).to_bits()))
     }
 
-    /// π.
+    /// Creates π.
     pub fn pi(&mut self) -> NodeId {
         self.node(Op::Pi)
     }
 
-    /// An input.
+    /// Creates an input.
     pub fn input(&mut self, input: Input) -> NodeId {
         self.node(Op::Input(input))
     }
 
-    /// The number a node always is, if it is one.
+    /// Returns the constant value of a node; `None` if it is not constant.
     #[must_use]
     pub fn as_constant(&self, node: NodeId) -> Option<f64> {
         match self.op(node) {
@@ -56,13 +57,13 @@ impl Graph {
         }
     }
 
-    /// Whether the node is the constant `value`.
+    /// Returns whether the node is the constant `value`.
     #[must_use]
     pub fn is(&self, node: NodeId, value: f64) -> bool {
         self.as_constant(node) == Some(value)
     }
 
-    /// The node without its leading minus sign, and whether it had one.
+    /// Returns the node without its leading minus sign, and whether it had one.
     pub(super) fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
         match self.op(node) {
             Op::Neg(a) => (a, true),
@@ -74,7 +75,7 @@ impl Graph {
         if negative { self.neg(node) } else { node }
     }
 
-    /// −a.
+    /// Creates −a.
     pub fn neg(&mut self, a: NodeId) -> NodeId {
         match self.op(a) {
             Op::Constant(bits) => self.constant(-f64::from_bits(bits)),
@@ -84,13 +85,13 @@ impl Graph {
         }
     }
 
-    /// Whether an operation on constants is done here: always where doubles compute, but the textbook form, which is also
-    /// evaluated to more digits, only takes results that are exact.
+    /// Returns whether to fold an operation on constants. The textbook form is also evaluated in higher precision, so
+    /// it only folds exact results.
     fn folds(&self, exact: bool) -> bool {
         exact || self.form() == Form::Robust
     }
 
-    /// a + b.
+    /// Creates a + b.
     pub fn add(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
             && self.folds(x.sum_error(y) == 0.0)
@@ -120,13 +121,13 @@ impl Graph {
                 let (c, sum) = (self.constant(c), self.add(x, y));
                 self.mul(c, sum)
             }
-            // One order for both, that written first: it decides which product a sum takes along.
+            // Uses the operand order that was written first: it decides which product is fused.
             _ if self.index.contains_key(&Op::Add(b, a)) => self.node(Op::Add(b, a)),
             _ => self.node(Op::Add(a, b)),
         }
     }
 
-    /// a − b. With a = 1 and b a cosine between vectors, 1 − cos of the angle; with a = ‖d‖ and b a length, the elongation.
+    /// Creates a − b. `1 − cos` of an angle between vectors and `‖d‖ − L` become robust primitives.
     pub fn sub(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
             && self.folds(x.sum_error(-y) == 0.0)
@@ -159,7 +160,7 @@ impl Graph {
                 self.mul(c, difference)
             }
             _ => {
-                // The opposite difference may be there already.
+                // Reuses the opposite difference if it exists.
                 if let Some(&opposite) = self.index.get(&Op::Sub(b, a)) {
                     return self.node(Op::Neg(opposite));
                 }
@@ -168,12 +169,12 @@ impl Graph {
         }
     }
 
-    /// a − b without recognition.
+    /// Creates a − b without recognition.
     pub(crate) fn plain_difference(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::Sub(a, b))
     }
 
-    /// a · b. A squared elongation becomes its own primitive.
+    /// Creates a · b. A squared elongation becomes its own primitive.
     pub fn mul(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b))
             && self.folds(x.mul_add(y, -(x * y)) == 0.0)
@@ -215,12 +216,12 @@ impl Graph {
         self.signed(product, minus_a != minus_b)
     }
 
-    /// a · b with a sign left before a factor.
+    /// Creates a · b; a minus sign stays with its factor.
     pub(super) fn signed_product(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::Mul(a.min(b), a.max(b)))
     }
 
-    /// The constant and the other factor of a product.
+    /// Splits a product into its constant and its other factor.
     fn scaled_by_constant(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
         match self.op(node) {
             Op::Mul(c, y) if self.as_constant(c).is_some() => Some((c, y)),
@@ -229,20 +230,20 @@ impl Graph {
         }
     }
 
-    /// The power of two that leads a product, and what it multiplies; 1 and the node itself if there is none.
+    /// Splits a leading power of two off a product; returns 1 and the node if there is none.
     fn power_of_two_times(&self, node: NodeId) -> (f64, NodeId) {
         let scaled = self.scaled_by_constant(node);
         let scaled = scaled.and_then(|(c, x)| Some((self.as_constant(c).filter(|&c| is_power_of_two(c))?, x)));
         scaled.unwrap_or((1.0, node))
     }
 
-    /// The power of two that leads both terms of a sum, and what it multiplies.
+    /// Returns the power of two that both terms share, and the other factors.
     fn common_power_of_two(&self, a: NodeId, b: NodeId) -> Option<(f64, NodeId, NodeId)> {
         let ((c, x), (d, y)) = (self.power_of_two_times(a), self.power_of_two_times(b));
         (c == d && c != 1.0).then_some((c, x, y))
     }
 
-    /// x · (c · y) with both constants powers of two.
+    /// Regroups x · (c · y) if both constants are powers of two.
     fn regroup(&mut self, x: f64, b: NodeId) -> Option<NodeId> {
         let (c, y) = self.scaled_by_constant(b)?;
         let c = self.as_constant(c)?;
@@ -253,7 +254,7 @@ impl Graph {
         Some(self.mul(factor, y))
     }
 
-    /// a / b; by a power of two, a product.
+    /// Creates a / b. A division by a power of two becomes a product.
     pub fn div(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if self.is(a, 0.0) {
             return a;
@@ -284,7 +285,7 @@ impl Graph {
         }
     }
 
-    /// √a; of 1 − cos between vectors, its own primitive.
+    /// Creates √a. The root of 1 − cos between vectors becomes its own primitive.
     pub fn sqrt(&mut self, a: NodeId) -> NodeId {
         if let Some(recognised) = self.recognised(Ending::Root, a, a) {
             return recognised;
@@ -292,18 +293,18 @@ impl Graph {
         self.plain_sqrt(a)
     }
 
-    /// √a without recognition.
+    /// Creates √a without recognition.
     pub(crate) fn plain_sqrt(&mut self, a: NodeId) -> NodeId {
         self.unary(a, f64::sqrt, Op::Sqrt)
     }
 
-    /// |a|.
+    /// Creates |a|.
     pub fn abs(&mut self, a: NodeId) -> NodeId {
         let (a, _) = self.magnitude(a);
         self.unary(a, f64::abs, Op::Abs)
     }
 
-    /// sin a; of a dihedral angle or its half, without the angle.
+    /// Creates sin a. For a dihedral angle or its half, the angle is not computed.
     pub fn sin(&mut self, a: NodeId) -> NodeId {
         if let Some(recognised) = self.recognised(Ending::Sine, a, a) {
             return recognised;
@@ -311,7 +312,7 @@ impl Graph {
         self.unary(a, f64::sin, Op::Sin)
     }
 
-    /// cos a; of a dihedral angle or its half, without the angle.
+    /// Creates cos a. For a dihedral angle or its half, the angle is not computed.
     pub fn cos(&mut self, a: NodeId) -> NodeId {
         if let Some(recognised) = self.recognised(Ending::Cosine, a, a) {
             return recognised;
@@ -319,37 +320,37 @@ impl Graph {
         self.unary(a, f64::cos, Op::Cos)
     }
 
-    /// eᵃ.
+    /// Creates eᵃ.
     pub fn exp(&mut self, a: NodeId) -> NodeId {
         self.unary(a, f64::exp, Op::Exp)
     }
 
-    /// ln a.
+    /// Creates ln a.
     pub fn ln(&mut self, a: NodeId) -> NodeId {
         self.unary(a, f64::ln, Op::Ln)
     }
 
-    /// atan2(y, x).
+    /// Creates atan2(y, x).
     pub fn atan2(&mut self, y: NodeId, x: NodeId) -> NodeId {
         self.node(Op::Atan2(y, x))
     }
 
-    /// atan2(y, x) where y² + x² is moderate.
+    /// Creates atan2(y, x) for moderate y² + x².
     pub fn moderate_atan2(&mut self, y: NodeId, x: NodeId) -> NodeId {
         self.node(Op::ModerateAtan2(y, x))
     }
 
-    /// min(a, b).
+    /// Creates min(a, b).
     pub fn min(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if a == b { a } else { self.node(Op::Min(a.min(b), a.max(b))) }
     }
 
-    /// max(a, b).
+    /// Creates max(a, b).
     pub fn max(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if a == b { a } else { self.node(Op::Max(a.min(b), a.max(b))) }
     }
 
-    /// a^b: products for integers, a root for halves, `powf` for what is left. A power of a norm is its own primitive.
+    /// Creates a^b: products for integers, a root for halves, else `powf`. A power of a norm becomes its own primitive.
     pub fn pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if let Some(recognised) = self.recognised(Ending::Power, a, b) {
             return recognised;
@@ -357,7 +358,7 @@ impl Graph {
         self.plain_pow(a, b)
     }
 
-    /// a^b without recognition.
+    /// Creates a^b without recognition.
     pub(crate) fn plain_pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
         let Some(exponent) = self.as_constant(b) else { return self.node(Op::Pow(a, b)) };
         if let Some(x) = self.as_constant(a)
@@ -395,8 +396,7 @@ impl Graph {
     }
 }
 
-/// Whether a function of one number is known to have an exact result: |x|, a root that is a double, or at 0 and 1 what are
-/// integers there.
+/// Returns whether the result of a unary function is known to be exact: |x|, an exact root, or an integer at 0 and 1.
 fn is_exact(x: f64, result: f64) -> bool {
     result == x.abs() || result.mul_add(result, -x) == 0.0 || (result.fract() == 0.0 && (x == 0.0 || x == 1.0))
 }

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::{Graph, NodeId, Op};
 use energy_runtime::OperationCount;
 
-/// The nodes that must be computed for `outputs`, in ascending (hence topological) order, rules replaced by their values.
+/// Returns the nodes needed to compute `outputs`, in topological order. Rules are replaced by their values.
 #[must_use]
 pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
@@ -16,7 +16,7 @@ pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
     seen
 }
 
-/// The arithmetic needed for `outputs`.
+/// Counts the operations needed to compute `outputs`.
 #[must_use]
 pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
     let mut count = OperationCount::default();
@@ -31,7 +31,7 @@ pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
             Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) | Op::RootError(..) => {
                 count.error_terms += 1
             }
-            // Its product alone, beside an error term.
+            // Counts the product here; its error term is counted apart.
             Op::FusedMulSub(..) => {
                 count.basic += 1;
                 count.error_terms += 1;

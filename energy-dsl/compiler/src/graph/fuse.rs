@@ -1,16 +1,16 @@
-//! Which sums take a product along, as one fused multiply-add.
+//! Selects the products that fuse with a sum into one multiply-add.
 //!
-//! The choice depends on the graph alone and not on the routine, so that all routines compute a node alike. A difference of
-//! two products stays as it is: fused, a·b − a·b would not be 0, and a flat hinge not flat. What is scaled by a power of two is
-//! rounded first, also where the scale turns out to be 1 and is left out: results scale exactly with their configuration.
+//! The choice depends only on the graph, so all routines compute a node in the same way. A difference of two products
+//! is not fused: then a·b − a·b would not be 0, and a flat hinge would not be flat. Scaled operands are rounded first
+//! even if the scale is 1 and omitted, so that results scale exactly with their configuration.
 
 use super::{Graph, NodeId, Op};
 
 impl Graph {
-    /// What computes a node where products fuse with sums.
+    /// Returns the fused operation that computes a node.
     #[must_use]
     pub fn fused(&self, node: NodeId) -> Op {
-        // A sign of what is added costs nothing either.
+        // Negating the addend is free.
         let unsigned = |c: NodeId| match self.op(self.resolve(c)) {
             Op::Neg(c) => Some(c),
             _ => None,
@@ -28,7 +28,7 @@ impl Graph {
         match self.op(node) {
             op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) => {
                 match (self.product_of(a), self.product_of(b)) {
-                    // Of two products the one that is used less: the other is computed anyway.
+                    // Fuses the product with fewer uses; the other one is computed anyway.
                     (Some((x, y)), Some(_)) if self.users(a) < self.users(b) => Op::MulAdd(x, y, b),
                     (_, Some((x, y))) => Op::MulAdd(x, y, a),
                     (Some((x, y)), None) => Op::MulAdd(x, y, b),
@@ -42,7 +42,7 @@ impl Graph {
                     _ => op,
                 }
             }
-            // The same rounding with the other sign, at no cost.
+            // The result with the opposite sign rounds identically, at no cost.
             op @ Op::Neg(a) => match self.with_product(a) {
                 Op::MulAdd(x, y, z) => Op::NegMulSub(x, y, z),
                 Op::MulSub(x, y, z) => Op::NegMulAdd(x, y, z),
@@ -53,8 +53,8 @@ impl Graph {
         }
     }
 
-    /// The two products, the subtrahend last, of a sum whose terms are products with opposite signs, unless that difference is there
-    /// already.
+    /// Returns the two products (subtrahend last) of a sum whose terms are products of opposite signs, unless their
+    /// difference already exists.
     pub(super) fn opposed_products(&self, a: NodeId, b: NodeId) -> Option<[NodeId; 2]> {
         let [plus, minus] = match (self.magnitude(a), self.magnitude(b)) {
             ((x, false), (y, true)) => [x, y],
@@ -66,7 +66,8 @@ impl Graph {
         (products && !known).then_some([plus, minus])
     }
 
-    /// The difference of two products, one of them fused: the younger, so that the opposite difference is the same but for its sign.
+    /// Creates the difference of two products with the younger one fused, so that the opposite difference differs only
+    /// in sign.
     pub(super) fn fused_difference(&mut self, [plus, minus]: [NodeId; 2]) -> NodeId {
         let (older, younger) = (plus.min(minus), plus.max(minus));
         let (x, y) = self.product_of(younger).expect("a product");
@@ -78,7 +79,7 @@ impl Graph {
         self.users[node.0 as usize]
     }
 
-    /// The factors of a product whose rounding error nobody asks for: asked for, it is that of the rounded product.
+    /// Returns the factors of a product, unless its rounding error is used: that error belongs to the rounded product.
     fn product_of(&self, node: NodeId) -> Option<(NodeId, NodeId)> {
         match self.op(self.resolve(node)) {
             Op::Mul(x, y) if !self.has(Op::ProductError(x, y)) && !self.rounded.contains(&self.resolve(node)) => {
@@ -88,14 +89,14 @@ impl Graph {
         }
     }
 
-    /// Notes that a node is rounded before any use.
+    /// Marks a node as rounded before every use.
     pub(super) fn round(&mut self, node: NodeId) {
         if matches!(self.op(node), Op::Mul(..)) {
             self.rounded.insert(node);
         }
     }
 
-    /// Whether a node is a power of two that scales.
+    /// Returns whether a node is a power of two that scales.
     pub(super) fn is_scale(&self, node: NodeId) -> bool {
         match self.op(node) {
             Op::PowerOfTwoScale(_) => true,

@@ -1,34 +1,34 @@
-//! Constructors of masks and selections, folded where the outcome is known.
+//! Constructors of masks and selections. Known outcomes are folded.
 
 use super::{Graph, NodeId, Op};
 
 impl Graph {
-    /// a < b.
+    /// Creates a < b.
     pub fn less(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::Less(a, b))
     }
 
-    /// a ≤ b.
+    /// Creates a ≤ b.
     pub fn less_or_equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::LessOrEqual(a, b))
     }
 
-    /// a = b.
+    /// Creates a = b.
     pub fn equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::Equal(a.min(b), a.max(b)))
     }
 
-    /// A mask that is the same everywhere.
+    /// Creates a constant mask.
     pub fn truth(&mut self, value: bool) -> NodeId {
         self.node(Op::Truth(value))
     }
 
-    /// Whether precautions must be taken.
+    /// Creates the mask of extraordinary configurations.
     pub fn cautious(&mut self) -> NodeId {
         self.node(Op::Cautious)
     }
 
-    /// Both.
+    /// Creates the conjunction.
     pub fn and(&mut self, a: NodeId, b: NodeId) -> NodeId {
         match (self.op(a), self.op(b)) {
             (Op::Truth(true), _) | (_, Op::Truth(false)) => b,
@@ -38,7 +38,7 @@ impl Graph {
         }
     }
 
-    /// Either.
+    /// Creates the disjunction.
     pub fn or(&mut self, a: NodeId, b: NodeId) -> NodeId {
         match (self.op(a), self.op(b)) {
             (Op::Truth(false), _) | (_, Op::Truth(true)) => b,
@@ -48,7 +48,7 @@ impl Graph {
         }
     }
 
-    /// Not.
+    /// Creates the negation.
     pub fn not(&mut self, a: NodeId) -> NodeId {
         match self.op(a) {
             Op::Not(b) => b,
@@ -57,7 +57,7 @@ impl Graph {
         }
     }
 
-    /// A selection.
+    /// Creates a selection.
     pub fn select(&mut self, mask: NodeId, yes: NodeId, no: NodeId) -> NodeId {
         match self.op(mask) {
             Op::Truth(true) => yes,

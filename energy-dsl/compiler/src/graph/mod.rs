@@ -1,5 +1,5 @@
-//! The hash-consed scalar expression graph. Equal expressions are one node, so sharing is found by construction, and
-//! nodes are numbered in topological order: operands before their uses.
+//! The hash-consed graph of scalar expressions. Equal expressions are one node, so common subexpressions are shared.
+//! Nodes are numbered in topological order: operands come before their uses.
 
 mod build;
 mod count;
@@ -24,16 +24,16 @@ pub use signs::with_signs_inside;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// How language functions are lowered.
+/// The form that functions are lowered to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// To robust primitives with their own derivative rules; naive spellings of them are recognised.
+    /// Robust primitives with their own derivative rules. Naive spellings of them are recognised.
     Robust,
-    /// As a textbook prints them: the audit's independent form.
+    /// The form a textbook prints, independent of all rewrites. The audit uses it.
     Textbook,
 }
 
-/// The graph. Only its constructors in `build.rs` add nodes, and they simplify.
+/// The expression graph. Only the constructors in `build.rs` add nodes, and they simplify.
 #[derive(Clone, Debug)]
 pub struct Graph {
     form: Form,
@@ -41,32 +41,32 @@ pub struct Graph {
     recognisers: &'static [Recogniser],
     nodes: Vec<Op>,
     varies: Vec<bool>,
-    /// How many nodes each is an operand of.
+    /// Number of uses of each node as an operand.
     users: Vec<u32>,
     index: HashMap<Op, NodeId>,
     rules: Vec<Rule>,
     rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
     assumptions: Vec<Assumption>,
-    /// What was made of what, by components; see `origin.rs`.
+    /// Origins of vectors, by their components; see `origin.rs`.
     origins: HashMap<Vec<NodeId>, Origin>,
-    /// Nodes that no sum takes along unrounded; see `fuse.rs`.
+    /// Nodes that are rounded before every use; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
-    /// Differences of products that a weight goes into; see `sums.rs`.
+    /// Differences of products that absorb a weight; see `sums.rs`.
     weighable: BTreeMap<NodeId, [Product; 2]>,
-    /// Whether powers of two move out of products and sums, to meet and cancel.
+    /// Whether powers of two move outwards, to meet and cancel.
     outward: bool,
-    /// Whether rounding errors are computed, to be added where they matter.
+    /// Whether rounding errors are computed and compensated.
     compensated: bool,
 }
 
 impl Graph {
-    /// An empty graph in the robust form.
+    /// Creates an empty graph in the robust form.
     #[must_use]
     pub fn robust(recognisers: &'static [Recogniser]) -> Self {
         Self::new(Form::Robust, recognisers)
     }
 
-    /// An empty graph in the textbook form.
+    /// Creates an empty graph in the textbook form.
     #[must_use]
     pub fn textbook() -> Self {
         Self::new(Form::Textbook, &[])
@@ -91,47 +91,47 @@ impl Graph {
         }
     }
 
-    /// Whether rounding errors are computed; otherwise each is taken as 0, and vanishes with what is made of it.
+    /// Sets whether rounding errors are computed. Otherwise they are 0, and whatever uses them folds.
     pub fn compensate(&mut self, compensated: bool) {
         self.compensated = compensated;
     }
 
-    /// Whether powers of two move out of products and sums.
+    /// Sets whether powers of two move out of products and sums.
     pub fn move_outward(&mut self, outward: bool) {
         self.outward = outward;
     }
 
-    /// How functions are lowered into it.
+    /// Returns the form that functions are lowered to.
     #[must_use]
     pub fn form(&self) -> Form {
         self.form
     }
 
-    /// The number of nodes ever made.
+    /// Returns the number of nodes.
     #[must_use]
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Whether it has no nodes.
+    /// Returns whether the graph has no nodes.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// What a node computes.
+    /// Returns the operation of a node.
     #[must_use]
     pub fn op(&self, node: NodeId) -> Op {
         self.nodes[node.0 as usize]
     }
 
-    /// Whether the node depends on positions, velocities or unknowns (and not on parameters and rest shape alone).
+    /// Returns whether the node depends on positions, velocities or unknowns, not only on parameters and rest shape.
     #[must_use]
     pub fn varies(&self, node: NodeId) -> bool {
         self.varies[node.0 as usize]
     }
 
-    /// The rule behind a node, if it is a robust primitive.
+    /// Returns the rule of a node; `None` if it is not a robust primitive.
     #[must_use]
     pub fn rule(&self, node: NodeId) -> Option<&Rule> {
         match self.op(node) {
@@ -140,7 +140,7 @@ impl Graph {
         }
     }
 
-    /// The node that computes the value: a rule's own expression, or the node itself.
+    /// Returns the node that computes the value: the rule's expression, or the node itself.
     #[must_use]
     pub fn resolve(&self, mut node: NodeId) -> NodeId {
         while let Some(rule) = self.rule(node) {

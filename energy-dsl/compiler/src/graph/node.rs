@@ -1,34 +1,34 @@
-/// A node's number. Operands have smaller numbers than their uses.
+/// Index of a node. Operands have smaller indices than their uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId(pub(crate) u32);
 
-/// Where a number comes from.
+/// The source of an input number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Input {
     /// Coordinate of the positions (point · 3 + axis), or an unknown of a residual.
     Position(u16),
     /// Coordinate of the velocities.
     Velocity(u16),
-    /// Number of the parameters.
+    /// Index among the parameter numbers.
     Parameter(u16),
-    /// Number of the rest shape.
+    /// Index among the rest-shape numbers.
     Rest(u16),
-    /// Number that the `rest` block computed once for the element.
+    /// Index among the numbers that the `rest` block computes once for each element.
     Precomputed(u16),
 }
 
-/// One scalar operation. Comparisons and connectives yield masks, all others numbers.
+/// A scalar operation. Comparisons and connectives return masks, all others numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Op {
     /// A constant, as the bits of a double.
     Constant(u64),
-    /// A mask that is the same everywhere.
+    /// A constant mask.
     Truth(bool),
-    /// A mask: whether the configuration may not be ordinary, so that precautions must be taken.
+    /// The mask of configurations that may be extraordinary, so that precautions are needed.
     Cautious,
-    /// π, to the precision of the number type at hand.
+    /// π in the precision of the number type.
     Pi,
-    /// An input.
+    /// An input number.
     Input(Input),
     /// −a.
     Neg(NodeId),
@@ -58,21 +58,21 @@ pub enum Op {
     Ln(NodeId),
     /// The angle of the point (x = b, y = a).
     Atan2(NodeId, NodeId),
-    /// The same where x² + y² is moderate. Stands for it where that is assumed.
+    /// The angle of a point with moderate x² + y². It replaces `Atan2` where that is assumed.
     ModerateAtan2(NodeId, NodeId),
     /// a to the power b.
     Pow(NodeId, NodeId),
-    /// What rounding a + b lost; zero derivative.
+    /// Rounding error of a + b; zero derivative.
     SumError(NodeId, NodeId),
-    /// What rounding a − b lost; zero derivative.
+    /// Rounding error of a − b; zero derivative.
     DifferenceError(NodeId, NodeId),
-    /// What rounding a · b lost; zero derivative.
+    /// Rounding error of a · b; zero derivative.
     ProductError(NodeId, NodeId),
-    /// What √a, rounded to b, lost: a − b²; zero derivative.
+    /// Rounding error a − b² of b = fl(√a); zero derivative.
     RootError(NodeId, NodeId),
     /// a · b − c, as if rounded once.
     FusedMulSub(NodeId, NodeId, NodeId),
-    /// a · b + c, rounded once where the processor can. Made of sums by [`super::Graph::fused`] when code is written.
+    /// a · b + c, rounded once if the processor can. [`super::Graph::fused`] creates it from sums when code is emitted.
     MulAdd(NodeId, NodeId, NodeId),
     /// a · b − c.
     MulSub(NodeId, NodeId, NodeId),
@@ -80,7 +80,7 @@ pub enum Op {
     NegMulAdd(NodeId, NodeId, NodeId),
     /// −a · b − c.
     NegMulSub(NodeId, NodeId, NodeId),
-    /// A power of two that brings |a| into [1, 2); zero derivative.
+    /// The power of two that scales |a| into [1, 2); zero derivative.
     PowerOfTwoScale(NodeId),
     /// a < b.
     Less(NodeId, NodeId),
@@ -88,22 +88,22 @@ pub enum Op {
     LessOrEqual(NodeId, NodeId),
     /// a = b.
     Equal(NodeId, NodeId),
-    /// Whether a is the given power of a length that needs no scaling.
+    /// Whether a is a moderate power of a length, so that no scaling is needed.
     IsModerate(NodeId, u8),
-    /// Both masks.
+    /// The conjunction of two masks.
     And(NodeId, NodeId),
-    /// Either mask.
+    /// The disjunction of two masks.
     Or(NodeId, NodeId),
-    /// The opposite mask.
+    /// The negation of a mask.
     Not(NodeId),
-    /// Where the mask holds the second, elsewhere the third.
+    /// Mask, value where it holds, value elsewhere.
     Select(NodeId, NodeId, NodeId),
-    /// A robust primitive with its own derivatives.
+    /// A robust primitive with its own derivative rules, by index.
     Rule(u32),
 }
 
 impl Op {
-    /// The operands of an elementary operation (a rule's are its own affair).
+    /// Returns the operands of an elementary operation. A rule has none here.
     pub fn operands(self) -> impl Iterator<Item = NodeId> {
         let (count, list) = match self {
             Self::Constant(_) | Self::Truth(_) | Self::Cautious | Self::Pi | Self::Input(_) | Self::Rule(_) => {
@@ -147,7 +147,7 @@ impl Op {
         list.into_iter().take(count)
     }
 
-    /// Whether the node is a rounding error or a scale: its derivative is zero whatever its operands.
+    /// Returns whether the node is a rounding error or a scale. Its derivative is zero for all operands.
     #[must_use]
     pub fn is_constant_in_exact_arithmetic(self) -> bool {
         matches!(
@@ -160,7 +160,7 @@ impl Op {
         )
     }
 
-    /// Whether the node is a mask and not a number.
+    /// Returns whether the node is a mask.
     #[must_use]
     pub fn is_mask(self) -> bool {
         matches!(

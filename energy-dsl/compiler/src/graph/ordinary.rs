@@ -1,29 +1,29 @@
-//! The path that ordinary configurations take. Robust primitives scale their vectors, and choose other values where a vector
-//! vanishes; nearly always all that is idle. Each such precaution comes with an [`Assumption`] under which it can be
-//! left out without changing a bit of the result, and one mask tells whether all assumptions hold.
+//! Splits off the path of ordinary configurations. Robust primitives scale their vectors and select other values where
+//! a vector vanishes, which is rarely needed. Each such precaution has an [`Assumption`] under which it can be skipped
+//! without changing a bit. One mask tells whether all assumptions hold.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Graph, NodeId, Op};
 
-/// Where `guard`, computed under the assumptions themselves, holds, `node` equals `instead`.
+/// If `guard` holds, evaluated under the assumptions themselves, `node` equals `instead`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assumption {
-    /// The precaution.
+    /// The node with the precaution.
     pub node: NodeId,
-    /// What it comes to.
+    /// The node without the precaution.
     pub instead: NodeId,
-    /// When.
+    /// The mask under which both are equal.
     pub guard: NodeId,
 }
 
 impl Graph {
-    /// Whether a mask is the same wherever the assumptions hold.
+    /// Returns whether a mask is constant under the assumptions.
     pub(crate) fn is_decided(&mut self, mask: NodeId) -> bool {
         ordinary(self, &[mask]).is_some_and(|(masks, _)| matches!(self.op(masks[0]), Op::Truth(_)))
     }
 
-    /// Notes that `node` equals `instead` where `guard` holds.
+    /// Records that `node` equals `instead` where `guard` holds.
     pub(crate) fn assume(&mut self, node: NodeId, instead: NodeId, guard: NodeId) {
         if node != instead && !self.assumptions.iter().any(|a| a.node == node) {
             self.assumptions.push(Assumption { node, instead, guard });
@@ -31,7 +31,7 @@ impl Graph {
     }
 }
 
-/// `outputs` with all precautions.
+/// Returns `outputs` with all precautions.
 pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
     let mut path = Path { assumptions: BTreeMap::new(), done: BTreeMap::new(), guards: BTreeSet::new() };
     let (cautious, always) = (g.cautious(), g.truth(true));
@@ -39,7 +39,7 @@ pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
     outputs.iter().map(|&output| path.rebuild(g, output)).collect()
 }
 
-/// `outputs` under all assumptions, and the mask where they hold; nothing if no precaution is taken.
+/// Returns `outputs` under all assumptions, and the mask where these hold; `None` if there are no precautions.
 pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeId)> {
     let mut path = Path {
         assumptions: g.assumptions.iter().map(|a| (a.node, *a)).collect(),
@@ -49,7 +49,7 @@ pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeI
     let (cautious, never) = (g.cautious(), g.truth(false));
     path.done.insert(cautious, never);
     let outputs = outputs.iter().map(|&output| path.rebuild(g, output)).collect();
-    // A guard may rest on further assumptions.
+    // Guards may depend on further assumptions.
     let mut masks = BTreeMap::new();
     while let Some(&guard) = path.guards.iter().find(|guard| !masks.contains_key(*guard)) {
         let mask = path.rebuild(g, guard);
@@ -66,8 +66,8 @@ struct Path {
 }
 
 impl Path {
-    /// The node under the assumptions. Operands have smaller numbers, so a stack of pending nodes suffices; what a decided
-    /// selection leaves out is never visited.
+    /// Rebuilds a node under the assumptions. Operands have smaller indices, so a stack of pending nodes suffices.
+    /// Operands of a decided selection that it does not use are never visited.
     fn rebuild(&mut self, g: &mut Graph, node: NodeId) -> NodeId {
         let node = g.resolve(node);
         let mut stack = vec![node];
@@ -98,7 +98,7 @@ impl Path {
         self.done[&node]
     }
 
-    /// The operands that must be known: of a selection the mask first, then what it leaves open.
+    /// Returns the operands to rebuild first. For a selection that is the mask, then the branches it leaves open.
     fn needed(&self, g: &Graph, node: NodeId) -> Vec<NodeId> {
         let op = g.op(node);
         if let Op::Select(mask, yes, no) = op {
@@ -133,7 +133,7 @@ impl Path {
             Op::Sub(a, b) => g.sub(d(a), d(b)),
             Op::Mul(a, b) | Op::Div(a, b) => {
                 let [x, y] = [a, b].map(d);
-                // Where a scale is left out its operand is rounded all the same.
+                // Operands of an omitted scale are still rounded.
                 for (scale, scaled) in [(a, y), (b, x)] {
                     if g.is_scale(g.resolve(scale)) {
                         g.round(scaled);

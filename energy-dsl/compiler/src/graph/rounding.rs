@@ -1,16 +1,16 @@
-//! Constructors of nodes about rounding: what a sum, a product or a root lost, products fused with sums, and scales by powers of two.
+//! Constructors for rounding: rounding errors of sums, products and roots, fused products, and scales by powers of two.
 
 use super::build::is_power_of_two;
 use super::{Graph, NodeId, Op};
 
 impl Graph {
-    /// 0 − a: −a, but for +0 where a is a zero of either sign.
+    /// Creates 0 − a. It equals −a, except that it is +0 for both zeros.
     pub fn minus_or_plus_zero(&mut self, a: NodeId) -> NodeId {
         let zero = self.constant(0.0);
         self.node(Op::Sub(zero, a))
     }
 
-    /// What rounding a + b lost. Signs move out as they do of the sum itself, so that a sum and its error name the same operands.
+    /// Creates the rounding error of a + b. Signs move out as in the sum itself, so that both have the same operands.
     pub fn sum_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if !self.compensated || self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
@@ -26,7 +26,7 @@ impl Graph {
         }
     }
 
-    /// What rounding a − b lost.
+    /// Creates the rounding error of a − b.
     pub fn difference_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if !self.compensated || self.is(a, 0.0) || self.is(b, 0.0) {
             return self.constant(0.0);
@@ -46,7 +46,7 @@ impl Graph {
         }
     }
 
-    /// What rounding a · b lost.
+    /// Creates the rounding error of a · b.
     pub fn product_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         let exact = [a, b].iter().any(|&factor| self.as_constant(factor).is_some_and(is_power_of_two));
         if !self.compensated || exact {
@@ -57,7 +57,7 @@ impl Graph {
         self.signed(error, minus_a != minus_b)
     }
 
-    /// What rounding lost when this node was computed as a difference of two others; zero for other nodes.
+    /// Returns the rounding error of a node that is a difference; zero for other nodes.
     pub fn rounding_tail(&mut self, node: NodeId) -> NodeId {
         match self.op(node) {
             Op::Sub(a, b) => self.difference_error(a, b),
@@ -69,7 +69,7 @@ impl Graph {
         }
     }
 
-    /// a · b − c, as if rounded once; uncompensated rounded twice, so that a · b − b · a is 0.
+    /// Creates a · b − c as if rounded once. Without compensation it is rounded twice, so that a · b − b · a is 0.
     pub fn fused_mul_sub(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
         if !self.compensated || self.as_constant(a).or(self.as_constant(b)).is_some() || self.is(c, 0.0) {
             let product = self.mul(a, b);
@@ -83,13 +83,13 @@ impl Graph {
         self.signed(difference, negative)
     }
 
-    /// a · b − c · d with one of the products fused, for where it need not be 0 when both are equal.
+    /// Creates a · b − c · d with one product fused, for use where it need not be 0 when both are equal.
     pub fn difference_of_products(&mut self, [a, b]: [NodeId; 2], [c, d]: [NodeId; 2]) -> NodeId {
         let product = self.mul(a, b);
         self.neg_mul_add(c, d, product)
     }
 
-    /// c − a · b, fused.
+    /// Creates c − a · b, fused.
     pub(crate) fn neg_mul_add(&mut self, a: NodeId, b: NodeId, c: NodeId) -> NodeId {
         if self.is(c, 0.0) || self.as_constant(a).or(self.as_constant(b)).is_some() {
             let product = self.mul(a, b);
@@ -100,7 +100,7 @@ impl Graph {
         if minus_a == minus_b { self.node(Op::NegMulAdd(a, b, c)) } else { self.node(Op::MulAdd(a, b, c)) }
     }
 
-    /// a − b², b being √a rounded.
+    /// Creates a − b², where b is √a rounded.
     pub fn root_error(&mut self, a: NodeId, b: NodeId) -> NodeId {
         if !self.compensated {
             return self.constant(0.0);
@@ -108,17 +108,17 @@ impl Graph {
         self.node(Op::RootError(a, b))
     }
 
-    /// A power of two that brings |a| into [1, 2).
+    /// Creates the power of two that scales |a| into [1, 2).
     pub fn power_of_two_scale(&mut self, a: NodeId) -> NodeId {
         self.node(Op::PowerOfTwoScale(a))
     }
 
-    /// Whether a ≥ 0 is the given power of a length that needs no scaling.
+    /// Creates the mask of a ≥ 0 being a moderate power of a length, so that no scaling is needed.
     pub fn is_moderate(&mut self, a: NodeId, degree: u8) -> NodeId {
         self.node(Op::IsModerate(a, degree))
     }
 
-    /// a × b with fused products: more exact where it does not vanish, but not exactly 0 where it should.
+    /// Creates a × b with fused products. It is more accurate, but not exactly 0 where the cross product vanishes.
     pub fn fused_cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
         std::array::from_fn(|i| {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);

@@ -2,7 +2,7 @@ use super::node::NodeId;
 use super::{Graph, Op};
 use energy_runtime::Flag;
 
-/// A robust primitive of the language; each output of a vector-valued one is a primitive of its own.
+/// A robust primitive of the language. Each component of a vector-valued one is a primitive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Primitive {
     /// x·y.
@@ -19,9 +19,9 @@ pub enum Primitive {
     Elongation,
     /// ½ (‖d‖ − L)².
     HalfElongationSquared,
-    /// cos of the angle between two vectors.
+    /// Cosine of the angle between two vectors.
     Cosine,
-    /// 1 − cos of the angle between two vectors.
+    /// 1 − cosine of the angle between two vectors.
     OneMinusCosine,
     /// The unsigned angle between two vectors.
     Angle,
@@ -59,9 +59,9 @@ pub enum Primitive {
     Expm1,
     /// ln(1 + eˣ).
     Softplus,
-    /// Quadratic up to a threshold, then linear.
+    /// Huber's loss: quadratic up to a threshold, then linear.
     Huber,
-    /// A smooth one.
+    /// The pseudo-Huber loss, a smooth version of it.
     PseudoHuber,
     /// tan x.
     Tangent,
@@ -69,17 +69,17 @@ pub enum Primitive {
     ArcSine,
     /// acos x.
     ArcCosine,
-    /// A first partial derivative of another rule's output.
+    /// A first partial derivative of another rule.
     Partial {
-        /// The node differentiated.
+        /// Node that is differentiated.
         of: u32,
-        /// By which argument.
+        /// Index of the argument.
         by: u8,
     },
 }
 
 impl Primitive {
-    /// What the documentation of generated code calls it.
+    /// Returns its name in the documentation of generated code; `None` if it is internal.
     #[must_use]
     pub const fn label(self) -> Option<&'static str> {
         Some(match self {
@@ -118,46 +118,46 @@ impl Primitive {
     }
 }
 
-/// A condition that the caller is told of, from a given order of derivative on.
+/// A flag that is raised from a given order of derivative on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RuleFlag {
-    /// 0: already the value is a convention; 1: first derivatives are; 2: second derivatives are.
+    /// Lowest order of derivative that is a convention: 0 is the value, 1 first derivatives, 2 second derivatives.
     pub order: u8,
-    /// What is met.
+    /// Flag that is raised.
     pub flag: Flag,
-    /// The mask node.
+    /// Mask where it is raised.
     pub mask: NodeId,
 }
 
-/// A primitive's value and its own derivatives, each an expression of the same graph.
+/// The value and the derivatives of a primitive, as expressions of the same graph.
 #[derive(Clone, Debug)]
 pub struct Rule {
-    /// Which primitive.
+    /// The primitive.
     pub primitive: Primitive,
-    /// What it is differentiated by.
+    /// Arguments that it is differentiated with respect to.
     pub arguments: Vec<NodeId>,
-    /// The expression that computes it.
+    /// Expression of the value.
     pub value: NodeId,
-    /// ∂value/∂argument.
+    /// ∂value/∂argument, one product per argument.
     pub first: Vec<Product>,
-    /// ∂²value/∂argument², upper triangle row by row (see [`symmetric_index`]), each a sum of products; `None`: differentiate
-    /// `value` instead.
+    /// ∂²value/∂argument²: the upper triangle row by row (see [`symmetric_index`]), each entry a sum of products.
+    /// `None`: differentiate `value` instead.
     pub second: Option<Vec<Vec<Product>>>,
-    /// Conditions.
+    /// Flags of the value and its derivatives.
     pub flags: Vec<RuleFlag>,
-    /// Of a dihedral angle: the pieces its sine and cosine are made of.
+    /// Sine and cosine of a dihedral angle; `None` for other rules.
     pub dihedral: Option<DihedralParts>,
-    /// Of an elongation: its rule's square.
+    /// Half the square of an elongation; `None` for other rules.
     pub half_square: Option<NodeId>,
-    /// Of a length: the vector.
+    /// The vector of a length; `None` for other rules.
     pub vector: Option<Vec<NodeId>>,
 }
 
-/// Factors, to be multiplied from left to right: what weighs the product multiplies the first, so that entries that share
-/// their leading factors share those products too.
+/// Factors that are multiplied from left to right. A weight multiplies the first factor, so that entries which share
+/// leading factors also share these products.
 pub type Product = Vec<NodeId>;
 
-/// The functions of a dihedral angle that are better computed without it.
+/// Functions of a dihedral angle that do not need the angle.
 #[derive(Clone, Copy, Debug)]
 pub struct DihedralParts {
     /// sin θ.
@@ -168,11 +168,11 @@ pub struct DihedralParts {
     pub sine_half: NodeId,
     /// cos θ/2.
     pub cosine_half: NodeId,
-    /// Where θ is a convention.
+    /// Mask where the angle is a convention.
     pub degenerate: NodeId,
 }
 
-/// The place of (i, j), i ≤ j < n, in an upper triangle stored row by row.
+/// Returns the index of (i, j), i ≤ j < n, in an upper triangle stored row by row.
 #[must_use]
 pub const fn symmetric_index(n: usize, i: usize, j: usize) -> usize {
     let (i, j) = if i <= j { (i, j) } else { (j, i) };
@@ -180,7 +180,7 @@ pub const fn symmetric_index(n: usize, i: usize, j: usize) -> usize {
 }
 
 impl Graph {
-    /// The node of a rule. `extra` tells apart rules whose primitive and arguments agree but whose constants do not.
+    /// Adds a rule. `extra` distinguishes rules with equal primitives and arguments but different constants.
     pub(crate) fn add_rule(&mut self, rule: Rule, extra: &[NodeId]) -> NodeId {
         let mut key = rule.arguments.clone();
         key.extend_from_slice(extra);
@@ -190,7 +190,7 @@ impl Graph {
         }
         let varies = rule.arguments.iter().any(|&a| self.varies(a));
         if !varies {
-            // Nothing will differentiate it; its value stands for itself, unless the caller must hear of a condition.
+            // If nothing differentiates it and it raises no flag, its value suffices.
             if rule.flags.is_empty() && rule.dihedral.is_none() && rule.half_square.is_none() {
                 return rule.value;
             }
@@ -202,7 +202,7 @@ impl Graph {
         node
     }
 
-    /// Node of ∂(rule output)/∂(its `by`-th argument), itself a rule where second derivatives are known.
+    /// Returns the node of ∂(rule)/∂(argument `by`). It is a rule itself if second derivatives are known.
     pub(crate) fn partial(&mut self, of: NodeId, by: usize) -> NodeId {
         let rule = self.rule(of).expect("only rules have partials of their own").clone();
         let value = self.product(None, &rule.first[by]);
@@ -232,7 +232,7 @@ impl Graph {
 }
 
 impl Rule {
-    /// A rule without conditions.
+    /// Creates a rule without flags.
     #[must_use]
     pub fn smooth(
         primitive: Primitive,
@@ -246,7 +246,7 @@ impl Rule {
         Self::factored(primitive, arguments, value, first, second)
     }
 
-    /// A rule without conditions whose derivatives are products.
+    /// Creates a rule without flags whose derivatives are products.
     #[must_use]
     pub fn factored(
         primitive: Primitive,
@@ -269,7 +269,7 @@ impl Rule {
         }
     }
 
-    /// The same with a condition.
+    /// Adds a flag to the rule.
     #[must_use]
     pub fn flagged(mut self, order: u8, flag: Flag, mask: NodeId) -> Self {
         self.flags.push(RuleFlag { order, flag, mask });

@@ -1,13 +1,13 @@
-//! Signs of results. Constructors move them outwards, where they meet; what is left of them stands before whole products, and is cheaper
-//! before a factor that several have in common.
+//! Signs of results. Constructors move signs outwards, where they meet. The remaining ones precede whole products, and
+//! are cheaper before a factor that several products share.
 
 use std::collections::BTreeMap;
 
 use super::{Graph, NodeId, Op, reachable};
 
-/// `outputs` with their signs moved into factors, where that leaves fewer of them; not a bit changes.
+/// Moves the signs of `outputs` into factors where that leaves fewer of them. No bit changes.
 pub fn with_signs_inside(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
-    // What is made here must not sway which product a sum takes along: other routines have the same sums.
+    // The new nodes must not influence which product is fused: other routines share the sums.
     let users = g.users.clone();
     let outputs = moved(g, outputs);
     g.users[..users.len()].copy_from_slice(&users);
@@ -29,7 +29,7 @@ fn moved(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
     outputs.iter().map(|&output| *instead.get(&g.resolve(output)).unwrap_or(&output)).collect()
 }
 
-/// The outputs −a·b whose product nothing else reads.
+/// Returns the outputs −a·b whose product has no other use.
 fn negative_products(g: &Graph, outputs: &[NodeId]) -> Vec<(NodeId, [NodeId; 2])> {
     let mut reads: BTreeMap<NodeId, usize> = BTreeMap::new();
     for node in reachable(g, outputs) {
@@ -49,7 +49,7 @@ fn negative_products(g: &Graph, outputs: &[NodeId]) -> Vec<(NodeId, [NodeId; 2])
     outputs.iter().filter_map(|&output| product(output)).collect()
 }
 
-/// The factor that most products have, if several do; the oldest of equals.
+/// Returns the factor that most products share, if several do; the oldest of equals.
 fn most_common_factor(products: &[(NodeId, [NodeId; 2])]) -> Option<NodeId> {
     let mut uses: BTreeMap<NodeId, usize> = BTreeMap::new();
     products.iter().flat_map(|(_, factors)| factors).for_each(|&factor| *uses.entry(factor).or_default() += 1);

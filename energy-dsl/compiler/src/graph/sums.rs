@@ -1,9 +1,9 @@
-//! Constructors made of others: sums, products, and those of vectors.
+//! Constructors of sums and products, and of vectors of them.
 
 use super::{Graph, NodeId};
 
 impl Graph {
-    /// Σ terms, left to right.
+    /// Creates Σ terms, from left to right.
     pub fn sum(&mut self, terms: impl IntoIterator<Item = NodeId>) -> NodeId {
         let mut terms = terms.into_iter();
         match terms.next() {
@@ -12,8 +12,8 @@ impl Graph {
         }
     }
 
-    /// sum + term, as derivatives are added up: of a difference of two products one is fused. Those that a formula itself forms
-    /// are not, for they must vanish where the products are equal; see `fuse.rs`.
+    /// Creates sum + term for derivatives. A difference of two products may fuse here; in the formula itself it may
+    /// not, because it must vanish for equal products (see `fuse.rs`).
     pub fn accumulate(&mut self, sum: NodeId, term: NodeId) -> NodeId {
         match self.opposed_products(sum, term) {
             Some(opposed) => self.fused_difference(opposed),
@@ -21,18 +21,18 @@ impl Graph {
         }
     }
 
-    /// Σ aᵢ bᵢ.
+    /// Creates Σ aᵢ bᵢ.
     pub fn dot(&mut self, a: &[NodeId], b: &[NodeId]) -> NodeId {
         let products: Vec<_> = a.iter().zip(b).map(|(&x, &y)| self.mul(x, y)).collect();
         self.sum(products)
     }
 
-    /// Σ aᵢ².
+    /// Creates Σ aᵢ².
     pub fn sum_of_squares(&mut self, a: &[NodeId]) -> NodeId {
         self.dot(a, a)
     }
 
-    /// a × b.
+    /// Creates a × b.
     pub fn cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
         std::array::from_fn(|i| {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -41,7 +41,7 @@ impl Graph {
         })
     }
 
-    /// weight · the factors, from left to right.
+    /// Creates weight · the product of the factors, from left to right.
     pub fn product(&mut self, weight: Option<NodeId>, factors: &[NodeId]) -> NodeId {
         match (weight, factors) {
             (Some(weight), [first, rest @ ..]) => {
@@ -55,8 +55,8 @@ impl Graph {
         }
     }
 
-    /// The difference of two products, as a factor of others: what weighs that weighs what leads the two, once for all
-    /// components that share it.
+    /// Creates the difference of two products for use as a factor. A weight goes into the leading factor of both, once
+    /// for all components that share it.
     pub fn weighable_difference(&mut self, plus: &[NodeId], minus: &[NodeId]) -> NodeId {
         let node = self.fused_product_difference(None, plus, minus);
         let (unsigned, negative) = self.magnitude(node);
@@ -72,15 +72,15 @@ impl Graph {
         self.signed(difference, negative)
     }
 
-    /// weight · (the product of `plus` − that of `minus`), the second fused.
+    /// Creates weight · (product of `plus` − product of `minus`), with the second product fused.
     fn fused_product_difference(&mut self, weight: Option<NodeId>, plus: &[NodeId], minus: &[NodeId]) -> NodeId {
         let (last, leading) = minus.split_last().expect("a product has factors");
         let (plus, leading) = (self.product(weight, plus), self.product(weight, leading));
         self.neg_mul_add(leading, *last, plus)
     }
 
-    /// weight · Σ products, the weight going into each. Products that follow each other and end in the same factor are added
-    /// before it multiplies them.
+    /// Creates weight · Σ products, with the weight inside each product. Consecutive products that end in the same
+    /// factor are added before it multiplies them.
     pub fn sum_of_products(&mut self, weight: Option<NodeId>, products: &[Vec<NodeId>]) -> NodeId {
         let mut terms = Vec::with_capacity(products.len());
         for group in products.chunk_by(|a, b| a.len() > 1 && b.len() > 1 && a.last() == b.last()) {
@@ -99,13 +99,13 @@ impl Graph {
         terms.into_iter().fold(zero, |sum, term| self.accumulate(sum, term))
     }
 
-    /// Whether each product has a factor 0.
+    /// Returns whether each product has a factor 0.
     #[must_use]
     pub fn vanishes(&self, products: &[Vec<NodeId>]) -> bool {
         products.iter().all(|factors| factors.iter().any(|&f| self.is(f, 0.0)))
     }
 
-    /// factor · a.
+    /// Creates factor · a.
     pub fn scaled(&mut self, factor: NodeId, a: &[NodeId]) -> Vec<NodeId> {
         a.iter().map(|&x| self.mul(factor, x)).collect()
     }

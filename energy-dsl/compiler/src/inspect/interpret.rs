@@ -1,23 +1,23 @@
-//! Evaluates a graph over any number type: doubles, dual numbers, multi-precision. The audit's way in.
+//! Evaluates a graph over any number type: doubles, dual numbers, multi-precision. The audit uses it.
 
 use crate::graph::{Graph, Input, NodeId, Op, reachable};
 use energy_runtime::{Baseline, Inputs, Mask, Number};
 
-/// What an operation yields.
+/// The result of an operation.
 #[derive(Clone)]
 pub enum Computed<T: Number> {
-    /// A number.
+    /// A number of the evaluated type.
     Number(T),
-    /// The outcome of a comparison.
+    /// A mask of the evaluated type.
     Mask(T::Mask),
 }
 
-/// The values of `outputs`, none of which may be a mask.
+/// Returns the values of `outputs`, none of which may be a mask.
 pub fn interpret<T: Number>(graph: &Graph, outputs: &[NodeId], inputs: &Inputs<'_, T>) -> Vec<T> {
     interpret_with(graph, outputs, inputs, &[])
 }
 
-/// The same of a graph that reads numbers computed before.
+/// Returns the values of `outputs` of a graph that reads precomputed numbers.
 pub fn interpret_with<T: Number>(
     graph: &Graph,
     outputs: &[NodeId],
@@ -31,7 +31,7 @@ pub fn interpret_with<T: Number>(
     outputs.iter().map(|&o| number(graph, &values, o)).collect()
 }
 
-/// A mask.
+/// Returns the value of a mask.
 pub fn interpret_mask<T: Number>(graph: &Graph, output: NodeId, inputs: &Inputs<'_, T>) -> T::Mask {
     let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
     for node in reachable(graph, &[output]) {
@@ -66,7 +66,7 @@ fn compute<T: Number>(
     apply(graph.fused(node), inputs, precomputed, n, m)
 }
 
-/// One operation, its operands found by `n` and `m`.
+/// Evaluates one operation; `n` and `m` return its operands.
 pub fn apply<T: Number>(
     op: Op,
     inputs: &Inputs<'_, T>,

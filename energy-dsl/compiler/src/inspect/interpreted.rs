@@ -11,8 +11,8 @@ use energy_runtime::{
     Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, RestError, Routine, settle, triangle_index,
 };
 
-/// An element whose compiled routines are interpreted, not emitted as Rust: what a text read at run time can be evaluated and
-/// audited by. Its numbers are those of the generated code where products and sums do not fuse.
+/// An element whose compiled routines are interpreted instead of emitted as Rust. Declarations read at run time are
+/// evaluated and audited in this way. Results equal those of the generated code without fused operations.
 ///
 /// ```
 /// use energy_compiler::{Inputs, Interpreted};
@@ -30,7 +30,7 @@ pub struct Interpreted {
     routines: Vec<InterpretedRoutine>,
 }
 
-/// The routines that blocks come from.
+/// Routines that blocks are taken from.
 const EVALUATED: [&str; 8] =
     ["value", "gradient", "hessian", "force", "jacobians", "constraint_jacobian", "residual", "jacobian"];
 
@@ -38,7 +38,7 @@ const EVALUATED: [&str; 8] =
 struct InterpretedRoutine {
     name: &'static str,
     ordinary: Tape,
-    /// Which of the two flags each mask of the tape stands for.
+    /// The flag of each mask of the tape.
     ordinary_flags: [bool; 2],
     general: Option<GeneralPath>,
 }
@@ -53,7 +53,7 @@ struct GeneralPath {
 impl Interpreted {
     /// Compiles the declarations of a text.
     ///
-    /// Their descriptions stay in memory until the program ends, as those of generated elements do.
+    /// Their descriptions are leaked: like those of generated elements, they live until the program ends.
     ///
     /// # Errors
     /// Whatever is wrong with the text.
@@ -64,7 +64,7 @@ impl Interpreted {
             .collect())
     }
 
-    /// Compiles the declarations of a file, whose text this is.
+    /// Compiles the declarations in the text of a file.
     ///
     /// # Errors
     /// Whatever is wrong with the text, at its places in the file.
@@ -97,13 +97,13 @@ impl Interpreted {
         }
     }
 
-    /// What was declared.
+    /// Returns the declaration.
     #[must_use]
     pub fn declaration(&self) -> &'static Declaration {
         self.declaration
     }
 
-    /// Every block, as generated code's `Element::evaluate` gives them.
+    /// Evaluates all blocks, as `Element::evaluate` of generated code does.
     ///
     /// # Errors
     /// When the rest shape is degenerate.
@@ -154,8 +154,8 @@ impl Interpreted {
         Ok(Outputs { blocks, repeats, flags })
     }
 
-    /// One routine alone (`value`, `gradient`, `hessian`, …), from what [`Self::precomputed`] made of the rest shape: its numbers by group, a
-    /// Hessian as its triangle of blocks, and whether a condition was met. `None` where the kind has no such routine.
+    /// Evaluates one routine (`value`, `gradient`, `hessian`, …) with the numbers of [`Self::precomputed`]. Returns its
+    /// numbers by group (a Hessian as its triangle of blocks) and its flags. `None` if the kind has no such routine.
     ///
     /// ```
     /// use energy_compiler::{Inputs, Interpreted};
@@ -177,14 +177,14 @@ impl Interpreted {
         Some((groups, flags))
     }
 
-    /// What the rest shape alone determines, for [`Self::routine`].
+    /// Returns the numbers that the rest shape determines, for [`Self::routine`].
     ///
     /// # Errors
     /// When the rest shape is degenerate.
     pub fn precomputed<T: Number>(&self, inputs: &Inputs<'_, T>) -> Result<Vec<T>, RestError> {
         let (mut groups, degenerate) = self.rest.run(inputs, &[]);
         let numbers = groups.remove(0);
-        // Neither infinite nor NaN.
+        // False for infinite numbers and NaN.
         let sound = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
         if degenerate.iter().any(|mask| mask.any()) || !numbers.iter().all(sound) {
             return Err(RestError { element: self.declaration.name });
@@ -192,7 +192,7 @@ impl Interpreted {
         Ok(numbers)
     }
 
-    /// The outcome of every comparison in what computes ordinary configurations: which branches an input takes.
+    /// Returns the outcomes of all comparisons on the ordinary path: the branches that an input takes.
     ///
     /// # Errors
     /// When the rest shape is degenerate.
@@ -202,13 +202,13 @@ impl Interpreted {
         Ok(routines.flat_map(|routine| routine.ordinary.comparisons(inputs, &rest)).collect())
     }
 
-    /// Every fault that can be planted in what computes the numbers of ordinary configurations. Operations that only decide
-    /// which of two forms of the same number is computed are left alone: either is right.
+    /// Returns every fault that can be planted in the numbers of the ordinary path. Operations that only choose between
+    /// two equivalent forms are left alone: both are right.
     #[must_use]
     pub fn mutations(&self) -> Vec<Mutation> {
         let tapes = std::iter::once(("rest", &self.rest))
             .chain(self.routines.iter().filter(|r| EVALUATED.contains(&r.name)).map(|r| (r.name, &r.ordinary)));
-        // A residual's unknowns need not come by threes: what is no input cannot be read by mistake.
+        // The unknowns of a residual need not come in threes. A fault must not read a number that does not exist.
         let unknowns: usize = self.declaration.points.iter().map(|field| field.size).sum();
         let exists = |op: Op| !matches!(op, Op::Input(graph::Input::Position(i)) if usize::from(i) >= unknowns);
         let mut list = Vec::new();
@@ -222,7 +222,7 @@ impl Interpreted {
         list
     }
 
-    /// The same with a fault.
+    /// Returns the element with a fault planted.
     #[must_use]
     pub fn mutated(&self, mutation: &Mutation) -> Self {
         let mut broken = self.clone();
@@ -230,8 +230,8 @@ impl Interpreted {
         broken
     }
 
-    /// Whether the routine with that fault is the same function in exact arithmetic: proved by building both into one graph where
-    /// equal expressions are one node, rounding errors are 0, and 0 and 1 fold. `false` where that proves nothing.
+    /// Returns whether a fault provably changes nothing in exact arithmetic. Both routines are built into one graph in
+    /// which equal expressions are one node, rounding errors are 0, and 0 and 1 fold. `false` if that proves nothing.
     #[must_use]
     pub fn is_proved_equivalent(&self, mutation: &Mutation) -> bool {
         let before = self.clone().tape(mutation.routine).clone();
@@ -244,7 +244,7 @@ impl Interpreted {
     }
 }
 
-/// What a routine returns.
+/// The results of a routine.
 struct Results<T: Number> {
     groups: Vec<Vec<T>>,
     flags: Flags<T>,
@@ -271,7 +271,7 @@ impl InterpretedRoutine {
 }
 
 impl GeneralPath {
-    /// In numbers whose exponents do not end.
+    /// Runs the general path over numbers with an extended exponent.
     fn run<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> Results<T> {
         let unbounded = |numbers: &[T]| numbers.iter().map(|x| x.unbounded(0)).collect::<Vec<_>>();
         let inputs = Inputs {
@@ -299,7 +299,7 @@ impl GeneralPath {
     }
 }
 
-/// A triangle of 3×3 blocks as a full matrix, row by row.
+/// Expands a triangle of 3×3 blocks to a full matrix, row by row.
 fn full_triangle<T: Number>(points: usize, triangle: &[T]) -> Vec<T> {
     entries(points)
         .map(|(row, column)| {
@@ -309,7 +309,7 @@ fn full_triangle<T: Number>(points: usize, triangle: &[T]) -> Vec<T> {
         .collect()
 }
 
-/// A square of 3×3 blocks as a full matrix, row by row.
+/// Expands a square of 3×3 blocks to a full matrix, row by row.
 fn full_square<T: Number>(points: usize, square: &[T]) -> Vec<T> {
     entries(points)
         .map(|(row, column)| square[9 * (row / 3 * points + column / 3) + row % 3 * 3 + column % 3].clone())
@@ -320,7 +320,7 @@ fn entries(points: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..3 * points).flat_map(move |row| (0..3 * points).map(move |column| (row, column)))
 }
 
-/// What generated code would say of itself.
+/// Returns the self-description that generated code would have.
 fn describe(program: &Program, routines: &Routines) -> Declaration {
     let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
     let declared = &program.parameters[..program.parameters.len() - implied];

@@ -6,21 +6,22 @@ use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
 use crate::graph::{NodeId, count};
 use crate::inspect::interpret::{interpret, interpret_mask};
+use crate::inspect::layout::{layout, methods};
 use crate::inspect::textbook::programs;
 use crate::lower::lower;
 use crate::routines::{Routines, differentiate};
 use energy_runtime::{Inputs, Mask, Number, OperationCount};
 
-/// Which of a routine's two forms.
+/// The two paths of a routine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Path {
-    /// As generated code chooses: that for ordinary configurations where they are.
+    /// The ordinary path for ordinary configurations, as generated code chooses.
     Chosen,
-    /// That with all precautions.
+    /// The general path, with all precautions.
     General,
 }
 
-/// What the compiler makes of a declaration: its code, and how it got there.
+/// The code of a declaration, and how the compiler got there.
 ///
 /// ```
 /// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
@@ -49,41 +50,35 @@ impl Listing {
         Ok(programs.iter().map(listing).collect())
     }
 
-    /// The declaration's name.
+    /// Returns the name of the declaration.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// All generated code.
+    /// Returns all generated code.
     #[must_use]
     pub fn code(&self) -> String {
-        pretty(self.code.clone())
+        layout(&self.code)
     }
 
-    /// The method of a routine (`value`, `hessian`, …), and those it calls where inputs are ordinary and where they are not.
+    /// Returns the method of a routine (`value`, `hessian`, …), with its ordinary and its general path.
     #[must_use]
     pub fn routine(&self, name: &str) -> Option<String> {
         let wanted = ["at", "is_ordinary", "if_ordinary", "in_general"].map(|part| format!("{name}_{part}"));
-        let methods: Vec<String> = methods(&self.code)
-            .into_iter()
-            .filter(|method| wanted.contains(&method.sig.ident.to_string()))
-            .map(|method| pretty(quote::quote!(#method)))
-            .collect();
+        let methods: Vec<String> =
+            methods(&self.code).into_iter().filter(|(name, _)| wanted.contains(name)).map(|(_, text)| text).collect();
         (!methods.is_empty()).then(|| methods.join("\n"))
     }
 
-    /// The names that [`Self::routine`] knows.
+    /// Returns the names that [`Self::routine`] accepts.
     #[must_use]
     pub fn routines(&self) -> Vec<String> {
-        methods(&self.code)
-            .iter()
-            .filter_map(|m| m.sig.ident.to_string().strip_suffix("_at").map(str::to_owned))
-            .collect()
+        methods(&self.code).iter().filter_map(|(name, _)| name.strip_suffix("_at").map(str::to_owned)).collect()
     }
 
-    /// What a routine of a declaration without rest shape returns, group by group, by interpretation. `None` for an
-    /// unknown routine.
+    /// Interprets a routine of a declaration without rest shape. Returns its results by group; `None` for an unknown
+    /// routine.
     ///
     /// # Panics
     /// When an input slice is shorter than declared.
@@ -100,7 +95,7 @@ impl Listing {
         Some(groups.iter().map(|group| interpret(graph, group, inputs)).collect())
     }
 
-    /// Whether a routine of a declaration without rest shape meets a condition of its flags. `None` for an unknown routine.
+    /// Returns whether a routine of a declaration without rest shape raises a flag; `None` for an unknown routine.
     #[must_use]
     pub fn is_flagged<T: Number>(&self, routine: &str, inputs: &Inputs<'_, T>) -> Option<bool> {
         let routine = self.routines.list.iter().find(|r| r.name == routine)?;
@@ -108,8 +103,8 @@ impl Listing {
         Some(flags.into_iter().flatten().any(|mask| interpret_mask(&self.routines.graph, mask, inputs).any()))
     }
 
-    /// What each routine costs in ordinary configurations, and what is left of the Hessian where a point is pinned: operations in
-    /// all, and instructions where products and sums fuse.
+    /// Lists what each routine costs on the ordinary path, and the Hessian if a point is pinned: total operations, and
+    /// instructions with fused operations.
     #[must_use]
     pub fn counts(&self) -> String {
         let mut text = format!("{:<34} operations  instructions\n", self.name);
@@ -136,8 +131,8 @@ impl Listing {
         text
     }
 
-    /// The routes to each routine's derivatives with their operations in ordinary configurations and reduced coordinates; the
-    /// first of each was taken.
+    /// Lists the routes to the derivatives of each routine, with their operations on the ordinary path in reduced
+    /// coordinates. The first one was taken.
     #[must_use]
     pub fn plans(&self) -> String {
         let mut text = String::new();
@@ -168,35 +163,14 @@ impl Listing {
     }
 }
 
-fn methods(code: &TokenStream) -> Vec<syn::ImplItemFn> {
-    let file: syn::File = syn::parse2(code.clone()).expect("compiler bug: generated code parses");
-    let implementations = file.items.into_iter().filter_map(|item| match item {
-        syn::Item::Impl(implementation) => Some(implementation),
-        _ => None,
-    });
-    let items = implementations.flat_map(|implementation| implementation.items);
-    items.filter_map(|item| if let syn::ImplItem::Fn(method) = item { Some(method) } else { None }).collect()
-}
-
-/// Code as `rustfmt` would lay it out, more or less.
-fn pretty(code: TokenStream) -> String {
-    if let Ok(file) = syn::parse2::<syn::File>(code.clone()) {
-        return prettyplease::unparse(&file);
-    }
-    // A method stands in an implementation only.
-    let wrapped: syn::File = syn::parse2(quote::quote!(impl Element { #code })).expect("compiler bug: a method parses");
-    let text = prettyplease::unparse(&wrapped);
-    let inner = text.trim_start_matches("impl Element {\n").trim_end().trim_end_matches('}');
-    inner.lines().map(|line| format!("{}\n", line.strip_prefix("    ").unwrap_or(line))).collect()
-}
-
 /// Writes the code of a declaration to `folder/name.rs`.
 ///
 /// # Errors
-/// When the folder cannot be made or the file not be written; then no file stands under that name that was not there before.
+/// When the folder cannot be made or the file not be written; then no file stands under that name that was not there
+/// before.
 pub(crate) fn write_code(folder: &std::path::Path, name: &str, code: &TokenStream) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let unfinished = folder.join(format!(".{name}.{}.rs", std::process::id()));
-    std::fs::write(&unfinished, pretty(code.clone()))?;
+    std::fs::write(&unfinished, layout(code))?;
     std::fs::rename(&unfinished, folder.join(format!("{name}.rs")))
 }

@@ -1,12 +1,12 @@
-//! A declaration's body as MathML: what a report prints.
+//! The body of a declaration as MathML, for reports.
 
 use std::fmt::Write as _;
 
 use crate::diagnostic::Diagnostics;
 use crate::syntax::{Body, Expression, ExpressionKind, Item, parse};
 
-/// The body of the last declaration of a text as presentation MathML, a row to each `let` and one to the result; nothing for what
-/// does not parse.
+/// Returns the body of the last declaration of a text as presentation MathML, one row per `let` and one for the result;
+/// `None` if the text does not parse.
 ///
 /// ```
 /// let formula = energy_compiler::mathml("energy Spring(p, q: Point; k, L: Scalar) = \"k/2 (‖p − q‖ − L)²\";").unwrap();
@@ -28,7 +28,7 @@ pub fn mathml(source: &str) -> Option<String> {
     Some(format!("<math display=\"block\"><mtable columnalign=\"left\">{rows}</mtable></math>"))
 }
 
-/// A body's definitions and its result, a row to each.
+/// Writes the definitions and the result of a body, one row each.
 fn lines(body: &Body, rows: &mut String) {
     for definition in &body.lets {
         let (name, value) = (identifier(&definition.name.text), expression(&definition.value, 0));
@@ -44,7 +44,8 @@ fn row(rows: &mut String, content: &str) {
     let _ = write!(rows, "<mtr><mtd><mrow>{content}</mrow></mtd></mtr>");
 }
 
-/// Precedence: sums 1, products 2, signs 3, powers 4, all else 5. What binds less than `least` is put in parentheses.
+/// Writes an expression, in parentheses if it binds less than `least`. Precedence: sums 1, products 2, signs 3, powers
+/// 4, all else 5.
 fn expression(of: &Expression, least: u8) -> String {
     let (text, strength) = parts(of);
     if strength < least { format!("<mrow><mo>(</mo>{text}<mo>)</mo></mrow>") } else { text }
@@ -117,7 +118,7 @@ fn bracketed(open: &str, list: &[Expression], close: &str) -> String {
     format!("<mrow><mo>{open}</mo>{}<mo>{close}</mo></mrow>", entries.join("<mo>,</mo>"))
 }
 
-/// A name; what follows an underscore, and digits at the end, are its index.
+/// Writes a name. Text after an underscore, and final digits, are its index.
 fn identifier(name: &str) -> String {
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
     let (stem, index) = match name.split_once('_') {

@@ -1,8 +1,9 @@
-//! Ways to look at a declaration other than its generated code. The audit, the simulator's run-time materials and the
-//! command line use them; compiling a declaration does not.
+//! Views of a declaration other than its generated code, for the audit, materials read at run time, and the command
+//! line. Compiling a declaration does not need them.
 
 mod interpret;
 mod interpreted;
+mod layout;
 mod listing;
 mod mathml;
 mod mutation;

@@ -1,4 +1,4 @@
-//! Faults to plant in compiled code, so that an audit can show that it would notice them.
+//! Faults to plant in compiled routines. They show whether an audit would notice them.
 
 use std::fmt;
 
@@ -7,21 +7,21 @@ use crate::graph::{Input, Op};
 /// The kinds of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Fault {
-    /// + for −, or a minus sign lost.
+    /// A flipped sign: + for −, or a missing minus sign.
     FlippedSign,
-    /// One term of a sum left out.
+    /// A missing term of a sum.
     DroppedTerm,
-    /// One factor of a product left out.
+    /// A missing factor of a product.
     DroppedFactor,
-    /// Twice a constant.
+    /// A doubled constant.
     ChangedFactor,
-    /// Operands exchanged where that matters.
+    /// Swapped operands, where the order matters.
     SwappedOperands,
-    /// One operand used twice, the other not at all.
+    /// One operand used twice, and the other not at all.
     WrongOperand,
-    /// Another function: cosine for sine, a minimum for a maximum, no root.
+    /// A wrong function: cosine for sine, minimum for maximum, no root.
     WrongFunction,
-    /// Another component of a point or parameter.
+    /// A wrong component of a point or parameter.
     WrongInput,
 }
 
@@ -40,12 +40,12 @@ impl fmt::Display for Fault {
     }
 }
 
-/// One fault in one operation of one routine.
+/// A fault in one operation of one routine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mutation {
-    /// What is done.
+    /// Kind of the fault.
     pub fault: Fault,
-    /// The routine it is done to; `rest` is what the rest shape decides.
+    /// Routine with the fault; `rest` is the part that the rest shape determines.
     pub routine: &'static str,
     pub(crate) place: usize,
     pub(crate) before: Op,
@@ -59,13 +59,13 @@ impl fmt::Display for Mutation {
     }
 }
 
-/// The faults that fit an operation.
+/// Returns the faults that fit an operation.
 pub(crate) fn faults(op: Op) -> Vec<(Fault, Op)> {
     use Fault::{
         ChangedFactor, DroppedFactor, DroppedTerm, FlippedSign, SwappedOperands, WrongFunction, WrongInput,
         WrongOperand,
     };
-    // max(a, a) is a: the operation of a list that only passes on.
+    // max(a, a) = a passes an operand on.
     let pass = |a| Op::Max(a, a);
     match op {
         Op::Neg(a) => vec![(FlippedSign, pass(a))],
@@ -123,10 +123,10 @@ pub(crate) fn faults(op: Op) -> Vec<(Fault, Op)> {
     }
 }
 
-/// The other component of a pair: always one that there is, for the first two of each list.
+/// Returns the other component of a pair, which always exists.
 fn neighbour(input: Input) -> Input {
     match input {
-        // The axes of one point: x for y, y for z, z for x.
+        // Other axes of the same point: x for y, y for z, z for x.
         Input::Position(i) => Input::Position(i / 3 * 3 + (i + 2) % 3),
         Input::Velocity(i) => Input::Velocity(i / 3 * 3 + (i + 2) % 3),
         other => other,

@@ -1,4 +1,4 @@
-//! A routine as a list of operations: what the interpreter of whole elements runs, and what mutations are planted in.
+//! A routine as a list of operations, for the interpreter and for planted faults.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use crate::graph::{Graph, NodeId, Op, reachable};
 use crate::inspect::interpret::{Computed, apply};
 use energy_runtime::{Inputs, Number};
 
-/// Operations in topological order; operands are their places in the list.
+/// Operations in topological order. Operands are indices into the list.
 #[derive(Clone, Debug)]
 pub(crate) struct Tape {
     ops: Vec<Op>,
@@ -15,7 +15,7 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// What computes the numbers of the groups, and the masks.
+    /// Creates the tape that computes the groups of numbers and the masks.
     pub(crate) fn new(graph: &Graph, groups: &[Vec<NodeId>], masks: &[NodeId]) -> Self {
         let outputs: Vec<NodeId> = groups.iter().flatten().chain(masks).copied().collect();
         let nodes = reachable(graph, &outputs);
@@ -36,7 +36,7 @@ impl Tape {
         &self.ops
     }
 
-    /// The same with another operation at a place.
+    /// Returns the tape with another operation at one index.
     pub(crate) fn with(&self, place: usize, op: Op) -> Self {
         let mut tape = self.clone();
         tape.ops[place] = op;
@@ -52,21 +52,21 @@ impl Tape {
         values
     }
 
-    /// The outcomes of all comparisons.
+    /// Returns the outcomes of all comparisons.
     pub(crate) fn comparisons<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Vec<T::Mask> {
         let mask = |value| if let Computed::Mask(mask) = value { Some(mask) } else { None };
         self.values(inputs, precomputed).into_iter().filter_map(mask).collect()
     }
 
-    /// The groups of numbers, and the masks.
+    /// Returns the groups of numbers, and the masks.
     pub(crate) fn run<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> (Vec<Vec<T>>, Vec<T::Mask>) {
         let values = self.values(inputs, precomputed);
         let group = |group: &Vec<NodeId>| group.iter().map(|&at| number(&values, at)).collect();
         (self.groups.iter().map(group).collect(), self.masks.iter().map(|&at| mask(&values, at)).collect())
     }
 
-    /// Whether two tapes are the same function in exact arithmetic, as far as the graph's constructors prove it: both are built
-    /// into one hash-consed graph, where rounding errors are 0, and all that they return must meet.
+    /// Returns whether two tapes provably are the same function in exact arithmetic. Both are built into one
+    /// hash-consed graph where rounding errors are 0; all outputs must be the same nodes.
     pub(crate) fn is_proved_equal(&self, other: &Self) -> bool {
         let mut graph = Graph::textbook();
         self.exactly(&mut graph) == other.exactly(&mut graph)
@@ -81,7 +81,7 @@ impl Tape {
         self.groups.iter().flatten().chain(&self.masks).map(|at| signed[at.0 as usize]).collect()
     }
 
-    /// Which operations reach a result other than by deciding a comparison.
+    /// Marks the operations that affect a number of the result, other than through a comparison.
     pub(crate) fn are_numbers_of_results(&self) -> Vec<bool> {
         let mut reach = vec![false; self.ops.len()];
         for at in self.groups.iter().flatten() {
@@ -96,7 +96,7 @@ impl Tape {
     }
 }
 
-/// A node, or its negative: so that a − b and b − a are one node, whose square is one too.
+/// A node or its negative. With it, a − b and b − a are one node, and so are their squares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Signed {
     node: NodeId,
@@ -120,7 +120,7 @@ impl Signed {
         let at = |id: NodeId| signed[id.0 as usize];
         match op {
             Op::Neg(a) => at(a).flipped(true),
-            // Passes a number on.
+            // A tape's way to pass on a number.
             Op::Max(a, b) if a == b => at(a),
             Op::Add(a, b) => Self::sum(g, at(a), at(b)),
             Op::Sub(a, b) => Self::sum(g, at(a), at(b).flipped(true)),
@@ -150,7 +150,7 @@ impl Signed {
                 Self::of(g, magnitude)
             }
             other => {
-                // As 0 − a, which is always the same node: the negative of a difference may be one of two.
+                // Written as 0 − a, which is always the same node; the negative of a difference may be one of two.
                 let zero = g.constant(0.0);
                 let with_signs = with_operands(other, |id| {
                     let Self { node, negative } = at(id);
@@ -167,9 +167,9 @@ impl Signed {
         Self::of(g, product).flipped(a.negative != b.negative)
     }
 
-    /// With the earlier node first and positive, so that sums that differ by sign or order meet.
+    /// Puts the earlier node first and positive, so that sums that differ in sign or order become one node.
     fn sum(g: &mut Graph, a: Self, b: Self) -> Self {
-        // Not left to the graph, whose negative of a difference would be another node.
+        // The graph would turn the negative of a difference into another node.
         if g.is(a.node, 0.0) || g.is(b.node, 0.0) {
             return if g.is(a.node, 0.0) { b } else { a };
         }
@@ -193,7 +193,7 @@ fn mask<T: Number>(values: &[Computed<T>], at: NodeId) -> T::Mask {
     }
 }
 
-/// What is not arithmetic, by the constructors that simplify.
+/// Rebuilds an operation that is not arithmetic by the simplifying constructors.
 fn rebuilt(g: &mut Graph, op: Op) -> NodeId {
     match op {
         Op::Constant(bits) => g.constant(f64::from_bits(bits)),
@@ -225,7 +225,7 @@ fn rebuilt(g: &mut Graph, op: Op) -> NodeId {
     }
 }
 
-/// The operation on other operands.
+/// Returns the operation on other operands.
 fn with_operands(op: Op, mut to: impl FnMut(NodeId) -> NodeId) -> Op {
     match op {
         Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) | Op::Rule(_) => op,
@@ -271,7 +271,7 @@ mod tests {
     use crate::inspect::Interpreted;
     use crate::inspect::mutation::Fault;
 
-    /// What only rounding errors are made of is 0 in exact arithmetic, and a cross product squared has no sign.
+    /// Pure rounding errors are 0 in exact arithmetic, and a squared cross product has no sign.
     #[test]
     fn what_changes_nothing_is_proved_and_what_changes_something_is_not() {
         let hinge = "energy Angle(a, b, c, d: Point) { dihedral(a, b, c, d) }";

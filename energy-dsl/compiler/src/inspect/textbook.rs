@@ -9,8 +9,8 @@ use crate::lower::{TextbookFormula, lower_textbook};
 use crate::syntax::{parse, parse_file};
 use energy_runtime::{Inputs, Number};
 
-/// A declaration in its printed form, without robust primitives and rewrites, to be evaluated over any number type: what an
-/// audit holds generated code against.
+/// A declaration in its textbook form, without robust primitives and rewrites. It can be evaluated over any number
+/// type; the audit compares generated code with it.
 ///
 /// ```
 /// use energy_compiler::{Inputs, Textbook};
@@ -25,7 +25,7 @@ pub struct Textbook {
 }
 
 impl Textbook {
-    /// Reads the first declaration of a text.
+    /// Parses the first declaration of a text.
     ///
     /// # Errors
     /// Whatever is wrong with the text.
@@ -38,16 +38,17 @@ impl Textbook {
         Ok(Self { program, formula })
     }
 
-    /// The checked declaration.
+    /// Returns the checked declaration.
     #[must_use]
     pub fn program(&self) -> &Program {
         &self.program
     }
 
-    /// The value, row by row: U; C; the forces, three numbers to a point; or r. A constraint's stiffness and damping are not read.
+    /// Evaluates the formula, row by row: U; C; the forces, three numbers per point; or r. The stiffness and damping of
+    /// a constraint are not used.
     ///
-    /// A derivative that the formula names (`gradient(U, p)`) is had by dual numbers over `T`: nothing of the compiler's own
-    /// differentiation is used.
+    /// Derivatives that the formula uses (`gradient(U, p)`) are computed with dual numbers over `T`, independently of
+    /// the compiler's differentiation.
     ///
     /// # Panics
     /// When an input slice is shorter than declared.
@@ -62,8 +63,8 @@ impl Textbook {
         rows.into_iter().map(Tower::into_plain).collect()
     }
 
-    /// The named derivatives that `outputs` read, three numbers to each (0 for those they do not read), each moved by an ε of
-    /// its own depth.
+    /// Returns the derivatives that `outputs` use, three numbers each (0 for unused ones). Each is differentiated with
+    /// an ε of its own depth.
     fn gradients<T: Number>(&self, outputs: &[NodeId], inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
         let graph = &self.formula.formula.graph;
         let mut numbers = vec![Tower::from_f64(0.0); 3 * self.formula.gradients.len()];
@@ -79,7 +80,7 @@ impl Textbook {
     }
 }
 
-/// Inputs as towers of dual numbers.
+/// Inputs as nested dual numbers.
 struct TowerInputs<T> {
     parameters: Vec<Tower<T>>,
     rest: Vec<Tower<T>>,
@@ -98,7 +99,7 @@ impl<T: Number> TowerInputs<T> {
         }
     }
 
-    /// One coordinate moved by the ε of this depth.
+    /// Adds the ε of this depth to one coordinate.
     fn raised(&self, coordinate: usize, depth: usize) -> Self {
         let mut positions = self.positions.clone();
         positions[coordinate] = positions[coordinate].clone().raised(depth);
@@ -138,7 +139,8 @@ pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
     diagnostics.finish(programs)
 }
 
-/// The same of a file, where mathematical notation stands in strings without escapes. Messages name the file.
+/// Parses and checks the text of a file, where mathematical notation is in strings without escapes. Messages name the
+/// file.
 ///
 /// # Errors
 /// Everything that is wrong with it.

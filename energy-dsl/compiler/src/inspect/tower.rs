@@ -2,28 +2,28 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use energy_runtime::{Level, Number};
 
-/// Dual numbers of dual numbers of … of `T`, as many as a formula needs for the derivatives it names: a + b ε with ε² = 0, where
-/// the ε of greater depth is the outer one. What does not move by an ε does not carry it.
+/// Nested dual numbers a + b ε with ε² = 0 over `T`, nested as deep as a formula needs for its derivatives. The ε of
+/// greater depth is the outer one. Numbers that do not depend on an ε do not carry it.
 #[derive(Clone, Debug)]
 pub(crate) enum Tower<T> {
-    /// Does not move.
+    /// A number that depends on no ε.
     Plain(T),
-    /// `value` + `slope` ε, the ε of that depth.
+    /// `value` + `slope` ε, with the ε of this depth.
     Raised { depth: usize, value: Box<Tower<T>>, slope: Box<Tower<T>> },
 }
 
 impl<T: Number> Tower<T> {
-    /// self + ε, of a depth greater than any it carries.
+    /// Returns self + ε, with a depth greater than any it carries.
     pub(crate) fn raised(self, depth: usize) -> Self {
         Self::new(depth, self, Self::from_f64(1.0))
     }
 
-    /// The coefficient of ε of this depth, which is greater than any other it carries.
+    /// Returns the coefficient of the ε of this depth, the greatest it carries.
     pub(crate) fn slope(self, depth: usize) -> Self {
         if self.depth() == depth { self.split(depth).1 } else { Self::from_f64(0.0) }
     }
 
-    /// What it is without any ε.
+    /// Returns the part without any ε.
     pub(crate) fn into_plain(self) -> T {
         match self {
             Self::Plain(value) => value,
@@ -42,7 +42,7 @@ impl<T: Number> Tower<T> {
         }
     }
 
-    /// Value and slope by the ε of a depth, the greatest there is.
+    /// Returns value and slope with respect to the ε of the greatest depth.
     fn split(self, outer: usize) -> (Self, Self) {
         match self {
             Self::Raised { depth, value, slope } if depth == outer => (*value, *slope),
@@ -50,7 +50,7 @@ impl<T: Number> Tower<T> {
         }
     }
 
-    /// f(self), whose derivative is `slope`.
+    /// Returns f(self), where f has the derivative `slope`.
     fn chain(self, plain: impl FnOnce(T) -> T, raised: impl FnOnce(Self) -> (Self, Self)) -> Self {
         match self {
             Self::Plain(value) => Self::Plain(plain(value)),
@@ -61,7 +61,7 @@ impl<T: Number> Tower<T> {
         }
     }
 
-    /// f(self, other), from values and slopes by the outer ε.
+    /// Returns f(self, other), from values and slopes with respect to the outer ε.
     fn combine(
         self,
         other: Self,
@@ -176,7 +176,7 @@ impl<T: Number> Number for Tower<T> {
         })
     }
     fn powf<L: Level>(self, exponent: Self) -> Self {
-        // A constant exponent allows a base that is negative or zero.
+        // With a constant exponent the base may be negative or zero.
         if let Self::Plain(e) = &exponent {
             let e = e.clone();
             return self.chain(
@@ -224,7 +224,7 @@ mod tests {
     use super::*;
     use energy_runtime::Baseline;
 
-    /// f = x³ y has ∂²f/∂x∂y = 3x²; inner and outer ε stay apart.
+    /// f = x³ y has ∂²f/∂x∂y = 3x². The inner and the outer ε stay separate.
     #[test]
     fn two_depths_give_the_mixed_derivative() {
         let x = Tower::Plain(2.0).raised(1);

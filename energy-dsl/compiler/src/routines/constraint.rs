@@ -1,19 +1,19 @@
-//! A constraint's routines: those of its energy U = ½ k_s CᵀC, C with J and ∂²C, and its force f = −∇U − k_d Jᵀ Ċ.
+//! The routines of a constraint: those of its energy U = ½ k_s CᵀC, C with J and ∂²C, and its force f = −∇U − k_d Jᵀ Ċ.
 
 use super::{Routine, flags, potential};
 use crate::check::Program;
 use crate::diff::{Coordinates, Plan, SecondOrder, first_order, second_order};
 use crate::graph::{Graph, Input, NodeId, symmetric_index};
 
-/// What all routines are made of, in reduced coordinates.
+/// The shared parts of all routines, in reduced coordinates.
 struct Compliant<'a> {
     c: &'a [NodeId],
-    /// Row by coordinate.
+    /// J, by row and coordinate.
     jacobian: Vec<Vec<NodeId>>,
-    /// Of each row the upper triangle.
+    /// ∂²C, the upper triangle of each row.
     hessians: Vec<Vec<NodeId>>,
     energy: SecondOrder,
-    /// ∇U by forward derivatives, for the routines without ∇²U.
+    /// ∇U by forward derivatives, for routines without ∇²U.
     gradient: Vec<NodeId>,
     stiffness: NodeId,
     damping: NodeId,
@@ -68,14 +68,14 @@ pub(super) fn routines(
 }
 
 impl Compliant<'_> {
-    /// Conditions of U's derivatives of an order and of C's.
+    /// Returns the flags of U's derivatives of one order and of C's of another.
     fn flags(&self, g: &mut Graph, energy_order: u8, row_order: u8) -> [Option<NodeId>; 2] {
         let mut roots = vec![(self.energy.value, energy_order)];
         roots.extend(self.c.iter().map(|&row| (row, row_order)));
         flags(g, &roots)
     }
 
-    /// C with J, and with ∂²C too.
+    /// Creates the routines of C with J, and with ∂²C too.
     fn geometry(&self, g: &mut Graph) -> [Routine; 2] {
         let rows = |order: u8| self.c.iter().map(|&row| (row, order)).collect::<Vec<_>>();
         let (first_flags, second_flags) = (flags(g, &rows(1)), flags(g, &rows(2)));
@@ -100,14 +100,14 @@ impl Compliant<'_> {
         ]
     }
 
-    /// Entry of factor · JᵀJ.
+    /// Returns an entry of factor · JᵀJ.
     fn outer(&self, g: &mut Graph, factor: NodeId, i: usize, j: usize) -> NodeId {
         let terms: Vec<_> = self.jacobian.iter().map(|row| g.mul(row[i], row[j])).collect();
         let sum = g.sum(terms);
         g.mul(factor, sum)
     }
 
-    /// U, ∇U and k_s JᵀJ.
+    /// Creates the routine of U, ∇U and k_s JᵀJ.
     fn gauss_newton(&self, g: &mut Graph) -> Routine {
         let n = self.coordinates.len();
         let upper = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
@@ -125,8 +125,8 @@ impl Compliant<'_> {
         )
     }
 
-    /// f = −∇U − k_d Jᵀ Ċ, Ċ = J q̇ with q̇ the differences of velocity; ∂f/∂x = −∇²U − k_d Σ (Ċ ∂²C + ∇C (∂²C q̇)ᵀ) and
-    /// ∂f/∂v = −k_d JᵀJ.
+    /// Creates the routines of the force f = −∇U − k_d Jᵀ Ċ with Ċ = J q̇, where q̇ are the differences of velocities,
+    /// and of its Jacobians ∂f/∂x = −∇²U − k_d Σ (Ċ ∂²C + ∇C (∂²C q̇)ᵀ) and ∂f/∂v = −k_d JᵀJ.
     fn force(&self, g: &mut Graph) -> [Routine; 2] {
         let n = self.coordinates.len();
         let speeds = self.coordinates.rates(g);
@@ -142,7 +142,7 @@ impl Compliant<'_> {
             .collect();
 
         let entry = |list: &[NodeId], i: usize, j: usize| list[symmetric_index(n, i, j)];
-        // k_d ∂²C q̇ of each row.
+        // k_d ∂²C q̇ for each row.
         let turning: Vec<Vec<NodeId>> = self
             .hessians
             .iter()

@@ -1,4 +1,4 @@
-//! What a declaration of each kind computes: the routines, as nodes of one graph.
+//! The routines of each kind of declaration, as nodes of one graph.
 
 mod constraint;
 
@@ -10,29 +10,29 @@ use crate::graph::{Graph, Input, NodeId, Op, Primitive, general, ordinary, with_
 use crate::lower::{Formula, RestFormula};
 use energy_runtime::{Flag, Kind};
 
-/// One routine to be generated.
+/// A routine to be generated.
 #[derive(Clone, Debug)]
 pub struct Routine {
-    /// Its name.
+    /// Name of the routine.
     pub name: &'static str,
-    /// What it computes in reduced coordinates.
+    /// Results in reduced coordinates.
     pub reduced: Vec<NodeId>,
-    /// What it returns, group by group: value, gradient, ….
+    /// Returned results by group: value, gradient, ….
     pub groups: Vec<Vec<NodeId>>,
-    /// Masks: degenerate, kink.
+    /// Masks of the flags: degenerate, kink.
     pub flags: [Option<NodeId>; 2],
-    /// What ordinary configurations leave out.
+    /// The general path; `None` if there are no precautions.
     pub general: Option<General>,
 }
 
-/// A routine with all its precautions, for where the mask does not hold.
+/// The general path of a routine, with all precautions.
 #[derive(Clone, Debug)]
 pub struct General {
-    /// Where the routine itself suffices.
+    /// Mask where the ordinary path suffices.
     pub ordinary: NodeId,
-    /// What is returned elsewhere.
+    /// Results on the general path.
     pub groups: Vec<Vec<NodeId>>,
-    /// The masks returned elsewhere.
+    /// Masks of the flags on the general path.
     pub flags: [Option<NodeId>; 2],
 }
 
@@ -41,7 +41,7 @@ impl Routine {
         Self { name, reduced, groups, flags, general: None }
     }
 
-    /// Splits off what only extraordinary configurations need.
+    /// Splits the routine into its ordinary and its general path.
     fn split(self, g: &mut Graph) -> Self {
         let all: Vec<NodeId> = self.reduced.iter().copied().chain(self.outputs()).collect();
         let cautious = general(g, &all);
@@ -55,7 +55,7 @@ impl Routine {
         Self { general: Some(general), ..self.with(g, &nodes) }
     }
 
-    /// The routine with other nodes: reduced, groups, flags.
+    /// Replaces the nodes of the routine: reduced, groups, flags.
     fn with(&self, g: &Graph, nodes: &[NodeId]) -> Self {
         let mut nodes = nodes.iter().copied();
         let mut take = |n: usize| nodes.by_ref().take(n).collect::<Vec<_>>();
@@ -65,14 +65,14 @@ impl Routine {
         Self { name: self.name, reduced, groups, flags, general: None }
     }
 
-    /// All that it returns.
+    /// Returns all outputs.
     #[must_use]
     pub fn outputs(&self) -> Vec<NodeId> {
         let guard = self.general.as_ref().map(|general| general.ordinary);
         self.groups.iter().flatten().copied().chain(self.flags.into_iter().flatten()).chain(guard).collect()
     }
 
-    /// All that it computes before the expansion to points.
+    /// Returns all outputs before the expansion to points.
     #[must_use]
     pub fn reduced_outputs(&self) -> Vec<NodeId> {
         let guard = self.general.as_ref().map(|general| general.ordinary);
@@ -80,45 +80,45 @@ impl Routine {
     }
 }
 
-/// A declaration's routines.
+/// The routines of a declaration.
 #[derive(Clone, Debug)]
 pub struct Routines {
-    /// What the rest shape decides.
+    /// The part that the rest shape determines.
     pub rest: RestFormula,
     /// Masks under which the rest shape is degenerate.
     pub rest_flags: [Option<NodeId>; 2],
-    /// The graph of the rest.
+    /// Graph of the moving part.
     pub graph: Graph,
-    /// The routines, in the order of their traits' methods.
+    /// Routines in the order of the trait methods.
     pub list: Vec<Routine>,
-    /// The coordinates the derivatives were taken by.
+    /// Number of reduced coordinates.
     pub coordinates: usize,
-    /// Of each coordinate vector the points it is made of, with sign; of a residual nothing.
+    /// Points of each coordinate vector, with signs; empty for residuals.
     pub vectors: Vec<Vec<(usize, bool)>>,
-    /// What turns reduced derivatives of an energy into those by points.
+    /// Expansion of the derivatives of an energy to points.
     pub expansion: Option<Expansion>,
-    /// Whether points enter only through differences.
+    /// Whether points enter only as differences.
     pub translation_invariant: bool,
-    /// The robust primitives used.
+    /// Robust primitives that the formula uses.
     pub primitives: Vec<&'static str>,
-    /// How each routine's derivatives were reached.
+    /// Routes to the derivatives of each routine.
     pub plans: Vec<Plan>,
 }
 
-/// Derivatives by points, of the numbers of a reduced routine: the gradient's are [`Input::Precomputed`] 0 to n − 1, the
-/// triangle's follow.
+/// Derivatives with respect to points, as functions of the numbers of a reduced routine: [`Input::Precomputed`] 0 to n
+/// − 1 are the gradient, the triangle follows.
 #[derive(Clone, Debug)]
 pub struct Expansion {
     /// The graph.
     pub graph: Graph,
-    /// ∇U.
+    /// The gradient ∇U.
     pub gradient: Vec<NodeId>,
     /// The triangle of ∇²U.
     pub triangle: Vec<NodeId>,
 }
 
 impl Expansion {
-    /// What is 0, or the same as another number, in the reduced routine is so here.
+    /// Creates the expansion. Numbers that are zero or equal in the reduced routine are so here.
     fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates, points: usize) -> Self {
         let mut graph = Graph::textbook();
         let all: Vec<NodeId> = energy.gradient.iter().chain(&energy.hessian).map(|&node| g.resolve(node)).collect();
@@ -139,7 +139,7 @@ impl Expansion {
     }
 }
 
-/// Differentiates the formulas that a program was lowered to, as its kind demands.
+/// Differentiates the formulas of a program as its kind requires.
 #[must_use]
 pub fn differentiate(
     program: &Program,
@@ -184,7 +184,7 @@ pub fn differentiate(
     }
 }
 
-/// Value, gradient, Hessian of U.
+/// Creates value, gradient and Hessian of U.
 fn potential(
     g: &mut Graph,
     energy: &SecondOrder,
@@ -259,7 +259,7 @@ fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut 
     ]
 }
 
-/// The rules that `roots` are made of.
+/// Returns the rules that `roots` depend on.
 fn rules(g: &Graph, roots: &[NodeId]) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack = roots.to_vec();
@@ -275,7 +275,7 @@ fn rules(g: &Graph, roots: &[NodeId]) -> BTreeSet<NodeId> {
     seen
 }
 
-/// The conditions under which derivatives of the given orders of `roots` are conventions: degenerate, kink.
+/// Returns the masks (degenerate, kink) under which derivatives of `roots` up to the given orders are conventions.
 fn flags(g: &mut Graph, roots: &[(NodeId, u8)]) -> [Option<NodeId>; 2] {
     let mut masks = [None, None];
     for &(root, order) in roots {
@@ -291,7 +291,7 @@ fn flags(g: &mut Graph, roots: &[(NodeId, u8)]) -> [Option<NodeId>; 2] {
     masks
 }
 
-/// What the documentation says the formula was compiled to.
+/// Lists the primitives for the documentation of the generated type.
 fn primitives(g: &Graph, outputs: &[NodeId], list: &[Routine]) -> Vec<&'static str> {
     let values: Vec<NodeId> =
         outputs.iter().chain(list.first().into_iter().flat_map(|r| r.groups.iter().flatten())).copied().collect();

@@ -6,77 +6,77 @@ use energy_runtime::{Kind, Property};
 /// A declaration, a function or a constant.
 #[derive(Clone, Debug)]
 pub enum Item {
-    /// `energy Name(…) { … }` and its kin.
+    /// An energy, constraint, force or residual.
     Declaration(Declaration),
     /// `fn name(a, b) { … }`.
     Function(UserFunction),
     /// `const name: Scalar = value;`.
     Constant(Constant),
-    /// `energy Name = Other(k = 100);`, while parsing: it becomes a declaration.
+    /// `energy Name = Other(k = 100);`. Exists only while parsing; it becomes a declaration.
     Specialisation(Box<Specialisation>),
 }
 
 /// A declared energy, constraint, force or residual.
 #[derive(Clone, Debug)]
 pub struct Declaration {
-    /// Lines of its doc comment.
+    /// Lines of the doc comment.
     pub docs: Vec<String>,
-    /// `pub`, `pub(crate)`, or nothing.
+    /// `pub`, `pub(crate)`, or empty.
     pub visibility: String,
-    /// Samples of the generated audit test, if one was asked for by `#[audit]`.
+    /// Samples of the generated audit test; `None` without `#[audit]`.
     pub audit_samples: Option<usize>,
-    /// What it claims of itself, and where.
+    /// Claimed properties, and where they are claimed.
     pub properties: Vec<(Property, Span)>,
-    /// Whether `#[uncompensated]` stands above it.
+    /// Whether the declaration has the attribute `#[uncompensated]`.
     pub uncompensated: bool,
-    /// What it describes.
+    /// Kind of the declaration.
     pub kind: Kind,
-    /// Its name.
+    /// Name of the generated type.
     pub name: Name,
-    /// Its inputs.
+    /// Groups of inputs in declared order.
     pub inputs: Vec<InputGroup>,
-    /// Its formula; nothing if it could not be parsed.
+    /// Formula; `None` if it could not be parsed.
     pub body: Option<Body>,
-    /// The declaration as text, without documentation and visibility.
+    /// Text of the declaration, without documentation and visibility.
     pub source: String,
-    /// The body as text.
+    /// Text of the body.
     pub formula: String,
 }
 
-/// Where in the signature inputs stand.
+/// The section of the signature that an input is declared in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Section {
-    /// Before the first semicolon, unless marked.
+    /// Before the first semicolon, without the word `rest`.
     Moving,
-    /// Marked `rest`.
+    /// Marked with the word `rest`.
     Rest,
-    /// After the first semicolon, unless marked.
+    /// After the first semicolon, without the word `rest`.
     Parameter,
 }
 
-/// The declared type of an input, or of the entries of an array.
+/// Type of an input, or of the entries of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ElementType {
-    /// A point of space.
+    /// A point in space.
     Point,
     /// The velocity of the point with the same number.
     Velocity,
-    /// A number.
+    /// One number.
     Scalar,
-    /// A vector of 2, 3 or 4.
+    /// A vector of 2, 3 or 4 numbers.
     Vector(u8),
     /// A matrix, rows × columns.
     Matrix(u8, u8),
     /// A quaternion: w, x, y, z.
     Quat,
-    /// A dual quaternion: the real part, then the dual one, each w, x, y, z.
+    /// A dual quaternion: real part, then dual part, each w, x, y, z.
     DualQuat,
     /// A rotation vector θ, then a translation t.
     Twist,
 }
 
 impl ElementType {
-    /// How the numbers are nested in an array of the generated code, outermost first; nothing for a scalar.
+    /// Dimensions of the array that the generated code uses, outermost first; empty for a scalar.
     #[must_use]
     pub fn dimensions(self) -> Vec<usize> {
         match self {
@@ -90,114 +90,114 @@ impl ElementType {
         }
     }
 
-    /// How many numbers.
+    /// Returns the count of numbers.
     #[must_use]
     pub fn size(self) -> usize {
         self.dimensions().into_iter().product()
     }
 }
 
-/// The type of an input: `Type` or `[Type; length]`.
+/// Type of an input: `Type` or `[Type; length]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputType {
-    /// Of one, or of each entry.
+    /// Type of the input, or of the entries of the array.
     pub element: ElementType,
-    /// How many, if it is an array.
+    /// Length of the array; `None` if the input is not an array.
     pub length: Option<usize>,
 }
 
 impl InputType {
-    /// How the numbers are nested, outermost first; nothing for a scalar.
+    /// Dimensions of the generated array, outermost first; empty for a scalar.
     #[must_use]
     pub fn dimensions(self) -> Vec<usize> {
         self.length.into_iter().chain(self.element.dimensions()).collect()
     }
 
-    /// How many numbers.
+    /// Returns the count of numbers.
     #[must_use]
     pub fn size(self) -> usize {
         self.dimensions().into_iter().product()
     }
 }
 
-/// `a, b: Type[unit]`.
+/// Inputs that share a type: `a, b: Type[unit]`.
 #[derive(Clone, Debug)]
 pub struct InputGroup {
-    /// Where it stands.
+    /// Section of the signature.
     pub section: Section,
-    /// The names.
+    /// Names of the inputs.
     pub names: Vec<Name>,
-    /// The type, or that of the entries.
+    /// Type of the inputs, or of the entries of arrays.
     pub element: ElementType,
-    /// The length of an array as written.
+    /// Length of the arrays, as written.
     pub length: Option<Expression>,
-    /// Where the type is written.
+    /// Place of the type.
     pub type_span: Span,
-    /// The unit as written, or empty.
+    /// Unit as written; empty if there is none.
     pub unit: Unit,
 }
 
-/// A unit as written.
+/// A unit, as written.
 #[derive(Clone, Debug, Default)]
 pub struct Unit {
-    /// The text; empty if there is none.
+    /// Text of the unit; empty if there is none.
     pub text: String,
-    /// Where.
+    /// Place of the unit.
     pub span: Option<Span>,
 }
 
 /// `const name: Scalar[unit] = value;`.
 #[derive(Clone, Debug)]
 pub struct Constant {
-    /// Its name.
+    /// Name of the constant.
     pub name: Name,
-    /// Its unit.
+    /// Unit of the constant.
     pub unit: Unit,
-    /// Its value.
+    /// Value of the constant.
     pub value: Expression,
-    /// The declaration as text.
+    /// Text of the declaration.
     pub source: String,
 }
 
-/// A function of the user's.
+/// A function defined in the text.
 #[derive(Clone, Debug)]
 pub struct UserFunction {
-    /// Its name.
+    /// Name of the function.
     pub name: Name,
-    /// Its parameters.
+    /// Names of its parameters.
     pub parameters: Vec<Name>,
-    /// What it returns.
+    /// Expression that it returns.
     pub body: Body,
-    /// The declaration as text.
+    /// Text of the function.
     pub source: String,
 }
 
-/// `let`s and functions, then the result.
+/// Statements and a result.
 #[derive(Clone, Debug)]
 pub struct Body {
     /// Constants, visible in the whole body.
     pub constants: Vec<Constant>,
     /// Functions, visible in the whole body.
     pub functions: Vec<UserFunction>,
-    /// In order.
+    /// `let` bindings in order.
     pub lets: Vec<Let>,
-    /// The value.
+    /// Result of the body.
     pub result: Box<Expression>,
 }
 
 /// `let name = value;`, in a `rest` block or not.
 #[derive(Clone, Debug)]
 pub struct Let {
-    /// The name.
+    /// Name that is bound.
     pub name: Name,
-    /// The value.
+    /// Value that is bound.
     pub value: Expression,
-    /// Whether it stands in the `rest` block.
+    /// Whether the binding is in the `rest` block.
     pub rest: bool,
 }
 
 impl Body {
-    /// A body that is its result alone.
+    /// Creates a body without statements.
     #[must_use]
     pub fn of(result: Expression) -> Self {
         Self { constants: Vec::new(), functions: Vec::new(), lets: Vec::new(), result: Box::new(result) }
@@ -207,22 +207,22 @@ impl Body {
 /// An expression.
 #[derive(Clone, Debug)]
 pub struct Expression {
-    /// What it is.
+    /// Kind of the expression.
     pub kind: ExpressionKind,
-    /// Where.
+    /// Place of the expression.
     pub span: Span,
 }
 
 /// The kinds of expression. Operators are calls.
 #[derive(Clone, Debug)]
 pub enum ExpressionKind {
-    /// A literal.
+    /// A number.
     Number(f64),
-    /// A name.
+    /// A named value.
     Name(Name),
-    /// A function or operator applied.
+    /// A function or operator with its arguments.
     Call(Name, Vec<Expression>),
-    /// `if condition { } else { }`.
+    /// `if condition { … } else { … }`.
     If(Box<Expression>, Box<Body>, Box<Body>),
     /// `[a, b, …]`, an array.
     List(Vec<Expression>),
@@ -232,19 +232,19 @@ pub enum ExpressionKind {
     Component(Box<Expression>, Name),
     /// `sum(j in first..end, term)`.
     Sum(Box<Sum>),
-    /// A body in braces, or in a string.
+    /// A body in braces or in a string.
     Body(Box<Body>),
 }
 
 /// `sum(index in first..end, term)`.
 #[derive(Clone, Debug)]
 pub struct Sum {
-    /// What counts.
+    /// Index variable.
     pub index: Name,
-    /// From.
+    /// First index.
     pub first: Expression,
-    /// Up to, exclusive.
+    /// End of the range, exclusive.
     pub end: Expression,
-    /// What is summed.
+    /// Term of the sum.
     pub term: Expression,
 }

@@ -1,4 +1,4 @@
-//! What stands above a declaration: documentation, the audit, properties it claims, and how accurate it is to be.
+//! Attributes of declarations: documentation, audit, claimed properties and accuracy.
 
 use super::parse::{Parsed, Parser};
 use super::tokens::{Kind as TokenKind, Token};
@@ -15,8 +15,8 @@ pub(super) struct Attributes {
 }
 
 impl Parser<'_> {
-    /// `[doc = "…"]`, `[audit]`, `[audit(samples = n)]`, `[invariant(translation, rotation)]`, `[rest_state(zero_force)]`, `[even]` or
-    /// `[uncompensated]`, after the `#`.
+    /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n)]`, `[invariant(translation,
+    /// rotation)]`, `[rest_state(zero_force)]`, `[even]` or `[uncompensated]`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
         self.expect("[", "to open the attribute")?;
         let name = self.name("`doc`, `audit` or a property")?;
@@ -48,7 +48,7 @@ impl Parser<'_> {
         self.expect("]", "to close the attribute")
     }
 
-    /// `(samples = n)`, or nothing.
+    /// Parses `(samples = n)`; returns the default count if there are no parentheses.
     fn samples(&mut self) -> Parsed<usize> {
         if !self.take("(") {
             return Ok(200);
@@ -66,7 +66,7 @@ impl Parser<'_> {
         Ok(samples)
     }
 
-    /// `(name, name)`, of the known names.
+    /// Parses `(name, name)` with known names.
     fn properties(&mut self, known: &[(&str, Property)], attributes: &mut Attributes) -> Parsed<()> {
         let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         self.expect("(", &format!("and one of: {names}"))?;

@@ -1,4 +1,4 @@
-//! Expressions, by precedence.
+//! Parses expressions by precedence.
 
 use super::ast::{Body, Expression, ExpressionKind, Sum};
 use super::name::Name;
@@ -8,12 +8,12 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::functions;
 
 impl<'a> Parser<'a> {
-    /// An expression of any precedence.
+    /// Parses an expression of any precedence.
     pub(super) fn expression(&mut self) -> Parsed<Expression> {
         self.binary(0)
     }
 
-    /// Left-associative operators, by rising precedence.
+    /// Parses left-associative operators, by increasing precedence.
     fn binary(&mut self, level: usize) -> Parsed<Expression> {
         const LEVELS: &[&[&str]] =
             &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×", "⊗"]];
@@ -41,7 +41,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Whether a factor follows without an operator, which in notation is a product.
+    /// Returns whether a factor follows without an operator. In notation that is a product.
     fn starts_factor(&self) -> bool {
         let Some(token) = self.peek().filter(|t| t.notation) else { return false };
         match &token.kind {
@@ -59,7 +59,7 @@ impl<'a> Parser<'a> {
         self.nested(Self::signed)
     }
 
-    /// Every nesting passes here: it is bounded, because the compiler recurses over expressions.
+    /// Bounds the nesting of expressions, because the compiler recurses over them. Every nested expression passes here.
     fn nested(&mut self, parse: fn(&mut Self) -> Parsed<Expression>) -> Parsed<Expression> {
         const DEEPEST: usize = 100;
         if self.depth >= DEEPEST {
@@ -154,7 +154,7 @@ impl<'a> Parser<'a> {
         Ok(Expression { kind, span })
     }
 
-    /// A bracketed expression after its opening bracket.
+    /// Parses a bracketed expression after its opening bracket.
     fn bracketed(&mut self, open: &str, close: &str) -> Parsed<Expression> {
         self.bars.push(open.into());
         let inner = self.expression()?;
@@ -178,7 +178,7 @@ impl<'a> Parser<'a> {
         Ok(items)
     }
 
-    /// `‖d‖`, a norm, or `|x|`, an absolute value.
+    /// Parses `‖d‖`, a norm, or `|x|`, an absolute value.
     fn barred(&mut self, bar: &str) -> Parsed<Expression> {
         let span = self.span();
         self.at += 1;
@@ -210,7 +210,7 @@ impl<'a> Parser<'a> {
             return Ok(Expression { kind: ExpressionKind::Call(name, arguments), span });
         }
         if function && notation && self.is("^") {
-            // `sin² θ`, as printed; not sin⁻¹, which has two meanings.
+            // `sin² θ` as printed. `sin⁻¹` is refused: it has two meanings.
             if let Some(Token { kind: TokenKind::Number(power), span: at, .. }) = self.tokens.get(self.at + 1)
                 && *power > 0.0
             {
@@ -226,14 +226,14 @@ impl<'a> Parser<'a> {
             ));
         }
         if function && notation && self.starts_factor() {
-            // `sin θ`, as printed.
+            // `sin θ` as printed.
             let argument = self.nested(Self::power)?;
             return Ok(Expression { kind: ExpressionKind::Call(name, vec![argument]), span });
         }
         Ok(Expression { kind: ExpressionKind::Name(name), span })
     }
 
-    /// `sum(j in first..end, term)`, after the name.
+    /// Parses `sum(j in first..end, term)` after the name.
     fn sum(&mut self, span: Span) -> Parsed<Expression> {
         const FORM: &str = "as in sum(j in 0..4, w[j] * x[j])";
         self.expect("(", FORM)?;
@@ -270,7 +270,7 @@ impl<'a> Parser<'a> {
         Ok(Expression { kind: ExpressionKind::If(Box::new(condition), Box::new(yes), Box::new(no)), span })
     }
 
-    /// The content of a string literal: a body of its own.
+    /// Parses the contents of a string literal, which is a body.
     fn notation(&mut self, inner: &'a [Token], span: &Span) -> Parsed<Expression> {
         let end = inner.last().map_or_else(|| span.clone(), |t| t.span.clone());
         let mut parser = Parser {

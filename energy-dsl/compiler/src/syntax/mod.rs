@@ -1,4 +1,4 @@
-//! Text to syntax tree. Rust tokens and mathematical notation become the same tokens, and one parser reads both.
+//! Converts text to a syntax tree. Rust tokens and mathematical notation become the same tokens; one parser reads both.
 
 mod ast;
 mod attribute;

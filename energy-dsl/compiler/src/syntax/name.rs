@@ -1,23 +1,24 @@
 use crate::diagnostic::Span;
 
-/// A name as written, and the form by which names are compared.
+/// A name as written. Names are compared in canonical form.
 #[derive(Clone, Debug)]
 pub struct Name {
-    /// As written.
+    /// The name as written.
     pub text: String,
-    /// Where.
+    /// Place of the name.
     pub span: Span,
 }
 
 impl Name {
-    /// What it is compared by.
+    /// Returns the canonical form.
     #[must_use]
     pub fn canonical(&self) -> String {
         canonical(&self.text)
     }
 }
 
-/// Spellings of one symbol agree: `θ₀`, `θ_0` and `θ0`; `p_ℓ`, `p_l`, `pₗ` and `pl`; `θ` and `theta`.
+/// Returns the canonical form of a name, in which all spellings of a symbol agree: `θ₀`, `θ_0` and `θ0`; `p_ℓ`, `p_l`,
+/// `pₗ` and `pl`; `θ` and `theta`.
 #[must_use]
 pub fn canonical(name: &str) -> String {
     let mut plain = String::with_capacity(name.len());
@@ -37,7 +38,7 @@ pub fn canonical(name: &str) -> String {
     plain
 }
 
-/// The letter that a subscript letter stands for.
+/// Returns the letter of a subscript letter.
 pub(super) fn subscript_letter(c: char) -> Option<char> {
     const SUBSCRIPTS: &str = "ₐaₑeₕhᵢiⱼjₖkₗlₘmₙnₒoₚpᵣrₛsₜtᵤuᵥvₓx";
     let mut pairs = SUBSCRIPTS.chars();

@@ -1,4 +1,4 @@
-//! Mathematical notation, as printed in papers, to the tokens that the Rust-like spelling has.
+//! Converts mathematical notation, as papers print it, to the tokens of the Rust-like spelling.
 
 use std::rc::Rc;
 
@@ -6,14 +6,14 @@ use super::name::GREEK;
 use super::tokens::{Kind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
 
-/// Splits a formula into tokens. `literal` is where the string stands.
+/// Splits a formula into tokens. `literal` is the place of the string.
 pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
     let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: None };
     let whole = Span { token: literal.token, excerpt: Some(excerpt.clone()) };
     tokens_within(&excerpt.text, (0, text.len()), &whole, diagnostics)
 }
 
-/// Splits the formula between two places of a text into tokens. `whole` is the text.
+/// Splits the formula between two places of the text `whole` into tokens.
 pub(super) fn tokens_within(
     text: &Rc<str>,
     (start, end): (usize, usize),
@@ -132,7 +132,7 @@ impl Lexer<'_> {
         let mut end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
         // `0..4` is a range.
         end = rest.find("..").map_or(end, |range| range.min(end));
-        // An exponent is digits after `e`, else `e` is a name.
+        // Digits after `e` make it an exponent; otherwise `e` is a name.
         let bytes = rest.as_bytes();
         if bytes.get(end).is_some_and(|b| b.eq_ignore_ascii_case(&b'e')) {
             let sign = usize::from(bytes.get(end + 1).is_some_and(|b| b"+-".contains(b)));
@@ -148,7 +148,7 @@ impl Lexer<'_> {
         Ok(())
     }
 
-    /// A LaTeX command: `\hat a`, `\cdot`, `\times`, `\theta`, ….
+    /// Reads a LaTeX command: `\hat a`, `\cdot`, `\times`, `\theta`, ….
     fn command(&mut self) -> Result<(), String> {
         let start = self.at;
         self.advance();
@@ -179,7 +179,7 @@ impl Lexer<'_> {
             "lvert" | "rvert" => self.symbol("|", start),
             "le" => self.symbol("<=", start),
             "ge" => self.symbol(">=", start),
-            // They only size the bracket that follows.
+            // These only size the bracket that follows.
             "left" | "right" => {}
             function if crate::functions::find(function).is_some() => self.push(Kind::Name(command), start),
             "pi" => self.push(Kind::Name("π".into()), start),
@@ -198,7 +198,7 @@ impl Lexer<'_> {
         Ok(())
     }
 
-    /// A name; a part of it may stand in braces, as in `p_{kl}` and `\hat{n}_1`.
+    /// Reads a name. Parts in braces belong to it, as in `p_{kl}` and `\hat{n}_1`.
     fn name(&mut self, mut braced: bool) {
         let start = self.at;
         let mut name = String::new();
@@ -231,7 +231,7 @@ impl Lexer<'_> {
     }
 }
 
-/// The letter under a precomposed hat.
+/// Returns the letter under a precomposed hat.
 pub(crate) fn unhatted(c: char) -> Option<char> {
     Some(match c {
         'â' => 'a',

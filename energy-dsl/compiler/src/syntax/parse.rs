@@ -1,4 +1,4 @@
-//! One parser for both spellings.
+//! Parses items, in both spellings.
 
 use proc_macro2::TokenStream;
 
@@ -14,13 +14,13 @@ use super::tokens::{self, Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
 use energy_runtime::Kind;
 
-/// Parses all items. After an error in one item it goes on with the next.
+/// Parses all items. After an error in one item, parsing continues with the next.
 pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
     let tokens = tokens::from_rust(stream, diagnostics);
     items(&tokens, diagnostics)
 }
 
-/// The same of a file's text. `at` is where Rust code names the file.
+/// Parses the text of a file. `at` is the place in Rust code that names the file.
 pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Item> {
     let tokens = text::tokens(text, file, at, diagnostics);
     items(&tokens, diagnostics)
@@ -53,14 +53,14 @@ pub(super) type Parsed<T> = Result<T, Box<Diagnostic>>;
 pub(super) struct Parser<'a> {
     pub(super) tokens: &'a [Token],
     pub(super) at: usize,
-    /// Where the text ends.
+    /// End of the text.
     pub(super) end: Span,
-    /// Open bars `‖` and `|`; a bracket between hides those outside it.
+    /// Open bars `‖` and `|`. A bracket hides the bars outside it.
     pub(super) bars: Vec<String>,
-    /// How deep the expression at hand is nested.
+    /// Nesting depth of the current expression.
     pub(super) depth: usize,
     pub(super) user_functions: Vec<String>,
-    /// Errors after which the declaration could still be made out.
+    /// Errors that do not prevent the declaration from being understood.
     pub(super) errors: Vec<Diagnostic>,
 }
 
@@ -135,7 +135,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Goes on after the next `;` or closing brace that ends an item.
+    /// Skips past the next `;` or closing brace that ends an item.
     fn skip_item(&mut self) {
         let mut depth = 0_i32;
         self.bars.clear();
@@ -232,7 +232,7 @@ impl<'a> Parser<'a> {
         }))
     }
 
-    /// `= Other(k = 100, L = 0.1);`.
+    /// Parses `= Other(k = 100, L = 0.1);`.
     fn specialisation(&mut self, start: usize, mut declaration: Declaration) -> Parsed<Specialisation> {
         const FORM: &str = "as in energy Stiff = Spring(k = 100);";
         self.expect("=", FORM)?;
@@ -297,7 +297,7 @@ impl<'a> Parser<'a> {
         Ok(groups)
     }
 
-    /// `Type[unit]` or `[Type[unit]; length]`.
+    /// Parses `Type[unit]` or `[Type[unit]; length]`.
     fn input_type(&mut self) -> Parsed<(ElementType, Unit, Option<Expression>)> {
         if !self.take("[") {
             let element = self.element_type()?;
@@ -324,7 +324,7 @@ impl<'a> Parser<'a> {
         })
     }
 
-    /// `[unit]`, or nothing.
+    /// Parses `[unit]`; returns an empty unit if there is none.
     fn unit(&mut self) -> Parsed<Unit> {
         if !self.take("[") {
             return Ok(Unit::default());
@@ -341,7 +341,7 @@ impl<'a> Parser<'a> {
         Ok(Unit { text, span: Some(span) })
     }
 
-    /// `name: Scalar[unit] = value;`, after the `const`.
+    /// Parses `name: Scalar[unit] = value;` after the word `const`.
     fn constant(&mut self) -> Parsed<Constant> {
         let start = self.at - 1;
         let name = self.name("the name of the constant")?;
@@ -399,7 +399,7 @@ impl<'a> Parser<'a> {
         Ok(body)
     }
 
-    /// Statements and a result, up to the closing brace or the end of a string.
+    /// Parses statements and a result, up to the closing brace or the end of a string.
     pub(super) fn body(&mut self, braced: bool) -> Parsed<Body> {
         let mut constants = Vec::new();
         let mut body = (Vec::new(), Vec::new());
@@ -459,12 +459,12 @@ fn section_of(section: Section, element: ElementType) -> Section {
     }
 }
 
-/// Words that cannot name anything.
+/// Returns whether a word is reserved by the language.
 pub(super) fn is_keyword(word: &str) -> bool {
     matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub" | "const")
 }
 
-/// The body as a reader would write it: a string's content, or the statements without the braces.
+/// Returns the body as a reader would write it: the contents of a string, or the statements without braces.
 fn formula(tokens: &[Token]) -> String {
     match tokens {
         [equals, Token { kind: TokenKind::Notation(_), text, .. }, _] if equals.text == "=" => {

@@ -1,23 +1,24 @@
-//! `energy Stiff = Spring(k = 100);`: a declaration with some of its parameters fixed, which fold into the formula.
+//! Specialisations such as `energy Stiff = Spring(k = 100);`: declarations with some parameters fixed. The values fold
+//! into the formula.
 
 use super::ast::{Constant, Declaration, ElementType, Expression, Item, Section};
 use super::name::Name;
 use crate::diagnostic::{Diagnostic, Diagnostics, nearest};
 
-/// A declaration by another one, as written.
+/// A specialisation, as written.
 #[derive(Clone, Debug)]
 pub struct Specialisation {
-    /// What it declares; inputs and body are still to come.
+    /// The new declaration, still without inputs and body.
     pub declaration: Declaration,
-    /// The other one.
+    /// Name of the original declaration.
     pub of: Name,
-    /// The parameters that it fixes.
+    /// Parameters with fixed values.
     pub values: Vec<(Name, Expression)>,
 }
 
-/// Replaces each specialisation by the declaration that it stands for.
+/// Replaces each specialisation by a declaration.
 pub(super) fn specialise(mut items: Vec<Item>, diagnostics: &mut Diagnostics) -> Vec<Item> {
-    // One may build on another, in any order: those whose original is known first.
+    // Specialisations may build on each other in any order. Those whose original is known go first.
     loop {
         let known: Vec<Declaration> = items
             .iter()
@@ -81,7 +82,7 @@ fn specialised(
     inputs.retain(|group| !group.names.is_empty());
     let mut docs = declaration.docs.clone();
     docs.push(format!(" `{}` with fixed {}: {}", of.text, fixed.join(", "), declaration.formula));
-    // The text of the other follows, so that this one still comes first.
+    // The original's text follows, so that this declaration comes first.
     let source = format!("{} {}", declaration.source, original.source);
     let uncompensated = declaration.uncompensated || original.uncompensated;
     Some(Declaration { docs, inputs, body, uncompensated, formula: original.formula.clone(), source, ..declaration })

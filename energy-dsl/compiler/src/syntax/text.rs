@@ -1,4 +1,4 @@
-//! The text of a file as tokens, each with its place in the file: what the Rust compiler does for a macro's input.
+//! Splits the text of a file into tokens with their places, as the Rust compiler does for the input of a macro.
 
 use std::rc::Rc;
 
@@ -6,7 +6,7 @@ use super::notation;
 use super::tokens::{Kind, OPERATORS, Token, literal_kind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
 
-/// Splits a file into tokens. `at` is where Rust code names it.
+/// Splits a file into tokens. `at` is the place in Rust code that names the file.
 pub(super) fn tokens(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
     let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: Some(file.into()) };
     let whole = Span { token: at.token, excerpt: Some(excerpt.clone()) };
@@ -18,7 +18,7 @@ pub(super) fn tokens(text: &str, file: &str, at: &Span, diagnostics: &mut Diagno
     lexer.tokens
 }
 
-/// Whether the lexer is inside `#[…]`, where strings are no formulas.
+/// Tracks whether the lexer is inside `#[…]`, where strings are not formulas.
 #[derive(Clone, Copy, PartialEq)]
 enum Attribute {
     No,
@@ -58,7 +58,7 @@ impl Lexer<'_> {
         self.diagnostics.push(Diagnostic::new(&span, message).help(help));
     }
 
-    /// Goes on while `part` holds; what it went over.
+    /// Consumes characters while `part` holds, and returns them.
     fn take_while(&mut self, part: impl Fn(char) -> bool) -> String {
         let rest = self.rest();
         let taken = rest[..rest.find(|c| !part(c)).unwrap_or(rest.len())].to_owned();
@@ -86,7 +86,7 @@ impl Lexer<'_> {
         }
     }
 
-    /// A comment; `///` is documentation.
+    /// Reads a comment. `///` is documentation.
     fn comment(&mut self) {
         let start = self.at;
         let line = self.take_while(|c| c != '\n');
@@ -106,7 +106,7 @@ impl Lexer<'_> {
         }
     }
 
-    /// A formula in quotes, as it stands: a backslash is a backslash.
+    /// Reads a formula in quotes. A backslash is a backslash.
     fn string(&mut self) {
         let start = self.at;
         self.at += 1;
@@ -131,7 +131,7 @@ impl Lexer<'_> {
         let start = self.at;
         let digit = |c: char| c.is_ascii_digit() || c == '_';
         self.take_while(digit);
-        // Not the first dot of a range.
+        // Excludes the first dot of a range.
         if self.rest().starts_with('.') && !self.rest().starts_with("..") {
             self.at += 1;
             self.take_while(digit);

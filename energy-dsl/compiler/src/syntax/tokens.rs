@@ -3,35 +3,35 @@ use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use super::notation;
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
     Name(String),
     Number(f64),
-    /// A string literal, its content already split into tokens.
+    /// A string literal, split into the tokens of its notation.
     Notation(Vec<Token>),
-    /// Any other string.
+    /// A string literal of an attribute.
     Text(String),
-    /// Operators, brackets, separators.
+    /// An operator, bracket or separator.
     Symbol(String),
 }
 
-/// A token.
+/// A token and its place.
 #[derive(Clone, Debug)]
 pub(super) struct Token {
     pub(super) kind: Kind,
     pub(super) span: Span,
-    /// From mathematical notation, where standing side by side means a product.
+    /// Whether it comes from mathematical notation, where juxtaposition is a product.
     pub(super) notation: bool,
-    /// As written.
+    /// Text of the token.
     pub(super) text: String,
 }
 
-/// A unit as it is written: a space stands for a product.
+/// Returns the text of a unit. A space is a product.
 pub(super) fn unit_text(tokens: &[Token]) -> String {
     let mut unit = String::new();
     for token in tokens {
-        // A unit with characters that are no Rust tokens stands in a string.
+        // Units with characters that are not Rust tokens are written as strings.
         if let Ok(text) = syn::parse_str::<syn::LitStr>(&token.text) {
             unit.push_str(&text.value());
             continue;
@@ -45,7 +45,7 @@ pub(super) fn unit_text(tokens: &[Token]) -> String {
     unit
 }
 
-/// Tokens as text that reads well and lexes to the same tokens.
+/// Returns readable text that splits into the same tokens.
 pub(super) fn text(tokens: &[Token]) -> String {
     let mut text = String::new();
     let mut glue = true;
@@ -74,14 +74,14 @@ impl PartialEq for Token {
 
 pub(super) const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
 
-/// Rust tokens as ours. Attributes' strings stay text; every other string literal is notation.
+/// Converts Rust tokens. Strings in attributes stay text; all others are notation.
 pub(super) fn from_rust(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Token> {
     let mut tokens = Vec::new();
     flatten(stream, &mut tokens, (false, 0), diagnostics);
     tokens
 }
 
-/// Brackets within brackets are walked by recursion, so they are bounded; the parser refuses far shallower ones.
+/// Nested brackets are walked by recursion, so their depth is bounded. The parser refuses far shallower nesting.
 const DEEPEST: usize = 1000;
 
 fn flatten(
@@ -140,7 +140,7 @@ fn flatten(
     }
 }
 
-/// A number, or a string as notation.
+/// Returns the token of a number, or of a string with notation.
 pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
     if let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
         let content = string.value();

@@ -4,28 +4,30 @@ use std::marker::PhantomData;
 use super::Level;
 use crate::real::Real;
 
-/// How many numbers a [`BlockSum`] reads from where a block begins; only nine are of the block, and the others come to nothing.
+/// Numbers that a [`BlockSum`] reads from the start of a block. Only the first nine belong to the block; the others do
+/// not affect the result.
 pub const BLOCK_NUMBERS: usize = 16;
 
-/// A sum of products of 3×3 blocks with vectors: what sweeps through the rows of a sparse matrix compute, most of all.
+/// A running sum of products of 3×3 blocks with vectors: the inner loop of sweeps over a sparse matrix.
 ///
-/// Vectors have a fourth component that means nothing. Blocks are stored row by row, with [`BLOCK_NUMBERS`] to read. Products of entries are summed up
-/// each by itself, and only at the end those of a row together: every implementation rounds alike, at the same [`Level::FUSED`].
+/// Vectors have an unused fourth component. Blocks are stored row by row, with [`BLOCK_NUMBERS`] readable numbers. Each
+/// entry's products are summed separately and combined per row only at the end, so all implementations with the same
+/// [`Level::FUSED`] round identically.
 pub trait BlockSum<T>: Copy + Debug {
-    /// Nothing yet.
+    /// Creates an empty sum.
     fn zero() -> Self;
 
     /// Adds B v.
     fn add(&mut self, block: &[T; BLOCK_NUMBERS], v: &[T; 4]);
 
-    /// The sum.
+    /// Returns the sum.
     fn total(self) -> [T; 4];
 
-    /// u − B v, column by column: only three operations have to wait for v.
+    /// Returns u − B v, column by column: only three operations wait for v.
     fn less(u: [T; 4], block: &[T; BLOCK_NUMBERS], v: &[T; 4]) -> [T; 4];
 }
 
-/// The products of each row in a vector of its own.
+/// The products of each row, in a vector per row.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<T, L> {
     rows: [[T; 4]; 3],

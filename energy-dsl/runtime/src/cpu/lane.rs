@@ -1,34 +1,34 @@
 use crate::real::{Number, Real};
 
-/// Several numbers of type `S` that are computed with at once. A scalar is a lane of one.
+/// Several numbers of type `S` in one SIMD register. A scalar is a lane of one.
 ///
-/// Every operation gives each lane the same bits as the scalar's operation at the same [`super::Level::FUSED`].
+/// Every operation gives each lane the bits of the scalar operation at the same [`super::Level::FUSED`].
 pub trait Lane<S: Number>: Real {
-    /// How many numbers there are.
+    /// Number of lanes.
     const LANES: usize;
 
-    /// The same number in every lane.
+    /// Creates a register with the same number in every lane.
     fn splat(value: S) -> Self;
 
-    /// The first [`Self::LANES`] numbers of a slice.
+    /// Reads the first [`Self::LANES`] numbers of a slice.
     ///
     /// # Panics
     /// When there are fewer; see [`Self::load_ragged`].
     fn load(values: &[S]) -> Self;
 
-    /// Writes to the first [`Self::LANES`] places of a slice.
+    /// Writes the first [`Self::LANES`] numbers of a slice.
     ///
     /// # Panics
     /// When there are fewer; see [`Self::store_ragged`].
     fn store(self, values: &mut [S]);
 
-    /// The number `value(i)` in lane `i`.
+    /// Creates a register with `value(i)` in lane `i`.
     fn from_fn(value: impl FnMut(usize) -> S) -> Self;
 
-    /// The number in lane `lane`.
+    /// Returns the number in one lane.
     fn extract(self, lane: usize) -> S;
 
-    /// The points of the first [`Self::LANES`] indices: x, y and z.
+    /// Gathers the points at the first [`Self::LANES`] indices; returns x, y and z.
     ///
     /// # Panics
     /// When there is no such point, or there are fewer indices.
@@ -37,8 +37,8 @@ pub trait Lane<S: Number>: Real {
         gather_by_element(points, indices)
     }
 
-    /// Writes lanes as rows: number `r` of lane `c` goes to `out[c · stride + r]`, for the first `count` lanes. It turns results
-    /// of many elements, one a lane, to one result after the other.
+    /// Transposes lanes to rows: number `r` of lane `c` goes to `out[c · stride + r]`, for the first `count` lanes.
+    /// This turns results with one element per lane into one result after the other.
     ///
     /// # Panics
     /// When there are fewer lanes or places, or rows would overlap.
@@ -48,8 +48,7 @@ pub trait Lane<S: Number>: Real {
         transpose_by_element(numbers, count, out, stride);
     }
 
-    /// The first numbers of a slice; lanes beyond its end repeat its last number, so that they compute, and flag, nothing
-    /// that it does not.
+    /// Reads the first numbers of a slice. Lanes beyond its end repeat its last number, so they add no flags.
     ///
     /// # Panics
     /// When the slice is empty.
@@ -62,7 +61,7 @@ pub trait Lane<S: Number>: Real {
         Self::from_fn(|lane| values[lane.min(last)].clone())
     }
 
-    /// Writes the first lanes, as many as the slice takes.
+    /// Writes the first lanes, as many as the slice holds.
     #[inline(always)]
     fn store_ragged(self, values: &mut [S]) {
         if values.len() >= Self::LANES {
@@ -74,7 +73,7 @@ pub trait Lane<S: Number>: Real {
     }
 }
 
-/// [`Lane::gather`] number by number: the gathering instructions of AVX-512 were not faster.
+/// [`Lane::gather`], number by number. AVX-512 gather instructions are no faster.
 #[inline(always)]
 pub fn gather_by_element<S: Number, V: Lane<S>>(points: &[[S; 3]], indices: &[u32]) -> [V; 3] {
     assert!(indices.len() >= V::LANES, "{} lanes from {} indices", V::LANES, indices.len());
@@ -89,7 +88,7 @@ pub fn gather_by_element<S: Number, V: Lane<S>>(points: &[[S; 3]], indices: &[u3
     [V::load(&numbers[0]), V::load(&numbers[1]), V::load(&numbers[2])]
 }
 
-/// [`Lane::store_transposed`] number by number.
+/// [`Lane::store_transposed`], number by number.
 #[inline(always)]
 pub fn transpose_by_element<S: Number, V: Lane<S>>(numbers: &[V], count: usize, out: &mut [S], stride: usize) {
     for (row, number) in numbers.iter().enumerate() {
@@ -99,7 +98,7 @@ pub fn transpose_by_element<S: Number, V: Lane<S>>(numbers: &[V], count: usize, 
     }
 }
 
-/// The conditions of [`Lane::store_transposed`].
+/// Checks the preconditions of [`Lane::store_transposed`].
 #[inline(always)]
 pub fn check_transposed<S: Number, V: Lane<S>>(numbers: usize, count: usize, places: usize, stride: usize) {
     assert!(count <= V::LANES, "{count} lanes of {}", V::LANES);

@@ -1,4 +1,4 @@
-//! Registers as numbers.
+//! Implements numbers by registers.
 
 use std::fmt::{self, Debug};
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -10,7 +10,7 @@ use crate::elementary::{Atan2, Cos, Double, Exp, Ln, ModerateAtan2, Pow, Sin};
 use crate::real::Number;
 use crate::unbounded::Unbounded;
 
-/// A register as a number.
+/// A register with the arithmetic of a number.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Lanes<R>(pub(super) R);
@@ -114,7 +114,7 @@ impl<R: Register> Number for Lanes<R> {
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        // The scalar's order: self unless the other is truly smaller.
+        // The order of the scalar's `min`: self unless the other is truly smaller.
         Self(R::min(other.0, self.0))
     }
     #[inline(always)]
@@ -160,14 +160,14 @@ impl<R: Register> Number for Lanes<R> {
     }
     #[inline(always)]
     fn sum_error(self, other: Self) -> Self {
-        // Knuth's TwoSum.
+        // Knuth's 2Sum.
         let sum = self + other;
         let virtual_other = sum - self;
         (self - (sum - virtual_other)) + (other - virtual_other)
     }
     #[inline(always)]
     fn difference_error(self, other: Self) -> Self {
-        // The same without −other: one instruction less.
+        // 2Sum without forming −other: one instruction less.
         let difference = self - other;
         let virtual_other = self - difference;
         (self - (difference + virtual_other)) + (virtual_other - other)
@@ -204,8 +204,9 @@ impl<R: Register> Number for Lanes<R> {
     #[inline(always)]
     fn power_of_two_scale(self) -> Self {
         let exponent = R::and(self.0, R::splat(R::Scalar::INFINITY));
-        // The exponent field of the inverse is twice the bias less the number's; at least 1. A subnormal has 0: it gets the
-        // largest power of two there is. Infinity and NaN wrap round to a negative number, replaced below like zero.
+        // The exponent field of the inverse is twice the bias minus the number's field, at least 1. A subnormal number
+        // has field 0 and gets the largest power of two. Infinity and NaN wrap to a negative number, which is replaced
+        // below, as for zero.
         let inverse = R::sub_bits(R::splat(R::Scalar::LARGEST_POWER), exponent);
         let inverse = R::max(inverse, R::splat(R::Scalar::LEAST_NORMAL));
         let zero = R::splat(R::Scalar::default());

@@ -1,12 +1,12 @@
-//! What a processor can do, and how code is run at the best level it has.
+//! SIMD levels of the processor, and dispatch to the best one at run time.
 //!
-//! A [`Kernel`] is work that is generic over a [`Level`], a set of instructions. [`dispatch`] runs it at the best level of
-//! the machine, found at run time: users need no compiler flags. A level brings its widest lanes ([`Level::F64`],
-//! [`Level::F32`]), so a kernel over many elements takes [`Lane::LANES`] of them at a time.
+//! A [`Kernel`] is code that is generic over a [`Level`], a set of instructions. [`dispatch`] runs it at the best level
+//! of the machine, detected at run time, so users need no compiler flags. A level has its widest lanes ([`Level::F64`],
+//! [`Level::F32`]); a kernel over many elements processes [`Lane::LANES`] of them at a time.
 //!
-//! Results depend on a level only by [`Level::FUSED`]: levels that agree in it give the same bits, at any width. The
-//! environment variable `ENERGY_LEVEL` (`baseline`, `avx2` or `avx512`), read once, caps the level: with it one machine
-//! reproduces the results of a lesser one. (It cannot undo what the program was compiled to require.)
+//! Results depend on the level only through [`Level::FUSED`]: levels that agree in it give the same bits, at any width.
+//! The environment variable `ENERGY_LEVEL` (`baseline`, `avx2` or `avx512`) caps the level; it is read once. With it,
+//! one machine reproduces the results of a lesser one. It cannot go below what the program was compiled to require.
 
 mod block_sum;
 mod lane;
@@ -28,21 +28,21 @@ pub(crate) use register::Scalar;
 
 /// A set of instructions that kernels are compiled for.
 pub trait Level: Copy + Debug + 'static {
-    /// Its name.
+    /// Name of the level.
     const NAME: &'static str;
-    /// Whether a product and a sum fuse into one rounding.
+    /// Whether a · b + c is rounded once.
     const FUSED: bool;
-    /// As many doubles as one instruction takes.
+    /// The widest register of doubles.
     type F64: Lane<f64>;
-    /// As many single-precision numbers as one instruction takes.
+    /// The widest register of single-precision numbers.
     type F32: Lane<f32>;
-    /// What sweeps through sparse matrices of doubles sum up with.
+    /// Running sum for sweeps over sparse matrices of doubles.
     type Sum64: BlockSum<f64>;
-    /// The same of single-precision numbers.
+    /// Running sum for sweeps over sparse matrices of single-precision numbers.
     type Sum32: BlockSum<f32>;
 }
 
-/// What every processor of the target has.
+/// The level that every processor of the target has.
 #[derive(Clone, Copy, Debug)]
 pub struct Baseline;
 
@@ -55,7 +55,7 @@ impl Level for Baseline {
     type Sum32 = Rows<f32, Self>;
 }
 
-/// Baseline, with fused operations by library calls: what gives the bits of fused levels outside their kernels.
+/// The baseline with fused operations by library calls. It reproduces the bits of fused levels outside their kernels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fused;
 
@@ -68,19 +68,19 @@ impl Level for Fused {
     type Sum32 = Rows<f32, Self>;
 }
 
-/// Work that can be compiled for any [`Level`].
+/// Code that can be compiled for any [`Level`].
 pub trait Kernel {
-    /// What it returns.
+    /// The result.
     type Output;
-    /// Does it. Mark implementations `#[inline(always)]`: only what is inlined is compiled for the level.
+    /// Runs the code. Mark implementations `#[inline(always)]`: only inlined code is compiled for the level.
     fn run<L: Level>(self) -> Self::Output;
 }
 
-/// The levels there are, from the least to the best. A better one can do all that a lesser one can.
+/// The SIMD levels, in increasing order. A level includes the instructions of all lower ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum LevelName {
-    /// What every processor of the target has; see [`Baseline`].
+    /// The instructions that every processor of the target has; see [`Baseline`].
     Baseline,
     /// x86-64 with AVX2 and FMA: 4 doubles.
     Avx2,
@@ -89,10 +89,10 @@ pub enum LevelName {
 }
 
 impl LevelName {
-    /// Every level, of this machine or not.
+    /// All levels, whether or not this machine has them.
     pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
-    /// The name as `ENERGY_LEVEL` has it.
+    /// Returns the name that `ENERGY_LEVEL` uses.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -117,7 +117,7 @@ impl FromStr for LevelName {
     }
 }
 
-/// A name that is no level's.
+/// An unknown SIMD level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownLevel(String);
 
@@ -129,7 +129,7 @@ impl Display for UnknownLevel {
 
 impl std::error::Error for UnknownLevel {}
 
-/// Runs a kernel at the best level this machine has, capped by `ENERGY_LEVEL`.
+/// Runs a kernel at the best level of this machine, capped by `ENERGY_LEVEL`.
 ///
 /// ```
 /// use energy_runtime::{Kernel, Lane, Level, Number, dispatch};
@@ -156,7 +156,7 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     run_at(REQUIRED.unwrap_or_else(level), kernel)
 }
 
-/// Runs scalar code: at AVX2 at most, for fused operations. AVX-512 would be one more instantiation of everything.
+/// Runs scalar code, at AVX2 at most: it needs fused operations, and AVX-512 would compile everything once more.
 #[inline(always)]
 pub(crate) fn dispatch_scalar<K: Kernel>(kernel: K) -> K::Output {
     if Baseline::FUSED {
@@ -165,17 +165,17 @@ pub(crate) fn dispatch_scalar<K: Kernel>(kernel: K) -> K::Output {
     run_scalar(level(), kernel)
 }
 
-/// Runs a kernel at a level by name, if this machine has it: for tests and benchmarks.
+/// Runs a kernel at a named level, for tests and benchmarks. Returns `None` if this machine does not have it.
 #[inline]
 pub fn dispatch_at<K: Kernel>(name: LevelName, kernel: K) -> Option<K::Output> {
     (name <= detected()).then(|| run_at(name, kernel))
 }
 
-/// The level that [`dispatch`] runs at.
+/// Returns the level that [`dispatch`] uses.
 #[inline]
 #[must_use]
 pub fn level() -> LevelName {
-    /// One more than the level; 0 while it is not known.
+    /// The level plus one; 0 while it is unknown.
     static CHOICE: AtomicU8 = AtomicU8::new(0);
     match CHOICE.load(Ordering::Relaxed) {
         1 => LevelName::Baseline,
@@ -189,12 +189,12 @@ pub fn level() -> LevelName {
     }
 }
 
-/// The levels this machine has, from the least to the best, whatever `ENERGY_LEVEL` says.
+/// Returns the levels of this machine in increasing order, regardless of `ENERGY_LEVEL`.
 pub fn available() -> impl Iterator<Item = LevelName> {
     LevelName::ALL.into_iter().filter(|&name| name <= detected())
 }
 
-/// A level that the program was compiled to require: no choice is left if it is the best there is.
+/// The level that the program was compiled to require. If it is the best one, there is no choice left.
 const REQUIRED: Option<LevelName> = if cfg!(all(
     target_arch = "x86_64",
     target_feature = "avx512f",
@@ -215,7 +215,7 @@ fn choose() -> LevelName {
         Ok(cap) => match cap.parse::<LevelName>() {
             Ok(cap) => detected().min(cap),
             Err(error) => {
-                // A mistyped cap that went unnoticed would make a comparison of machines worthless.
+                // A typing error that goes unnoticed would invalidate a comparison of machines.
                 eprintln!("warning: ENERGY_LEVEL is ignored: {error}");
                 detected()
             }
@@ -229,7 +229,7 @@ pub(crate) use x86::read_alone;
 #[cfg(target_arch = "x86_64")]
 use x86::{detected, run_at, run_scalar};
 
-/// A number, by a load of its own.
+/// Reads a number by a load of its own.
 #[cfg(not(target_arch = "x86_64"))]
 #[inline(always)]
 pub(crate) fn read_alone<T: Copy>(number: &T) -> T {

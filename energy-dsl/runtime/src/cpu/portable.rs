@@ -1,5 +1,5 @@
-//! Registers as arrays, for any processor: lane by lane without loops or branches, which compilers turn into the target's vector
-//! instructions (SSE2, NEON), and soon.
+//! Registers as arrays, for any processor. Operations go lane by lane without loops or branches, so compilers turn them
+//! into vector instructions of the target (SSE2, NEON) and compile them quickly.
 
 use std::ops::{BitAnd, BitOr, Not};
 
@@ -9,19 +9,19 @@ use super::{Baseline, Kernel, Level};
 use crate::elementary::{Binary, Double, Unary, sin_cos};
 use crate::real::Mask;
 
-/// Two doubles.
+/// A register of two doubles.
 #[derive(Clone, Copy)]
 #[repr(align(16))]
 pub struct F64x2([f64; 2]);
 
-/// Four single-precision numbers.
+/// A register of four single-precision numbers.
 #[derive(Clone, Copy)]
 #[repr(align(16))]
 pub struct F32x4([f32; 4]);
 
 macro_rules! array_register {
     ($register:ident, $mask:ident, $float:ident, $lanes:literal, [$($i:literal)*], $elementary:ident) => {
-        /// Where it holds.
+        /// One `bool` per lane.
         #[derive(Clone, Copy, Debug)]
         pub struct $mask([bool; $lanes]);
 

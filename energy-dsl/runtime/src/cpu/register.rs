@@ -1,4 +1,4 @@
-//! What a processor's register can do. [`super::lanes`] makes numbers of registers.
+//! The operations of a processor's register. [`super::lanes`] turns registers into numbers.
 
 use super::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use super::lanes::Lanes;
@@ -8,42 +8,42 @@ use crate::flags::Flags;
 use crate::real::{Mask, Number};
 use crate::unbounded::{Unbounded, WithCare};
 
-/// A floating-point number that lanes are made of, with the bit patterns that work on it needs.
+/// A floating-point number that lanes are made of, with the bit patterns of its format.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
-    /// Only the sign bit.
+    /// The sign bit alone.
     const SIGN: Self;
-    /// All bits but the sign.
+    /// All bits except the sign.
     const MAGNITUDE: Self;
-    /// All bits of the exponent: the pattern of infinity.
+    /// All exponent bits: the pattern of infinity.
     const INFINITY: Self;
-    /// Its exponent field is twice the bias: the largest power of two.
+    /// The power of two with twice the bias in its exponent field: the largest one.
     const LARGEST_POWER: Self;
-    /// The least normal number: exponent field 1.
+    /// The least normal number, with exponent field 1.
     const LEAST_NORMAL: Self;
     /// Dekker's splitter, 2^⌈p/2⌉ + 1 for p bits of mantissa.
     const SPLITTER: Self;
-    /// The number one.
+    /// The number 1.
     const ONE: Self;
-    /// The exponent of the least normal number.
+    /// Exponent of the least normal number.
     const FIRST: i32;
-    /// The exponent of the largest numbers.
+    /// Exponent of the largest numbers.
     const LAST: i32;
-    /// Between which magnitudes significands of [`crate::Unbounded`] are left as they are.
+    /// Significands of [`crate::Unbounded`] within these magnitudes are not renormalised.
     const SPAN: (Self, Self);
-    /// Numbers whose exponents differ by more do not meet in a sum, nor in a fused one.
+    /// If exponents differ by more, the smaller number cannot change a sum, fused or not.
     const REACH: i32;
 
-    /// The number nearest to a double.
+    /// Returns the nearest number to a double.
     fn nearest(value: f64) -> Self;
-    /// In double precision.
+    /// Converts to double precision.
     fn to_f64(self) -> f64;
-    /// ⌊log₂|self|⌋ of a normal number.
+    /// Returns ⌊log₂|self|⌋ of a normal number.
     fn exponent(self) -> i32;
-    /// 2^exponent, a normal number.
+    /// Returns 2^exponent, a normal number.
     fn power_of_two(exponent: i32) -> Self;
-    /// From where to where [`crate::Number::is_moderate`] holds.
+    /// Returns the bounds within which [`crate::Number::is_moderate`] holds.
     fn moderate_bounds(degree: u8) -> (Self, Self);
-    /// Runs a routine with all precautions in this precision.
+    /// Runs the general path of a routine in this precision.
     fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Unbounded<Self>; INPUTS],
     ) -> ([Unbounded<Self>; OUTPUTS], Flags<Unbounded<Self>>);
@@ -95,7 +95,7 @@ macro_rules! scalar {
     };
 }
 
-// Products of two significands, with all their bits, and a third number shifted by the reach, are normal numbers.
+// Products of two full significands, and a third number shifted by the reach, are normal numbers.
 scalar!(
     f64,
     u64,
@@ -109,107 +109,108 @@ scalar!(
 );
 scalar!(f32, u32, W::run, 23, 127, 4097.0, 12, 16.0, 95);
 
-/// A register of numbers. Where it needs features of the processor, it is used in kernels run at [`Self::Level`] only.
+/// A register of numbers. If it needs processor features, it is used only in kernels that run at the level of the
+/// register.
 pub trait Register: Copy {
-    /// One of the numbers.
+    /// The type of one lane.
     type Scalar: Scalar;
     /// The outcome of a comparison.
     type Mask: Mask;
-    /// How many there are.
+    /// Number of lanes.
     const LANES: usize;
 
-    /// Runs a kernel at the level that the register is of.
+    /// Runs a kernel at the level of the register.
     fn dispatch<K: Kernel>(kernel: K) -> K::Output;
 
-    /// The same number everywhere.
+    /// Returns the same number in every lane.
     fn splat(value: Self::Scalar) -> Self;
-    /// The numbers of a slice that is long enough.
+    /// Reads a slice that is long enough.
     fn load(values: &[Self::Scalar]) -> Self;
-    /// Writes to a slice that is long enough.
+    /// Writes a slice that is long enough.
     fn store(self, values: &mut [Self::Scalar]);
-    /// The number `value(i)` at place `i`.
+    /// Returns `value(i)` in lane `i`.
     fn from_fn(value: impl FnMut(usize) -> Self::Scalar) -> Self;
 
-    /// a + b.
+    /// Returns a + b.
     fn add(a: Self, b: Self) -> Self;
-    /// a − b.
+    /// Returns a − b.
     fn sub(a: Self, b: Self) -> Self;
-    /// a · b.
+    /// Returns a · b.
     fn mul(a: Self, b: Self) -> Self;
-    /// a / b.
+    /// Returns a / b.
     fn div(a: Self, b: Self) -> Self;
-    /// √a.
+    /// Returns √a.
     fn sqrt(a: Self) -> Self;
-    /// a · b + c, rounded once.
+    /// Returns a · b + c, rounded once.
     fn fused(a: Self, b: Self, c: Self) -> Self;
-    /// a < b ? a : b.
+    /// Returns a < b ? a : b.
     fn min(a: Self, b: Self) -> Self;
-    /// a > b ? a : b.
+    /// Returns a > b ? a : b.
     fn max(a: Self, b: Self) -> Self;
 
-    /// a < b.
+    /// Returns a < b.
     fn less(a: Self, b: Self) -> Self::Mask;
-    /// a ≤ b.
+    /// Returns a ≤ b.
     fn less_or_equal(a: Self, b: Self) -> Self::Mask;
-    /// a = b.
+    /// Returns a = b.
     fn equal(a: Self, b: Self) -> Self::Mask;
-    /// `yes` where the mask holds, `no` elsewhere.
+    /// Returns `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// Bits that both have.
+    /// Bitwise and.
     fn and(a: Self, b: Self) -> Self;
-    /// Bits that either has.
+    /// Bitwise or.
     fn or(a: Self, b: Self) -> Self;
-    /// Bits that just one has.
+    /// Bitwise exclusive or.
     fn xor(a: Self, b: Self) -> Self;
-    /// The sum of the bit patterns as integers.
+    /// Adds the bit patterns as integers.
     fn add_bits(a: Self, b: Self) -> Self;
-    /// The difference of the bit patterns as integers.
+    /// Subtracts the bit patterns as integers.
     fn sub_bits(a: Self, b: Self) -> Self;
 
-    /// [`Lane::gather`].
+    /// Gathers points, as [`Lane::gather`] does.
     #[inline(always)]
     fn gather(points: &[[Self::Scalar; 3]], indices: &[u32]) -> [Self; 3] {
         gather_by_element::<_, Lanes<Self>>(points, indices).map(|lanes| lanes.0)
     }
 
-    /// [`Lane::store_transposed`].
+    /// Writes lanes as rows, as [`Lane::store_transposed`] does.
     #[inline(always)]
     fn store_transposed(numbers: &[Lanes<Self>], count: usize, out: &mut [Self::Scalar], stride: usize) {
         check_transposed::<_, Lanes<Self>>(numbers.len(), count, out.len(), stride);
         transpose_by_element(numbers, count, out, stride);
     }
 
-    /// An elementary function of each number.
+    /// Applies an elementary function to each lane.
     fn unary<F: Unary, L: Level>(a: Self) -> Self;
-    /// Sine and cosine of each number.
+    /// Returns sine and cosine of each lane.
     fn sin_cos<L: Level>(a: Self) -> (Self, Self);
-    /// An elementary function of each pair of numbers.
+    /// Applies a binary elementary function lane by lane.
     fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self;
 }
 
-/// A register of doubles, with the shifts that elementary functions need.
+/// A register of doubles with the shifts that elementary functions need.
 pub trait DoubleRegister: Register<Scalar = f64> {
-    /// Each shifted to the left by 52 bits.
+    /// Shifts each lane left by 52 bits.
     fn low_bits_to_exponent(a: Self) -> Self;
-    /// Each shifted to the right by 52 bits.
+    /// Shifts each lane right by 52 bits.
     fn exponent_to_low_bits(a: Self) -> Self;
-    /// Each shifted to the left by 62 bits, the sign bit kept.
+    /// Shifts each lane left by 62 bits and keeps only the sign bit.
     fn bit_1_to_sign(a: Self) -> Self;
 }
 
-/// A register of single-precision numbers, half of which fill one of doubles.
+/// A register of single-precision numbers. Half of them fill a register of doubles.
 pub trait SingleRegister: Register<Scalar = f32> {
-    /// As many bits of doubles.
+    /// The register of doubles with the same number of bits.
     type Double: DoubleRegister;
 
-    /// Both halves in double precision.
+    /// Converts both halves to double precision.
     fn widen(a: Self) -> [Self::Double; 2];
-    /// Both halves, rounded.
+    /// Rounds two registers of doubles to the two halves.
     fn narrow(halves: [Self::Double; 2]) -> Self;
 }
 
-/// Elementary functions of a register of doubles.
+/// Implements the elementary functions of a register of doubles.
 macro_rules! elementary_of_doubles {
     () => {
         #[inline(always)]
@@ -228,8 +229,8 @@ macro_rules! elementary_of_doubles {
     };
 }
 
-/// Elementary functions of a register of single-precision numbers: by way of doubles. (Not with closures, which would not be
-/// compiled for the level.)
+/// Implements the elementary functions of a register of single-precision numbers through doubles. Closures are avoided,
+/// because they would not be compiled for the level.
 macro_rules! elementary_of_singles {
     () => {
         #[inline(always)]

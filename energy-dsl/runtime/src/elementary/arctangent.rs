@@ -1,13 +1,14 @@
 use super::{Binary, Double, fast_sum, polynomial, power_of_two};
 use crate::cpu::Level;
 
-/// The angle of the point (x, y), y first.
+/// The angle of the point (x, y); y is the first argument.
 pub struct Atan2;
 
-/// The same of a point whose distance from the origin is between 2^−320 and 2^320: bit for bit, without what other points need.
+/// The angle of a point whose distance from the origin is between 2^−320 and 2^320. Same bits as [`Atan2`], without the
+/// special cases.
 pub struct ModerateAtan2;
 
-/// π/4 in two parts. The double nearest to it ends in three zeros: its products with 2, 3 and 4 are exact.
+/// π/4 in two parts. The first part ends in three zero bits, so its products with 2, 3 and 4 are exact.
 const QUARTER_PI: (f64, f64) = (std::f64::consts::FRAC_PI_4, 3.061616997868383e-17);
 
 /// (atan t − t)/t³ of z = t², |t| ≤ tan π/8; relative error of the arc tangent below 2^−58.3.
@@ -26,7 +27,7 @@ const ARC_TANGENT: [f64; 12] = [
     0.01519305869190648,
 ];
 
-/// n/d in two parts, from the approximate quotient: n − quotient·d, exact in both ways of computing it.
+/// Returns n/d in two parts, given the rounded quotient. Its remainder n − quotient·d is exact, fused or not.
 #[inline(always)]
 fn remainder<D: Double, L: Level>(n: D, quotient: D, d: D) -> D {
     if L::FUSED { (-quotient).mul_add::<L>(d, n) } else { (n - quotient * d) - quotient.product_error::<L>(d) }
@@ -37,12 +38,12 @@ impl Binary for Atan2 {
     fn of<D: Double, L: Level>(y: D, x: D) -> D {
         let (zero, one) = (D::splat(0.0), D::splat(1.0));
         let Octant { steep, less, more } = octant(y, x);
-        // 0/0 counts as 0, ∞/∞ as 1, anything else over ∞ as 0.
+        // 0/0 counts as 0, ∞/∞ as 1, and finite/∞ as 0.
         let infinity = D::splat(f64::INFINITY);
         let infinite = more.equal(infinity);
         let less = D::select(infinite, D::select(less.equal(infinity), one, zero), less);
         let more = D::select(infinite | more.equal(zero), one, more);
-        // Scaled so that nothing below overflows, and only a quotient that is subnormal itself underflows.
+        // The scale prevents overflow below; a quotient underflows only if it is subnormal.
         let scale = D::select(
             more.less(D::splat(power_of_two(-400))),
             D::splat(power_of_two(600)),
@@ -58,13 +59,13 @@ impl Binary for ModerateAtan2 {
     #[inline(always)]
     fn of<D: Double, L: Level>(y: D, x: D) -> D {
         let Octant { steep, less, more } = octant(y, x);
-        // The lesser may be as small as doubles are.
+        // The smaller coordinate may be as small as doubles get.
         let scale = D::splat(power_of_two(400));
         angle::<D, L>(y, x, Octant { steep, less: less * scale, more: more * scale })
     }
 }
 
-/// The magnitudes of a point's coordinates by size, and whether that of y is the larger.
+/// The magnitudes of a point's coordinates in order, and whether |y| is the larger.
 struct Octant<D: Double> {
     steep: D::Mask,
     less: D,
@@ -78,7 +79,7 @@ fn octant<D: Double>(y: D, x: D) -> Octant<D> {
     Octant { steep, less: D::select(steep, width, height), more: D::select(steep, height, width) }
 }
 
-/// The angle of a point whose magnitudes, scaled alike, are normal numbers.
+/// Returns the angle of a point with equally scaled magnitudes that are normal numbers.
 #[inline(always)]
 fn angle<D: Double, L: Level>(y: D, x: D, Octant { steep, less, more }: Octant<D>) -> D {
     let (zero, one, two, four) = (D::splat(0.0), D::splat(1.0), D::splat(2.0), D::splat(4.0));
@@ -94,7 +95,7 @@ fn angle<D: Double, L: Level>(y: D, x: D, Octant { steep, less, more }: Octant<D
     let rest = (remainder::<D, L>(numerator, t, denominator) + errors) * reciprocal;
     let z = t * t;
     let correction = (t * z).mul_add::<L>(polynomial::<D, L, 12>(z, ARC_TANGENT), rest - rest * z);
-    // The angle is base ± (t + correction), base a multiple of π/4.
+    // The angle is base ± (t + correction); base is a multiple of π/4.
     let left = one.or(x.sign()).less(zero);
     let quarters = D::select(far, one, zero);
     let quarters = D::select(steep, two - quarters, quarters);

@@ -1,7 +1,7 @@
 use super::{Double, ROUND, Unary, fast_sum, polynomial};
 use crate::cpu::Level;
 
-/// eˣ.
+/// The exponential function.
 pub struct Exp;
 
 /// ln 2 in two parts. The first has 42 bits: its products with exponents are exact.
@@ -22,20 +22,20 @@ const EXPONENTIAL: [f64; 11] = [
     2.0826678703672504e-09,
 ];
 
-/// e^(x + low), for `low` of at most some units in the last place of a large `x`.
+/// Returns e^(x + low), where `low` is at most a few units in the last place of a large `x`.
 #[inline(always)]
 pub fn exp_of_sum<D: Double, L: Level>(x: D, low: D) -> D {
-    // Beyond these the result is zero or infinite.
+    // Beyond these bounds the result is zero or infinite.
     let x = x.max(D::splat(-746.0)).min(D::splat(710.0));
     let count = x.mul_add::<L>(D::splat(std::f64::consts::LOG2_E), D::splat(ROUND)) - D::splat(ROUND);
-    // Exact: the product by construction, the difference because the two are close.
+    // The product is exact by construction; the difference is exact because the operands are close.
     let coarse = x - count * D::splat(LN_2.0);
     let fine = count * D::splat(LN_2.1);
     let r = coarse - fine;
     let (r, low) = fast_sum(r, ((coarse - r) - fine) + low);
     let (sum, error) = fast_sum(D::splat(1.0), r);
     let power = sum + (r * r).mul_add::<L>(polynomial::<D, L, 11>(r, EXPONENTIAL), low.mul_add::<L>(sum, error));
-    // 2^count in two factors, each a normal number: the second product alone rounds, if the result is subnormal.
+    // 2^count as two factors, each a normal number, so only the second product rounds if the result is subnormal.
     let biased = D::splat(ROUND + 1023.0);
     let half = count.mul_add::<L>(D::splat(0.5), biased);
     let other = (count - (half - biased)) + biased;

@@ -1,12 +1,12 @@
-//! Reduction of angles of any size by the method of Payne and Hanek: of the product with 2/π only the bits about the binary
-//! point are computed, in integers.
+//! Reduction of angles of any size by the method of Payne and Hanek. Of the product with 2/π, only the bits around the
+//! binary point are computed, in integers.
 
 use crate::cpu::Baseline;
 use crate::real::Number;
 
 use super::{ROUND, power_of_two};
 
-/// The first bits of 2/π.
+/// The leading bits of 2/π.
 const TWO_OVER_PI: [u64; 20] = [
     0xa2f9836e4e441529,
     0xfc2757d1f534ddc0,
@@ -33,7 +33,7 @@ const TWO_OVER_PI: [u64; 20] = [
 /// π/2 in two parts.
 const HALF_PI: (f64, f64) = (std::f64::consts::FRAC_PI_2, 6.123233995736766e-17);
 
-/// Reduces the marked angles: quadrant (in the low bits), high and low part of the rest.
+/// Reduces the marked angles. Writes the quadrant (in the low bits), and the high and low part of the remainder.
 #[cold]
 #[inline(never)]
 pub fn reduce(angles: &[f64], marked: u32, parts: &mut [[f64; 8]; 3]) {
@@ -50,13 +50,13 @@ fn reduce_one(angle: f64) -> (u8, f64, f64) {
     // angle = mantissa · 2^exponent
     let mantissa = (angle.to_bits() & ((1 << 52) - 1)) | 1 << 52;
     let exponent = (angle.to_bits() >> 52) as i32 - 1075;
-    // Bits of 2/π whose products are multiples of 4 are left out: 192 bits follow those.
+    // Skips bits of 2/π whose products are multiples of 4, and uses the 192 bits after them.
     let (skipped, shift) = ((exponent - 2).max(0) as usize, (2 - exponent).max(0) as u32);
     let word = |i: usize| {
         let (word, bit) = (skipped / 64 + i, skipped % 64);
         if bit == 0 { TWO_OVER_PI[word] } else { TWO_OVER_PI[word] << bit | TWO_OVER_PI[word + 1] >> (64 - bit) }
     };
-    // The product modulo 2^192, after a shift that makes 2^190 stand for 1; shifts are below 64.
+    // The product modulo 2^192, shifted so that 2^190 represents 1. Shifts are below 64.
     let mut product = [0u64; 4];
     let mut carry = 0u128;
     for i in 0..3 {
@@ -68,17 +68,17 @@ fn reduce_one(angle: f64) -> (u8, f64, f64) {
     let shifted = |i: usize| if shift == 0 { product[i] } else { product[i] >> shift | product[i + 1] << (64 - shift) };
     let [mut low, mut middle, mut top] = [shifted(0), shifted(1), shifted(2)];
     let mut quadrant = (top >> 62) as u8;
-    // The fraction, with its binary point before the first bit; from one half on it counts back from the next quadrant.
+    // The fraction, with its binary point before the first bit. From one half on it counts back from the next quadrant.
     let negative = top >> 61 & 1 == 1;
     top = top << 2 | middle >> 62;
     middle = middle << 2 | low >> 62;
     low <<= 2;
     if negative {
         quadrant = (quadrant + 1) & 3;
-        // Two's complement but for the last bit, which does not matter.
+        // Two's complement, except for the last bit, which does not matter.
         (top, middle, low) = (!top, !middle, !low);
     }
-    // At most 62 or so bits cancel: 128 bits from the first that is set.
+    // At most about 62 bits cancel, so 128 bits from the first set bit suffice.
     let zeros = if top != 0 { top.leading_zeros() } else { 64 + middle.leading_zeros() };
     let fraction = match zeros {
         0 => u128::from(top) << 64 | u128::from(middle),

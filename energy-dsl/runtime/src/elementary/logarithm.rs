@@ -16,10 +16,10 @@ const LOGARITHM: [f64; 7] = [
     0.14795630718842445,
 ];
 
-/// √½ as bits.
+/// The bits of √½.
 const ROOT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
 
-/// (f, k) with x = (1 + f)·2^k and 1 + f from √½ to √2, for x positive and finite.
+/// Returns (f, k) with x = (1 + f)·2^k and 1 + f between √½ and √2, for positive, finite x.
 #[inline(always)]
 pub fn decompose<D: Double>(x: D) -> (D, D) {
     let zero = D::splat(0.0);
@@ -27,7 +27,7 @@ pub fn decompose<D: Double>(x: D) -> (D, D) {
     let x = x * D::select(subnormal, D::splat(18_014_398_509_481_984.0), D::splat(1.0));
     let shifted = x.add_bits(D::from_bits((1023 << 52) - ROOT_HALF));
     let mantissa = shifted.and(D::from_bits((1 << 52) - 1)).add_bits(D::from_bits(ROOT_HALF));
-    // 2⁵² + the exponent's field.
+    // 2⁵² plus the exponent field.
     let exponent = shifted.exponent_to_low_bits().or(D::splat(4_503_599_627_370_496.0));
     let bias = D::select(subnormal, D::splat(54.0), zero) + D::splat(4_503_599_627_370_496.0 + 1023.0);
     (mantissa - D::splat(1.0), exponent - bias)

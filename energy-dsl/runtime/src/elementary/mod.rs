@@ -1,12 +1,11 @@
-//! Sine, cosine, exponential, logarithm, arc tangent and power, each one branch-free algorithm that is generic over the
-//! width, so that a lane has the bits of the scalar. The only branch is the reduction of angles beyond 2²⁰.
+//! Sine, cosine, exponential, logarithm, arc tangent and power. Each is one branch-free algorithm that is generic over
+//! the width, so a lane has the bits of the scalar. The only branch reduces angles beyond 2²⁰.
 //!
-//! They are within 1 ulp over the whole range, subnormal numbers and special cases of IEEE 754 included; `verify` holds them
-//! to it. Single precision is computed in
-//! double precision and rounded once.
+//! All are within 1 ulp over the whole range, including subnormal numbers and the special cases of IEEE 754; `verify`
+//! tests this. Single precision is computed in double precision and rounded once.
 //!
-//! The polynomials are minimax for the relative error of the function, computed in multi-precision by the exchange
-//! algorithm of Remez, then rounded to doubles. The stated error is that of the rounded coefficients.
+//! The polynomials minimise the maximum relative error of the function. They were computed in multi-precision by the
+//! Remez exchange algorithm, then rounded to doubles. The stated error is that of the rounded coefficients.
 
 mod arctangent;
 mod exponential;
@@ -24,30 +23,30 @@ pub(crate) use trigonometry::{Cos, Sin, sin_cos};
 use super::cpu::{Lane, Level};
 use super::real::Number;
 
-/// Doubles whose bits can be worked on.
+/// Doubles with access to their bits.
 pub trait Double: Lane<f64> {
-    /// Bits that both have.
+    /// Bitwise and.
     fn and(self, other: Self) -> Self;
-    /// Bits that either has.
+    /// Bitwise or.
     fn or(self, other: Self) -> Self;
-    /// Bits that just one has.
+    /// Bitwise exclusive or.
     fn xor(self, other: Self) -> Self;
-    /// The sum of the bit patterns as integers.
+    /// Adds the bit patterns as integers.
     fn add_bits(self, other: Self) -> Self;
-    /// The lowest bits moved into the place of sign and exponent.
+    /// Moves the lowest bits to the position of sign and exponent.
     fn low_bits_to_exponent(self) -> Self;
-    /// Sign and exponent moved into the lowest bits.
+    /// Moves sign and exponent to the lowest bits.
     fn exponent_to_low_bits(self) -> Self;
-    /// Bit 1, that of value 2, moved into the place of the sign; nothing else.
+    /// Moves bit 1 (of value 2) to the sign position and clears the others.
     fn bit_1_to_sign(self) -> Self;
 
-    /// The number whose bits are these, in every lane.
+    /// Returns the number with these bits, in every lane.
     #[inline(always)]
     fn from_bits(bits: u64) -> Self {
         Self::splat(f64::from_bits(bits))
     }
 
-    /// The sign bit alone.
+    /// Returns the sign bit alone.
     #[inline(always)]
     fn sign(self) -> Self {
         self.and(Self::splat(-0.0))
@@ -87,32 +86,33 @@ impl Double for f64 {
 
 /// A function of one number.
 pub trait Unary {
-    /// Its value.
+    /// Returns the value of the function.
     fn of<D: Double, L: Level>(x: D) -> D;
 }
 
 /// A function of two numbers.
 pub trait Binary {
-    /// Its value.
+    /// Returns the value of the function.
     fn of<D: Double, L: Level>(a: D, b: D) -> D;
 
-    /// Its value to more than single precision.
+    /// Returns the value with more precision than a single-precision result needs.
     #[inline(always)]
     fn of_single<D: Double, L: Level>(a: D, b: D) -> D {
         Self::of::<D, L>(a, b)
     }
 }
 
-/// Adding and subtracting it rounds a number below 2⁵¹ to an integer, which the low bits of the sum hold: 1.5·2⁵².
+/// 1.5·2⁵². Adding it rounds a number below 2⁵¹ to an integer, which the low bits of the sum hold.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// 2 to the power of an exponent of normal numbers.
+/// Returns 2^exponent, a normal number.
 const fn power_of_two(exponent: i32) -> f64 {
     f64::from_bits(((1023 + exponent) as u64) << 52)
 }
 
-/// Σ `coefficients[i]` zⁱ of at most 16 coefficients by Estrin's scheme: a short chain of dependent operations. (A loop over its
-/// rounds would not always be unrolled, and then the terms live in memory.)
+/// Returns Σ `coefficients[i]` zⁱ for at most 16 coefficients, by Estrin's scheme: a short chain of dependent
+/// operations. Written without a loop over its rounds, which is not always unrolled; then the terms would live in
+/// memory.
 #[inline(always)]
 fn polynomial<D: Double, L: Level, const N: usize>(z: D, coefficients: [f64; N]) -> D {
     const { assert!(N <= 16, "there are four rounds") };
@@ -130,7 +130,8 @@ fn polynomial<D: Double, L: Level, const N: usize>(z: D, coefficients: [f64; N])
     terms[0]
 }
 
-/// Of the first `count` terms each second one, times the power, is added to the one before it. Returns how many are left.
+/// One round of Estrin's scheme: adds every second of the first `count` terms, times the power, to the term before it.
+/// Returns how many terms remain.
 #[inline(always)]
 fn estrin_round<D: Double, L: Level, const N: usize>(terms: &mut [D; N], count: usize, power: D) -> usize {
     for i in 0..count / 2 {
@@ -142,7 +143,7 @@ fn estrin_round<D: Double, L: Level, const N: usize>(terms: &mut [D; N], count: 
     count.div_ceil(2)
 }
 
-/// The sum of two numbers, the first of which is the larger, and what rounding lost.
+/// FastTwoSum: returns the sum and its rounding error. The first number must be the larger.
 #[inline(always)]
 fn fast_sum<D: Number + Copy>(larger: D, smaller: D) -> (D, D) {
     let sum = larger + smaller;

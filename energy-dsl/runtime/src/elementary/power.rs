@@ -6,8 +6,8 @@ use crate::cpu::Level;
 /// A number to a real power.
 pub struct Pow;
 
-/// ((artanh(s)/s − 1)/z − 1/3)/z² − 1/(5 z) of z = s², for (1 + s)/(1 − s) from √½ to √2; what it adds to the logarithm is
-/// known to 2^−71 of that.
+/// ((artanh(s)/s − 1)/z − 1/3)/z² − 1/(5 z) with z = s², for (1 + s)/(1 − s) from √½ to √2. Its contribution to the
+/// logarithm is accurate to 2^−71 of the logarithm.
 const TAIL: [f64; 7] = [
     0.1428571428571658,
     0.1111111111000677,
@@ -21,13 +21,13 @@ const TAIL: [f64; 7] = [
 /// ⅓ in two parts.
 const THIRD: (f64, f64) = (1.0 / 3.0, 1.850371707708594e-17);
 
-/// The product of two numbers and what rounding lost.
+/// Returns a product and its rounding error.
 #[inline(always)]
 fn product<D: Double, L: Level>(a: D, b: D) -> (D, D) {
     (a * b, a.product_error::<L>(b))
 }
 
-/// ln x in two parts, to a relative error of about 2^−65, for x positive and finite.
+/// Returns ln x in two parts, with a relative error of about 2^−65, for positive, finite x.
 #[inline(always)]
 fn precise_logarithm<D: Double, L: Level>(x: D) -> (D, D) {
     let (f, k) = decompose(x);
@@ -54,21 +54,21 @@ fn precise_logarithm<D: Double, L: Level>(x: D) -> (D, D) {
     fast_sum(sum, error + k.mul_add::<L>(D::splat(LN_2.1), low + low))
 }
 
-/// Whether a non-negative number is an integer.
+/// Returns whether a non-negative number is an integer.
 #[inline(always)]
 fn is_integer<D: Double>(x: D) -> D::Mask {
     let all_integers_from = D::splat(4_503_599_627_370_496.0);
     all_integers_from.less_or_equal(x) | ((x + all_integers_from) - all_integers_from).equal(x)
 }
 
-/// The arguments with which |x|ʸ is computed: exponents beyond ±2⁶⁶ do the same as those.
+/// Clamps the arguments of |x|ʸ: exponents beyond ±2⁶⁶ give the same results as ±2⁶⁶.
 #[inline(always)]
 fn tame<D: Double>(x: D, y: D) -> (D, D) {
     let bound = D::splat(power_of_two(66));
     (x.abs(), y.max(-bound).min(bound))
 }
 
-/// xʸ of any numbers from |x|ʸ, which needs to be right for |x| neither zero nor infinite.
+/// Derives xʸ from |x|ʸ, which must be right unless |x| is zero or infinite.
 #[inline(always)]
 fn with_special_cases<D: Double>(x: D, y: D, power: D) -> D {
     let (zero, one, infinity) = (D::splat(0.0), D::splat(1.0), D::splat(f64::INFINITY));
@@ -89,7 +89,7 @@ impl Binary for Pow {
         let (size, factor) = tame(x, y);
         let (high, low) = precise_logarithm::<D, L>(size);
         let (exponent, error) = product::<D, L>(factor, high);
-        // Where the result overflows or vanishes, the error would not be small.
+        // If the result overflows or vanishes, the error term would not be small.
         let ordinary = exponent.abs().less(D::splat(1000.0));
         let rest = D::select(ordinary, factor.mul_add::<L>(low, error), D::splat(0.0));
         with_special_cases(x, y, exp_of_sum::<D, L>(exponent, rest))

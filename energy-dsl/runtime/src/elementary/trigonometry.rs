@@ -2,15 +2,15 @@ use super::{Double, ROUND, Unary, huge_angle, polynomial};
 use crate::cpu::Level;
 use crate::real::Mask;
 
-/// Sine.
+/// The sine.
 pub struct Sin;
-/// Cosine.
+/// The cosine.
 pub struct Cos;
 
 /// π/2 in four parts. The first three have 33 bits: their products with integers below 2²⁰ are exact.
 const HALF_PI: [f64; 4] = [1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32];
 
-/// Angles from here on are reduced lane by lane.
+/// Angles from here on are reduced one lane at a time.
 const HUGE: f64 = 1_048_576.0;
 
 /// (sin r − r)/r³ of z = r², |r| ≤ π/4; relative error of the sine below 2^−56.4.
@@ -33,7 +33,7 @@ const COSINE: [f64; 6] = [
     -1.1358513730492512e-11,
 ];
 
-/// A non-negative angle as a multiple of π/2, in the low bits, and the rest of it in two parts, at most π/4 in magnitude.
+/// A non-negative angle as a multiple of π/2 (in the low bits) and a remainder of magnitude at most π/4, in two parts.
 struct Reduced<D> {
     quadrant: D,
     high: D,
@@ -44,7 +44,7 @@ struct Reduced<D> {
 fn reduce<D: Double, L: Level>(x: D) -> Reduced<D> {
     let quadrant = x.mul_add::<L>(D::splat(std::f64::consts::FRAC_2_PI), D::splat(ROUND));
     let count = quadrant - D::splat(ROUND);
-    // Exact: the product by construction, the difference because the two are close.
+    // The product is exact by construction; the difference is exact because the operands are close.
     let first = x - count * D::splat(HALF_PI[0]);
     let second = -(count * D::splat(HALF_PI[1]));
     let third = -(count * D::splat(HALF_PI[2]));
@@ -68,7 +68,7 @@ fn reduce<D: Double, L: Level>(x: D) -> Reduced<D> {
     reduced
 }
 
-/// Sine and cosine together.
+/// Returns sine and cosine together.
 #[inline(always)]
 pub fn sin_cos<D: Double, L: Level>(x: D) -> (D, D) {
     let Reduced { quadrant, high: r, low } = reduce::<D, L>(x.abs());
@@ -80,12 +80,12 @@ pub fn sin_cos<D: Double, L: Level>(x: D) -> (D, D) {
         r + (z * r).mul_add::<L>(polynomial::<D, L, 6>(z, SINE), correction)
     };
     let cosine = {
-        // What rounding 1 − z/2 loses goes into the rest.
+        // The rounding error of 1 − z/2 is added to the remainder.
         let main = one - half;
         let rest = (one - main) - half;
         main + ((z * z).mul_add::<L>(polynomial::<D, L, 6>(z, COSINE), rest) - r * low)
     };
-    // Compared as numbers near 1, of which the lowest bit is that of the quadrant.
+    // Compared as numbers near 1 whose lowest bit is the lowest bit of the quadrant.
     let even = quadrant.and(D::from_bits(1)).or(one).equal(one);
     let sine_sign = quadrant.bit_1_to_sign().xor(x.sign());
     let cosine_sign = (quadrant + one).bit_1_to_sign();

@@ -1,12 +1,12 @@
-//! Dimensions: powers of kilogram, metre and second, known or yet to be found.
+//! Dimensions: powers of kilogram, metre and second, known or not yet known.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// The exponents of kg, m and s.
+/// Exponents of kg, m and s.
 type Exponents = [f64; 3];
 
-/// A product of powers of base units and of unknown dimensions.
+/// A product of powers of base units and unknown dimensions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Dimension {
     pub(super) base: Exponents,
@@ -14,7 +14,7 @@ pub(super) struct Dimension {
     pub(super) unknown: BTreeMap<usize, f64>,
 }
 
-/// Exponents are small fractions: what differs by less is the same.
+/// Exponents are small fractions. Smaller differences are rounding.
 const TOLERANCE: f64 = 1e-9;
 
 pub(super) fn is_zero(exponent: f64) -> bool {
@@ -27,7 +27,7 @@ pub(super) const VELOCITY: Exponents = [0.0, 1.0, -1.0];
 pub(super) const FORCE: Exponents = [1.0, 1.0, -2.0];
 pub(super) const ENERGY: Exponents = [1.0, 2.0, -2.0];
 
-/// The units that can be written.
+/// Units that a text can use.
 const UNITS: &[(&str, Exponents)] = &[
     ("kg", [1.0, 0.0, 0.0]),
     ("m", LENGTH),
@@ -41,7 +41,7 @@ const UNITS: &[(&str, Exponents)] = &[
     ("1", NUMBER),
 ];
 
-/// How a person calls a quantity, and its unit.
+/// Names and units of common quantities, for messages.
 const QUANTITIES: &[(&str, &str, Exponents)] = &[
     ("a number", "1", NUMBER),
     ("a mass", "kg", [1.0, 0.0, 0.0]),
@@ -72,7 +72,7 @@ impl Dimension {
         Self { base: NUMBER, unknown: BTreeMap::from([(number, 1.0)]) }
     }
 
-    /// self · otherᵖ.
+    /// Returns self · otherᵖ.
     pub(super) fn times_power(&self, other: &Self, power: f64) -> Self {
         let mut product = self.clone();
         for (mine, theirs) in product.base.iter_mut().zip(other.base) {
@@ -122,7 +122,7 @@ impl fmt::Display for Dimension {
     }
 }
 
-/// An exponent, as a small fraction if it is one.
+/// An exponent, displayed as a small fraction if it is one.
 struct Power(f64);
 
 impl fmt::Display for Power {
@@ -136,7 +136,7 @@ impl fmt::Display for Power {
     }
 }
 
-/// Reads a unit: names with powers, put together by `·`, `*`, `/` or a space, with parentheses.
+/// Parses a unit: names with powers, combined by `·`, `*`, `/` or a space, with parentheses.
 ///
 /// # Errors
 /// What is wrong with it.
@@ -156,7 +156,7 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    /// The next character that is not a space.
+    /// Returns the next character that is not a space.
     fn next(&mut self) -> Option<char> {
         while self.characters.get(self.at) == Some(&' ') {
             self.at += 1;
@@ -219,7 +219,7 @@ impl Parser<'_> {
         known.map(|(_, base)| Dimension::of(*base)).ok_or_else(|| format!("unknown unit `{name}`"))
     }
 
-    /// `2`, `-1`, `0.5`, `(1/2)`.
+    /// Parses `2`, `-1`, `0.5` or `(1/2)`.
     fn exponent(&mut self) -> Result<f64, String> {
         if !self.take(&['(']) {
             return self.signed();
@@ -262,7 +262,7 @@ fn number(digits: &str) -> Result<f64, String> {
     digits.parse().ok().filter(|power: &f64| power.abs() <= 16.0).ok_or_else(|| format!("`{digits}` is not a power"))
 }
 
-/// The units that can be written, for messages.
+/// Lists the known units, for messages.
 pub(super) fn known() -> String {
     UNITS.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }

@@ -1,4 +1,4 @@
-//! A walk over the typed program that collects the equations.
+//! Walks the typed program and collects the equations between units.
 
 use super::dimension::{Dimension, LENGTH, VELOCITY};
 use super::solver::Solver;
@@ -8,7 +8,7 @@ use crate::check::typed::{Input, Program, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::functions::Shape;
 
-/// The dimensions of a value: one; of a dual quaternion, of its two parts; of a twist, of θ and t.
+/// The dimensions of a value: one; two for a dual quaternion (its parts) and for a twist (θ and t).
 #[derive(Clone, Debug)]
 pub(super) struct Units(pub(super) Vec<Dimension>);
 
@@ -21,34 +21,34 @@ impl Units {
         Self(vec![first, second])
     }
 
-    /// The only one, or the first.
+    /// Returns the first or only dimension.
     pub(super) fn main(&self) -> Dimension {
         self.0[0].clone()
     }
 
-    /// The only one, or the second.
+    /// Returns the second or only dimension.
     pub(super) fn other(&self) -> Dimension {
         self.0[self.0.len() - 1].clone()
     }
 
-    /// Each changed in the same way.
+    /// Applies a change to each dimension.
     pub(super) fn map(&self, change: impl Fn(&Dimension) -> Dimension) -> Self {
         Self(self.0.iter().map(change).collect())
     }
 }
 
-/// How many dimensions a value of a shape has.
+/// Returns how many dimensions a value of a shape has.
 fn parts(shape: Shape) -> usize {
     if matches!(shape, Shape::DualQuat | Shape::Twist) { 2 } else { 1 }
 }
 
-/// The state of the walk.
+/// State of the walk.
 pub(super) struct Inference<'a> {
     program: &'a Program,
     diagnostics: &'a mut Diagnostics,
     pub(super) solver: Solver,
     bindings: Vec<Option<Units>>,
-    /// Of each input by section and first number: what it was given when first met.
+    /// The dimensions each input received when first met, by section and first number.
     inputs: Vec<((u8, usize), Units)>,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Inference<'a> {
         Self { program, diagnostics, solver: Solver::default(), bindings, inputs: Vec::new() }
     }
 
-    /// Reports an error, once at each place: functions and sums are walked again for each use.
+    /// Reports an error once per place. Functions and sums are walked again for each use.
     pub(super) fn error(&mut self, span: &Span, message: String, help: &str) {
         let place = |span: &Span| (span.token.start(), span.excerpt.as_ref().map(|e| (e.start, e.end)));
         if self.diagnostics.0.iter().all(|d| place(&d.span) != place(span)) {
@@ -66,21 +66,21 @@ impl<'a> Inference<'a> {
         }
     }
 
-    /// Demands that a result has the dimension that its kind has.
+    /// Requires the dimension that the kind of declaration prescribes for its result.
     pub(super) fn result(&mut self, found: &Dimension, wanted: &Dimension, span: &Span, what: &str) {
         if let Err((found, _)) = self.solver.equal(found, wanted) {
             self.error(span, format!("{what}, but this is {found}"), "check the formula, or the units of the inputs");
         }
     }
 
-    /// Nothing known of each part.
+    /// Creates unknown dimensions for each part of a shape.
     pub(super) fn fresh(&mut self, shape: Shape) -> Units {
         Units((0..parts(shape)).map(|_| self.solver.fresh()).collect())
     }
 
     pub(super) fn expression(&mut self, typed: &Typed) -> Units {
         match &typed.kind {
-            // Nothing is nothing in any unit.
+            // Zero has any unit.
             TypedKind::Constant(0.0) => self.fresh(typed.shape),
             TypedKind::Constant(_) | TypedKind::Pi => Units::one(Dimension::default()),
             TypedKind::Input(source, first) => self.input(*source, *first, typed.shape),
@@ -139,7 +139,7 @@ impl<'a> Inference<'a> {
             return units.clone();
         }
         let units = match (shape, declared(input)) {
-            // A rotation is a number, a translation is not.
+            // A rotation is a plain number; a translation is not.
             (Shape::Twist, known) => Units::two(Dimension::default(), known.unwrap_or(Dimension::of(LENGTH))),
             (Shape::DualQuat, Some(known)) => Units::two(Dimension::default(), known),
             (_, Some(known)) => Units::one(known),
@@ -149,7 +149,7 @@ impl<'a> Inference<'a> {
         units
     }
 
-    /// Demands that all are of the same units, and yields those.
+    /// Requires equal dimensions of all values, and returns them.
     pub(super) fn same(&mut self, name: &str, values: &[&Units], span: &Span) -> Units {
         let first = values[0];
         for (number, other) in values.iter().enumerate().skip(1) {
@@ -168,7 +168,7 @@ impl<'a> Inference<'a> {
         first.clone()
     }
 
-    /// Demands a number without a unit; whether it is one.
+    /// Requires a number without unit; returns whether it is one.
     pub(super) fn number(&mut self, name: &str, value: &Dimension, span: &Span) -> bool {
         if let Err((found, _)) = self.solver.equal(value, &Dimension::default()) {
             let message = format!("`{name}` takes a number without a unit, but this is {found}");

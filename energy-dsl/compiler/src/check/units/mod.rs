@@ -1,5 +1,5 @@
-//! Units: every input has a dimension, known or unknown; every operator gives equations between them. What finite
-//! differences cannot see, a wrong formula, this can.
+//! Checks units. Every input has a dimension, known or unknown, and every operator gives equations between dimensions.
+//! This finds wrong formulas, which finite differences cannot.
 
 mod dimension;
 mod infer;
@@ -13,8 +13,8 @@ use dimension::{Dimension, ENERGY, FORCE, LENGTH, VELOCITY};
 use energy_runtime::Kind;
 use infer::Inference;
 
-/// Checks the units of a declaration whose shapes are right. Without any unit of a quantity there is nothing to check: all
-/// inputs may be numbers.
+/// Checks the units of a declaration with correct shapes. If no input has the unit of a quantity, there is nothing to
+/// check: all inputs may be plain numbers.
 pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
     let inputs = program.moving.iter().chain(&program.rest).chain(&program.parameters);
     let mut annotated = false;
@@ -32,7 +32,7 @@ pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
     let mut inference = Inference::new(program, diagnostics);
     let results: &[Typed] = match &program.result.kind {
         TypedKind::Array(rows) => rows,
-        // Rows may be of different kinds.
+        // Rows may have different units.
         TypedKind::Call(f, rows) if f.name == "vector" && program.kind != Kind::Energy => rows,
         _ => std::slice::from_ref(&program.result),
     };
@@ -47,7 +47,7 @@ pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// The exponents of kg, m and s in a unit as written, as in `N/m`; nothing for what is not one.
+/// Returns the exponents of kg, m and s of a unit such as `N/m`; `None` if the text is not a unit.
 ///
 /// ```
 /// assert_eq!(energy_compiler::unit_exponents("N/m"), Some([1.0, 0.0, -2.0]));
@@ -58,7 +58,7 @@ pub fn unit_exponents(unit: &str) -> Option<[f64; 3]> {
     dimension::parse(unit).ok().map(|dimension| dimension.base)
 }
 
-/// Whether a unit is that of a quantity, and not of a number. Reports what cannot be read.
+/// Returns whether a unit is that of a quantity rather than a plain number. Reports invalid units.
 fn read(unit: &str, span: &Span, diagnostics: &mut Diagnostics) -> bool {
     if unit.is_empty() {
         return false;
@@ -77,7 +77,7 @@ fn read(unit: &str, span: &Span, diagnostics: &mut Diagnostics) -> bool {
     }
 }
 
-/// The dimension of an input that is known without an equation: points are in metres.
+/// Returns the dimension of an input that is known without an equation. Points are in metres.
 fn declared(input: &Input) -> Option<Dimension> {
     if !input.unit.is_empty() {
         return dimension::parse(&input.unit).ok();

@@ -1,4 +1,4 @@
-//! What each function does to units.
+//! The effect of each function on units.
 
 use super::dimension::Dimension;
 use super::infer::{Inference, Units};
@@ -6,18 +6,18 @@ use crate::check::typed::Typed;
 use crate::diagnostic::Span;
 use crate::functions::Shape;
 
-/// A function applied.
+/// A function with its arguments.
 pub(super) struct Call<'a> {
     pub(super) name: &'static str,
     pub(super) arguments: &'a [Typed],
     pub(super) units: &'a [Units],
     pub(super) span: &'a Span,
-    /// The number that the last argument always is.
+    /// The constant value of the last argument.
     pub(super) constant: Option<f64>,
 }
 
 impl Call<'_> {
-    /// The dimension of an argument that has one.
+    /// Returns the first or only dimension of an argument.
     fn main(&self, argument: usize) -> Dimension {
         self.units[argument].main()
     }
@@ -27,7 +27,7 @@ impl Call<'_> {
     }
 }
 
-/// The units of the result.
+/// Returns the units of the result.
 pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
     let number = || Units::one(Dimension::default());
     let all: Vec<&Units> = call.units.iter().collect();
@@ -69,7 +69,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
         "quat" | "dual_quat" | "twist" | "angular" | "linear" | "real" | "dual" | "imaginary" | "rotate"
         | "transform" | "rotation" | "rotation_matrix" => of_motion(inference, call),
         "&&" | "||" => number(),
-        // The others are functions of a number.
+        // All other functions take plain numbers.
         _ => {
             for units in call.units {
                 inference.number(call.name, &units.main(), call.span);
@@ -79,7 +79,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
     }
 }
 
-/// The product of everything with everything.
+/// Returns the product of the dimensions of all arguments.
 fn scaled(call: &Call<'_>) -> Units {
     let (a, b) = (&call.units[0], &call.units[1]);
     if a.0.len() > 1 { a.map(|d| d.times(&b.main())) } else { b.map(|d| a.main().times(d)) }
@@ -100,7 +100,7 @@ fn power(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
     if let Some(exponent) = call.constant {
         return call.units[0].map(|d| d.power(exponent));
     }
-    // A power that is not known: of numbers only.
+    // With an unknown exponent, only plain numbers can be raised.
     let exponent = inference.number("^", &call.main(1), &call.arguments[1].span);
     if exponent && inference.number("^", &call.main(0), call.span) {
         return Units::one(Dimension::default());
@@ -133,7 +133,7 @@ fn of_motion(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
             inference.number(call.name, &call.main(0), call.span);
             Units::one(Dimension::default())
         }
-        // `real`, `angular`, `imaginary`: the first part.
+        // `real`, `angular` and `imaginary` return the first part.
         _ => Units::one(call.main(0)),
     }
 }

@@ -1,25 +1,25 @@
-//! Equations between dimensions: linear in the exponents of the unknown ones.
+//! Solves equations between dimensions. They are linear in the unknown exponents.
 
 use super::dimension::Dimension;
 
-/// What is known of the unknown dimensions.
+/// Solutions of unknown dimensions.
 #[derive(Default)]
 pub(super) struct Solver {
-    /// Each in terms of others, once an equation gives it.
+    /// Each unknown in terms of others, once an equation determines it.
     solutions: Vec<Option<Dimension>>,
 }
 
 impl Solver {
-    /// A dimension of which nothing is known.
+    /// Creates an unknown dimension.
     pub(super) fn fresh(&mut self) -> Dimension {
         self.solutions.push(None);
         Dimension::unknown(self.solutions.len() - 1)
     }
 
-    /// The dimension with all that is known put in.
+    /// Substitutes all known solutions.
     pub(super) fn resolve(&self, dimension: &Dimension) -> Dimension {
         let mut resolved = dimension.clone();
-        // A solution is in terms of dimensions that were unknown when it was found.
+        // A solution refers to dimensions that were unknown when it was found.
         while let Some((&number, &exponent)) = resolved.unknown.iter().find(|(n, _)| self.solutions[**n].is_some()) {
             let solution = self.solutions[number].clone().unwrap_or_default();
             resolved.unknown.remove(&number);
@@ -28,7 +28,7 @@ impl Solver {
         resolved
     }
 
-    /// Demands that both are the same; what they are if they cannot be.
+    /// Requires equal dimensions. On failure, returns both resolved.
     pub(super) fn equal(&mut self, a: &Dimension, b: &Dimension) -> Result<(), (Dimension, Dimension)> {
         let ratio = self.resolve(&a.over(b));
         let Some((&number, &exponent)) = ratio.unknown.iter().next() else {

@@ -1,10 +1,11 @@
-//! Sums of products of 3×3 blocks in one register.
+//! Sums of products of 3×3 blocks in one AVX-512 register.
 
 use std::arch::x86_64::*;
 
 use super::super::block_sum::{BLOCK_NUMBERS, BlockSum};
 
-/// The products of entries, row by row, in the first nine lanes: a block is one load, and one operation. The other lanes mean nothing.
+/// Products of entries, row by row, in the first nine lanes: one load and one operation per block. The other lanes are
+/// unused.
 #[derive(Clone, Copy, Debug)]
 pub struct Nine(__m512);
 
@@ -50,7 +51,7 @@ impl BlockSum<f32> for Nine {
     }
 }
 
-/// The columns of a block that is stored row by row, each with a fourth number that means nothing.
+/// Returns the columns of a block that is stored row by row, each with an unused fourth number.
 #[inline(always)]
 fn columns(block: __m512) -> [__m128; 3] {
     // SAFETY: registers exist where the features were detected.
@@ -63,7 +64,7 @@ fn columns(block: __m512) -> [__m128; 3] {
     }
 }
 
-/// The lanes with these numbers.
+/// Permutes lanes: lane i becomes the i-th of these.
 #[inline(always)]
 fn chosen([a, b, c, d, e, f, g, h, i]: [i32; 9], lanes: __m512) -> __m512 {
     // SAFETY: registers exist where the features were detected.

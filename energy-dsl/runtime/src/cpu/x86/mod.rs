@@ -1,9 +1,9 @@
-//! The levels of x86-64. All unsafe code of the crate is in this tree: calls into code compiled for features that were
-//! detected, and the intrinsics that need those features.
+//! The SIMD levels of x86-64. All unsafe code of the workspace is in this folder: calls of code compiled for detected
+//! features, and the intrinsics that need these features.
 //!
-//! Why it is sound: [`Avx2`] and [`Avx512`] cannot be named outside the crate, and neither can their lanes. The only way to
-//! them is the type parameter of a kernel, which [`run_at`] instantiates; so a register of a level exists only after the
-//! level's features were detected, and a processor does not lose them.
+//! Why it is sound: [`Avx2`], [`Avx512`] and their lanes cannot be named outside the crate. They appear only as the
+//! type parameter of a kernel that [`run_at`] instantiates, after the level's features were detected. A processor does
+//! not lose features.
 #![allow(unsafe_code)]
 
 mod avx2;
@@ -16,7 +16,7 @@ use super::lanes::Lanes;
 use super::{Baseline, Kernel, Level, LevelName};
 use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
 
-/// AVX2 and FMA.
+/// The level with AVX2 and FMA.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2;
 
@@ -29,7 +29,7 @@ impl Level for Avx2 {
     type Sum32 = Rows<f32, Self>;
 }
 
-/// AVX-512 F, DQ, VL and BW.
+/// The level with AVX-512 F, DQ, VL and BW.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512;
 
@@ -42,7 +42,7 @@ impl Level for Avx512 {
     type Sum32 = block_sum::Nine;
 }
 
-/// The best level of this machine. The standard library remembers what it detected.
+/// Returns the best level of this machine. The standard library caches the detection.
 pub fn detected() -> LevelName {
     let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
     let avx512 = is_x86_feature_detected!("avx512f")
@@ -56,12 +56,13 @@ pub fn detected() -> LevelName {
     }
 }
 
-/// Runs a kernel at a level, which must not be better than [`detected`] said.
+/// Runs a kernel at a level that is at most [`detected`].
 #[inline(always)]
 pub(super) fn run_at<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     debug_assert!(name <= detected(), "{name} is not available");
     match name {
-        // SAFETY: callers, all in the parent module, pass what `detected` allows or what the program was compiled to require.
+        // SAFETY: callers, all in the parent module, pass what `detected` allows or what the program was compiled to
+        // require.
         LevelName::Avx512 => unsafe { run_avx512(kernel) },
         // SAFETY: as above.
         LevelName::Avx2 => unsafe { run_avx2(kernel) },
@@ -69,7 +70,7 @@ pub(super) fn run_at<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     }
 }
 
-/// Runs scalar code at AVX2 where the level, which must not be better than [`detected`] said, has it.
+/// Runs scalar code at AVX2 if the level, at most [`detected`], includes it.
 #[inline(never)]
 pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     if name >= LevelName::Avx2 {
@@ -80,14 +81,14 @@ pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     }
 }
 
-/// A number, by a load of its own: volatile loads are not merged to wider ones.
+/// Reads a number by a load of its own. Volatile loads are not merged into wider ones.
 #[inline(always)]
 pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
     // SAFETY: a reference is valid for reads, aligned and initialised, and what it refers to is `Copy`.
     unsafe { std::ptr::read_volatile(number) }
 }
 
-/// Out of line: a scalar routine at a lesser level should not swell its callers.
+/// Not inlined: a scalar routine at a lower level should not bloat its callers.
 #[inline(never)]
 fn run_plain<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Baseline>()
@@ -105,20 +106,21 @@ fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx512>()
 }
 
-/// Functions of a register, each one expression of intrinsics.
+/// Implements operations of a register, each as one expression of intrinsics.
 macro_rules! intrinsics {
     ($(fn $name:ident($($argument:ident: $type:ty),*) -> $output:ty = $body:expr;)*) => {
         $(
             #[inline(always)]
             fn $name($($argument: $type),*) -> $output {
-                // SAFETY: there are registers of this type only where their level's features were detected; see `super`.
+                // SAFETY: there are registers of this type only where their level's features were detected; see
+                // `super`.
                 unsafe { $body }
             }
         )*
     };
 }
 
-/// A mask that registers hold as an integer or a register, with its logic.
+/// Implements a mask that is an integer or a register.
 macro_rules! mask {
     ($mask:ident($inner:ty), none: $none:expr, bits: |$m:ident| $bits:expr, from_bits: |$b:ident| $from_bits:expr, and: $and:expr, or: $or:expr, not: $not:expr) => {
         #[doc = "The outcome of a comparison of registers."]

@@ -1,11 +1,11 @@
-//! Lanes written as rows, and read from rows.
+//! Transposition of lanes to rows, and gathering of points.
 
 use std::arch::x86_64::*;
 
 use super::super::lanes::Lanes;
 use super::super::register::Register;
 
-/// [`super::super::Lane::store_transposed`] by squares of 4×4, and what is left over number by number.
+/// [`super::super::Lane::store_transposed`] by squares of 4×4; the remainder goes number by number.
 ///
 /// # Safety
 /// There must be (count − 1) · stride + numbers places.
@@ -16,7 +16,7 @@ pub unsafe fn store_4(numbers: &[Lanes<__m256d>], count: usize, out: &mut [f64],
     for (square, first) in squares.iter().zip((0..).step_by(4)) {
         // SAFETY: registers exist where the features were detected.
         let columns = unsafe { transpose_4(square.map(|number| number.0)) };
-        // All lanes are asked for, so that the loop is unrolled and columns stay in registers.
+        // Visits all lanes, so that the loop is unrolled and the columns stay in registers.
         for lane in 0..4 {
             if lane == count {
                 break;
@@ -28,7 +28,7 @@ pub unsafe fn store_4(numbers: &[Lanes<__m256d>], count: usize, out: &mut [f64],
     store_rest(rest, 4 * squares.len(), count, out, stride);
 }
 
-/// [`super::super::Lane::store_transposed`] by squares of 8×8, and what is left over number by number, if that is not much.
+/// [`super::super::Lane::store_transposed`] by squares of 8×8; a small remainder goes number by number.
 ///
 /// # Safety
 /// There must be (count − 1) · stride + numbers places.
@@ -57,7 +57,7 @@ pub unsafe fn store_8(numbers: &[Lanes<__m512d>], count: usize, out: &mut [f64],
     }
 }
 
-/// A few numbers, from number `first` on.
+/// Writes the last few numbers, from number `first` on.
 #[inline(always)]
 fn store_rest<R: Register<Scalar = f64>>(
     numbers: &[Lanes<R>],
@@ -78,7 +78,7 @@ fn store_rest<R: Register<Scalar = f64>>(
     }
 }
 
-/// The points of four indices: x, y and z. It is compiled into its callers: a call would cost more than the work.
+/// Gathers the points of four indices; returns x, y and z. It is always inlined: a call would cost more than the work.
 ///
 /// # Panics
 /// When there is no such point, or there are fewer indices.
@@ -98,7 +98,7 @@ pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
     }
 }
 
-/// The points of eight indices: x, y and z.
+/// Gathers the points of eight indices; returns x, y and z.
 ///
 /// # Panics
 /// When there is no such point, or there are fewer indices.
@@ -129,10 +129,11 @@ pub fn gather_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
     }
 }
 
-/// A point, and a zero.
+/// Loads a point and a zero.
 #[inline(always)]
 fn load_point(point: &[f64; 3]) -> __m256d {
-    // SAFETY: registers exist where the features were detected, and only the three numbers are read whose mask is negative.
+    // SAFETY: registers exist where the features were detected, and only the three numbers are read whose mask is
+    // negative.
     unsafe { _mm256_maskload_pd(point.as_ptr(), _mm256_set_epi64x(0, -1, -1, -1)) }
 }
 
@@ -152,7 +153,7 @@ fn transpose_4([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
 #[inline]
 fn transpose_8([a, b, c, d, e, f, g, h]: [__m512d; 8]) -> [__m512d; 8] {
-    // Pairs of rows, by even and odd columns; then squares of 4×4 pairs.
+    // Transposes pairs of rows by even and odd columns, then squares of 4×4 pairs.
     let even = quarters(
         _mm512_unpacklo_pd(a, b),
         _mm512_unpacklo_pd(c, d),
@@ -168,7 +169,7 @@ fn transpose_8([a, b, c, d, e, f, g, h]: [__m512d; 8]) -> [__m512d; 8] {
     [even[0], odd[0], even[1], odd[1], even[2], odd[2], even[3], odd[3]]
 }
 
-/// The transpose of a square of 4×4 pairs of numbers.
+/// Transposes a square of 4×4 pairs of numbers.
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
 #[inline]
 fn quarters(a: __m512d, b: __m512d, c: __m512d, d: __m512d) -> [__m512d; 4] {
