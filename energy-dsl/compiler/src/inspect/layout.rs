@@ -56,7 +56,9 @@ fn pieces(code: TokenStream) -> Vec<Piece> {
             TokenTree::Punct(symbol) => {
                 joint = symbol.spacing() == Spacing::Joint;
                 match pieces.last_mut() {
-                    Some(Piece::Symbol(before)) if was_joint => before.push(symbol.as_char()),
+                    Some(Piece::Symbol(before)) if was_joint && is_operator(before, symbol.as_char()) => {
+                        before.push(symbol.as_char());
+                    }
                     _ => pieces.push(Piece::Symbol(symbol.as_char().into())),
                 }
             }
@@ -64,10 +66,22 @@ fn pieces(code: TokenStream) -> Vec<Piece> {
                 Some(Piece::Symbol(quote)) if quote == "'" => *quote = format!("'{name}"),
                 _ => pieces.push(Piece::Word(name.to_string())),
             },
-            TokenTree::Literal(literal) => pieces.push(Piece::Word(literal.to_string())),
+            TokenTree::Literal(literal) => pieces.push(Piece::Word(without_type(&literal.to_string()).into())),
         }
     }
     pieces
+}
+
+/// Whether two symbols form one operator.
+fn is_operator(first: &str, second: char) -> bool {
+    ["::", "->", "=>", "==", "!=", "<=", ">=", "..", "&&", "||"].contains(&format!("{first}{second}").as_str())
+}
+
+/// A number without the suffix of its type.
+fn without_type(literal: &str) -> &str {
+    let types = ["usize", "u32", "u8", "f64"];
+    let plain = types.iter().find_map(|suffix| literal.strip_suffix(suffix));
+    plain.filter(|_| literal.starts_with(|c: char| c.is_ascii_digit())).unwrap_or(literal)
 }
 
 fn is_word(piece: &Piece, word: &str) -> bool {
@@ -88,11 +102,15 @@ fn is_attribute(statement: &[Piece]) -> bool {
 
 /// Splits code after each `;` and `,`, after attributes, and after braces that end a statement.
 fn statements(code: &[Piece]) -> Vec<&[Piece]> {
-    let (mut list, mut start) = (Vec::new(), 0);
+    let (mut list, mut start, mut angles) = (Vec::new(), 0, 0);
     for end in 1..=code.len() {
         let (last, next) = (&code[end - 1], code.get(end));
+        angles += i32::from(is_symbol(Some(last), &["<"])) - i32::from(is_symbol(Some(last), &[">"]));
         let goes_on = is_symbol(next, &[";", ",", ".", "?", "=", "=="]) || next.is_some_and(|n| is_word(n, "else"));
-        let ends = is_symbol(Some(last), &[";", ","]) || is_braces(last) && !goes_on || is_attribute(&code[start..end]);
+        let ends = is_symbol(Some(last), &[";"])
+            || angles == 0 && is_symbol(Some(last), &[","])
+            || is_braces(last) && !goes_on
+            || is_attribute(&code[start..end]);
         if ends || end == code.len() {
             list.push(&code[start..end]);
             start = end;
@@ -147,13 +165,17 @@ fn write_group(delimiter: Delimiter, inner: &[Piece], depth: usize, text: &mut S
         Delimiter::None => ("", ""),
     };
     let column = text.rsplit('\n').next().map_or(0, |line| line.chars().count());
+    let is_array_type = delimiter == Delimiter::Bracket && inner.iter().any(|piece| is_symbol(Some(piece), &[";"]));
+    let is_list = delimiter != Delimiter::Brace || statements(inner).iter().any(|s| is_symbol(s.last(), &[","]));
     let mut short = String::new();
-    if delimiter != Delimiter::Brace {
+    if is_list {
         write(inner, depth + 1, &mut short);
     }
+    let fits = is_list && !short.contains('\n') && column + short.chars().count() < WIDTH;
     text.push_str(open);
-    if inner.is_empty() || !short.is_empty() && !short.contains('\n') && column + short.chars().count() < WIDTH {
-        text.push_str(&short);
+    if inner.is_empty() || is_array_type || fits {
+        let space = if delimiter == Delimiter::Brace && !inner.is_empty() { " " } else { "" };
+        text.push_str(&format!("{space}{short}{space}"));
     } else {
         text.push('\n');
         write_statements(inner, depth + 1, text);
@@ -165,24 +187,28 @@ fn write_group(delimiter: Delimiter, inner: &[Piece], depth: usize, text: &mut S
 /// Whether a space belongs before a piece.
 fn has_space(before: &[Piece], piece: &Piece) -> bool {
     let last = before.last();
-    let operand = |piece: Option<&Piece>| matches!(piece, Some(Piece::Word(_) | Piece::Group(..)));
+    let is_keyword =
+        |word: &str| ["if", "in", "match", "return", "let", "else", "for", "impl", "mut", "as"].contains(&word);
+    let operand = |piece: Option<&Piece>| match piece {
+        Some(Piece::Word(word)) => !is_keyword(word),
+        Some(Piece::Group(..)) => true,
+        _ => false,
+    };
     let prefix = is_symbol(last, &["-", "&", "!", "*"]) && !operand(before.len().checked_sub(2).map(|i| &before[i]));
     if prefix || is_symbol(last, &["::", ".", "<", "#", ".."]) {
         return false;
     }
     match piece {
         Piece::Symbol(symbol) => match symbol.as_str() {
-            "," | ";" | "." | "?" | "<" | ">" | ":" | ".." | ">," | ">::" | ">;" => false,
-            "::" => {
-                is_symbol(last, &[",", "=", ":", "+", "->"]) || matches!(last, Some(Piece::Word(word)) if word == "for")
-            }
+            "," | ";" | "." | "?" | ">" | ":" | ".." => false,
+            "<" => is_symbol(last, &[":", ","]),
+            "::" => !operand(last) && !is_symbol(last, &[">"]),
             "!" => !operand(last),
             _ => true,
         },
         Piece::Group(Delimiter::Brace, _) => true,
         Piece::Group(..) => {
-            let keyword =
-                matches!(last, Some(Piece::Word(word)) if ["if", "in", "match", "return", "let"].contains(&&word[..]));
+            let keyword = matches!(last, Some(Piece::Word(word)) if is_keyword(word));
             keyword || matches!(last, Some(Piece::Symbol(symbol)) if symbol != ">" && symbol != "!")
         }
         Piece::Word(_) => true,
