@@ -29,7 +29,7 @@ fn dampers() -> Box<dyn Term> {
     Box::new(ForceTerm::new(ElementList::new("dampers", elements, &EDGES).unwrap()))
 }
 
-/// Springs without rest length, whose Jacobians are constant, two of them between vertices that nothing else couples.
+/// Springs without rest length, whose Jacobians are constant. Two of them connect vertices that nothing else couples.
 fn slack_springs() -> Box<dyn Term> {
     let edges = [[0, 1], [0, 4], [2, 4]];
     let elements = (0..3).map(|i| AnySpring::<f64, true> { stiffness: 3.0 + i as f64, length: 0.0 }).collect();
@@ -94,7 +94,7 @@ fn masses_are_added_on_the_diagonal() {
     let heavier: Vec<f64> = masses.iter().map(|mass| 2.0 * mass).collect();
     let weights = Weights { position: -1e-2, velocity: -0.1 };
     let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
-    // Slack springs have constant Jacobians, others have not.
+    // Only slack springs have constant Jacobians.
     let ropes = |terms| System::new(terms, &[false, false, false, true, false]).unwrap();
     for mut system in [system(&[3]), ropes(vec![springs()]), ropes(vec![springs(), slack_springs()])] {
         let mut bare = system.matrix();
@@ -129,7 +129,7 @@ fn single_precision_rounds_the_matrix_and_nothing_else() {
         let options = LinearisationOptions { stiffness_times_velocity: wanted, ..options(weights, Curvature::Exact) };
         let (mut double, mut single) = (system.matrix(), system.matrix_in::<f32>());
         let expected = system.linearise_with_masses(state, options, &[0.5; 5], &mut double).unwrap();
-        // What is constant is kept the first time, and evaluated again where the matrix was changed.
+        // The constant part is kept the first time, and evaluated again after the matrix was changed.
         for time in 0..3 {
             if time == 2 {
                 single.values_mut().fill([[7.0; 3]; 3]);
@@ -243,7 +243,7 @@ fn energies_that_came_with_forces_are_not_evaluated_again() {
     agree(energies(&mut system));
     assert_eq!(evaluated(&system), before);
 
-    // Elsewhere they are, and after a step began, which may change what terms hold fixed.
+    // Energies are evaluated at other positions, and after the start of a step, which may change what terms hold fixed.
     let elsewhere = velocities();
     assert!(system.energies(&elsewhere).unwrap()[0].energy != expected[0]);
     agree(energies(&mut system));
@@ -290,7 +290,7 @@ fn constant_jacobians_are_evaluated_once_for_each_matrix() {
     assert_eq!(added(&mut system, options, &mut system_matrix(&copy)), 3);
 }
 
-/// A zero matrix of the same pattern.
+/// Creates a zero matrix of the same pattern.
 fn system_matrix(matrix: &BlockMatrix) -> BlockMatrix {
     BlockMatrix::zeros(matrix.pattern().clone())
 }
@@ -344,7 +344,7 @@ fn non_finite_numbers_are_traced_to_their_source() {
     let state = system.forces(State { x: &x, v: &v }).unwrap_err();
     assert!(matches!(state, EvaluationError::NonFiniteState { what: "position", vertex: 2, .. }), "{state}");
 
-    // Coincident ends: this spring, unlike the robust ones, divides by zero.
+    // This spring, unlike the robust ones, divides by zero at coincident ends.
     x[2] = x[1];
     let element = system.forces(State { x: &x, v: &v }).unwrap_err();
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Sums of squared residuals: assembly against finite differences, solvers against each other, and what is refused.
+//! Sums of squared residuals: assembly against finite differences, solvers against each other, and rejected inputs.
 #![allow(missing_docs)]
 
 use std::sync::Arc;
@@ -10,13 +10,14 @@ use energy_solve::{
 };
 
 energy! {
-    /// Two places at a distance, and turned against each other by a sine: three rows.
+    /// Three rows that couple two points.
     residual Link(a, b: Vec2; L: Scalar) { [norm(b - a) - L, sin(a.x) * b.y, a.y - b.x^2] }
 
     residual Anchor(a: Vec2; x: Vec2) { a - x }
 }
 
-/// A chain of blocks with links of both directions, so that places are stored turned, in a number that leaves lanes over.
+/// A chain of blocks with links in both directions, so that some blocks are stored transposed. The number of links
+/// leaves lanes unused.
 struct Chain {
     pattern: Arc<NormalPattern>,
     links: ResidualTerm<Link, 2>,
@@ -113,7 +114,7 @@ fn a_graph_alone_is_singular_and_needs_damping() {
     let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
     let mut links = ResidualTerm::<Link, 2>::new("links", Arc::new(Couplings::new(&pattern, &[[0, 1]]).unwrap()), 1.0);
     links.set_elements([Placed { element: Link::new(1.0), stencil: 0, weight: 1.0 }]);
-    // Three rows for four unknowns: without damping there is no factor; the iteration finds a damping that does.
+    // Three rows for four unknowns: there is no factor without damping, so the iteration must increase it.
     let options = GaussNewtonOptions { damping: 0.0, ..GaussNewtonOptions::default() };
     let mut solver = GaussNewton::new(pattern, options).unwrap();
     let mut x = [[0.0, 0.0], [2.0, 0.5]];

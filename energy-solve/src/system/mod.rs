@@ -19,19 +19,22 @@ use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
 
-/// Terms that do not fit the vertices.
+/// An element that does not fit the vertices of its system.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SystemError {
     /// An element acts on a vertex that does not exist.
-    #[error("{term}: element {element} names vertex {vertex}, but there are only {vertex_count} vertices (0 to {})", .vertex_count.saturating_sub(1))]
+    #[error(
+        "{term}: element {element} names vertex {vertex}, but there are only {vertex_count} vertices (0 to {})",
+        .vertex_count.saturating_sub(1)
+    )]
     VertexOutOfRange {
-        /// The term's name.
+        /// Name of the term.
         term: String,
-        /// Which element, from 0.
+        /// Index of the element.
         element: usize,
-        /// The vertex it names.
+        /// Index of the missing vertex.
         vertex: usize,
-        /// The number of vertices.
+        /// Number of vertices of the system.
         vertex_count: usize,
     },
 }
@@ -39,44 +42,44 @@ pub enum SystemError {
 /// A sum that could not be evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EvaluationError {
-    /// Positions or velocities for another number of vertices.
+    /// The number of positions or velocities is not the number of vertices.
     #[error("the system has {expected} vertices, but {found} {what} were given")]
     WrongLength {
-        /// Positions or velocities.
+        /// "positions" or "velocities".
         what: &'static str,
-        /// The number of vertices.
+        /// Number of vertices of the system.
         expected: usize,
-        /// Vectors given.
+        /// Number of vectors given.
         found: usize,
     },
     /// A position or velocity is infinite or NaN.
     #[error("vertex {vertex} has a non-finite {what}: {value:?}")]
     NonFiniteState {
-        /// Position or velocity.
+        /// "position" or "velocity".
         what: &'static str,
-        /// The vertex.
+        /// Index of the vertex.
         vertex: usize,
-        /// What it holds.
+        /// The position or velocity.
         value: Vector3<f64>,
     },
-    /// An element returned an infinite or NaN force or energy.
+    /// The force or energy of an element is infinite or NaN.
     #[error(
         "{term}: element {element} on vertices {vertices:?} has a non-finite {what} at finite positions and velocities"
     )]
     NonFiniteElement {
-        /// The term's name.
+        /// Name of the term.
         term: String,
-        /// Which element, from 0.
+        /// Index of the element.
         element: usize,
-        /// Its vertices.
+        /// Vertices of the element.
         vertices: Vec<usize>,
-        /// Energy or force.
+        /// Whether the energy or the force is not finite.
         what: Quantity,
     },
-    /// Every element's energy or force is finite, but their sum is not.
-    #[error("the {what} of all elements together is too large a number")]
+    /// Each element's energy or force is finite, but the sum is not.
+    #[error("the {what} of each element is finite, but their sum overflows")]
     NonFiniteSum {
-        /// Energy or force.
+        /// Whether the energy or the force is not finite.
         what: Quantity,
     },
 }
@@ -84,29 +87,29 @@ pub enum EvaluationError {
 /// The energy of one term.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TermEnergy<'a> {
-    /// The term's name.
+    /// Name of the term.
     pub term: &'a str,
-    /// Σ U in J; `None` for a force law.
+    /// Σ U, in J; `None` for a force law.
     pub energy: Option<f64>,
 }
 
-/// The vectors that [`System::linearise`] returns, of all vertices.
+/// The vectors that [`System::linearise`] returns, one entry per vertex.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearisedForces {
     /// f, in N.
     pub force: Vec<Vector3<f64>>,
-    /// (∂f/∂x) v, in N/s; empty unless it was asked for.
+    /// (∂f/∂x) v, in N/s; empty if it was not requested.
     pub stiffness_times_velocity: Vec<Vector3<f64>>,
 }
 
-/// What [`System::linearise`] computes.
+/// Options of [`System::linearise`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearisationOptions {
     /// α and β.
     pub weights: Weights,
-    /// How to treat negative curvature.
+    /// Treatment of negative eigenvalues of element Hessians.
     pub curvature: Curvature,
-    /// Whether (∂f/∂x) v is wanted.
+    /// Whether to compute (∂f/∂x) v.
     pub stiffness_times_velocity: bool,
 }
 
@@ -118,15 +121,15 @@ pub struct System {
     terms: Vec<Counted>,
     threads: usize,
     shares: Vec<Share>,
-    /// Where forces were evaluated last, and some energies with them.
+    /// Positions of the last evaluation of forces, with which some terms keep their energies; empty if none is valid.
     evaluated_at: Vec<Vector3<f64>>,
-    /// The blocks that terms write whose Jacobians are not constant; found when first needed.
+    /// The blocks that terms with non-constant Jacobians write; `None` until first needed.
     changing: Option<Arc<[Range<u32>]>>,
     /// The constant parts of the matrices in use.
     constants: Vec<ConstantPart>,
 }
 
-/// A term, and what it did.
+/// A term and its evaluation counts.
 #[derive(Debug)]
 struct Counted {
     term: Box<dyn PlacedTerm>,
@@ -134,10 +137,10 @@ struct Counted {
 }
 
 impl System {
-    /// The sum of the terms; vertex i does not move where `pinned[i]`.
+    /// Creates the sum of the terms; vertex i does not move if `pinned[i]`.
     ///
     /// # Errors
-    /// When an element names a vertex that does not exist.
+    /// If an element names a vertex that does not exist.
     pub fn new(terms: Vec<Box<dyn Term>>, pinned: &[bool]) -> Result<Self, SystemError> {
         for term in &terms {
             check_range(&**term, pinned.len())?;
@@ -169,7 +172,7 @@ impl System {
         Ok(system)
     }
 
-    /// From now on sums are divided among at most so many threads, as far as that is worth it. Results are the same, to the last bit, for any number.
+    /// Sets the largest number of threads. Small systems use fewer. Results are bit-identical for any number.
     pub fn set_threads(&mut self, threads: usize) {
         self.threads = threads.max(1);
         self.shares = division::shares(&self.dofs, &self.pattern, self.threads);
@@ -178,43 +181,44 @@ impl System {
         }
     }
 
-    /// How many threads there may be.
+    /// Returns the largest number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
         self.threads
     }
 
-    /// The terms that threads can divide, each with whether its Jacobians are wanted.
+    /// Returns one entry per term: its parallel form, if it has one, and whether `wanted` selects its Jacobian.
     fn divisible(&self, wanted: impl Fn(&dyn PlacedTerm) -> bool) -> Vec<Option<(&dyn Divisible, bool)>> {
         let terms = self.terms.iter().map(|counted| &*counted.term);
         terms.map(|term| term.divisible().map(|divisible| (divisible, wanted(term)))).collect()
     }
 
-    /// Which vertices move.
+    /// Returns the map between vertices and matrix rows.
     #[must_use]
     pub fn dofs(&self) -> &DofMap {
         &self.dofs
     }
 
-    /// A zero matrix of the free vertices, for [`System::linearise`].
+    /// Creates a zero matrix over the free vertices, for [`System::linearise`].
     #[must_use]
     pub fn matrix(&self) -> BlockMatrix {
         self.matrix_in()
     }
 
-    /// The same, of numbers of some precision. Single precision takes half the memory, and serves where the solution of a linear system is wanted to a few digits.
+    /// Creates a zero matrix in the given precision. Single precision takes half the memory; it suffices if the linear
+    /// system is solved to a few digits only.
     #[must_use]
     pub fn matrix_in<T: Precision>(&self) -> BlockMatrix<T> {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
-    /// Whether a matrix comes from [`System::matrix`] of this system.
+    /// Whether the matrix was created by [`System::matrix`] or [`System::matrix_in`] of this system.
     #[must_use]
     pub fn owns<T: Precision>(&self, matrix: &BlockMatrix<T>) -> bool {
         Arc::ptr_eq(matrix.pattern(), &self.pattern)
     }
 
-    /// What all terms' forces have in common.
+    /// Returns the properties of the summed force.
     #[must_use]
     pub fn character(&self) -> Character {
         let all = || self.terms.iter().map(|counted| counted.term.character());
@@ -226,16 +230,16 @@ impl System {
         }
     }
 
-    /// The terms in order, each with what it evaluated so far.
+    /// Returns the terms in order, each with its evaluation counts so far.
     pub fn terms(&self) -> impl Iterator<Item = (&dyn PlacedTerm, Counts)> {
         self.terms.iter().map(|counted| (&*counted.term, counted.counts))
     }
 
-    /// The energy of each term, of all elements with a free vertex (the energy of the others is constant). What came with forces or Jacobians, if they
-    /// were evaluated last at these very positions, is not evaluated again.
+    /// Returns the energy of each term, summed over the elements with a free vertex; the energy of the others is
+    /// constant. Energies that came with forces or Jacobians at the same positions are reused.
     ///
     /// # Errors
-    /// When positions are missing or not finite, or an energy is not finite.
+    /// If positions are missing or not finite, or an energy is not finite.
     pub fn energies(&mut self, x: &[Vector3<f64>]) -> Result<Vec<TermEnergy<'_>>, EvaluationError> {
         self.check_state("position", x)?;
         let known = self.evaluated_at == x;
@@ -260,10 +264,10 @@ impl System {
         Ok(energies)
     }
 
-    /// Tells every term that a step begins; see [`PlacedTerm::begin_step`].
+    /// Notifies every term of the start of a step; see [`PlacedTerm::begin_step`].
     ///
     /// # Errors
-    /// When the state is incomplete or not finite.
+    /// If the state is incomplete or not finite.
     pub fn begin_step(&mut self, start: StepStart<'_>) -> Result<(), EvaluationError> {
         self.check(start.state)?;
         self.evaluated_at.clear();
@@ -271,11 +275,11 @@ impl System {
         Ok(())
     }
 
-    /// Rayleigh's dissipation function R(x, v), in W: f(x, v) − f(x, 0) = −∂R/∂v. Of drag in proportion to velocity it is half the power
-    /// that is taken out of the motion. Terms without it are not evaluated.
+    /// Returns Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v. For drag proportional to
+    /// velocity, R is half the dissipated power. Terms without dissipation are not evaluated.
     ///
     /// # Errors
-    /// When the state is incomplete or not finite.
+    /// If the state is incomplete or not finite.
     pub fn dissipation(&mut self, state: State<'_>) -> Result<f64, EvaluationError> {
         self.check(state)?;
         let mut sum = 0.0;
@@ -288,10 +292,10 @@ impl System {
         Ok(sum)
     }
 
-    /// f(x, v), in N, of all vertices. Pinned ones get the force of the elements they share with free ones.
+    /// Returns f(x, v) of all vertices, in N. Pinned vertices get the force of the elements they share with free ones.
     ///
     /// # Errors
-    /// When the state is incomplete or not finite, or a force is not finite.
+    /// If the state or a force is incomplete or not finite.
     pub fn forces(&mut self, state: State<'_>) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         self.check(state)?;
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
@@ -306,14 +310,15 @@ impl System {
         Ok(force)
     }
 
-    /// Writes α ∂f/∂x + β ∂f/∂v over the free vertices to `matrix` (which must come from [`System::matrix`]) and returns f and
-    /// (∂f/∂x) v of all vertices. With the matrix stays what is constant of it: it is best used again.
+    /// Writes α ∂f/∂x + β ∂f/∂v over the free vertices to `matrix` and returns f and (∂f/∂x) v of all vertices.
+    ///
+    /// The system keeps the constant part of each matrix, so pass the same matrix to every step.
     ///
     /// # Errors
-    /// When the state is incomplete or not finite, or a force is not finite.
+    /// If the state is incomplete or not finite, or a force is not finite.
     ///
     /// # Panics
-    /// When the matrix comes from elsewhere.
+    /// If the matrix was not created by this system.
     pub fn linearise(
         &mut self,
         state: State<'_>,
@@ -323,13 +328,14 @@ impl System {
         self.linearise_with_masses(state, options, &[], matrix)
     }
 
-    /// The same with the mass of each vertex, in kg, on the diagonal: M + α ∂f/∂x + β ∂f/∂v. Masses are constant, and come with the constant Jacobians.
+    /// Writes M + α ∂f/∂x + β ∂f/∂v, with the vertices' masses, in kg, on the diagonal; otherwise as
+    /// [`System::linearise`]. Masses belong to the constant part of the matrix.
     ///
     /// # Errors
-    /// When the state is incomplete or not finite, or a force is not finite.
+    /// If the state is incomplete or not finite, or a force is not finite.
     ///
     /// # Panics
-    /// When the matrix comes from elsewhere, or there are masses, but not of all vertices.
+    /// If the matrix was not created by this system, or the number of masses is neither zero nor that of the vertices.
     pub fn linearise_with_masses<T: Precision>(
         &mut self,
         state: State<'_>,
@@ -338,11 +344,14 @@ impl System {
         matrix: &mut BlockMatrix<T>,
     ) -> Result<LinearisedForces, EvaluationError> {
         self.check(state)?;
-        assert!(masses.is_empty() || masses.len() == self.dofs.vertex_count(), "every vertex has a mass, or none");
-        assert!(self.owns(matrix), "the matrix must come from the same system");
+        assert!(
+            masses.is_empty() || masses.len() == self.dofs.vertex_count(),
+            "expected a mass for every vertex, or no masses"
+        );
+        assert!(self.owns(matrix), "the matrix belongs to another system");
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
         let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
-        // For the product every term is evaluated anyway.
+        // The product (∂f/∂x) v needs the Jacobian of every term, so none is reused.
         let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
         if !with_constant {
             self.terms.iter_mut().for_each(|counted| counted.term.place_blocks(&self.dofs, &self.pattern));
@@ -390,7 +399,7 @@ impl System {
         Some(self.constants.swap_remove(found))
     }
 
-    /// Evaluates the masses and the Jacobians of the quadratic terms.
+    /// Evaluates the masses and the Jacobians of the quadratic terms, and writes them to the matrix.
     fn constant<T: Precision>(
         &mut self,
         state: State<'_>,
@@ -400,7 +409,7 @@ impl System {
     ) -> (ConstantPart, Arc<Contents>) {
         self.constants.retain(ConstantPart::is_in_use);
         let runs = self.changing_places();
-        // What need not be changed is found by changing it.
+        // Projecting tells whether there was anything to project.
         let mut treated = Curvature::Clamped;
         let projected = self.evaluate_constant(state, weights, treated, masses, matrix);
         if projected && curvature != treated {
@@ -412,7 +421,7 @@ impl System {
         (ConstantPart::new(&contents, part, masses, projected, runs, T::blocks(matrix.values_mut())), contents)
     }
 
-    /// Writes them to the matrix; returns whether some element's curvature was changed.
+    /// Writes masses and quadratic Jacobians to the matrix. Returns whether the Hessian of some element was projected.
     fn evaluate_constant<T: Precision>(
         &mut self,
         state: State<'_>,
@@ -442,7 +451,7 @@ impl System {
         projected
     }
 
-    /// The blocks to which terms are added that are not constant.
+    /// Returns the blocks that terms with non-constant Jacobians write.
     fn changing_places(&mut self) -> Arc<[Range<u32>]> {
         if let Some(known) = &self.changing {
             return Arc::clone(known);
@@ -479,7 +488,7 @@ impl System {
     }
 }
 
-/// Adds masses of all vertices, if there are any, to the diagonal.
+/// Adds the masses, if there are any, to the diagonal.
 fn add_masses<T: Precision>(dofs: &DofMap, pattern: &Pattern, masses: &[f64], blocks: &mut [Block<T>]) {
     let free = if masses.is_empty() { &[] } else { dofs.free() };
     for (row, &vertex) in free.iter().enumerate() {
@@ -490,13 +499,13 @@ fn add_masses<T: Precision>(dofs: &DofMap, pattern: &Pattern, masses: &[f64], bl
     }
 }
 
-/// Whether a term's Jacobians are evaluated only once.
+/// Whether a term's Jacobians are constant, so that they are evaluated only once.
 fn is_constant(term: &dyn PlacedTerm) -> bool {
     let Character { quadratic, curved, .. } = term.character();
     quadratic && curved
 }
 
-/// Evaluates element by element until one is found whose energy or force is not finite.
+/// Evaluates element by element to find the first with a non-finite energy or force.
 fn blame<'a>(terms: impl Iterator<Item = &'a dyn PlacedTerm>, what: Quantity, state: State<'_>) -> EvaluationError {
     for term in terms {
         if let Some(element) = term.find_non_finite(what, state) {

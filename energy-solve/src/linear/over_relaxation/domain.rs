@@ -4,28 +4,28 @@ use energy_dsl::{Level, Vector3};
 
 use super::RELAXATION;
 use crate::linear::domains::{
-    Couplings, InverseFactor, Precision, Triangle, Wide, add_products, less_products, of_three, scaled,
-    subtract_turned, unscaled,
+    Couplings, InverseFactor, Precision, Triangle, Wide, add_products, minus_products, scaled, subtract_transposed,
+    sum_of_three, unscaled,
 };
 use crate::matrix::pattern::Pattern;
 
-/// Consecutive rows: their part of the scaled matrix, and of the vectors of conjugate gradients.
+/// A domain: its part of the scaled matrix and of the vectors of conjugate gradients.
 #[derive(Clone, Debug)]
 pub(super) struct Domain<T> {
     pub(super) triangle: Triangle<T>,
-    /// Ẽ: what couples it with other domains.
+    /// Ẽ, the couplings with other domains.
     pub(super) couplings: Couplings<T>,
     residual: Vec<Wide<T>>,
     direction: Vec<Wide<T>>,
     /// t = (I + L̃ᵀ)⁻¹ p.
     back: Vec<Wide<T>>,
-    /// (I + L̃)⁻¹ (p + (ω − 2) t + Ẽ t).
+    /// w = (I + L̃)⁻¹ (p + (ω − 2) t + Ẽ t).
     forth: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
 }
 
 impl<T: Precision> Domain<T> {
-    /// A domain of the rows of the triangle.
+    /// Creates the domain of the triangle's rows.
     pub(super) fn new(triangle: Triangle<T>, couplings: Couplings<T>) -> Self {
         let zeros = vec![[T::from_f64(0.0); 4]; triangle.rows.len()];
         Self {
@@ -62,10 +62,10 @@ impl<T: Precision> Domain<T> {
         for vector in &self.residual {
             add_products(&mut squares, vector, vector);
         }
-        of_three(squares)
+        sum_of_three(squares)
     }
 
-    /// p ← r + β p, t ← (I + L̃ᵀ)⁻¹ p, w ← p + (ω − 2) t. Returns p · t, and shows t on the border.
+    /// p ← r + β p, t ← (I + L̃ᵀ)⁻¹ p, w ← p + (ω − 2) t. Publishes t on the border and returns p · t.
     #[inline(always)]
     pub(super) fn backward<L: Level>(
         &mut self,
@@ -83,7 +83,7 @@ impl<T: Precision> Domain<T> {
                 direction[lane] = direction[lane].mul_add::<L>(conjugate, residual[lane]);
             }
             p[row] = direction;
-            let back = less_products::<T, L>(rows.blocks(row), direction, t);
+            let back = minus_products::<T, L>(rows.blocks(row), direction, t);
             let mut start = direction;
             for lane in 0..4 {
                 start[lane] = back[lane].mul_add::<L>(rest, direction[lane]);
@@ -91,8 +91,8 @@ impl<T: Precision> Domain<T> {
             add_products(&mut along, &direction, &back);
             (t[row], w[row]) = (back, start);
         }
-        self.couplings.show(&self.back, border);
-        of_three(along)
+        self.couplings.publish(&self.back, border);
+        sum_of_three(along)
     }
 
     /// w ← w + Ẽ t.
@@ -111,10 +111,10 @@ impl<T: Precision> Domain<T> {
             let here = w[row];
             add_products(&mut along, &p[row], &here);
             for (block, column) in rows.blocks(row) {
-                subtract_turned::<T, L>(&mut w[column], block, &here);
+                subtract_transposed::<T, L>(&mut w[column], block, &here);
             }
         }
-        of_three(along)
+        sum_of_three(along)
     }
 
     /// x ← x + α t, r ← r − α (t + w). Returns r · r.
@@ -134,10 +134,10 @@ impl<T: Precision> Domain<T> {
             add_products(&mut squares, &rest, &rest);
             (x[row], r[row]) = (solution, rest);
         }
-        of_three(squares)
+        sum_of_three(squares)
     }
 
-    /// C⁻ᵀ x s.
+    /// Writes C⁻ᵀ x s.
     #[inline(always)]
     pub(super) fn finish(&self, inverses: &[InverseFactor<T>], scale: f64, x: &mut [Vector3<f64>]) {
         for row in 0..x.len() {
