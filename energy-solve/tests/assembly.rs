@@ -77,7 +77,8 @@ fn matrix_is_the_derivative_of_the_force() {
                         let got = matrix.block(row, column)[component][axis];
                         assert!(
                             (got - expected).abs() < 1e-7,
-                            "by velocity: {by_velocity}, block ({row}, {column}), entry ({component}, {axis}): {got} {expected}"
+                            "by velocity: {by_velocity}, block ({row}, {column}), entry ({component}, {axis}): \
+                             {got} {expected}"
                         );
                     }
                 }

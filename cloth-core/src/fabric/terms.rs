@@ -4,7 +4,7 @@ use energy_elements::{
     FlatBending, Gravity, HairBend, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK,
     StableNeoHookean, StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
-use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
+use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term, TermDescription};
 
 use super::declared::{Declared, DeclaredError, Ground};
 use super::interpreted_term::InterpretedTerm;

@@ -91,7 +91,10 @@ pub enum GaussNewtonError {
         found: usize,
     },
     /// The energy of a term is infinite or NaN at the start.
-    #[error("the energy of `{term}` is not finite{}", .element.map_or_else(String::new, |at| format!(", first at element {at}")))]
+    #[error(
+        "the energy of `{term}` is not finite{}",
+        .element.map_or_else(String::new, |element| format!(", first at element {element}"))
+    )]
     NonFiniteEnergy {
         /// Name of the term.
         term: String,
