@@ -16,7 +16,7 @@ pub fn write_inputs<K: Subject>(folder: &Path, samples: &[Sample]) -> anyhow::Re
     let results = expected::<K>(samples).concat();
     for (what, bytes) in [("inputs", bytes(inputs)), ("expected", bytes(results.into_iter()))] {
         let path = folder.join(format!("{}.{what}", K::KEY));
-        verify::write_whole(&path, &bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        energy_cli::write_file(&path, &bytes)?;
     }
     Ok(())
 }

@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     match obey(Arguments::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", verify::message(&error));
+            eprintln!("error: {}", energy_cli::message(&error));
             ExitCode::FAILURE
         }
     }

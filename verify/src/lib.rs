@@ -15,7 +15,6 @@
 //! ```
 #![forbid(unsafe_code)]
 
-mod atomic_file;
 pub mod audit;
 pub mod bench;
 mod blocks;
@@ -26,18 +25,17 @@ mod formula;
 pub mod fuzz;
 mod geometry;
 mod listings;
-mod message;
 pub mod multiprecision;
-pub mod plot;
 pub mod reference;
 mod sample;
 pub mod stress;
 
-pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
 pub use listings::listings;
-pub use message::message;
+// For cloth-core only, until it uses energy-cli itself.
+#[doc(hidden)]
+pub use energy_cli::{message, plot, write_whole};
 pub use sample::Sample;
 
 /// Audits an element in a test: `assert_derivatives!(MyMaterial)`, or with `samples = 200` random inputs. See

@@ -84,7 +84,7 @@ pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> 
         weights: body.weights.clone(),
     };
     let text = serde_json::to_vec(&stored).map_err(|source| BodyFileError::Json { path: path.into(), source })?;
-    verify::write_whole(path, &text).map_err(|source| BodyFileError::File { path: path.into(), source })
+    energy_cli::write_whole(path, &text).map_err(|source| BodyFileError::File { path: path.into(), source })
 }
 
 /// The vertices of an OBJ file.

@@ -3,7 +3,6 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use fusion_core::skeleton::BoneNoise;
-use verify::audit::{Options, audit_catalogue, describe_failure};
 
 use super::evaluate::{Evaluate, summary};
 use super::print;
@@ -21,7 +20,8 @@ pub struct Demo {
     frames: usize,
 }
 
-/// The declared residuals that the demonstration's energy is made of.
+/// The declared residuals of the demonstration's energy.
+#[cfg(feature = "audit")]
 const TERMS: [&str; 6] = ["NonrigidPlane4", "GraphEdge", "Binding", "BoneBinding", "SkeletonPlane", "BlendedPoint4"];
 
 impl Demo {
@@ -55,8 +55,11 @@ impl Demo {
     }
 }
 
-/// Every term is compared with dual numbers and finite differences before it is used.
+/// Compares the derivatives of every term with dual numbers and finite differences.
+#[cfg(feature = "audit")]
 fn audit() -> Result<()> {
+    use verify::audit::{Options, audit_catalogue, describe_failure};
+
     let options = Options { samples: 50, ..Options::default() };
     let report = audit_catalogue(&TERMS, options).map_err(anyhow::Error::msg)?;
     if !report.passed() {
@@ -64,4 +67,9 @@ fn audit() -> Result<()> {
         bail!("the audit failed; nothing was tracked\n{}", failures.join("\n"));
     }
     print(&format!("audit of {} terms on {} random inputs each: passed\n\n", TERMS.len(), options.samples))
+}
+
+#[cfg(not(feature = "audit"))]
+fn audit() -> Result<()> {
+    print("audit skipped: built without the feature `audit`\n\n")
 }

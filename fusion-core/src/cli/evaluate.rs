@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
+use energy_cli::write_file;
 use fusion_core::body::{Mesh, read_body, read_vertices};
 use fusion_core::depth::{DepthSequence, visible_vertices};
 use fusion_core::evaluation::{ErrorSummary, FrameErrors, TrackErrors};
@@ -10,7 +11,7 @@ use fusion_core::plot::errors_svg;
 use fusion_core::skeleton::Skeleton;
 use serde::Serialize;
 
-use super::folder::{MODEL, SKELETON, mesh_file, write};
+use super::folder::{MODEL, SKELETON, mesh_file};
 use super::print;
 
 /// What to measure.
@@ -48,9 +49,9 @@ impl Evaluate {
     pub fn run(&self) -> Result<Evaluated> {
         let evaluated = self.measure()?;
         let (table, plot) = (self.track.join("errors.csv"), self.track.join("errors.svg"));
-        write(&table, &csv(&evaluated.track)?)?;
+        write_file(&table, &csv(&evaluated.track)?)?;
         let picture = errors_svg(&evaluated.track).map_err(anyhow::Error::msg)?;
-        write(&plot, picture.as_bytes())?;
+        write_file(&plot, picture.as_bytes())?;
         let rows = [("tracked", &evaluated.track), ("skeleton alone", &evaluated.skeleton)];
         print(&format!("{}\nwrote {} and {}\n", summary(&rows), table.display(), plot.display()))?;
         Ok(evaluated)

@@ -37,8 +37,3 @@ pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -
     }
     old.iter().try_for_each(std::fs::remove_file).with_context(here)
 }
-
-/// Writes a file whole or not at all.
-pub fn write(path: &Path, contents: &[u8]) -> Result<()> {
-    verify::write_whole(path, contents).with_context(|| format!("cannot write {}", path.display()))
-}

@@ -7,7 +7,7 @@ pub mod track;
 use std::io::{ErrorKind, Write};
 
 use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
+use energy_cli::progress::{self, ProgressBar};
 
 /// Prints to standard output. A reader that has seen enough (`| head`) is no error.
 fn print(text: &str) -> Result<()> {
@@ -19,7 +19,5 @@ fn print(text: &str) -> Result<()> {
 
 /// Hidden where standard error is not a terminal.
 fn progress_bar(frames: usize, what: &'static str) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{msg} {wide_bar} frame {pos}/{len}, {eta} left").expect("the template is valid");
-    ProgressBar::new(frames as u64).with_style(style).with_message(what)
+    progress::bar(frames as u64, "{msg} {wide_bar} frame {pos}/{len}, {eta} left").with_message(what)
 }

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use energy_cli::write_file;
 use fusion_core::body::{
     SkinnedBody, figure, figure_motion, obj_text, read_body, read_gltf, read_makehuman, write_body,
 };
@@ -11,7 +12,7 @@ use fusion_core::protocol::{Recording, reported_bones};
 use fusion_core::skeleton::{BoneNoise, Bvh, Retarget, Skeleton};
 use nalgebra::Isometry3;
 
-use super::folder::{MODEL, SKELETON, mesh_file, prepare, write};
+use super::folder::{MODEL, SKELETON, mesh_file, prepare};
 use super::{print, progress_bar};
 
 /// Steps of the images to a metre.
@@ -129,7 +130,7 @@ impl Render {
     fn write(&self, recording: &Recording) -> Result<()> {
         let folder = &self.output;
         let info = SequenceInfo { camera: recording.camera, depth_scale: PER_METRE };
-        write(&folder.join(DepthSequence::INTRINSICS), &serde_json::to_vec_pretty(&info)?)?;
+        write_file(&folder.join(DepthSequence::INTRINSICS), &serde_json::to_vec_pretty(&info)?)?;
         write_body(&folder.join(MODEL), &recording.body)?;
         let sensor = SensorNoise { factor: self.noise, step: 1.0 / PER_METRE };
         let bones = BoneNoise { turn: self.bone_turn.to_radians(), shift: 1e-3 * self.bone_shift };
@@ -141,7 +142,7 @@ impl Render {
             write_depth(&folder.join(&name), &recording.image(frame, sensor), PER_METRE)?;
             writeln!(list, "{:.6} {name}", frame as f64 / 30.0)?;
             let truth = recording.truth(frame);
-            write(&mesh_file(folder, "truth", frame), obj_text(&truth.vertices, &truth.triangles).as_bytes())?;
+            write_file(&mesh_file(folder, "truth", frame), obj_text(&truth.vertices, &truth.triangles).as_bytes())?;
             // The first frame is the rest that everything is relative to.
             let noise = if frame == 0 { BoneNoise::default() } else { bones };
             skeleton.push(&reported_bones(recording, frame, noise));
@@ -149,7 +150,7 @@ impl Render {
         }
         progress.finish_and_clear();
         skeleton.write(&folder.join(SKELETON))?;
-        write(&folder.join(DepthSequence::LIST), list.as_bytes())
+        write_file(&folder.join(DepthSequence::LIST), list.as_bytes())
     }
 }
 

@@ -2,6 +2,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use energy_cli::write_file;
 use fusion_core::body::obj_text;
 use fusion_core::depth::DepthSequence;
 use fusion_core::energy::BoneMode;
@@ -11,7 +12,7 @@ use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 
-use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare, write};
+use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare};
 use super::render::read_any_body;
 use super::{print, progress_bar};
 
@@ -129,7 +130,7 @@ impl Track {
             }
             lines.push(line);
             let mesh = obj_text(&tracker.vertices(), &tracker.model().mesh.triangles);
-            write(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
+            write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
             motions.push(tracker.twists().to_vec());
             progress.inc(1);
         }
@@ -196,7 +197,7 @@ impl Track {
     fn write(&self, lines: &[Line], motions: &[Vec<Twist>], tracker: &Tracker, options: TrackerOptions) -> Result<()> {
         let mut table = csv::Writer::from_writer(Vec::new());
         lines.iter().try_for_each(|line| table.serialize(line))?;
-        write(&self.output.join(FRAMES), &table.into_inner()?)?;
+        write_file(&self.output.join(FRAMES), &table.into_inner()?)?;
         let model = tracker.model();
         let nodes = NodeMotions {
             origin: model.origin.into(),
@@ -204,7 +205,7 @@ impl Track {
             nodes: model.nodes.iter().map(|&node| node.into()).collect(),
             frames: motions,
         };
-        write(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
+        write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
 }
 

@@ -104,7 +104,7 @@ pub fn write_depth(path: &Path, image: &DepthImage, per_metre: f64) -> Result<()
     let mut writer = encoder.write_header().map_err(failed)?;
     writer.write_image_data(&bytes).map_err(failed)?;
     writer.finish().map_err(failed)?;
-    verify::write_whole(path, &file).map_err(|source| DepthFileError::File { path: path.into(), source })
+    energy_cli::write_whole(path, &file).map_err(|source| DepthFileError::File { path: path.into(), source })
 }
 
 #[cfg(test)]

@@ -102,6 +102,6 @@ impl Skeleton {
     /// When it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), SkeletonError> {
         let text = serde_json::to_vec(self).map_err(|source| SkeletonError::Json { path: path.into(), source })?;
-        verify::write_whole(path, &text).map_err(|source| SkeletonError::File { path: path.into(), source })
+        energy_cli::write_whole(path, &text).map_err(|source| SkeletonError::File { path: path.into(), source })
     }
 }

@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use energy_cli::plot::{Curve, logarithmic};
+
 use super::report::{Check, Report, Section, describe_failure};
 use crate::blocks::BlockName;
-use crate::plot::{Curve, logarithmic};
 
 /// The report as one page that needs nothing else: formulas, tables, errors of differences against their step, errors by
 /// configuration, planted faults.

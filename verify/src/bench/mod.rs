@@ -6,10 +6,11 @@ mod methods;
 
 use std::fmt::Write as _;
 
+use energy_cli::plot::{Curve, logarithmic};
+
 pub use self::methods::Measured;
 use self::methods::Methods;
 use crate::audit::Target;
-use crate::plot::{Curve, logarithmic};
 use crate::sample::{Sample, Sampler};
 
 /// Inputs of each element.

@@ -22,6 +22,11 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Inputs are cut to so many bytes.
 const LONGEST: usize = 4096;
 
+/// File in the corpus that holds the running input, in case it ends the process.
+const CURRENT: &str = "fuzz-input";
+/// File in the corpus that lists inputs in other folders: one path per line, relative to the corpus.
+const LINKS: &str = "links";
+
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub enum Budget {
@@ -111,7 +116,7 @@ struct Fuzzer<'a, F> {
 impl<F: Fn(&str) -> String> Fuzzer<'_, F> {
     /// Where the input that runs is left, should it end the process.
     fn current(&self) -> PathBuf {
-        self.corpus.join("fuzz-input")
+        self.corpus.join(CURRENT)
     }
 
     /// Whether its outcome is new.
@@ -127,7 +132,7 @@ impl<F: Fn(&str) -> String> Fuzzer<'_, F> {
             Ok(outcome) => return Ok(self.outcomes.insert(hash(&without_names(outcome)))),
         };
         let kept = self.corpus.join(format!("found-{:016x}", hash(input)));
-        crate::write_whole(&kept, input.as_bytes()).with_context(|| format!("cannot write {}", kept.display()))?;
+        energy_cli::write_file(&kept, input)?;
         Err(Finding { why, input: kept }.into())
     }
 }
@@ -139,14 +144,24 @@ fn read(corpus: &Path) -> anyhow::Result<Vec<String>> {
         files.push(entry.with_context(reading)?.path());
     }
     files.sort();
-    files
-        .iter()
-        .filter(|path| path.is_file() && path.file_name().is_some_and(|name| name != "fuzz-input"))
-        .map(|path| {
-            let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-            Ok(String::from_utf8_lossy(&bytes).into_owned())
-        })
-        .collect()
+    let mut inputs = Vec::new();
+    for path in files.iter().filter(|path| path.is_file()) {
+        match path.file_name().and_then(|name| name.to_str()) {
+            Some(CURRENT) => {}
+            Some(LINKS) => {
+                for line in read_file(path)?.lines() {
+                    inputs.push(read_file(&corpus.join(line))?);
+                }
+            }
+            _ => inputs.push(read_file(path)?),
+        }
+    }
+    Ok(inputs)
+}
+
+fn read_file(path: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// A message without the numbers and quoted text that make each one different.
@@ -183,6 +198,20 @@ mod tests {
         assert!(finding.why.contains("two in a row"), "{finding}");
         assert!(std::fs::read_to_string(&finding.input).unwrap().contains("=="));
         assert!(fuzz(folder.path(), &["="], Budget::Inputs(0), 1, run).is_err());
+    }
+
+    #[test]
+    fn a_corpus_may_link_inputs_of_other_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        let corpus = folder.path().join("corpus");
+        std::fs::create_dir(&corpus).unwrap();
+        std::fs::write(corpus.join(LINKS), "../elsewhere\n").unwrap();
+        std::fs::write(corpus.join("own"), "own").unwrap();
+        std::fs::write(folder.path().join("elsewhere"), "linked").unwrap();
+        assert_eq!(read(&corpus).unwrap(), ["linked", "own"]);
+        let links = Target::File.corpus().join(LINKS);
+        assert!(std::fs::read_to_string(links).unwrap().contains("errata.energy"));
+        read(&Target::File.corpus()).unwrap();
     }
 
     #[test]

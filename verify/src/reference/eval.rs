@@ -5,7 +5,6 @@ use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
 use super::mapping::{is_undeclared, mapping};
-use crate::atomic_file::write_whole;
 use crate::blocks::{NoAnswer, evaluate};
 use crate::multiprecision::truth;
 
@@ -42,7 +41,7 @@ pub fn evaluate_file(input: &Path, output: &Path, source: Source) -> Result<usiz
     }
     let count = records.len();
     let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
-    write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
+    energy_cli::write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
     Ok(count)
 }
 

@@ -14,7 +14,6 @@ use serde_json::{Map, Value};
 use super::exact::Truth;
 use super::file::{RecordError, read};
 use super::fusion_system;
-use crate::atomic_file::write_whole;
 use crate::dual::Hyper;
 
 /// The errors of one array of one family over all cases.
@@ -236,7 +235,7 @@ pub fn evaluate_fusion(input: &Path, output: &Path) -> Result<Option<usize>, Rec
     }
     if count.is_some() {
         let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
-        write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
+        energy_cli::write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
     }
     Ok(count)
 }

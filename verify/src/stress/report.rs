@@ -1,7 +1,8 @@
 use std::fmt::Write as _;
 
+use energy_cli::plot::{Curve, logarithmic};
+
 use super::{Point, Track};
-use crate::plot::{Curve, logarithmic};
 
 /// A Markdown table: a row to each block of each sweep of each element.
 #[must_use]
