@@ -1,4 +1,4 @@
-//! The binary, end to end.
+//! End-to-end tests of the binary.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -73,7 +73,7 @@ fn the_reference_values_are_met() {
     let output = verify(&["reference"]);
     let printed = text(&output.stdout);
     assert!(output.status.success(), "{printed}{}", text(&output.stderr));
-    // Everything but what is listed here is within tier A, and within tier B where it applies.
+    // Every result is within tier A, and within tier B if it applies.
     assert!(printed.contains("beyond tier A: none\n"), "{printed}");
     assert!(printed.contains("beyond tier B: none\n"), "{printed}");
     assert!(printed.contains("132 of 132 blocks at degenerate inputs as documented"), "{printed}");
@@ -127,7 +127,7 @@ fn degenerate_records_are_evaluated_with_flags() {
     assert!(written["records"][1]["error"].as_str().unwrap().contains("degenerate"));
 }
 
-/// A file may mix potentials; only a degenerate rest shape has no answer.
+/// A file may mix potentials; only a degenerate rest shape has no result.
 #[test]
 fn the_degenerate_inputs_are_all_evaluated_but_for_a_degenerate_rest_shape() {
     let folder = tempfile::tempdir().unwrap();
@@ -145,7 +145,7 @@ fn the_degenerate_inputs_are_all_evaluated_but_for_a_degenerate_rest_shape() {
     assert_eq!(without, ["stvk_membrane"]);
 }
 
-/// A decimal that is not the double that was meant is a damaged file, not a slightly different input.
+/// A decimal that is not the intended double means a damaged file.
 #[test]
 fn a_number_that_disagrees_with_its_bits_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,7 +216,7 @@ fn generated_code_is_shown() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(printed.contains("fn value_at<L: ::energy_dsl::Level>") && printed.contains("self.K *"), "{printed}");
     assert!(!printed.contains("fn gradient"), "one routine only: {printed}");
-    // Byte for byte the same each time.
+    // The output is deterministic.
     assert_eq!(verify(&["show", "BridsonForce"]).stdout, verify(&["show", "BridsonForce"]).stdout);
 }
 

@@ -1,4 +1,4 @@
-//! The residuals of body tracking against multi-precision values.
+//! Residuals of body tracking against multi-precision values.
 
 use std::path::Path;
 

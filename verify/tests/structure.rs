@@ -1,5 +1,5 @@
-//! The structure of the workspace: no import cycle between the top-level modules of a crate, no dependency cycle between
-//! crates, and no path in `ARCHITECTURE.md` that does not exist.
+//! The structure of the workspace: no import cycle between the top-level modules of a crate, no dependency cycle
+//! between crates, and no path in `ARCHITECTURE.md` that does not exist.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use proc_macro2::{TokenStream, TokenTree};
 /// Crates whose import cycles are still to be untied.
 const MODULE_CYCLES: &[&str] = &["cloth-core", "energy-dsl"];
 
-/// Dependencies that are still to be removed from a cycle: the crate and what it depends on.
+/// Dependencies still to be removed: (crate, dependency).
 const CRATE_CYCLES: &[(&str, &str)] = &[("energy-dsl", "energy-macros")];
 
-/// Which nodes each node points to.
+/// The nodes that each node points to.
 type Graph = BTreeMap<String, BTreeSet<String>>;
 
 fn workspace() -> PathBuf {

@@ -1,7 +1,7 @@
-//! Fuzzing on a stable compiler: inputs of a corpus, and what becomes of them by random edits, must neither panic nor take long.
+//! Fuzzing on a stable compiler: the inputs of a corpus and random edits of them must neither panic nor take long.
 //!
-//! Inputs whose outcome was not seen before are kept and edited further, so that a run digs into what it finds. What fails is
-//! written to the corpus, which is replayed first ever after.
+//! Inputs with a new outcome are kept and edited further, so that a run digs into what it finds. Failing inputs are
+//! written to the corpus, which every later run replays first.
 
 mod edits;
 mod targets;
@@ -17,9 +17,9 @@ use fastrand::Rng;
 
 pub use self::targets::Target;
 
-/// The longest that one input may take.
+/// Time limit of one input.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Inputs are cut to so many bytes.
+/// Inputs are cut to this many bytes.
 const LONGEST: usize = 4096;
 
 /// File in the corpus that holds the running input, in case it ends the process.
@@ -27,23 +27,23 @@ const CURRENT: &str = "fuzz-input";
 /// File in the corpus that lists inputs in other folders: one path per line, relative to the corpus.
 const LINKS: &str = "links";
 
-/// When to stop.
+/// Limit of a run.
 #[derive(Clone, Copy, Debug)]
 pub enum Budget {
-    /// After so many edited inputs.
+    /// Number of edited inputs.
     Inputs(u64),
-    /// After so long.
+    /// Run time.
     Time(Duration),
 }
 
-/// What a run without findings did.
+/// Statistics of a run without findings.
 #[derive(Clone, Copy, Debug)]
 pub struct Summary {
     /// Inputs of the corpus.
     pub corpus: usize,
     /// Edited inputs.
     pub edited: u64,
-    /// Different outcomes.
+    /// Number of different outcomes.
     pub outcomes: usize,
 }
 
@@ -51,19 +51,20 @@ pub struct Summary {
 #[derive(Debug, thiserror::Error)]
 #[error("{why}; the input is kept as {}", .input.display())]
 pub struct Finding {
-    /// What happened.
+    /// Description of the failure.
     pub why: String,
-    /// Where the input is.
+    /// Path of the input.
     pub input: PathBuf,
 }
 
-/// Runs every input of a corpus, then edited ones. `run` answers with whatever tells one outcome from another: the message of an
-/// error, say. `words` are pieces of text that edits insert.
+/// Runs every input of a corpus, then edited ones. `run` returns a text that tells outcomes apart, such as the message
+/// of an error. `words` are pieces of text that edits insert.
 ///
-/// An input that overflows the stack ends the process: it is left in the file `fuzz-input` of the corpus.
+/// An input that overflows the stack ends the process; the file `fuzz-input` in the corpus contains it.
 ///
 /// # Errors
-/// A [`Finding`] when an input panics or takes longer than 20 seconds, or why the corpus cannot be read or written.
+/// Returns a [`Finding`] if an input panics or takes longer than 20 seconds, or an error if the corpus cannot be read
+/// or written.
 ///
 /// ```
 /// use verify::fuzz::{Budget, fuzz};
@@ -85,7 +86,7 @@ pub fn fuzz(
     run: impl Fn(&str) -> String,
 ) -> anyhow::Result<Summary> {
     let mut inputs = read(corpus)?;
-    anyhow::ensure!(!inputs.is_empty(), "{} holds no input to start from", corpus.display());
+    anyhow::ensure!(!inputs.is_empty(), "{} contains no input", corpus.display());
     let mut fuzzer = Fuzzer { corpus, run, outcomes: BTreeSet::new() };
     for input in &inputs {
         fuzzer.try_input(input)?;
@@ -114,12 +115,12 @@ struct Fuzzer<'a, F> {
 }
 
 impl<F: Fn(&str) -> String> Fuzzer<'_, F> {
-    /// Where the input that runs is left, should it end the process.
+    /// Path of the running input, in case it ends the process.
     fn current(&self) -> PathBuf {
         self.corpus.join(CURRENT)
     }
 
-    /// Whether its outcome is new.
+    /// Runs an input. Returns whether its outcome is new.
     fn try_input(&mut self, input: &str) -> anyhow::Result<bool> {
         let current = self.current();
         std::fs::write(&current, input).with_context(|| format!("cannot write {}", current.display()))?;
@@ -164,7 +165,7 @@ fn read_file(path: &Path) -> anyhow::Result<String> {
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// A message without the numbers and quoted text that make each one different.
+/// Removes the numbers and the quoted text, which make each message different.
 fn without_names(outcome: &str) -> String {
     let unquoted = outcome.split(['`', '"']).step_by(2).collect::<String>();
     unquoted.chars().filter(|c| !c.is_numeric()).take(400).collect()
@@ -178,7 +179,7 @@ fn hash(text: &str) -> u64 {
 
 fn message(panic: &(dyn std::any::Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("of no message")
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }
 
 #[cfg(test)]
