@@ -51,9 +51,6 @@ pub trait LeastSquaresTerm<const D: usize>: Debug {
     fn linearise(&self, x: &[[f64; D]], equations: &mut NormalEquations<D>) -> TermSum;
     /// Returns the index of the first element with a non-finite energy.
     fn find_non_finite(&self, x: &[[f64; D]]) -> Option<usize>;
-    /// Computes all Jacobians and discards them, to measure the cost of derivatives alone. Returns the sum of some
-    /// entries.
-    fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64;
 }
 
 /// An element on one of the stencils of a term's [`Couplings`].
@@ -168,6 +165,18 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     #[must_use]
     pub fn stencil(&self, element: usize) -> &[u32] {
         self.couplings.stencil(self.stencils[element] as usize)
+    }
+
+    /// Computes all Jacobians and discards them, to measure the cost of derivatives alone. Returns the sum of some
+    /// entries.
+    #[must_use]
+    pub fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
+        let (mut sum, mut chunk) = (0.0, Chunk::default());
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            self.linearise_chunk(first, x, &mut chunk);
+            sum += std::hint::black_box(&chunk.jacobians)[0];
+        }
+        sum
     }
 
     fn rows() -> usize {
@@ -312,15 +321,6 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for Res
             }
         }
         None
-    }
-
-    fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
-        let (mut sum, mut chunk) = (0.0, Chunk::default());
-        for first in (0..self.stencils.len()).step_by(CHUNK) {
-            self.linearise_chunk(first, x, &mut chunk);
-            sum += std::hint::black_box(&chunk.jacobians)[0];
-        }
-        sum
     }
 }
 

@@ -38,7 +38,8 @@ impl std::str::FromStr for Truth {
             return Ok(Self { high, low: 0.0 });
         }
         let exact = decimal(text.trim()).ok_or_else(|| format!("`{text}` is not a decimal number"))?;
-        let rounded = BigRational::from_float(high).ok_or_else(|| format!("`{text}` is out of the range of doubles"))?;
+        let rounded =
+            BigRational::from_float(high).ok_or_else(|| format!("`{text}` is out of the range of doubles"))?;
         Ok(Self { high, low: (exact - rounded).to_f64().unwrap_or(0.0) })
     }
 }
