@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Parser;
 use energy_bench::accuracy::near_rest;
 use energy_bench::contenders::contenders;

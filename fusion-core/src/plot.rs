@@ -16,7 +16,7 @@ const STATISTICS: [Statistic; 3] = [
 /// Draws mean, median and 95th percentile of each frame, in mm, as SVG.
 ///
 /// # Errors
-/// If there are no frames, or errors that are not finite.
+/// If the track is empty, or an error is not finite.
 pub fn errors_svg(errors: &TrackErrors) -> Result<String, String> {
     let summaries: Vec<ErrorSummary> = errors.frames.iter().map(|frame| ErrorSummary::of(frame.all.clone())).collect();
     let highest = summaries.iter().map(|summary| summary.p95.max(summary.mean)).fold(0.0, f64::max).max(1e-3);

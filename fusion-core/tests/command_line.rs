@@ -1,4 +1,4 @@
-//! The binary `fusion`, as users run it.
+//! End-to-end tests of the binary `fusion`.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -25,7 +25,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     let again = error_of(&fusion(&["render", "--to", "4", "-o", recording]));
     assert!(again.contains("--overwrite"), "{again}");
 
-    // One image is damaged, one is gone: both are skipped with a reason, the others tracked.
+    // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
     let output = fusion(&["track", recording, "-o", track]);

@@ -1,4 +1,4 @@
-//! The figure of tubes: tracked, and through whatever goes wrong.
+//! Tracking of the figure of tubes, also with bad input.
 
 use fusion_core::body::{figure, figure_motion};
 use fusion_core::depth::{Camera, DepthImage, SensorNoise};
@@ -40,7 +40,7 @@ fn every_choice_of_energy_follows_the_figure() {
             for normal in [NormalDerivative::Full, NormalDerivative::Frozen] {
                 let mut options = TrackerOptions::default();
                 (options.energy.angle, options.energy.normal) = (angle, normal);
-                // Bones at rest: the data must do the work.
+                // Bones at rest, so that only the data moves the body.
                 options.energy.weights.binding = 0.1;
                 let model = ModelOptions { nodes_per_vertex: k, ..ModelOptions::default() };
                 let mut tracker = tracker(&recording, model, options);

@@ -188,10 +188,10 @@ fn module_graph(sources: &[(PathBuf, String)]) -> Graph {
         }
     }
     let modules: BTreeSet<String> = imports.keys().cloned().collect();
-    let resolve = |name: &String| if modules.contains(name) { Some(name) } else { exports.get(name) };
+    let resolve = |name: &String| if modules.contains(name) { Some(name.clone()) } else { exports.get(name).cloned() };
     let graph = imports.iter().map(|(module, names)| {
-        let targets = names.iter().filter_map(resolve).filter(|&target| target != module && modules.contains(target));
-        (module.clone(), targets.cloned().collect())
+        let targets = names.iter().filter_map(resolve).filter(|target| target != module && modules.contains(target));
+        (module.clone(), targets.collect())
     });
     graph.collect()
 }

@@ -9,13 +9,13 @@ use super::print;
 use super::render::Render;
 use super::track::Track;
 
-/// The demonstration.
+/// Options of `fusion demo`.
 #[derive(Debug, Args)]
 pub struct Demo {
-    /// Where the files go; those of an earlier demo are replaced.
+    /// Output folder; replaces the files of an earlier demonstration.
     #[arg(short, long, default_value = "out/fusion")]
     output: PathBuf,
-    /// Thirtieths of a second to track.
+    /// Frames to track, at 30 Hz.
     #[arg(long, default_value_t = 60)]
     frames: usize,
 }

@@ -1,4 +1,4 @@
-//! Terms of unknown bones.
+//! Terms for unknown bones.
 
 use std::sync::Arc;
 
@@ -11,14 +11,14 @@ use crate::body::Bone;
 use crate::model::DeformationModel;
 use crate::twist::Twist;
 
-/// The terms that unknown bones add.
+/// The terms for unknown bones.
 #[derive(Debug)]
 pub(super) struct BoneTerms {
     pub(super) skeleton: ResidualTerm<SkeletonPlane, 6>,
     pub(super) binding: ResidualTerm<BoneBinding, 6>,
     pub(super) prior: ResidualTerm<Binding, 6>,
     pub(super) joints: ResidualTerm<GraphEdge, 6>,
-    /// How much each vertex follows the four bones of its stencil.
+    /// Weights of the four bones of each vertex's stencil.
     pub(super) shares: Vec<[f64; 4]>,
 }
 
@@ -30,14 +30,14 @@ impl BoneTerms {
     }
 }
 
-/// Four places around a bone's joint, by which its motion is compared with another.
+/// Returns four points around a bone's joint, at which its motion is compared with another.
 pub(super) fn prior_places(bone: &Bone) -> [Vector3<f64>; 4] {
     const REACH: f64 = 0.1;
     let head = Vector3::from(bone.head);
     [head, head + REACH * Vector3::x(), head + REACH * Vector3::y(), head + REACH * Vector3::z()]
 }
 
-/// Which bones the terms of unknown bones act on; their blocks stand behind those of the nodes.
+/// Stencils of the terms for unknown bones. The blocks of the bones follow those of the nodes.
 pub(super) struct BoneStencils {
     vertices: Vec<[u32; 4]>,
     vertex_shares: Vec<[f64; 4]>,
@@ -104,8 +104,8 @@ impl BoneStencils {
     }
 }
 
-/// The four heaviest bones and their shares, brought to a sum of one. Where there are fewer, others fill up with a share of none:
-/// their relations first, so that few blocks are added.
+/// Returns the four bones of largest weight, with weights normalised to a sum of 1. Bones with zero weight fill up the
+/// four: first parents and children, so that few blocks are added.
 fn four_bones(model: &DeformationModel, bones: &[(usize, f64)], first: u32) -> ([u32; 4], [f64; 4]) {
     let mut chosen: Vec<(usize, f64)> = bones.iter().copied().take(4).collect();
     let mut related: Vec<usize> = Vec::new();

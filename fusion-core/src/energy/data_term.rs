@@ -13,25 +13,25 @@ use super::options::{EnergyOptions, NormalDerivative};
 use crate::model::DeformationModel;
 use crate::twist::Twist;
 
-/// A vertex and the measured point it is matched with, in the model's coordinates.
+/// A vertex and its matching point, in the model's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
-    /// The vertex.
+    /// Index of the vertex.
     pub vertex: u32,
-    /// The point.
+    /// Measured point.
     pub point: Vector3<f64>,
 }
 
-/// Vertices and normals as moved, in the model's coordinates.
+/// Moved vertices and normals, in the model's coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moved {
-    /// Positions.
+    /// Positions of the vertices.
     pub vertices: Vec<Vector3<f64>>,
     /// Unit normals.
     pub normals: Vec<Vector3<f64>>,
 }
 
-/// What blends K nodes.
+/// Residuals that blend K nodes.
 trait Blend<const K: usize>: Debug + Send {
     type Plane: PackedResidual<f64> + Debug + Send;
     type Frozen: PackedResidual<f64> + Debug + Send;
@@ -87,7 +87,7 @@ macro_rules! blend {
 blend!(Four, 4, NonrigidPlane4, FrozenPlane4, BlendedPoint4);
 blend!(Eight, 8, NonrigidPlane8, FrozenPlane8, BlendedPoint8);
 
-/// The data term, whatever K.
+/// The data term for any K.
 pub(super) trait DataTerm: Debug + Send {
     fn set_pairs(&mut self, model: &DeformationModel, pairs: &[Pair], normals: Option<&[Vector3<f64>]>);
     fn moved(&self, x: &[Twist]) -> Moved;

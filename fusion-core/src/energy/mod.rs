@@ -1,4 +1,5 @@
-//! The energy: λ_n E_nonrigid + λ_s E_skeleton + λ_g E_graph + λ_b E_binding over the twists of nodes, and perhaps of bones.
+//! The energy λ_n E_nonrigid + λ_s E_skeleton + λ_g E_graph + λ_b E_binding over the twists of nodes, and optionally of
+//! bones.
 
 mod bones;
 mod data_term;
@@ -17,23 +18,23 @@ pub use self::options::{BoneMode, EdgeWeight, EnergyOptions, NormalDerivative, T
 use crate::model::DeformationModel;
 use crate::twist::Twist;
 
-/// Unknown bones need four of them at least: the declared residuals blend four.
+/// An energy that cannot be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EnergyError {
-    /// There are fewer bones than a stencil has.
-    #[error("{0} bones; with bones as unknowns there must be four at least")]
+    /// There are fewer bones than the four that a declared residual blends.
+    #[error("expected at least four bones if bones are unknowns, got {0}")]
     TooFewBones(usize),
-    /// A bug: the model names what it does not have.
+    /// The model names a node or bone that does not exist, which is a bug.
     #[error(transparent)]
     Coupling(#[from] CouplingError),
 }
 
-/// The energy of a model: terms that stay, data that comes with each search for correspondences.
+/// The energy of a model. The data change with each search for correspondences, the other terms do not.
 ///
-/// The unknowns are the twists of the nodes and, if bones are unknown, those of the bones behind them.
+/// The unknowns are the twists of the nodes, followed by those of the bones if bones are unknown.
 #[derive(Debug)]
 pub struct FusionEnergy {
-    /// Its parameters.
+    /// Options of the energy.
     pub options: EnergyOptions,
     pattern: Arc<NormalPattern>,
     data: Box<dyn DataTerm>,
@@ -43,10 +44,10 @@ pub struct FusionEnergy {
 }
 
 impl FusionEnergy {
-    /// The energy of a model, without data.
+    /// Creates the energy of a model, without data.
     ///
     /// # Errors
-    /// When bones are unknowns and there are fewer than four.
+    /// If bones are unknowns and there are fewer than four.
     pub fn new(model: &DeformationModel, options: EnergyOptions) -> Result<Self, EnergyError> {
         let nodes = model.nodes.len();
         let unknown_bones = options.bones == BoneMode::Unknown;
@@ -88,13 +89,13 @@ impl FusionEnergy {
         Ok(Self { options, pattern, data, graph, binding, bones })
     }
 
-    /// Which blocks of JᵀJ there are.
+    /// Returns the pattern of JᵀJ.
     #[must_use]
     pub fn pattern(&self) -> &Arc<NormalPattern> {
         &self.pattern
     }
 
-    /// Replaces the data. `moved` gives the normals that are held, if they are.
+    /// Replaces the data. `moved` contains the normals for [`NormalDerivative::Frozen`].
     pub fn set_pairs(&mut self, model: &DeformationModel, pairs: &[Pair], moved: &Moved) {
         self.data.set_pairs(model, pairs, Some(&moved.normals));
         if let Some(bones) = &mut self.bones {
@@ -109,7 +110,7 @@ impl FusionEnergy {
         }
     }
 
-    /// Replaces what a body tracker says, in the model's coordinates; nothing takes nodes off their bones.
+    /// Replaces the reported motions of the bones, in the model's coordinates. `None` releases nodes from their bones.
     pub fn set_bones(&mut self, model: &DeformationModel, motions: Option<&[Isometry3<f64>]>) {
         let turn = self.options.angle.turn();
         let Some(motions) = motions else {
@@ -133,7 +134,7 @@ impl FusionEnergy {
         }
     }
 
-    /// The terms that have unknowns.
+    /// Returns the terms that depend on the unknowns.
     #[must_use]
     pub fn terms(&self) -> Vec<&dyn LeastSquaresTerm<6>> {
         let mut terms: Vec<&dyn LeastSquaresTerm<6>> = vec![self.data.term(), &self.graph];
@@ -151,8 +152,8 @@ impl FusionEnergy {
         terms
     }
 
-    /// Computes the Jacobians of all terms and discards them, to measure the cost of derivatives alone. Returns the sum of
-    /// some entries.
+    /// Computes the Jacobians of all terms and discards them, to measure the cost of derivatives alone. Returns the sum
+    /// of some entries.
     #[must_use]
     pub fn evaluate_jacobians(&self, x: &[Twist]) -> f64 {
         let sum = self.data.evaluate_jacobians(x) + self.graph.evaluate_jacobians(x);
@@ -162,20 +163,20 @@ impl FusionEnergy {
         }
     }
 
-    /// All vertices moved.
+    /// Returns all vertices and normals, moved by the twists.
     #[must_use]
     pub fn moved(&self, x: &[Twist]) -> Moved {
         self.data.moved(x)
     }
 }
 
-/// x̃ = Σ_j η_j T_bj x.
+/// Returns x̃ = Σ_j η_j T_bj x.
 fn bound_place(x: &Vector3<f64>, row: &[f64], motions: &[Isometry3<f64>]) -> Vector3<f64> {
     let followed = row.iter().zip(motions).filter(|(share, _)| **share > 0.0);
     followed.map(|(share, motion)| *share * motion.transform_point(&(*x).into()).coords).sum()
 }
 
-/// λ_s E_skeleton of known bones, Σ (ñ·(ṽ − u))² over the pairs: it depends on no unknown, and is reported.
+/// Returns λ_s E_skeleton of known bones, Σ (ñ·(ṽ − u))² over the pairs. It does not depend on the unknowns.
 #[must_use]
 pub fn skeleton_energy(model: &DeformationModel, lambda: f64, motions: &[Isometry3<f64>], pairs: &[Pair]) -> f64 {
     let one = |pair: &Pair| {

@@ -2,21 +2,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::twist::AngleConvention;
 
-/// λ of each term, in 1/m² if the energy is to be a number.
+/// Weights λ of the terms, in 1/m² for a dimensionless energy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TermWeights {
-    /// λ_n, vertices to measured points along normals.
+    /// λ_n, distances of vertices from measured points along normals.
     pub nonrigid: f64,
-    /// λ_s, the same for the skinned skeleton. With known bones it is reported only.
+    /// λ_s, the same for the skinned skeleton. With known bones it is only reported.
     pub skeleton: f64,
-    /// λ_g, neighbouring nodes alike.
+    /// λ_g, differences between neighbouring nodes.
     pub graph: f64,
-    /// λ_b, nodes with their bones.
+    /// λ_b, distances of nodes from their bones.
     pub binding: f64,
-    /// Unknown bones: near to what the body tracker says.
+    /// Distances of unknown bones from the reported ones.
     pub prior: f64,
-    /// Unknown bones: together at their joints.
+    /// Gaps between unknown bones at their joints.
     pub joints: f64,
 }
 
@@ -26,26 +26,26 @@ impl Default for TermWeights {
     }
 }
 
-/// ψ of an edge, by s = |H_i − H_j|².
+/// The weight ψ of an edge as a function of s = |H_i − H_j|².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EdgeWeight {
-    /// min(1, δ/s): nodes of one part hold together, those of different parts less.
+    /// min(1, δ/s): edges within a part are stiffer than edges between parts.
     #[default]
     Decreasing,
     /// min(1, δ/√s).
     DecreasingByNorm,
-    /// Huber's loss ρ(s) itself, as the paper prints it: none inside a part, most across joints.
+    /// Huber's loss ρ(s) itself, as printed in the paper: zero within a part, largest across joints.
     Printed,
-    /// 1.
+    /// 1 for every edge.
     Uniform,
 }
 
 impl EdgeWeight {
-    /// δ, as the paper has it.
+    /// δ of the paper.
     pub const DELTA: f64 = 0.2;
 
-    /// ψ(s).
+    /// Returns ψ(s).
     #[must_use]
     pub fn of(self, s: f64, delta: f64) -> f64 {
         match self {
@@ -60,44 +60,44 @@ impl EdgeWeight {
     }
 }
 
-/// What the normal does in the derivative of the data term.
+/// The treatment of the normal in the derivative of the data term.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NormalDerivative {
-    /// It moves with the nodes.
+    /// The normal moves with the nodes.
     #[default]
     Full,
-    /// It is held, as many systems do.
+    /// The normal is held fixed, as in many systems.
     Frozen,
 }
 
-/// Whether bones are known.
+/// Whether the motions of bones are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BoneMode {
-    /// As the body tracker says.
+    /// Bones move as the body tracker reports.
     #[default]
     Known,
-    /// Six unknowns each, near to what the body tracker says.
+    /// Each bone has six unknowns, near the reported motion.
     Unknown,
 }
 
-/// Which energy.
+/// Options of the energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnergyOptions {
-    /// λ.
+    /// Weights λ of the terms.
     pub weights: TermWeights,
-    /// ψ.
+    /// Weights ψ of the edges.
     pub edges: EdgeWeight,
-    /// What ‖θ‖ means.
+    /// Convention of the angle ‖θ‖.
     pub angle: AngleConvention,
-    /// Which Jacobian the data term has.
+    /// Jacobian of the data term.
     pub normal: NormalDerivative,
     /// Whether bones are unknowns.
     pub bones: BoneMode,
-    /// Tukey's limit of the data term, m; none for least squares.
+    /// Tukey's limit of the data term, in m; `None` for least squares.
     pub data_tukey: Option<f64>,
-    /// Huber's limit of the graph, m; none for least squares.
+    /// Huber's limit of the graph, in m; `None` for least squares.
     pub graph_huber: Option<f64>,
 }
