@@ -127,16 +127,18 @@ proptest! {
 }
 
 #[test]
-fn an_element_at_rest_is_left_alone() {
+fn an_element_at_rest_is_not_projected() {
     let rest = StVK::new([0.0, 0.0], [1.0, 0.0], [0.3, 0.9], 1.0, 2.0).unwrap();
     // Rotated, so that the zeros of its Hessian have rounding errors.
     let x = [[0.1, 0.2, 0.3], [0.1 + 0.6, 0.2, 0.3 + 0.8], [0.1 + 0.18, 0.2 + 0.9, 0.3 + 0.24]];
-    let (_, counts) = hessians(&[rest], &[x], Curvature::Clamped);
+    let (exact, _) = hessians(&[rest], &[x], Curvature::Exact);
+    let (found, counts) = hessians(&[rest], &[x], Curvature::Clamped);
     assert_eq!((counts.hessian.evaluated, counts.hessian.projected), (1, 0));
+    assert_eq!(found, exact);
 }
 
 #[test]
-fn neighbours_do_not_matter() {
+fn lanes_do_not_affect_each_other() {
     let spring = |length| HookeSpring { K: 1.0, L: length };
     let x = [[[0.0; 3], [1.0, 0.2, 0.3]]; 2];
     let (alone, _) = hessians(&[spring(2.0)], &x[..1], Curvature::Clamped);

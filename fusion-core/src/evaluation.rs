@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn summaries_count_what_they_say() {
+    fn summaries_have_the_right_statistics() {
         let summary = ErrorSummary::of((0..=100).rev().map(f64::from).collect());
         assert_eq!((summary.count, summary.mean, summary.median, summary.p95), (101, 50.0, 50.0, 95.0));
         assert!((summary.share_below_25 - 25.0 / 101.0).abs() < 1e-15);

@@ -87,7 +87,7 @@ mod tests {
     const CONVENTIONS: [AngleConvention; 2] = [AngleConvention::HalfAngle, AngleConvention::RotationVector];
 
     #[test]
-    fn twists_and_motions_go_back_and_forth() {
+    fn twists_and_motions_convert_both_ways() {
         for convention in CONVENTIONS {
             let twist = [0.3, -0.2, 0.5, 1.0, 2.0, 3.0];
             let back = convention.twist(&convention.motion(&twist));
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blend_of_equal_motions_is_the_motion_whatever_its_sign() {
+    fn a_blend_of_equal_motions_is_the_motion_for_either_sign() {
         let motion = AngleConvention::HalfAngle.motion(&[1.4, 0.3, 0.0, 1.0, 2.0, 3.0]);
         let negative =
             Isometry3::from_parts(motion.translation, UnitQuaternion::new_unchecked(-motion.rotation.into_inner()));

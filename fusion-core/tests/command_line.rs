@@ -44,7 +44,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
 }
 
 #[test]
-fn what_cannot_be_used_is_refused_with_the_reason() {
+fn unusable_input_is_rejected_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let here = text(folder.path());
     let missing = error_of(&fusion(&["track", here, "-o", &format!("{here}/t")]));

@@ -45,7 +45,7 @@ fn run(recording: &Recording, options: TrackerOptions, noise: BoneNoise, name: &
 }
 
 #[test]
-fn a_real_body_is_followed() {
+fn a_real_body_is_tracked() {
     let Some(folder) = folder() else {
         eprintln!("skipped: no data of a real body; name its folder in FUSION_BODY");
         return;

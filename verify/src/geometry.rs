@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn degenerate_shapes_are_turned_down() {
+    fn degenerate_shapes_are_rejected() {
         assert!(is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3, 1.0));
         assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 3, 1.0), "too close");
         assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.1, 0.0], 3, 1.0), "in line");

@@ -53,7 +53,7 @@ fn a_file_is_audited_reported_and_run_again_at_its_inputs() {
 }
 
 #[test]
-fn sweeps_of_a_distance_lose_nothing_where_the_textbook_form_has_no_digit_left() {
+fn sweeps_of_a_distance_keep_the_digits_that_the_textbook_form_loses() {
     let output = verify(&["stress", "Distance", "PowerLaw"]);
     let printed = text(&output.stdout);
     assert!(output.status.success(), "{printed}{}", text(&output.stderr));
@@ -61,7 +61,7 @@ fn sweeps_of_a_distance_lose_nothing_where_the_textbook_form_has_no_digit_left()
 }
 
 #[test]
-fn an_unknown_element_is_refused_with_the_known_ones() {
+fn an_unknown_element_is_rejected_with_the_known_ones() {
     let output = verify(&["audit", "Sprin"]);
     assert_eq!(output.status.code(), Some(2));
     let message = text(&output.stderr);
@@ -147,7 +147,7 @@ fn the_degenerate_inputs_are_all_evaluated_but_for_a_degenerate_rest_shape() {
 
 /// A decimal that is not the intended double means a damaged file.
 #[test]
-fn a_number_that_disagrees_with_its_bits_is_refused() {
+fn a_number_that_disagrees_with_its_bits_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let (input, out) = (folder.path().join("in.json"), folder.path().join("out.json"));
     let original = std::fs::read_to_string(data("distance.json")).unwrap();
@@ -161,7 +161,7 @@ fn a_number_that_disagrees_with_its_bits_is_refused() {
 }
 
 #[test]
-fn bad_records_are_refused_by_name_and_nothing_is_written() {
+fn bad_records_are_named_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let (input, out) = (folder.path().join("in.json"), folder.path().join("out.json"));
     for (content, expected) in [
@@ -231,7 +231,7 @@ fn plans_name_each_route_and_the_one_taken() {
 }
 
 #[test]
-fn pinned_points_leave_operations_out() {
+fn pinned_points_save_operations() {
     let printed = text(&verify(&["show", "QuadraticHinge", "--counts"]).stdout);
     let operations = |row: &str| -> usize {
         let line = printed.lines().find(|line| line.trim_start().starts_with(row)).expect(row);
@@ -246,7 +246,7 @@ fn pinned_points_leave_operations_out() {
 }
 
 #[test]
-fn unknown_routines_and_files_are_refused() {
+fn unknown_routines_and_files_are_rejected() {
     let output = verify(&["show", "Spring", "--routine", "hesian"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("it has hessian, value, gradient"), "{}", text(&output.stderr));

@@ -57,7 +57,7 @@ fn each_printed_mistake_is_noticed_by_its_check() {
 }
 
 #[test]
-fn what_is_right_passes() {
+fn correct_declarations_pass() {
     for (name, energy) in [("RightHooke", "HookeSpring"), ("RightNormSquared", "BridsonBending")] {
         let report = audited(name, Some(energy));
         assert!(report.passed(), "{name}: {:?}", report.failures().collect::<Vec<_>>());
@@ -118,7 +118,7 @@ jacobian!(DiagonalOnly, |n, numbers| for (i, j) in (0..n).flat_map(|i| (0..n).ma
 });
 
 #[test]
-fn a_symmetric_but_wrong_jacobian_and_one_without_its_other_blocks_are_noticed() {
+fn wrong_jacobians_are_noticed_even_if_symmetric() {
     for message in [
         catch_unwind(|| verify::assert_derivatives::<Symmetrised>(20)),
         catch_unwind(|| verify::assert_derivatives::<DiagonalOnly>(20)),

@@ -52,7 +52,7 @@ fn check(path: &Path, folder: &Path) -> (usize, usize) {
 }
 
 #[test]
-fn every_reference_value_comes_out_to_its_last_digits() {
+fn every_reference_value_is_reproduced_to_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     let paths = std::fs::read_dir(data()).unwrap().map(|entry| entry.unwrap().path());
     let files: Vec<PathBuf> =

@@ -57,7 +57,7 @@ fn an_uncompensated_hinge_is_as_exact_as_its_points_are_rounded() {
 }
 
 #[test]
-fn what_does_not_stretch_or_bend_is_still_exactly_zero() {
+fn undeformed_elements_have_exactly_zero_energy() {
     let flat = [[0.3, 1.0, 0.7], [0.6, -1.0, 0.7], [0.0, 0.0, 0.7], [1.0, 0.0, 0.7]].concat();
     for (source, parameters, positions) in
         [(SPRING, [5.0, 1.5], vec![0.25, 1.0, 2.0, 0.25, 1.0, 3.5]), (HINGE, [5.0, 0.0], flat)]

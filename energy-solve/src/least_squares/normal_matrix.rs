@@ -248,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pattern_is_the_diagonal_and_what_stencils_couple() {
+    fn a_pattern_is_the_diagonal_and_the_coupled_blocks() {
         let pattern = NormalPattern::new(4, [[3, 0].as_slice(), &[0, 1]]).unwrap();
         assert_eq!(
             (0..4).map(|row| pattern.row(row).to_vec()).collect::<Vec<_>>(),
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn stencils_that_do_not_fit_are_refused() {
+    fn stencils_that_do_not_fit_are_rejected() {
         let pattern = NormalPattern::new(3, [[0, 1].as_slice()]).unwrap();
         assert!(matches!(Couplings::new(&pattern, &[[0, 0]]), Err(CouplingError::Repeated { element: 0, block: 0 })));
         assert!(matches!(
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn products_see_both_halves() {
+    fn products_use_both_triangles() {
         let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
         let mut matrix = NormalMatrix::<2>::zeros(pattern);
         // The padding past a block's own columns must be ignored.

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_do_not_fit_are_refused() {
+    fn parts_that_do_not_fit_are_rejected() {
         let good = vec![vec![(0, 1.0)]; 3];
         let refuse = |mesh, bones, weights| SkinnedBody::new(mesh, bones, weights).unwrap_err();
         assert_eq!(refuse(Mesh::default(), vec![], vec![]), BodyError::Empty);

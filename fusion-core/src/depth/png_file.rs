@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn depths_survive_a_file_but_for_rounding() {
+    fn depths_survive_a_file_up_to_rounding() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("d.png");
         let image = DepthImage { width: 3, height: 2, depth: vec![0.0, 1.0, 2.5004, f32::NAN, -1.0, 70.0] };

@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_as_large_as_the_model_says() {
+    fn noise_has_the_standard_deviation_of_the_model() {
         let mut image = DepthImage { width: 100, height: 100, depth: vec![2.4; 10_000] };
         SensorNoise { factor: 1.0, step: 0.0 }.add(&mut image, &mut fastrand::Rng::with_seed(1));
         let square: f64 = image.depth.iter().map(|&d| (f64::from(d) - 2.4).powi(2)).sum::<f64>() / 1e4;

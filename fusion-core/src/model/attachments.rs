@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fill_reaches_what_is_connected() {
+    fn a_fill_reaches_connected_nodes() {
         let mut h = Attachments {
             rows: vec![vec![1.0, 0.0], vec![0.0; 2], vec![0.0; 2], vec![0.0, 1.0], vec![0.0; 2]],
             assigned: vec![true, false, false, true, false],
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_bone_counts_if_it_is_near() {
+    fn points_attach_to_the_nearest_bone_within_reach() {
         let bones = [[Vector3::zeros(), Vector3::x()], [Vector3::y(), 2.0 * Vector3::y()]];
         let places = [Vector3::new(0.5, 0.1, 0.0), Vector3::new(0.0, 3.0, 0.0)];
         let h = Attachments::nearest_bone(&places, &bones, 0.5);

@@ -223,7 +223,7 @@ Frame Time: .01
 ";
 
     #[test]
-    fn joints_turn_what_hangs_on_them() {
+    fn joints_rotate_their_descendants() {
         let bvh = Bvh::parse(ARM).unwrap();
         assert_eq!((bvh.frames(), bvh.joints.len(), bvh.ends[0].0), (2, 2, 1));
         let pose = bvh.pose(1).unwrap();
@@ -235,7 +235,7 @@ Frame Time: .01
     }
 
     #[test]
-    fn mistakes_are_refused_with_their_line() {
+    fn mistakes_are_reported_with_their_line() {
         for (from, to, line) in [
             ("Frames: 2", "Frames: 3", 20),
             ("-90 0 0", "-90 0", 19),

@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_are_as_large_as_asked_for() {
+    fn errors_have_the_requested_size() {
         let bone = Bone { name: "arm".into(), parent: None, head: [1.0, 2.0, 3.0], tail: [1.0, 3.0, 3.0] };
         let mut random = fastrand::Rng::with_seed(3);
         let noise = BoneNoise { turn: 0.1, shift: 0.02 };

@@ -138,7 +138,7 @@ mod tests {
 
     /// The complex step yields derivatives to full precision.
     #[test]
-    fn a_step_is_a_derivative() {
+    fn the_complex_step_is_a_derivative() {
         let x = Complex { re: 0.7, im: 1e-100 };
         let slope = |f: Complex| f.im / 1e-100;
         let near = |a: f64, b: f64| assert!((a - b).abs() <= 4e-16 * b.abs(), "{a} {b}");

@@ -252,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_undefined_stays_so_and_never_panics() {
+    fn undefined_numbers_stay_undefined_and_never_panic() {
         let (zero, one) = (Big::from_f64(0.0), Big::from_f64(1.0));
         let nothing = [
             one.clone() / zero.clone(),
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hundredth_of_a_roundoff_is_seen_and_no_range_is_left() {
+    fn errors_of_a_hundredth_of_a_roundoff_are_visible_over_the_whole_range() {
         let third = Big::from_f64(1.0) / Big::from_f64(3.0);
         assert!((third.error_of(1.0 / 3.0) / 2.0_f64.powi(-53) - 1.0 / 6.0 * 2.0).abs() < 0.2);
         let tiny = Big::from_f64(1e-300) * Big::from_f64(1e-300);

@@ -62,7 +62,7 @@ mod tests {
     use super::Truth;
 
     #[test]
-    fn what_rounding_lost_is_known() {
+    fn the_remainder_of_rounding_is_known() {
         let tenth: Truth = "1.00000000000000000000000000000e-01".parse().unwrap();
         // 0.1 = 0x3fb999999999999a − 5.551115123125783e-18.
         assert_eq!(tenth.high, 0.1);

@@ -73,7 +73,7 @@ mod tests {
     use super::{TABLE, UNDECLARED, mapping};
 
     #[test]
-    fn a_potential_is_declared_or_listed_as_not() {
+    fn each_potential_is_declared_or_listed_as_undeclared() {
         assert!(UNDECLARED.iter().all(|name| mapping(name).is_none()), "an element has come: strike it off the list");
     }
 

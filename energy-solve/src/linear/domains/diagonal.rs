@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_scaled_on_both_sides_has_the_relaxation_on_its_diagonal() {
+    fn the_scaled_diagonal_is_the_relaxation_factor() {
         let matrix = matrix();
         for (row, inverse) in inverted(&matrix).unwrap().iter().enumerate() {
             let block = matrix.diagonal(row);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_row_that_is_not_definite_is_named() {
+    fn the_first_indefinite_row_is_named() {
         for (row, entry) in [(2, -1.0), (9, 0.0), (10, f64::NAN), (4, f64::INFINITY)] {
             let mut matrix = matrix();
             matrix.diagonal_mut(row)[1][1] = entry;

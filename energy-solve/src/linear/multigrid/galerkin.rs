@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_dense_product() {
+    fn the_galerkin_product_is_the_dense_product() {
         let pattern = Arc::new(grid(11));
         let mut fine = BlockMatrix::zeros(Arc::clone(&pattern));
         let mut seed = 1_u64;
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn translations_are_carried_and_roots_by_their_own() {
+    fn prolongation_reproduces_translations_and_is_exact_at_roots() {
         let pattern = grid(11);
         let interpolation = Interpolation::<f64>::averaged(&pattern);
         let mut roots = vec![0; interpolation.aggregates()];

@@ -184,7 +184,7 @@ mod tests {
     use super::{pair, rounds};
 
     #[test]
-    fn in_a_sweep_each_pair_is_turned_once_and_in_a_round_each_row() {
+    fn a_sweep_rotates_each_pair_once_and_a_round_each_row_once() {
         for n in 2..=12 {
             let mut met = BTreeSet::new();
             for round in 0..rounds(n) {
