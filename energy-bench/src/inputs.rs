@@ -3,7 +3,8 @@ use std::path::Path;
 use anyhow::Context;
 
 use crate::check::expected;
-use crate::subject::{Sample, Subject};
+use crate::sample::Sample;
+use crate::subject::Subject;
 
 /// Writes the inputs of the textbook formula of all elements, and the library's results, as little-endian doubles, element by
 /// element: `K1.inputs` and `K1.expected`, and so on.

@@ -4,7 +4,7 @@ use energy_dsl::{Declaration, Inputs, Kind, Number, Textbook};
 
 use crate::blocks::{Block, BlockName};
 use crate::dual::Hyper;
-use crate::multiprecision::{Jet, Order};
+use crate::jet::{Jet, Order};
 use crate::sample::Sample;
 
 /// The rows of a formula with first and second derivatives at one input.

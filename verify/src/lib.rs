@@ -27,6 +27,7 @@ mod finite_difference;
 mod formula;
 pub mod fuzz;
 mod geometry;
+mod jet;
 mod listings;
 pub mod multiprecision;
 pub mod reference;

@@ -80,7 +80,7 @@ impl BlockCholesky {
                 columns.push(rows.len());
             }
         }
-        let order = Order::of_groups(3, &groups, &others).map_err(failed)?;
+        let order = Order::by_minimum_degree(3, &groups, &others).map_err(failed)?;
         let factor = SparseFactor::new(columns, rows, Some(&order)).map_err(failed)?;
         Ok(Self { pattern: Arc::clone(pattern), factor })
     }

@@ -96,7 +96,7 @@ pub(crate) struct Order {
 impl Order {
     /// Computes an approximate minimum degree order for groups of `size` unknowns. `columns` and `rows` are the lower
     /// triangle of the groups' pattern.
-    pub(crate) fn of_groups(size: usize, columns: &[usize], rows: &[usize]) -> Result<Self, FaerError> {
+    pub(crate) fn by_minimum_degree(size: usize, columns: &[usize], rows: &[usize]) -> Result<Self, FaerError> {
         let groups = columns.len() - 1;
         let structure = SymbolicSparseColMatRef::new_checked(groups, groups, columns, None, rows);
         let (mut order, mut places) = (vec![0; groups], vec![0; groups]);

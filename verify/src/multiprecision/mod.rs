@@ -10,7 +10,6 @@
 mod big;
 #[cfg(not(feature = "rug"))]
 mod dashu;
-mod jet;
 #[cfg(feature = "rug")]
 mod rug;
 mod truth;
@@ -21,6 +20,5 @@ use dashu::Float;
 #[cfg(feature = "rug")]
 use rug::Float;
 
-pub(crate) use jet::{Jet, Order};
 pub use truth::{TrueBlock, truth};
 pub(crate) use truth::{truth_of_ordinary, worse};

@@ -44,7 +44,7 @@ struct Relaxed<T> {
     unit: f64,
     residual: Vec<Wide<T>>,
     smoothed: Vec<Wide<T>>,
-    carried: Vec<Wide<T>>,
+    prolonged: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
     next: Option<Coarse<T>>,
 }
@@ -123,7 +123,7 @@ impl<T: Precision> Relaxed<T> {
             unit: 1.0,
             residual: zeros.clone(),
             smoothed: zeros.clone(),
-            carried: zeros.clone(),
+            prolonged: zeros.clone(),
             solution: zeros,
             next: Coarse::below(pattern, &ranges),
         }
@@ -196,26 +196,26 @@ impl<T: Precision> Kernel for Up<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Relaxed { smoother, residual, carried, solution, next, .. } = self.level;
-        carried.fill([T::from_f64(0.0); 4]);
+        let Relaxed { smoother, residual, prolonged, solution, next, .. } = self.level;
+        prolonged.fill([T::from_f64(0.0); 4]);
         if let Some(Coarse { interpolation, correction, .. }) = next {
-            for row in 0..carried.len() {
-                carried[row] = smoother.scaled(row, &interpolation.carried::<L>(row, correction));
+            for row in 0..prolonged.len() {
+                prolonged[row] = smoother.scaled(row, &interpolation.prolonged::<L>(row, correction));
             }
-            smoother.subtract_lower::<L>(self.pattern, carried, residual);
+            smoother.subtract_lower::<L>(self.pattern, prolonged, residual);
         }
         smoother.backward::<L>(self.pattern, residual);
         add(solution, residual);
         if self.last {
             return;
         }
-        for row in 0..carried.len() {
+        for row in 0..prolonged.len() {
             for lane in 0..4 {
-                carried[row][lane] = residual[row][lane] - carried[row][lane];
+                prolonged[row][lane] = residual[row][lane] - prolonged[row][lane];
             }
         }
         residual.fill([T::from_f64(0.0); 4]);
-        smoother.subtract_lower::<L>(self.pattern, carried, residual);
+        smoother.subtract_lower::<L>(self.pattern, prolonged, residual);
     }
 }
 

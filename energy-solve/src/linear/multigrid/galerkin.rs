@@ -132,8 +132,8 @@ impl UpperTimes {
         let mut product = Self { columns: Vec::new(), start: vec![0], slots: Vec::new(), slot_start: vec![0] };
         for row in 0..fine.rows() {
             let before = product.columns.len();
-            let carried_by = fine.row(row).flat_map(|(_, column)| interpolation.columns(column));
-            for &aggregate in carried_by {
+            let prolonged_from = fine.row(row).flat_map(|(_, column)| interpolation.columns(column));
+            for &aggregate in prolonged_from {
                 let known = product.columns[before..].iter().position(|&known| known == aggregate);
                 product.slots.push(u16::try_from(known.unwrap_or(product.columns.len() - before)).ok()?);
                 if known.is_none() {

@@ -26,7 +26,7 @@ pub(super) struct Vectors<T> {
     /// p, q = A p and u = (I + L̃)⁻¹ q.
     direction: Vec<Wide<T>>,
     product: Vec<Wide<T>>,
-    forth: Vec<Wide<T>>,
+    forward_product: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
     /// The coarse correction e; then c − e.
     change: Vec<Wide<T>>,
@@ -42,7 +42,7 @@ impl<T: Precision> Vectors<T> {
             smoothed: zeros.clone(),
             direction: zeros.clone(),
             product: zeros.clone(),
-            forth: zeros.clone(),
+            forward_product: zeros.clone(),
             solution: zeros.clone(),
             change: zeros.clone(),
             back: zeros,
@@ -216,8 +216,8 @@ impl<T: Precision> Kernel for Start<'_, '_, '_, T> {
     fn run<L: Level>(self) -> f64 {
         let Part { number, vectors, inverses, b, .. } = self.part;
         let smoother = &self.common.smoothers[*number];
-        let Vectors { residual, smoothed, direction, product, forth, solution, .. } = &mut **vectors;
-        for zeros in [direction, product, forth, solution] {
+        let Vectors { residual, smoothed, direction, product, forward_product, solution, .. } = &mut **vectors;
+        for zeros in [direction, product, forward_product, solution] {
             zeros.fill([T::from_f64(0.0); 4]);
         }
         for row in 0..residual.len() {
@@ -280,8 +280,8 @@ impl<T: Precision> Kernel for PublishCorrection<'_, T> {
         let Self { smoother, coarse, border } = self;
         for (place, &local) in smoother.couplings.border().iter().enumerate() {
             let row = smoother.triangle.rows.start + local as usize;
-            let carried = coarse.interpolation.carried::<L>(row, &coarse.correction);
-            border[place] = smoother.scaled(local as usize, &carried);
+            let prolonged = coarse.interpolation.prolonged::<L>(row, &coarse.correction);
+            border[place] = smoother.scaled(local as usize, &prolonged);
         }
     }
 }
@@ -306,8 +306,8 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
             Some(coarse) => {
                 let coarse = coarse.read().expect("no other thread panicked");
                 for row in 0..change.len() {
-                    let carried = coarse.interpolation.carried::<L>(before + row, &coarse.correction);
-                    change[row] = smoother.scaled(row, &carried);
+                    let prolonged = coarse.interpolation.prolonged::<L>(before + row, &coarse.correction);
+                    change[row] = smoother.scaled(row, &prolonged);
                 }
             }
             None => change.fill([T::from_f64(0.0); 4]),
@@ -344,7 +344,7 @@ impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
         let Common { pattern, smoothers, changes, .. } = self.common;
         let Part { number, vectors, .. } = self.part;
         let smoother = &smoothers[*number];
-        let Vectors { residual, smoothed, direction, product, forth, change, back, .. } = &mut **vectors;
+        let Vectors { residual, smoothed, direction, product, forward_product, change, back, .. } = &mut **vectors;
         let conjugate = T::from_f64(self.conjugate);
         for row in 0..product.len() {
             let (mut p, mut q) = (direction[row], product[row]);
@@ -355,7 +355,7 @@ impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
             (direction[row], product[row]) = (p, q);
         }
         smoother.add_coupled::<L>(1.0, changes, change, product);
-        smoother.add_lower_and_forward::<L>(pattern, change, product, forth);
+        smoother.add_lower_and_forward::<L>(pattern, change, product, forward_product);
         let mut curvature = [0.0; 4];
         for row in 0..product.len() {
             add_products(&mut curvature, &direction[row], &product[row]);
@@ -377,7 +377,7 @@ impl<T: Precision> Kernel for Advance<'_, '_, '_, T> {
     #[inline(always)]
     fn run<L: Level>(self) -> f64 {
         let Part { number, vectors, .. } = self.part;
-        let Vectors { residual, smoothed, direction, product, forth, solution, .. } = &mut **vectors;
+        let Vectors { residual, smoothed, direction, product, forward_product, solution, .. } = &mut **vectors;
         let step = T::from_f64(self.step);
         let mut squares = [0.0; 4];
         for row in 0..residual.len() {
@@ -385,7 +385,7 @@ impl<T: Precision> Kernel for Advance<'_, '_, '_, T> {
             for lane in 0..4 {
                 x[lane] = direction[row][lane].mul_add::<L>(step, x[lane]);
                 r[lane] = product[row][lane].mul_add::<L>(-step, r[lane]);
-                s[lane] = forth[row][lane].mul_add::<L>(-step, s[lane]);
+                s[lane] = forward_product[row][lane].mul_add::<L>(-step, s[lane]);
             }
             (solution[row], residual[row], smoothed[row]) = (x, r, s);
             add_products(&mut squares, &s, &s);

@@ -99,7 +99,7 @@ impl<T: Precision> Interpolation<T> {
 
     /// Returns the row of P e.
     #[inline(always)]
-    pub(super) fn carried<L: Level>(&self, row: usize, e: &[Wide<T>]) -> Wide<T> {
+    pub(super) fn prolonged<L: Level>(&self, row: usize, e: &[Wide<T>]) -> Wide<T> {
         let mut sum = [T::from_f64(0.0); 4];
         for place in self.places(row) {
             let (weight, from) = (self.weights[place], e[self.columns[place] as usize]);

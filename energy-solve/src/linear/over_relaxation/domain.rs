@@ -18,9 +18,9 @@ pub(super) struct Domain<T> {
     residual: Vec<Wide<T>>,
     direction: Vec<Wide<T>>,
     /// t = (I + L̃ᵀ)⁻¹ p.
-    back: Vec<Wide<T>>,
+    backward_solution: Vec<Wide<T>>,
     /// w = (I + L̃)⁻¹ (p + (ω − 2) t + Ẽ t).
-    forth: Vec<Wide<T>>,
+    forward_solution: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
 }
 
@@ -33,8 +33,8 @@ impl<T: Precision> Domain<T> {
             couplings,
             residual: zeros.clone(),
             direction: zeros.clone(),
-            back: zeros.clone(),
-            forth: zeros.clone(),
+            backward_solution: zeros.clone(),
+            forward_solution: zeros.clone(),
             solution: zeros,
         }
     }
@@ -52,12 +52,12 @@ impl<T: Precision> Domain<T> {
         self.solution.fill(zero);
         self.direction.fill(zero);
         let per_scale = 1.0 / scale;
-        for row in 0..self.forth.len() {
+        for row in 0..self.forward_solution.len() {
             let [u, v, w] = scaled(&inverses[row], &b[row]);
-            self.forth[row] = [u, v, w, 0.0].map(|component| T::from_f64(component * per_scale));
+            self.forward_solution[row] = [u, v, w, 0.0].map(|component| T::from_f64(component * per_scale));
         }
         self.forward::<L>(pattern);
-        std::mem::swap(&mut self.residual, &mut self.forth);
+        std::mem::swap(&mut self.residual, &mut self.forward_solution);
         let mut squares = [0.0; 4];
         for vector in &self.residual {
             add_products(&mut squares, vector, vector);
@@ -75,7 +75,12 @@ impl<T: Precision> Domain<T> {
     ) -> f64 {
         let (conjugate, rest) = (T::from_f64(conjugate), T::from_f64(RELAXATION - 2.0));
         let rows = self.triangle.by_rows(pattern);
-        let (r, p, t, w) = (&self.residual[..], &mut self.direction[..], &mut self.back[..], &mut self.forth[..]);
+        let (r, p, t, w) = (
+            &self.residual[..],
+            &mut self.direction[..],
+            &mut self.backward_solution[..],
+            &mut self.forward_solution[..],
+        );
         let mut along = [0.0; 4];
         for row in (0..p.len()).rev() {
             let (residual, mut direction) = (r[row], p[row]);
@@ -91,21 +96,21 @@ impl<T: Precision> Domain<T> {
             add_products(&mut along, &direction, &back);
             (t[row], w[row]) = (back, start);
         }
-        self.couplings.publish(&self.back, border);
+        self.couplings.publish(&self.backward_solution, border);
         sum_of_three(along)
     }
 
     /// w ← w + Ẽ t.
     #[inline(always)]
     pub(super) fn couple<L: Level>(&mut self, borders: &[RwLock<Vec<Wide<T>>>]) {
-        self.couplings.add_product::<L>(T::from_f64(1.0), borders, &mut self.forth);
+        self.couplings.add_product::<L>(T::from_f64(1.0), borders, &mut self.forward_solution);
     }
 
     /// w ← (I + L̃)⁻¹ w. Returns p · w.
     #[inline(always)]
     pub(super) fn forward<L: Level>(&mut self, pattern: &Pattern) -> f64 {
         let rows = self.triangle.by_rows(pattern);
-        let (p, w) = (&self.direction[..], &mut self.forth[..]);
+        let (p, w) = (&self.direction[..], &mut self.forward_solution[..]);
         let mut along = [0.0; 4];
         for row in 0..w.len() {
             let here = w[row];
@@ -121,7 +126,8 @@ impl<T: Precision> Domain<T> {
     #[inline(always)]
     pub(super) fn advance<L: Level>(&mut self, step: f64) -> f64 {
         let step = T::from_f64(step);
-        let (t, w, x, r) = (&self.back[..], &self.forth[..], &mut self.solution[..], &mut self.residual[..]);
+        let (t, w, x, r) =
+            (&self.backward_solution[..], &self.forward_solution[..], &mut self.solution[..], &mut self.residual[..]);
         let mut squares = [0.0; 4];
         for row in 0..r.len() {
             let (t, w, mut solution, mut rest) = (t[row], w[row], x[row], r[row]);
