@@ -97,7 +97,7 @@ pub(crate) fn sweep(
     let chosen = (0..extrapolations.len() - 1).min_by(|&a, &b| disagreement(a).total_cmp(&disagreement(b)));
     let (step, best) = extrapolations.swap_remove(chosen.unwrap_or_default());
     let error = deviation(&best);
-    // Use the first step whose error is not yet dominated by rounding.
+    // Measure the order at the first step, unless rounding dominates its error.
     let order = plain
         .first()
         .filter(|(whole, half)| *half > 1e3 * error && *half > 1e-10 * largest(block) && *whole > *half)

@@ -37,10 +37,10 @@ impl Sample {
         }
     }
 
-    /// Checks that the sample has as many numbers as the declaration needs.
+    /// Checks that the sample has as many numbers as the declaration needs, all of them finite.
     ///
     /// # Errors
-    /// If a list has the wrong length, with its name and the expected length.
+    /// If a list has the wrong length, or contains a number that is not finite.
     pub fn fits(&self, declaration: &Declaration) -> Result<(), String> {
         let size = |fields: &[Field]| fields.iter().map(|field| field.size).sum::<usize>();
         let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };

@@ -1,88 +1,26 @@
+//! Sums of terms over the vertices of a body.
+
 mod constant;
 mod division;
+mod error;
+mod linearise;
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use energy_dsl::{Block, Vector3};
+use energy_dsl::Vector3;
 
-use self::constant::{ConstantPart, coupled_runs};
-use self::division::Sums;
-use crate::matrix::block_matrix::{BlockMatrix, Contents};
+use self::constant::ConstantPart;
+pub use self::error::{EvaluationError, SystemError};
+pub use self::linearise::{LinearisationOptions, LinearisedForces};
+use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Precision;
 use crate::terms::counts::{Counts, Tally};
-use crate::terms::curvature::Curvature;
-use crate::terms::linearisation::{Linearisation, Weights};
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
-use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
-
-/// An element that does not fit the vertices of its system.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SystemError {
-    /// An element acts on a vertex that does not exist.
-    #[error(
-        "{term}: element {element} names vertex {vertex}, but there are only {vertex_count} vertices (0 to {})",
-        .vertex_count.saturating_sub(1)
-    )]
-    VertexOutOfRange {
-        /// Name of the term.
-        term: String,
-        /// Index of the element.
-        element: usize,
-        /// Index of the missing vertex.
-        vertex: usize,
-        /// Number of vertices of the system.
-        vertex_count: usize,
-    },
-}
-
-/// A sum that could not be evaluated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum EvaluationError {
-    /// The number of positions or velocities is not the number of vertices.
-    #[error("the system has {expected} vertices, but {found} {what} were given")]
-    WrongLength {
-        /// "positions" or "velocities".
-        what: &'static str,
-        /// Number of vertices of the system.
-        expected: usize,
-        /// Number of vectors given.
-        found: usize,
-    },
-    /// A position or velocity is infinite or NaN.
-    #[error("vertex {vertex} has a non-finite {what}: {value:?}")]
-    NonFiniteState {
-        /// "position" or "velocity".
-        what: &'static str,
-        /// Index of the vertex.
-        vertex: usize,
-        /// The position or velocity.
-        value: Vector3<f64>,
-    },
-    /// The force or energy of an element is infinite or NaN.
-    #[error(
-        "{term}: element {element} on vertices {vertices:?} has a non-finite {what} at finite positions and velocities"
-    )]
-    NonFiniteElement {
-        /// Name of the term.
-        term: String,
-        /// Index of the element.
-        element: usize,
-        /// Vertices of the element.
-        vertices: Vec<usize>,
-        /// Whether the energy or the force is not finite.
-        what: Quantity,
-    },
-    /// Each element's energy or force is finite, but the sum is not.
-    #[error("the {what} of each element is finite, but their sum overflows")]
-    NonFiniteSum {
-        /// Whether the energy or the force is not finite.
-        what: Quantity,
-    },
-}
+use crate::terms::term::{Character, PlacedTerm, Quantity, Term};
 
 /// The energy of one term.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,26 +29,6 @@ pub struct TermEnergy<'a> {
     pub term: &'a str,
     /// Σ U, in J; `None` for a force law.
     pub energy: Option<f64>,
-}
-
-/// The vectors that [`System::linearise`] returns, one entry per vertex.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LinearisedForces {
-    /// f, in N.
-    pub force: Vec<Vector3<f64>>,
-    /// (∂f/∂x) v, in N/s; empty if it was not requested.
-    pub stiffness_times_velocity: Vec<Vector3<f64>>,
-}
-
-/// Options of [`System::linearise`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinearisationOptions {
-    /// α and β.
-    pub weights: Weights,
-    /// Treatment of negative eigenvalues of element Hessians.
-    pub curvature: Curvature,
-    /// Whether to compute (∂f/∂x) v.
-    pub stiffness_times_velocity: bool,
 }
 
 /// A sum of terms over the vertices of one body.
@@ -310,162 +228,6 @@ impl System {
         Ok(force)
     }
 
-    /// Writes α ∂f/∂x + β ∂f/∂v over the free vertices to `matrix` and returns f and (∂f/∂x) v of all vertices.
-    ///
-    /// The system keeps the constant part of each matrix, so pass the same matrix to every step.
-    ///
-    /// # Errors
-    /// If the state is incomplete or not finite, or a force is not finite.
-    ///
-    /// # Panics
-    /// If the matrix was not created by this system.
-    pub fn linearise(
-        &mut self,
-        state: State<'_>,
-        options: LinearisationOptions,
-        matrix: &mut BlockMatrix<impl Precision>,
-    ) -> Result<LinearisedForces, EvaluationError> {
-        self.linearise_with_masses(state, options, &[], matrix)
-    }
-
-    /// Writes M + α ∂f/∂x + β ∂f/∂v, with the vertices' masses, in kg, on the diagonal; otherwise as
-    /// [`System::linearise`]. Masses belong to the constant part of the matrix.
-    ///
-    /// # Errors
-    /// If the state is incomplete or not finite, or a force is not finite.
-    ///
-    /// # Panics
-    /// If the matrix was not created by this system, or the number of masses is neither zero nor that of the vertices.
-    pub fn linearise_with_masses<T: Precision>(
-        &mut self,
-        state: State<'_>,
-        options: LinearisationOptions,
-        masses: &[f64],
-        matrix: &mut BlockMatrix<T>,
-    ) -> Result<LinearisedForces, EvaluationError> {
-        self.check(state)?;
-        assert!(
-            masses.is_empty() || masses.len() == self.dofs.vertex_count(),
-            "expected a mass for every vertex, or no masses"
-        );
-        assert!(self.owns(matrix), "the matrix belongs to another system");
-        let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
-        // The product (∂f/∂x) v needs the Jacobian of every term, so none is reused.
-        let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
-        if !with_constant {
-            self.terms.iter_mut().for_each(|counted| counted.term.place_blocks(&self.dofs, &self.pattern));
-        }
-        let contents = matrix.take_contents();
-        let known = contents.and_then(|contents| Some((self.take_constant(&contents)?, contents)));
-        let constant = with_constant.then(|| match known {
-            Some((known, contents)) if known.matches(weights, curvature, masses) => (known, contents),
-            _ => self.constant(state, (weights, curvature), masses, matrix),
-        });
-        let linear = |term: &dyn PlacedTerm| term.character().curved && !(with_constant && is_constant(term));
-        let mut product = if wanted { force.clone() } else { Vec::new() };
-        let product_wanted = wanted.then_some(&mut product[..]);
-        state.x.clone_into(&mut self.evaluated_at);
-        let values = matrix.values_and_nowhere();
-        let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
-        let part = constant.as_ref().map(|(part, _)| part);
-        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, part, &mut sums);
-        let mut sum = sums.linearisation();
-        for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
-            if linear(&**term) {
-                counts.hessian += divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
-            } else {
-                let tally = divided.unwrap_or_else(|| term.add_force(state, sum.force));
-                counts.reused += if term.character().curved { tally.evaluated } else { 0 };
-                counts.gradient += tally;
-            }
-        }
-        if let Some((part, contents)) = constant {
-            self.constants.push(part);
-            matrix.set_contents(Some(contents));
-        }
-        if force.iter().flatten().any(|component| !component.is_finite()) {
-            return Err(self.find_non_finite_force(state));
-        }
-        if !with_constant {
-            add_masses(&self.dofs, &self.pattern, masses, matrix.values_mut());
-        }
-        Ok(LinearisedForces { force, stiffness_times_velocity: product })
-    }
-
-    /// Removes and returns the constant part of a matrix with these contents.
-    fn take_constant(&mut self, contents: &Arc<Contents>) -> Option<ConstantPart> {
-        let found = self.constants.iter().position(|part| part.is_in(contents))?;
-        Some(self.constants.swap_remove(found))
-    }
-
-    /// Evaluates the masses and the Jacobians of the quadratic terms, and writes them to the matrix.
-    fn constant<T: Precision>(
-        &mut self,
-        state: State<'_>,
-        (weights, curvature): (Weights, Curvature),
-        masses: &[f64],
-        matrix: &mut BlockMatrix<T>,
-    ) -> (ConstantPart, Arc<Contents>) {
-        self.constants.retain(ConstantPart::is_in_use);
-        let runs = self.changing_places();
-        // Projecting tells whether there was anything to project.
-        let mut treated = Curvature::Clamped;
-        let projected = self.evaluate_constant(state, weights, treated, masses, matrix);
-        if projected && curvature != treated {
-            treated = curvature;
-            self.evaluate_constant(state, weights, treated, masses, matrix);
-        }
-        let contents = Arc::new(Contents);
-        let part = (weights, treated);
-        (ConstantPart::new(&contents, part, masses, projected, runs, T::blocks(matrix.values_mut())), contents)
-    }
-
-    /// Writes masses and quadratic Jacobians to the matrix. Returns whether the Hessian of some element was projected.
-    fn evaluate_constant<T: Precision>(
-        &mut self,
-        state: State<'_>,
-        weights: Weights,
-        curvature: Curvature,
-        masses: &[f64],
-        matrix: &mut BlockMatrix<T>,
-    ) -> bool {
-        let blocks = matrix.values_and_nowhere();
-        blocks.fill([[T::from_f64(0.0); 3]; 3]);
-        add_masses(&self.dofs, &self.pattern, masses, blocks);
-        let mut sum = Linearisation {
-            weights,
-            curvature,
-            matrix: T::blocks(blocks),
-            force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
-            stiffness_times_velocity: None,
-        };
-        let mut projected = false;
-        for Counted { term, counts } in self.terms.iter_mut().filter(|counted| is_constant(&*counted.term)) {
-            term.place_blocks(&self.dofs, &self.pattern);
-            let tally = term.add_linearisation(state, &mut sum);
-            term.forget_blocks();
-            projected |= tally.projected > 0;
-            counts.hessian += tally;
-        }
-        projected
-    }
-
-    /// Returns the blocks that terms with non-constant Jacobians write.
-    fn changing_places(&mut self) -> Arc<[Range<u32>]> {
-        if let Some(known) = &self.changing {
-            return Arc::clone(known);
-        }
-        let terms = self.terms.iter().map(|counted| &*counted.term);
-        let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
-        let runs = coupled_runs(
-            &self.pattern,
-            |vertex| self.dofs.place(vertex as usize),
-            changing.map(TermDescription::stencils),
-        );
-        Arc::clone(self.changing.insert(runs))
-    }
-
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
         self.check_state("position", state.x)?;
         self.check_state("velocity", state.v)
@@ -486,23 +248,6 @@ impl System {
     fn find_non_finite_force(&self, state: State<'_>) -> EvaluationError {
         blame(self.terms.iter().map(|counted| &*counted.term), Quantity::Force, state)
     }
-}
-
-/// Adds the masses, if there are any, to the diagonal.
-fn add_masses<T: Precision>(dofs: &DofMap, pattern: &Pattern, masses: &[f64], blocks: &mut [Block<T>]) {
-    let free = if masses.is_empty() { &[] } else { dofs.free() };
-    for (row, &vertex) in free.iter().enumerate() {
-        let diagonal = &mut blocks[pattern.diagonal(row)];
-        for axis in 0..3 {
-            diagonal[axis][axis] = diagonal[axis][axis] + T::from_f64(masses[vertex]);
-        }
-    }
-}
-
-/// Whether a term's Jacobians are constant, so that they are evaluated only once.
-fn is_constant(term: &dyn PlacedTerm) -> bool {
-    let Character { quadratic, curved, .. } = term.character();
-    quadratic && curved
 }
 
 /// Evaluates element by element to find the first with a non-finite energy or force.

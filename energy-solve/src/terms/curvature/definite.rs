@@ -2,8 +2,8 @@ use energy_dsl::{Lane, Mask};
 
 use super::{MOST, upper_index};
 
-/// Relative tolerance: an eigenvalue above −τ, with τ this fraction of the largest diagonal entry, counts as zero. A
-/// membrane at rest has a singular Hessian, and rounding moves its zero eigenvalues to either side.
+/// Relative tolerance: an eigenvalue above −τ, with τ this fraction of the largest diagonal entry, counts as
+/// non-negative. A membrane at rest has a singular Hessian, and rounding moves its zero eigenvalues to either side.
 const TOLERANCE: f64 = 64.0 * f64::EPSILON;
 
 /// Returns a mask of the lanes where A + τ I has a factorisation L D Lᵀ with D > 0, so that no eigenvalue of A is below
