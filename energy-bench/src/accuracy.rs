@@ -6,7 +6,8 @@ use serde::Serialize;
 use verify::BlockName;
 use verify::multiprecision::{TrueBlock, truth};
 
-use crate::subject::{Answer, Sample, Subject};
+use crate::sample::{Answer, Sample};
+use crate::subject::Subject;
 
 /// How far from rest: a strain, or an angle.
 pub const STRAIN: f64 = 1e-6;

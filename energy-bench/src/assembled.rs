@@ -7,9 +7,9 @@ use energy_dsl::{
 };
 use energy_solve::{BlockMatrix, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
 
-use crate::run::{TOGETHER, Work};
-use crate::subject::{Sample, points};
+use crate::sample::{Sample, points};
 use crate::vector::{add, sub};
+use crate::work::{TOGETHER, Work};
 
 /// The work of all elements by way of vertices.
 pub struct Assembled {

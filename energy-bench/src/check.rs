@@ -4,8 +4,10 @@ use std::marker::PhantomData;
 
 use energy_dsl::{available, dispatch_at};
 
-use crate::run::{Collect, Doubles, One, Width, lanes, packed};
-use crate::subject::{Answer, Sample, Subject};
+use crate::run::Collect;
+use crate::sample::{Answer, Sample};
+use crate::subject::Subject;
+use crate::work::{Doubles, One, Width, lanes, packed};
 
 /// How far results may be apart, relative to the largest number of the same order of derivative.
 pub const TOLERANCE: f64 = 1e-9;

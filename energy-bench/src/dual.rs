@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 use num_dual::{Dual2Vec, DualNum, hessian};
 
-use crate::subject::Derivatives;
+use crate::sample::Derivatives;
 
 /// Any of num-dual's numbers over `f64`.
 pub trait Dual: DualNum<Primitive = f64> + Copy {}

@@ -3,7 +3,8 @@ use std::path::Path;
 use anyhow::Context;
 
 use crate::check::expected;
-use crate::subject::{Sample, Subject};
+use crate::sample::Sample;
+use crate::subject::Subject;
 
 /// Writes the inputs of the textbook formula of all elements, and the library's results, as little-endian doubles, element by
 /// element: `K1.inputs` and `K1.expected`, and so on.
@@ -16,7 +17,7 @@ pub fn write_inputs<K: Subject>(folder: &Path, samples: &[Sample]) -> anyhow::Re
     let results = expected::<K>(samples).concat();
     for (what, bytes) in [("inputs", bytes(inputs)), ("expected", bytes(results.into_iter()))] {
         let path = folder.join(format!("{}.{what}", K::KEY));
-        verify::write_whole(&path, &bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        energy_cli::write_file(&path, &bytes)?;
     }
     Ok(())
 }

@@ -6,8 +6,8 @@ use energy_dsl::OperationCount;
 use serde::Serialize;
 
 use crate::accuracy::NearRest;
-use crate::contenders::Contender;
-use crate::run::Work;
+use crate::contender::Contender;
+use crate::work::Work;
 
 /// A contender's time.
 #[derive(Clone, Copy, Debug)]

@@ -1,83 +1,13 @@
-//! The loops that are measured: all elements in, results written to a buffer of a few elements that stays in the cache, so
-//! that arithmetic is compared and not memory.
+//! The loops that are measured: a kernel's code on all elements.
 
-use std::fmt::Debug;
 use std::hint::black_box;
 use std::marker::PhantomData;
 
-use energy_dsl::{Aligned, Array, Baseline, Kernel, Lane, Level, Number, Real};
+use energy_dsl::{Array, Baseline, Kernel, Lane, Level, Number, Real};
 
-use crate::subject::{Answer, Sample, Subject};
-
-/// How many elements' results the buffer holds.
-pub const TOGETHER: usize = 16;
-
-/// Work on all elements.
-pub type Work = Box<dyn FnMut()>;
-
-/// One element at a time, or as many as there are lanes.
-pub trait Width: Debug + 'static {
-    /// A number of which there are several.
-    type Scalar: Real;
-    /// What is computed with at a level.
-    type Number<L: Level>: Lane<Self::Scalar>;
-}
-
-macro_rules! width {
-    ($(#[$docs:meta])* $name:ident: $scalar:ty, $number:ty) => {
-        $(#[$docs])*
-        #[derive(Clone, Copy, Debug)]
-        pub struct $name;
-
-        impl Width for $name {
-            type Scalar = $scalar;
-            type Number<L: Level> = $number;
-        }
-    };
-}
-
-width!(
-    /// One double.
-    One: f64, f64
-);
-width!(
-    /// Lanes of doubles.
-    Doubles: f64, L::F64
-);
-width!(
-    /// Lanes of single-precision numbers.
-    Singles: f32, L::F32
-);
-
-/// How many lanes there are at the level of the kernel.
-struct Lanes<W>(PhantomData<W>);
-
-impl<W: Width> Kernel for Lanes<W> {
-    type Output = usize;
-
-    #[inline(always)]
-    fn run<L: Level>(self) -> usize {
-        <W::Number<L> as Lane<W::Scalar>>::LANES
-    }
-}
-
-/// The lanes of a width at a level; nothing if the machine has no such level.
-#[must_use]
-pub fn lanes<W: Width>(level: energy_dsl::LevelName) -> Option<usize> {
-    energy_dsl::dispatch_at(level, Lanes::<W>(PhantomData))
-}
-
-/// Elements side by side: number by number, `width` elements together. With a width of one, an array of structs.
-#[must_use]
-pub fn packed<S: Real>(samples: &[Sample], width: usize, of: impl Fn(&Sample) -> &[f64]) -> Aligned<S> {
-    let mut numbers = Vec::new();
-    for block in samples.chunks_exact(width) {
-        for i in 0..of(&block[0]).len() {
-            numbers.extend(block.iter().map(|sample| S::from_f64(of(sample)[i])));
-        }
-    }
-    Aligned::from(numbers.as_slice())
-}
+use crate::sample::Answer;
+use crate::subject::Subject;
+use crate::work::{TOGETHER, Width, call_each, each_block};
 
 #[inline(always)]
 fn hand<K: Subject, S: Real, V: Lane<S>, L: Level>(numbers: &[S]) -> K::HandAnswer<V> {
@@ -87,26 +17,6 @@ fn hand<K: Subject, S: Real, V: Lane<S>, L: Level>(numbers: &[S]) -> K::HandAnsw
     }
     K::hand::<V, L>(&x)
 }
-
-/// The loop over blocks of `size` numbers, each of as many elements as `lanes`.
-macro_rules! each_block {
-    ($numbers:expr, $size:expr, $lanes:expr, |$block:ident| $call:expr) => {{
-        let (numbers, size) = ($numbers, $size);
-        let first = {
-            let $block = &numbers[..size];
-            $call
-        };
-        let mut results = vec![first; $crate::run::TOGETHER / $lanes];
-        for group in numbers.chunks(size * ($crate::run::TOGETHER / $lanes)) {
-            for ($block, result) in group.chunks_exact(size).zip(&mut results) {
-                *result = $call;
-            }
-            std::hint::black_box(&mut results);
-        }
-    }};
-}
-
-pub(crate) use each_block;
 
 /// Hand-derived code on all elements, [`packed`] for the lanes of the level.
 #[derive(Debug)]
@@ -141,23 +51,6 @@ impl<K: Subject, W: Width> Kernel for Library<'_, K, W> {
 /// The library's plain method on all elements, with the unknowns of all one after the other.
 pub fn library_plain<K: Subject>(elements: &[K::Element], unknowns: &[f64]) {
     call_each(elements, unknowns, K::library_plain, K::library_plain_into);
-}
-
-/// A call for each element, after one that makes room for results.
-pub(crate) fn call_each<E, A: Clone>(
-    elements: &[E],
-    unknowns: &[f64],
-    first: impl Fn(&E, &[f64]) -> A,
-    call: impl Fn(&E, &[f64], &mut A),
-) {
-    let size = unknowns.len() / elements.len();
-    let mut results = vec![first(&elements[0], &unknowns[..size]); TOGETHER];
-    for (elements, unknowns) in elements.chunks(TOGETHER).zip(unknowns.chunks(size * TOGETHER)) {
-        for ((element, unknowns), result) in elements.iter().zip(unknowns.chunks_exact(size)).zip(&mut results) {
-            call(element, unknowns, result);
-        }
-        black_box(&mut results);
-    }
 }
 
 /// Hand-derived code on one element, for [`Number::dispatch`]: at the level that the library's plain methods run at.

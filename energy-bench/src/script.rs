@@ -3,7 +3,7 @@ use std::process::Command;
 
 use anyhow::{Context, bail};
 
-use crate::contenders::Contender;
+use crate::contender::Contender;
 use crate::measure::Time;
 
 /// Runs `scripts/symbolic_kernels.py` on a folder of inputs; the times by kernel.

@@ -2,7 +2,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use energy_dsl::LevelName;
 
 use crate::accuracy::NearRest;
-use crate::contenders::Contender;
+use crate::contender::Contender;
 use crate::measure::Measured;
 
 /// Times and their ratios, one kernel a column.

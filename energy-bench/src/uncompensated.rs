@@ -5,9 +5,9 @@ use std::marker::PhantomData;
 use energy_dsl::energy;
 use energy_dsl::{Array, Kernel, Lane, Level, LevelName, PackedPotential, Potential, Vector3, available, dispatch_at};
 
-use crate::contenders::Contender;
-use crate::run::{Doubles, Work, call_each, each_block, lanes, packed};
-use crate::subject::{Answer, Sample, points, potential};
+use crate::contender::Contender;
+use crate::sample::{Answer, Sample, points, potential};
+use crate::work::{Doubles, Work, call_each, each_block, lanes, packed};
 
 energy! {
     /// K1.

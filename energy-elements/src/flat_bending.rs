@@ -22,16 +22,3 @@ energy! {
         3 / 4 * k * per_area * norm_squared(K)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use energy_dsl::Element;
-
-    use super::FlatBending;
-
-    #[test]
-    fn its_hessian_need_be_computed_only_once() {
-        assert!(<FlatBending as Element>::DECLARATION.quadratic);
-        assert!(!<crate::NeoHookean as Element>::DECLARATION.quadratic);
-    }
-}

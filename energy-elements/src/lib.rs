@@ -1,4 +1,6 @@
-//! Declared energies, constraints and forces, one file each: formula, source, and a test that audits its derivatives.
+//! Declared energies, constraints and forces, one file each: formula, source and audited properties.
+//!
+//! The crate `verify` depends on this one, so the audits that `#[audit]` asks for run in its `tests/elements.rs`.
 //!
 //! ```
 //! use energy_dsl::Potential;

@@ -20,6 +20,12 @@ fn operations(declaration: &energy_dsl::Declaration, routine: &str) -> usize {
 }
 
 #[test]
+fn flat_bending_has_a_constant_hessian() {
+    assert!(find("FlatBending").unwrap().declaration.quadratic);
+    assert!(!find("NeoHookean").unwrap().declaration.quadratic);
+}
+
+#[test]
 fn hessians_stay_small() {
     for (name, most) in [("HookeSpring", 60), ("HairBend", 230), ("QuadraticHinge", 750)] {
         let count = operations(find(name).unwrap().declaration, "hessian");

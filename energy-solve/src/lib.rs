@@ -1,25 +1,35 @@
-//! Sums of elements: gather, block-sparse assembly, iterative solvers.
+//! Sums of energies and forces over meshes, and solvers for the linear systems that they lead to.
 //!
-//! An [`ElementList`] holds elements of one type and the vertices each acts on. A [`System`] sums lists of different types
-//! ([`Term`]s) over the vertices of one body, some of which may be pinned, and yields
+//! An [`ElementList`] holds elements of one type and the vertices each acts on. A [`System`] sums such lists
+//! ([`Term`]s) over the vertices of one body, some of which may be pinned. It returns
 //!
-//! * the energy U(x) of every term that has one,
-//! * the force f(x, v) on every vertex, in N,
-//! * α ∂f/∂x + β ∂f/∂v over the free vertices as a [`BlockMatrix`] whose pattern is built once (its upper triangle, where all
-//!   terms are symmetric), with the elements' Hessians as they are or made positive semi-definite ([`Curvature`]), and (∂f/∂x) v.
+//! * the energy U(x) of each term that has one;
+//! * the force f(x, v) on each vertex, in N;
+//! * the matrix α ∂f/∂x + β ∂f/∂v over the free vertices, as a [`BlockMatrix`] with a fixed pattern, and the vector
+//!   (∂f/∂x) v. If every term is symmetric, only the upper triangle is stored. [`Curvature`] selects exact or positive
+//!   semi-definite element Hessians.
 //!
-//! Pinned vertices are removed from the matrix, not penalised; elements with pinned vertices only are never evaluated. What
-//! was evaluated and what was skipped is counted ([`Counts`]). [`conjugate_gradients`] and [`bicgstab`] solve with the matrix, and
-//! [`OverRelaxation`] to the few digits that Newton's method wants, in a fraction of the time; [`Multigrid`] where sheets are so fine or so stiff that the
-//! iterations of both are many; [`BlockCholesky`] to all digits.
+//! Pinned vertices are removed from the matrix, not penalised, and elements whose vertices are all pinned are never
+//! evaluated. [`Counts`] records what was evaluated and skipped.
 //!
-//! Potentials are evaluated many elements at once, and by several threads ([`System::set_threads`], [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is
-//! deterministic: sums run in the order of terms and elements, whatever the number of threads.
+//! Linear solvers:
+//!
+//! * [`OverRelaxation`] is the fastest for the few digits that Newton's method needs.
+//! * [`Multigrid`] replaces it for meshes so fine or stiff that it takes too many iterations.
+//! * [`BlockCholesky`] solves to full precision.
+//! * [`conjugate_gradients`] and [`bicgstab`] take a [`Preconditioner`]. BiCGSTAB also solves systems that are not
+//!   symmetric.
+//!
+//! Potentials are evaluated in SIMD lanes and by several threads ([`System::set_threads`],
+//! [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is deterministic: sums run in the order
+//! of terms and elements, for any number of threads.
+//!
+//! A [`GaussNewton`] solver minimises sums of squared residuals ([`ResidualTerm`]) over blocks of unknowns.
 //!
 //! ```
 //! use energy_solve::{BlockJacobi, BlockMatrix, Pattern, SolveOptions, Storage, conjugate_gradients};
 //!
-//! // One vertex held by three springs of stiffness 2, 4 and 8 N/m along the axes, pulled with 1 N along each.
+//! // One vertex held by springs of 2, 4 and 8 N/m along the axes, pulled with 1 N along each axis.
 //! let mut matrix = BlockMatrix::zeros(Pattern::from_stencils(Storage::Upper, 1, []).into());
 //! for (axis, stiffness) in [2.0, 4.0, 8.0].into_iter().enumerate() {
 //!     matrix.diagonal_mut(0)[axis][axis] = stiffness;

@@ -1,16 +1,17 @@
-//! Work divided among threads. What is done does not depend on how many there are; only who does it.
+//! Work divided among threads. The results do not depend on the number of threads.
 
 use std::panic::resume_unwind;
 
-/// Does `work` with every item, on at most so many threads, this one among them. The results are in the order of the items.
+/// Applies `work` to every item on at most `threads` threads, including the calling one. Results are in the order of
+/// the items.
 pub(crate) fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
     let each = |items: Vec<I>| items.into_iter().map(&work).collect::<Vec<R>>();
     in_parts(threads, items, each).into_iter().flatten().collect()
 }
 
-/// Divides the items among at most so many threads, each of which does `work` with its part, all at the same time.
+/// Divides the items among at most `threads` threads and applies `work` to each part, all parts at the same time.
 pub(crate) fn in_parts<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(Vec<I>) -> R + Sync) -> Vec<R> {
-    let mut parts = divided(items, threads).into_iter();
+    let mut parts = split(items, threads).into_iter();
     let Some(own) = parts.next() else { return Vec::new() };
     std::thread::scope(|scope| {
         let work = &work;
@@ -21,15 +22,15 @@ pub(crate) fn in_parts<I: Send, R: Send>(threads: usize, items: Vec<I>, work: im
     })
 }
 
-/// At most so many runs of about the same length, none of them empty.
-fn divided<I>(items: Vec<I>, parts: usize) -> Vec<Vec<I>> {
+/// Splits the items into at most `parts` non-empty runs of about the same length.
+fn split<I>(items: Vec<I>, parts: usize) -> Vec<Vec<I>> {
     let (count, parts) = (items.len(), parts.clamp(1, items.len().max(1)));
     let mut items = items.into_iter();
     let run = |part: usize| items.by_ref().take((part + 1) * count / parts - part * count / parts).collect::<Vec<I>>();
     (0..parts).map(run).filter(|run| !run.is_empty()).collect()
 }
 
-/// Consecutive parts of a slice with these lengths.
+/// Splits a slice into consecutive parts of these lengths.
 pub(crate) fn split_mut<T>(mut slice: &mut [T], lengths: impl IntoIterator<Item = usize>) -> Vec<&mut [T]> {
     let mut parts = Vec::new();
     for length in lengths {

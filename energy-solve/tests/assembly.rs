@@ -29,7 +29,7 @@ fn dampers() -> Box<dyn Term> {
     Box::new(ForceTerm::new(ElementList::new("dampers", elements, &EDGES).unwrap()))
 }
 
-/// Springs without rest length, whose Jacobians are constant, two of them between vertices that nothing else couples.
+/// Springs without rest length, whose Jacobians are constant. Two of them connect vertices that nothing else couples.
 fn slack_springs() -> Box<dyn Term> {
     let edges = [[0, 1], [0, 4], [2, 4]];
     let elements = (0..3).map(|i| AnySpring::<f64, true> { stiffness: 3.0 + i as f64, length: 0.0 }).collect();
@@ -77,7 +77,8 @@ fn matrix_is_the_derivative_of_the_force() {
                         let got = matrix.block(row, column)[component][axis];
                         assert!(
                             (got - expected).abs() < 1e-7,
-                            "by velocity: {by_velocity}, block ({row}, {column}), entry ({component}, {axis}): {got} {expected}"
+                            "by velocity: {by_velocity}, block ({row}, {column}), entry ({component}, {axis}): \
+                             {got} {expected}"
                         );
                     }
                 }
@@ -94,7 +95,7 @@ fn masses_are_added_on_the_diagonal() {
     let heavier: Vec<f64> = masses.iter().map(|mass| 2.0 * mass).collect();
     let weights = Weights { position: -1e-2, velocity: -0.1 };
     let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
-    // Slack springs have constant Jacobians, others have not.
+    // Only slack springs have constant Jacobians.
     let ropes = |terms| System::new(terms, &[false, false, false, true, false]).unwrap();
     for mut system in [system(&[3]), ropes(vec![springs()]), ropes(vec![springs(), slack_springs()])] {
         let mut bare = system.matrix();
@@ -129,7 +130,7 @@ fn single_precision_rounds_the_matrix_and_nothing_else() {
         let options = LinearisationOptions { stiffness_times_velocity: wanted, ..options(weights, Curvature::Exact) };
         let (mut double, mut single) = (system.matrix(), system.matrix_in::<f32>());
         let expected = system.linearise_with_masses(state, options, &[0.5; 5], &mut double).unwrap();
-        // What is constant is kept the first time, and evaluated again where the matrix was changed.
+        // The constant part is kept the first time, and evaluated again after the matrix was changed.
         for time in 0..3 {
             if time == 2 {
                 single.values_mut().fill([[7.0; 3]; 3]);
@@ -204,7 +205,7 @@ fn pinning_removes_rows_and_columns() {
 }
 
 #[test]
-fn counts_say_what_was_evaluated_and_skipped() {
+fn evaluated_and_skipped_elements_are_counted() {
     let mut system = system(&[0, 3]);
     assembled(&mut system, Weights { position: 1.0, velocity: 0.0 });
     system.energies(&velocities()).unwrap();
@@ -243,7 +244,7 @@ fn energies_that_came_with_forces_are_not_evaluated_again() {
     agree(energies(&mut system));
     assert_eq!(evaluated(&system), before);
 
-    // Elsewhere they are, and after a step began, which may change what terms hold fixed.
+    // Energies are evaluated at other positions, and after the start of a step, which may change what terms hold fixed.
     let elsewhere = velocities();
     assert!(system.energies(&elsewhere).unwrap()[0].energy != expected[0]);
     agree(energies(&mut system));
@@ -287,16 +288,14 @@ fn constant_jacobians_are_evaluated_once_for_each_matrix() {
         assert_eq!(added(&mut system, LinearisationOptions { weights, ..options }, matrix), 3);
     }
     assert_eq!(one.values(), two.values());
-    assert_eq!(added(&mut system, options, &mut system_matrix(&copy)), 3);
-}
-
-/// A zero matrix of the same pattern.
-fn system_matrix(matrix: &BlockMatrix) -> BlockMatrix {
-    BlockMatrix::zeros(matrix.pattern().clone())
+    let mut new = system.matrix();
+    assert_eq!(added(&mut system, options, &mut new), 3);
+    assert_eq!(added(&mut system, options, &mut copy), 0);
+    assert_eq!(new.values(), copy.values());
 }
 
 #[test]
-fn what_is_pinned_altogether_is_counted_as_skipped() {
+fn elements_with_pinned_vertices_only_are_counted_as_skipped() {
     let mut pinned = system(&[0, 1, 2, 3, 4]);
     assert_eq!(pinned.energies(&positions()).unwrap()[0].energy, Some(0.0));
     let (_, counts) = pinned.terms().next().unwrap();
@@ -328,7 +327,8 @@ fn stencils_that_do_not_fit_are_named() {
     assert_eq!(arity.to_string(), "hinges: Spring acts on 2 points, but its stencils have 3 vertices");
     let repeated = ElementList::new("springs", vec![spring; 2], &[[0, 1], [4, 4]]).unwrap_err();
     assert_eq!(repeated, ListError::RepeatedVertex { list: "springs".into(), index: 1, vertex: 4 });
-    assert!(matches!(ElementList::new("s", vec![spring], &[[0, 1], [1, 2]]), Err(ListError::CountMismatch { .. })));
+    let count = ElementList::new("springs", vec![spring], &[[0, 1], [1, 2]]).unwrap_err();
+    assert_eq!(count.to_string(), "springs: expected one stencil per element, got 2 stencils for 1 elements");
     let list = ElementList::new("springs", vec![spring; 2], &[[0, 1], [1, 7]]).unwrap();
     let range = System::new(vec![Box::new(PotentialTerm::new(list))], &[false; 3]).unwrap_err();
     let SystemError::VertexOutOfRange { element, vertex, .. } = &range;
@@ -344,7 +344,7 @@ fn non_finite_numbers_are_traced_to_their_source() {
     let state = system.forces(State { x: &x, v: &v }).unwrap_err();
     assert!(matches!(state, EvaluationError::NonFiniteState { what: "position", vertex: 2, .. }), "{state}");
 
-    // Coincident ends: this spring, unlike the robust ones, divides by zero.
+    // This spring, unlike the robust ones, divides by zero at coincident ends.
     x[2] = x[1];
     let element = system.forces(State { x: &x, v: &v }).unwrap_err();
     assert_eq!(

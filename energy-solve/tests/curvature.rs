@@ -1,4 +1,4 @@
-//! Hessians made positive semi-definite over lanes, in the coordinates of an element, against the eigenvalues of the full matrix.
+//! Projection in the reduced coordinates of an element, in lanes, against the eigenvalues of the full matrix.
 
 #![allow(mixed_script_confusables)] // θ0 is what the declaration calls it
 
@@ -14,7 +14,7 @@ use energy_solve::{Counts, Curvature, ElementList, LinearisationOptions, Potenti
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
-/// The Hessian of each element as a dense matrix, and what was counted.
+/// Returns the Hessian of each element as a dense matrix, and the evaluation counts.
 fn hessians<E, const N: usize>(
     elements: &[E],
     x: &[[Vector3<f64>; N]],
@@ -48,7 +48,7 @@ fn with_eigenvalues(of: &DMatrix<f64>, change: impl Fn(f64) -> f64) -> DMatrix<f
     eigen.recompose()
 }
 
-/// All three ways on the same elements.
+/// Compares all three treatments of negative eigenvalues on the same elements.
 fn check<E, const N: usize>(elements: &[E], x: &[[Vector3<f64>; N]]) -> Result<(), TestCaseError>
 where
     E: PackedPotential<f64> + Clone + Debug + 'static + Sync,
@@ -127,16 +127,18 @@ proptest! {
 }
 
 #[test]
-fn an_element_at_rest_is_left_alone() {
+fn an_element_at_rest_is_not_projected() {
     let rest = StVK::new([0.0, 0.0], [1.0, 0.0], [0.3, 0.9], 1.0, 2.0).unwrap();
-    // Turned, so that the zeros of its Hessian are rounded.
+    // Rotated, so that the zeros of its Hessian have rounding errors.
     let x = [[0.1, 0.2, 0.3], [0.1 + 0.6, 0.2, 0.3 + 0.8], [0.1 + 0.18, 0.2 + 0.9, 0.3 + 0.24]];
-    let (_, counts) = hessians(&[rest], &[x], Curvature::Clamped);
+    let (exact, _) = hessians(&[rest], &[x], Curvature::Exact);
+    let (found, counts) = hessians(&[rest], &[x], Curvature::Clamped);
     assert_eq!((counts.hessian.evaluated, counts.hessian.projected), (1, 0));
+    assert_eq!(found, exact);
 }
 
 #[test]
-fn neighbours_do_not_matter() {
+fn lanes_do_not_affect_each_other() {
     let spring = |length| HookeSpring { K: 1.0, L: length };
     let x = [[[0.0; 3], [1.0, 0.2, 0.3]]; 2];
     let (alone, _) = hessians(&[spring(2.0)], &x[..1], Curvature::Clamped);

@@ -1,4 +1,4 @@
-//! Sums of squared residuals: assembly against finite differences, solvers against each other, and what is refused.
+//! Sums of squared residuals: assembly against finite differences, solvers against each other, and rejected inputs.
 #![allow(missing_docs)]
 
 use std::sync::Arc;
@@ -10,13 +10,14 @@ use energy_solve::{
 };
 
 energy! {
-    /// Two places at a distance, and turned against each other by a sine: three rows.
+    /// Three rows that couple two points.
     residual Link(a, b: Vec2; L: Scalar) { [norm(b - a) - L, sin(a.x) * b.y, a.y - b.x^2] }
 
     residual Anchor(a: Vec2; x: Vec2) { a - x }
 }
 
-/// A chain of blocks with links of both directions, so that places are stored turned, in a number that leaves lanes over.
+/// A chain of blocks with links in both directions, so that some blocks are stored transposed. The number of links
+/// leaves lanes unused.
 struct Chain {
     pattern: Arc<NormalPattern>,
     links: ResidualTerm<Link, 2>,
@@ -52,7 +53,7 @@ fn energy(chain: &Chain, x: &[[f64; 2]]) -> f64 {
 }
 
 #[test]
-fn the_gradient_is_that_of_the_energy_whatever_the_loss() {
+fn the_gradient_is_that_of_the_energy_for_every_loss() {
     for loss in [Loss::Squares, Loss::Huber(0.4), Loss::Tukey(3.0)] {
         let chain = chain(11, loss);
         let mut solver = GaussNewton::new(chain.pattern.clone(), GaussNewtonOptions::default()).unwrap();
@@ -98,7 +99,7 @@ fn both_solvers_solve() {
 }
 
 #[test]
-fn iterations_go_down_to_where_nothing_is_left_to_gain() {
+fn iterations_decrease_the_energy_to_a_minimum() {
     let mut chain = chain(9, Loss::Squares);
     let mut solver = GaussNewton::new(chain.pattern.clone(), GaussNewtonOptions::default()).unwrap();
     let terms: [&dyn LeastSquaresTerm<2>; 2] = [&chain.links, &chain.anchors];
@@ -113,16 +114,17 @@ fn a_graph_alone_is_singular_and_needs_damping() {
     let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
     let mut links = ResidualTerm::<Link, 2>::new("links", Arc::new(Couplings::new(&pattern, &[[0, 1]]).unwrap()), 1.0);
     links.set_elements([Placed { element: Link::new(1.0), stencil: 0, weight: 1.0 }]);
-    // Three rows for four unknowns: without damping there is no factor; the iteration finds a damping that does.
+    // Three rows for four unknowns: there is no factor without damping, so the iteration must increase it.
     let options = GaussNewtonOptions { damping: 0.0, ..GaussNewtonOptions::default() };
     let mut solver = GaussNewton::new(pattern, options).unwrap();
     let mut x = [[0.0, 0.0], [2.0, 0.5]];
     let report = solver.iterate(&[&links], &mut x).unwrap();
     assert!(report.outcome == Outcome::Decreased && report.after < report.before, "{report:?}");
+    assert!(report.damping > 0.0, "{report:?}");
 }
 
 #[test]
-fn what_is_no_number_is_refused_by_its_place() {
+fn non_finite_numbers_are_rejected_with_their_position() {
     let mut chain = chain(5, Loss::Squares);
     let mut solver = GaussNewton::new(chain.pattern.clone(), GaussNewtonOptions::default()).unwrap();
     let mut x = chain.x.clone();
@@ -131,6 +133,7 @@ fn what_is_no_number_is_refused_by_its_place() {
     assert_eq!(error, GaussNewtonError::NonFiniteUnknown { block: 3, unknown: 1 });
     let error = solver.iterate(&[&chain.links], &mut chain.x[..4]).unwrap_err();
     assert_eq!(error, GaussNewtonError::WrongLength { expected: 5, found: 4 });
+    assert_eq!(error.to_string(), "expected 5 blocks of unknowns, got 4");
     let place = |i: u32| Placed {
         element: Anchor::new([if i == 2 { f64::INFINITY } else { 0.0 }, 0.0]),
         stencil: i,
@@ -140,5 +143,6 @@ fn what_is_no_number_is_refused_by_its_place() {
     let before = chain.x.clone();
     let error = solver.iterate(&[&chain.links, &chain.anchors], &mut chain.x).unwrap_err();
     assert_eq!(error, GaussNewtonError::NonFiniteEnergy { term: "anchors".into(), element: Some(2) });
+    assert_eq!(error.to_string(), "the energy of `anchors` is not finite, first at element 2");
     assert_eq!(chain.x, before);
 }

@@ -1,4 +1,4 @@
-//! The iterative solvers against a dense factorisation, and why they stop.
+//! Iterative solvers against a dense factorisation, and the reasons why they stop.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ fn pattern(storage: Storage) -> Arc<Pattern> {
     Arc::new(Pattern::from_stencils(storage, ROWS, stencils.iter().map(<[u32; 3]>::as_slice)))
 }
 
-/// A chain with second neighbours; numbers from a fixed recurrence, `skew` added above the diagonal only.
+/// A chain with second neighbours and pseudo-random entries; `skew` is added above the diagonal only.
 fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
     let pattern = pattern(if skew == 0.0 { Storage::Upper } else { Storage::Whole });
     let mut matrix = BlockMatrix::zeros(Arc::clone(&pattern));
@@ -94,7 +94,8 @@ fn tolerance_is_relative_to_the_right_hand_side() {
     for solver in [conjugate_gradients as Solver, bicgstab] {
         let ((x, whole), (y, scaled)) = (solve(solver, &matrix, &b, &options), solve(solver, &matrix, &tiny, &options));
         assert_eq!(whole.iterations, scaled.iterations);
-        assert_eq!(x[3][1] * 2.0_f64.powi(-200), y[3][1]);
+        let expected: Vec<_> = x.iter().map(|row| row.map(|entry| entry * 2.0_f64.powi(-200))).collect();
+        assert_eq!(expected, y);
     }
 }
 
@@ -106,7 +107,7 @@ fn indefinite_curvature_is_reported() {
     assert_eq!(report.stopped, StopReason::IndefiniteCurvature);
     assert!(x.iter().flatten().all(|entry| entry.is_finite()));
 
-    // Every diagonal block is positive definite here, but no chain of such strong links is.
+    // Every diagonal block is positive definite, but a chain with links this strong is not.
     let mut linked = BlockMatrix::zeros(Arc::clone(matrix.pattern()));
     for row in 0..ROWS {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -154,7 +155,7 @@ fn incomplete_cholesky_saves_iterations_and_is_exact_without_fill() {
     let mut x = vec![[0.0; 3]; ROWS];
     let report = conjugate_gradients(&matrix, &factor, &b, &mut x, &options);
     assert!(report.converged() && !matrix.pattern().fills_in() && sheet(3).pattern().fills_in());
-    // A chain with second neighbours has no fill: the factorisation is complete.
+    // A chain with second neighbours has no fill-in, so the factorisation is complete.
     assert!(report.iterations <= 2, "{} iterations", report.iterations);
     let (expected, jacobi) = solve(conjugate_gradients, &matrix, &b, &options);
     assert!(jacobi.iterations > 5);
@@ -169,7 +170,7 @@ fn an_indefinite_matrix_has_a_shifted_factor_or_none() {
     broken.diagonal_mut(4)[1][1] = -6.0;
     let mut factor = IncompleteCholesky::new(broken.pattern());
     assert_eq!(factor.factor(&broken).unwrap_err().row, 4);
-    // Positive diagonal blocks, but links too strong for them.
+    // Positive definite diagonal blocks with links too strong for them.
     let mut linked = matrix(0.6, 0.0);
     for row in 0..ROWS {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -181,7 +182,7 @@ fn an_indefinite_matrix_has_a_shifted_factor_or_none() {
     assert!(factor.shift() > 0.0);
 }
 
-/// A sheet of springs, `side` vertices along each side, as stiff as it is fine, of vertices that weigh little.
+/// A sheet of springs with `side` light vertices per side.
 fn sheet(side: usize) -> BlockMatrix {
     let vertex = |i: usize, j: usize| (i * side + j) as u32;
     let mut links = Vec::new();
@@ -245,7 +246,7 @@ fn over_relaxation_agrees_with_conjugate_gradients() {
     }
 }
 
-/// The solution for a right-hand side of all wave lengths.
+/// Solves for a right-hand side with all wavelengths.
 fn relaxed<T: Precision>(matrix: &BlockMatrix, scale: f64, tolerance: f64) -> (Vec<Vector3<f64>>, SolveReport) {
     let rows = matrix.pattern().rows();
     let mut solver = OverRelaxation::<T>::new(matrix.pattern());
@@ -273,10 +274,10 @@ fn over_relaxation_saves_iterations_and_serves_in_single_precision() {
 }
 
 #[test]
-fn single_precision_is_not_left_whatever_the_unit() {
+fn single_precision_suffices_in_any_unit() {
     let mut light = sheet(9);
     let (expected, _) = relaxed::<f32>(&light, 1.0, 1e-4);
-    // A power of two, so that nothing is rounded differently.
+    // A power of two changes no rounding.
     let unit = 2.0_f64.powi(-150);
     light.values_mut().as_flattened_mut().as_flattened_mut().iter_mut().for_each(|entry| *entry *= unit);
     let (found, report) = relaxed::<f32>(&light, unit.powi(2), 1e-4);
@@ -299,7 +300,7 @@ fn over_relaxation_says_why_it_stops() {
     let mut broken = right_hand_side();
     broken[3][1] = f64::NAN;
     assert_eq!(solve(&broken).stopped, StopReason::NonFinite);
-    // A diagonal block that is not positive definite, and links too strong for those that are.
+    // An indefinite diagonal block; then links too strong for positive definite ones.
     let mut indefinite = matrix(6.0, 0.0);
     indefinite.diagonal_mut(4)[1][1] = -6.0;
     assert_eq!(OverRelaxation::<f64>::new(indefinite.pattern()).scale(&indefinite).unwrap_err().row, 4);

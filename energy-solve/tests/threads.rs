@@ -1,4 +1,4 @@
-//! The same bits for any number of threads.
+//! Results are bit-identical for any number of threads.
 
 use energy_dsl::{Block, Vector3};
 use energy_elements::{Gravity, NeoHookean, QuadraticHinge, ViscousDrag};
@@ -7,14 +7,14 @@ use energy_solve::{
     Precision, SolveOptions, State, System, Term, Weights,
 };
 
-/// Cells along each side: enough vertices for three threads.
+/// Cells per side: enough vertices for three threads.
 const CELLS: usize = 140;
 
 fn vertex(i: usize, j: usize) -> usize {
     j * (CELLS + 1) + i
 }
 
-/// A crumpled sheet, some of whose vertices are pinned.
+/// A crumpled sheet with pinned vertices.
 fn sheet() -> (System, Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let mut triangles = Vec::new();
     let mut hinges = Vec::new();
@@ -25,7 +25,7 @@ fn sheet() -> (System, Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
             hinges.push([b, d, a, c]);
         }
     }
-    // So that the elements do not come in the order of the vertices.
+    // Elements should not be in the order of the vertices.
     triangles.reverse();
     let u: Vec<[f64; 2]> =
         (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| [i as f64, j as f64].map(|k| k / CELLS as f64))).collect();

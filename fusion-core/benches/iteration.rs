@@ -1,5 +1,5 @@
-//! What an iteration of Gauss–Newton costs, on one core: derivatives, assembly, solution; and what the data term's derivatives cost by
-//! finite differences and by dual numbers. `cargo bench -p fusion-core`.
+//! Time of a Gauss–Newton iteration on one core: derivatives, assembly, solution. Also the time of the data term's
+//! derivatives by finite differences and by dual numbers. Run by `cargo bench -p fusion-core`.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -15,7 +15,7 @@ use fusion_core::twist::{AngleConvention, Twist};
 use nalgebra::{Isometry3, SVector, Vector3};
 use num_dual::DualNum;
 
-/// A tall closed surface of about so many vertices, as wide as a body, with four bones along it.
+/// Creates a tall closed surface of about this many vertices, as wide as a body, with four bones along it.
 fn body(vertices: usize) -> SkinnedBody {
     const HEIGHT: f64 = 1.8;
     let around = (vertices as f64 / 2.3).sqrt().round() as usize;
@@ -49,7 +49,7 @@ fn body(vertices: usize) -> SkinnedBody {
     SkinnedBody::new(Mesh::new(places, triangles), (0..4).map(bone).collect(), weights).expect("the parts fit")
 }
 
-/// The median of repeated runs, ms.
+/// Returns the median time of repeated runs, in ms.
 fn median(mut run: impl FnMut()) -> f64 {
     run();
     let mut times: Vec<f64> = (0..15)
@@ -63,7 +63,7 @@ fn median(mut run: impl FnMut()) -> f64 {
     times[times.len() / 2]
 }
 
-/// A body and the nodes' distance that gives about so many nodes.
+/// Creates a body, and searches the distance of nodes that gives about this many nodes.
 fn model(vertices: usize, nodes: usize, k: usize) -> DeformationModel {
     let body = body(vertices);
     let (mut low, mut high) = (0.005, 0.5);
@@ -93,7 +93,7 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
         .collect();
     let filling = median(|| energy.set_pairs(&model, &pairs, &moved));
     let derivatives = median(|| {
-        black_box(energy.terms().iter().map(|term| term.evaluate_jacobians(&x)).sum::<f64>());
+        black_box(energy.evaluate_jacobians(&x));
     });
     println!(
         "\n{} nodes, {} pairs, K = {k}, KG = 8: {} blocks of JᵀJ stored",
@@ -122,7 +122,8 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
         });
         let total = assembled + solved;
         println!(
-            "  {name:<26} total {total:8.2} ms: derivatives and assembly {assembled:.2}, solution {solved:.2}; derivatives {:.0} %",
+            "  {name:<26} total {total:8.2} ms: derivatives and assembly {assembled:.2}, solution {solved:.2}; \
+             derivatives {:.0} %",
             100.0 * derivatives / total
         );
     }
@@ -131,7 +132,7 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
     }
 }
 
-/// The data term's rows by other means, one pair after the other.
+/// Times the data term's rows by other methods, one pair after the other.
 fn others(model: &DeformationModel, pairs: &[Pair], x: &[Twist]) {
     let parts = |pair: &Pair| {
         let vertex = pair.vertex as usize;
@@ -178,11 +179,12 @@ fn others(model: &DeformationModel, pairs: &[Pair], x: &[Twist]) {
         }
     });
     println!(
-        "  data term's rows alone: generated, one by one {scalar:.2} ms; central differences {differences:.2} ms; num-dual {dual:.2} ms"
+        "  data term's rows alone: generated, one by one {scalar:.2} ms; central differences {differences:.2} ms; \
+         num-dual {dual:.2} ms"
     );
 }
 
-/// The gradient of n̂·(v̂ − u) by dual numbers over the textbook's formulas.
+/// Computes the gradient of n̂·(v̂ − u) by dual numbers through the textbook's formulas.
 fn dual_row(w: &[f64; 4], v: &[f64; 3], n: &[f64; 3], u: &[f64; 3], unknowns: &[f64; 24]) -> [f64; 24] {
     let x = SVector::<f64, 24>::from_column_slice(unknowns);
     let (_, gradient) = num_dual::gradient(|x| plane(w, v, n, u, |i| x[i]), &x);

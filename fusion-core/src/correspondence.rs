@@ -1,4 +1,4 @@
-//! Which measured point belongs to which vertex: the one in the pixel where the vertex is seen.
+//! Correspondences by projection: a vertex matches the point measured in the pixel that it projects to.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 use crate::depth::{Camera, DepthImage};
 use crate::energy::{Moved, Pair};
 
-/// When a match is believed.
+/// Criteria for accepting a match.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gates {
-    /// The largest distance of vertex and point, m.
+    /// Largest distance of vertex and point, in m.
     pub distance: f64,
-    /// The largest angle between their normals, rad.
+    /// Largest angle between their normals, in rad.
     pub angle: f64,
-    /// Pixels to each side that the measured normal is taken from.
+    /// Pixels on each side from which the measured normal is computed.
     pub normal_reach: usize,
 }
 
@@ -24,24 +24,25 @@ impl Default for Gates {
     }
 }
 
-/// What became of the vertices.
+/// Number of vertices by the result of their search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MatchCounts {
-    /// Matched.
+    /// Matched vertices.
     pub matched: usize,
-    /// Seen from behind.
+    /// Facing away from the camera.
     pub back_facing: usize,
-    /// Outside of the image, or behind the camera.
+    /// Outside the image, or behind the camera.
     pub outside: usize,
-    /// Nothing measured there, or no normal.
+    /// Without a measured depth or normal.
     pub no_depth: usize,
-    /// Beyond the gate of distance.
+    /// Too far from the measured point.
     pub far: usize,
-    /// Beyond the gate of the angle.
+    /// With too large an angle to the measured normal.
     pub turned: usize,
 }
 
-/// Matches each vertex with the point measured where it is seen. `origin` is that of the model in the camera's coordinates.
+/// Matches each vertex with the point measured in its pixel. `origin` is the model's origin in the camera's
+/// coordinates.
 #[must_use]
 pub fn correspondences(
     moved: &Moved,

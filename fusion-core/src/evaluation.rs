@@ -1,25 +1,25 @@
-//! How far a track is from the truth.
+//! Errors of a track against the truth.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// End-point errors over some vertices, mm.
+/// Statistics of end-point errors, in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorSummary {
-    /// Vertices.
+    /// Number of vertices.
     pub count: usize,
-    /// The mean.
+    /// Mean error.
     pub mean: f64,
-    /// Half are smaller.
+    /// Median error.
     pub median: f64,
-    /// 95 of 100 are smaller.
+    /// 95th percentile.
     pub p95: f64,
-    /// The share below 25 mm.
+    /// Fraction of errors below 25 mm.
     pub share_below_25: f64,
 }
 
 impl ErrorSummary {
-    /// Of errors in mm, in any order.
+    /// Summarises errors in mm, in any order.
     #[must_use]
     pub fn of(mut errors: Vec<f64>) -> Self {
         errors.sort_by(f64::total_cmp);
@@ -32,17 +32,17 @@ impl ErrorSummary {
     }
 }
 
-/// End-point errors of one frame, mm.
+/// End-point errors of one frame, in mm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameErrors {
-    /// Of all vertices.
+    /// Errors of all vertices.
     pub all: Vec<f64>,
-    /// Of those that the camera sees.
+    /// Errors of the vertices that the camera sees.
     pub visible: Vec<f64>,
 }
 
 impl FrameErrors {
-    /// Distances of found vertices to the true ones.
+    /// Computes the distances of tracked vertices from the true ones.
     #[must_use]
     pub fn new(found: &[Vector3<f64>], truth: &[Vector3<f64>], visible: &[bool]) -> Self {
         let all: Vec<f64> = found.iter().zip(truth).map(|(a, b)| 1e3 * (a - b).norm()).collect();
@@ -51,21 +51,21 @@ impl FrameErrors {
     }
 }
 
-/// The errors of a whole track.
+/// The errors of a track.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackErrors {
-    /// Frame by frame.
+    /// Errors by frame.
     pub frames: Vec<FrameErrors>,
 }
 
 impl TrackErrors {
-    /// Over all frames, all vertices.
+    /// Summarises all vertices over all frames.
     #[must_use]
     pub fn all(&self) -> ErrorSummary {
         ErrorSummary::of(self.frames.iter().flat_map(|frame| frame.all.iter().copied()).collect())
     }
 
-    /// Over all frames, the vertices seen in each.
+    /// Summarises the visible vertices over all frames.
     #[must_use]
     pub fn visible(&self) -> ErrorSummary {
         ErrorSummary::of(self.frames.iter().flat_map(|frame| frame.visible.iter().copied()).collect())
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn summaries_count_what_they_say() {
+    fn summaries_have_the_right_statistics() {
         let summary = ErrorSummary::of((0..=100).rev().map(f64::from).collect());
         assert_eq!((summary.count, summary.mean, summary.median, summary.p95), (101, 50.0, 50.0, 95.0));
         assert!((summary.share_below_25 - 25.0 / 101.0).abs() < 1e-15);

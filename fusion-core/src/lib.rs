@@ -1,11 +1,11 @@
 //! Tracking of a deforming body in depth images.
 //!
-//! A [`model::DeformationModel`] has nodes on a mesh; each moves by a twist, and vertices move by the blend of their nodes as dual
-//! quaternions. [`energy::FusionEnergy`] sums the declared residuals of `energy-elements`,
-//! E = λ_n E_nonrigid + λ_s E_skeleton + λ_g E_graph + λ_b E_binding, whose Jacobians are all generated; `energy-solve` minimises it by
-//! Gauss–Newton. A [`tracker::Tracker`] does so image after image.
+//! A [`model::DeformationModel`] has nodes on a mesh. Each node moves by a twist, and vertices move by the dual
+//! quaternion blend of their nodes. [`energy::FusionEnergy`] sums the declared residuals of `energy-elements`, E = λ_n
+//! E_nonrigid + λ_s E_skeleton + λ_g E_graph + λ_b E_binding, with generated Jacobians. A [`tracker::Tracker`]
+//! minimises it by Gauss–Newton (`energy-solve`), image after image.
 //!
-//! Units are metres and radians throughout.
+//! Units are metres and radians.
 //!
 //! ```
 //! use fusion_core::body::{figure, figure_motion};
@@ -15,7 +15,7 @@
 //! use fusion_core::protocol::Recording;
 //! use fusion_core::tracker::{Tracker, TrackerOptions};
 //!
-//! // A figure of tubes, seen by a depth camera, a thirtieth of a second after it started to move.
+//! // A figure of tubes in front of a depth camera, 1/30 s after it started to move.
 //! let motions: Vec<_> = [0.0, 1.0 / 30.0].map(figure_motion).to_vec();
 //! let recording = Recording::new(&figure(), &motions, Camera::VGA, 2.6);
 //! let model = DeformationModel::new(&recording.body, ModelOptions::default())?;

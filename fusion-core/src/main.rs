@@ -19,23 +19,24 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Audits the terms of the energy, renders a figure of tubes, tracks it with exact and with noisy bones, and measures both.
+    /// Audits the terms of the energy, renders a figure of tubes, tracks it with exact and with noisy bones, and
+    /// evaluates both tracks.
     Demo(cli::demo::Demo),
-    /// Renders a body in motion as a depth camera sees it: images, model, skeleton, truth.
+    /// Renders a moving body as a depth camera sees it: images, model, skeleton, truth.
     Render(cli::render::Render),
-    /// Tracks a model through depth images: motions of its nodes, moved meshes, a table of frames.
+    /// Tracks a model through depth images: node motions, moved meshes, a table of frames.
     Track(cli::track::Track),
-    /// Measures a track against the truth: table and plot.
+    /// Compares a track with the truth: table and plot.
     Evaluate(cli::evaluate::Evaluate),
 }
 
 fn main() -> ExitCode {
-    // A reader that has seen enough (`| head`) ends the program, without a panic.
+    // A closed pipe (`| head`) ends the program without a panic.
     sigpipe::reset();
     match obey(Arguments::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", verify::message(&error));
+            eprintln!("error: {}", energy_cli::message(&error));
             ExitCode::FAILURE
         }
     }

@@ -1,4 +1,5 @@
-//! A body that moves in front of a depth camera, as test data: where it truly is, what the camera sees, what a body tracker says.
+//! Test data: a body that moves in front of a depth camera, with its true motion, the images, and a body tracker's
+//! bones.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -11,17 +12,17 @@ use crate::tracker::{FrameError, FrameReport, Tracker};
 /// A moving body in the camera's coordinates. The first frame is the rest shape.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// The body as in the first frame.
+    /// The body in the first frame.
     pub body: SkinnedBody,
-    /// For each frame the motions of the bones from the first.
+    /// Motions of the bones from the first frame, by frame.
     pub motions: Vec<Vec<Isometry3<f64>>>,
-    /// The camera.
+    /// The depth camera.
     pub camera: Camera,
 }
 
 impl Recording {
-    /// Puts a camera `distance` in front of a body whose bones move as given from its own rest, in coordinates whose y points up. In front
-    /// is where the first bone's z axis points to in the first frame, at the height of the body's centroid.
+    /// Places a camera in front of a body, at `distance` and at the height of the body's centroid. The motions of the
+    /// bones are from the body's own rest, with y up. The first bone's z axis points to the front in the first frame.
     #[must_use]
     pub fn new(body: &SkinnedBody, motions: &[Vec<Isometry3<f64>>], camera: Camera, distance: f64) -> Self {
         let Some(first) = motions.first() else {
@@ -39,14 +40,14 @@ impl Recording {
         Self { body: body.at_rest_in(&start), motions, camera }
     }
 
-    /// Where the body truly is.
+    /// Returns the true mesh in a frame.
     #[must_use]
     pub fn truth(&self, frame: usize) -> Mesh {
         let posed = self.body.posed(&self.motions[frame]);
         Mesh::new(posed.vertices, posed.triangles)
     }
 
-    /// What the camera sees. The noise of a frame is always the same.
+    /// Returns the camera's image of a frame. The noise of a frame is reproducible.
     #[must_use]
     pub fn image(&self, frame: usize, noise: SensorNoise) -> DepthImage {
         let mut image = render(&self.truth(frame), &self.camera);
@@ -55,15 +56,15 @@ impl Recording {
     }
 }
 
-/// What a body tracker says of a recording: the true motions with errors, always the same ones for a frame.
+/// Returns the bones that a body tracker reports: the true motions with errors, which are reproducible for a frame.
 #[must_use]
 pub fn reported_bones(recording: &Recording, frame: usize, noise: BoneNoise) -> Vec<Isometry3<f64>> {
     let mut random = fastrand::Rng::with_seed(1000 + frame as u64);
     noisy(&recording.body.bones, &recording.motions[frame], noise, &mut random)
 }
 
-/// Tracks all frames but the first, which is the model's rest, and measures each. `each` hears of every frame; a frame that was skipped
-/// is measured as the tracker left it.
+/// Tracks and measures all frames except the first, which is the model's rest. Calls `each` for every frame. A skipped
+/// frame is measured with the tracker's last state.
 pub fn track_recording(
     recording: &Recording,
     tracker: &mut Tracker,
@@ -81,7 +82,7 @@ pub fn track_recording(
     errors
 }
 
-/// The errors of the skinned skeleton without any tracking.
+/// Measures the skinned skeleton without tracking.
 #[must_use]
 pub fn skeleton_alone(recording: &Recording, noise: BoneNoise) -> TrackErrors {
     let frame =
@@ -94,7 +95,8 @@ fn measured(recording: &Recording, frame: usize, found: &[Vector3<f64>]) -> Fram
     FrameErrors::new(found, &truth.vertices, &visible_vertices(&truth, &recording.camera))
 }
 
-/// From the world, y up, to a camera at a place looking along a horizontal direction: x right, y down, z forwards.
+/// Returns the motion from the world, y up, to a camera that looks along a horizontal direction: x right, y down, z
+/// forwards.
 fn view(place: Vector3<f64>, along: Vector3<f64>) -> Isometry3<f64> {
     let down = -Vector3::y();
     let right = down.cross(&along);

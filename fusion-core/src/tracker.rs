@@ -1,4 +1,4 @@
-//! From one depth image to the next.
+//! Tracking from one depth image to the next.
 
 use energy_solve::{GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, Outcome, SolverError};
 use nalgebra::{Isometry3, Vector3};
@@ -10,21 +10,21 @@ use crate::energy::{BoneMode, EnergyError, EnergyOptions, FusionEnergy, Moved, s
 use crate::model::DeformationModel;
 use crate::twist::{Twist, blended};
 
-/// How frames are tracked.
+/// Options of a [`Tracker`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerOptions {
-    /// The energy.
+    /// Options of the energy.
     pub energy: EnergyOptions,
-    /// Searches for correspondences in a frame, each followed by one Gauss–Newton step.
+    /// Searches for correspondences per frame, each followed by one Gauss–Newton step.
     pub iterations: usize,
-    /// Gates of the last search.
+    /// Criteria of the last search.
     pub gates: Gates,
-    /// The gate of distance of the first search, m; it shrinks to that of the last.
+    /// Largest distance of a match in the first search, in m; it shrinks to that of the last.
     pub first_distance: f64,
-    /// μ, Levenberg's damping.
+    /// Levenberg's damping μ.
     pub damping: f64,
-    /// A frame with fewer matches is not believed.
+    /// Frames with fewer matches are skipped.
     pub least_matches: usize,
 }
 
@@ -42,8 +42,8 @@ impl Default for TrackerOptions {
 }
 
 impl TrackerOptions {
-    /// For a body tracker that is off by a few degrees and centimetres: bones are unknowns too, matches are sought further away and more
-    /// often.
+    /// Options for a body tracker with errors of a few degrees and centimetres: bones are unknowns, and searches reach
+    /// further and are repeated more often.
     #[must_use]
     pub fn with_unknown_bones() -> Self {
         let mut options = Self { iterations: 12, first_distance: 0.1, ..Self::default() };
@@ -52,54 +52,57 @@ impl TrackerOptions {
     }
 }
 
-/// A tracker that cannot be made.
+/// A tracker that cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum TrackerError {
-    /// The energy.
+    /// The energy cannot be created.
     #[error(transparent)]
     Energy(#[from] EnergyError),
-    /// The solver.
+    /// The solver cannot be created.
     #[error(transparent)]
     Solver(#[from] SolverError),
 }
 
-/// Why a frame was skipped. The track is as before it.
+/// The reason why a frame was skipped. The track is as before the frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FrameError {
-    /// Another size than the camera's.
-    #[error("the image has {found:?} pixels, the camera {expected:?}")]
+    /// The image and the camera have different sizes.
+    #[error("expected an image of {expected:?} pixels, got {found:?}")]
     Size {
-        /// The camera's.
+        /// Size of the camera.
         expected: [usize; 2],
-        /// The image's.
+        /// Size of the image.
         found: [usize; 2],
     },
-    /// A measurement that is none.
-    #[error("pixel ({u}, {v}) is NaN or infinite; 0 means that nothing was measured")]
+    /// A pixel is infinite or NaN.
+    #[error("pixel ({u}, {v}) is NaN or infinite; mark missing measurements by 0")]
     NotANumber {
-        /// Its column.
+        /// Column of the pixel.
         u: usize,
-        /// Its row.
+        /// Row of the pixel.
         v: usize,
     },
-    /// Nothing measured at all.
+    /// The image has no depth.
     #[error("no pixel has a depth")]
     NothingMeasured,
-    /// Too little that fits the model.
-    #[error("{} matches, fewer than {least}: {} vertices without depth, {} too far, {} turned away, {} outside of the image",
-        .counts.matched, .counts.no_depth, .counts.far, .counts.turned, .counts.outside)]
+    /// Too few vertices have a match.
+    #[error(
+        "expected at least {least} matches, got {}: {} vertices without depth, {} too far, {} turned away, \
+         {} outside the image",
+        .counts.matched, .counts.no_depth, .counts.far, .counts.turned, .counts.outside
+    )]
     TooFewMatches {
-        /// What became of the vertices.
+        /// Results of the search.
         counts: MatchCounts,
-        /// How many matches are needed.
+        /// Required number of matches.
         least: usize,
     },
-    /// Another number of bones than the model's.
-    #[error("{found} bones, the model has {expected}")]
+    /// The numbers of bones differ.
+    #[error("expected {expected} bones, got {found}")]
     BoneCount {
-        /// The model's.
+        /// Bones of the model.
         expected: usize,
-        /// Those given.
+        /// Bones given.
         found: usize,
     },
     /// No step could be computed.
@@ -107,18 +110,18 @@ pub enum FrameError {
     Step(#[from] GaussNewtonError),
 }
 
-/// What happened in a frame.
+/// Statistics of one frame.
 #[derive(Clone, Debug)]
 pub struct FrameReport {
-    /// The last search for correspondences.
+    /// Results of the last search for correspondences.
     pub counts: MatchCounts,
-    /// Each step.
+    /// Report of each step.
     pub iterations: Vec<IterationReport>,
-    /// λ_s E_skeleton of known bones with the last data: a constant to the unknowns.
+    /// λ_s E_skeleton of known bones with the last data, which does not depend on the unknowns.
     pub skeleton_energy: Option<f64>,
 }
 
-/// Follows a model through depth images.
+/// Tracks a model through depth images.
 #[derive(Debug)]
 pub struct Tracker {
     model: DeformationModel,
@@ -126,15 +129,15 @@ pub struct Tracker {
     options: TrackerOptions,
     energy: FusionEnergy,
     solver: GaussNewton<6>,
-    /// Twists of the nodes, and of the bones behind them if these are unknowns.
+    /// Twists of the nodes, then of the bones if these are unknowns.
     twists: Vec<Twist>,
 }
 
 impl Tracker {
-    /// A tracker of a model in a camera's coordinates, at rest.
+    /// Creates a tracker of a model at rest, in the camera's coordinates.
     ///
     /// # Errors
-    /// When bones are to be unknowns and there are too few, or memory does not suffice.
+    /// If bones are unknowns and there are too few, or memory runs out.
     pub fn new(model: DeformationModel, camera: Camera, options: TrackerOptions) -> Result<Self, TrackerError> {
         let energy = FusionEnergy::new(&model, options.energy)?;
         let steps = GaussNewtonOptions { damping: options.damping, ..GaussNewtonOptions::default() };
@@ -143,29 +146,29 @@ impl Tracker {
         Ok(Self { model, camera, options, energy, solver, twists })
     }
 
-    /// The model.
+    /// Returns the model.
     #[must_use]
     pub fn model(&self) -> &DeformationModel {
         &self.model
     }
 
-    /// The twists of the nodes, in the model's coordinates.
+    /// Returns the twists of the nodes, in the model's coordinates.
     #[must_use]
     pub fn twists(&self) -> &[Twist] {
         &self.twists[..self.model.nodes.len()]
     }
 
-    /// The vertices as tracked, in the camera's coordinates.
+    /// Returns the tracked vertices, in the camera's coordinates.
     #[must_use]
     pub fn vertices(&self) -> Vec<Vector3<f64>> {
         self.energy.moved(&self.twists).vertices.iter().map(|vertex| vertex + self.model.origin).collect()
     }
 
-    /// Tracks one image. `bones` are the motions of the model's bones from rest, in the camera's coordinates, if there is a body tracker:
-    /// nodes then start where their bones are, else where they were.
+    /// Tracks one image. `bones` are a body tracker's motions of the model's bones from rest, in the camera's
+    /// coordinates. With them, nodes start at the blend of their bones; without, where they were.
     ///
     /// # Errors
-    /// When the image, the bones or the matches cannot be used: the reason. The track is then as before.
+    /// If the image, the bones or the matches cannot be used. The track is then unchanged.
     pub fn track(&mut self, image: &DepthImage, bones: Option<&[Isometry3<f64>]>) -> Result<FrameReport, FrameError> {
         let before = self.twists.clone();
         let result = self.check(image, bones).and_then(|()| self.follow(image, bones));
@@ -230,14 +233,14 @@ impl Tracker {
         Ok(report)
     }
 
-    /// The gate of distance of one search: from the first to the last in equal ratios.
+    /// Returns the largest distance of a match in a search: a geometric sequence from the first to the last.
     fn distance(&self, iteration: usize) -> f64 {
         let (first, last) = (self.options.first_distance, self.options.gates.distance);
         let part = iteration as f64 / (self.options.iterations.max(2) - 1) as f64;
         first * (last / first).powf(part)
     }
 
-    /// Nodes where the blend of their bones takes them, bones where they are said to be.
+    /// Moves nodes by the blend of their bones, and bones to the reported motions.
     fn start_from(&mut self, motions: &[Isometry3<f64>]) {
         let angle = self.options.energy.angle;
         let nodes = self.model.nodes.len();
@@ -249,7 +252,7 @@ impl Tracker {
         }
     }
 
-    /// The vertices and normals as tracked, in the model's coordinates.
+    /// Returns the tracked vertices and normals, in the model's coordinates.
     #[must_use]
     pub fn moved(&self) -> Moved {
         self.energy.moved(&self.twists)

@@ -4,22 +4,22 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// (θ, t): a turn about θ, then a shift by t, in m.
+/// A twist (θ, t): a rotation about θ, followed by a translation t, in m.
 pub type Twist = [f64; 6];
 
-/// What ‖θ‖ means.
+/// The angle of a twist's rotation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AngleConvention {
-    /// The turn is by 2 ‖θ‖, as in the papers' formulas: θ is half the rotation vector.
+    /// The angle is 2 ‖θ‖, as in the papers' formulas: θ is half the rotation vector.
     #[default]
     HalfAngle,
-    /// The turn is by ‖θ‖: θ is the rotation vector.
+    /// The angle is ‖θ‖: θ is the rotation vector.
     RotationVector,
 }
 
 impl AngleConvention {
-    /// The parameter `turn` of the declared residuals: half the angle over ‖θ‖.
+    /// Returns the parameter `turn` of the declared residuals: half the angle divided by ‖θ‖.
     #[must_use]
     pub fn turn(self) -> f64 {
         match self {
@@ -28,7 +28,7 @@ impl AngleConvention {
         }
     }
 
-    /// The motion of a twist.
+    /// Returns the motion of a twist.
     #[must_use]
     pub fn motion(self, twist: &Twist) -> Isometry3<f64> {
         let rotation = 2.0 * self.turn() * Vector3::from_column_slice(&twist[..3]);
@@ -38,7 +38,7 @@ impl AngleConvention {
         )
     }
 
-    /// The twist of a motion, with the least turn.
+    /// Returns the twist of a motion, with the smallest angle.
     #[must_use]
     pub fn twist(self, motion: &Isometry3<f64>) -> Twist {
         let rotation = motion.rotation.scaled_axis() / (2.0 * self.turn());
@@ -46,8 +46,8 @@ impl AngleConvention {
         [rotation.x, rotation.y, rotation.z, shift.x, shift.y, shift.z]
     }
 
-    /// The same motion with the least turn: ‖θ‖ ≤ π/2 for [`Self::HalfAngle`], ≤ π for [`Self::RotationVector`]. A blend sees
-    /// q or −q, which its signs make up for.
+    /// Returns the twist of the same motion with the smallest angle: ‖θ‖ ≤ π/2 for [`Self::HalfAngle`], ≤ π for
+    /// [`Self::RotationVector`]. The quaternion may change its sign, which blends align.
     #[must_use]
     pub fn wrapped(self, twist: &Twist) -> Twist {
         let period = PI / self.turn();
@@ -61,8 +61,8 @@ impl AngleConvention {
     }
 }
 
-/// The blend of motions as dual quaternions, each in the hemisphere of the heaviest one's; the identity for weights that are all
-/// zero.
+/// Blends motions as dual quaternions, each in the hemisphere of the heaviest one. Returns the identity if all weights
+/// are zero.
 #[must_use]
 pub fn blended<'a>(motions: impl Iterator<Item = (f64, &'a Isometry3<f64>)> + Clone) -> Isometry3<f64> {
     let heaviest = motions.clone().max_by(|a, b| a.0.total_cmp(&b.0));
@@ -87,7 +87,7 @@ mod tests {
     const CONVENTIONS: [AngleConvention; 2] = [AngleConvention::HalfAngle, AngleConvention::RotationVector];
 
     #[test]
-    fn twists_and_motions_go_back_and_forth() {
+    fn twists_and_motions_convert_both_ways() {
         for convention in CONVENTIONS {
             let twist = [0.3, -0.2, 0.5, 1.0, 2.0, 3.0];
             let back = convention.twist(&convention.motion(&twist));
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blend_of_equal_motions_is_the_motion_whatever_its_sign() {
+    fn a_blend_of_equal_motions_is_the_motion_for_either_sign() {
         let motion = AngleConvention::HalfAngle.motion(&[1.4, 0.3, 0.0, 1.0, 2.0, 3.0]);
         let negative =
             Isometry3::from_parts(motion.translation, UnitQuaternion::new_unchecked(-motion.rotation.into_inner()));

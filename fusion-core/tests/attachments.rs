@@ -1,4 +1,4 @@
-//! Smoothing of attachments against exact fractions: the file that `verify reference` reads has them too.
+//! Smoothing of attachments against exact fractions, from the file that `verify reference` reads.
 
 use std::path::Path;
 
@@ -48,7 +48,7 @@ fn fill_and_relax_as_in_the_reference() {
         }
         let mut whole = Attachments { rows: rows(&case["H0"]), assigned: flags(&case["assigned0"]) };
         let report = whole.fill(&graph);
-        // The reference counts the pass that finds nothing left to do where a fill stalls.
+        // If a fill stalls, the reference also counts the pass that changes nothing.
         let stalled = usize::from(!report.left.is_empty());
         assert_eq!(
             report.passes + stalled,

@@ -1,4 +1,4 @@
-//! The binary `fusion`, as users run it.
+//! End-to-end tests of the binary `fusion`.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -25,7 +25,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     let again = error_of(&fusion(&["render", "--to", "4", "-o", recording]));
     assert!(again.contains("--overwrite"), "{again}");
 
-    // One image is damaged, one is gone: both are skipped with a reason, the others tracked.
+    // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
     let output = fusion(&["track", recording, "-o", track]);
@@ -44,7 +44,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
 }
 
 #[test]
-fn what_cannot_be_used_is_refused_with_the_reason() {
+fn unusable_input_is_rejected_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let here = text(folder.path());
     let missing = error_of(&fusion(&["track", here, "-o", &format!("{here}/t")]));

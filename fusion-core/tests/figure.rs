@@ -1,4 +1,4 @@
-//! The figure of tubes: tracked, and through whatever goes wrong.
+//! Tracking of the figure of tubes, also with bad input.
 
 use fusion_core::body::{figure, figure_motion};
 use fusion_core::depth::{Camera, DepthImage, SensorNoise};
@@ -33,14 +33,14 @@ fn noisy_bones_are_improved_upon() {
 }
 
 #[test]
-fn every_choice_of_energy_follows_the_figure() {
+fn every_choice_of_energy_tracks_the_figure() {
     let recording = recording(2);
     for k in [1, 4, 8] {
         for angle in [AngleConvention::HalfAngle, AngleConvention::RotationVector] {
             for normal in [NormalDerivative::Full, NormalDerivative::Frozen] {
                 let mut options = TrackerOptions::default();
                 (options.energy.angle, options.energy.normal) = (angle, normal);
-                // Bones at rest: the data must do the work.
+                // Bones at rest, so that only the data moves the body.
                 options.energy.weights.binding = 0.1;
                 let model = ModelOptions { nodes_per_vertex: k, ..ModelOptions::default() };
                 let mut tracker = tracker(&recording, model, options);
@@ -57,7 +57,7 @@ fn every_choice_of_energy_follows_the_figure() {
 }
 
 #[test]
-fn a_bad_frame_is_refused_with_its_reason_and_leaves_the_track_as_it_was() {
+fn bad_frames_are_rejected_and_leave_the_track_unchanged() {
     let recording = recording(2);
     let mut tracker = tracker(&recording, ModelOptions::default(), TrackerOptions::default());
     let good = recording.image(1, SensorNoise::default());
@@ -82,7 +82,7 @@ fn a_bad_frame_is_refused_with_its_reason_and_leaves_the_track_as_it_was() {
 }
 
 #[test]
-fn models_that_cannot_be_are_refused() {
+fn invalid_models_are_rejected() {
     let body = figure();
     let refuse = |options| DeformationModel::new(&body, options).unwrap_err();
     let with = ModelOptions::default();
@@ -93,7 +93,7 @@ fn models_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn a_skeleton_without_a_bone_is_refused_by_its_name() {
+fn a_missing_bone_is_named() {
     let body = figure();
     let mut skeleton = Skeleton::of(&body.bones);
     skeleton.push(&figure_motion(0.5));

@@ -1,5 +1,5 @@
-//! The protocol on a scanned body and captured motion, where its data is: a folder `human` beside the workspace, or that of
-//! `FUSION_BODY`, with `base.obj`, `rig.cmu_mb.json`, `weights.cmu_mb.json` and `01_01.bvh`.
+//! The protocol on a scanned body and captured motion, if the data is available: `base.obj`, `rig.cmu_mb.json`,
+//! `weights.cmu_mb.json` and `01_01.bvh` in the folder `FUSION_BODY`, or in a folder `human` next to the workspace.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ fn folder() -> Option<PathBuf> {
     folder.join("base.obj").exists().then_some(folder)
 }
 
-/// A jump, frames 420 to 660 at 30 Hz, in front of a camera at 2.6 m.
+/// A jump, frames 420 to 660 at 30 Hz, with a camera at 2.6 m.
 fn recording(folder: &Path) -> Recording {
     let file = |name: &str| folder.join(name);
     let body = read_makehuman(&file("base.obj"), &file("rig.cmu_mb.json"), &file("weights.cmu_mb.json")).unwrap();
@@ -45,7 +45,7 @@ fn run(recording: &Recording, options: TrackerOptions, noise: BoneNoise, name: &
 }
 
 #[test]
-fn a_real_body_is_followed() {
+fn a_real_body_is_tracked() {
     let Some(folder) = folder() else {
         eprintln!("skipped: no data of a real body; name its folder in FUSION_BODY");
         return;

@@ -1,15 +1,15 @@
-//! Named blocks of numbers: what an element returns, and what it is compared with.
+//! Named blocks of numbers that elements return and that the audit compares.
 
 use energy_dsl::{Declaration, Flags, Inputs, Kind, Outputs, RestError};
 use serde::Serialize;
 
-/// How a generated element is evaluated, whatever its type.
+/// A function that evaluates a generated element of any type.
 pub type Evaluate = fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>;
 
 /// The blocks that an element may return.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum BlockName {
-    /// U.
+    /// The energy U.
     #[serde(rename = "energy")]
     Energy,
     /// ∂U/∂x.
@@ -18,7 +18,7 @@ pub enum BlockName {
     /// ∂²U/∂x².
     #[serde(rename = "hess")]
     Hessian,
-    /// f.
+    /// The force f.
     #[serde(rename = "force")]
     Force,
     /// ∂f/∂x.
@@ -27,10 +27,10 @@ pub enum BlockName {
     /// ∂f/∂v.
     #[serde(rename = "dfdv")]
     ForceByVelocity,
-    /// C.
+    /// The constraint C.
     #[serde(rename = "constraint")]
     Constraint,
-    /// r.
+    /// The residual r.
     #[serde(rename = "residual")]
     Residual,
     /// ∂C/∂x or ∂r/∂u.
@@ -39,7 +39,7 @@ pub enum BlockName {
 }
 
 impl BlockName {
-    /// The name it carries in [`Outputs::blocks`] and in record files.
+    /// Returns the name of the block in [`Outputs::blocks`] and in record files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -55,7 +55,7 @@ impl BlockName {
         }
     }
 
-    /// The blocks that an element of this kind returns.
+    /// Returns the blocks of an element of this kind.
     #[must_use]
     pub fn of_kind(kind: Kind) -> &'static [Self] {
         use BlockName::{Constraint, Energy, Force, ForceByPosition, ForceByVelocity};
@@ -70,14 +70,15 @@ impl BlockName {
         }
     }
 
-    /// How often an element's own formula was differentiated to obtain this block: its place in [`Outputs::flags`].
+    /// Returns the order of differentiation of the element's formula that yields this block, which is its index in
+    /// [`Outputs::flags`].
     #[must_use]
     pub fn order(self, kind: Kind) -> usize {
         match self {
             Self::Energy | Self::Constraint | Self::Residual => 0,
             Self::Gradient | Self::Jacobian => 1,
             Self::Hessian => 2,
-            // A constraint's force holds J already.
+            // The force of a constraint contains its Jacobian.
             Self::Force => usize::from(kind == Kind::Constraint),
             Self::ForceByPosition => 1 + usize::from(kind == Kind::Constraint),
             Self::ForceByVelocity => 1,
@@ -94,11 +95,11 @@ impl std::fmt::Display for BlockName {
 /// One block, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block<T = f64> {
-    /// Which one.
+    /// Name of the block.
     pub name: BlockName,
-    /// Numbers to a row.
+    /// Numbers per row.
     pub columns: usize,
-    /// All numbers.
+    /// Numbers of the block.
     pub numbers: Vec<T>,
 }
 
@@ -113,74 +114,74 @@ impl<T: Clone> Block<T> {
 }
 
 impl Block {
-    /// The largest magnitude; NaN if there is one.
+    /// Returns the largest magnitude; NaN if the block contains one.
     #[must_use]
     pub fn largest(&self) -> f64 {
         largest(&self.numbers)
     }
 }
 
-/// The largest magnitude; NaN if there is one.
+/// Returns the largest magnitude; NaN if the numbers contain one.
 pub(crate) fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().map(|x| x.abs()).fold(0.0, |most, x| if most.is_nan() || x <= most { most } else { x })
 }
 
-/// An element's answer, its blocks checked for completeness.
+/// The complete blocks of an element at one input.
 #[derive(Clone, Debug)]
 pub struct Answer {
-    /// The blocks in the order of [`BlockName::of_kind`].
+    /// Blocks in the order of [`BlockName::of_kind`].
     pub blocks: Vec<Block>,
-    /// The same blocks as other routines return them: the routine, and the block.
+    /// Blocks that further routines return as well, with the name of the routine.
     pub repeats: Vec<(&'static str, Block)>,
-    /// Conditions met, by order of derivative.
+    /// Flags by order of differentiation.
     pub flags: [Flags<f64>; 3],
 }
 
 impl Answer {
-    /// A block that this kind of element has.
+    /// Returns a block by its name.
     ///
     /// # Panics
-    /// When it has none of this name: a mistake in the caller.
+    /// If elements of this kind have no such block.
     #[must_use]
     pub fn block(&self, name: BlockName) -> &Block {
         self.blocks.iter().find(|block| block.name == name).expect("the kind of element decides the blocks")
     }
 }
 
-/// Why an element gave no usable answer.
+/// The reason why an element has no usable result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoAnswer {
     /// The rest shape is degenerate.
     #[error(transparent)]
     Rest(#[from] RestError),
-    /// A block is not among the outputs.
+    /// The outputs lack a block.
     #[error("{element}: the block `{block}` is missing from the outputs of this {kind}")]
     Missing {
-        /// The element.
+        /// Name of the element.
         element: &'static str,
-        /// The missing block.
+        /// Name of the missing block.
         block: BlockName,
-        /// The kind of element.
+        /// Kind of the element.
         kind: &'static str,
     },
     /// A block has the wrong length.
     #[error("{element}: the block `{block}` holds {found} numbers, expected {expected}")]
     Length {
-        /// The element.
+        /// Name of the element.
         element: &'static str,
-        /// The block.
+        /// Name of the block.
         block: BlockName,
-        /// How many numbers it must hold.
+        /// Expected length.
         expected: usize,
-        /// How many it holds.
+        /// Actual length.
         found: usize,
     },
 }
 
-/// Evaluates an element and checks that every block of its kind is there in full.
+/// Evaluates an element and checks that it returns every block of its kind in full.
 ///
 /// # Errors
-/// On a degenerate rest shape, a missing block or one of the wrong length.
+/// If the rest shape is degenerate, or a block is missing or has the wrong length.
 pub fn evaluate(
     declaration: &'static Declaration,
     evaluate: impl Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,
@@ -211,7 +212,7 @@ pub fn evaluate(
     Ok(Answer { blocks, repeats, flags: outputs.flags })
 }
 
-/// Rows and columns of a block; vectors are one row.
+/// Returns the number of rows and columns of a block; vectors have one row.
 fn shape(declaration: &Declaration, name: BlockName) -> (usize, usize) {
     let n: usize = declaration.points.iter().map(|point| point.size).sum();
     match name {

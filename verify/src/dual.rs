@@ -1,23 +1,24 @@
-//! [`Number`] for num-dual's hyper-dual numbers, so that the interpreter can differentiate a formula by a code path that
-//! shares nothing with the compiler's own differentiation.
+//! [`Number`] for num-dual's hyper-dual numbers. They let the interpreter differentiate a formula independently of the
+//! compiler.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use energy_dsl::{Level, Number};
 use num_dual::{DualNum, HyperDual64};
 
-/// a + b ε₁ + c ε₂ + d ε₁ε₂ with ε₁² = ε₂² = 0: carries a value, two first derivatives and their mixed second one.
+/// A hyper-dual number a + b ε₁ + c ε₂ + d ε₁ε₂ with ε₁² = ε₂² = 0: a value, two first derivatives and their mixed
+/// second derivative.
 #[derive(Clone, Copy, Debug)]
 pub struct Hyper(pub HyperDual64);
 
 impl Hyper {
-    /// A constant.
+    /// Creates a constant.
     #[must_use]
     pub fn constant(value: f64) -> Self {
         Self(HyperDual64::from_re(value))
     }
 
-    /// A variable that moves by `first` along ε₁ and by `second` along ε₂.
+    /// Creates a variable with a unit derivative along ε₁ if `first`, and along ε₂ if `second`.
     #[must_use]
     pub fn variable(value: f64, first: bool, second: bool) -> Self {
         let unit = |moves| if moves { 1.0 } else { 0.0 };
@@ -91,7 +92,7 @@ impl Number for Hyper {
         Self(self.0.ln())
     }
     fn atan2<L: Level>(self, x: Self) -> Self {
-        // num-dual's own divides by x, and by x² in its derivatives.
+        // num-dual's atan2 divides by x, and by x² in its derivatives.
         if x.0.re.abs() >= self.0.re.abs() {
             return Self(self.0.atan2(x.0));
         }
@@ -99,7 +100,7 @@ impl Number for Hyper {
         quarter - Self((x.0 / self.0).atan())
     }
     fn powf<L: Level>(self, exponent: Self) -> Self {
-        // A constant exponent allows a base that is negative or zero, which exp(e ln x) does not.
+        // A constant exponent allows a zero or negative base, which exp(e ln x) does not.
         if exponent.is_constant() { Self(self.0.powf(exponent.0.re)) } else { Self(self.0.powd(exponent.0)) }
     }
     fn sum_error(self, _other: Self) -> Self {
@@ -134,7 +135,7 @@ mod tests {
 
     use super::*;
 
-    /// At (3, 4), by hand: f = atan2(y, x) has f_x = −y/r², f_xy = (y² − x²)/r⁴.
+    /// At (3, 4), f = atan2(y, x) has f_x = −y/r², f_xy = (y² − x²)/r⁴.
     #[test]
     fn second_derivatives_of_the_angle_of_a_point() {
         let x = Hyper::variable(3.0, true, false);
@@ -165,7 +166,7 @@ mod tests {
         assert_eq!((magnitude.re, magnitude.eps1), (2.0, -1.0));
         let chosen = Hyper::select(x.less(Hyper::constant(0.0)), x * x, Hyper::constant(f64::NAN)).0;
         assert_eq!((chosen.re, chosen.eps1, chosen.eps1eps2), (4.0, -4.0, 2.0));
-        // x times its scale has the derivative of x times a constant.
+        // The scale counts as a constant in the derivative.
         let scaled = (x * x.power_of_two_scale()).0;
         assert_eq!((scaled.re, scaled.eps1), (-1.0, 0.5));
     }

@@ -1,8 +1,8 @@
-/// The eigenvalues of a symmetric n×n matrix, by Jacobi's rotations; NaN in, NaN out.
+/// Returns the eigenvalues of a symmetric n×n matrix by Jacobi rotations. NaN entries give NaN eigenvalues.
 pub(crate) fn eigenvalues(n: usize, matrix: &[f64]) -> Vec<f64> {
     let mut a = matrix.to_vec();
     let largest = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    // Quadratic convergence: a dozen sweeps leave nothing but rounding.
+    // Convergence is quadratic: a dozen sweeps leave only rounding errors.
     for _ in 0..30 {
         let off = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| a[i * n + j].abs()).fold(0.0, f64::max);
         if off <= f64::EPSILON * 1e-3 * largest {
@@ -17,7 +17,7 @@ pub(crate) fn eigenvalues(n: usize, matrix: &[f64]) -> Vec<f64> {
     (0..n).map(|i| a[i * n + i]).collect()
 }
 
-/// Makes entry (p, q) zero.
+/// Rotates so that entry (p, q) becomes zero.
 fn rotate(a: &mut [f64], n: usize, p: usize, q: usize) {
     let off = a[p * n + q];
     if off == 0.0 {
@@ -43,7 +43,7 @@ mod tests {
 
     #[test]
     fn known_eigenvalues() {
-        // [[2, 1, 0], [1, 2, 1], [0, 1, 2]]: 2, 2 ± √2.
+        // [[2, 1, 0], [1, 2, 1], [0, 1, 2]] has the eigenvalues 2 and 2 ± √2.
         let mut values = eigenvalues(3, &[2.0, 1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 1.0, 2.0]);
         values.sort_by(f64::total_cmp);
         for (got, want) in values.iter().zip([2.0 - 2.0_f64.sqrt(), 2.0, 2.0 + 2.0_f64.sqrt()]) {

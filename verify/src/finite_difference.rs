@@ -1,19 +1,21 @@
-//! Central differences, extrapolated once, over a sweep of steps: the error falls with the step, then rises as rounding takes
-//! over; the least error found and the order of the fall are what tell a right derivative from a wrong one.
+//! Central differences with one extrapolation, over a sweep of steps.
+//!
+//! The error falls with the step until rounding takes over. The smallest error and the observed order tell a right
+//! derivative from a wrong one.
 
 use energy_dsl::Kind;
 
 use crate::blocks::{BlockName, NoAnswer, largest};
 use crate::sample::Sample;
 
-/// Which inputs are stepped.
+/// The inputs that are stepped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stepped {
     Positions,
     Velocities,
 }
 
-/// The block one order below, whose differences a block must equal, and by what.
+/// Returns the block one order below, whose differences must equal `block`, and the inputs to step.
 pub(crate) fn antiderivative(block: BlockName, kind: Kind) -> Option<(BlockName, Stepped)> {
     match block {
         BlockName::Jacobian if kind == Kind::Residual => Some((BlockName::Residual, Stepped::Positions)),
@@ -26,20 +28,21 @@ pub(crate) fn antiderivative(block: BlockName, kind: Kind) -> Option<(BlockName,
     }
 }
 
-/// A sweep over steps.
+/// The result of a sweep over steps.
 #[derive(Clone, Debug)]
 pub(crate) struct Sweep {
-    /// The extrapolated differences at the step where they vary least, row-major: row of the lower block, then stepped input.
+    /// Extrapolated differences at the step where they vary least, row-major: by row of the lower block, then stepped
+    /// input.
     pub(crate) best: Vec<f64>,
-    /// That step.
+    /// The step of `best`.
     pub(crate) step: f64,
-    /// Observed order of the plain central difference, if its error fell far enough to be measured.
+    /// Observed order of the plain central difference; `None` if its error did not fall far enough to measure it.
     pub(crate) order: Option<f64>,
-    /// Step, relative to the length, and the largest deviation of plain and extrapolated differences.
+    /// Relative step, and the largest deviation of plain and of extrapolated differences.
     pub(crate) curve: Vec<(f64, f64, f64)>,
 }
 
-/// Differences of `lower`, a function of the stepped inputs, against `block`.
+/// Compares differences of `lower`, a function of the stepped inputs, with `block`.
 pub(crate) fn sweep(
     sample: &Sample,
     stepped: Stepped,
@@ -48,7 +51,7 @@ pub(crate) fn sweep(
     lower: impl Fn(&Sample) -> Result<Vec<f64>, NoAnswer>,
 ) -> Result<Sweep, NoAnswer> {
     const STEPS: [i32; 5] = [-6, -8, -10, -12, -14];
-    // Where the function itself jumps nearby (a sign is chosen), only steps that do not reach the jump say anything.
+    // If the function jumps nearby (a sign is chosen), only steps that stay on one side are useful.
     const FINER: [i32; 3] = [-17, -20, -23];
     const SUSPICIOUS: f64 = 1e-7;
     let inputs = match stepped {
@@ -89,12 +92,12 @@ pub(crate) fn sweep(
         curve.push((step / length, deviation(&whole), deviation(&extrapolated)));
         extrapolations.push((step, extrapolated));
     }
-    // Without looking at the block: where two steps in a row agree best, truncation and rounding are least.
+    // The step is chosen without the block: errors are smallest where consecutive steps agree best.
     let disagreement = |k: usize| largest_difference(&extrapolations[k].1, &extrapolations[k + 1].1);
     let chosen = (0..extrapolations.len() - 1).min_by(|&a, &b| disagreement(a).total_cmp(&disagreement(b)));
     let (step, best) = extrapolations.swap_remove(chosen.unwrap_or_default());
     let error = deviation(&best);
-    // The first step's fall, where it is not yet lost in rounding.
+    // Measure the order at the first step, unless rounding dominates its error.
     let order = plain
         .first()
         .filter(|(whole, half)| *half > 1e3 * error && *half > 1e-10 * largest(block) && *whole > *half)

@@ -1,36 +1,37 @@
-//! A formula as written, evaluated and differentiated by arithmetic that is independent of the generated code.
+//! Evaluation and differentiation of a formula as written, independent of the generated code.
 
 use energy_compiler::Textbook;
 use energy_dsl::{Declaration, Inputs, Kind, Number};
 
 use crate::blocks::{Block, BlockName};
 use crate::dual::Hyper;
-use crate::multiprecision::{Jet, Order};
+use crate::jet::{Jet, Order};
 use crate::sample::Sample;
 
-/// A formula's rows with their first and second derivatives at one input.
+/// The rows of a formula with first and second derivatives at one input.
 struct Expansion<T> {
-    /// The rows.
+    /// Values of the rows.
     values: Vec<T>,
-    /// Row by coordinate.
+    /// First derivatives, by row, then coordinate.
     by_position: Vec<Vec<T>>,
-    /// Row by pair of coordinates; empty where none was asked for.
+    /// Second derivatives, by row, then pair of coordinates; empty if not requested.
     by_position_twice: Vec<Vec<Vec<T>>>,
-    /// Row by velocity component; empty unless the declaration is a force.
+    /// Derivatives by row, then velocity component; empty unless the declaration is a force.
     by_velocity: Vec<Vec<T>>,
 }
 
-/// The rows of a formula in plain double arithmetic.
+/// Evaluates the rows of a formula in plain double precision.
 pub(crate) fn rows(formula: &Textbook, sample: &Sample) -> Vec<f64> {
     formula.evaluate(&sample.inputs())
 }
 
-/// Every block of a declaration from its formula alone, by hyper-dual numbers.
+/// Computes every block of a declaration from its formula alone, by hyper-dual numbers.
 pub(crate) fn expected_blocks(declaration: &Declaration, formula: &Textbook, sample: &Sample) -> Vec<Block> {
     blocks(declaration.kind, expand(formula, sample, order(declaration.kind) == Order::Second), sample)
 }
 
-/// The same over any number type, by jets. The numbers are made here, so that they have the precision of the caller.
+/// Computes every block over any number type, by jets. Creates the numbers itself, so that they have the caller's
+/// precision.
 pub(crate) fn blocks_over<T: Number<Mask = bool>>(
     declaration: &Declaration,
     formula: &Textbook,
@@ -39,7 +40,7 @@ pub(crate) fn blocks_over<T: Number<Mask = bool>>(
     blocks(declaration.kind, expand_by_jets(formula, sample, order(declaration.kind)), sample)
 }
 
-/// How often a formula must be differentiated for the blocks of its kind.
+/// Returns the order of differentiation that the blocks of a kind need.
 fn order(kind: Kind) -> Order {
     match kind {
         Kind::Energy | Kind::Constraint => Order::Second,
@@ -67,7 +68,7 @@ fn blocks<T: Number>(kind: Kind, expansion: Expansion<T>, sample: &Sample) -> Ve
     }
 }
 
-/// Witkin's ½ k_s CᵀC and −Jᵀ (k_s C + k_d J v) with their derivatives, written out over C, J and ∂²C.
+/// Computes Witkin's ½ k_s CᵀC and −Jᵀ (k_s C + k_d J v) with their derivatives from C, J and ∂²C.
 fn constraint_blocks<T: Number>(expansion: &Expansion<T>, sample: &Sample) -> Vec<Block<T>> {
     let (stiffness, damping) = sample.stiffness_and_damping();
     let (stiffness, damping) = (T::from_f64(stiffness), T::from_f64(damping));
@@ -112,7 +113,7 @@ fn sum<T: Number>(count: usize, term: impl Fn(usize) -> T) -> T {
     (0..count).fold(T::from_f64(0.0), |sum, i| sum + term(i))
 }
 
-/// One evaluation with all coordinates moving: positions first, velocities after them.
+/// Evaluates once with all coordinates variable: first positions, then velocities.
 fn expand_by_jets<T: Number<Mask = bool>>(formula: &Textbook, sample: &Sample, order: Order) -> Expansion<T> {
     let (n, m) = (sample.positions.len(), if order == Order::First { sample.velocities.len() } else { 0 });
     let constants = |numbers: &[f64]| numbers.iter().map(|&x| Jet::constant(T::from_f64(x))).collect::<Vec<_>>();
@@ -136,7 +137,8 @@ fn expand_by_jets<T: Number<Mask = bool>>(formula: &Textbook, sample: &Sample, o
     }
 }
 
-/// One hyper-dual evaluation per pair of coordinates, or per coordinate where no second derivative is wanted.
+/// Evaluates once per pair of coordinates by hyper-dual numbers; once per coordinate if no second derivatives are
+/// needed.
 fn expand(formula: &Textbook, sample: &Sample, second: bool) -> Expansion<f64> {
     let n = sample.positions.len();
     let values = rows(formula, sample);
@@ -162,7 +164,7 @@ fn expand(formula: &Textbook, sample: &Sample, second: bool) -> Expansion<f64> {
     Expansion { values, by_position, by_position_twice, by_velocity }
 }
 
-/// The rows with ε₁ along position `i` (and ε₂ along `j`), or with ε₁ along one velocity.
+/// Evaluates the rows with ε₁ along position `i` and ε₂ along `j`, or with ε₁ along one velocity.
 fn evaluate_hyper(formula: &Textbook, sample: &Sample, (i, j): (usize, usize), velocity: Option<usize>) -> Vec<Hyper> {
     let constants = |numbers: &[f64]| numbers.iter().map(|&x| Hyper::constant(x)).collect::<Vec<_>>();
     let positions: Vec<Hyper> =

@@ -1,6 +1,6 @@
-//! The little vector geometry that sampling and the conservation laws need.
+//! Small vector geometry for sampling and conservation laws.
 
-/// A rotation about the origin, row by row.
+/// A rotation about the origin, by rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rotation([[f64; 3]; 3]);
 
@@ -14,12 +14,12 @@ impl Rotation {
     }
 }
 
-/// The rotated vector.
+/// Returns the rotated vector.
 pub(crate) fn rotate(Rotation(rows): &Rotation, v: &[f64]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// Every vector of a flattened list, rotated.
+/// Rotates each vector of a flattened list.
 pub(crate) fn rotate_all(rotation: &Rotation, vectors: &[f64]) -> Vec<f64> {
     vectors.chunks(3).flat_map(|v| rotate(rotation, v)).collect()
 }
@@ -28,7 +28,7 @@ pub(crate) fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// a × b of two vectors in space.
+/// Returns a × b.
 pub(crate) fn cross(a: &[f64], b: &[f64]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
@@ -41,14 +41,14 @@ fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// The shortest distance between two points in space; none without a pair, or where all coincide.
+/// Returns the shortest positive distance between two points in space; `None` if there is none.
 pub(crate) fn shortest_distance(points: &[f64]) -> Option<f64> {
     let points: Vec<&[f64]> = points.chunks(3).collect();
     let distances = pairs(points.len()).map(|(i, j)| norm(&difference(points[i], points[j])));
     distances.filter(|&d| d > 0.0).min_by(f64::total_cmp)
 }
 
-/// The longest distance between two points in space; none without a pair.
+/// Returns the longest distance between two points in space; `None` for fewer than two points.
 pub(crate) fn longest_distance(points: &[f64]) -> Option<f64> {
     let points: Vec<&[f64]> = points.chunks(3).collect();
     pairs(points.len()).map(|(i, j)| norm(&difference(points[i], points[j]))).max_by(f64::total_cmp)
@@ -58,9 +58,9 @@ fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
-/// Whether points are well apart, no three are near a line and no four (in space) near a plane: textbook forms lose
-/// digits near all of these, and the audit would measure that loss. `demand` is 1 for the full distances and angles; many
-/// points do not fit a box with that and must make do with less.
+/// Whether points are well separated, with no three near a line and no four (in space) near a plane. Textbook forms
+/// lose digits near these configurations, and the audit would measure that loss. `demand` scales the required distances
+/// and angles from 1 downwards: many points do not fit into a box otherwise.
 pub(crate) fn is_well_shaped(points: &[f64], dimension: usize, demand: f64) -> bool {
     let points: Vec<&[f64]> = points.chunks(dimension).collect();
     let edge = |i: usize, j: usize| difference(points[j], points[i]);
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn degenerate_shapes_are_turned_down() {
+    fn degenerate_shapes_are_rejected() {
         assert!(is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3, 1.0));
         assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 3, 1.0), "too close");
         assert!(!is_well_shaped(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.1, 0.0], 3, 1.0), "in line");

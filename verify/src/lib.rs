@@ -1,21 +1,23 @@
-//! The audit of generated derivatives.
+//! Audit of generated derivatives.
 //!
-//! Every block that an element returns is compared with three independent routes: multi-precision and hyper-dual numbers run
-//! through the declaration's *textbook* form ([`multiprecision`], [`dual::Hyper`]), and finite differences of the block one
-//! order below, at a step chosen by where they vary least. Where routes disagree, the audit names the one to suspect. The laws that
-//! a declaration implies are checked beside, and faults are planted that must be noticed ([`audit`](mod@audit)).
-//! [`reference`](mod@reference) measures errors against values computed elsewhere, [`stress`](mod@stress) along the way to every
-//! singularity.
+//! Three independent routes check each block that an element returns:
+//!
+//! * multi-precision numbers through the declaration's *textbook* form ([`multiprecision`]),
+//! * hyper-dual numbers through the same form ([`dual::Hyper`]), and
+//! * finite differences of the block one order below, at the step where they vary least.
+//!
+//! If routes disagree, the audit names the one to suspect. It also checks the laws that a declaration implies, and
+//! plants faults that must be noticed ([`audit`](mod@audit)). [`reference`](mod@reference) measures errors against
+//! recorded values, [`stress`](mod@stress) on the way to every singularity.
 //!
 //! ```
 //! use energy_elements::HairBend;
 //!
-//! // In a test of one's own: panics and names element, block and entry, what each route gives, and the input.
+//! // In a test. A failure names element, block and entry, the result of each route, and the input.
 //! verify::assert_derivatives!(HairBend, samples = 20);
 //! ```
 #![forbid(unsafe_code)]
 
-mod atomic_file;
 pub mod audit;
 pub mod bench;
 mod blocks;
@@ -25,23 +27,23 @@ mod finite_difference;
 mod formula;
 pub mod fuzz;
 mod geometry;
+mod jet;
 mod listings;
-mod message;
 pub mod multiprecision;
-pub mod plot;
 pub mod reference;
 mod sample;
 pub mod stress;
 
-pub use atomic_file::write_whole;
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
 pub use listings::listings;
-pub use message::message;
+// Temporary, for cloth-core only: remove once it depends on energy-cli itself.
+#[doc(hidden)]
+pub use energy_cli::{message, plot, write_whole};
 pub use sample::Sample;
 
 /// Audits an element in a test: `assert_derivatives!(MyMaterial)`, or with `samples = 200` random inputs. See
-/// [`assert_derivatives`](fn@assert_derivatives) for what a failure says.
+/// [`assert_derivatives`](fn@assert_derivatives) for the message of a failure.
 ///
 /// ```
 /// use energy_dsl::energy;

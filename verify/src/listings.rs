@@ -3,10 +3,10 @@ use std::path::Path;
 use anyhow::Context;
 use energy_compiler::Listing;
 
-/// What the compiler makes of an element of the catalogue, or of the declarations of an `.energy` file.
+/// Compiles an element of the catalogue, or the declarations of an `.energy` file, for printing.
 ///
 /// # Errors
-/// When there is no such element or file, or the file has errors.
+/// If there is no such element or file, or the file has errors.
 pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
     let source = if Path::new(name).extension().is_some_and(|extension| extension == "energy") {
         std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?

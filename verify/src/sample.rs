@@ -12,13 +12,13 @@ use crate::geometry::{Rotation, difference, is_well_shaped, rotate, shortest_dis
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
-    /// Parameters; a constraint's stiffness and damping at the end.
+    /// Parameters, followed by a constraint's stiffness and damping.
     #[serde(default)]
     pub parameters: Vec<f64>,
     /// Rest shape.
     #[serde(default)]
     pub rest: Vec<f64>,
-    /// Positions, or a residual's unknowns.
+    /// Positions, or the unknowns of a residual.
     pub positions: Vec<f64>,
     /// Velocities; empty for an energy or a residual.
     #[serde(default)]
@@ -26,7 +26,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// As an element takes it.
+    /// Returns the input in the form that elements take.
     #[must_use]
     pub fn inputs(&self) -> Inputs<'_, f64> {
         Inputs {
@@ -37,10 +37,10 @@ impl Sample {
         }
     }
 
-    /// Whether it holds as many numbers as the declaration takes.
+    /// Checks that the sample has as many numbers as the declaration needs, all of them finite.
     ///
     /// # Errors
-    /// Which list does not, and how many it should hold.
+    /// If a list has the wrong length, or contains a number that is not finite.
     pub fn fits(&self, declaration: &Declaration) -> Result<(), String> {
         let size = |fields: &[Field]| fields.iter().map(|field| field.size).sum::<usize>();
         let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
@@ -59,7 +59,7 @@ impl Sample {
         check("parameters", &self.parameters, size(declaration.parameters) + implied)
     }
 
-    /// k_s and k_d, the last two parameters of a constraint.
+    /// Returns k_s and k_d, the last two parameters of a constraint.
     pub(crate) fn stiffness_and_damping(&self) -> (f64, f64) {
         match self.parameters[..] {
             [.., stiffness, damping] => (stiffness, damping),
@@ -67,12 +67,13 @@ impl Sample {
         }
     }
 
-    /// The length over which an element may change its shape: the shortest distance between points, 1 without a pair.
+    /// Returns the length over which an element may change: the shortest distance between points, or 1 for fewer than
+    /// two points.
     pub(crate) fn feature_length(&self, declaration: &Declaration) -> f64 {
         if has_points(declaration) { shortest_distance(&self.positions).unwrap_or(1.0) } else { 1.0 }
     }
 
-    /// The numbers by name with 17 significant digits, from which the very same doubles can be read back.
+    /// Formats the numbers by name with 17 significant digits, from which the same doubles can be read back.
     pub(crate) fn describe(&self, declaration: &Declaration) -> String {
         let mut text = String::new();
         let mut add = |title: &str, fields: &[(String, usize)], numbers: &[f64]| {
@@ -99,7 +100,7 @@ impl Sample {
     }
 }
 
-/// Numbers with 17 significant digits.
+/// Formats numbers with 17 significant digits.
 struct Numbers<'a>(&'a [f64]);
 
 impl fmt::Display for Numbers<'_> {
@@ -114,7 +115,7 @@ impl fmt::Display for Numbers<'_> {
     }
 }
 
-/// Whether the positions are points in space, and not other unknowns.
+/// Whether the positions are points in space, rather than other unknowns.
 pub(crate) fn has_points(declaration: &Declaration) -> bool {
     !declaration.points.is_empty() && declaration.points.iter().all(|point| point.size == 3)
 }
@@ -126,9 +127,9 @@ pub(crate) struct Sampler {
 }
 
 impl Sampler {
-    /// The samples of a declaration depend on the seed and its name alone, not on what else is audited.
+    /// Creates a sampler whose samples depend on the seed and the declaration's name only.
     pub(crate) fn new(declaration: &'static Declaration, seed: u64) -> Self {
-        // FNV-1a
+        // FNV-1a.
         let name = declaration
             .name
             .bytes()
@@ -136,7 +137,7 @@ impl Sampler {
         Self { declaration, random: Rng::with_seed(seed ^ name) }
     }
 
-    /// Uniform in [low, high).
+    /// Returns a uniform number in [low, high).
     fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.random.f64()
     }
@@ -145,14 +146,15 @@ impl Sampler {
         (0..count).map(|_| self.uniform(low, high)).collect()
     }
 
-    /// One input: points of order one to eight apart, anywhere within a few units of the origin.
+    /// Draws an input: points at distances of about one to eight, within a few units of the origin.
     pub(crate) fn sample(&mut self) -> Sample {
         let declaration = self.declaration;
         let count: usize = declaration.points.iter().map(|point| point.size).sum();
         let positions = if has_points(declaration) { self.points(count) } else { self.unknowns(count) };
         let rest = self.rest();
         let mut parameters = Vec::new();
-        // Lengths are of the size of the configuration, so that springs are short and long, and barriers near and far.
+        // Lengths are about the size of the configuration, so that springs are compressed and stretched, and barriers
+        // near and far.
         let length = if has_points(declaration) { shortest_distance(&positions).unwrap_or(1.0) } else { 1.0 };
         for parameter in declaration.parameters {
             let scale = if parameter.unit == "m" { length } else { 1.0 };
@@ -168,16 +170,16 @@ impl Sampler {
         Sample { parameters, rest, positions, velocities }
     }
 
-    /// Unknowns of one size, from ¼ to 4.
+    /// Draws unknowns of one size, from ¼ to 4.
     fn unknowns(&mut self, count: usize) -> Vec<f64> {
         let scale = self.uniform(-2.0, 2.0).exp2();
         self.uniforms(count, -scale, scale)
     }
 
-    /// An input whose points have small whole coordinates: edges along axes, right angles, components that vanish.
+    /// Draws an input whose points have small integer coordinates: edges along axes, right angles, zero components.
     pub(crate) fn lattice_sample(&mut self) -> Sample {
         let sample = self.sample();
-        // A function of the coordinates themselves may have a kink at any whole number.
+        // A function of the coordinates themselves may have a kink at any integer.
         if !has_points(self.declaration) || !self.declaration.translation_invariant {
             return sample;
         }
@@ -193,7 +195,7 @@ impl Sampler {
         }
     }
 
-    /// An input that may be anything but degenerate: with unknowns and parameters, or what differs between points, of very
+    /// Draws an unusual but non-degenerate input: unknowns and parameters, or distances between points, of very
     /// different sizes.
     pub(crate) fn odd_sample(&mut self) -> Sample {
         let mut sample = self.sample();
@@ -212,7 +214,7 @@ impl Sampler {
         sample
     }
 
-    /// Well-shaped points, scaled and moved at random.
+    /// Draws well-shaped points, scaled and translated at random.
     fn points(&mut self, count: usize) -> Vec<f64> {
         let points = self.shape(count, 3);
         let scale = self.uniform(-1.0, 2.0).exp2();
@@ -221,7 +223,7 @@ impl Sampler {
         points.chunks(3).flat_map(|p| rotate(&turn, p)).enumerate().map(|(i, x)| scale * x + offset[i % 3]).collect()
     }
 
-    /// A rest shape: points in the plane (a triangle has positive area) or in space, else plain numbers.
+    /// Draws a rest shape: points in the plane (a triangle has positive area) or in space, or plain numbers.
     fn rest(&mut self) -> Vec<f64> {
         let fields = self.declaration.rest;
         let count = fields.iter().map(|field| field.size).sum();
@@ -232,8 +234,8 @@ impl Sampler {
         self.shape(count, dimension)
     }
 
-    /// Points in the box (−1, 1) that are well apart, the less so the longer they are looked for; a plane triangle has positive
-    /// area.
+    /// Draws points in the box (−1, 1) that are well separated, with a demand that falls with each attempt. A plane
+    /// triangle has positive area.
     fn shape(&mut self, count: usize, dimension: usize) -> Vec<f64> {
         let mut demand = 1.0;
         loop {
@@ -247,7 +249,7 @@ impl Sampler {
         }
     }
 
-    /// Angles in (−2, 2), other scalars in [0.5, 2); vectors of either sign.
+    /// Draws angles in (−2, 2), other scalars in [0.5, 2), and vectors of either sign.
     fn parameter(&mut self, field: &Field) -> Vec<f64> {
         match (field.unit, field.size) {
             ("rad", size) => self.uniforms(size, -2.0, 2.0),
@@ -256,12 +258,12 @@ impl Sampler {
         }
     }
 
-    /// A random rotation.
+    /// Draws a rotation.
     pub(crate) fn rotation(&mut self) -> Rotation {
         loop {
             let quaternion = [(); 4].map(|()| self.uniform(-1.0, 1.0));
             let length = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
-            // Reject the corners, which would make some directions likelier, and the centre.
+            // Reject the corners, which would favour some directions, and the centre.
             if (0.1..1.0).contains(&length) {
                 return Rotation::from_unit_quaternion(quaternion.map(|q| q / length));
             }
@@ -269,7 +271,7 @@ impl Sampler {
     }
 }
 
-/// Whether a plane triangle is counter-clockwise; true of anything else.
+/// Whether a plane triangle is counter-clockwise; `true` for all other shapes.
 fn has_positive_area(points: &[f64], dimension: usize) -> bool {
     let corners: Vec<&[f64]> = points.chunks(2).collect();
     let (2, [a, b, c]) = (dimension, corners.as_slice()) else { return true };

@@ -1,5 +1,5 @@
-//! Functions of one number, with their first and second derivatives, against 600-bit fixed-point series: the bounds that the table
-//! of functions states.
+//! Functions of one number, with first and second derivatives, against 600-bit fixed-point series, within the bounds
+//! that the table of functions states.
 #![allow(missing_docs)]
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -44,7 +44,7 @@ impl Fixed {
         Self((self.0.clone() << BITS).sqrt())
     }
 
-    /// Σ termₖ, termₖ₊₁ = termₖ · ratio(k), until they vanish.
+    /// Returns Σ termₖ with termₖ₊₁ = termₖ · ratio(k), until the terms vanish.
     fn series(first: Self, ratio: impl Fn(i32) -> Self) -> Self {
         let (mut sum, mut term) = (first.clone(), first);
         for k in 0.. {
@@ -65,7 +65,7 @@ impl Fixed {
         Self::series(self.clone(), |k| self.clone() / Self::of(f64::from(k + 2)))
     }
 
-    /// 2 artanh(x/(2 + x)), for −½ ≤ x ≤ 1.
+    /// Returns 2 artanh(x/(2 + x)), for −½ ≤ x ≤ 1.
     fn log1p(&self) -> Self {
         let z = self.clone() / (Self::of(2.0) + self.clone());
         let square = z.clone() * z.clone();
@@ -73,7 +73,7 @@ impl Fixed {
         Self::of(2.0) * Self::series(z, ratio)
     }
 
-    /// The m-th derivative of Σ (−1)ᵏ yᵏ/(2k + offset)!.
+    /// Returns the m-th derivative of Σ (−1)ᵏ yᵏ/(2k + offset)!.
     fn even(&self, offset: i32, m: i32) -> Self {
         let first: f64 = (1..=m).map(f64::from).product();
         let factorial: f64 = (1..=2 * m + offset).map(f64::from).product();
@@ -120,7 +120,7 @@ fn error(value: f64, truth: &Fixed) -> f64 {
     scaled.to_f64().unwrap() / 2.0_f64.powi(160 - 53)
 }
 
-/// Both signs of numbers from 1e-30 to `most`, where `negative`.
+/// Returns numbers from 1e-30 to `most`, of both signs if `negative`.
 fn arguments(most: f64, negative: bool) -> Vec<f64> {
     let mut arguments = Vec::new();
     let mut random = fastrand::Rng::with_seed(7);
@@ -134,7 +134,7 @@ fn arguments(most: f64, negative: bool) -> Vec<f64> {
     arguments
 }
 
-/// Checks value, first and second derivative within the bounds, in units of roundoff.
+/// Checks value, first and second derivative against bounds in units of roundoff.
 fn check<E: Potential<f64, Points = [[f64; 3]; 1]>>(
     element: &E,
     arguments: &[f64],
@@ -206,7 +206,7 @@ fn sines_over_angles() {
     });
 }
 
-/// sin x and cos x.
+/// Returns sin x and cos x.
 fn sine_and_cosine(x: &Fixed) -> (Fixed, Fixed) {
     let y = x.clone() * x.clone();
     (x.clone() * y.even(1, 0), y.even(0, 0))
@@ -228,7 +228,7 @@ fn trigonometric_functions() {
     });
     check(&Asin::new(), &arguments(0.999, true), [3.0, 3.0, 8.0], |x| {
         let other = (one() - x.clone() * x.clone()).sqrt();
-        // One step of Newton from the rounded angle, and one more.
+        // Newton's method from the rounded angle.
         let mut angle = Fixed::of((x.0.to_f64().unwrap() / 2.0_f64.powi(BITS as i32)).asin());
         for _ in 0..5 {
             let (sine, cosine) = sine_and_cosine(&angle);

@@ -1,4 +1,4 @@
-//! The audit bites: elements with one wrong sign or one dropped term are refused, and the message names element, block and
+//! The audit rejects elements with one wrong sign or one dropped term, with a message that names element, block and
 //! entry.
 
 use std::panic::catch_unwind;
@@ -7,7 +7,7 @@ use energy_dsl::{Declaration, Element, Inputs, Outputs, Real, RestError};
 use energy_elements::{BridsonForceDamped, HairBend, QuadraticHinge, Spring, StVK};
 use verify::assert_derivatives;
 
-/// An element whose output is tampered with on its way.
+/// Declares an element whose output is changed on the way.
 macro_rules! broken {
     ($name:ident, $of:ty, $block:literal, |$numbers:ident| $change:expr) => {
         #[derive(Clone, Copy)]
@@ -44,7 +44,7 @@ broken!(Lopsided, StVK<f64>, "hess", |h| h[1] = h[1] * number(1.0 + 1e-12, h[1])
 broken!(SevenTimes, Spring<f64>, "force", |f| f.iter_mut().for_each(|f| *f = *f * number(7.0, *f)));
 broken!(NotANumber, HairBend<f64>, "energy", |u| u[0] = u[0] * number(f64::NAN, u[0]));
 
-/// A number of the type at hand.
+/// Converts a number to the type of `_like`.
 fn number<T: Real>(value: f64, _like: T) -> T {
     T::from_f64(value)
 }
@@ -86,7 +86,7 @@ fn an_asymmetry_in_the_last_digits_is_found() {
     assert!(message::<Lopsided>().contains("symmetry"));
 }
 
-/// Seven times the force passes Σ f = 0 and Σ x × f = 0: those laws are necessary only.
+/// Seven times the force still obeys Σ f = 0 and Σ x × f = 0, which are necessary conditions only.
 #[test]
 fn seven_times_the_force_is_found_although_it_keeps_the_laws() {
     let message = message::<SevenTimes>();

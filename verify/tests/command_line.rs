@@ -1,4 +1,4 @@
-//! The binary, end to end.
+//! End-to-end tests of the binary.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -53,7 +53,7 @@ fn a_file_is_audited_reported_and_run_again_at_its_inputs() {
 }
 
 #[test]
-fn sweeps_of_a_distance_lose_nothing_where_the_textbook_form_has_no_digit_left() {
+fn sweeps_of_a_distance_keep_the_digits_that_the_textbook_form_loses() {
     let output = verify(&["stress", "Distance", "PowerLaw"]);
     let printed = text(&output.stdout);
     assert!(output.status.success(), "{printed}{}", text(&output.stderr));
@@ -61,7 +61,7 @@ fn sweeps_of_a_distance_lose_nothing_where_the_textbook_form_has_no_digit_left()
 }
 
 #[test]
-fn an_unknown_element_is_refused_with_the_known_ones() {
+fn an_unknown_element_is_rejected_with_the_known_ones() {
     let output = verify(&["audit", "Sprin"]);
     assert_eq!(output.status.code(), Some(2));
     let message = text(&output.stderr);
@@ -73,7 +73,7 @@ fn the_reference_values_are_met() {
     let output = verify(&["reference"]);
     let printed = text(&output.stdout);
     assert!(output.status.success(), "{printed}{}", text(&output.stderr));
-    // Everything but what is listed here is within tier A, and within tier B where it applies.
+    // Every result is within tier A, and within tier B if it applies.
     assert!(printed.contains("beyond tier A: none\n"), "{printed}");
     assert!(printed.contains("beyond tier B: none\n"), "{printed}");
     assert!(printed.contains("132 of 132 blocks at degenerate inputs as documented"), "{printed}");
@@ -127,7 +127,7 @@ fn degenerate_records_are_evaluated_with_flags() {
     assert!(written["records"][1]["error"].as_str().unwrap().contains("degenerate"));
 }
 
-/// A file may mix potentials; only a degenerate rest shape has no answer.
+/// A file may mix potentials; only a degenerate rest shape has no result.
 #[test]
 fn the_degenerate_inputs_are_all_evaluated_but_for_a_degenerate_rest_shape() {
     let folder = tempfile::tempdir().unwrap();
@@ -145,9 +145,9 @@ fn the_degenerate_inputs_are_all_evaluated_but_for_a_degenerate_rest_shape() {
     assert_eq!(without, ["stvk_membrane"]);
 }
 
-/// A decimal that is not the double that was meant is a damaged file, not a slightly different input.
+/// A decimal that is not the intended double means a damaged file.
 #[test]
-fn a_number_that_disagrees_with_its_bits_is_refused() {
+fn a_number_that_disagrees_with_its_bits_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let (input, out) = (folder.path().join("in.json"), folder.path().join("out.json"));
     let original = std::fs::read_to_string(data("distance.json")).unwrap();
@@ -161,7 +161,7 @@ fn a_number_that_disagrees_with_its_bits_is_refused() {
 }
 
 #[test]
-fn bad_records_are_refused_by_name_and_nothing_is_written() {
+fn bad_records_are_named_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let (input, out) = (folder.path().join("in.json"), folder.path().join("out.json"));
     for (content, expected) in [
@@ -216,7 +216,7 @@ fn generated_code_is_shown() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(printed.contains("fn value_at<L: ::energy_dsl::Level>") && printed.contains("self.K *"), "{printed}");
     assert!(!printed.contains("fn gradient"), "one routine only: {printed}");
-    // Byte for byte the same each time.
+    // The output is deterministic.
     assert_eq!(verify(&["show", "BridsonForce"]).stdout, verify(&["show", "BridsonForce"]).stdout);
 }
 
@@ -231,7 +231,7 @@ fn plans_name_each_route_and_the_one_taken() {
 }
 
 #[test]
-fn pinned_points_leave_operations_out() {
+fn pinned_points_save_operations() {
     let printed = text(&verify(&["show", "QuadraticHinge", "--counts"]).stdout);
     let operations = |row: &str| -> usize {
         let line = printed.lines().find(|line| line.trim_start().starts_with(row)).expect(row);
@@ -246,7 +246,7 @@ fn pinned_points_leave_operations_out() {
 }
 
 #[test]
-fn unknown_routines_and_files_are_refused() {
+fn unknown_routines_and_files_are_rejected() {
     let output = verify(&["show", "Spring", "--routine", "hesian"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("it has hessian, value, gradient"), "{}", text(&output.stderr));

@@ -1,5 +1,7 @@
-//! The elementary functions against multi-precision ones: random arguments of every size and hard ones, in both precisions,
-//! at every level of the machine. The worst error of each is printed: `cargo test -p verify --test elementary_functions -- --nocapture`.
+//! The elementary functions against multi-precision ones: random arguments of every size and hard ones, in both
+//! precisions, at every SIMD level of the machine.
+//!
+//! `cargo test -p verify --test elementary_functions -- --nocapture` prints the worst error of each.
 
 use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
@@ -14,20 +16,20 @@ fn big(x: f64) -> Big {
     Big::try_from(x).expect("arguments are finite").with_precision(PRECISION).value()
 }
 
-/// A function with its truth and its arguments; the second is unused in functions of one.
+/// A function with its true values and arguments; functions of one argument ignore the second.
 struct Case {
     name: &'static str,
     truth: fn(f64, f64) -> Big,
     arguments: fn(&mut fastrand::Rng, f32_range: bool) -> (f64, f64),
-    /// Allowed errors in double and single precision, in ulp.
+    /// Allowed errors in double and in single precision, in ulp.
     bound: [f64; 2],
 }
 
-/// A positive number whose exponent is equally likely to be any from `from` to `to`.
+/// Returns a positive number whose exponent is uniform between `from` and `to`.
 fn any_size(rng: &mut fastrand::Rng, from: i32, to: i32) -> f64 {
     let mantissa = 1.0 + rng.f64();
     let exponent = rng.i32(from..to);
-    // In two steps, so that subnormal numbers come out.
+    // In two steps, so that subnormal numbers are reached.
     mantissa * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
 }
 
@@ -45,10 +47,10 @@ fn angle(rng: &mut fastrand::Rng, single: bool) -> (f64, f64) {
         0 => any_size(rng, from, to),
         1 => any_size(rng, -8, 30),
         2 => rng.f64() * 7.0,
-        // Neighbours of the multiples of π/2, where most digits cancel.
+        // Neighbours of multiples of π/2, where most digits cancel.
         3 => f64::from(rng.i32(1..2_000_000)) * std::f64::consts::FRAC_PI_2,
         4 => f64::from(rng.i32(1..20)) * std::f64::consts::FRAC_PI_4 + (rng.f64() - 0.5) * 1e-9,
-        // The double that comes closest to a multiple of π/2.
+        // The double closest to a multiple of π/2.
         _ => 6_381_956_970_095_103.0 * 2f64.powi(if single { 20 } else { 797 }),
     };
     (signed(rng, x), 0.0)
@@ -112,7 +114,7 @@ fn evaluate<S: Number, V: Lane<S>, L: Level>(name: &str, a: V, b: V) -> V {
     }
 }
 
-/// The results for all arguments, in both precisions.
+/// Computes the results for all arguments in both precisions.
 struct Results<'a> {
     name: &'static str,
     arguments: &'a [(f64, f64)],
@@ -141,14 +143,14 @@ impl Kernel for Results<'_> {
     }
 }
 
-/// A format of numbers: bits of the mantissa, least exponent of normal numbers, greatest number.
+/// A floating-point format: bits of the mantissa, smallest exponent of normal numbers, greatest number.
 #[derive(Clone, Copy)]
 struct Format(i32, i32, f64);
 
 const DOUBLE: Format = Format(53, -1022, f64::MAX);
 const SINGLE: Format = Format(24, -126, f32::MAX as f64);
 
-/// A true value: the nearest double, what is missing in units of the last place, and the exponent of that unit.
+/// A true value: the nearest double, the remainder in units of the last place, and the exponent of that unit.
 #[derive(Clone, Copy)]
 struct Truth {
     nearest: f64,
@@ -164,12 +166,12 @@ impl Truth {
         }
         let exponent = if nearest == 0.0 { least } else { (nearest.abs().log2().floor() as i32).max(least) };
         let unit = exponent - (digits - 1);
-        // Scaled before it is rounded: it may be less than any double.
+        // Scaled before rounding: the remainder may be smaller than any double.
         let missing = ((value - big(nearest)) << -isize::try_from(unit).expect("small")).to_f64().value();
         Self { nearest, missing, unit }
     }
 
-    /// The distance of a result in units of the last place.
+    /// Returns the error of a result in units of the last place.
     fn error(self, result: f64, Format(.., greatest): Format) -> f64 {
         if result.is_infinite() {
             return if self.nearest * result.signum() >= greatest { 0.0 } else { f64::INFINITY };
@@ -197,7 +199,7 @@ fn check(case: &Case) {
         for level in available() {
             let results = dispatch_at(level, Results { name: case.name, arguments: &arguments });
             let results = &results.expect("the level is available")[precision];
-            // A result that is not a number is the worst of all.
+            // NaN is worse than any error.
             let error = |i: usize| Some(truths[i].error(results[i], format)).filter(|e| !e.is_nan());
             let rank = |i: usize| error(i).unwrap_or(f64::INFINITY);
             let worst = (0..arguments.len()).max_by(|&i, &j| rank(i).total_cmp(&rank(j))).expect("there are some");
@@ -219,7 +221,7 @@ fn check(case: &Case) {
     assert!(failures.is_empty(), "beyond the bound:\n{}", failures.join("\n"));
 }
 
-// One test for each, so that they run side by side.
+// One test per function, so that they run in parallel.
 
 #[test]
 fn sine_is_within_its_bound() {

@@ -1,5 +1,5 @@
-//! Each mistake that the sources print, declared as they print it, is noticed by the audit, and by the check that the table in
-//! `docs/audit.md` says; what is right beside it passes.
+//! Mistakes that the sources print, declared as printed. The audit notices each, by the check that the table in
+//! `docs/audit.md` names, and passes the corrected formulas.
 
 use std::panic::catch_unwind;
 use std::path::Path;
@@ -12,7 +12,7 @@ fn declared() -> Vec<Target> {
     Target::of_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/errata.energy")).unwrap()
 }
 
-/// The audit of one declaration of the file, held against an energy of the file or the catalogue.
+/// Audits one declaration of the file against an energy of the file or the catalogue.
 fn audited(name: &str, energy: Option<&str>) -> Report {
     let all = declared();
     let find = |name: &str| all.iter().find(|target| target.name() == name).cloned();
@@ -30,7 +30,7 @@ fn failed(report: &Report) -> Vec<Check> {
     checks
 }
 
-/// Declaration, the energy its force should come from, and the check that notices.
+/// Declaration, the energy that its force should derive from, and the check that fails.
 const PRINTED: &[(&str, Option<&str>, Check)] = &[
     ("PrintedDotProduct", Some("DotProduct"), Check::MinusGradient),
     ("PrintedDistanceSquare", Some("Distance"), Check::MinusGradient),
@@ -57,7 +57,7 @@ fn each_printed_mistake_is_noticed_by_its_check() {
 }
 
 #[test]
-fn what_is_right_passes() {
+fn correct_declarations_pass() {
     for (name, energy) in [("RightHooke", "HookeSpring"), ("RightNormSquared", "BridsonBending")] {
         let report = audited(name, Some(energy));
         assert!(report.passed(), "{name}: {:?}", report.failures().collect::<Vec<_>>());
@@ -65,14 +65,14 @@ fn what_is_right_passes() {
     assert!(failed(&audited("DotProduct", None)).is_empty());
 }
 
-/// The laws alone do not notice it: they are necessary only.
+/// The laws alone do not notice it: they are necessary conditions only.
 #[test]
 fn seven_times_the_force_passes_everything_but_the_energy() {
     assert_eq!(failed(&audited("SevenTimes", Some("BridsonBending"))), [Check::MinusGradient]);
     assert!(audited("SevenTimes", None).passed());
 }
 
-/// r' = r + v: a length is no velocity, and the language says so.
+/// r' = r + v adds a velocity to a length, which the language rejects.
 #[test]
 fn the_printed_euler_step_does_not_compile() {
     let step = |text: &str| {
@@ -84,7 +84,7 @@ fn the_printed_euler_step_does_not_compile() {
     assert!(step("r - (r0 + Δt * v)").is_ok());
 }
 
-/// An element whose Jacobian is tampered with on its way.
+/// Declares an element whose Jacobian is changed on the way.
 macro_rules! jacobian {
     ($name:ident, |$n:ident, $numbers:ident| $change:expr) => {
         #[derive(Clone, Copy)]
@@ -105,7 +105,7 @@ macro_rules! jacobian {
     };
 }
 
-// Damped springs have a Jacobian that is not symmetric; made so, it is wrong, and looks better.
+// Damped springs have a non-symmetric Jacobian. Made symmetric it looks better, but is wrong.
 jacobian!(Symmetrised, |n, numbers| for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))) {
     let mean = (numbers[i * n + j] + numbers[j * n + i]) * T::from_f64(0.5);
     (numbers[i * n + j], numbers[j * n + i]) = (mean, mean);
@@ -118,7 +118,7 @@ jacobian!(DiagonalOnly, |n, numbers| for (i, j) in (0..n).flat_map(|i| (0..n).ma
 });
 
 #[test]
-fn a_symmetric_but_wrong_jacobian_and_one_without_its_other_blocks_are_noticed() {
+fn wrong_jacobians_are_noticed_even_if_symmetric() {
     for message in [
         catch_unwind(|| verify::assert_derivatives::<Symmetrised>(20)),
         catch_unwind(|| verify::assert_derivatives::<DiagonalOnly>(20)),

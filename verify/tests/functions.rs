@@ -1,4 +1,4 @@
-//! Every function of the language is differentiated rightly, alone and in company.
+//! Derivatives of every function of the language, alone and combined.
 #![allow(missing_docs, mixed_script_confusables)]
 
 use energy_dsl::energy;
@@ -8,7 +8,9 @@ energy! {
     energy AngleBetween(p, q, r: Point; k: Scalar) { k * angle(q - p, r - q)^2 }
 
     #[audit(samples = 50)]
-    energy UnitVectors(p, q, r: Point; w: Vec3) { dot(w, unit(q - p)) * dot(w, unit(r - p)) + norm(unit(q - p) - unit(r - q)) }
+    energy UnitVectors(p, q, r: Point; w: Vec3) {
+        dot(w, unit(q - p)) * dot(w, unit(r - p)) + norm(unit(q - p) - unit(r - q))
+    }
 
     #[audit(samples = 50)]
     energy Cosines(p, q, r: Point; k: Scalar) { exp(k * dot(unit(q - p), unit(r - q))) + (1 - dot(unit(p), unit(q)))^2 }
@@ -94,7 +96,8 @@ energy! {
     #[audit(samples = 50)]
     energy Logarithms(p, q: Point; s: Scalar) {
         let x = dot(p, q);
-        log1p(x^2) * expm1(x / 8) + log(2 + norm(p)) + softplus(s * x) + log1pmx(x^2 / 8) + log1p(x^2, 1 + x^2) * log1pmx(x / 64, 1 + x / 64) + exp(x / 16) - 1 + log(1 + norm_squared(q))
+        log1p(x^2) * expm1(x / 8) + log(2 + norm(p)) + softplus(s * x) + log1pmx(x^2 / 8)
+            + log1p(x^2, 1 + x^2) * log1pmx(x / 64, 1 + x / 64) + exp(x / 16) - 1 + log(1 + norm_squared(q))
     }
 
     #[audit(samples = 50)]
@@ -161,14 +164,14 @@ energy! {
     residual Squares(a: Vec3, s: Scalar; k: Scalar) { [norm_squared(a) - k, s * a] }
 }
 
-/// What is not kept is found: the same claims on declarations that break them.
+/// Broken claims are found: the same claims on declarations that violate them.
 mod broken_claims {
     use std::panic::catch_unwind;
 
     use energy_dsl::{Declaration, Element, Inputs, Kind, Outputs, Property, Real, RestError};
     use energy_elements::{BridsonForce, Gravity, HingeAngle, StVK};
 
-    /// An element with a claim that its declaration does not make.
+    /// Declares an element with a claim that its declaration does not make.
     macro_rules! claims {
         ($name:ident, $of:ty, $property:ident) => {
             #[derive(Clone, Copy)]

@@ -1,4 +1,4 @@
-//! The residuals of body tracking against multi-precision values.
+//! Residuals of body tracking against multi-precision values.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ fn file() -> std::path::PathBuf {
 }
 
 #[test]
-fn every_family_keeps_its_digits() {
+fn every_family_is_within_its_bound() {
     let lines = fusion_reference(&file()).unwrap();
     for family in ["exp", "dqb", "nonrigid", "lbs_plane", "graph", "binding", "huber", "system"] {
         assert!(lines.iter().any(|line| line.family == family && line.cases >= 3), "{family}");
@@ -23,7 +23,7 @@ fn every_family_keeps_its_digits() {
 }
 
 #[test]
-fn a_wrong_digit_is_found_and_a_broken_file_refused() {
+fn a_wrong_digit_is_found_and_a_broken_file_rejected() {
     let text = std::fs::read_to_string(file()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("reference.json");

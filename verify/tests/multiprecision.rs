@@ -1,5 +1,4 @@
-//! The multi-precision truth against reference values that were computed elsewhere, record by record, and against the other two
-//! routes.
+//! Multi-precision results against recorded reference values, and against the other two routes.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,12 +19,12 @@ fn numbers(block: &Value) -> Vec<Truth> {
     block.as_array().map_or_else(|| vec![text(block)], |list| list.iter().map(text).collect())
 }
 
-/// How far apart two numbers of twice the precision of a double are.
+/// Returns the difference of two numbers in twice double precision.
 fn distance(a: Truth, b: Truth) -> f64 {
     ((a.high - b.high) + (a.low - b.low)).abs()
 }
 
-/// Compares one file; returns how many records and blocks it has.
+/// Compares one file. Returns the numbers of records and blocks.
 fn check(path: &Path, folder: &Path) -> (usize, usize) {
     let name = path.file_name().unwrap().to_str().unwrap();
     let out = folder.join(name);
@@ -44,7 +43,7 @@ fn check(path: &Path, folder: &Path) -> (usize, usize) {
                 let potential = &reference["potential"];
                 assert!(worst <= 1e-28 * largest, "{name} {potential} {block}: {:e}", worst / largest);
             } else {
-                // Zero where it is zero; beyond the doubles, both are.
+                // Both are zero, or both are beyond the range of doubles.
                 assert!(wanted.iter().zip(&got).all(|(a, b)| a.high == b.high || largest > 0.0), "{name} {block}");
             }
         }
@@ -53,7 +52,7 @@ fn check(path: &Path, folder: &Path) -> (usize, usize) {
 }
 
 #[test]
-fn every_reference_value_comes_out_to_its_last_digits() {
+fn every_reference_value_is_reproduced_to_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     let paths = std::fs::read_dir(data()).unwrap().map(|entry| entry.unwrap().path());
     let files: Vec<PathBuf> =

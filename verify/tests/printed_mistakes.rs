@@ -1,6 +1,6 @@
-//! The mistakes that the papers' formulas for body tracking are printed with, declared as terms: what the audit of a hand-written
-//! derivative would find. Each is compared with the derivative of what it is a derivative of, by dual numbers through the declared
-//! residuals; the right formula passes the same comparison.
+//! Mistakes in the printed formulas for body tracking, declared as terms: what an audit of hand-written derivatives
+//! would find. Each is compared with the true derivative, by dual numbers through the declared residuals; the corrected
+//! formula passes the same comparison.
 //!
 //! `cargo test -p verify --test printed_mistakes -- --nocapture` prints the table.
 #![allow(missing_docs, confusable_idents, mixed_script_confusables, uncommon_codepoints)]
@@ -20,7 +20,7 @@ energy! {
         [b + θ.x * c, b + θ.x^2 * c]
     }
 
-    /// A9: the blend divided by the norm of all eight numbers, where only the real four count; and by the real four.
+    /// A9: the blend divided by the norm of all eight numbers; it must be divided by the norm of the real four.
     residual PrintedBlend(ξ: [Twist; 4]; w: [Scalar[1]; 4], v: Vec3) {
         let b = sum(k in 0..4, w[k] * exp(ξ[k]));
         let all = sqrt(norm_squared(real(b)) + norm_squared(dual(b)));
@@ -28,7 +28,7 @@ energy! {
         [transform(wrong, v), transform(unit(b), v)]
     }
 
-    /// A10: point to plane with the linear blend of the energy's text instead of the dual quaternions of its derivative.
+    /// A10: point to plane with the linear blend of the text instead of the dual quaternions of its derivative.
     residual PrintedPlane(ξ: [Twist; 4]; w: [Scalar[1]; 4], v: Vec3, n: Vec3, u: Vec3) {
         let q = [exp(ξ[0]), exp(ξ[1]), exp(ξ[2]), exp(ξ[3])];
         dot(sum(k in 0..4, w[k] * rotate(q[k], n)), sum(k in 0..4, w[k] * transform(q[k], v)) - u)
@@ -39,7 +39,7 @@ energy! {
         transform(exp(ξ_i), x) + transform(exp(ξ_j), x)
     }
 
-    /// C1: the exponential with half the angle, taken for the printed one.
+    /// C1: the exponential with half the angle, mistaken for the printed one.
     residual HalfExponential(ξ: Twist) {
         numbers(exp(twist(angular(ξ) / 2, linear(ξ))))
     }
@@ -84,13 +84,14 @@ fn printed_mistakes_are_caught() {
     let [printed, right] = PrintedSlope::<f64>::new().residual(&[0.3, -0.4, 0.6]).value;
     table.push(("A1  ∂q¹/∂α = b + α c", (printed - truth).abs(), (right - truth).abs()));
 
-    // A2, rows labelled ∂/∂t_x where ∂/∂t_z stands: columns of the generated Jacobian.
+    // A2, rows labelled ∂/∂t_x instead of ∂/∂t_z: columns of the generated Jacobian.
     let jacobian = TwistMotion::new(1.0).jacobian(&TWISTS[0]).jacobian;
     let column = |c: usize| (0..8).map(|row| jacobian[6 * row + c]).collect::<Vec<f64>>();
     let by_z = finite_differences(TWISTS[0], |x| TwistMotion::new(1.0).residual(x).value.to_vec())[5].clone();
     table.push(("A2  ∂/∂t_x for ∂/∂t_z", largest(&column(3), &by_z), largest(&column(5), &by_z)));
 
-    // A3, tr(∂f/∂T ∂T/∂t_x) without the transpose: T's last column by t_x is the first axis, so that the printed trace is 0.
+    // A3, tr(∂f/∂T ∂T/∂t_x) without the transpose: the derivative of T's last column by t_x is the first axis, so the
+    // printed trace is 0.
     let plane = NonrigidPlane4::new(1.0, W, V, N, U);
     let single = NonrigidPlane4::new(1.0, [1.0, 0.0, 0.0, 0.0], V, N, U).jacobian(&all);
     let by_t =
@@ -104,7 +105,7 @@ fn printed_mistakes_are_caught() {
     let doubled: Vec<f64> = at.jacobian.iter().map(|j| 2.0 * at.value[0] * j).collect();
     table.push(("A5  ∂E/∂α = ∂f/∂α", largest(&at.jacobian, &truth), largest(&doubled, &truth)));
 
-    // A7, a fourth residual of 1 for each edge; A8, its sign.
+    // A7, a fourth residual of 1 per edge; A8, its sign.
     let edge: [f64; 12] = all[..12].try_into().unwrap();
     let (printed, right) = (PrintedEdge::<f64>::new(V), GraphEdge::new(1.0, V));
     let truth = finite_differences(edge, |x| right.residual(x).value.to_vec());
@@ -125,7 +126,7 @@ fn printed_mistakes_are_caught() {
         largest(&both[3..], &blended[16..19]),
     ));
 
-    // A10, the energy's linear blend with the derivative of the dual quaternions'.
+    // A10, the linear blend of the energy with the derivative for dual quaternions.
     let linear = PrintedPlane::<f64>::new(W, V, N, U);
     let truth = finite_differences(all, |x| linear.residual(x).value.to_vec()).concat();
     table.push((
@@ -134,11 +135,11 @@ fn printed_mistakes_are_caught() {
         largest(&linear.jacobian(&all).jacobian, &truth),
     ));
 
-    // A12, ρ(s) as a weight: none where a weight must be whole.
+    // A12, ρ(s) as a weight: 0 where the weight must be 1.
     let printed: f64 = HuberLoss::new(0.2).residual(&[0.0]).value[0];
     table.push(("A12 ψ = ρ(s) at s = 0", (printed - 1.0).abs(), 0.0));
 
-    // A15, JᵀJ d = Jᵀr: it leads uphill.
+    // A15, JᵀJ d = Jᵀr: the step leads uphill.
     let slope: f64 = at.jacobian.iter().map(|j| j * at.value[0] * j * at.value[0]).sum();
     table.push(("A15 JᵀJ d = +Jᵀr: slope of E along d", slope, (-slope).max(0.0)));
 

@@ -1,5 +1,7 @@
-//! Random well-typed programs: what the compiler makes of them agrees with hyper-dual numbers and with multi-precision numbers
-//! run through the text, by every routine and on both paths. `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
+//! Random well-typed programs: the compiled routines agree with hyper-dual and multi-precision numbers run through the
+//! text, for every routine and on both paths.
+//!
+//! `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
 
 use energy_compiler::{Interpreted, Listing, Path, Textbook};
 use energy_dsl::Inputs;
@@ -10,7 +12,7 @@ use verify::{Sample, multiprecision};
 /// Three points, two scalars and a vector.
 const SIGNATURE: &str = "p, q, r: Point; k, L: Scalar, u: Vec3";
 
-/// A scalar expression.
+/// Generates a scalar expression.
 fn scalar(depth: u32) -> BoxedStrategy<String> {
     let leaf = prop_oneof![
         Just("k".to_owned()),
@@ -42,7 +44,7 @@ fn scalar(depth: u32) -> BoxedStrategy<String> {
         1 => (less(), less()).prop_map(|(a, b)| format!("(if {a} < {b} {{ {a} * {b} }} else {{ {b} - {a} }})")),
         1 => (less(), 2..4_u8).prop_map(|(a, n)| format!("({a})^{n}")),
         2 => (vectors(), vectors()).prop_map(|(a, b)| format!("dot({a}, {b})")),
-        // Not of vectors that are 0, or parallel, but for rounding: there lengths and angles have no derivatives.
+        // Exclude vectors that are zero or parallel up to rounding: lengths and angles have no derivatives there.
         1 => vectors().prop_map(|a| format!("dot(unit(q - p), unit({a} + 2 * u))")),
         1 => vectors().prop_map(|a| format!("(1 - dot(unit({a} + 2 * u), unit(r - q)))")),
         1 => vectors().prop_map(|v| format!("(norm({v} + 2 * u) - L)")),
@@ -50,12 +52,13 @@ fn scalar(depth: u32) -> BoxedStrategy<String> {
         1 => vectors().prop_map(|v| format!("norm({v} + 2 * u)^1.5")),
         1 => vectors().prop_map(|a| format!("angle(q - p, {a} + 2 * u)")),
         1 => (vectors(), vectors(), vectors()).prop_map(|(a, b, c)| format!("det(columns({a}, {b}, {c}))")),
-        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("trace(transpose(columns({a}, {b})) * columns({a}, {b}))")),
+        1 => (vectors(), vectors())
+            .prop_map(|(a, b)| format!("trace(transpose(columns({a}, {b})) * columns({a}, {b}))")),
     ]
     .boxed()
 }
 
-/// A vector expression.
+/// Generates a vector expression.
 fn vector(depth: u32) -> BoxedStrategy<String> {
     let leaf = prop_oneof![
         3 => Just("(q - p)".to_owned()),
@@ -78,7 +81,7 @@ fn vector(depth: u32) -> BoxedStrategy<String> {
     .boxed()
 }
 
-/// U, ∇U and the triangle of ∇²U as the routine returns it, by hyper-dual numbers.
+/// Computes U, ∇U and the triangle of ∇²U, as the routine returns it, by hyper-dual numbers.
 fn expected(textbook: &Textbook, parameters: &[f64], x: &[f64]) -> [Vec<f64>; 3] {
     let constants: Vec<Hyper> = parameters.iter().map(|&p| Hyper::constant(p)).collect();
     let at = |i: usize, j: usize| {
@@ -95,7 +98,7 @@ fn expected(textbook: &Textbook, parameters: &[f64], x: &[f64]) -> [Vec<f64>; 3]
     [vec![at(0, 0).re], gradient, triangle]
 }
 
-/// The same by multi-precision numbers, right to 30 digits; none where the formula divides by zero.
+/// Computes the same blocks in multi-precision, to 30 digits; `None` if the formula divides by zero.
 fn true_blocks(source: &str, textbook: &Textbook, parameters: &[f64], x: &[f64]) -> Option<[Vec<f64>; 3]> {
     let sample = Sample { parameters: parameters.into(), rest: vec![], positions: x.into(), velocities: vec![] };
     let declaration = Interpreted::from_source(source).ok()?.first()?.declaration();
@@ -125,12 +128,12 @@ fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseErr
     prop_assume!(truth.is_some());
     let truth = truth.expect("just seen");
     prop_assume!(truth.iter().flatten().all(|n| n.is_finite() && n.abs() < 1e30));
-    // What the formula makes of a change in the last places of its inputs is what it may differ by.
+    // The tolerance is the effect of changing the last digits of the inputs.
     let moved: Vec<f64> = x.iter().enumerate().map(|(i, x)| x * (1.0 + (i as f64 - 4.5) * 2e-15)).collect();
     let nearby = expected(&textbook, parameters, &moved);
     prop_assume!(nearby.iter().flatten().all(|n| n.is_finite()));
     let inputs = Inputs { parameters, rest: &[], positions: x, velocities: &[] };
-    // Where a convention stands for a value that the text does not have, there is nothing to compare.
+    // Flagged results are conventions without a value in the text.
     prop_assume!(listing.is_flagged("hessian", &inputs) == Some(false));
     for path in [Path::Chosen, Path::General] {
         for (routine, blocks) in [("value", 1), ("gradient", 2), ("hessian", 3)] {
@@ -139,14 +142,15 @@ fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseErr
                 found.iter().zip(&by_duals).zip(&truth).zip(&nearby).take(blocks)
             {
                 let sensitivity = truth.iter().zip(nearby).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                // A kink or jump between the two inputs: no derivative to compare.
+                // A kink or jump between the two inputs leaves no derivative to compare.
                 prop_assume!(sensitivity <= 1e-3 * largest(truth) || largest(truth) < 1e-12);
-                // Inputs are of size 1: what cancels leaves their rounding.
+                // Inputs are about 1: cancellation leaves their rounding errors.
                 let bound = 1e-10 * largest(truth) + 1e4 * sensitivity + 1e-12;
                 for (entry, ((a, b), c)) in found.iter().zip(truth).zip(by_duals).enumerate() {
                     prop_assert!(
                         (a - b).abs() <= bound && (a - c).abs() <= bound,
-                        "{source}\n{routine} on the path {path:?}, entry {entry}: {a:e}, truly {b:e}, by dual numbers {c:e}, bound {bound:e}"
+                        "{source}\n{routine} on the path {path:?}, entry {entry}: {a:e}, truly {b:e}, \
+                         by dual numbers {c:e}, bound {bound:e}"
                     );
                 }
             }
@@ -173,7 +177,7 @@ proptest! {
     }
 }
 
-/// The comparison sees an error of the size it is to see.
+/// The comparison notices an error of the size that it should.
 #[test]
 fn a_wrong_derivative_is_noticed() {
     let source = format!("energy Random({SIGNATURE}) {{ k * L * dot(u, q - p) * norm(r - q) }}");

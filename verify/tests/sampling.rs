@@ -1,14 +1,14 @@
-//! What the audit draws its inputs from must not make it fail, or run forever, on sound elements.
+//! The sampling of inputs must not fail, or run forever, on correct elements.
 #![allow(missing_docs)]
 
 use energy_dsl::energy;
 use verify::assert_derivatives;
 
 energy! {
-    /// One everywhere: derivatives are rounding errors about zero, however they are found.
+    /// Constant: all derivatives are rounding errors around zero, by every route.
     energy Constant(p, q: Point; k: Scalar) { k * norm_squared(p - q) / norm(p - q)^2 }
 
-    /// More points than a small box holds far apart from each other.
+    /// More points than fit into a small box at large distances.
     energy Crowd(a, b, c, d, e, f, g, h, i, j: Point; k: Scalar) {
         k * norm_squared(a - b) * norm_squared(c - d) + norm_squared(e - f) * dot(g - h, i - j)
     }

@@ -1,4 +1,5 @@
-//! What `#[uncompensated]` gives up, against multi-precision: near rest its errors are those of rounding the points, and not of the result.
+//! The cost of `#[uncompensated]`, against multi-precision: near rest, its errors are those of rounding the points
+//! instead of the result.
 #![allow(missing_docs)]
 
 use energy_compiler::{Interpreted, Textbook};
@@ -9,7 +10,7 @@ const SPRING: &str = "energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) {
 const HINGE: &str =
     "energy Hinge(x1, x2, x3, x4: Point; k: Scalar[J], θ0: Scalar[rad]) { k * (dihedral(x1, x2, x3, x4) - θ0)^2 }";
 
-/// The gradient's error in units of roundoff of its largest entry, compensated and not.
+/// Returns the gradient's error in units of roundoff of its largest entry, with compensation and without.
 fn errors(source: &str, parameters: &[f64], positions: Vec<f64>) -> [f64; 2] {
     let sample = Sample { parameters: parameters.into(), rest: vec![], positions, velocities: vec![] };
     let formula = Textbook::from_source(source).unwrap();
@@ -22,13 +23,14 @@ fn errors(source: &str, parameters: &[f64], positions: Vec<f64>) -> [f64; 2] {
     })
 }
 
-/// A point of a frame whose axes are along no coordinate, about a unit away from the origin.
+/// Returns a point in a frame along no axis, about a unit away from the origin.
 fn point(along: f64, across: f64, up: f64) -> [f64; 3] {
     let axes = [[2.0, 3.0, 6.0], [3.0, -6.0, 2.0], [6.0, 2.0, -3.0]];
     std::array::from_fn(|i| 0.3 + (along * axes[0][i] + across * axes[1][i] + up * axes[2][i]) / 7.0)
 }
 
-/// Of a quantity that `positions` brings to the given values: how far off it is at each, relative to 1/value without compensation.
+/// Checks the error for inputs that `positions` brings to given values of a quantity. Without compensation, it grows
+/// with 1/value.
 fn check(source: &str, parameters: &[f64], positions: impl Fn(f64) -> Vec<f64>) {
     let mut worst = 0.0_f64;
     for exponent in 1..=12 {
@@ -55,7 +57,7 @@ fn an_uncompensated_hinge_is_as_exact_as_its_points_are_rounded() {
 }
 
 #[test]
-fn what_does_not_stretch_or_bend_is_still_exactly_zero() {
+fn undeformed_elements_have_exactly_zero_energy() {
     let flat = [[0.3, 1.0, 0.7], [0.6, -1.0, 0.7], [0.0, 0.0, 0.7], [1.0, 0.0, 0.7]].concat();
     for (source, parameters, positions) in
         [(SPRING, [5.0, 1.5], vec![0.25, 1.0, 2.0, 0.25, 1.0, 3.5]), (HINGE, [5.0, 0.0], flat)]

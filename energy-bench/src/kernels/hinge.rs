@@ -5,7 +5,8 @@ use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
 use crate::dual;
 use crate::random::Random;
-use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
+use crate::sample::{Derivatives, Sample, number_count, points, potential};
+use crate::subject::Subject;
 use crate::uncompensated::{Uncompensated, UncompensatedHinge, uncompensated};
 use crate::vector::{add, block, cross, dot, negative_block, scale, scale_add, sub, symmetric};
 

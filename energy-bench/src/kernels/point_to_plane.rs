@@ -6,7 +6,8 @@ use num_dual::gradient;
 use crate::assembled::Assembled;
 use crate::dual::{Dual, cross as dual_cross, dot as dual_dot};
 use crate::random::Random;
-use crate::subject::{Row, Sample, Subject, number_count, residual};
+use crate::sample::{Row, Sample, number_count, residual};
+use crate::subject::Subject;
 use crate::vector::{add, cross, cross_add, dot, scale, scale_add, sub};
 
 /// K5, the distance of a point to a plane, r = n̂·(v̂ − u), the point moved by the blend of four twists; r and its gradient.

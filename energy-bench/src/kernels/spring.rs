@@ -5,7 +5,8 @@ use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
 use crate::dual;
 use crate::random::Random;
-use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
+use crate::sample::{Derivatives, Sample, number_count, points, potential};
+use crate::subject::Subject;
 use crate::uncompensated::{Uncompensated, UncompensatedSpring, uncompensated};
 use crate::vector::{dot, negative, negative_block, scale, sub, symmetric};
 

@@ -4,7 +4,8 @@ use energy_elements::StVK;
 use crate::assembled::{Assembled, assembled};
 use crate::dual;
 use crate::random::Random;
-use crate::subject::{Derivatives, Sample, Subject, number_count, points, potential};
+use crate::sample::{Derivatives, Sample, number_count, points, potential};
+use crate::subject::Subject;
 use crate::vector::{add, block, dot, negative, scale, scale_add, sub, symmetric};
 
 /// K4, a St. Venant–Kirchhoff membrane A (μ ‖E‖² + λ/2 tr² E) on a triangle.

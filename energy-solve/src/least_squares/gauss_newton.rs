@@ -4,21 +4,21 @@ use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
 use crate::least_squares::normal_solver::{NormalSolver, NormalSolverKind, SolverError};
 use crate::least_squares::residual_term::{LeastSquaresTerm, NormalEquations};
 
-/// How steps are taken.
+/// Options of [`GaussNewton`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussNewtonOptions {
-    /// μ of (JᵀJ + μ 1) d = −Jᵀr, in the unit of JᵀJ.
+    /// The damping μ in (JᵀJ + μ 1) d = −Jᵀr, in the unit of JᵀJ.
     pub damping: f64,
-    /// A step is given up when damping beyond this does not help.
+    /// An iteration gives up if a step with this damping does not lower the energy.
     pub largest_damping: f64,
-    /// How often a step is halved before it is damped ten times more.
+    /// The number of times that a step is halved before the damping is multiplied by 10.
     pub halvings: usize,
-    /// How the normal equations are solved.
+    /// The solver of the normal equations.
     pub solver: NormalSolverKind,
 }
 
 impl Default for GaussNewtonOptions {
-    /// μ = 10⁻⁴, up to 10⁴; four halvings; Cholesky.
+    /// μ = 10⁻⁴, at most 10⁴; four halvings; Cholesky.
     fn default() -> Self {
         Self { damping: 1e-4, largest_damping: 1e4, halvings: 4, solver: NormalSolverKind::Cholesky }
     }
@@ -27,79 +27,82 @@ impl Default for GaussNewtonOptions {
 /// The energy of one term.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TermCost {
-    /// The term's name.
+    /// Name of the term.
     pub name: String,
     /// λ Σ w ρ(‖r‖²).
     pub energy: f64,
-    /// Its elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Those left out because they met a singularity.
+    /// Number of elements left out because they met a singularity.
     pub degenerate: usize,
 }
 
-/// How an iteration ended.
+/// The result of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The energy went down.
+    /// The energy decreased.
     Decreased,
     /// Jᵀr is zero.
     Stationary,
-    /// No step, however damped, lowers the energy: rounding is all that is left. The unknowns are as before.
+    /// No step lowers the energy, for any damping: only rounding errors remain. The unknowns are unchanged.
     Stalled,
 }
 
-/// One iteration.
+/// Statistics of one iteration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IterationReport {
-    /// The terms before the step.
+    /// Energies of the terms before the step.
     pub terms: Vec<TermCost>,
     /// E before the step.
     pub before: f64,
-    /// E after it.
+    /// E after the step.
     pub after: f64,
-    /// What E would fall by if residuals were linear and the loss's weights fixed, for the step that was solved for.
+    /// The decrease of E for the full step if residuals were linear and the weights of the loss constant.
     pub predicted_decrease: f64,
-    /// The fraction of it that was taken.
+    /// The fraction of the full step that was taken.
     pub fraction: f64,
-    /// The damping it took.
+    /// The damping of the step.
     pub damping: f64,
     /// ‖d‖ of the step taken.
     pub step_length: f64,
     /// Iterations of the linear solver.
     pub solver_iterations: usize,
-    /// How it ended.
+    /// The result of the iteration.
     pub outcome: Outcome,
 }
 
-/// A problem that cannot be solved as posed.
+/// A problem that cannot be solved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GaussNewtonError {
-    /// An unknown is not a number.
+    /// An unknown is infinite or NaN.
     #[error("unknown {unknown} of block {block} is not finite")]
     NonFiniteUnknown {
-        /// The block.
+        /// Index of the block.
         block: usize,
-        /// Which of its unknowns.
+        /// Index of the unknown within the block.
         unknown: usize,
     },
-    /// There are not as many blocks as the pattern has.
-    #[error("{found} blocks of unknowns, but the pattern is of {expected}")]
+    /// The number of blocks differs from that of the pattern.
+    #[error("expected {expected} blocks of unknowns, got {found}")]
     WrongLength {
-        /// Blocks of the pattern.
+        /// Number of blocks of the pattern.
         expected: usize,
-        /// Blocks given.
+        /// Number of blocks given.
         found: usize,
     },
-    /// An energy is not a number at the start.
-    #[error("the energy of `{term}` is not finite; element {element:?} is the first to blame")]
+    /// The energy of a term is infinite or NaN at the start.
+    #[error(
+        "the energy of `{term}` is not finite{}",
+        .element.map_or_else(String::new, |element| format!(", first at element {element}"))
+    )]
     NonFiniteEnergy {
-        /// The term.
+        /// Name of the term.
         term: String,
-        /// Its first element that is not finite; none if only the sum overflows.
+        /// The first element with a non-finite energy; `None` if only the sum overflows.
         element: Option<usize>,
     },
-    /// The linear system cannot be solved, however damped.
-    #[error("no step: {0}")]
+    /// The linear system cannot be solved, for any damping.
+    #[error("cannot solve for a step: {0}")]
     Solver(#[from] SolverError),
 }
 
@@ -130,31 +133,31 @@ pub enum GaussNewtonError {
 pub struct GaussNewton<const D: usize> {
     equations: NormalEquations<D>,
     solver: NormalSolver<D>,
-    /// How steps are taken.
+    /// Damping, backtracking and linear solver.
     pub options: GaussNewtonOptions,
 }
 
 impl<const D: usize> GaussNewton<D> {
-    /// A solver for problems whose elements couple blocks as the pattern says.
+    /// Creates a solver for terms whose elements couple blocks of the pattern.
     ///
     /// # Errors
-    /// When the factorisation does not fit into memory.
+    /// If the factorisation does not fit into memory.
     pub fn new(pattern: Arc<NormalPattern>, options: GaussNewtonOptions) -> Result<Self, SolverError> {
         let solver = NormalSolver::new(options.solver, &pattern)?;
         let right = vec![[0.0; D]; pattern.blocks()];
         Ok(Self { equations: NormalEquations { matrix: NormalMatrix::zeros(pattern), right }, solver, options })
     }
 
-    /// JᵀJ and Jᵀr as last linearised.
+    /// Returns JᵀJ and Jᵀr of the last linearisation.
     #[must_use]
     pub fn equations(&self) -> &NormalEquations<D> {
         &self.equations
     }
 
-    /// The terms' energies at x; JᵀJ and Jᵀr are renewed.
+    /// Linearises the terms at x: updates JᵀJ and Jᵀr and returns the terms' energies.
     ///
     /// # Errors
-    /// When unknowns or energies are not finite.
+    /// If unknowns or energies are not finite.
     pub fn linearise(
         &mut self,
         terms: &[&dyn LeastSquaresTerm<D>],
@@ -179,17 +182,17 @@ impl<const D: usize> GaussNewton<D> {
         Ok(costs)
     }
 
-    /// The step d of (JᵀJ + μ 1) d = −Jᵀr for the equations as last linearised, and the solver's iterations.
+    /// Solves (JᵀJ + μ 1) d = −Jᵀr with the last linearisation. Returns the step d and the number of solver iterations.
     ///
     /// # Errors
-    /// When the matrix is not positive definite, or iterations do not converge.
+    /// If the matrix is not positive definite, or iterations do not converge.
     pub fn solve(&mut self, damping: f64) -> Result<(Vec<[f64; D]>, usize), SolverError> {
         let mut step: Vec<[f64; D]> = self.equations.right.iter().map(|block| block.map(|entry| -entry)).collect();
         let solution = self.solver.solve(&self.equations.matrix, damping, &mut step)?;
         Ok((step, solution.iterations))
     }
 
-    /// E − ‖r + J d‖² = −2 dᵀJᵀr − dᵀJᵀJ d for the equations as last linearised.
+    /// Returns E − ‖r + J d‖² = −2 dᵀJᵀr − dᵀJᵀJ d for the last linearisation.
     #[must_use]
     pub fn predicted_decrease(&self, step: &[[f64; D]]) -> f64 {
         let mut product = vec![[0.0; D]; step.len()];
@@ -199,10 +202,11 @@ impl<const D: usize> GaussNewton<D> {
         step.iter().zip(product).zip(right).map(|((d, product), right)| -d * (2.0 * right + product)).sum()
     }
 
-    /// One iteration: linearises at x, solves, and goes as far along the step as the energy goes down.
+    /// Runs one iteration: linearises at x, solves for a step, and takes as much of it as lowers the energy.
     ///
     /// # Errors
-    /// When unknowns or energies are not finite, or the equations cannot be solved, however damped. The unknowns are then as before.
+    /// If unknowns or energies are not finite, or the equations cannot be solved for any damping. The unknowns are then
+    /// unchanged.
     pub fn iterate(
         &mut self,
         terms: &[&dyn LeastSquaresTerm<D>],
@@ -244,7 +248,8 @@ impl<const D: usize> GaussNewton<D> {
         }
     }
 
-    /// Takes the whole step, or a half, a quarter, … of it, so that the energy goes down; or none.
+    /// Takes the full step, or a half, a quarter, … of it, so that the energy decreases. Returns whether it found such
+    /// a step.
     fn backtrack(
         &self,
         terms: &[&dyn LeastSquaresTerm<D>],
@@ -273,10 +278,11 @@ impl<const D: usize> GaussNewton<D> {
         false
     }
 
-    /// Iterates until the energy falls by less than that part of itself, at most so many times.
+    /// Iterates until the relative decrease of the energy is at most `relative_decrease`, or the iteration limit is
+    /// reached.
     ///
     /// # Errors
-    /// As [`Self::iterate`].
+    /// See [`Self::iterate`].
     pub fn minimise(
         &mut self,
         terms: &[&dyn LeastSquaresTerm<D>],

@@ -1,17 +1,19 @@
-/// What a row of squared length s = ‖r‖² costs, and the weight dρ/ds it has in a step of least squares.
+/// A robust loss ρ(s) of a residual's squared length s = ‖r‖², whose derivative dρ/ds is its weight in a least-squares
+/// step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Loss {
-    /// s, least squares.
+    /// ρ = s, least squares.
     #[default]
     Squares,
-    /// s for ‖r‖ ≤ δ, else 2 δ ‖r‖ − δ²: twice Huber's loss. The weight is min(1, δ/‖r‖).
+    /// ρ = s for ‖r‖ ≤ δ, otherwise 2 δ ‖r‖ − δ²: twice Huber's loss. The weight is min(1, δ/‖r‖).
     Huber(f64),
-    /// c²/3 (1 − (1 − s/c²)³) for ‖r‖ ≤ c, else c²/3: twice Tukey's loss. The weight is (1 − s/c²)²; beyond c it is zero.
+    /// ρ = c²/3 (1 − (1 − s/c²)³) for ‖r‖ ≤ c, otherwise c²/3: twice Tukey's loss. The weight is (1 − s/c²)², and 0
+    /// beyond c.
     Tukey(f64),
 }
 
 impl Loss {
-    /// ρ(s) and dρ/ds.
+    /// Returns ρ(s) and dρ/ds.
     #[inline]
     #[must_use]
     pub fn of(self, s: f64) -> (f64, f64) {

@@ -1,50 +1,51 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Numbers in a stored row of a block: as many as the widest register takes, so that a row is one or a few loads. The numbers past
-/// the block's own columns mean nothing.
+/// Numbers in a stored row of a block: the lanes of the widest register, so that one or a few loads read a row. Numbers
+/// past the block's own columns are ignored.
 pub(crate) const WIDTH: usize = 8;
 
-/// A stored block: D rows of [`WIDTH`] numbers, of which the first D count.
+/// A stored block: D rows of [`WIDTH`] numbers, of which the first D are used.
 pub(crate) type WideBlock<const D: usize> = [[f64; WIDTH]; D];
 
 /// Stencils that do not fit a pattern.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CouplingError {
-    /// There is no such block of unknowns.
+    /// A stencil names a block of unknowns that does not exist.
     #[error("element {element} acts on block {block} of unknowns, but there are only {blocks}")]
     OutOfRange {
-        /// Which element, from 0.
+        /// Index of the element.
         element: usize,
-        /// The block it names.
+        /// Index of the missing block.
         block: usize,
-        /// How many there are.
+        /// Number of blocks.
         blocks: usize,
     },
-    /// An element acts on different blocks.
+    /// A stencil names a block of unknowns twice.
     #[error("element {element} names block {block} of unknowns twice")]
     Repeated {
-        /// Which element, from 0.
+        /// Index of the element.
         element: usize,
-        /// The block.
+        /// Index of the block.
         block: usize,
     },
-    /// Two blocks meet in an element that do not in the pattern.
+    /// An element couples two blocks that the pattern does not.
     #[error(
-        "element {element} couples blocks {first} and {second}, which the pattern does not; build the pattern from all stencils"
+        "element {element} couples blocks {first} and {second}, which the pattern does not; \
+         build the pattern from all stencils"
     )]
     NotInPattern {
-        /// Which element, from 0.
+        /// Index of the element.
         element: usize,
-        /// A block.
+        /// Index of the first block.
         first: usize,
-        /// Another.
+        /// Index of the second block.
         second: usize,
     },
 }
 
-/// Which blocks of JᵀJ are not zero: those on the diagonal, and those of blocks of unknowns that meet in an element. The upper half
-/// is kept, by rows, columns ascending.
+/// The positions of the non-zero blocks of JᵀJ: the diagonal, and pairs of blocks of unknowns that share an element.
+/// Stores the upper triangle by rows, with ascending columns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NormalPattern {
     row_start: Vec<usize>,
@@ -52,10 +53,10 @@ pub struct NormalPattern {
 }
 
 impl NormalPattern {
-    /// The pattern of `blocks` blocks of unknowns of which each stencil couples all of its own.
+    /// Creates a pattern over `blocks` blocks of unknowns that couples all blocks of each stencil.
     ///
     /// # Errors
-    /// When a stencil names a block that is not there.
+    /// If a stencil names a block out of range.
     pub fn new<'a>(blocks: usize, stencils: impl IntoIterator<Item = &'a [u32]>) -> Result<Self, CouplingError> {
         let mut right: Vec<BTreeSet<u32>> = (0..blocks as u32).map(|row| BTreeSet::from([row])).collect();
         for (element, stencil) in stencils.into_iter().enumerate() {
@@ -74,25 +75,25 @@ impl NormalPattern {
         Ok(pattern)
     }
 
-    /// Blocks of unknowns.
+    /// Returns the number of blocks of unknowns.
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.row_start.len() - 1
     }
 
-    /// Stored blocks: the diagonal and what is above it.
+    /// Returns the number of stored blocks, on and above the diagonal.
     #[must_use]
     pub fn stored(&self) -> usize {
         self.columns.len()
     }
 
-    /// The columns of a row from the diagonal on.
+    /// Returns the columns of a row, beginning with the diagonal.
     #[must_use]
     pub fn row(&self, row: usize) -> &[u32] {
         &self.columns[self.row_start[row]..self.row_start[row + 1]]
     }
 
-    /// The place of block (row, column), row ≤ column.
+    /// Returns the index of block (row, column) with row ≤ column; `None` if it is not in the pattern.
     #[must_use]
     pub fn slot(&self, row: usize, column: usize) -> Option<usize> {
         self.row(row).binary_search(&(column as u32)).ok().map(|at| self.row_start[row] + at)
@@ -103,21 +104,22 @@ impl NormalPattern {
     }
 }
 
-/// The blocks that each of many elements acts on, and where the products of their derivatives lie in JᵀJ. It is found once, and
-/// serves as long as the stencils do; elements may come and go.
+/// Scatter map from elements to JᵀJ: the blocks of unknowns of each stencil, and where the products of their
+/// derivatives are stored. It depends on the stencils only, so a term can replace its elements.
 #[derive(Clone, Debug)]
 pub struct Couplings {
     arity: usize,
     blocks: Vec<u32>,
-    /// For each pair i ≤ j of an element's blocks twice the place, plus one if block j comes first in the matrix.
+    /// For each pair i ≤ j of a stencil's blocks, twice the index in the matrix, plus one if the second block comes
+    /// first there.
     slots: Vec<u32>,
 }
 
 impl Couplings {
-    /// Looks the stencils up in a pattern.
+    /// Looks up the stencils in a pattern.
     ///
     /// # Errors
-    /// When a stencil repeats a block, or couples blocks that the pattern does not.
+    /// If a stencil repeats a block, or couples blocks that the pattern does not.
     pub fn new<const K: usize>(pattern: &NormalPattern, stencils: &[[u32; K]]) -> Result<Self, CouplingError> {
         let blocks = pattern.blocks();
         let mut slots = Vec::with_capacity(stencils.len() * K * (K + 1) / 2);
@@ -140,32 +142,32 @@ impl Couplings {
         Ok(Self { arity: K, blocks: stencils.concat(), slots })
     }
 
-    /// How many stencils there are.
+    /// Returns the number of stencils.
     #[must_use]
     pub fn len(&self) -> usize {
         self.blocks.len() / self.arity.max(1)
     }
 
-    /// Whether there are none.
+    /// Whether the map is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.blocks.is_empty()
     }
 
-    /// Blocks of unknowns that an element acts on.
+    /// Returns the number of blocks of unknowns per stencil.
     #[must_use]
     pub fn arity(&self) -> usize {
         self.arity
     }
 
-    /// The blocks of stencil `at`.
+    /// Returns the blocks of unknowns of stencil `at`.
     #[inline(always)]
     #[must_use]
     pub fn stencil(&self, at: usize) -> &[u32] {
         &self.blocks[at * self.arity..][..self.arity]
     }
 
-    /// See `slots`.
+    /// Returns the entries of `slots` for stencil `at`.
     #[inline(always)]
     pub(crate) fn slots(&self, at: usize) -> &[u32] {
         let pairs = self.arity * (self.arity + 1) / 2;
@@ -173,7 +175,7 @@ impl Couplings {
     }
 }
 
-/// JᵀJ, symmetric, of D×D blocks: the upper half, by a [`NormalPattern`].
+/// The symmetric matrix JᵀJ of D×D blocks. Stores the upper triangle of a [`NormalPattern`].
 #[derive(Clone, Debug)]
 pub struct NormalMatrix<const D: usize> {
     pattern: Arc<NormalPattern>,
@@ -183,7 +185,7 @@ pub struct NormalMatrix<const D: usize> {
 impl<const D: usize> NormalMatrix<D> {
     const FITS: () = assert!(D <= WIDTH, "a block has at most eight rows");
 
-    /// The zero matrix.
+    /// Creates the zero matrix of a pattern.
     #[must_use]
     pub fn zeros(pattern: Arc<NormalPattern>) -> Self {
         let () = Self::FITS;
@@ -191,18 +193,18 @@ impl<const D: usize> NormalMatrix<D> {
         Self { pattern, values }
     }
 
-    /// Its pattern.
+    /// Returns the pattern of the matrix.
     #[must_use]
     pub fn pattern(&self) -> &Arc<NormalPattern> {
         &self.pattern
     }
 
-    /// Sets it to zero.
+    /// Sets all entries to zero.
     pub fn clear(&mut self) {
         self.values.fill([[0.0; WIDTH]; D]);
     }
 
-    /// Block (row, column); zero where there is none.
+    /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> [[f64; D]; D] {
         let place = self.pattern.slot(row.min(column), row.max(column));
@@ -213,7 +215,7 @@ impl<const D: usize> NormalMatrix<D> {
         })
     }
 
-    /// y = (A + μ 1) x.
+    /// Computes y = (A + μ 1) x.
     pub fn multiply_damped(&self, damping: f64, x: &[[f64; D]], y: &mut [[f64; D]]) {
         for (y, x) in y.iter_mut().zip(x) {
             *y = x.map(|x| damping * x);
@@ -246,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pattern_is_the_diagonal_and_what_stencils_couple() {
+    fn a_pattern_is_the_diagonal_and_the_coupled_blocks() {
         let pattern = NormalPattern::new(4, [[3, 0].as_slice(), &[0, 1]]).unwrap();
         assert_eq!(
             (0..4).map(|row| pattern.row(row).to_vec()).collect::<Vec<_>>(),
@@ -257,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn stencils_that_do_not_fit_are_refused() {
+    fn stencils_that_do_not_fit_are_rejected() {
         let pattern = NormalPattern::new(3, [[0, 1].as_slice()]).unwrap();
         assert!(matches!(Couplings::new(&pattern, &[[0, 0]]), Err(CouplingError::Repeated { element: 0, block: 0 })));
         assert!(matches!(
@@ -272,10 +274,10 @@ mod tests {
     }
 
     #[test]
-    fn products_see_both_halves() {
+    fn products_use_both_triangles() {
         let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
         let mut matrix = NormalMatrix::<2>::zeros(pattern);
-        // Whatever stands beside a block's own columns counts for nothing.
+        // The padding past a block's own columns must be ignored.
         for (at, value) in matrix.values.iter_mut().enumerate() {
             for i in 0..2 {
                 value[i] = [f64::NAN; WIDTH];

@@ -1,16 +1,17 @@
 use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
 use crate::linear::sparse_factor::SparseFactor;
 
-/// How (JᵀJ + μ 1) d = −Jᵀr is solved.
+/// The solver of (JᵀJ + μ 1) d = −Jᵀr.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalSolverKind {
-    /// Sparse Cholesky factorisation; the elimination order is found once for a pattern.
+    /// Sparse Cholesky factorisation. The elimination order is computed once per pattern.
     Cholesky,
-    /// Conjugate gradients with the blocks on the diagonal as preconditioner.
+    /// Conjugate gradients, preconditioned by the diagonal blocks.
     ConjugateGradients {
-        /// The residual's norm in the preconditioner, relative to that of the right-hand side.
+        /// Tolerance of the residual's norm relative to that of the right-hand side, both in the norm of the
+        /// preconditioner.
         relative_tolerance: f64,
-        /// Give up after this many iterations.
+        /// Stop after this many iterations.
         iteration_limit: usize,
     },
 }
@@ -19,23 +20,23 @@ pub enum NormalSolverKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SolverError {
     /// A pivot is not positive.
-    #[error("the damped JᵀJ is not positive definite; a larger damping makes it so")]
+    #[error("the damped JᵀJ is not positive definite; increase the damping")]
     NotPositiveDefinite,
     /// Conjugate gradients did not converge.
-    #[error("conjugate gradients did not converge in {iterations} iterations; allow more, or factorise")]
+    #[error("conjugate gradients did not converge in {iterations} iterations; increase the limit, or use Cholesky")]
     NotConverged {
-        /// Iterations done.
+        /// Number of iterations done.
         iterations: usize,
     },
-    /// The pattern could not be analysed.
+    /// The factor does not fit into memory.
     #[error("the factorisation of {unknowns} unknowns does not fit into memory")]
     OutOfMemory {
-        /// Unknowns of the system.
+        /// Number of unknowns.
         unknowns: usize,
     },
 }
 
-/// What a solution took.
+/// Statistics of one solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NormalSolution {
     /// Iterations of conjugate gradients; 0 for a factorisation.
@@ -50,10 +51,10 @@ pub struct NormalSolver<const D: usize> {
 }
 
 impl<const D: usize> NormalSolver<D> {
-    /// A solver for matrices of that pattern.
+    /// Analyses a pattern.
     ///
     /// # Errors
-    /// When the memory does not suffice.
+    /// If memory runs out.
     pub fn new(kind: NormalSolverKind, pattern: &NormalPattern) -> Result<Self, SolverError> {
         let factor = match kind {
             NormalSolverKind::Cholesky => Some(Box::new(Factor::new::<D>(pattern)?)),
@@ -62,10 +63,10 @@ impl<const D: usize> NormalSolver<D> {
         Ok(Self { kind, factor })
     }
 
-    /// Solves (A + μ 1) x = b, given b in `x`.
+    /// Solves (A + μ 1) x = b in place; `x` holds b first.
     ///
     /// # Errors
-    /// When the matrix is not positive definite, or iterations do not converge.
+    /// If the matrix is not positive definite, or iterations do not converge.
     pub fn solve(
         &mut self,
         matrix: &NormalMatrix<D>,
@@ -80,12 +81,12 @@ impl<const D: usize> NormalSolver<D> {
                 factor.solve(matrix, damping, x)?;
                 Ok(NormalSolution::default())
             }
-            (NormalSolverKind::Cholesky, None) => unreachable!("a factor was analysed"),
+            (NormalSolverKind::Cholesky, None) => unreachable!("`new` created the factor"),
         }
     }
 }
 
-/// A sparse Cholesky factor of matrices of blocks.
+/// A sparse Cholesky factor of a block matrix.
 #[derive(Debug)]
 struct Factor(SparseFactor);
 
@@ -102,7 +103,7 @@ impl Factor {
                 columns.push(rows.len());
             }
         }
-        // An upper block's rows are the lower triangle's columns.
+        // The upper triangle by rows is the lower triangle by columns.
         SparseFactor::new(columns, rows, None).map(Self).map_err(|_| SolverError::OutOfMemory { unknowns })
     }
 
@@ -118,7 +119,7 @@ impl Factor {
         Ok(())
     }
 
-    /// The values in the order of the structure, damped.
+    /// Copies the values to the factor's structure and adds the damping.
     fn fill<const D: usize>(&mut self, matrix: &NormalMatrix<D>, damping: f64) {
         let pattern = matrix.pattern();
         let mut rest = self.0.values_mut();
@@ -138,7 +139,7 @@ impl Factor {
     }
 }
 
-/// Preconditioned conjugate gradients from zero.
+/// Solves by preconditioned conjugate gradients, starting from zero; `b` receives the solution.
 fn conjugate_gradients<const D: usize>(
     matrix: &NormalMatrix<D>,
     damping: f64,
@@ -192,7 +193,7 @@ fn dot<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
 }
 
-/// L with A + μ 1 = L Lᵀ, its diagonal inverted.
+/// Returns L with A + μ 1 = L Lᵀ, with an inverted diagonal; `None` if the matrix is not positive definite.
 fn lower_factor<const D: usize>(a: &[[f64; 8]; D], damping: f64) -> Option<[[f64; D]; D]> {
     let mut l = [[0.0; D]; D];
     for i in 0..D {
@@ -213,7 +214,7 @@ fn lower_factor<const D: usize>(a: &[[f64; 8]; D], damping: f64) -> Option<[[f64
     Some(l)
 }
 
-/// (L Lᵀ)⁻¹ b, the diagonal of L being inverted.
+/// Returns (L Lᵀ)⁻¹ b; the diagonal of L is inverted.
 fn divided<const D: usize>(l: &[[f64; D]; D], b: &[f64; D]) -> [f64; D] {
     let mut x = *b;
     for i in 0..D {

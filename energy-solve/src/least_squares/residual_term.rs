@@ -6,16 +6,17 @@ use energy_dsl::{Array, BLOCK, Declaration, Kernel, Lane, Level, Mask, Number, P
 use crate::least_squares::loss::Loss;
 use crate::least_squares::normal_matrix::{Couplings, NormalMatrix, WIDTH, WideBlock};
 
-/// What a term adds up to.
+/// The energy of a term.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TermSum {
     /// λ Σ w ρ(‖r‖²).
     pub energy: f64,
-    /// Elements that met a singularity. They are left out of every sum.
+    /// Number of elements that met a singularity and are left out of every sum.
     pub degenerate: usize,
 }
 
-/// JᵀJ and Jᵀr of all terms, rows multiplied by the roots of their weights. Half the gradient of the energy is Jᵀr.
+/// JᵀJ and Jᵀr of all terms, with rows multiplied by the square roots of their weights. Jᵀr is half the gradient of the
+/// energy.
 #[derive(Clone, Debug)]
 pub struct NormalEquations<const D: usize> {
     /// JᵀJ.
@@ -25,7 +26,7 @@ pub struct NormalEquations<const D: usize> {
 }
 
 impl<const D: usize> NormalEquations<D> {
-    /// Sets both to zero.
+    /// Sets JᵀJ and Jᵀr to zero.
     pub fn clear(&mut self) {
         self.matrix.clear();
         self.right.fill([0.0; D]);
@@ -34,38 +35,36 @@ impl<const D: usize> NormalEquations<D> {
 
 /// A sum of squared residuals over blocks of D unknowns.
 pub trait LeastSquaresTerm<const D: usize>: Debug {
-    /// What it stands for.
+    /// The term's name, for people.
     fn name(&self) -> &str;
-    /// The declaration of its elements.
+    /// The declaration of the term's elements.
     fn declaration(&self) -> &'static Declaration;
-    /// How many elements it has.
+    /// The number of elements.
     fn len(&self) -> usize;
-    /// Whether it has none.
+    /// Whether the term has zero elements.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Its energy.
+    /// Returns the energy at x.
     fn energy(&self, x: &[[f64; D]]) -> TermSum;
-    /// Its energy; adds JᵀJ and Jᵀr.
+    /// Returns the energy at x and adds JᵀJ and Jᵀr.
     fn linearise(&self, x: &[[f64; D]], equations: &mut NormalEquations<D>) -> TermSum;
-    /// The first element whose energy is not finite.
+    /// Returns the index of the first element with a non-finite energy.
     fn find_non_finite(&self, x: &[[f64; D]]) -> Option<usize>;
-    /// Computes all Jacobians and keeps none: what derivatives alone cost. Returns the sum of some of their entries.
-    fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64;
 }
 
 /// An element on one of the stencils of a term's [`Couplings`].
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<E> {
-    /// The element.
+    /// The residual and its own numbers.
     pub element: E,
-    /// Which stencil.
+    /// Index of the stencil.
     pub stencil: u32,
-    /// w ≥ 0, which multiplies its squared residual.
+    /// Weight w ≥ 0 of the squared residual.
     pub weight: f64,
 }
 
-/// Residuals of one type, E = λ Σ w ρ(‖r‖²): packed into lanes, on stencils that were looked up once.
+/// Residuals of one type, packed into SIMD lanes: E = λ Σ w ρ(‖r‖²).
 #[derive(Clone, Debug)]
 pub struct ResidualTerm<E, const D: usize> {
     name: String,
@@ -74,22 +73,27 @@ pub struct ResidualTerm<E, const D: usize> {
     pub lambda: f64,
     /// ρ.
     pub loss: Loss,
-    /// By block of elements, number, element.
+    /// Numbers of the elements, by pack, then number, then element.
     numbers: Vec<f64>,
     stencils: Vec<u32>,
     weights: Vec<f64>,
-    of: std::marker::PhantomData<E>,
+    element_type: std::marker::PhantomData<E>,
 }
 
 impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
-    /// A term without elements.
+    /// Creates a term without elements.
     ///
     /// # Panics
-    /// When the stencils' blocks have not as many unknowns as the residual (a bug in the caller).
+    /// If the number of unknowns of a stencil differs from that of the residual.
     #[must_use]
     pub fn new(name: impl Into<String>, couplings: Arc<Couplings>, lambda: f64) -> Self {
         let (unknowns, blocks) = (<E as Residual<f64>>::Unknowns::LEN, couplings.arity());
-        assert_eq!(unknowns, blocks * D, "{} has {unknowns} unknowns, {blocks} blocks of {D}", E::DECLARATION.name);
+        assert_eq!(
+            unknowns,
+            blocks * D,
+            "{} has {unknowns} unknowns, but its stencils have {blocks} blocks of {D}",
+            E::DECLARATION.name
+        );
         Self {
             name: name.into(),
             couplings,
@@ -98,21 +102,25 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
             numbers: Vec::new(),
             stencils: Vec::new(),
             weights: Vec::new(),
-            of: std::marker::PhantomData,
+            element_type: std::marker::PhantomData,
         }
     }
 
-    /// Replaces all elements, keeping the memory.
+    /// Replaces all elements and reuses the memory.
     ///
     /// # Panics
-    /// When an element's stencil is not among the couplings.
+    /// If the index of a stencil is out of range.
     pub fn set_elements(&mut self, elements: impl IntoIterator<Item = Placed<E>>) {
         self.numbers.clear();
         self.stencils.clear();
         self.weights.clear();
         let mut last = None;
         for (place, Placed { element, stencil, weight }) in elements.into_iter().enumerate() {
-            assert!((stencil as usize) < self.couplings.len(), "stencil {stencil} of {}", self.couplings.len());
+            assert!(
+                (stencil as usize) < self.couplings.len(),
+                "stencil {stencil} is out of range: there are {}",
+                self.couplings.len()
+            );
             if place % BLOCK == 0 {
                 self.numbers.resize(self.numbers.len() + Self::BLOCK_NUMBERS, 0.0);
             }
@@ -122,20 +130,20 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
             last = Some(element);
         }
         if let Some(element) = last {
-            // Lanes left over repeat the last element.
+            // Unused lanes repeat the last element.
             let places = self.stencils.len();
             (places..places.next_multiple_of(BLOCK)).for_each(|place| self.write(place, &element));
         }
     }
 
-    /// Numbers of a block of elements; elements without any take up room nevertheless, so that they have places.
+    /// Numbers per pack of elements. Elements without numbers take one, so that each has a position.
     const BLOCK_NUMBERS: usize = BLOCK * if E::NUMBERS == 0 { 1 } else { E::NUMBERS };
 
     fn write(&mut self, place: usize, element: &E) {
         element.store(&mut self.numbers[place / BLOCK * Self::BLOCK_NUMBERS + place % BLOCK..], BLOCK);
     }
 
-    /// All residuals without weights, element by element.
+    /// Returns all residuals without weights, element by element.
     #[must_use]
     pub fn residuals(&self, x: &[[f64; D]]) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.stencils.len() * Self::rows());
@@ -147,16 +155,28 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         all
     }
 
-    /// The weight of an element, λ w, without that of the loss.
+    /// Returns the weight λ w of an element, without that of the loss.
     #[must_use]
     pub fn weight(&self, element: usize) -> f64 {
         self.lambda * self.weights[element]
     }
 
-    /// The blocks of unknowns that an element acts on.
+    /// Returns the blocks of unknowns of an element.
     #[must_use]
     pub fn stencil(&self, element: usize) -> &[u32] {
         self.couplings.stencil(self.stencils[element] as usize)
+    }
+
+    /// Computes all Jacobians and discards them, to measure the cost of derivatives alone. Returns the sum of some
+    /// entries.
+    #[must_use]
+    pub fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
+        let (mut sum, mut chunk) = (0.0, Chunk::default());
+        for first in (0..self.stencils.len()).step_by(CHUNK) {
+            self.linearise_chunk(first, x, &mut chunk);
+            sum += std::hint::black_box(&chunk.jacobians)[0];
+        }
+        sum
     }
 
     fn rows() -> usize {
@@ -168,7 +188,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         E::load::<L::F64>(&self.numbers[first / BLOCK * Self::BLOCK_NUMBERS + first % BLOCK..], BLOCK)
     }
 
-    /// The unknowns of as many elements as there are lanes.
+    /// Gathers the unknowns of one element per lane.
     #[inline(always)]
     fn gather<L: Level>(&self, first: usize, x: &[[f64; D]]) -> <E::Wide<L::F64> as Residual<L::F64>>::Unknowns {
         let mut unknowns =
@@ -191,21 +211,21 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     }
 }
 
-/// Elements that are evaluated before their results are used: so many that what is done with them can be compiled apart, so few that
-/// they stay in the cache.
+/// Elements that are evaluated before their results are used. Large enough that the consumer can be compiled
+/// separately, small enough that the results stay in the cache.
 const CHUNK: usize = 64;
 
-/// Results of some elements.
+/// Results of a run of elements.
 #[derive(Debug, Default)]
 struct Chunk {
     residuals: Vec<f64>,
     jacobians: Vec<f64>,
-    /// Those that met a singularity, counted from the chunk's first.
+    /// Elements that met a singularity, counted from the chunk's first.
     degenerate: Vec<usize>,
 }
 
 impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
-    /// Residuals of the elements from `first` on; returns how many.
+    /// Evaluates the residuals of the elements from `first` on. Returns the number of elements.
     fn evaluate_chunk(&self, first: usize, x: &[[f64; D]], chunk: &mut Chunk) -> usize {
         let count = CHUNK.min(self.stencils.len() - first);
         chunk.degenerate.clear();
@@ -214,18 +234,19 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         count
     }
 
-    /// Residuals and Jacobians of the elements from `first` on; returns how many.
+    /// Evaluates the residuals and Jacobians of the elements from `first` on. Returns the number of elements.
     fn linearise_chunk(&self, first: usize, x: &[[f64; D]], chunk: &mut Chunk) -> usize {
         let count = CHUNK.min(self.stencils.len() - first);
         chunk.degenerate.clear();
         chunk.residuals.resize(CHUNK * Self::rows(), 0.0);
-        // A block's row is read as a whole register, which reaches past the end of the last block.
+        // Rows are read as whole registers, which reaches past the end of the last block.
         chunk.jacobians.resize(CHUNK * Self::rows() * self.couplings.arity() * D + WIDTH, 0.0);
         dispatch(Jacobians { term: self, x, first, count, chunk });
         count
     }
 
-    /// The roots of the elements' weights, and what they add to the energy. Those that met a singularity weigh nothing.
+    /// Calls `each` with an element's index, its energy, and the square root of its weight. Elements that met a
+    /// singularity have zero weight.
     fn weigh(&self, first: usize, count: usize, chunk: &Chunk, mut each: impl FnMut(usize, f64, f64)) {
         let rows = Self::rows();
         for at in 0..count {
@@ -301,18 +322,9 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for Res
         }
         None
     }
-
-    fn evaluate_jacobians(&self, x: &[[f64; D]]) -> f64 {
-        let (mut sum, mut chunk) = (0.0, Chunk::default());
-        for first in (0..self.stencils.len()).step_by(CHUNK) {
-            self.linearise_chunk(first, x, &mut chunk);
-            sum += std::hint::black_box(&chunk.jacobians)[0];
-        }
-        sum
-    }
 }
 
-/// r of a chunk.
+/// Evaluates r of a chunk.
 struct Residuals<'a, E, const D: usize> {
     term: &'a ResidualTerm<E, D>,
     x: &'a [[f64; D]],
@@ -339,7 +351,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> Kernel for Residuals<'_, E,
     }
 }
 
-/// r and J of a chunk.
+/// Evaluates r and J of a chunk.
 struct Jacobians<'a, E, const D: usize> {
     term: &'a ResidualTerm<E, D>,
     x: &'a [[f64; D]],
@@ -375,7 +387,7 @@ fn note<M: Mask>(degenerate: &mut Vec<usize>, at: usize, lanes: usize, mask: M) 
     degenerate.extend((0..lanes).filter(|&lane| mask.lane(lane)).map(|lane| at + lane));
 }
 
-/// Adds JᵀJ and Jᵀr of a chunk: the same code for all elements.
+/// Adds JᵀJ and Jᵀr of a chunk. Compiled once for all types of elements.
 struct Products<'a, const D: usize> {
     couplings: &'a Couplings,
     stencils: &'a [u32],
@@ -427,7 +439,7 @@ fn add_right<const D: usize>(
     }
 }
 
-/// Adds JᵀJ of one element, pair of blocks by pair of blocks.
+/// Adds JᵀJ of one element, one pair of blocks at a time.
 #[inline(always)]
 fn add_products<L: Level, const D: usize>(
     blocks: &mut [WideBlock<D>],
@@ -439,7 +451,7 @@ fn add_products<L: Level, const D: usize>(
     let mut slots = slots.iter();
     for i in 0..arity {
         for j in i..arity {
-            let &slot = slots.next().expect("a place for each pair");
+            let &slot = slots.next().expect("one place per pair");
             let (a, b) = if slot & 1 == 0 { (i, j) } else { (j, i) };
             let block = &mut blocks[(slot >> 1) as usize];
             for row in 0..rows {

@@ -6,8 +6,10 @@ use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::precision::Precision;
 use crate::matrix::vector::{add_scaled, dot};
 
-/// Solves A x = b for any invertible A, starting from the given x: BiCGSTAB (van der Vorst 1992) on the left-preconditioned
-/// system D⁻¹A x = D⁻¹b. For force laws, whose Jacobians are not symmetric.
+/// Solves A x = b for any invertible A by BiCGSTAB (van der Vorst 1992), starting from the given x. For force laws,
+/// whose Jacobians are not symmetric.
+///
+/// The preconditioner D acts from the left: D⁻¹A x = D⁻¹b.
 pub fn bicgstab(
     matrix: &BlockMatrix<impl Precision>,
     preconditioner: &impl Preconditioner,

@@ -9,12 +9,14 @@ use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::matrix::precision::Precision;
 
-/// Sparse Cholesky factorisation A = L Lᵀ: solves to the last digits, in a time that does not depend on the matrix, but grows with the power 1.5 of
-/// the vertices of a sheet (George, SIAM J. Numer. Anal. 10, 1973).
+/// Sparse Cholesky factorisation A = L Lᵀ, which solves to full precision.
 ///
-/// Vertices are eliminated in an order of approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996). It and the fill
-/// are found once for a pattern; [`BlockCholesky::factor`] reuses them for every matrix. The factor of a matrix also preconditions
-/// conjugate gradients for another one that differs little.
+/// Its time does not depend on the matrix entries. For a sheet it grows with the power 1.5 of the number of vertices
+/// (George, SIAM J. Numer. Anal. 10, 1973).
+///
+/// Vertices are eliminated in an approximate minimum degree order (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl.
+/// 17, 1996). The order and the fill-in are computed once per pattern; [`BlockCholesky::factor`] reuses them for every
+/// matrix. The factor of a matrix also preconditions conjugate gradients for a similar matrix.
 ///
 /// ```
 /// use energy_solve::{BlockCholesky, BlockMatrix, Pattern, Storage};
@@ -39,13 +41,13 @@ pub struct BlockCholesky {
     factor: SparseFactor,
 }
 
-/// A factorisation that is not possible.
+/// A factorisation that failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CholeskyError {
     /// A pivot is not positive.
     #[error("the matrix is not positive definite")]
     NotPositiveDefinite,
-    /// The factor is too large.
+    /// The factor does not fit into memory.
     #[error("the factor of a matrix of {rows} vertices does not fit into memory")]
     OutOfMemory {
         /// Block rows of the matrix.
@@ -54,17 +56,17 @@ pub enum CholeskyError {
 }
 
 impl BlockCholesky {
-    /// Prepares for matrices of a pattern.
+    /// Analyses a pattern.
     ///
     /// # Errors
-    /// When the memory does not suffice.
+    /// If memory runs out.
     ///
     /// # Panics
-    /// When it is not the upper triangle of a symmetric one.
+    /// If the pattern does not store an upper triangle.
     pub fn new(pattern: &Arc<Pattern>) -> Result<Self, CholeskyError> {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices have Cholesky factors");
         let failed = |_| CholeskyError::OutOfMemory { rows: pattern.rows() };
-        // The upper triangle by rows is the lower one by columns.
+        // The upper triangle by rows is the lower triangle by columns.
         let (mut groups, mut columns) = (vec![0], vec![0]);
         let (mut others, mut rows) = (Vec::new(), Vec::new());
         for row in 0..pattern.rows() {
@@ -78,12 +80,12 @@ impl BlockCholesky {
                 columns.push(rows.len());
             }
         }
-        let order = Order::of_groups(3, &groups, &others).map_err(failed)?;
+        let order = Order::by_minimum_degree(3, &groups, &others).map_err(failed)?;
         let factor = SparseFactor::new(columns, rows, Some(&order)).map_err(failed)?;
         Ok(Self { pattern: Arc::clone(pattern), factor })
     }
 
-    /// The numbers of the factor.
+    /// Returns the number of entries of the factor.
     #[must_use]
     pub fn entries(&self) -> usize {
         self.factor.entries()
@@ -92,10 +94,10 @@ impl BlockCholesky {
     /// Factors a matrix of the pattern.
     ///
     /// # Errors
-    /// When it is not positive definite.
+    /// If the matrix is not positive definite.
     ///
     /// # Panics
-    /// When it has another pattern.
+    /// If the matrix has another pattern.
     pub fn factor(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), CholeskyError> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let mut rest = self.factor.values_mut();
@@ -112,7 +114,7 @@ impl BlockCholesky {
         self.factor.factor().map_err(|_| CholeskyError::NotPositiveDefinite)
     }
 
-    /// x ← A⁻¹ b, A the matrix that was factored. Of a solution that is not finite the report says so.
+    /// Computes x ← A⁻¹ b for the last factored matrix A. The report tells if the solution is not finite.
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>]) -> SolveReport {
         x.copy_from_slice(b);
         self.factor.solve(x.as_flattened_mut());
@@ -129,6 +131,6 @@ impl Preconditioner for BlockCholesky {
 
     fn apply(&self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
         z.copy_from_slice(r);
-        self.factor.solve_apart(z.as_flattened_mut());
+        self.factor.solve_with_new_scratch(z.as_flattened_mut());
     }
 }

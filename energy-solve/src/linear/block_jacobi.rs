@@ -6,7 +6,7 @@ use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::precision::{Precision, doubled};
 use crate::matrix::vector::block_times;
 
-/// The block-Jacobi preconditioner: the inverses of the diagonal blocks.
+/// Block-Jacobi preconditioner: the inverses of the diagonal blocks.
 #[derive(Clone, Debug)]
 pub struct BlockJacobi {
     inverses: Vec<Block<f64>>,
@@ -17,7 +17,7 @@ impl BlockJacobi {
     /// Inverts the diagonal blocks of a matrix.
     ///
     /// # Errors
-    /// When one of them is singular or not finite.
+    /// If a diagonal block is singular or not finite.
     pub fn new(matrix: &BlockMatrix<impl Precision>) -> Result<Self, SingularBlock> {
         let blocks = || (0..matrix.pattern().rows()).map(|row| doubled(matrix.diagonal(row)));
         let inverses = blocks().enumerate().map(|(row, block)| inverse(&block).ok_or(SingularBlock { row }));
@@ -27,7 +27,7 @@ impl BlockJacobi {
 }
 
 impl Preconditioner for BlockJacobi {
-    /// Whether every diagonal block is.
+    /// Whether every diagonal block is positive definite.
     fn is_positive_definite(&self) -> bool {
         self.positive_definite
     }
@@ -40,7 +40,7 @@ impl Preconditioner for BlockJacobi {
 }
 
 pub(crate) fn inverse(block: &Block<f64>) -> Option<Block<f64>> {
-    // The determinant is cubic in the entries: bring them near 1 so that light or soft vertices do not underflow.
+    // The determinant is cubic in the entries: scale them to about 1 so that light or soft vertices do not underflow.
     let scale = block.iter().flatten().fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
     let scaled = Matrix3::from_fn(|row, column| block[row][column] / scale);
     let inverse = scaled.try_inverse()?;
@@ -48,21 +48,21 @@ pub(crate) fn inverse(block: &Block<f64>) -> Option<Block<f64>> {
     unscaled.iter().flatten().all(|entry| entry.is_finite()).then_some(unscaled)
 }
 
-/// Sylvester's criterion on the lower triangle, by elimination.
+/// Applies Sylvester's criterion to the lower triangle, by elimination.
 pub(crate) fn is_positive_definite(block: &Block<f64>) -> bool {
     let [[a, ..], [b, c, _], [d, e, f]] = *block;
     let (c, e, f) = (c - b * (b / a), e - b * (d / a), f - d * (d / a));
     a > 0.0 && c > 0.0 && f - e * (e / c) > 0.0
 }
 
-/// The inverse of a positive definite block, of which the upper triangle is read; `None` if it is not.
+/// Inverts a positive definite block, given by its upper triangle; `None` if it is not positive definite.
 #[inline(always)]
 pub(crate) fn inverse_of_definite(block: &Block<f64>) -> Option<Block<f64>> {
-    // The determinant is cubic in the entries: bring them near 1 so that light or soft vertices do not underflow.
+    // The determinant is cubic in the entries: scale them to about 1 so that light or soft vertices do not underflow.
     let scale = block[0][0].max(block[1][1]).max(block[2][2]).power_of_two_scale();
     let [[a, b, c], [_, d, e], [_, _, f]] = *block;
     let [a, b, c, d, e, f] = [a * scale, b * scale, c * scale, d * scale, e * scale, f * scale];
-    // The cofactors; Sylvester's criterion is on a, on that of f, and on the determinant.
+    // Cofactors of the entries. Sylvester's criterion tests a, the cofactor ff and the determinant.
     let [aa, bb, cc] = [d * f - e * e, c * e - b * f, b * e - c * d];
     let [dd, ee, ff] = [a * f - c * c, b * c - a * e, a * d - b * b];
     let determinant = a * aa + b * bb + c * cc;

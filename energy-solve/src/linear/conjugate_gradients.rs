@@ -6,10 +6,10 @@ use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::precision::Precision;
 use crate::matrix::vector::{add_scaled, dot, scale_and_add};
 
-/// Solves A x = b for a symmetric positive definite A, starting from the given x: preconditioned conjugate gradients
+/// Solves A x = b for a symmetric positive definite A by preconditioned conjugate gradients, starting from the given x
 /// (Shewchuk, "An introduction to the conjugate gradient method without the agonizing pain", 1994, B3).
 ///
-/// A direction of non-positive curvature stops it; see [`StopReason::IndefiniteCurvature`].
+/// Stops at a direction of non-positive curvature; see [`StopReason::IndefiniteCurvature`].
 pub fn conjugate_gradients(
     matrix: &BlockMatrix<impl Precision>,
     preconditioner: &impl Preconditioner,
@@ -30,7 +30,7 @@ pub fn conjugate_gradients(
     let mut iterations = 0;
     let stopped = loop {
         if !preconditioner.is_positive_definite() {
-            break StopReason::IndefiniteCurvature; // the matrix has a block that proves it
+            break StopReason::IndefiniteCurvature; // a diagonal block is indefinite, and so is the matrix
         }
         if !rho.is_finite() || !target.is_finite() {
             break StopReason::NonFinite;

@@ -4,51 +4,51 @@ use energy_dsl::{Block, Kernel, Level, Number, Vector3, dispatch};
 
 use crate::linear::block_jacobi::{inverse_of_definite, is_positive_definite};
 use crate::linear::preconditioner::{Preconditioner, SingularBlock};
-use crate::linear::rounded_block::{Sums, Wide, add_times, narrow, room, store_columns, store_rows, total, widen};
+use crate::linear::rounded_block::{Sums, Wide, add_times, narrow, store_columns, store_rows, total, widen, zeros};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::{Precision, doubled};
 use crate::matrix::vector::add_scaled_block;
 
-/// How much of the fill that is dropped goes to the diagonal.
-const KEPT: f64 = 0.95;
+/// The fraction of dropped fill-in that is added to the diagonal.
+const COMPENSATION: f64 = 0.95;
 
-/// How much the diagonal is strengthened, relative to itself, after a factorisation met a pivot that is not positive definite: nothing
-/// at first, then this, then ten times as much, ….
+/// The first relative shift of the diagonal, after a pivot failed without a shift. Each further failure multiplies it
+/// by 10.
 const FIRST_SHIFT: f64 = 1e-3;
 
-/// Incomplete Cholesky factorisation by 3×3 blocks without fill, A ≈ (1 + W)ᵀ D (1 + W) with W of the pattern of A above its diagonal and
-/// D block-diagonal (Meijerink and van der Vorst 1977).
+/// Incomplete Cholesky factorisation by 3×3 blocks without fill-in: A ≈ (1 + W)ᵀ D (1 + W). D is block-diagonal, and W
+/// has the pattern of A above the diagonal (Meijerink and van der Vorst 1977).
 ///
-/// Most of the fill that is dropped is added to the diagonal, so that smooth displacements meet nearly the same resistance as in A: half
-/// as many iterations on fine meshes (modified and relaxed, Gustafsson 1978, Axelsson and Lindskog 1986). Where a pivot fails it is
-/// dropped altogether, and then the diagonal strengthened (shifted, Manteuffel 1980).
+/// Most of the dropped fill-in is added to the diagonal, which preserves the action on smooth displacements and halves
+/// the iterations on fine meshes (relaxed modified factorisation, Gustafsson 1978, Axelsson and Lindskog 1986). If a
+/// pivot fails, the fill-in is dropped entirely; if one fails again, the diagonal is shifted (Manteuffel 1980).
 ///
-/// It is computed in double precision and kept in single: an approximation need not be exact, but it is read in every iteration of
-/// a solver.
+/// The factor is computed in double precision and stored in single precision: it is an approximation anyway, and a
+/// solver reads it in every iteration.
 ///
-/// Made for matrices that change and patterns that do not: [`IncompleteCholesky::factor`] reuses everything else.
+/// [`IncompleteCholesky::factor`] reuses everything that depends on the pattern alone.
 #[derive(Clone, Debug)]
 pub struct IncompleteCholesky {
     pattern: Arc<Pattern>,
-    /// By row, each pair of its blocks that changes a block of another row: W_kiᵀ U_kj for A_ij.
+    /// Pairs of blocks of a row that update a block of another row, sorted by row: A_ij −= W_kiᵀ U_kj.
     updates: Vec<Update>,
     update_start: Vec<u32>,
-    /// By row, each pair that would make a block where there is none.
+    /// Pairs of blocks of a row whose product is outside the pattern, sorted by row.
     dropped: Vec<Dropped>,
     dropped_start: Vec<u32>,
-    /// U = D W, and D, while they are computed.
+    /// U = D W and D during the factorisation.
     upper: Vec<Block<f64>>,
-    /// W by the places of the pattern, each block row by row.
+    /// W by block index, each block row by row.
     rows: Vec<f32>,
-    /// W column by column, with D⁻¹ on the diagonal.
+    /// W by block index, each block column by column, with D⁻¹ on the diagonal.
     columns: Vec<f32>,
     shift: f64,
-    /// How much of the dropped fill goes to the diagonal.
-    kept: f64,
+    /// The fraction of dropped fill-in that is added to the diagonal.
+    compensation: f64,
 }
 
-/// Blocks `left`ᵀ and `right` change block `to`.
+/// The product of blocks `left`ᵀ and `right` updates block `to`.
 #[derive(Clone, Copy, Debug)]
 struct Update {
     left: u32,
@@ -56,7 +56,7 @@ struct Update {
     to: u32,
 }
 
-/// Blocks `left`ᵀ and `right` make a block in the row and column of two on the diagonal.
+/// The product of blocks `left`ᵀ and `right` is dropped from the row and column of two diagonal blocks.
 #[derive(Clone, Copy, Debug)]
 struct Dropped {
     left: u32,
@@ -65,10 +65,10 @@ struct Dropped {
 }
 
 impl IncompleteCholesky {
-    /// Prepares for matrices of a pattern.
+    /// Analyses a pattern.
     ///
     /// # Panics
-    /// When it is not the upper triangle of a symmetric one.
+    /// If the pattern does not store an upper triangle.
     #[must_use]
     pub fn new(pattern: &Arc<Pattern>) -> Self {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices have Cholesky factors");
@@ -98,50 +98,51 @@ impl IncompleteCholesky {
             dropped,
             dropped_start,
             upper: Vec::new(),
-            rows: room(pattern.blocks()),
-            columns: room(pattern.blocks()),
+            rows: zeros(pattern.blocks()),
+            columns: zeros(pattern.blocks()),
             shift: 0.0,
-            kept: KEPT,
+            compensation: COMPENSATION,
         }
     }
 
     /// Factors a matrix of the pattern.
     ///
     /// # Errors
-    /// When a diagonal block is not positive definite: then the matrix is not.
+    /// If a diagonal block is not positive definite, in which case neither is the matrix.
     ///
     /// # Panics
-    /// When the matrix has another pattern.
+    /// If the matrix has another pattern.
     pub fn factor(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         if let Some(row) = (0..self.pattern.rows()).find(|&row| !is_positive_definite(&doubled(matrix.diagonal(row)))) {
             return Err(SingularBlock { row });
         }
-        (self.shift, self.kept) = (0.0, KEPT);
-        while let Err(row) = dispatch(Factorisation { of: self, matrix }) {
+        (self.shift, self.compensation) = (0.0, COMPENSATION);
+        while let Err(row) = dispatch(Factorisation { factor: self, matrix }) {
             if self.shift > 1.0 {
                 return Err(SingularBlock { row });
             }
             self.shift = match self.shift {
-                _ if self.kept > 0.0 => 0.0,
+                _ if self.compensation > 0.0 => 0.0,
                 0.0 => FIRST_SHIFT,
                 shift => 10.0 * shift,
             };
-            self.kept = 0.0;
+            self.compensation = 0.0;
         }
         Ok(())
     }
 
-    /// By how much the diagonal had to be strengthened, relative to itself.
+    /// Returns the relative shift of the diagonal that the last factorisation needed.
     #[must_use]
     pub fn shift(&self) -> f64 {
         self.shift
     }
 }
 
-/// The factorisation with the shift that is set. Fails with the row whose pivot is not positive definite.
+/// One attempt at a factorisation, with the current shift. Fails with the row of the first pivot that is not positive
+/// definite.
 struct Factorisation<'a, M> {
-    of: &'a mut IncompleteCholesky,
+    factor: &'a mut IncompleteCholesky,
     matrix: &'a BlockMatrix<M>,
 }
 
@@ -160,8 +161,8 @@ impl<M: Precision> Kernel for Factorisation<'_, M> {
             rows,
             columns,
             shift,
-            kept,
-        } = self.of;
+            compensation,
+        } = self.factor;
         upper.clear();
         upper.extend(self.matrix.values().iter().map(doubled));
         let mut scaled: Vec<Block<f64>> = Vec::new();
@@ -186,7 +187,7 @@ impl<M: Precision> Kernel for Factorisation<'_, M> {
                 let changed = less_transposed_product::<L>(&upper[to as usize], w, &upper[right as usize]);
                 upper[to as usize] = changed;
             }
-            if *kept == 0.0 {
+            if *compensation == 0.0 {
                 continue;
             }
             for number in dropped_start[row] as usize..dropped_start[row + 1] as usize {
@@ -194,7 +195,7 @@ impl<M: Precision> Kernel for Factorisation<'_, M> {
                 let w = &scaled[left as usize - diagonal - 1];
                 let fill = less_transposed_product::<L>(&[[0.0; 3]; 3], w, &upper[right as usize]);
                 for place in places {
-                    add_symmetric_part(&mut upper[place as usize], *kept, &fill);
+                    add_symmetric_part(&mut upper[place as usize], *compensation, &fill);
                 }
             }
         }
@@ -214,7 +215,7 @@ impl Preconditioner for IncompleteCholesky {
     }
 }
 
-/// r, to be replaced by z with (1 + W)ᵀ D (1 + W) z = r.
+/// Solves (1 + W)ᵀ D (1 + W) z = r in place; `z` holds r first.
 struct Solution<'a> {
     factor: &'a IncompleteCholesky,
     z: &'a mut [Wide],
@@ -257,7 +258,7 @@ fn add_symmetric_part(sum: &mut Block<f64>, scale: f64, block: &Block<f64>) {
     }
 }
 
-/// A B.
+/// Returns A B.
 #[inline(always)]
 fn product<L: Level>(a: &Block<f64>, b: &Block<f64>) -> Block<f64> {
     let mut product = [[0.0; 3]; 3];
@@ -271,7 +272,7 @@ fn product<L: Level>(a: &Block<f64>, b: &Block<f64>) -> Block<f64> {
     product
 }
 
-/// C − Aᵀ B.
+/// Returns C − Aᵀ B.
 #[inline(always)]
 fn less_transposed_product<L: Level>(c: &Block<f64>, a: &Block<f64>, b: &Block<f64>) -> Block<f64> {
     let mut difference = *c;

@@ -1,19 +1,20 @@
-//! 3×3 blocks rounded to single precision, nine numbers each, multiplied by vectors in double precision: half the memory to read, and
-//! three numbers of a column (and one that is not used) at once.
+//! 3×3 blocks in single precision, multiplied by vectors in double precision.
+//!
+//! This halves the memory traffic. A column is read as four numbers, of which the last is ignored.
 
 use energy_dsl::{Block, Level, Number, Vector3};
 
 use crate::matrix::vector::widened;
 
-/// Numbers after the last block, so that four can be read where its last column begins.
+/// Padding after the last block, so that its last column can be read as four numbers.
 const SLACK: usize = 1;
 
-/// Room for so many blocks.
-pub(crate) fn room(blocks: usize) -> Vec<f32> {
+/// Creates storage for `blocks` blocks.
+pub(crate) fn zeros(blocks: usize) -> Vec<f32> {
     vec![0.0; 9 * blocks + SLACK]
 }
 
-/// Stores a block column by column. Its transpose is stored row by row.
+/// Stores a block column by column, or the transpose of a block that is stored row by row.
 pub(crate) fn store_columns(numbers: &mut [f32], place: usize, block: &Block<f64>) {
     let numbers = &mut numbers[9 * place..][..9];
     for row in 0..3 {
@@ -33,25 +34,25 @@ pub(crate) fn store_rows(numbers: &mut [f32], place: usize, block: &Block<f64>) 
     }
 }
 
-/// A vector in a register of four, with a last component that means nothing.
+/// A 3-vector padded to a register of four; the last component is ignored.
 pub(crate) type Wide = [f64; 4];
 
-/// Vectors as [`Wide`] ones.
+/// Pads vectors to [`Wide`] ones.
 pub(crate) fn widen(vectors: &[Vector3<f64>]) -> Vec<Wide> {
     vectors.iter().copied().map(widened).collect()
 }
 
-/// Back again.
+/// Drops the padding.
 pub(crate) fn narrow(wide: &[Wide], vectors: &mut [Vector3<f64>]) {
     for (vector, &[x, y, z, _]) in vectors.iter_mut().zip(wide) {
         *vector = [x, y, z];
     }
 }
 
-/// Three partial sums of a vector: they do not wait for each other.
+/// Three partial sums of a vector, one per column of a block, which are independent for instruction-level parallelism.
 pub(crate) type Sums = [Wide; 3];
 
-/// Adds s B v, B stored column by column.
+/// Adds s B v, with B stored column by column.
 #[inline(always)]
 pub(crate) fn add_times<L: Level>(sums: &mut Sums, scale: f64, numbers: &[f32], place: usize, v: &Wide) {
     let block = &numbers[9 * place..][..9 + SLACK];
@@ -64,7 +65,7 @@ pub(crate) fn add_times<L: Level>(sums: &mut Sums, scale: f64, numbers: &[f32], 
     }
 }
 
-/// The sum of partial sums.
+/// Adds up the partial sums.
 #[inline(always)]
 pub(crate) fn total(sums: &Sums) -> Wide {
     let mut total = [0.0; 4];

@@ -3,36 +3,36 @@ use crate::matrix::precision::Precision;
 use crate::matrix::vector::dot;
 use energy_dsl::Vector3;
 
-/// When to stop.
+/// Stopping criteria of a linear solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveOptions {
-    /// Stop when the residual is this much smaller than the right-hand side, both measured as √(rᵀ D⁻¹ r) for conjugate
-    /// gradients and as ‖D⁻¹ r‖ for BiCGSTAB. D, the preconditioner, holds masses and stiffnesses: the test means the
-    /// same for a light and for a heavy cloth.
+    /// Stop once the residual is this much smaller than the right-hand side. Conjugate gradients measure both as √(rᵀ
+    /// D⁻¹ r), BiCGSTAB as ‖D⁻¹ r‖. The preconditioner D contains masses and stiffnesses, so the test means the same
+    /// for light and for heavy cloth.
     pub relative_tolerance: f64,
-    /// Give up after this many iterations.
+    /// Stop after this many iterations.
     pub iteration_limit: usize,
 }
 
 impl Default for SolveOptions {
-    /// 10⁻⁸ and 10 000 iterations.
+    /// Relative tolerance 10⁻⁸, at most 10 000 iterations.
     fn default() -> Self {
         Self { relative_tolerance: 1e-8, iteration_limit: 10_000 }
     }
 }
 
-/// Why a solver stopped.
+/// The reason why a solver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum StopReason {
     /// The residual met the tolerance.
     Converged,
-    /// It did not within the limit.
+    /// The residual did not meet the tolerance within the iteration limit.
     IterationLimit,
-    /// A direction p with pᵀAp ≤ 0 was met: the matrix is not positive definite. The iterate before it is returned.
+    /// A direction p has pᵀAp ≤ 0, so the matrix is not positive definite. Returns the iterate before it.
     IndefiniteCurvature,
-    /// The recurrences of BiCGSTAB broke down (a division by zero). The iterate before it is returned.
+    /// The recurrences of BiCGSTAB broke down (division by zero). Returns the iterate before it.
     Breakdown,
-    /// An intermediate result is infinite or NaN. The iterate is of no use.
+    /// An intermediate result is infinite or NaN. The iterate is useless.
     NonFinite,
 }
 
@@ -48,21 +48,21 @@ impl std::fmt::Display for StopReason {
     }
 }
 
-/// What a solver did.
+/// Statistics of one solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveReport {
-    /// Iterations done.
+    /// Number of iterations.
     pub iterations: usize,
-    /// The residual's norm before the first iteration; see [`SolveOptions::relative_tolerance`] for the norm.
+    /// Norm of the residual before the first iteration; see [`SolveOptions::relative_tolerance`] for the norm.
     pub initial_residual: f64,
-    /// The residual's norm at the end, by the solver's recurrence.
+    /// Norm of the final residual, by the solver's recurrence.
     pub final_residual: f64,
-    /// Why it stopped.
+    /// The reason why the solver stopped.
     pub stopped: StopReason,
 }
 
 impl SolveReport {
-    /// Of a matrix that shows to be indefinite before it is multiplied by anything.
+    /// Report for a matrix that proves to be indefinite before the first iteration.
     #[must_use]
     pub fn indefinite() -> Self {
         let stopped = StopReason::IndefiniteCurvature;
@@ -76,7 +76,7 @@ impl SolveReport {
     }
 }
 
-/// b − A x.
+/// Returns b − A x.
 pub(crate) fn residual(
     matrix: &BlockMatrix<impl Precision>,
     b: &[Vector3<f64>],

@@ -6,9 +6,9 @@ use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-/// A sparse Cholesky factor, for matrices of one pattern: elimination order and fill are found once.
+/// A sparse Cholesky factor for matrices of one pattern. The elimination order and the fill-in are computed once.
 pub(crate) struct SparseFactor {
-    /// The lower triangle by columns.
+    /// Pattern of the lower triangle, by columns.
     structure: SymbolicSparseColMat<usize>,
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
@@ -16,7 +16,7 @@ pub(crate) struct SparseFactor {
     memory: MemBuffer,
 }
 
-/// A pivot that is not positive.
+/// A pivot is not positive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NotPositiveDefinite;
 
@@ -27,8 +27,8 @@ impl std::fmt::Debug for SparseFactor {
 }
 
 impl SparseFactor {
-    /// Of lower triangles whose columns start here and have these rows. The unknowns are eliminated in the order given, or else in one found by
-    /// approximate minimum degree.
+    /// Analyses lower triangles with these column starts and row indices. Unknowns are eliminated in the given order,
+    /// or in an approximate minimum degree order.
     pub(crate) fn new(columns: Vec<usize>, rows: Vec<usize>, order: Option<&Order>) -> Result<Self, FaerError> {
         let unknowns = columns.len() - 1;
         let structure = SymbolicSparseColMat::new_checked(unknowns, unknowns, columns, None, rows);
@@ -48,17 +48,17 @@ impl SparseFactor {
         Ok(Self { structure, symbolic, values, factor, memory })
     }
 
-    /// The entries of the triangle, to be set before it is factored.
+    /// Returns the entries of the lower triangle, to be set before [`SparseFactor::factor`].
     pub(crate) fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
-    /// The entries of the factor.
+    /// Returns the number of entries of the factor.
     pub(crate) fn entries(&self) -> usize {
         self.factor.len()
     }
 
-    /// Factors the matrix with the values that are set.
+    /// Factors the matrix with the current values.
     pub(crate) fn factor(&mut self) -> Result<(), NotPositiveDefinite> {
         let Self { structure, symbolic, values, factor, memory } = self;
         let a = SparseColMatRef::new(structure.as_ref(), values.as_slice());
@@ -69,13 +69,13 @@ impl SparseFactor {
             .map_err(|_| NotPositiveDefinite)
     }
 
-    /// x ← A⁻¹ x, A the matrix that was factored.
+    /// x ← A⁻¹ x for the last factored matrix A.
     pub(crate) fn solve(&mut self, x: &mut [f64]) {
         Self::solve_with(&self.symbolic, &self.factor, x, MemStack::new(&mut self.memory));
     }
 
-    /// The same with memory of its own.
-    pub(crate) fn solve_apart(&self, x: &mut [f64]) {
+    /// x ← A⁻¹ x for the last factored matrix A, with scratch memory that is allocated for this call.
+    pub(crate) fn solve_with_new_scratch(&self, x: &mut [f64]) {
         let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         Self::solve_with(&self.symbolic, &self.factor, x, MemStack::new(&mut memory));
     }
@@ -87,15 +87,16 @@ impl SparseFactor {
     }
 }
 
-/// An order of elimination: the unknown that comes at each place, and the place of each unknown.
+/// An elimination order: the unknown at each position, and the position of each unknown.
 pub(crate) struct Order {
     forward: Vec<usize>,
     inverse: Vec<usize>,
 }
 
 impl Order {
-    /// By approximate minimum degree, of groups of `size` unknowns whose triangle's columns start here and have these rows.
-    pub(crate) fn of_groups(size: usize, columns: &[usize], rows: &[usize]) -> Result<Self, FaerError> {
+    /// Computes an approximate minimum degree order for groups of `size` unknowns. `columns` and `rows` are the lower
+    /// triangle of the groups' pattern.
+    pub(crate) fn by_minimum_degree(size: usize, columns: &[usize], rows: &[usize]) -> Result<Self, FaerError> {
         let groups = columns.len() - 1;
         let structure = SymbolicSparseColMatRef::new_checked(groups, groups, columns, None, rows);
         let (mut order, mut places) = (vec![0; groups], vec![0; groups]);

@@ -6,47 +6,48 @@ use crate::matrix::pattern::{Pattern, Storage};
 use crate::matrix::precision::{Precision, doubled};
 use crate::matrix::vector::{transposed, widened};
 
-/// A square sparse matrix of 3×3 blocks; a symmetric one as its upper triangle. Entries are stored in `T`, `f32` or `f64`.
+/// A square sparse matrix of 3×3 blocks with entries in `T`, `f32` or `f64`. A symmetric matrix stores its upper
+/// triangle.
 #[derive(Clone, Debug)]
 pub struct BlockMatrix<T = f64> {
     pattern: Arc<Pattern>,
-    /// The blocks of the pattern, and one more that takes what belongs nowhere.
+    /// The blocks of the pattern, and one more for the blocks of pinned vertices, at [`Pattern::nowhere`].
     values: Vec<Block<T>>,
-    /// What a system wrote to the matrix; `None` once an entry was changed by others.
+    /// Identifies what a system wrote to the matrix; `None` after any other change.
     contents: Option<Arc<Contents>>,
 }
 
-/// Identifies the contents that a system wrote to a matrix and its clones.
+/// Identity of the contents that a system wrote to a matrix and its clones.
 #[derive(Debug)]
 pub(crate) struct Contents;
 
 impl<T: Precision> BlockMatrix<T> {
-    /// The zero matrix of a pattern.
+    /// Creates the zero matrix of a pattern.
     #[must_use]
     pub fn zeros(pattern: Arc<Pattern>) -> Self {
         let values = vec![[[T::from_f64(0.0); 3]; 3]; pattern.blocks() + 1];
         Self { pattern, values, contents: None }
     }
 
-    /// The pattern.
+    /// Returns the pattern that says which blocks are stored.
     #[must_use]
     pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
-    /// The diagonal block of a row.
+    /// Returns the diagonal block of a row.
     #[must_use]
     pub fn diagonal(&self, row: usize) -> &Block<T> {
         &self.values[self.pattern.diagonal(row)]
     }
 
-    /// The diagonal block of a row, to be changed.
+    /// Returns the diagonal block of a row for modification.
     pub fn diagonal_mut(&mut self, row: usize) -> &mut Block<T> {
         self.contents = None;
         &mut self.values[self.pattern.diagonal(row)]
     }
 
-    /// A block; zero where the pattern has none.
+    /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> Block<f64> {
         let Some((slot, flipped)) = self.pattern.place(row, column) else { return [[0.0; 3]; 3] };
@@ -54,20 +55,20 @@ impl<T: Precision> BlockMatrix<T> {
         if flipped { transposed(&block) } else { block }
     }
 
-    /// The stored blocks in the order of [`Pattern::place`].
+    /// Returns the stored blocks, by [`Pattern::place`].
     #[must_use]
     pub fn values(&self) -> &[Block<T>] {
         &self.values[..self.pattern.blocks()]
     }
 
-    /// The stored blocks, to be changed.
+    /// Returns the stored blocks for modification, by [`Pattern::place`].
     pub fn values_mut(&mut self) -> &mut [Block<T>] {
         self.contents = None;
         let stored = self.pattern.blocks();
         &mut self.values[..stored]
     }
 
-    /// Returns the identity of the contents and forgets it: the caller is about to change entries.
+    /// Returns the identity of the contents and clears it, because the caller is about to change entries.
     pub(crate) fn take_contents(&mut self) -> Option<Arc<Contents>> {
         self.contents.take()
     }
@@ -77,12 +78,12 @@ impl<T: Precision> BlockMatrix<T> {
         self.contents = contents;
     }
 
-    /// The stored blocks, and the one at [`Pattern::nowhere`].
+    /// Returns the stored blocks and the one at [`Pattern::nowhere`].
     pub(crate) fn values_and_nowhere(&mut self) -> &mut [Block<T>] {
         &mut self.values
     }
 
-    /// Σ_j |a_ij| of every row i, by block rows: bounds on the eigenvalues (Gershgorin).
+    /// Returns Σ_j |a_ij| for each row i, which bounds the eigenvalues (Gershgorin).
     #[must_use]
     pub fn absolute_row_sums(&self) -> Vec<Vector3<f64>> {
         let mut sums = vec![[0.0; 3]; self.pattern.rows()];
@@ -102,12 +103,13 @@ impl<T: Precision> BlockMatrix<T> {
         sums
     }
 
-    /// y ← A x.
+    /// Computes y ← A x.
     pub fn multiply(&self, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
         dispatch(Product { matrix: self, x, y });
     }
 
-    /// A block in double precision, and what follows it, which means nothing: after the last comes the one that belongs nowhere.
+    /// Returns a block in double precision, padded with numbers of the next block, which the caller ignores. The block
+    /// at [`Pattern::nowhere`] keeps the last read within bounds.
     #[inline(always)]
     fn numbers_from(&self, slot: usize) -> [f64; BLOCK_NUMBERS] {
         let stored = &self.values.as_flattened().as_flattened()[9 * slot..][..BLOCK_NUMBERS];
@@ -119,7 +121,7 @@ impl<T: Precision> BlockMatrix<T> {
     }
 }
 
-/// y ← A x.
+/// The kernel y ← A x.
 struct Product<'a, T> {
     matrix: &'a BlockMatrix<T>,
     x: &'a [Vector3<f64>],
@@ -151,7 +153,7 @@ impl<T: Precision> Product<'_, T> {
         }
     }
 
-    /// Each block of the triangle acts twice, also as its own mirror image.
+    /// Each block above the diagonal acts twice: as itself and as its transpose.
     #[inline(always)]
     fn upper<L: Level>(self) {
         self.y.fill([0.0; 3]);

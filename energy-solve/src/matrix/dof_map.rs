@@ -2,19 +2,19 @@ use energy_dsl::Vector3;
 
 use crate::matrix::pattern::index;
 
-/// The place of a vertex that has none.
+/// Marks a pinned vertex in [`DofMap::place`].
 const PINNED: u32 = u32::MAX;
 
-/// Which vertices move, and their places in a vector of free vertices.
+/// Maps vertices to the rows of a vector or matrix over the free vertices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DofMap {
-    /// [`PINNED`] for a pinned one.
+    /// The row of each vertex; [`PINNED`] if it is pinned.
     place: Vec<u32>,
     free: Vec<usize>,
 }
 
 impl DofMap {
-    /// Vertex i is pinned where `pinned[i]`.
+    /// Creates the map; vertex i is pinned if `pinned[i]`.
     #[must_use]
     pub fn new(pinned: &[bool]) -> Self {
         let mut free: Vec<usize> = (0..pinned.len()).filter(|&vertex| !pinned[vertex]).collect();
@@ -26,26 +26,26 @@ impl DofMap {
         Self { place, free }
     }
 
-    /// The place of a vertex among the free ones; `None` when it is pinned.
+    /// Returns the row of a vertex; `None` if it is pinned.
     #[must_use]
     pub fn place(&self, vertex: usize) -> Option<usize> {
         let place = self.place[vertex];
         (place != PINNED).then_some(place as usize)
     }
 
-    /// The free vertices in ascending order.
+    /// Returns the free vertices, ascending.
     #[must_use]
     pub fn free(&self) -> &[usize] {
         &self.free
     }
 
-    /// The number of vertices, pinned ones included.
+    /// Returns the number of vertices, including pinned ones.
     #[must_use]
     pub fn vertex_count(&self) -> usize {
         self.place.len()
     }
 
-    /// The entries of the free vertices.
+    /// Returns the entries of the free vertices.
     #[must_use]
     pub fn gather(&self, all: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         self.free.iter().map(|&vertex| all[vertex]).collect()

@@ -1,4 +1,4 @@
-//! Sparse matrices of 3×3 blocks: their pattern, their numbers, and the rows of free vertices.
+//! Sparse matrices of 3×3 blocks over the free vertices of a mesh.
 
 pub(crate) mod block_matrix;
 pub(crate) mod dof_map;

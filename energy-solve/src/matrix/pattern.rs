@@ -1,13 +1,14 @@
-/// Which blocks of a matrix are stored.
+/// The part of a matrix that is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Storage {
-    /// All of them.
+    /// Every block of the pattern.
     Whole,
-    /// Of a symmetric matrix, those on the diagonal and above.
+    /// The diagonal and the blocks above it, for a symmetric matrix.
     Upper,
 }
 
-/// Which 3×3 blocks of a square sparse matrix exist: by rows, columns ascending, the diagonal always there.
+/// The positions of the non-zero 3×3 blocks of a square matrix, by rows, with ascending columns. The diagonal is always
+/// included.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     storage: Storage,
@@ -17,10 +18,10 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of `rows` block rows in which the rows of each stencil are all coupled.
+    /// Creates a pattern of `rows` block rows that couples all rows of each stencil.
     ///
     /// # Panics
-    /// When a stencil names a row there is not, or there are more than 2³² blocks.
+    /// If a stencil names a row out of range, or there are more than 2³² blocks.
     #[must_use]
     pub fn from_stencils<'a, S>(storage: Storage, rows: usize, stencils: S) -> Self
     where
@@ -31,7 +32,7 @@ impl Pattern {
         Self::from_pairs(storage, rows, stencils.into_iter().flat_map(pairs))
     }
 
-    /// The pattern of `rows` block rows with these blocks, of which those that are not stored are left out.
+    /// Creates a pattern with these (row, column) blocks and the diagonal. Blocks that `storage` excludes are dropped.
     pub(crate) fn from_pairs(storage: Storage, rows: usize, blocks: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
         let (start, mut columns) = sorted_by_row(storage, rows, blocks);
         let (mut row_start, mut diagonal, mut end) = (Vec::with_capacity(rows + 1), Vec::with_capacity(rows), 0);
@@ -41,7 +42,7 @@ impl Pattern {
             columns[named.clone()].sort_unstable();
             for place in named {
                 let column = columns[place];
-                // Each once.
+                // Skip duplicates.
                 if end == row_start[row] as usize || columns[end - 1] != column {
                     if column == index(row) {
                         diagonal.push(index(end));
@@ -57,25 +58,26 @@ impl Pattern {
         Self { storage, row_start, columns, diagonal }
     }
 
-    /// Which blocks are stored.
+    /// Returns which part of the matrix is stored.
     #[must_use]
     pub fn storage(&self) -> Storage {
         self.storage
     }
 
-    /// The number of block rows.
+    /// Returns the number of block rows.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.diagonal.len()
     }
 
-    /// The number of stored blocks.
+    /// Returns the number of stored blocks.
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.columns.len()
     }
 
-    /// Where block (row, column) is stored, and whether as its mirror image; `None` when it is not in the pattern.
+    /// Returns the index of block (row, column) and whether its transpose is stored instead; `None` if it is not in the
+    /// pattern.
     #[must_use]
     pub fn place(&self, row: usize, column: usize) -> Option<(usize, bool)> {
         let flipped = self.storage == Storage::Upper && column < row;
@@ -84,7 +86,7 @@ impl Pattern {
         self.columns[start..end].binary_search(&index(column)).ok().map(|offset| (start + offset, flipped))
     }
 
-    /// Whether eliminating row after row couples rows that are not coupled here. A chain in order does not fill in, a sheet does.
+    /// Whether eliminating the rows in order creates fill-in. Chains in order do not fill in; sheets do.
     #[must_use]
     pub fn fills_in(&self) -> bool {
         let coupled = |i: usize, j: usize| i == j || self.place(i, j).is_some();
@@ -92,43 +94,43 @@ impl Pattern {
         (0..self.rows()).any(|row| later(row).any(|i| later(row).any(|j| i < j && !coupled(i, j))))
     }
 
-    /// The place of blocks that are not part of the matrix, those of pinned vertices: after all others.
+    /// Returns the index, past all blocks, to which blocks of pinned vertices are written.
     #[must_use]
     pub fn nowhere(&self) -> usize {
         self.blocks()
     }
 
-    /// Where the diagonal block of a row is stored.
+    /// Returns the index of a row's diagonal block.
     #[must_use]
     #[inline]
     pub fn diagonal(&self, row: usize) -> usize {
         self.diagonal[row] as usize
     }
 
-    /// Where the diagonal blocks of all rows are stored.
+    /// Returns the indices of all diagonal blocks.
     #[inline(always)]
     pub(crate) fn diagonals(&self) -> &[u32] {
         &self.diagonal
     }
 
-    /// The places of the blocks above the diagonal in a row, for a pattern of upper triangles.
+    /// Returns the indices of a row's blocks above the diagonal, if only the upper triangle is stored.
     #[inline(always)]
     pub(crate) fn above(&self, row: usize) -> std::ops::Range<usize> {
         self.diagonal[row] as usize + 1..self.row_start[row + 1] as usize
     }
 
-    /// Where the blocks of a row begin, or, of the row after the last, where they all end.
+    /// Returns the index of a row's first block; the number of blocks for the row past the end.
     pub(crate) fn first_in(&self, row: usize) -> usize {
         self.row_start[row] as usize
     }
 
-    /// The columns of all blocks, by place.
+    /// Returns the columns of all blocks.
     #[inline(always)]
     pub(crate) fn columns(&self) -> &[u32] {
         &self.columns
     }
 
-    /// The places and columns of a row's blocks.
+    /// Returns the index and column of each block of a row.
     #[inline]
     pub fn row(&self, row: usize) -> impl ExactSizeIterator<Item = (usize, usize)> {
         let (start, end) = (self.row_start[row] as usize, self.row_start[row + 1] as usize);
@@ -137,14 +139,15 @@ impl Pattern {
     }
 }
 
-/// The columns of the blocks that are stored, and those on the diagonal, one row after the other, and where each row begins.
+/// Returns where each row begins, and the columns of the diagonal and of the stored blocks, row after row, with
+/// duplicates.
 fn sorted_by_row(
     storage: Storage,
     rows: usize,
     blocks: impl Iterator<Item = (u32, u32)> + Clone,
 ) -> (Vec<usize>, Vec<u32>) {
     let is_stored = |row: u32, column: u32| column > row || storage == Storage::Whole && column < row;
-    // One on the diagonal of each.
+    // One diagonal block per row.
     let mut start = vec![1; rows + 1];
     start[0] = 0;
     blocks.clone().for_each(|(row, column)| start[row as usize + 1] += usize::from(is_stored(row, column)));
@@ -162,10 +165,10 @@ fn sorted_by_row(
     (start, columns)
 }
 
-/// A number as indices are stored, with 32 bits.
+/// Converts an index to the 32 bits in which it is stored.
 ///
 /// # Panics
-/// When it has more.
+/// If it does not fit.
 #[must_use]
 pub fn index(number: usize) -> u32 {
     u32::try_from(number).expect("fewer than 2³² vertices and blocks")

@@ -1,10 +1,10 @@
 use energy_dsl::{Block, BlockSum, Level, Real};
 
-/// What a matrix is stored in, or a linear system solved in: `f32` or `f64`.
+/// The type in which a matrix is stored or a linear system solved: `f32` or `f64`.
 pub trait Precision: Real + Into<f64> + Send + Sync {
-    /// What sweeps through a matrix stored in it sum up with.
+    /// The accumulator of sweeps through a matrix of this precision.
     type Sum<L: Level>: BlockSum<Self>;
-    /// The blocks of a matrix stored in it, to be added to.
+    /// Wraps mutable blocks of this precision.
     fn blocks(blocks: &mut [Block<Self>]) -> Blocks<'_>;
 }
 
@@ -22,17 +22,17 @@ impl Precision for f64 {
     }
 }
 
-/// Blocks of a matrix of either precision, to which terms add theirs.
+/// Mutable blocks of a matrix in either precision, to which terms add theirs.
 #[derive(Debug)]
 pub enum Blocks<'a> {
-    /// Single precision: half the memory, and what Newton's method needs, whose iterations correct each other.
+    /// Single precision: half the memory, and enough for Newton's method, whose iterations correct each other.
     Single(&'a mut [Block<f32>]),
     /// Double precision.
     Double(&'a mut [Block<f64>]),
 }
 
 impl Blocks<'_> {
-    /// The same blocks, for a while.
+    /// Reborrows the blocks.
     #[must_use]
     pub fn reborrow(&mut self) -> Blocks<'_> {
         match self {
@@ -41,10 +41,10 @@ impl Blocks<'_> {
         }
     }
 
-    /// A ← A + s B at a place.
+    /// A ← A + s B for the block at an index.
     ///
     /// # Panics
-    /// When there is no such place.
+    /// If the index is out of range.
     pub fn add(&mut self, place: usize, s: f64, block: &Block<f64>) {
         match self {
             Self::Single(blocks) => add_scaled(&mut blocks[place], s, block),
@@ -63,7 +63,7 @@ fn add_scaled<T: Precision>(sum: &mut Block<T>, s: f64, block: &Block<f64>) {
     }
 }
 
-/// A block in double precision.
+/// Converts a block to double precision.
 #[inline(always)]
 pub(crate) fn doubled<T: Precision>(block: &Block<T>) -> Block<f64> {
     let mut doubled = [[0.0; 3]; 3];

@@ -1,10 +1,10 @@
-//! Sums over vectors of one 3-vector per vertex.
+//! Vectors with one 3-vector per vertex, and single 3×3 blocks.
 
 use energy_dsl::{Block, Vector3};
 
 use crate::matrix::precision::Precision;
 
-/// Σ aᵢ · bᵢ over all vertices.
+/// Returns Σ aᵢ · bᵢ over all vertices.
 #[must_use]
 pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     a.iter().zip(b).map(|(p, q)| p[0] * q[0] + p[1] * q[1] + p[2] * q[2]).sum()
@@ -28,19 +28,19 @@ pub(crate) fn scale_and_add(y: &mut [Vector3<f64>], s: f64, x: &[Vector3<f64>]) 
     }
 }
 
-/// A vector in a register of four, with a last component that means nothing.
+/// Pads a vector with a zero to fill a SIMD register.
 #[inline(always)]
 pub(crate) fn widened<T: Precision>([u, v, w]: Vector3<f64>) -> [T; 4] {
     [T::from_f64(u), T::from_f64(v), T::from_f64(w), T::from_f64(0.0)]
 }
 
-/// B v.
+/// Returns B v.
 #[inline]
 pub(crate) fn block_times(block: &Block<f64>, v: &Vector3<f64>) -> Vector3<f64> {
     std::array::from_fn(|row| block[row][0] * v[0] + block[row][1] * v[1] + block[row][2] * v[2])
 }
 
-/// Bᵀ.
+/// Returns Bᵀ.
 pub(crate) fn transposed(block: &Block<f64>) -> Block<f64> {
     std::array::from_fn(|row| std::array::from_fn(|column| block[column][row]))
 }

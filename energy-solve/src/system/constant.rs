@@ -12,16 +12,18 @@ use crate::terms::curvature::Curvature;
 use crate::terms::linearisation::Weights;
 use crate::terms::stencils::Stencils;
 
-/// The constant part of a matrix M + α ∂f/∂x + β ∂f/∂v: masses and quadratic terms, evaluated once for all steps of one size.
+/// The constant part of a matrix M + α ∂f/∂x + β ∂f/∂v: masses and quadratic terms, evaluated once for all steps of one
+/// size.
 ///
-/// The matrix itself holds this part. Blocks that other terms also write are copied here and restored before each assembly.
+/// The matrix itself holds this part. Blocks that other terms also write are copied here and restored before each
+/// assembly.
 #[derive(Clone, Debug)]
 pub(super) struct ConstantPart {
-    /// The matrices that hold this part.
+    /// Identifies the matrices that hold this part.
     contents: Weak<Contents>,
     weights: Weights,
     curvature: Curvature,
-    /// The masses of all vertices; empty if the matrix has none.
+    /// The masses of all vertices; empty if the matrix was assembled without masses.
     masses: Vec<f64>,
     /// Whether the Hessian of some element was projected. If not, the part is the same for every [`Curvature`].
     projected: bool,
@@ -70,7 +72,7 @@ impl ConstantPart {
         self.weights == weights && (!self.projected || self.curvature == curvature) && self.masses == masses
     }
 
-    /// Restores the blocks of consecutive rows; `first` is the place of their first block.
+    /// Restores blocks of consecutive rows; `first` is the index of their first block.
     pub(super) fn restore(&self, first: usize, matrix: Blocks<'_>) {
         match (&self.blocks, matrix) {
             (StoredBlocks::Single(blocks), Blocks::Single(matrix)) => restore(&self.runs, blocks, first, matrix),
@@ -87,7 +89,7 @@ fn gathered<T: Copy>(runs: &[Range<u32>], matrix: &[Block<T>]) -> Vec<Block<T>> 
     blocks
 }
 
-/// Writes the runs that lie within `matrix`, whose first block has the place `first`.
+/// Writes the runs that lie within `matrix`, whose first block has the index `first`.
 fn restore<T: Copy>(runs: &[Range<u32>], blocks: &[Block<T>], first: usize, matrix: &mut [Block<T>]) {
     let before = runs.partition_point(|run| (run.start as usize) < first);
     let mut done: usize = runs[..before].iter().map(ExactSizeIterator::len).sum();
@@ -99,7 +101,8 @@ fn restore<T: Copy>(runs: &[Range<u32>], blocks: &[Block<T>], first: usize, matr
     }
 }
 
-/// Returns the places of the blocks that the stencils couple, as runs within rows. `row` maps a vertex to its row, if it has one.
+/// Returns the indices of the blocks that the stencils couple, as runs within rows. `row` maps a vertex to its row, if
+/// it has one.
 pub(super) fn coupled_runs<'a>(
     pattern: &Pattern,
     row: impl Fn(u32) -> Option<usize>,

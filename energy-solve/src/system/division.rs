@@ -1,5 +1,7 @@
-//! Sums of terms, divided among threads: each sums up what concerns its own vertices and rows, in the order of terms and elements. So every entry is
-//! the same sum whatever the number of threads, and none is written by two.
+//! Sums of terms, divided among threads.
+//!
+//! Each thread sums the entries of the vertices and rows assigned to it, in the order of terms and elements. Every
+//! entry is therefore the same sum for any number of threads, and is written by one thread only.
 
 use energy_dsl::{Block, Vector3};
 
@@ -14,16 +16,16 @@ use crate::terms::share::{Divisible, Share};
 use crate::terms::state::State;
 use crate::threads::{for_each, split_mut};
 
-/// Free vertices that are worth a thread of their own.
-const WORTH: usize = 2048;
+/// Free vertices per thread, at least: fewer do not repay the cost of starting a thread.
+const MIN_VERTICES_PER_THREAD: usize = 2048;
 
-/// Of each term that can be divided, and whether its Jacobians are wanted.
+/// One entry per term: its parallel form, if it has one, and whether to assemble its Jacobian.
 type Terms<'a> = [Option<(&'a dyn Divisible, bool)>];
 
-/// As many shares as there are threads, or as are worth it.
+/// Divides vertices and rows into at most `threads` shares.
 pub(crate) fn shares(dofs: &DofMap, pattern: &Pattern, threads: usize) -> Vec<Share> {
     let (rows, vertices) = (dofs.free().len(), dofs.vertex_count());
-    let count = threads.min(rows / WORTH).max(1);
+    let count = threads.min(rows / MIN_VERTICES_PER_THREAD).max(1);
     let first_row = |number: usize| number * rows / count;
     let first_vertex = |number: usize| match number {
         0 => 0,
@@ -39,7 +41,7 @@ pub(crate) fn shares(dofs: &DofMap, pattern: &Pattern, threads: usize) -> Vec<Sh
     (0..count).map(share).collect()
 }
 
-/// The energies of the terms.
+/// Returns the energy of each divisible term.
 pub(crate) fn energies(terms: &Terms<'_>, threads: usize, x: &[Vector3<f64>]) -> Vec<Option<(f64, Tally)>> {
     let numbered = terms.iter().enumerate().filter_map(|(number, term)| term.map(|(term, _)| (number, term)));
     let parts = numbered.flat_map(|(number, term)| (0..term.energy_parts()).map(move |part| (number, term, part)));
@@ -54,7 +56,7 @@ pub(crate) fn energies(terms: &Terms<'_>, threads: usize, x: &[Vector3<f64>]) ->
     sums
 }
 
-/// Adds the forces of the terms.
+/// Adds the forces of the divisible terms.
 pub(crate) fn forces(
     terms: &Terms<'_>,
     shares: &[Share],
@@ -68,7 +70,7 @@ pub(crate) fn forces(
     total(tallies)
 }
 
-/// What terms are added to.
+/// The sums that terms are added to.
 pub(crate) struct Sums<'a, T> {
     pub(crate) weights: Weights,
     pub(crate) curvature: Curvature,
@@ -78,7 +80,7 @@ pub(crate) struct Sums<'a, T> {
 }
 
 impl<T: Precision> Sums<'_, T> {
-    /// As terms see it.
+    /// Returns the sums in the form that terms take.
     pub(crate) fn linearisation(&mut self) -> Linearisation<'_> {
         Linearisation {
             weights: self.weights,
@@ -90,7 +92,7 @@ impl<T: Precision> Sums<'_, T> {
     }
 }
 
-/// Sets the matrix to what is constant of it, or to zero, and adds the forces of the terms, and the Jacobians that are wanted.
+/// Resets the matrix to its constant part, or to zero, and adds the divisible terms' forces and requested Jacobians.
 pub(crate) fn linearisations<T: Precision>(
     terms: &Terms<'_>,
     shares: &[Share],
@@ -126,7 +128,7 @@ pub(crate) fn linearisations<T: Precision>(
     total(tallies)
 }
 
-/// What the shares did together.
+/// Sums the tallies of all shares, term by term.
 fn total(shares: Vec<Vec<Option<Tally>>>) -> Vec<Option<Tally>> {
     let add = |mut sums: Vec<Option<Tally>>, share: Vec<Option<Tally>>| {
         for (sum, tally) in sums.iter_mut().zip(share) {
@@ -136,5 +138,5 @@ fn total(shares: Vec<Vec<Option<Tally>>>) -> Vec<Option<Tally>> {
         }
         sums
     };
-    shares.into_iter().reduce(add).expect("there is a share")
+    shares.into_iter().reduce(add).expect("there is at least one share")
 }

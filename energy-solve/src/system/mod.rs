@@ -1,113 +1,34 @@
+//! Sums of terms over the vertices of a body.
+
 mod constant;
 mod division;
+mod error;
+mod linearise;
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use energy_dsl::{Block, Vector3};
+use energy_dsl::Vector3;
 
-use self::constant::{ConstantPart, coupled_runs};
-use self::division::Sums;
-use crate::matrix::block_matrix::{BlockMatrix, Contents};
+use self::constant::ConstantPart;
+pub use self::error::{EvaluationError, SystemError};
+pub use self::linearise::{LinearisationOptions, LinearisedForces};
+use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Precision;
 use crate::terms::counts::{Counts, Tally};
-use crate::terms::curvature::Curvature;
-use crate::terms::linearisation::{Linearisation, Weights};
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
-use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
-
-/// Terms that do not fit the vertices.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SystemError {
-    /// An element acts on a vertex that does not exist.
-    #[error("{term}: element {element} names vertex {vertex}, but there are only {vertex_count} vertices (0 to {})", .vertex_count.saturating_sub(1))]
-    VertexOutOfRange {
-        /// The term's name.
-        term: String,
-        /// Which element, from 0.
-        element: usize,
-        /// The vertex it names.
-        vertex: usize,
-        /// The number of vertices.
-        vertex_count: usize,
-    },
-}
-
-/// A sum that could not be evaluated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum EvaluationError {
-    /// Positions or velocities for another number of vertices.
-    #[error("the system has {expected} vertices, but {found} {what} were given")]
-    WrongLength {
-        /// Positions or velocities.
-        what: &'static str,
-        /// The number of vertices.
-        expected: usize,
-        /// Vectors given.
-        found: usize,
-    },
-    /// A position or velocity is infinite or NaN.
-    #[error("vertex {vertex} has a non-finite {what}: {value:?}")]
-    NonFiniteState {
-        /// Position or velocity.
-        what: &'static str,
-        /// The vertex.
-        vertex: usize,
-        /// What it holds.
-        value: Vector3<f64>,
-    },
-    /// An element returned an infinite or NaN force or energy.
-    #[error(
-        "{term}: element {element} on vertices {vertices:?} has a non-finite {what} at finite positions and velocities"
-    )]
-    NonFiniteElement {
-        /// The term's name.
-        term: String,
-        /// Which element, from 0.
-        element: usize,
-        /// Its vertices.
-        vertices: Vec<usize>,
-        /// Energy or force.
-        what: Quantity,
-    },
-    /// Every element's energy or force is finite, but their sum is not.
-    #[error("the {what} of all elements together is too large a number")]
-    NonFiniteSum {
-        /// Energy or force.
-        what: Quantity,
-    },
-}
+use crate::terms::term::{Character, PlacedTerm, Quantity, Term};
 
 /// The energy of one term.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TermEnergy<'a> {
-    /// The term's name.
+    /// Name of the term.
     pub term: &'a str,
-    /// Σ U in J; `None` for a force law.
+    /// Σ U, in J; `None` for a force law.
     pub energy: Option<f64>,
-}
-
-/// The vectors that [`System::linearise`] returns, of all vertices.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LinearisedForces {
-    /// f, in N.
-    pub force: Vec<Vector3<f64>>,
-    /// (∂f/∂x) v, in N/s; empty unless it was asked for.
-    pub stiffness_times_velocity: Vec<Vector3<f64>>,
-}
-
-/// What [`System::linearise`] computes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinearisationOptions {
-    /// α and β.
-    pub weights: Weights,
-    /// How to treat negative curvature.
-    pub curvature: Curvature,
-    /// Whether (∂f/∂x) v is wanted.
-    pub stiffness_times_velocity: bool,
 }
 
 /// A sum of terms over the vertices of one body.
@@ -118,15 +39,15 @@ pub struct System {
     terms: Vec<Counted>,
     threads: usize,
     shares: Vec<Share>,
-    /// Where forces were evaluated last, and some energies with them.
+    /// Positions of the last evaluation of forces, with which some terms keep their energies; empty if none is valid.
     evaluated_at: Vec<Vector3<f64>>,
-    /// The blocks that terms write whose Jacobians are not constant; found when first needed.
+    /// The blocks that terms with non-constant Jacobians write; `None` until first needed.
     changing: Option<Arc<[Range<u32>]>>,
     /// The constant parts of the matrices in use.
     constants: Vec<ConstantPart>,
 }
 
-/// A term, and what it did.
+/// A term and its evaluation counts.
 #[derive(Debug)]
 struct Counted {
     term: Box<dyn PlacedTerm>,
@@ -134,10 +55,10 @@ struct Counted {
 }
 
 impl System {
-    /// The sum of the terms; vertex i does not move where `pinned[i]`.
+    /// Creates the sum of the terms; vertex i does not move if `pinned[i]`.
     ///
     /// # Errors
-    /// When an element names a vertex that does not exist.
+    /// If an element names a vertex that does not exist.
     pub fn new(terms: Vec<Box<dyn Term>>, pinned: &[bool]) -> Result<Self, SystemError> {
         for term in &terms {
             check_range(&**term, pinned.len())?;
@@ -169,7 +90,7 @@ impl System {
         Ok(system)
     }
 
-    /// From now on sums are divided among at most so many threads, as far as that is worth it. Results are the same, to the last bit, for any number.
+    /// Sets the largest number of threads. Small systems use fewer. Results are bit-identical for any number.
     pub fn set_threads(&mut self, threads: usize) {
         self.threads = threads.max(1);
         self.shares = division::shares(&self.dofs, &self.pattern, self.threads);
@@ -178,43 +99,44 @@ impl System {
         }
     }
 
-    /// How many threads there may be.
+    /// Returns the largest number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
         self.threads
     }
 
-    /// The terms that threads can divide, each with whether its Jacobians are wanted.
+    /// Returns one entry per term: its parallel form, if it has one, and whether `wanted` selects its Jacobian.
     fn divisible(&self, wanted: impl Fn(&dyn PlacedTerm) -> bool) -> Vec<Option<(&dyn Divisible, bool)>> {
         let terms = self.terms.iter().map(|counted| &*counted.term);
         terms.map(|term| term.divisible().map(|divisible| (divisible, wanted(term)))).collect()
     }
 
-    /// Which vertices move.
+    /// Returns the map between vertices and matrix rows.
     #[must_use]
     pub fn dofs(&self) -> &DofMap {
         &self.dofs
     }
 
-    /// A zero matrix of the free vertices, for [`System::linearise`].
+    /// Creates a zero matrix over the free vertices, for [`System::linearise`].
     #[must_use]
     pub fn matrix(&self) -> BlockMatrix {
         self.matrix_in()
     }
 
-    /// The same, of numbers of some precision. Single precision takes half the memory, and serves where the solution of a linear system is wanted to a few digits.
+    /// Creates a zero matrix in the given precision. Single precision takes half the memory; it suffices if the linear
+    /// system is solved to a few digits only.
     #[must_use]
     pub fn matrix_in<T: Precision>(&self) -> BlockMatrix<T> {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
-    /// Whether a matrix comes from [`System::matrix`] of this system.
+    /// Whether the matrix was created by [`System::matrix`] or [`System::matrix_in`] of this system.
     #[must_use]
     pub fn owns<T: Precision>(&self, matrix: &BlockMatrix<T>) -> bool {
         Arc::ptr_eq(matrix.pattern(), &self.pattern)
     }
 
-    /// What all terms' forces have in common.
+    /// Returns the properties of the summed force.
     #[must_use]
     pub fn character(&self) -> Character {
         let all = || self.terms.iter().map(|counted| counted.term.character());
@@ -226,16 +148,16 @@ impl System {
         }
     }
 
-    /// The terms in order, each with what it evaluated so far.
+    /// Returns the terms in order, each with its evaluation counts so far.
     pub fn terms(&self) -> impl Iterator<Item = (&dyn PlacedTerm, Counts)> {
         self.terms.iter().map(|counted| (&*counted.term, counted.counts))
     }
 
-    /// The energy of each term, of all elements with a free vertex (the energy of the others is constant). What came with forces or Jacobians, if they
-    /// were evaluated last at these very positions, is not evaluated again.
+    /// Returns the energy of each term, summed over the elements with a free vertex; the energy of the others is
+    /// constant. Energies that came with forces or Jacobians at the same positions are reused.
     ///
     /// # Errors
-    /// When positions are missing or not finite, or an energy is not finite.
+    /// If positions are missing or not finite, or an energy is not finite.
     pub fn energies(&mut self, x: &[Vector3<f64>]) -> Result<Vec<TermEnergy<'_>>, EvaluationError> {
         self.check_state("position", x)?;
         let known = self.evaluated_at == x;
@@ -260,10 +182,10 @@ impl System {
         Ok(energies)
     }
 
-    /// Tells every term that a step begins; see [`PlacedTerm::begin_step`].
+    /// Notifies every term of the start of a step; see [`PlacedTerm::begin_step`].
     ///
     /// # Errors
-    /// When the state is incomplete or not finite.
+    /// If the state is incomplete or not finite.
     pub fn begin_step(&mut self, start: StepStart<'_>) -> Result<(), EvaluationError> {
         self.check(start.state)?;
         self.evaluated_at.clear();
@@ -271,11 +193,11 @@ impl System {
         Ok(())
     }
 
-    /// Rayleigh's dissipation function R(x, v), in W: f(x, v) − f(x, 0) = −∂R/∂v. Of drag in proportion to velocity it is half the power
-    /// that is taken out of the motion. Terms without it are not evaluated.
+    /// Returns Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v. For drag proportional to
+    /// velocity, R is half the dissipated power. Terms without dissipation are not evaluated.
     ///
     /// # Errors
-    /// When the state is incomplete or not finite.
+    /// If the state is incomplete or not finite.
     pub fn dissipation(&mut self, state: State<'_>) -> Result<f64, EvaluationError> {
         self.check(state)?;
         let mut sum = 0.0;
@@ -288,10 +210,10 @@ impl System {
         Ok(sum)
     }
 
-    /// f(x, v), in N, of all vertices. Pinned ones get the force of the elements they share with free ones.
+    /// Returns f(x, v) of all vertices, in N. Pinned vertices get the force of the elements they share with free ones.
     ///
     /// # Errors
-    /// When the state is incomplete or not finite, or a force is not finite.
+    /// If the state or a force is incomplete or not finite.
     pub fn forces(&mut self, state: State<'_>) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         self.check(state)?;
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
@@ -304,157 +226,6 @@ impl System {
             return Err(self.find_non_finite_force(state));
         }
         Ok(force)
-    }
-
-    /// Writes α ∂f/∂x + β ∂f/∂v over the free vertices to `matrix` (which must come from [`System::matrix`]) and returns f and
-    /// (∂f/∂x) v of all vertices. With the matrix stays what is constant of it: it is best used again.
-    ///
-    /// # Errors
-    /// When the state is incomplete or not finite, or a force is not finite.
-    ///
-    /// # Panics
-    /// When the matrix comes from elsewhere.
-    pub fn linearise(
-        &mut self,
-        state: State<'_>,
-        options: LinearisationOptions,
-        matrix: &mut BlockMatrix<impl Precision>,
-    ) -> Result<LinearisedForces, EvaluationError> {
-        self.linearise_with_masses(state, options, &[], matrix)
-    }
-
-    /// The same with the mass of each vertex, in kg, on the diagonal: M + α ∂f/∂x + β ∂f/∂v. Masses are constant, and come with the constant Jacobians.
-    ///
-    /// # Errors
-    /// When the state is incomplete or not finite, or a force is not finite.
-    ///
-    /// # Panics
-    /// When the matrix comes from elsewhere, or there are masses, but not of all vertices.
-    pub fn linearise_with_masses<T: Precision>(
-        &mut self,
-        state: State<'_>,
-        options: LinearisationOptions,
-        masses: &[f64],
-        matrix: &mut BlockMatrix<T>,
-    ) -> Result<LinearisedForces, EvaluationError> {
-        self.check(state)?;
-        assert!(masses.is_empty() || masses.len() == self.dofs.vertex_count(), "every vertex has a mass, or none");
-        assert!(self.owns(matrix), "the matrix must come from the same system");
-        let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
-        let LinearisationOptions { weights, curvature, stiffness_times_velocity: wanted } = options;
-        // For the product every term is evaluated anyway.
-        let with_constant = !wanted && self.terms.iter().any(|counted| is_constant(&*counted.term));
-        if !with_constant {
-            self.terms.iter_mut().for_each(|counted| counted.term.place_blocks(&self.dofs, &self.pattern));
-        }
-        let contents = matrix.take_contents();
-        let known = contents.and_then(|contents| Some((self.take_constant(&contents)?, contents)));
-        let constant = with_constant.then(|| match known {
-            Some((known, contents)) if known.matches(weights, curvature, masses) => (known, contents),
-            _ => self.constant(state, (weights, curvature), masses, matrix),
-        });
-        let linear = |term: &dyn PlacedTerm| term.character().curved && !(with_constant && is_constant(term));
-        let mut product = if wanted { force.clone() } else { Vec::new() };
-        let product_wanted = wanted.then_some(&mut product[..]);
-        state.x.clone_into(&mut self.evaluated_at);
-        let values = matrix.values_and_nowhere();
-        let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
-        let part = constant.as_ref().map(|(part, _)| part);
-        let divided = division::linearisations(&self.divisible(linear), &self.shares, state, part, &mut sums);
-        let mut sum = sums.linearisation();
-        for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
-            if linear(&**term) {
-                counts.hessian += divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
-            } else {
-                let tally = divided.unwrap_or_else(|| term.add_force(state, sum.force));
-                counts.reused += if term.character().curved { tally.evaluated } else { 0 };
-                counts.gradient += tally;
-            }
-        }
-        if let Some((part, contents)) = constant {
-            self.constants.push(part);
-            matrix.set_contents(Some(contents));
-        }
-        if force.iter().flatten().any(|component| !component.is_finite()) {
-            return Err(self.find_non_finite_force(state));
-        }
-        if !with_constant {
-            add_masses(&self.dofs, &self.pattern, masses, matrix.values_mut());
-        }
-        Ok(LinearisedForces { force, stiffness_times_velocity: product })
-    }
-
-    /// Removes and returns the constant part of a matrix with these contents.
-    fn take_constant(&mut self, contents: &Arc<Contents>) -> Option<ConstantPart> {
-        let found = self.constants.iter().position(|part| part.is_in(contents))?;
-        Some(self.constants.swap_remove(found))
-    }
-
-    /// Evaluates the masses and the Jacobians of the quadratic terms.
-    fn constant<T: Precision>(
-        &mut self,
-        state: State<'_>,
-        (weights, curvature): (Weights, Curvature),
-        masses: &[f64],
-        matrix: &mut BlockMatrix<T>,
-    ) -> (ConstantPart, Arc<Contents>) {
-        self.constants.retain(ConstantPart::is_in_use);
-        let runs = self.changing_places();
-        // What need not be changed is found by changing it.
-        let mut treated = Curvature::Clamped;
-        let projected = self.evaluate_constant(state, weights, treated, masses, matrix);
-        if projected && curvature != treated {
-            treated = curvature;
-            self.evaluate_constant(state, weights, treated, masses, matrix);
-        }
-        let contents = Arc::new(Contents);
-        let part = (weights, treated);
-        (ConstantPart::new(&contents, part, masses, projected, runs, T::blocks(matrix.values_mut())), contents)
-    }
-
-    /// Writes them to the matrix; returns whether some element's curvature was changed.
-    fn evaluate_constant<T: Precision>(
-        &mut self,
-        state: State<'_>,
-        weights: Weights,
-        curvature: Curvature,
-        masses: &[f64],
-        matrix: &mut BlockMatrix<T>,
-    ) -> bool {
-        let blocks = matrix.values_and_nowhere();
-        blocks.fill([[T::from_f64(0.0); 3]; 3]);
-        add_masses(&self.dofs, &self.pattern, masses, blocks);
-        let mut sum = Linearisation {
-            weights,
-            curvature,
-            matrix: T::blocks(blocks),
-            force: &mut vec![[0.0; 3]; self.dofs.vertex_count()],
-            stiffness_times_velocity: None,
-        };
-        let mut projected = false;
-        for Counted { term, counts } in self.terms.iter_mut().filter(|counted| is_constant(&*counted.term)) {
-            term.place_blocks(&self.dofs, &self.pattern);
-            let tally = term.add_linearisation(state, &mut sum);
-            term.forget_blocks();
-            projected |= tally.projected > 0;
-            counts.hessian += tally;
-        }
-        projected
-    }
-
-    /// The blocks to which terms are added that are not constant.
-    fn changing_places(&mut self) -> Arc<[Range<u32>]> {
-        if let Some(known) = &self.changing {
-            return Arc::clone(known);
-        }
-        let terms = self.terms.iter().map(|counted| &*counted.term);
-        let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
-        let runs = coupled_runs(
-            &self.pattern,
-            |vertex| self.dofs.place(vertex as usize),
-            changing.map(TermDescription::stencils),
-        );
-        Arc::clone(self.changing.insert(runs))
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
@@ -479,24 +250,7 @@ impl System {
     }
 }
 
-/// Adds masses of all vertices, if there are any, to the diagonal.
-fn add_masses<T: Precision>(dofs: &DofMap, pattern: &Pattern, masses: &[f64], blocks: &mut [Block<T>]) {
-    let free = if masses.is_empty() { &[] } else { dofs.free() };
-    for (row, &vertex) in free.iter().enumerate() {
-        let diagonal = &mut blocks[pattern.diagonal(row)];
-        for axis in 0..3 {
-            diagonal[axis][axis] = diagonal[axis][axis] + T::from_f64(masses[vertex]);
-        }
-    }
-}
-
-/// Whether a term's Jacobians are evaluated only once.
-fn is_constant(term: &dyn PlacedTerm) -> bool {
-    let Character { quadratic, curved, .. } = term.character();
-    quadratic && curved
-}
-
-/// Evaluates element by element until one is found whose energy or force is not finite.
+/// Evaluates element by element to find the first with a non-finite energy or force.
 fn blame<'a>(terms: impl Iterator<Item = &'a dyn PlacedTerm>, what: Quantity, state: State<'_>) -> EvaluationError {
     for term in terms {
         if let Some(element) = term.find_non_finite(what, state) {

@@ -6,12 +6,12 @@ use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::index;
 use crate::terms::stencils::Stencils;
 
-/// The elements that are evaluated: those with a free vertex.
+/// The active elements, which are evaluated: those with a free vertex.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Active {
     count: usize,
-    /// Which they are, unless all are.
-    chosen: Option<Vec<u32>>,
+    /// Indices of the active elements; `None` if every element is active.
+    indices: Option<Vec<u32>>,
 }
 
 impl Active {
@@ -19,33 +19,33 @@ impl Active {
         let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
         let active = || (0..stencils.len()).filter(|&element| stencils.stencil(element).any(is_free));
         let count = active().count();
-        let chosen = (count < stencils.len()).then(|| active().map(index).collect());
-        Self { count, chosen }
+        let indices = (count < stencils.len()).then(|| active().map(index).collect());
+        Self { count, indices }
     }
 
-    /// Whether there are no others.
+    /// Whether every element is active.
     pub(crate) fn is_all(&self) -> bool {
-        self.chosen.is_none()
+        self.indices.is_none()
     }
 
-    /// How many there are.
+    /// Returns the number of active elements.
     pub(crate) fn len(&self) -> usize {
         self.count
     }
 
-    /// The index among all elements.
+    /// Returns the index, among all elements, of an active element.
     #[inline(always)]
     pub(crate) fn element(&self, number: usize) -> usize {
-        self.chosen.as_ref().map_or(number, |chosen| chosen[number] as usize)
+        self.indices.as_ref().map_or(number, |indices| indices[number] as usize)
     }
 
-    /// All indices.
+    /// Returns the indices, among all elements, of the active ones.
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
         (0..self.count).map(|number| self.element(number))
     }
 }
 
-/// The vectors of an element's vertices.
+/// Gathers the vectors of an element's vertices.
 #[inline(always)]
 pub(crate) fn points_of<Points: Array<Vector3<f64>>>(stencil: &[u32], all: &[Vector3<f64>]) -> Points {
     Points::from_fn(|point| all[stencil[point] as usize])

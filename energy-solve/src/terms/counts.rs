@@ -1,16 +1,16 @@
 use std::ops::AddAssign;
 
-/// How often one routine ran.
+/// Evaluation counts of one routine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Elements evaluated.
     pub evaluated: u64,
-    /// Elements left out because all their vertices are pinned.
+    /// Elements skipped because all their vertices are pinned.
     pub skipped: u64,
-    /// Elements evaluated at a point where the formula has no single derivative; see [`energy_dsl::Flag`].
+    /// Elements evaluated where the formula has no unique derivative; see [`energy_dsl::Flag`].
     pub flagged: u64,
-    /// Elements whose Hessian had negative eigenvalues that were changed; see [`crate::Curvature`]. For the others a test said that there
-    /// are none.
+    /// Elements whose Hessian had negative eigenvalues that [`Curvature`](crate::Curvature) changed. The other Hessians
+    /// passed a test of semi-definiteness.
     pub projected: u64,
 }
 
@@ -23,14 +23,14 @@ impl AddAssign for Tally {
     }
 }
 
-/// What one term's routines did since the system was made.
+/// Evaluation counts of one term since its system was created.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// The value alone.
+    /// Evaluations of the value alone.
     pub value: Tally,
-    /// Value and gradient, or the force.
+    /// Evaluations of value and gradient, or of the force.
     pub gradient: Tally,
-    /// Everything up to the Hessian, or the force's Jacobians.
+    /// Evaluations of value, gradient and Hessian, or of the force's Jacobians.
     pub hessian: Tally,
     /// Hessians that were not evaluated because they are constant and known.
     pub reused: u64,

@@ -6,36 +6,36 @@ use crate::terms::stencils::Stencils;
 /// Stencils that do not fit their elements.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ListError {
-    /// As many stencils as elements are needed.
-    #[error("{list}: {elements} elements but {stencils} stencils; give every element the vertices it acts on")]
+    /// The numbers of stencils and elements differ.
+    #[error("{list}: expected one stencil per element, got {stencils} stencils for {elements} elements")]
     CountMismatch {
-        /// The list's name.
+        /// Name of the list.
         list: String,
-        /// Elements given.
+        /// Number of elements.
         elements: usize,
-        /// Stencils given.
+        /// Number of stencils.
         stencils: usize,
     },
-    /// The element acts on another number of points.
+    /// The stencils and the element have different numbers of points.
     #[error("{list}: {element} acts on {expected} points, but its stencils have {found} vertices")]
     WrongArity {
-        /// The list's name.
+        /// Name of the list.
         list: String,
-        /// The element's type.
+        /// Type of the element.
         element: &'static str,
         /// Points of the element.
         expected: usize,
-        /// Vertices of the stencils.
+        /// Vertices of a stencil.
         found: usize,
     },
-    /// An element's points are different vertices.
+    /// A stencil names a vertex twice.
     #[error("{list}: element {index} names vertex {vertex} twice")]
     RepeatedVertex {
-        /// The list's name.
+        /// Name of the list.
         list: String,
-        /// Which element, from 0.
+        /// Index of the element.
         index: usize,
-        /// The vertex.
+        /// Index of the vertex.
         vertex: usize,
     },
 }
@@ -50,11 +50,11 @@ pub struct ElementList<E> {
 }
 
 impl<E: Element> ElementList<E> {
-    /// Element i acts on the vertices `stencils[i]`, in the order of its declared points. The name, for people, says what
-    /// the list stands for: "structural springs".
+    /// Creates a list in which element i acts on the vertices `stencils[i]`, in the order of its declared points. The
+    /// name tells people what the list represents: "structural springs".
     ///
     /// # Errors
-    /// When the numbers of elements and stencils, or of points and vertices, differ, or a stencil repeats a vertex.
+    /// If the numbers of elements and stencils, or of points and vertices, differ, or if a stencil repeats a vertex.
     pub fn new<const N: usize>(
         name: impl Into<String>,
         elements: Vec<E>,
@@ -81,13 +81,13 @@ impl<E: Element> ElementList<E> {
         })
     }
 
-    /// The list's name.
+    /// Returns the name of the list.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The elements, in order.
+    /// Returns the elements in order.
     #[must_use]
     pub fn elements(&self) -> &[E] {
         &self.elements
@@ -98,19 +98,19 @@ impl<E: Element> ElementList<E> {
         (self.name, self.vertices)
     }
 
-    /// The stencils of all elements.
+    /// Returns the vertices of all elements.
     #[must_use]
     pub fn stencils(&self) -> Stencils<'_> {
         Stencils::new(self.arity, &self.vertices)
     }
 
-    /// How many points an element has.
+    /// Returns the number of points of an element.
     #[must_use]
     pub fn arity(&self) -> usize {
         self.arity
     }
 
-    /// The vertices of one element.
+    /// Returns the vertices of one element.
     #[must_use]
     pub fn stencil(&self, index: usize) -> &[u32] {
         &self.vertices[index * self.arity..][..self.arity]

@@ -26,7 +26,7 @@ pub struct ForceTerm<E: ForceLaw<f64>> {
 }
 
 impl<E: ForceLaw<f64>> ForceTerm<E> {
-    /// Creates the sum of the forces of a list. Its [`Character`] is what the declaration proves.
+    /// Creates the sum of the forces of a list. The declaration determines its [`Character`].
     #[must_use]
     pub fn new(list: ElementList<E>) -> Self {
         Self { list, energy: None }
@@ -110,8 +110,8 @@ impl<E: ForceLaw<f64>> PlacedForceTerm<E> {
         Some(value(&self.elements()[element], &points_of(self.stencil(element), x)))
     }
 
-    /// Adds an element's blocks to the matrix. If the pattern stores a pair of blocks as one, adds only the block that is
-    /// not transposed.
+    /// Adds an element's blocks to the matrix. If the pattern stores a pair of blocks as one, adds only the block that
+    /// is not transposed.
     fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
         let slots = self.places.of(number..number + 1);
         for (pair, block) in blocks.iter().enumerate() {

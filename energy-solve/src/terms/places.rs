@@ -7,19 +7,19 @@ use crate::matrix::pattern::{Pattern, index};
 use crate::terms::active::Active;
 use crate::terms::stencils::Stencils;
 
-/// Where the blocks of elements go: for each pair of an element's points one place in the matrix, for which block (i, j) may have to be
-/// transposed to block (j, i).
+/// Scatter map from elements to a matrix: the block index of each pair of an element's points. If the pattern stores
+/// only block (j, i) of a pair, the block (i, j) is transposed first.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Places {
     pairs: usize,
-    /// By element, pair.
+    /// Block indices, by element, then pair.
     slots: Vec<u32>,
-    /// By block of elements, pair: bit e is set where the pair of element e is transposed.
+    /// Masks, sorted by pack of elements, then pair: bit e is set if the block of element e must be transposed.
     transposed: Vec<u16>,
 }
 
 impl Places {
-    /// The places of the `active` elements, pairs of points in the order of `pairs`.
+    /// Looks up the blocks of the active elements, for each of the `pairs` of points.
     pub(crate) fn new(
         active: &Active,
         stencils: Stencils<'_>,
@@ -41,18 +41,18 @@ impl Places {
         Self { pairs: pairs.len(), slots, transposed }
     }
 
-    /// Whether there are none.
+    /// Whether the map is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.slots.is_empty()
     }
 
-    /// The places of the pairs of elements, one element after the other.
+    /// Returns the block indices of a range of elements, one element after the other.
     #[inline(always)]
     pub(crate) fn of(&self, elements: Range<usize>) -> &[u32] {
         &self.slots[elements.start * self.pairs..elements.end * self.pairs]
     }
 
-    /// Bit e is set where the pair of element `first` + e is transposed.
+    /// Returns a mask: bit e is set if the pair's block of element `first` + e must be transposed.
     #[inline(always)]
     pub(crate) fn transposed(&self, first: usize, pair: usize) -> u32 {
         u32::from(self.transposed[first / BLOCK * self.pairs + pair] >> (first % BLOCK))

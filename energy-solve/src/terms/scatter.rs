@@ -1,22 +1,22 @@
-//! Results for many elements at once, added to the vectors and blocks of their vertices: always element after element, so that sums do not depend on how
-//! many there are at once.
+//! Adds the results of a batch to the vectors and blocks of its vertices, one element after the other, so that sums do
+//! not depend on the number of lanes.
 
 use energy_dsl::{BLOCK, Batch, Block, Lane, Level, PackedPotential, Vector3, triangle_index};
 
 use crate::matrix::precision::Precision;
 
-/// Room for a vector at each point of a batch's elements: number by number for all elements.
+/// Scratch buffer for one vector per point of a batch's elements; each component is stored for all elements together.
 #[derive(Debug)]
-pub(crate) struct VectorRoom {
+pub(crate) struct VectorBuffer {
     numbers: Vec<[f64; BLOCK]>,
 }
 
-impl VectorRoom {
+impl VectorBuffer {
     pub(crate) fn new(points: usize) -> Self {
         Self { numbers: vec![[0.0; BLOCK]; 3 * points] }
     }
 
-    /// Subtracts vectors of the elements' points from those of the vertices from the first on.
+    /// Subtracts the vectors at the elements' points from `sums`, which holds the vertices from `first_vertex` on.
     #[inline(always)]
     pub(crate) fn subtract<E: PackedPotential<f64>, L: Level>(
         &mut self,
@@ -42,24 +42,24 @@ impl VectorRoom {
     }
 }
 
-/// Room for the triangles of a batch's elements.
+/// Scratch buffer for the triangles of blocks of a batch's elements.
 #[derive(Debug)]
-pub(crate) struct TriangleRoom {
-    /// Blocks of a triangle.
+pub(crate) struct TriangleBuffer {
+    /// Blocks per triangle.
     pairs: usize,
-    /// By element, pair: the first eight entries of a block, which are added together.
+    /// The first eight entries of each block, which are added in one register; sorted by element, then pair.
     eights: Vec<[f64; 8]>,
-    /// By pair, element: the last entry.
+    /// The last entry of each block; sorted by pair, then element.
     ninths: Vec<[f64; BLOCK]>,
 }
 
-impl TriangleRoom {
+impl TriangleBuffer {
     pub(crate) fn new(points: usize) -> Self {
         let pairs = points * (points + 1) / 2;
         Self { pairs, eights: vec![[0.0; 8]; BLOCK * pairs], ninths: vec![[0.0; BLOCK]; pairs] }
     }
 
-    /// Takes in the triangles of all lanes.
+    /// Fills the buffer with the scaled triangles of all lanes.
     #[inline(always)]
     pub(crate) fn fill<L: Level>(&mut self, scale: f64, triangle: &[[Vector3<L::F64>; 3]]) {
         let scale = L::F64::splat(scale);
@@ -74,8 +74,8 @@ impl TriangleRoom {
         }
     }
 
-    /// Adds the blocks of elements to those of the matrix from the first block on. `pairs` is how many blocks an element has, known where this is
-    /// compiled into.
+    /// Adds the blocks to `matrix`, which holds the blocks from `first_block` on. `pairs`, the blocks per element, is a
+    /// constant wherever this is inlined.
     #[inline(always)]
     pub(crate) fn add_to<T: Precision>(
         &self,
@@ -99,7 +99,7 @@ impl TriangleRoom {
         }
     }
 
-    /// Adds the blocks below the diagonal, where other terms make the matrix one that is not symmetric.
+    /// Adds the blocks below the diagonal. Out of line: only matrices that other terms make non-symmetric store them.
     #[inline(never)]
     fn add_mirrored<T: Precision>(&self, slots: &[u32], first_block: usize, matrix: &mut [Block<T>]) {
         let n = points_of_triangle(self.pairs);
@@ -129,7 +129,7 @@ fn add_block<T: Precision>(sum: &mut Block<T>, eight: &[f64; 8], ninth: f64) {
     sum[8] = sum[8] + T::from_f64(ninth);
 }
 
-/// n, of n (n + 1)/2 blocks.
+/// Returns n for a triangle of n (n + 1)/2 blocks.
 pub(crate) fn points_of_triangle(blocks: usize) -> usize {
-    (1..).find(|n| n * (n + 1) / 2 >= blocks).expect("there is such a number")
+    (1..).find(|n| n * (n + 1) / 2 >= blocks).expect("some triangle is large enough")
 }

@@ -11,9 +11,9 @@ use crate::terms::state::State;
 pub struct Share {
     /// Index among all shares.
     pub number: usize,
-    /// The vertices.
+    /// Range of vertices.
     pub vertices: Range<usize>,
-    /// The blocks, by [`Pattern::place`](crate::Pattern::place).
+    /// Range of blocks, by [`Pattern::place`](crate::Pattern::place).
     pub blocks: Range<usize>,
 }
 

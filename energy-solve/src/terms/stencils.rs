@@ -1,6 +1,6 @@
 use energy_dsl::BLOCK;
 
-/// The vertices of a term's elements, `arity` to an element.
+/// The vertices of a term's elements, `arity` per element.
 ///
 /// ```
 /// use energy_solve::Stencils;
@@ -22,44 +22,44 @@ pub struct Stencils<'a> {
 enum Layout {
     /// One stencil after the other.
     ByElement,
-    /// Blocks of as many stencils as are packed together, by point.
+    /// Sorted by pack of elements, then point, then element.
     InLanes,
 }
 
 impl<'a> Stencils<'a> {
-    /// All stencils one after the other.
+    /// Wraps vertices that are stored one stencil after the other.
     ///
     /// # Panics
-    /// When `arity` is zero.
+    /// If `arity` is zero.
     #[must_use]
     pub fn new(arity: usize, vertices: &'a [u32]) -> Self {
         Self { count: vertices.len() / arity, arity, vertices, layout: Layout::ByElement }
     }
 
-    /// As [`Packed`](energy_dsl::Packed) holds them.
+    /// Wraps vertices in the layout of [`Packed`](energy_dsl::Packed).
     pub(crate) fn in_lanes(count: usize, arity: usize, vertices: &'a [u32]) -> Self {
         Self { count, arity, vertices, layout: Layout::InLanes }
     }
 
-    /// Points of an element.
+    /// Returns the number of points of an element.
     #[must_use]
     pub fn arity(&self) -> usize {
         self.arity
     }
 
-    /// The number of elements.
+    /// Returns the number of elements.
     #[must_use]
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there are none.
+    /// Whether the list is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// The vertex that is one of the points of an element.
+    /// Returns the vertex at a point of an element.
     #[inline(always)]
     #[must_use]
     pub fn vertex(&self, element: usize, point: usize) -> u32 {
@@ -69,12 +69,12 @@ impl<'a> Stencils<'a> {
         }]
     }
 
-    /// The vertices of one element.
+    /// Returns the vertices of one element.
     pub fn stencil(self, element: usize) -> impl ExactSizeIterator<Item = u32> + Clone + use<'a> {
         (0..self.arity).map(move |point| self.vertex(element, point))
     }
 
-    /// The stencils one by one.
+    /// Returns the stencil of each element.
     pub fn iter(self) -> impl ExactSizeIterator<Item = impl ExactSizeIterator<Item = u32> + Clone + use<'a>> + use<'a> {
         (0..self.count).map(move |element| self.stencil(element))
     }
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn both_layouts_hold_the_same() {
-        // 18 triangles: a full block and two more.
+        // 18 triangles: one full pack and two more.
         let vertex = |element: usize, point: usize| (3 * element + point) as u32;
         let by_element: Vec<u32> = (0..54).collect();
         let mut in_lanes = vec![u32::MAX; 2 * 3 * BLOCK];

@@ -24,9 +24,9 @@ pub struct Character {
 /// A quantity that may turn out to be infinite or NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
-    /// U.
+    /// The energy U.
     Energy,
-    /// f.
+    /// The force f.
     Force,
 }
 
@@ -55,8 +55,8 @@ pub trait TermDescription: std::fmt::Debug {
 ///
 /// A term cannot be evaluated until [`Term::place`] turns it into a [`PlacedTerm`].
 pub trait Term: TermDescription {
-    /// Returns the term bound to a system: it evaluates the elements with a free vertex, and knows where their blocks are
-    /// stored.
+    /// Returns the term bound to a system: it evaluates the elements with a free vertex, and knows where their blocks
+    /// are stored.
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm>;
 }
 

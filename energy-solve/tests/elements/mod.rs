@@ -1,4 +1,4 @@
-//! Two elements written by hand, so that assembly and solvers are tested apart from generated code.
+//! Two elements written by hand, to test assembly and solvers independently of generated code.
 
 use energy_dsl::{
     Block, Declaration, Element, Field, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian, Inputs, Kind,
@@ -47,7 +47,8 @@ fn delta(row: usize, column: usize) -> f64 {
     f64::from(row == column)
 }
 
-/// U = ½ k (‖p − q‖ − L)², without precautions: coincident ends divide by zero. `SLACK` ones are declared quadratic, and must have L = 0.
+/// U = ½ k (‖p − q‖ − L)² without guards: coincident ends divide by zero. `SLACK` springs are declared quadratic and
+/// must have L = 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AnySpring<T, const SLACK: bool> {
     pub(crate) stiffness: T,
@@ -57,7 +58,7 @@ pub(crate) struct AnySpring<T, const SLACK: bool> {
 pub(crate) type Spring<T = f64> = AnySpring<T, false>;
 
 impl<T: Real, const SLACK: bool> AnySpring<T, SLACK> {
-    /// d, ‖d‖ and the stretch.
+    /// Returns d, ‖d‖ and the elongation.
     fn state(&self, [p, q]: &[Vector3<T>; 2]) -> (Vector3<T>, T, T) {
         let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
         let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
@@ -139,7 +140,8 @@ impl<const SLACK: bool> PackedPotential<f64> for AnySpring<f64, SLACK> {
     }
 }
 
-/// f on p: −c ‖d‖² w − d (e·w), with d = p − q, w the difference of velocities and a fixed e: neither Jacobian is symmetric.
+/// f on p: −c ‖d‖² w − d (e·w), with d = p − q, the velocity difference w, and a fixed e. Neither Jacobian is
+/// symmetric.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Damper {
     pub(crate) c: f64,

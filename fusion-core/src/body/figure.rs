@@ -1,4 +1,4 @@
-//! A figure of tubes and a motion for it, so that everything can be tried without files.
+//! A built-in figure of tubes with a motion, for trying everything without files.
 
 use std::f64::consts::TAU;
 
@@ -11,11 +11,11 @@ use super::skinned::{Bone, SkinnedBody};
 struct Limb {
     /// Joints from the root of the chain to its end.
     joints: &'static [[f64; 3]],
-    /// The bones between them.
+    /// Indices of the bones between the joints.
     bones: &'static [usize],
-    /// Half axes of the tube's section at each joint, sideways and forwards.
+    /// Semi-axes of the tube's cross-section at each joint, sideways and forwards.
     radii: &'static [[f64; 2]],
-    /// Vertices around.
+    /// Vertices around the tube.
     around: usize,
 }
 
@@ -83,7 +83,7 @@ const LIMBS: [Limb; 5] = [
     },
 ];
 
-/// A standing figure with its arms stretched out: 1.7 m tall, 16 bones, five closed tubes of some 2800 vertices.
+/// Creates a standing figure with outstretched arms: 1.7 m tall, 16 bones, five closed tubes with about 2800 vertices.
 ///
 /// # Panics
 /// Never: the figure is fixed.
@@ -98,7 +98,7 @@ pub fn figure() -> SkinnedBody {
 }
 
 impl Limb {
-    /// Rings along the chain, closed by a point at each end.
+    /// Builds rings along the chain, closed by a point at each end.
     fn build(
         &self,
         vertices: &mut Vec<Vector3<f64>>,
@@ -145,7 +145,8 @@ impl Limb {
         }
     }
 
-    /// Centre, half axes and bones at a distance along the chain. Near a joint two bones share.
+    /// Returns centre, semi-axes and bone weights at a distance along the chain. Two bones share the weight near a
+    /// joint.
     fn section(&self, joints: &[Vector3<f64>], at: f64) -> (Vector3<f64>, [f64; 2], Vec<(usize, f64)>) {
         const SHARED: f64 = 0.06;
         let (mut start, mut segment) = (0.0, 0);
@@ -173,7 +174,8 @@ impl Limb {
     }
 }
 
-/// The motions of the figure's bones at a time in s: it sways, lowers and waves its arms, bends its knees, every four seconds alike.
+/// Returns the motions of the figure's bones at a time in s: it sways, lowers and waves its arms, and bends its knees,
+/// with a period of four seconds.
 #[must_use]
 pub fn figure_motion(time: f64) -> Vec<Isometry3<f64>> {
     let swing = |period: f64, phase: f64| (TAU * (time / period + phase)).sin();

@@ -5,40 +5,41 @@ use nalgebra::{Matrix4, Point3, Vector3};
 use super::mesh::Mesh;
 use super::skinned::{BodyError, Bone, SkinnedBody};
 
-/// A glTF file that holds no skinned body.
+/// A glTF file without a usable skinned body.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfError {
     /// The file cannot be read or is malformed.
     #[error("{}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the parser.
         source: Box<gltf::Error>,
     },
-    /// Something needed is missing.
+    /// A required part is missing.
     #[error("{}: {what}", .path.display())]
     Missing {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What, and what would fix it.
+        /// The missing part, and a remedy.
         what: &'static str,
     },
     /// The parts do not fit.
     #[error("{}", .path.display())]
     Body {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Description of the error.
         source: BodyError,
     },
 }
 
-/// Reads the first skinned mesh of a binary glTF file (`.glb`): positions, triangles, joints and weights. The joints' places at rest come
-/// from the inverse bind matrices; a bone's tail is the mean of its children's heads, or its own head if it has none.
+/// Reads the first skinned mesh of a binary glTF file (`.glb`): positions, triangles, joints and weights. The inverse
+/// bind matrices give the joints' positions at rest. A bone's tail is the mean of its children's heads, or its own head
+/// without children.
 ///
 /// # Errors
-/// When the file is malformed or has no skinned mesh with embedded data.
+/// If the file is malformed or has no skinned mesh with embedded data.
 pub fn read_gltf(path: &Path) -> Result<SkinnedBody, GltfError> {
     let unreadable = |source| GltfError::Unreadable { path: path.to_owned(), source: Box::new(source) };
     let missing = |what| GltfError::Missing { path: path.to_owned(), what };
@@ -79,7 +80,7 @@ pub fn read_gltf(path: &Path) -> Result<SkinnedBody, GltfError> {
         .map_err(|source| GltfError::Body { path: path.to_owned(), source })
 }
 
-/// Bones, parents first, and for each joint of the skin which bone it is.
+/// Returns the bones, parents first, and the bone of each joint of the skin.
 fn bones<'a>(
     skin: &gltf::Skin<'_>,
     data: impl Clone + Fn(gltf::Buffer<'_>) -> Option<&'a [u8]>,

@@ -15,51 +15,51 @@ pub enum MakeHumanError {
     /// A file cannot be read.
     #[error("cannot read {}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The mesh is malformed.
     #[error("{}: not a Wavefront OBJ: {message}", .path.display())]
     Mesh {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser found.
+        /// Error of the parser.
         message: String,
     },
     /// The rig or the weights are malformed.
     #[error("{}", .path.display())]
     Json {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser found, and where.
+        /// Error of the parser, with its position.
         source: serde_json::Error,
     },
-    /// The mesh lacks a group that is needed.
+    /// The mesh lacks a required group.
     #[error("{}: the mesh has no group `{group}`, which {needed_by} needs", .path.display())]
     MissingGroup {
-        /// The mesh.
+        /// Path of the mesh.
         path: PathBuf,
-        /// The group.
+        /// Name of the group.
         group: String,
-        /// What for.
+        /// Name of what needs the group.
         needed_by: String,
     },
-    /// A file names something that is not there.
+    /// A file names something that does not exist.
     #[error("{}: {message}", .path.display())]
     Unknown {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What, and where.
+        /// Description of the error.
         message: String,
     },
     /// The parts do not fit.
     #[error("{}", .path.display())]
     Body {
-        /// The mesh.
+        /// Path of the mesh.
         path: PathBuf,
-        /// Why.
+        /// Description of the error.
         source: BodyError,
     },
 }
@@ -74,11 +74,11 @@ struct RigBone {
 #[derive(Deserialize)]
 #[serde(tag = "strategy", rename_all = "UPPERCASE")]
 enum Place {
-    /// The centre of a small cube that is part of the mesh.
+    /// The centre of a small cube in the mesh.
     Cube { cube_name: String },
-    /// The mean of vertices.
+    /// The mean of some vertices.
     Mean { vertex_indices: Vec<usize> },
-    /// A vertex.
+    /// The position of a vertex.
     Vertex { vertex_index: usize },
 }
 
@@ -94,14 +94,15 @@ struct Groups {
     polygons: BTreeMap<String, Vec<Vec<usize>>>,
 }
 
-/// Decimetres, the unit of the mesh, to metres.
+/// Metres per decimetre, the unit of the mesh.
 const METRES: f64 = 0.1;
 
-/// Reads a body as MakeHuman stores it: an OBJ in decimetres whose group `body` is the skin and whose groups `joint-…` are small cubes
-/// that mark joints, a rig that says which joints each bone joins, and skinning weights by bone and vertex of the OBJ.
+/// Reads a body in MakeHuman's format: an OBJ mesh in decimetres, a rig, and skinning weights by bone and vertex. The
+/// group `body` is the skin, and the groups `joint-…` are small cubes at the joints; the rig says which joints each
+/// bone connects.
 ///
 /// # Errors
-/// When a file is malformed, or names a joint, bone or vertex that is not there.
+/// If a file is malformed, or names a joint, bone or vertex that does not exist.
 pub fn read_makehuman(mesh: &Path, rig: &Path, weights: &Path) -> Result<SkinnedBody, MakeHumanError> {
     let groups = Groups::read(mesh)?;
     let bones = read_bones(rig, &groups)?;
@@ -159,7 +160,7 @@ impl Groups {
         places.filter(|p| !p.is_empty()).map(|p| p.iter().copied().sum::<Vector3<f64>>() / p.len() as f64)
     }
 
-    /// The skin: group `body`, quadrilaterals cut in two, with those vertices only that it uses.
+    /// Returns the skin: the vertices of the group `body`, with quadrilaterals split in two.
     fn skin(&self, bones: Vec<Bone>, weights: &[Vec<(usize, f64)>]) -> Result<SkinnedBody, MakeHumanError> {
         let mut place = vec![None; self.positions.len()];
         let (mut vertices, mut rows, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
@@ -181,7 +182,7 @@ impl Groups {
     }
 }
 
-/// The bones, parents first.
+/// Returns the bones, parents first.
 fn read_bones(path: &Path, groups: &Groups) -> Result<Vec<Bone>, MakeHumanError> {
     let rig: BTreeMap<String, RigBone> = read_json(path)?;
     let unknown = |message| MakeHumanError::Unknown { path: path.to_owned(), message };
@@ -211,7 +212,7 @@ fn read_bones(path: &Path, groups: &Groups) -> Result<Vec<Bone>, MakeHumanError>
         if bones.len() == before {
             let lost = rig.keys().find(|name| bones.iter().all(|bone| bone.name != **name)).expect("one is missing");
             return Err(unknown(format!(
-                "bone `{lost}`: its parent `{}` is missing, or hangs on it",
+                "bone `{lost}`: its parent `{}` is missing or one of its descendants",
                 rig[lost].parent
             )));
         }

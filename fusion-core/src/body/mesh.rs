@@ -2,33 +2,33 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 
-/// Triangles over vertices, with unit normals at the vertices.
+/// Triangles with unit normals at the vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Positions, m.
+    /// Positions, in m.
     pub vertices: Vec<Vector3<f64>>,
-    /// Unit normals; zero at a vertex of no triangle.
+    /// Unit normals; zero at a vertex without triangles.
     pub normals: Vec<Vector3<f64>>,
-    /// Vertices of each triangle, anticlockwise seen from outside.
+    /// Vertices of each triangle, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    /// The mesh with the normals that its triangles have.
+    /// Creates a mesh and computes its normals.
     #[must_use]
     pub fn new(vertices: Vec<Vector3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
         let normals = vertex_normals(&vertices, &triangles);
         Self { vertices, normals, triangles }
     }
 
-    /// The mean of the vertices; the origin if there are none.
+    /// Returns the mean of the vertices; the origin without vertices.
     #[must_use]
     pub fn centroid(&self) -> Vector3<f64> {
         self.vertices.iter().sum::<Vector3<f64>>() / self.vertices.len().max(1) as f64
     }
 }
 
-/// Mean normals of the triangles at each vertex, weighted by area.
+/// Returns the area-weighted mean normal of the triangles at each vertex.
 #[must_use]
 pub fn vertex_normals(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<f64>> {
     let mut normals = vec![Vector3::zeros(); vertices.len()];
@@ -42,7 +42,7 @@ pub fn vertex_normals(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<
     normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_default()).collect()
 }
 
-/// A mesh as Wavefront OBJ, micrometres kept.
+/// Formats a mesh as Wavefront OBJ, with micrometre precision.
 #[must_use]
 pub fn obj_text(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> String {
     let mut text = String::new();

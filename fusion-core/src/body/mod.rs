@@ -1,4 +1,4 @@
-//! Skinned bodies: a mesh at rest, bones, and how much each vertex follows each bone.
+//! Skinned bodies: a mesh at rest, bones, and skinning weights.
 
 mod figure;
 mod gltf_file;

@@ -6,76 +6,76 @@ use super::mesh::Mesh;
 /// A bone at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bone {
-    /// Its name.
+    /// Name of the bone.
     pub name: String,
-    /// The bone it hangs on; none for a root. Parents come before their children.
+    /// Index of the parent; `None` for a root. Parents come before their children.
     pub parent: Option<usize>,
-    /// The joint it turns about, m.
+    /// Position of the joint that it rotates about, in m.
     pub head: [f64; 3],
-    /// Its other end, m.
+    /// Position of the other end, in m.
     pub tail: [f64; 3],
 }
 
 /// A body that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BodyError {
-    /// Nothing to track.
-    #[error("the body has no vertices, or no triangles")]
+    /// The mesh is empty.
+    #[error("the body has no vertices or no triangles")]
     Empty,
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names vertex {vertex} of {vertices}")]
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertex {vertex}, but there are only {vertices} vertices")]
     TriangleOutOfRange {
-        /// The triangle.
+        /// Index of the triangle.
         triangle: usize,
-        /// What it names.
+        /// Index of the missing vertex.
         vertex: usize,
-        /// Vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
-    /// A number that is none.
+    /// A position is infinite or NaN.
     #[error("vertex {vertex} is not finite")]
     NonFinite {
-        /// The vertex.
+        /// Index of the vertex.
         vertex: usize,
     },
-    /// Weights for another number of vertices.
-    #[error("{found} rows of skinning weights for {vertices} vertices")]
+    /// The numbers of weight rows and vertices differ.
+    #[error("expected one row of skinning weights per vertex, got {found} rows for {vertices} vertices")]
     WeightCount {
-        /// Rows.
+        /// Number of rows.
         found: usize,
-        /// Vertices.
+        /// Number of vertices.
         vertices: usize,
     },
-    /// A weight for a bone that is not there, negative, or not a number; or a vertex that follows no bone.
-    #[error("vertex {vertex}: its skinning weights must be positive, of existing bones, and at least one")]
+    /// A weight is negative or not finite, or names a bone that does not exist; or a vertex has no bone.
+    #[error("vertex {vertex}: expected at least one positive skinning weight, and only weights of existing bones")]
     BadWeights {
-        /// The vertex.
+        /// Index of the vertex.
         vertex: usize,
     },
-    /// A parent must come before its child.
+    /// A child comes before its parent.
     #[error("bone `{bone}` comes before its parent")]
     Order {
-        /// The child.
+        /// Name of the child.
         bone: String,
     },
 }
 
-/// A mesh that bones move by linear blend skinning.
+/// A mesh that moves with bones by linear blend skinning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkinnedBody {
     /// The mesh at rest.
     pub mesh: Mesh,
-    /// Its bones.
+    /// The bones at rest.
     pub bones: Vec<Bone>,
-    /// For each vertex the bones it follows and how much; each row sums to one.
+    /// Bones and weights of each vertex; each row sums to 1.
     pub weights: Vec<Vec<(usize, f64)>>,
 }
 
 impl SkinnedBody {
-    /// Checks all parts, and brings each vertex's weights to a sum of one.
+    /// Checks all parts, and normalises each vertex's weights to a sum of 1.
     ///
     /// # Errors
-    /// When the parts do not fit.
+    /// If the parts do not fit.
     pub fn new(mesh: Mesh, bones: Vec<Bone>, mut weights: Vec<Vec<(usize, f64)>>) -> Result<Self, BodyError> {
         let vertices = mesh.vertices.len();
         if vertices == 0 || mesh.triangles.is_empty() {
@@ -106,10 +106,10 @@ impl SkinnedBody {
         Ok(Self { mesh, bones, weights })
     }
 
-    /// Vertices and normals (of length one) where motions of the bones, from rest, take them: Σ η_j T_j v.
+    /// Returns the mesh moved by the bones' motions from rest, Σ η_j T_j v, with unit normals.
     ///
     /// # Panics
-    /// When there are not as many motions as bones.
+    /// If the numbers of motions and bones differ.
     #[must_use]
     pub fn posed(&self, motions: &[Isometry3<f64>]) -> Mesh {
         assert_eq!(motions.len(), self.bones.len(), "a motion for every bone");
@@ -127,7 +127,7 @@ impl SkinnedBody {
         Mesh { vertices, normals, triangles: self.mesh.triangles.clone() }
     }
 
-    /// The body as motions of its bones leave it, as a new rest shape.
+    /// Returns the body moved by the bones, as a new rest shape.
     #[must_use]
     pub fn at_rest_in(&self, motions: &[Isometry3<f64>]) -> Self {
         let moved = |bone: usize, point: [f64; 3]| motions[bone].transform_point(&point.into()).coords.into();
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_do_not_fit_are_refused() {
+    fn parts_that_do_not_fit_are_rejected() {
         let good = vec![vec![(0, 1.0)]; 3];
         let refuse = |mesh, bones, weights| SkinnedBody::new(mesh, bones, weights).unwrap_err();
         assert_eq!(refuse(Mesh::default(), vec![], vec![]), BodyError::Empty);

@@ -7,39 +7,39 @@ use serde::{Deserialize, Serialize};
 use super::mesh::Mesh;
 use super::skinned::{BodyError, Bone, SkinnedBody};
 
-/// A body's or a mesh's file that cannot be used.
+/// A file of a body or mesh that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum BodyFileError {
     /// The file cannot be read or written.
     #[error("{}", .path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is malformed.
     #[error("{}", .path.display())]
     Json {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser found, and where.
+        /// Error of the parser, with its position.
         source: serde_json::Error,
     },
     /// The mesh is malformed.
     #[error("{}: not a Wavefront OBJ: {message}", .path.display())]
     Obj {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser found.
+        /// Error of the parser.
         message: String,
     },
     /// The parts do not fit.
     #[error("{}", .path.display())]
     Body {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Description of the error.
         source: BodyError,
     },
 }
@@ -52,17 +52,17 @@ struct Stored {
     weights: Vec<Vec<(usize, f64)>>,
 }
 
-/// Reads a skinned body as [`write_body`] writes it: JSON with vertices, triangles, bones and weights.
+/// Reads a skinned body in the format of [`write_body`]: JSON with vertices, triangles, bones and weights.
 ///
 /// # Errors
-/// When the file is malformed or its parts do not fit.
+/// If the file is malformed or its parts do not fit.
 pub fn read_body(path: &Path) -> Result<SkinnedBody, BodyFileError> {
     let text = std::fs::read_to_string(path).map_err(|source| BodyFileError::File { path: path.into(), source })?;
     let stored: Stored =
         serde_json::from_str(&text).map_err(|source| BodyFileError::Json { path: path.into(), source })?;
     let vertices: Vec<Vector3<f64>> = stored.vertices.into_iter().map(Vector3::from).collect();
     let in_range = stored.triangles.iter().flatten().all(|&vertex| (vertex as usize) < vertices.len());
-    // Normals of a mesh that will be refused need not be found.
+    // A mesh with invalid triangles is rejected below and needs no normals.
     let mesh = if in_range {
         Mesh::new(vertices, stored.triangles)
     } else {
@@ -72,10 +72,10 @@ pub fn read_body(path: &Path) -> Result<SkinnedBody, BodyFileError> {
         .map_err(|source| BodyFileError::Body { path: path.into(), source })
 }
 
-/// Writes a skinned body, whole or not at all.
+/// Writes a skinned body completely or not at all.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If the file cannot be written.
 pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> {
     let stored = Stored {
         vertices: body.mesh.vertices.iter().map(|&vertex| vertex.into()).collect(),
@@ -84,13 +84,13 @@ pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> 
         weights: body.weights.clone(),
     };
     let text = serde_json::to_vec(&stored).map_err(|source| BodyFileError::Json { path: path.into(), source })?;
-    verify::write_whole(path, &text).map_err(|source| BodyFileError::File { path: path.into(), source })
+    energy_cli::write_whole(path, &text).map_err(|source| BodyFileError::File { path: path.into(), source })
 }
 
-/// The vertices of an OBJ file.
+/// Reads the vertices of an OBJ file.
 ///
 /// # Errors
-/// When the file cannot be read or is malformed.
+/// If the file cannot be read or is malformed.
 pub fn read_vertices(path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
     let file = std::fs::File::open(path).map_err(|source| BodyFileError::File { path: path.into(), source })?;
     let raw = obj::raw::parse_obj(BufReader::new(file))

@@ -3,25 +3,25 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use fusion_core::skeleton::BoneNoise;
-use verify::audit::{Options, audit_catalogue, describe_failure};
 
 use super::evaluate::{Evaluate, summary};
 use super::print;
 use super::render::Render;
 use super::track::Track;
 
-/// The demonstration.
+/// Options of `fusion demo`.
 #[derive(Debug, Args)]
 pub struct Demo {
-    /// Where the files go; those of an earlier demo are replaced.
+    /// Output folder; replaces the files of an earlier demonstration.
     #[arg(short, long, default_value = "out/fusion")]
     output: PathBuf,
-    /// Thirtieths of a second to track.
+    /// Frames to track, at 30 Hz.
     #[arg(long, default_value_t = 60)]
     frames: usize,
 }
 
-/// The declared residuals that the demonstration's energy is made of.
+/// The declared residuals of the demonstration's energy.
+#[cfg(feature = "audit")]
 const TERMS: [&str; 6] = ["NonrigidPlane4", "GraphEdge", "Binding", "BoneBinding", "SkeletonPlane", "BlendedPoint4"];
 
 impl Demo {
@@ -55,8 +55,11 @@ impl Demo {
     }
 }
 
-/// Every term is compared with dual numbers and finite differences before it is used.
+/// Compares the derivatives of every term with dual numbers and finite differences.
+#[cfg(feature = "audit")]
 fn audit() -> Result<()> {
+    use verify::audit::{Options, audit_catalogue, describe_failure};
+
     let options = Options { samples: 50, ..Options::default() };
     let report = audit_catalogue(&TERMS, options).map_err(anyhow::Error::msg)?;
     if !report.passed() {
@@ -64,4 +67,9 @@ fn audit() -> Result<()> {
         bail!("the audit failed; nothing was tracked\n{}", failures.join("\n"));
     }
     print(&format!("audit of {} terms on {} random inputs each: passed\n\n", TERMS.len(), options.samples))
+}
+
+#[cfg(not(feature = "audit"))]
+fn audit() -> Result<()> {
+    print("audit skipped: built without the feature `audit`\n\n")
 }

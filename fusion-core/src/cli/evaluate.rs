@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
+use energy_cli::write_file;
 use fusion_core::body::{Mesh, read_body, read_vertices};
 use fusion_core::depth::{DepthSequence, visible_vertices};
 use fusion_core::evaluation::{ErrorSummary, FrameErrors, TrackErrors};
@@ -10,15 +11,15 @@ use fusion_core::plot::errors_svg;
 use fusion_core::skeleton::Skeleton;
 use serde::Serialize;
 
-use super::folder::{MODEL, SKELETON, mesh_file, write};
+use super::folder::{MODEL, SKELETON, mesh_file};
 use super::print;
 
-/// What to measure.
+/// Options of `fusion evaluate`.
 #[derive(Debug, Args)]
 pub struct Evaluate {
-    /// A rendered recording.
+    /// Folder of a rendered recording.
     recording: PathBuf,
-    /// Its track.
+    /// Folder of its track.
     track: PathBuf,
 }
 
@@ -34,9 +35,9 @@ struct Line {
 
 /// The errors of a track, and of the skeleton alone.
 pub struct Evaluated {
-    /// The track's.
+    /// Errors of the track.
     pub track: TrackErrors,
-    /// The skinned skeleton's.
+    /// Errors of the skinned skeleton.
     pub skeleton: TrackErrors,
 }
 
@@ -48,15 +49,15 @@ impl Evaluate {
     pub fn run(&self) -> Result<Evaluated> {
         let evaluated = self.measure()?;
         let (table, plot) = (self.track.join("errors.csv"), self.track.join("errors.svg"));
-        write(&table, &csv(&evaluated.track)?)?;
+        write_file(&table, &csv(&evaluated.track)?)?;
         let picture = errors_svg(&evaluated.track).map_err(anyhow::Error::msg)?;
-        write(&plot, picture.as_bytes())?;
+        write_file(&plot, picture.as_bytes())?;
         let rows = [("tracked", &evaluated.track), ("skeleton alone", &evaluated.skeleton)];
         print(&format!("{}\nwrote {} and {}\n", summary(&rows), table.display(), plot.display()))?;
         Ok(evaluated)
     }
 
-    /// Measures every frame but the first, which is the model's rest.
+    /// Measures every frame except the first, which is the model's rest.
     fn measure(&self) -> Result<Evaluated> {
         let sequence = DepthSequence::open(&self.recording)?;
         let body = read_body(&self.recording.join(MODEL))?;
@@ -67,7 +68,7 @@ impl Evaluate {
             let found = read_vertices(&mesh_file(&self.track, "meshes", frame)).context("the track")?;
             ensure!(
                 truth.len() == found.len(),
-                "frame {frame}: the track has {} vertices, the truth {}; is it another recording's?",
+                "frame {frame}: the track has {} vertices, the truth {}; does the track belong to another recording?",
                 found.len(),
                 truth.len()
             );
@@ -102,7 +103,7 @@ fn csv(errors: &TrackErrors) -> Result<Vec<u8>> {
     Ok(table.into_inner()?)
 }
 
-/// A table of end-point errors, one run a row and kind of vertices.
+/// Formats end-point errors: one row per run and kind of vertices.
 pub fn summary(rows: &[(&str, &TrackErrors)]) -> Table {
     let mut table = Table::new();
     let headings = ["run", "vertices", "mean, mm", "median, mm", "95 %, mm", "share < 25 mm"];

@@ -2,22 +2,22 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-/// A recording's files.
+/// Model in a recording.
 pub const MODEL: &str = "model.json";
-/// What a body tracker says.
+/// Bones of a body tracker, in a recording.
 pub const SKELETON: &str = "skeleton.json";
-/// A track's table of frames.
+/// Table of frames in a track.
 pub const FRAMES: &str = "frames.csv";
-/// A track's node motions.
+/// Node motions in a track.
 pub const NODES: &str = "nodes.json";
 
-/// The mesh of a frame in `truth` or `meshes`.
+/// Path of a frame's mesh in `truth` or `meshes`.
 pub fn mesh_file(folder: &Path, kind: &str, frame: usize) -> PathBuf {
     folder.join(kind).join(format!("{frame:06}.obj"))
 }
 
-/// Makes an output folder with its parts, before anything is computed. Files of an earlier run are removed if they may be, so that no
-/// folder mixes two runs.
+/// Creates an output folder with its subfolders before anything is computed. With `overwrite`, removes the files of an
+/// earlier run, so that no folder mixes two runs.
 pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -> Result<()> {
     let here = || format!("cannot prepare {}", folder.display());
     std::fs::create_dir_all(folder).with_context(here)?;
@@ -36,9 +36,4 @@ pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -
         bail!("{} exists; choose another folder, or allow --overwrite", path.display());
     }
     old.iter().try_for_each(std::fs::remove_file).with_context(here)
-}
-
-/// Writes a file whole or not at all.
-pub fn write(path: &Path, contents: &[u8]) -> Result<()> {
-    verify::write_whole(path, contents).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -7,9 +7,9 @@ pub mod track;
 use std::io::{ErrorKind, Write};
 
 use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
+use energy_cli::progress::{self, ProgressBar};
 
-/// Prints to standard output. A reader that has seen enough (`| head`) is no error.
+/// Prints to standard output. A closed pipe (`| head`) is not an error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("cannot print"),
@@ -17,9 +17,7 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Hidden where standard error is not a terminal.
+/// Creates a progress bar over frames.
 fn progress_bar(frames: usize, what: &'static str) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{msg} {wide_bar} frame {pos}/{len}, {eta} left").expect("the template is valid");
-    ProgressBar::new(frames as u64).with_style(style).with_message(what)
+    progress::bar(frames as u64, "{msg} {wide_bar} frame {pos}/{len}, {eta} left").with_message(what)
 }

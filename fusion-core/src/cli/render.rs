@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use energy_cli::write_file;
 use fusion_core::body::{
     SkinnedBody, figure, figure_motion, obj_text, read_body, read_gltf, read_makehuman, write_body,
 };
@@ -11,44 +12,44 @@ use fusion_core::protocol::{Recording, reported_bones};
 use fusion_core::skeleton::{BoneNoise, Bvh, Retarget, Skeleton};
 use nalgebra::Isometry3;
 
-use super::folder::{MODEL, SKELETON, mesh_file, prepare, write};
+use super::folder::{MODEL, SKELETON, mesh_file, prepare};
 use super::{print, progress_bar};
 
-/// Steps of the images to a metre.
+/// Steps per metre of the depth images.
 const PER_METRE: f64 = 1000.0;
 
-/// What to render.
+/// Options of `fusion render`.
 #[derive(Debug, Args)]
 pub struct Render {
-    /// The body: `figure` (one of tubes, with its own motion), a folder with `base.obj`, `rig.*.json` and `weights.*.json`, a skinned mesh
-    /// (`.glb`), or a stored model (`.json`).
+    /// Body: `figure` (built-in, made of tubes, with its own motion), a folder with `base.obj`, `rig.*.json` and
+    /// `weights.*.json`, a skinned mesh (`.glb`), or a stored model (`.json`).
     #[arg(long, default_value = "figure")]
     body: String,
-    /// Its motion (`.bvh`, first frame a T pose, joints named as the bones).
+    /// Motion of the body (`.bvh`), with a T pose in the first frame and joints named like the bones.
     #[arg(long)]
     motion: Option<PathBuf>,
-    /// The first frame of the motion; it becomes the model's rest.
+    /// First frame of the motion; it becomes the model's rest.
     #[arg(long, default_value_t = 0)]
     from: usize,
-    /// The last frame of the motion.
+    /// Last frame of the motion.
     #[arg(long)]
     to: Option<usize>,
-    /// Every how many frames.
+    /// Step between frames.
     #[arg(long, default_value_t = 1)]
     step: usize,
-    /// How far in front of the body the camera stands, m.
+    /// Distance of the camera in front of the body, in m.
     #[arg(long, default_value_t = 2.6)]
     distance: f64,
-    /// Noise of the sensor: k of k (0.0012 + 0.0019 (z − 0.4)²) m.
+    /// Factor k of the sensor noise k (0.0012 + 0.0019 (z − 0.4)²) m.
     #[arg(long, default_value_t = 0.3)]
     noise: f64,
-    /// Errors of the skeleton's turns, standard deviation in degrees.
+    /// Standard deviation of the rotations of bones, in degrees.
     #[arg(long, default_value_t = 0.0)]
     bone_turn: f64,
-    /// Errors of the skeleton's places, standard deviation in mm along each axis.
+    /// Standard deviation of the translations of bones along each axis, in mm.
     #[arg(long, default_value_t = 0.0)]
     bone_shift: f64,
-    /// Where the recording goes.
+    /// Output folder.
     #[arg(short, long)]
     output: PathBuf,
     /// Replace an earlier recording.
@@ -57,7 +58,7 @@ pub struct Render {
 }
 
 impl Render {
-    /// The figure of tubes for as many thirtieths of a second.
+    /// Options for the figure of tubes, with `frames` frames at 30 Hz.
     pub fn figure(frames: usize, noise: BoneNoise, output: &Path) -> Self {
         Self {
             body: "figure".into(),
@@ -75,15 +76,19 @@ impl Render {
     }
 
     pub fn run(&self) -> Result<()> {
-        ensure!(self.step > 0, "--step must be 1 at least");
-        ensure!(self.distance > 0.0 && self.distance.is_finite(), "--distance must be above 0 m");
+        ensure!(self.step > 0, "--step: expected at least 1, got {}", self.step);
+        ensure!(
+            self.distance > 0.0 && self.distance.is_finite(),
+            "--distance: expected more than 0 m, got {} m",
+            self.distance
+        );
         for (name, value) in
             [("--noise", self.noise), ("--bone-turn", self.bone_turn), ("--bone-shift", self.bone_shift)]
         {
-            ensure!(value >= 0.0 && value.is_finite(), "{name} must be a finite number, 0 or above");
+            ensure!(value >= 0.0 && value.is_finite(), "{name}: expected a finite number of at least 0, got {value}");
         }
         let (body, motions) = self.posed()?;
-        ensure!(motions.len() > 1, "fewer than two frames between --from and --to");
+        ensure!(motions.len() > 1, "expected at least two frames between --from and --to");
         let recording = Recording::new(&body, &motions, Camera::VGA, self.distance);
         let files = [MODEL, SKELETON, DepthSequence::INTRINSICS, DepthSequence::LIST];
         prepare(&self.output, &["depth", "truth"], &files, self.overwrite)?;
@@ -97,10 +102,10 @@ impl Render {
         ))
     }
 
-    /// The body and the motions of its bones from its own rest.
+    /// Returns the body and the motions of its bones from its own rest.
     fn posed(&self) -> Result<(SkinnedBody, Vec<Vec<Isometry3<f64>>>)> {
         if self.body == "figure" {
-            ensure!(self.motion.is_none(), "the figure has its own motion; leave --motion out");
+            ensure!(self.motion.is_none(), "the figure has its own motion; remove --motion");
             let last = self.to.unwrap_or(self.from + 120);
             let motions =
                 (self.from..=last).step_by(self.step).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
@@ -129,7 +134,7 @@ impl Render {
     fn write(&self, recording: &Recording) -> Result<()> {
         let folder = &self.output;
         let info = SequenceInfo { camera: recording.camera, depth_scale: PER_METRE };
-        write(&folder.join(DepthSequence::INTRINSICS), &serde_json::to_vec_pretty(&info)?)?;
+        write_file(&folder.join(DepthSequence::INTRINSICS), &serde_json::to_vec_pretty(&info)?)?;
         write_body(&folder.join(MODEL), &recording.body)?;
         let sensor = SensorNoise { factor: self.noise, step: 1.0 / PER_METRE };
         let bones = BoneNoise { turn: self.bone_turn.to_radians(), shift: 1e-3 * self.bone_shift };
@@ -141,19 +146,19 @@ impl Render {
             write_depth(&folder.join(&name), &recording.image(frame, sensor), PER_METRE)?;
             writeln!(list, "{:.6} {name}", frame as f64 / 30.0)?;
             let truth = recording.truth(frame);
-            write(&mesh_file(folder, "truth", frame), obj_text(&truth.vertices, &truth.triangles).as_bytes())?;
-            // The first frame is the rest that everything is relative to.
+            write_file(&mesh_file(folder, "truth", frame), obj_text(&truth.vertices, &truth.triangles).as_bytes())?;
+            // The first frame is the rest of the model.
             let noise = if frame == 0 { BoneNoise::default() } else { bones };
             skeleton.push(&reported_bones(recording, frame, noise));
             progress.inc(1);
         }
         progress.finish_and_clear();
         skeleton.write(&folder.join(SKELETON))?;
-        write(&folder.join(DepthSequence::LIST), list.as_bytes())
+        write_file(&folder.join(DepthSequence::LIST), list.as_bytes())
     }
 }
 
-/// A body in any of the formats.
+/// Reads a body in any of the formats.
 pub fn read_any_body(path: &Path) -> Result<SkinnedBody> {
     if path.is_dir() {
         let file = |start: &str, end: &str| -> Result<PathBuf> {
@@ -172,6 +177,6 @@ pub fn read_any_body(path: &Path) -> Result<SkinnedBody> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("glb") => Ok(read_gltf(path)?),
         Some("json") => Ok(read_body(path)?),
-        _ => bail!("{}: neither a folder, nor a .glb or .json file with a body", path.display()),
+        _ => bail!("{}: expected a folder, or a .glb or .json file", path.display()),
     }
 }

@@ -2,6 +2,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use energy_cli::write_file;
 use fusion_core::body::obj_text;
 use fusion_core::depth::DepthSequence;
 use fusion_core::energy::BoneMode;
@@ -11,31 +12,32 @@ use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 
-use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare, write};
+use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare};
 use super::render::read_any_body;
 use super::{print, progress_bar};
 
-/// What to track.
+/// Options of `fusion track`.
 #[derive(Debug, Args)]
 pub struct Track {
-    /// The folder of depth images: `intrinsics.json`, and `depth.txt` or `depth/*.png`. The first image shows the model at rest.
+    /// Folder of depth images with `intrinsics.json`, and `depth.txt` or `depth/*.png`. The first image shows the model
+    /// at rest.
     recording: PathBuf,
-    /// The model, in the camera's coordinates (`.json`, `.glb` or a folder); the recording's `model.json` if none is given.
+    /// Model in the camera's coordinates: `.json`, `.glb` or a folder [default: the recording's `model.json`].
     #[arg(long)]
     model: Option<PathBuf>,
-    /// What a body tracker says; the recording's `skeleton.json` if none is given and there is one.
+    /// Bones of a body tracker [default: the recording's `skeleton.json`, if it exists].
     #[arg(long)]
     skeleton: Option<PathBuf>,
     /// Track without bones: nodes start where they were.
     #[arg(long, conflicts_with_all = ["skeleton", "unknown_bones"])]
     no_bones: bool,
-    /// Bones are unknowns too, near to what the body tracker says.
+    /// Treat bones as unknowns near the reported motions.
     #[arg(long)]
     unknown_bones: bool,
-    /// All parameters of model and tracker (`.json`): `{"model": {…}, "tracker": {…}}`.
+    /// Options of model and tracker (`.json`): `{"model": {…}, "tracker": {…}}`.
     #[arg(long)]
     options: Option<PathBuf>,
-    /// Where the track goes.
+    /// Output folder.
     #[arg(short, long)]
     output: PathBuf,
     /// Replace an earlier track.
@@ -43,7 +45,7 @@ pub struct Track {
     overwrite: bool,
 }
 
-/// Parameters as a file has them.
+/// Options in a file.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Parameters {
@@ -51,7 +53,7 @@ struct Parameters {
     tracker: TrackerOptions,
 }
 
-/// A line of the table of frames.
+/// A row of the table of frames.
 #[derive(Debug, Default, Serialize)]
 struct Line {
     frame: usize,
@@ -71,25 +73,25 @@ struct Line {
 /// Motions of the nodes.
 #[derive(Serialize)]
 struct NodeMotions<'a> {
-    /// The origin that twists turn about, in the camera's coordinates, m.
+    /// Origin of the twists' rotations, in the camera's coordinates, in m.
     origin: [f64; 3],
     angle: fusion_core::twist::AngleConvention,
-    /// Places at rest, relative to the origin.
+    /// Positions at rest, relative to the origin.
     nodes: Vec<[f64; 3]>,
-    /// For each frame the twist of each node.
+    /// Twists by frame, then node.
     frames: &'a [Vec<Twist>],
 }
 
-/// How many frames were tracked.
+/// Numbers of frames.
 pub struct Tracked {
-    /// Followed.
+    /// Tracked frames.
     pub tracked: usize,
-    /// Skipped, with a reason in the table.
+    /// Skipped frames; the table has the reasons.
     pub skipped: usize,
 }
 
 impl Track {
-    /// A track of a recording with everything in its own folder.
+    /// Options for tracking a recording with the files in its folder.
     pub fn of(recording: &Path, unknown_bones: bool, output: &Path) -> Self {
         Self {
             recording: recording.to_owned(),
@@ -114,7 +116,7 @@ impl Track {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
         }
         if let Some(skeleton) = &skeleton {
-            // A missing bone is refused before anything is tracked.
+            // Report missing bones before tracking starts.
             skeleton.motions(0, &model.bones)?;
         }
         let mut tracker = Tracker::new(model, sequence.info.camera, parameters.tracker)?;
@@ -129,7 +131,7 @@ impl Track {
             }
             lines.push(line);
             let mesh = obj_text(&tracker.vertices(), &tracker.model().mesh.triangles);
-            write(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
+            write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
             motions.push(tracker.twists().to_vec());
             progress.inc(1);
         }
@@ -171,7 +173,7 @@ impl Track {
         Ok(parameters)
     }
 
-    /// One frame; what goes wrong with it stands in the line, and the track goes on.
+    /// Tracks one frame. An error is recorded in the row, and tracking continues.
     fn frame(
         &self,
         frame: usize,
@@ -196,7 +198,7 @@ impl Track {
     fn write(&self, lines: &[Line], motions: &[Vec<Twist>], tracker: &Tracker, options: TrackerOptions) -> Result<()> {
         let mut table = csv::Writer::from_writer(Vec::new());
         lines.iter().try_for_each(|line| table.serialize(line))?;
-        write(&self.output.join(FRAMES), &table.into_inner()?)?;
+        write_file(&self.output.join(FRAMES), &table.into_inner()?)?;
         let model = tracker.model();
         let nodes = NodeMotions {
             origin: model.origin.into(),
@@ -204,7 +206,7 @@ impl Track {
             nodes: model.nodes.iter().map(|&node| node.into()).collect(),
             frames: motions,
         };
-        write(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
+        write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
 }
 

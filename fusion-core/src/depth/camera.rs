@@ -1,34 +1,34 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// A pinhole camera: x to the right, y down, z into the scene; pixel (u, v) is centred at whole numbers.
+/// A pinhole camera: x to the right, y down, z into the scene. Pixel centres have integer coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// Focal lengths, pixels.
+    /// Horizontal focal length, in pixels.
     pub fx: f64,
-    /// See `fx`.
+    /// Vertical focal length, in pixels.
     pub fy: f64,
-    /// The axis, pixels.
+    /// Horizontal principal point, in pixels.
     pub cx: f64,
-    /// See `cx`.
+    /// Vertical principal point, in pixels.
     pub cy: f64,
-    /// Pixels across.
+    /// Width of the image, in pixels.
     pub width: usize,
-    /// Pixels down.
+    /// Height of the image, in pixels.
     pub height: usize,
 }
 
 impl Camera {
-    /// 640 × 480 pixels, f = 525: the usual structured-light camera.
+    /// The usual structured-light camera: 640 × 480 pixels, focal length 525 pixels.
     pub const VGA: Self = Self { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
 
-    /// Where a point is seen, in pixels; nothing behind the camera.
+    /// Returns the projection of a point, in pixels; `None` behind the camera.
     #[must_use]
     pub fn project(&self, p: &Vector3<f64>) -> Option<[f64; 2]> {
         (p.z > 1e-6).then(|| [self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy])
     }
 
-    /// The pixel a point is seen in; none outside of the image.
+    /// Returns the pixel of a point; `None` outside the image.
     #[must_use]
     pub fn pixel(&self, p: &Vector3<f64>) -> Option<[usize; 2]> {
         let [u, v] = self.project(p)?.map(|x| (x + 0.5).floor());
@@ -36,22 +36,22 @@ impl Camera {
         inside.then_some([u as usize, v as usize])
     }
 
-    /// The point that a pixel sees at a depth.
+    /// Returns the point that a pixel sees at a depth.
     #[must_use]
     pub fn unproject(&self, [u, v]: [usize; 2], depth: f64) -> Vector3<f64> {
         Vector3::new((u as f64 - self.cx) / self.fx, (v as f64 - self.cy) / self.fy, 1.0) * depth
     }
 
-    /// What is wrong with it, if anything.
+    /// Returns a description of an invalid parameter; `None` if all are valid.
     #[must_use]
     pub fn fault(&self) -> Option<&'static str> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(self.fx) && positive(self.fy)) {
-            return Some("focal lengths must be above 0");
+            return Some("expected focal lengths greater than 0");
         }
         if !(self.cx.is_finite() && self.cy.is_finite()) {
-            return Some("the axis must be finite");
+            return Some("expected a finite principal point");
         }
-        (self.width == 0 || self.height == 0).then_some("the image must have pixels")
+        (self.width == 0 || self.height == 0).then_some("expected an image with at least one pixel")
     }
 }

@@ -2,38 +2,38 @@ use nalgebra::Vector3;
 
 use super::camera::Camera;
 
-/// Depths along the camera's axis, m, row by row; 0 where nothing was measured.
+/// Depths along the camera's axis, in m, row by row; 0 without a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage {
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: usize,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: usize,
-    /// The depths.
+    /// Depths in m.
     pub depth: Vec<f32>,
 }
 
 impl DepthImage {
-    /// Nothing measured anywhere.
+    /// Creates an image without measurements.
     #[must_use]
     pub fn empty(width: usize, height: usize) -> Self {
         Self { width, height, depth: vec![0.0; width * height] }
     }
 
-    /// The depth at a pixel; nothing where none was measured, or where it is negative, infinite or NaN.
+    /// Returns the depth at a pixel; `None` if it is not positive and finite.
     #[must_use]
     pub fn at(&self, [u, v]: [usize; 2]) -> Option<f64> {
         let depth = *self.depth.get(v * self.width + u)?;
         (depth > 0.0 && depth.is_finite()).then_some(f64::from(depth))
     }
 
-    /// Pixels with a depth.
+    /// Returns the number of pixels with a depth.
     #[must_use]
     pub fn valid(&self) -> usize {
         self.depth.iter().filter(|&&depth| depth > 0.0 && depth.is_finite()).count()
     }
 
-    /// Forgets the depths where a mask is 0.
+    /// Clears the depths where a mask is 0.
     pub fn mask(&mut self, mask: &[u8]) {
         for (depth, &keep) in self.depth.iter_mut().zip(mask) {
             if keep == 0 {
@@ -42,8 +42,9 @@ impl DepthImage {
         }
     }
 
-    /// The unit normal of the surface at a pixel, towards the camera, from depths `reach` pixels to each side. None where one of them is
-    /// missing, or there is an edge: neighbours on both sides must lie within 5 cm, and in line within 2 cm.
+    /// Returns the unit normal of the surface at a pixel, towards the camera, from depths `reach` pixels on each side.
+    /// `None` if a depth is missing or at an edge: depths on both sides must be within 5 cm of each other, and within 2
+    /// cm of a line.
     #[must_use]
     pub fn normal(&self, camera: &Camera, [u, v]: [usize; 2], reach: usize) -> Option<Vector3<f64>> {
         if u < reach || v < reach || u + reach >= self.width || v + reach >= self.height {
@@ -57,7 +58,7 @@ impl DepthImage {
         };
         let right = across([u - reach, v], [u + reach, v])?;
         let down = across([u, v - reach], [u, v + reach])?;
-        // x right and y down: their product points into the scene.
+        // x points right and y down, so their cross product points into the scene.
         down.cross(&right).try_normalize(0.0)
     }
 }

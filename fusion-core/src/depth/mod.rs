@@ -1,4 +1,4 @@
-//! Depth images: cameras, files, rendering with a sensor's noise, normals.
+//! Depth images: cameras, files, normals, and rendering with sensor noise.
 
 mod camera;
 mod image;

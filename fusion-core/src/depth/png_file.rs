@@ -6,38 +6,38 @@ use super::image::DepthImage;
 /// An image that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum DepthFileError {
-    /// The file.
+    /// The file cannot be read or written.
     #[error("{}", .path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Not a PNG, or a damaged one.
+    /// The file is not a PNG image, or is damaged.
     #[error("{}", .path.display())]
     Png {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the decoder found.
+        /// Error of the decoder.
         source: png::DecodingError,
     },
-    /// Another kind of image.
+    /// The image has another format.
     #[error("{}: expected {expected}, found {found}", .path.display())]
     Format {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is needed.
+        /// Expected format.
         expected: &'static str,
-        /// What there is.
+        /// Actual format.
         found: String,
     },
-    /// Encoding failed.
+    /// The image cannot be encoded.
     #[error("{}", .path.display())]
     Encode {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the encoder.
         source: png::EncodingError,
     },
 }
@@ -64,11 +64,11 @@ fn read_grey(path: &Path, depth: png::BitDepth, expected: &'static str) -> Resul
     Ok(Grey { width: info.width as usize, height: info.height as usize, bytes })
 }
 
-/// Reads a depth image: 16-bit grey, `per_metre` steps to a metre (1000 for millimetres, 5000 in the TUM's data), 0 where nothing was
-/// measured.
+/// Reads a depth image: 16-bit grey, `per_metre` steps per metre (1000 for millimetres, 5000 in the TUM's data), 0
+/// without a measurement.
 ///
 /// # Errors
-/// When the file cannot be read, or is another kind of image.
+/// If the file cannot be read, or has another format.
 pub fn read_depth(path: &Path, per_metre: f64) -> Result<DepthImage, DepthFileError> {
     let Grey { width, height, bytes } = read_grey(path, png::BitDepth::Sixteen, "16-bit grey depth")?;
     let steps = bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]]));
@@ -76,19 +76,19 @@ pub fn read_depth(path: &Path, per_metre: f64) -> Result<DepthImage, DepthFileEr
     Ok(DepthImage { width, height, depth })
 }
 
-/// Reads a mask: 8-bit grey, 0 where depths are to be ignored. Returns width, height and the pixels.
+/// Reads a mask: 8-bit grey, 0 where depths are ignored. Returns width, height and the pixels.
 ///
 /// # Errors
-/// When the file cannot be read, or is another kind of image.
+/// If the file cannot be read, or has another format.
 pub fn read_mask(path: &Path) -> Result<(usize, usize, Vec<u8>), DepthFileError> {
     let Grey { width, height, bytes } = read_grey(path, png::BitDepth::Eight, "an 8-bit grey mask")?;
     Ok((width, height, bytes))
 }
 
-/// Writes a depth image, whole or not at all. Depths are rounded to steps; beyond the largest step they are left out.
+/// Writes a depth image completely or not at all. Depths are rounded to steps; depths beyond the largest step become 0.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If the file cannot be written.
 pub fn write_depth(path: &Path, image: &DepthImage, per_metre: f64) -> Result<(), DepthFileError> {
     let failed = |source| DepthFileError::Encode { path: path.into(), source };
     let mut bytes = Vec::with_capacity(2 * image.depth.len());
@@ -104,7 +104,7 @@ pub fn write_depth(path: &Path, image: &DepthImage, per_metre: f64) -> Result<()
     let mut writer = encoder.write_header().map_err(failed)?;
     writer.write_image_data(&bytes).map_err(failed)?;
     writer.finish().map_err(failed)?;
-    verify::write_whole(path, &file).map_err(|source| DepthFileError::File { path: path.into(), source })
+    energy_cli::write_whole(path, &file).map_err(|source| DepthFileError::File { path: path.into(), source })
 }
 
 #[cfg(test)]
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn depths_survive_a_file_but_for_rounding() {
+    fn depths_survive_a_file_up_to_rounding() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("d.png");
         let image = DepthImage { width: 3, height: 2, depth: vec![0.0, 1.0, 2.5004, f32::NAN, -1.0, 70.0] };

@@ -5,12 +5,13 @@ use super::image::DepthImage;
 use crate::body::Mesh;
 use crate::random::gaussian;
 
-/// A structured-light sensor's noise: a standard deviation of k (0.0012 + 0.0019 (z − 0.4)²) m at depth z, then rounding to steps.
+/// Noise of a structured-light sensor: a standard deviation of k (0.0012 + 0.0019 (z − 0.4)²) m at depth z, then
+/// rounding to steps.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SensorNoise {
-    /// k; 1 for the sensor as measured by Khoshelham and Oude Elberink, 0 for none.
+    /// Factor k: 1 for the sensor as measured by Khoshelham and Oude Elberink, 0 without noise.
     pub factor: f64,
-    /// The step depths are rounded to, m; 0 for none.
+    /// Step to which depths are rounded, in m; 0 without rounding.
     pub step: f64,
 }
 
@@ -32,8 +33,8 @@ impl SensorNoise {
     }
 }
 
-/// The depths of a mesh, in the camera's coordinates: the nearest triangle at every pixel, by a z-buffer. Triangles that reach behind
-/// the camera are left out.
+/// Renders the depths of a mesh, in the camera's coordinates, with a z-buffer. Triangles that reach behind the camera
+/// are skipped.
 #[must_use]
 pub fn render(mesh: &Mesh, camera: &Camera) -> DepthImage {
     let mut image = DepthImage::empty(camera.width, camera.height);
@@ -74,7 +75,7 @@ fn fill(image: &mut DepthImage, [a, b, c]: [[f64; 2]; 3], inverse: [f64; 3]) {
     }
 }
 
-/// Which vertices the camera sees: they face it, and lie within 1 cm of the depth rendered where they are.
+/// Returns which vertices the camera sees: they face it, and lie within 1 cm of the rendered depth.
 #[must_use]
 pub fn visible_vertices(mesh: &Mesh, camera: &Camera) -> Vec<bool> {
     let image = render(mesh, camera);
@@ -89,7 +90,7 @@ pub fn visible_vertices(mesh: &Mesh, camera: &Camera) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// A square facing the camera at depth 2, and one behind it.
+    /// A square facing the camera at depth 2, and another behind it.
     fn squares() -> Mesh {
         let square = |z: f64, half: f64| [[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]];
         let vertices = [square(2.0, 0.5), square(3.0, 0.6)].concat().into_iter().map(Vector3::from).collect();
@@ -108,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_as_large_as_the_model_says() {
+    fn noise_has_the_standard_deviation_of_the_model() {
         let mut image = DepthImage { width: 100, height: 100, depth: vec![2.4; 10_000] };
         SensorNoise { factor: 1.0, step: 0.0 }.add(&mut image, &mut fastrand::Rng::with_seed(1));
         let square: f64 = image.depth.iter().map(|&d| (f64::from(d) - 2.4).powi(2)).sum::<f64>() / 1e4;

@@ -6,61 +6,61 @@ use super::camera::Camera;
 use super::image::DepthImage;
 use super::png_file::{DepthFileError, read_depth, read_mask};
 
-/// A folder that is no sequence.
+/// A folder that is not a sequence of depth images.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
     /// A file cannot be read or written.
     #[error("{}", .path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The intrinsics are malformed.
     #[error("{}", .path.display())]
     Json {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser found, and where.
+        /// Error of the parser, with its position.
         source: serde_json::Error,
     },
-    /// The intrinsics make no camera.
+    /// The intrinsics are invalid.
     #[error("{}: {fault}", .path.display())]
     Camera {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the error.
         fault: &'static str,
     },
-    /// There are no images.
+    /// The folder contains no images.
     #[error("{}: no images; expected depth.txt (`timestamp file` on each line) or depth/*.png", .path.display())]
     Empty {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// An image cannot be used.
+    /// An image cannot be read.
     #[error(transparent)]
     Image(#[from] DepthFileError),
-    /// An image, or its mask, is of another size.
-    #[error("{}: {found:?} pixels, but the camera has {expected:?}", .path.display())]
+    /// The size of an image or its mask differs from the camera's.
+    #[error("{}: expected {expected:?} pixels as in the camera, got {found:?}", .path.display())]
     Size {
-        /// The image.
+        /// Path of the image.
         path: PathBuf,
-        /// The camera's.
+        /// Size of the camera.
         expected: [usize; 2],
-        /// The image's.
+        /// Size of the image.
         found: [usize; 2],
     },
 }
 
-/// What a sequence's `intrinsics.json` says.
+/// Contents of a sequence's `intrinsics.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SequenceInfo {
-    /// The camera.
+    /// The depth camera.
     #[serde(flatten)]
     pub camera: Camera,
-    /// Steps of the images to a metre.
+    /// Steps of the images per metre.
     #[serde(default = "millimetres")]
     pub depth_scale: f64,
 }
@@ -69,8 +69,11 @@ fn millimetres() -> f64 {
     1000.0
 }
 
-/// A folder of depth images as the TUM's RGB-D data lays them out: `depth.txt` with a timestamp and a file on each line (or all of
-/// `depth/*.png` in order), `intrinsics.json` beside it, and perhaps `mask/` with an 8-bit image of the same name for each.
+/// A folder of depth images in the layout of the TUM's RGB-D data:
+///
+/// * `depth.txt` with a timestamp and a file on each line, or `depth/*.png` in order;
+/// * `intrinsics.json`;
+/// * optionally `mask/` with an 8-bit image of the same name for each image.
 #[derive(Clone, Debug)]
 pub struct DepthSequence {
     folder: PathBuf,
@@ -80,22 +83,23 @@ pub struct DepthSequence {
 }
 
 impl DepthSequence {
-    /// The file with the camera.
+    /// File name of the camera.
     pub const INTRINSICS: &'static str = "intrinsics.json";
-    /// The list of images.
+    /// File name of the list of images.
     pub const LIST: &'static str = "depth.txt";
 
     /// Opens a folder.
     ///
     /// # Errors
-    /// When it lacks intrinsics or images.
+    /// If it lacks intrinsics or images.
     pub fn open(folder: &Path) -> Result<Self, SequenceError> {
         let path = folder.join(Self::INTRINSICS);
         let text =
             std::fs::read_to_string(&path).map_err(|source| SequenceError::File { path: path.clone(), source })?;
         let info: SequenceInfo =
             serde_json::from_str(&text).map_err(|source| SequenceError::Json { path: path.clone(), source })?;
-        let scale = (info.depth_scale.is_nan() || info.depth_scale <= 0.0).then_some("depth_scale must be above 0");
+        let scale =
+            (info.depth_scale.is_nan() || info.depth_scale <= 0.0).then_some("expected a `depth_scale` greater than 0");
         if let Some(fault) = info.camera.fault().or(scale) {
             return Err(SequenceError::Camera { path, fault });
         }
@@ -113,22 +117,22 @@ impl DepthSequence {
         Ok(Self { folder: folder.to_owned(), info, images })
     }
 
-    /// Frames.
+    /// Returns the number of frames.
     #[must_use]
     pub fn len(&self) -> usize {
         self.images.len()
     }
 
-    /// Whether there are none; never, for an opened one.
+    /// Whether the sequence is empty; always `false`.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.images.is_empty()
     }
 
-    /// Reads an image, with its mask applied if it has one.
+    /// Reads an image and applies its mask, if it has one.
     ///
     /// # Errors
-    /// When it is missing, of another kind, or of another size.
+    /// If the image is missing, or has another format or size.
     pub fn image(&self, frame: usize) -> Result<DepthImage, SequenceError> {
         let path = self.folder.join(&self.images[frame]);
         let mut image = read_depth(&path, self.info.depth_scale)?;

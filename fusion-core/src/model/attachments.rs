@@ -1,25 +1,25 @@
 use nalgebra::Vector3;
 
-/// How much each node follows each bone, N × m: rows are zero or sum to one.
+/// Weights of the bones for each node, N × m. Rows are zero or sum to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attachments {
-    /// The rows.
+    /// Weights by node, then bone.
     pub rows: Vec<Vec<f64>>,
-    /// Whether a row is set at all.
+    /// Whether the row of each node is set.
     pub assigned: Vec<bool>,
 }
 
-/// What a fill did.
+/// Statistics of a fill.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FillReport {
-    /// Passes that assigned a node.
+    /// Number of passes that assigned a node.
     pub passes: usize,
-    /// Nodes that no assigned node can be reached from.
+    /// Nodes without a path to an assigned node.
     pub left: Vec<usize>,
 }
 
 impl Attachments {
-    /// Each place follows the bone (a segment) nearest to it wholly, if that is within `reach`; others are not assigned.
+    /// Assigns each point to the nearest bone (a segment) within `reach`. Points without one are not assigned.
     #[must_use]
     pub fn nearest_bone(places: &[Vector3<f64>], bones: &[[Vector3<f64>; 2]], reach: f64) -> Self {
         let (mut rows, mut assigned) = (Vec::new(), Vec::new());
@@ -40,14 +40,15 @@ impl Attachments {
         Self { rows, assigned }
     }
 
-    /// Rows that are all given.
+    /// Creates attachments from complete rows.
     #[must_use]
     pub fn given(rows: Vec<Vec<f64>>) -> Self {
         let assigned = vec![true; rows.len()];
         Self { rows, assigned }
     }
 
-    /// One pass, all nodes at once: a node that is not assigned, but has assigned neighbours, becomes their mean. Returns whether any did.
+    /// Runs one simultaneous pass: an unassigned node with assigned neighbours becomes their mean. Returns whether any
+    /// node was assigned.
     pub fn fill_once(&mut self, neighbours: &[Vec<usize>]) -> bool {
         let before = self.clone();
         let mut changed = false;
@@ -63,8 +64,8 @@ impl Attachments {
         changed
     }
 
-    /// Passes until all nodes are assigned or nothing changes. On a graph whose edges lead both ways only parts without any assigned
-    /// node are left.
+    /// Repeats passes until all nodes are assigned or nothing changes. On a symmetric graph, only components without an
+    /// assigned node remain.
     pub fn fill(&mut self, neighbours: &[Vec<usize>]) -> FillReport {
         let mut passes = 0;
         while self.assigned.contains(&false) && self.fill_once(neighbours) {
@@ -74,7 +75,7 @@ impl Attachments {
         FillReport { passes, left }
     }
 
-    /// One pass, all nodes at once: each becomes the mean of itself and its neighbours, as far as these are assigned.
+    /// Runs one simultaneous pass: each node becomes the mean of itself and its neighbours, of those that are assigned.
     pub fn relax_once(&mut self, neighbours: &[Vec<usize>]) {
         let before = self.clone();
         for (node, around) in neighbours.iter().enumerate() {
@@ -99,7 +100,7 @@ impl Attachments {
     }
 }
 
-/// The distance of a place to a segment.
+/// Returns the distance of a point from a segment.
 #[must_use]
 pub fn bone_distance(place: &Vector3<f64>, [head, tail]: &[Vector3<f64>; 2]) -> f64 {
     let along = tail - head;
@@ -113,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fill_reaches_what_is_connected() {
+    fn a_fill_reaches_connected_nodes() {
         let mut h = Attachments {
             rows: vec![vec![1.0, 0.0], vec![0.0; 2], vec![0.0; 2], vec![0.0, 1.0], vec![0.0; 2]],
             assigned: vec![true, false, false, true, false],
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_bone_counts_if_it_is_near() {
+    fn points_attach_to_the_nearest_bone_within_reach() {
         let bones = [[Vector3::zeros(), Vector3::x()], [Vector3::y(), 2.0 * Vector3::y()]];
         let places = [Vector3::new(0.5, 0.1, 0.0), Vector3::new(0.0, 3.0, 0.0)];
         let h = Attachments::nearest_bone(&places, &bones, 0.5);

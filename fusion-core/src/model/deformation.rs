@@ -6,20 +6,21 @@ use super::neighbours::nearest;
 use super::nodes::sample_nodes;
 use crate::body::{Bone, Mesh, SkinnedBody};
 
-/// How a model is made of a body.
+/// Options of a [`DeformationModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelOptions {
-    /// Distance of nodes, m; also the width of their influence.
+    /// Distance between nodes, in m, which is also the width of their influence.
     pub node_radius: f64,
-    /// K, nodes that move a vertex: 1, 4 or 8.
+    /// K, the number of nodes that move a vertex: 1, 4 or 8.
     pub nodes_per_vertex: usize,
     /// Neighbours of a node in the graph.
     pub graph_neighbours: usize,
-    /// Metres that a wholly different attachment counts for in the distances between nodes and vertices, so that the two arms, or arm and
-    /// trunk, do not move each other where they touch.
+    /// Distance in m that entirely different attachments add between nodes and vertices, so that the two arms, or arm
+    /// and trunk, do not move each other on contact.
     pub attachment_length: f64,
-    /// Attach nodes to the nearest bone within this, m, then fill and relax; `None` takes the skinning weights of the body.
+    /// Attach nodes to the nearest bone within this distance, in m, then fill and relax. `None` uses the skinning
+    /// weights of the body.
     pub attachment_reach: Option<f64>,
     /// Passes of relaxation after a fill.
     pub relaxations: usize,
@@ -38,36 +39,37 @@ impl Default for ModelOptions {
     }
 }
 
-/// A body from which no model can be made.
+/// A body for which no model can be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ModelError {
-    /// Only some K are compiled.
-    #[error("{0} nodes per vertex: 1, 4 or 8 can be had")]
+    /// K is not 1, 4 or 8.
+    #[error("expected 1, 4 or 8 nodes per vertex, got {0}")]
     NodesPerVertex(usize),
     /// There are fewer nodes than a vertex or a node needs.
     #[error(
-        "{nodes} nodes, but {needed} are needed ({what}); sample them more densely than {radius_mm} mm, or ask for fewer"
+        "{nodes} nodes, but {needed} are needed ({what}); \
+         reduce the node radius of {radius_mm} mm, or ask for fewer nodes"
     )]
     TooFewNodes {
-        /// Nodes there are.
+        /// Number of nodes.
         nodes: usize,
-        /// How many are needed.
+        /// Required number.
         needed: usize,
-        /// What for.
+        /// Purpose of the nodes.
         what: &'static str,
-        /// The radius they were sampled at.
+        /// Sampling radius, in mm.
         radius_mm: usize,
     },
-    /// A length that is none.
-    #[error("`{name}` must be a finite number above 0")]
+    /// A length is not positive and finite.
+    #[error("expected a positive and finite `{name}`")]
     BadLength {
-        /// Which.
+        /// Name of the option.
         name: &'static str,
     },
 }
 
-/// Nodes on a body, and everything that stays as it is while they move. Coordinates are relative to [`Self::origin`], the centroid of the
-/// mesh at rest: turns about a far origin would couple a node's two parts.
+/// Nodes on a body, and everything that is constant while they move. Coordinates are relative to [`Self::origin`], the
+/// mesh's centroid at rest: rotations about a distant origin would couple rotation and translation of a node.
 #[derive(Clone, Debug)]
 pub struct DeformationModel {
     /// The origin in the world.
@@ -76,21 +78,21 @@ pub struct DeformationModel {
     pub mesh: Mesh,
     /// The bones at rest.
     pub bones: Vec<Bone>,
-    /// The nodes' places at rest.
+    /// Positions of the nodes at rest.
     pub nodes: Vec<Vector3<f64>>,
-    /// For each node its neighbours, without itself.
+    /// Neighbours of each node, without itself.
     pub graph: Vec<Vec<usize>>,
-    /// How much each node follows each bone.
+    /// Weights of the bones for each node.
     pub attachments: Attachments,
-    /// For each vertex the nodes that move it, nearest first.
+    /// Nodes that move each vertex, nearest first.
     pub vertex_nodes: Vec<Vec<u32>>,
-    /// How much each of them does.
+    /// Weights of these nodes.
     pub vertex_weights: Vec<Vec<f64>>,
-    /// How much each vertex follows each bone: the mean of its nodes' attachments.
+    /// Weights of the bones for each vertex: the weighted mean of its nodes' attachments.
     pub vertex_bones: Vec<Vec<(usize, f64)>>,
-    /// What was left when attachments were filled.
+    /// Statistics of filling the attachments.
     pub fill: FillReport,
-    /// How it was made.
+    /// Options of the model.
     pub options: ModelOptions,
 }
 
@@ -98,7 +100,7 @@ impl DeformationModel {
     /// Samples nodes on a body and connects them.
     ///
     /// # Errors
-    /// When K is none of 1, 4, 8, or there are too few nodes.
+    /// If K is not 1, 4 or 8, a length is invalid, or there are too few nodes.
     pub fn new(body: &SkinnedBody, options: ModelOptions) -> Result<Self, ModelError> {
         let ModelOptions { node_radius, nodes_per_vertex, graph_neighbours, attachment_length, .. } = options;
         if ![1, 4, 8].contains(&nodes_per_vertex) {
@@ -153,7 +155,7 @@ impl DeformationModel {
                 square_length * square
             };
             let around = nearest(place, &nodes, nodes_per_vertex, extra, None);
-            // The nearest node counts fully, so that far ones cannot all vanish.
+            // The nearest node has weight 1, so that the weights of distant nodes do not all vanish.
             let weights: Vec<f64> =
                 around.iter().map(|(_, s)| (-(s - around[0].1) / (2.0 * node_radius * node_radius)).exp()).collect();
             vertex_bones.push(mean_attachment(&attachments, &around, &weights));
@@ -175,7 +177,7 @@ impl DeformationModel {
         })
     }
 
-    /// A motion of the world as one of the model's coordinates: (R, t) becomes (R, t + R o − o).
+    /// Converts a motion from the world to the model's coordinates: (R, t) becomes (R, t + R o − o).
     #[must_use]
     pub fn centred(&self, motion: &Isometry3<f64>) -> Isometry3<f64> {
         let shift = motion.translation.vector + motion.rotation * self.origin - self.origin;
@@ -183,7 +185,7 @@ impl DeformationModel {
     }
 }
 
-/// Attachments of the nodes: the body's skinning weights, or the nearest bones smoothed.
+/// Returns the attachments of the nodes: the body's skinning weights, or the nearest bones, smoothed.
 fn attach(
     nodes: &[Vector3<f64>],
     bones: &[Bone],
@@ -195,7 +197,7 @@ fn attach(
     };
     let segments: Vec<[Vector3<f64>; 2]> = bones.iter().map(|bone| [bone.head.into(), bone.tail.into()]).collect();
     let mut attachments = Attachments::nearest_bone(nodes, &segments, reach);
-    // Edges both ways: otherwise a fill can stall before nodes that nobody calls a neighbour.
+    // The graph must be symmetric: otherwise a fill could not reach nodes that are not neighbours of others.
     let mut graph: Vec<Vec<usize>> = (0..nodes.len())
         .map(|i| {
             let around = nearest(&nodes[i], nodes, options.graph_neighbours, |_| 0.0, Some(i));
@@ -214,7 +216,7 @@ fn attach(
     (attachments, report)
 }
 
-/// Σ w_k H_k/Σ w_k, its bones from the heaviest on.
+/// Returns Σ w_k H_k/Σ w_k, with bones from the largest weight on.
 fn mean_attachment(attachments: &Attachments, around: &[(usize, f64)], weights: &[f64]) -> Vec<(usize, f64)> {
     let bones = attachments.rows.first().map_or(0, Vec::len);
     let sum: f64 = weights.iter().sum();

@@ -1,4 +1,4 @@
-//! The model that deforms: nodes on a mesh, their graph, which nodes move which vertex, and which bones each node follows.
+//! The deformation model: nodes on a mesh, their graph, the nodes of each vertex, and the bones of each node.
 
 mod attachments;
 mod deformation;

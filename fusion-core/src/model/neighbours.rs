@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 
-/// The `count` places nearest to `from`, in ascending order, but for those that `skip` leaves out. The square of a distance is
-/// |x − y|² + `extra(i)`.
+/// Returns the `count` points nearest to `from` with their squared distances, ascending. The squared distance of
+/// point i is |x − y|² + `extra(i)`. The point `skip` is left out.
 #[must_use]
 pub fn nearest(
     from: &Vector3<f64>,

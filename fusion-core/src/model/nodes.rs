@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 
-/// Vertices no two of which are closer than `radius`, such that every vertex is within it of one: greedily, in the order of the vertices,
-/// so that a mesh has always the same nodes.
+/// Selects vertices at least `radius` apart such that every vertex is within `radius` of one. Greedy, in the order of
+/// the vertices, so that the nodes of a mesh are reproducible.
 #[must_use]
 pub fn sample_nodes(vertices: &[Vector3<f64>], radius: f64) -> Vec<usize> {
     let mut nodes: Vec<usize> = Vec::new();

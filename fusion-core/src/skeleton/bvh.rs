@@ -8,24 +8,24 @@ pub enum BvhError {
     /// The file cannot be read.
     #[error("cannot read {}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Something in it is wrong.
+    /// The file is malformed.
     #[error("{}:{line}: {message}", .path.display())]
     Malformed {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
 }
 
-/// One number of a frame.
+/// The meaning of one number of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Channel {
     Shift(usize),
@@ -35,23 +35,23 @@ enum Channel {
 /// A joint of the hierarchy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
-    /// The joint it hangs on; none for the root.
+    /// Index of the parent; `None` for the root.
     pub parent: Option<usize>,
-    /// Its place relative to its parent, in the file's unit.
+    /// Position relative to the parent, in the file's unit.
     pub offset: Vector3<f64>,
     channels: Vec<Channel>,
 }
 
-/// A motion in Biovision's format: a hierarchy of joints, and for each frame the numbers of their channels.
+/// A motion in Biovision's format: a hierarchy of joints, and the numbers of their channels for each frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bvh {
     /// Joints, parents first.
     pub joints: Vec<Joint>,
-    /// Ends of the chains: the joint, and the end's place relative to it.
+    /// End sites: the joint, and the position relative to it.
     pub ends: Vec<(usize, Vector3<f64>)>,
-    /// Seconds from one frame to the next.
+    /// Seconds per frame.
     pub frame_time: f64,
     frames: Vec<Vec<f64>>,
 }
@@ -60,7 +60,7 @@ impl Bvh {
     /// Reads a file.
     ///
     /// # Errors
-    /// When it cannot be read or is malformed; the line is named.
+    /// If the file cannot be read, or is malformed; the error has the line.
     pub fn read(path: &Path) -> Result<Self, BvhError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| BvhError::Unreadable { path: path.to_owned(), source })?;
@@ -71,7 +71,7 @@ impl Bvh {
         })
     }
 
-    /// Parses a text; an error has its line, from 0.
+    /// Parses a text. An error has its line, from 0.
     fn parse(text: &str) -> Result<Self, (usize, String)> {
         let lines: Vec<&str> = text.lines().collect();
         let mut at = 0;
@@ -84,7 +84,7 @@ impl Bvh {
         let count = value(at, "Frames:")?;
         let frame_time = value(at + 1, "Frame Time:")?;
         if !(frame_time > 0.0 && frame_time.is_finite()) {
-            return Err((at + 1, "the frame time must be above 0".into()));
+            return Err((at + 1, "expected a frame time greater than 0".into()));
         }
         let channels: usize = joints.iter().map(|joint| joint.channels.len()).sum();
         let mut frames = Vec::new();
@@ -92,23 +92,23 @@ impl Bvh {
             let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse::<f64>).collect();
             let numbers = numbers.map_err(|error| (number, error.to_string()))?;
             if numbers.len() != channels || numbers.iter().any(|x| !x.is_finite()) {
-                return Err((number, format!("a frame has {channels} finite numbers, this one {}", numbers.len())));
+                return Err((number, format!("expected {channels} finite numbers, got {}", numbers.len())));
             }
             frames.push(numbers);
         }
         if frames.len() as f64 != count {
-            return Err((lines.len(), format!("{count} frames announced, {} found", frames.len())));
+            return Err((lines.len(), format!("expected {count} frames, got {}", frames.len())));
         }
         Ok(Self { joints, ends, frame_time, frames })
     }
 
-    /// How many frames there are.
+    /// Returns the number of frames.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.frames.len()
     }
 
-    /// Where each joint is in a frame, and how it is turned, in the file's unit; none past the last frame.
+    /// Returns position and rotation of each joint in a frame, in the file's unit; `None` past the last frame.
     #[must_use]
     pub fn pose(&self, frame: usize) -> Option<Vec<Isometry3<f64>>> {
         let mut numbers = self.frames.get(frame)?.iter();
@@ -134,10 +134,10 @@ impl Bvh {
 
 type Ends = Vec<(usize, Vector3<f64>)>;
 
-/// The joints from `HIERARCHY` up to `MOTION`.
+/// Parses the joints between `HIERARCHY` and `MOTION`.
 fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usize, String)> {
     let (mut joints, mut ends): (Vec<Joint>, Ends) = (Vec::new(), Vec::new());
-    // The open braces: joints, or an end site.
+    // Stack of open braces: joints, or `None` for an end site.
     let mut open: Vec<Option<usize>> = Vec::new();
     let mut next: Option<usize> = None;
     while let Some(line) = lines.get(*at) {
@@ -152,7 +152,7 @@ fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usiz
             ["ROOT" | "JOINT", name @ ..] if !name.is_empty() => {
                 let parent = open.last().copied().flatten();
                 if parent.is_none() && !joints.is_empty() {
-                    return Err(wrong("one root is expected, and joints inside it"));
+                    return Err(wrong("expected one root, and joints inside it"));
                 }
                 next = Some(joints.len());
                 joints.push(Joint { name: name.join(" "), parent, offset: Vector3::zeros(), channels: Vec::new() });
@@ -164,11 +164,11 @@ fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usiz
             }
             ["OFFSET", numbers @ ..] => {
                 let numbers: Vec<f64> = numbers.iter().filter_map(|n| n.parse().ok()).collect();
-                let &[x, y, z] = numbers.as_slice() else { return Err(wrong("an offset is three numbers")) };
+                let &[x, y, z] = numbers.as_slice() else { return Err(wrong("expected three numbers after OFFSET")) };
                 match open.as_slice() {
                     [.., Some(joint)] => joints[*joint].offset = Vector3::new(x, y, z),
                     [.., Some(joint), None] => ends.push((*joint, Vector3::new(x, y, z))),
-                    _ => return Err(wrong("an offset outside of a joint")),
+                    _ => return Err(wrong("OFFSET outside a joint")),
                 }
             }
             ["CHANNELS", count, names @ ..] => {
@@ -176,7 +176,7 @@ fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usiz
                 let channels: Option<Vec<Channel>> = names.iter().map(|name| channel(name)).collect();
                 let channels = channels.ok_or_else(|| wrong("channels are Xposition, …, Zrotation"))?;
                 if count.parse() != Ok(channels.len()) {
-                    return Err(wrong("the number of channels is not that of their names"));
+                    return Err(wrong("the number of channels differs from the number of their names"));
                 }
                 joints[joint].channels = channels;
             }
@@ -184,7 +184,7 @@ fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usiz
         }
         *at += 1;
     }
-    Err((*at, "the file ends before its MOTION".into()))
+    Err((*at, "the file ends before MOTION".into()))
 }
 
 fn channel(name: &str) -> Option<Channel> {
@@ -223,7 +223,7 @@ Frame Time: .01
 ";
 
     #[test]
-    fn joints_turn_what_hangs_on_them() {
+    fn joints_rotate_their_descendants() {
         let bvh = Bvh::parse(ARM).unwrap();
         assert_eq!((bvh.frames(), bvh.joints.len(), bvh.ends[0].0), (2, 2, 1));
         let pose = bvh.pose(1).unwrap();
@@ -235,7 +235,7 @@ Frame Time: .01
     }
 
     #[test]
-    fn mistakes_are_refused_with_their_line() {
+    fn mistakes_are_reported_with_their_line() {
         for (from, to, line) in [
             ("Frames: 2", "Frames: 3", 20),
             ("-90 0 0", "-90 0", 19),

@@ -1,4 +1,4 @@
-//! Motions of a body's bones: from motion capture, or as stored; with errors as body trackers make them.
+//! Motions of a body's bones: from motion capture or files, and with the errors of body trackers.
 
 mod bvh;
 mod noise;

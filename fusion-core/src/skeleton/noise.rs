@@ -3,16 +3,16 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use crate::body::Bone;
 use crate::random::gaussian;
 
-/// How wrong a body tracker's bones are: standard deviations of normal errors.
+/// Standard deviations of a body tracker's errors, which are normally distributed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BoneNoise {
-    /// Of the angle, rad, by which each bone is turned about its joint, about a random axis.
+    /// Rotation of each bone about its joint, about a random axis, in rad.
     pub turn: f64,
-    /// Of each coordinate of its shift, m.
+    /// Translation along each axis, in m.
     pub shift: f64,
 }
 
-/// Motions with errors, anew for every bone and call.
+/// Adds errors to motions, with new random numbers for every bone and call.
 #[must_use]
 pub fn noisy(
     bones: &[Bone],
@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_are_as_large_as_asked_for() {
+    fn errors_have_the_requested_size() {
         let bone = Bone { name: "arm".into(), parent: None, head: [1.0, 2.0, 3.0], tail: [1.0, 3.0, 3.0] };
         let mut random = fastrand::Rng::with_seed(3);
         let noise = BoneNoise { turn: 0.1, shift: 0.02 };

@@ -6,49 +6,49 @@ use crate::body::Bone;
 /// A motion that does not fit a body.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RetargetError {
-    /// None of the body's bones is in the motion.
-    #[error("the motion has no joint of the name of any bone; its root is `{root}`, the body's is `{bone}`")]
+    /// No joint of the motion has the name of a bone.
+    #[error("no joint of the motion has the name of a bone; its root is `{root}`, the body's is `{bone}`")]
     NothingInCommon {
-        /// The motion's root.
+        /// Root of the motion.
         root: String,
-        /// The body's.
+        /// Root of the body.
         bone: String,
     },
-    /// The root must be there: nothing else says where the body is.
+    /// The motion lacks the body's root, which determines the position of the body.
     #[error("the motion has no joint `{bone}`, the root of the body")]
     MissingRoot {
-        /// The body's root.
+        /// Root of the body.
         bone: String,
     },
-    /// There is no such frame.
-    #[error("frame {frame} of {frames}")]
+    /// The motion has no such frame.
+    #[error("frame {frame} does not exist; the motion has {frames} frames")]
     NoFrame {
-        /// The frame asked for.
+        /// Index of the frame.
         frame: usize,
-        /// How many there are.
+        /// Number of frames.
         frames: usize,
     },
 }
 
-/// A body's bones moved as the joints of the same names in a motion whose first frame is a T pose.
+/// Transfer of a motion to a body with bones of the same names. The first frame of the motion is a T pose.
 #[derive(Clone, Debug)]
 pub struct Retarget<'a> {
     bones: &'a [Bone],
     motion: &'a Bvh,
-    /// For each bone its joint.
+    /// Joint of each bone.
     joints: Vec<Option<usize>>,
-    /// What turns each bone from its rest to the T pose.
+    /// Rotation of each bone from rest to the T pose.
     to_t_pose: Vec<UnitQuaternion<f64>>,
     t_pose: Vec<Isometry3<f64>>,
-    /// Metres in a unit of the motion, so that legs have the same length.
+    /// Metres per unit of the motion, chosen so that legs have the same length.
     scale: f64,
 }
 
 impl<'a> Retarget<'a> {
-    /// Finds the joint of each bone by its name. A bone without one moves with its parent; see [`Self::missing`].
+    /// Finds the joint of each bone by its name. A bone without a joint moves with its parent; see [`Self::missing`].
     ///
     /// # Errors
-    /// When the motion has no frames, or lacks the body's root.
+    /// If the motion has no frames, or lacks the body's root.
     pub fn new(bones: &'a [Bone], motion: &'a Bvh) -> Result<Self, RetargetError> {
         let joints: Vec<Option<usize>> =
             bones.iter().map(|bone| motion.joints.iter().position(|joint| joint.name == bone.name)).collect();
@@ -65,15 +65,16 @@ impl<'a> Retarget<'a> {
         Ok(Self { bones, motion, joints, to_t_pose, t_pose, scale })
     }
 
-    /// The bones that move with their parents, for want of a joint.
+    /// Returns the bones without a joint, which move with their parents.
     pub fn missing(&self) -> impl Iterator<Item = &'a str> {
         self.bones.iter().zip(&self.joints).filter(|(_, joint)| joint.is_none()).map(|(bone, _)| bone.name.as_str())
     }
 
-    /// The motion of each bone from rest to a frame. The root goes where the motion's root goes, from its place in the first frame.
+    /// Returns the motion of each bone from rest to a frame. The root moves as the motion's root does from its position
+    /// in the first frame.
     ///
     /// # Errors
-    /// When there is no such frame.
+    /// If the motion has no such frame.
     pub fn motions(&self, frame: usize) -> Result<Vec<Isometry3<f64>>, RetargetError> {
         let frames = self.motion.frames();
         let pose = self.motion.pose(frame).ok_or(RetargetError::NoFrame { frame, frames })?;
@@ -98,8 +99,9 @@ impl<'a> Retarget<'a> {
     }
 }
 
-/// The least turn from a limb's direction at rest to that of its joint in the T pose; a trunk's, or an end's, is as its parent's, or
-/// none. Rigs draw trunks and hips differently, so that directions mean something for limbs only: arms, thighs, legs, by name.
+/// Returns the rotation of each bone from rest to the T pose. A limb rotates by the smallest angle to the direction of
+/// its joint; other bones rotate as their parents, or not at all. Rigs draw trunks and hips differently, so that
+/// directions are meaningful for limbs only: arms, thighs and legs, found by name.
 fn aligned(
     bones: &[Bone],
     motion: &Bvh,
@@ -118,7 +120,7 @@ fn aligned(
         return UnitQuaternion::rotation_between(&own, &there).unwrap_or(identity);
     }
     let of_limb = |name: &str| LIMBS.iter().any(|limb| name.ends_with(limb));
-    // What hangs on a limb's end turns with it: hands with the forearm, feet with nothing (they stand).
+    // The end of a limb rotates with it: hands with the forearm. Feet do not rotate, because the body stands on them.
     match parent {
         Some(parent) if !name.contains("Foot") && !name.contains("Toe") => {
             let mut at = Some(*parent);
@@ -134,7 +136,7 @@ fn aligned(
     }
 }
 
-/// The body's legs over the motion's, as the lengths between joints that both have.
+/// Returns the ratio of leg lengths of body and motion, from the joints that both have.
 fn leg_ratio(bones: &[Bone], joints: &[Option<usize>], t_pose: &[Isometry3<f64>]) -> f64 {
     let (mut own, mut there) = (0.0, 0.0);
     for (bone, joint) in bones.iter().zip(joints) {

@@ -5,52 +5,52 @@ use serde::{Deserialize, Serialize};
 
 use crate::body::Bone;
 
-/// A skeleton's file that cannot be used.
+/// A file of a skeleton that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SkeletonError {
     /// The file cannot be read or written.
     #[error("{}", .path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is malformed.
     #[error("{}", .path.display())]
     Json {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser found, and where.
+        /// Error of the parser, with its position.
         source: serde_json::Error,
     },
-    /// The model's weights refer to a bone that the skeleton does not move.
+    /// The skeleton lacks a bone that the model's weights use.
     #[error("the skeleton has no bone `{bone}`, which the model's weights refer to; it has {known}")]
     MissingBone {
-        /// The bone.
+        /// Name of the bone.
         bone: String,
-        /// The bones it has.
+        /// Names of the skeleton's bones.
         known: String,
     },
-    /// A frame has too few bones, or a number that is none.
-    #[error("frame {frame}: every bone needs a unit quaternion and a shift, all finite")]
+    /// A frame has too few bones, or a number that is not finite.
+    #[error("frame {frame}: expected a finite unit quaternion and translation for every bone")]
     BadFrame {
-        /// The frame.
+        /// Index of the frame.
         frame: usize,
     },
 }
 
-/// What a body tracker delivers: for each frame the motion of each bone from the model's rest to that frame.
+/// Bones of a body tracker: for each frame, the motion of each bone from the model's rest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Skeleton {
     /// Names of the bones.
     pub bones: Vec<String>,
-    /// For each frame, for each bone (w, x, y, z | x, y, z): unit quaternion and shift, m.
+    /// Unit quaternion and translation in m, (w, x, y, z | x, y, z), by frame, then bone.
     pub frames: Vec<Vec<[f64; 7]>>,
 }
 
 impl Skeleton {
-    /// Of bones, without frames.
+    /// Creates a skeleton of these bones without frames.
     #[must_use]
     pub fn of(bones: &[Bone]) -> Self {
         Self { bones: bones.iter().map(|bone| bone.name.clone()).collect(), frames: Vec::new() }
@@ -65,10 +65,10 @@ impl Skeleton {
         self.frames.push(motions.iter().map(numbers).collect());
     }
 
-    /// The motions of a model's bones in a frame, in the model's order; none past the last frame.
+    /// Returns the motions of a model's bones in a frame, in the model's order; `None` past the last frame.
     ///
     /// # Errors
-    /// When a bone is missing, or a number is none.
+    /// If a bone is missing, or a number is not finite.
     pub fn motions(&self, frame: usize, bones: &[Bone]) -> Result<Option<Vec<Isometry3<f64>>>, SkeletonError> {
         let Some(numbers) = self.frames.get(frame) else { return Ok(None) };
         let motion =
@@ -90,18 +90,18 @@ impl Skeleton {
     /// Reads a file.
     ///
     /// # Errors
-    /// When it cannot be read or is malformed.
+    /// If the file cannot be read or is malformed.
     pub fn read(path: &Path) -> Result<Self, SkeletonError> {
         let text = std::fs::read_to_string(path).map_err(|source| SkeletonError::File { path: path.into(), source })?;
         serde_json::from_str(&text).map_err(|source| SkeletonError::Json { path: path.into(), source })
     }
 
-    /// Writes a file, whole or not at all.
+    /// Writes a file completely or not at all.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), SkeletonError> {
         let text = serde_json::to_vec(self).map_err(|source| SkeletonError::Json { path: path.into(), source })?;
-        verify::write_whole(path, &text).map_err(|source| SkeletonError::File { path: path.into(), source })
+        energy_cli::write_whole(path, &text).map_err(|source| SkeletonError::File { path: path.into(), source })
     }
 }

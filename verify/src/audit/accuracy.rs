@@ -8,8 +8,8 @@ use crate::sample::{Sample, has_points};
 
 const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
-/// The largest error in units of roundoff of the block's largest number. A block that vanishes has rounding errors of its
-/// natural size.
+/// Returns the largest error in units of roundoff of the block's largest number. Errors of a zero block are relative to
+/// its natural size.
 pub(super) fn in_roundoffs(truth: &TrueBlock, got: &[f64], natural: f64) -> f64 {
     let error = truth.block.numbers.iter().zip(got).map(|(t, &g)| t.error_of(g)).fold(0.0, worse);
     let largest = truth.largest();
@@ -21,11 +21,12 @@ pub(super) fn in_roundoffs(truth: &TrueBlock, got: &[f64], natural: f64) -> f64 
     }
 }
 
-/// κ of a block: how much a relative componentwise perturbation of the edges between points (and of those of the rest shape; of
-/// what is no point, of every number) is amplified, in the largest norm; the most of sixteen random patterns of signs. What forms
-/// edges in working precision cannot in general be more accurate than κ roundoffs.
+/// Returns κ of a block: the amplification, in the maximum norm, of relative componentwise perturbations of the edges
+/// between points and of the rest shape's edges. Inputs that are not points are perturbed themselves. κ is the maximum
+/// over sixteen random sign patterns. Code that computes edges in working precision cannot in general be more accurate
+/// than κ roundoffs.
 pub(crate) fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
-    // Large against rounding, small against all else.
+    // Large compared with rounding, small compared with everything else.
     const PERTURBATION: f64 = 1.0 / (1 << 20) as f64;
     let here = answer.block(block);
     let mut random = Rng::with_seed(1);
@@ -65,7 +66,7 @@ fn perturbed(declaration: &Declaration, sample: &Sample, by: f64, random: &mut R
     Sample { parameters, rest, positions, velocities }
 }
 
-/// That of a rest shape of points.
+/// Returns the dimension of the rest shape's points; `None` if it has none.
 fn dimension(rest: &[Field]) -> Option<usize> {
     let dimension = rest.first()?.size;
     ((2..=3).contains(&dimension) && rest.iter().all(|field| field.size == dimension)).then_some(dimension)
@@ -92,7 +93,7 @@ mod tests {
         ($($name:ident),* $(,)?) => { [$(energy_elements::$name::<f32>::evaluate::<f32> as EvaluateSingle),*] };
     }
 
-    /// The blocks of an element in single precision.
+    /// Evaluates an element's blocks in single precision.
     fn in_single_precision(evaluate: EvaluateSingle, sample: &Sample) -> Vec<(&'static str, Vec<f64>)> {
         let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| single(list));
         let [parameters, rest, positions, velocities] = lists.each_ref().map(Vec::as_slice);
@@ -101,7 +102,8 @@ mod tests {
         outputs.blocks.into_iter().map(|(name, numbers)| (name, doubles(numbers))).collect()
     }
 
-    /// Every element within 8 u·max(1, κ) of single precision's u, against the truth at inputs that are single-precision numbers.
+    /// Each element is within 8 u·max(1, κ), with u of single precision, at inputs that single precision represents
+    /// exactly.
     #[test]
     fn elements_are_as_accurate_in_single_precision() {
         let mut beyond = Vec::new();

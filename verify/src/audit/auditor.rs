@@ -1,4 +1,4 @@
-//! One element under audit: its inputs with what they must give, and the notes taken.
+//! An element under audit: inputs with their expected results, and the findings.
 
 use std::collections::BTreeMap;
 
@@ -13,13 +13,13 @@ use crate::geometry::{Rotation, rotate_all};
 use crate::multiprecision::{TrueBlock, truth_of_ordinary};
 use crate::sample::{Sample, Sampler};
 
-/// An input, with what does not depend on the code under audit.
+/// An input with the expected results, which do not depend on the code under audit.
 pub(super) struct Case {
     pub(super) sample: Sample,
     pub(super) turn: Rotation,
-    /// By hyper-dual numbers through the textbook form.
+    /// Blocks by hyper-dual numbers through the textbook form.
     pub(super) dual: Vec<Block>,
-    /// In multi-precision; of some cases only, for it takes time.
+    /// Blocks in multi-precision; empty for most cases, because they are slow.
     pub(super) truth: Vec<TrueBlock>,
 }
 
@@ -37,12 +37,12 @@ impl Case {
     }
 }
 
-/// Digits of the truth that doubles are held against.
+/// Digits of the multi-precision blocks.
 const DIGITS: usize = 25;
-/// Every so many inputs one has whole coordinates.
+/// One in this many inputs has integer coordinates.
 const LATTICE: usize = 5;
 
-/// Inputs drawn from a seed, `with_truth` of them with multi-precision blocks.
+/// Draws inputs from a seed; the first `with_truth` get multi-precision blocks.
 pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: u64) -> Vec<Case> {
     let mut sampler = Sampler::new(subject.declaration, seed);
     (0..samples)
@@ -57,12 +57,12 @@ pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: 
         .collect()
 }
 
-/// Whether the element says that an input is no ordinary one: then there is nothing to hold it to.
+/// Whether the element flags an input as degenerate, so that no result can be expected.
 fn is_flagged(subject: &Subject, sample: &Sample) -> bool {
     subject.answer(sample).is_ok_and(|answer| answer.flags.iter().any(|flags| flags.any()))
 }
 
-/// One input that was asked for.
+/// Creates the case of a given input.
 pub(super) fn case(subject: &Subject, sample: Sample, turn: Rotation, with_truth: bool) -> Case {
     let Subject { declaration, formula, .. } = subject;
     Case {
@@ -73,7 +73,7 @@ pub(super) fn case(subject: &Subject, sample: Sample, turn: Rotation, with_truth
     }
 }
 
-/// What is being audited, and what was noted.
+/// The element under audit, and the findings so far.
 pub(super) struct Auditor<'a> {
     pub(super) subject: &'a Subject,
     pub(super) declaration: &'static Declaration,
@@ -81,7 +81,7 @@ pub(super) struct Auditor<'a> {
     places: BTreeMap<(Check, BlockName), usize>,
 }
 
-/// What is noted of one comparison.
+/// The result of one comparison.
 pub(super) struct Finding<'a> {
     pub(super) check: Check,
     pub(super) block: BlockName,
@@ -99,7 +99,7 @@ impl<'a> Auditor<'a> {
         self.subject.answer(sample)
     }
 
-    /// Notes a finding; `detail` is asked for only if it is the worst of its check and block.
+    /// Records a finding. `detail` is evaluated only if it is the worst of its check and block.
     pub(super) fn record(&mut self, finding: &Finding<'_>, detail: impl FnOnce() -> String) {
         let &Finding { check, block, error, order, sample } = finding;
         let element = self.declaration.name;
@@ -114,7 +114,7 @@ impl<'a> Auditor<'a> {
         if let Some(order) = order {
             line.order = Some(line.order.map_or(order, |least: f64| least.min(order)));
         }
-        // A NaN is worse than anything.
+        // NaN is worse than any error.
         if line.input.is_none() || error > line.worst || (error.is_nan() && !line.worst.is_nan()) {
             line.worst = error;
             line.detail = detail();
@@ -122,14 +122,14 @@ impl<'a> Auditor<'a> {
         }
     }
 
-    /// The length over which stepping an input changes an element.
+    /// Returns the length over which stepping an input changes an element.
     pub(super) fn length(&self, sample: &Sample, stepped: Stepped) -> f64 {
         if stepped == Stepped::Positions { sample.feature_length(self.declaration) } else { 1.0 }
     }
 
-    /// How large a block is by nature. A derivative: what its antiderivative would need to change by its own size over a length.
-    /// What is not one: what its derivative amounts to over a length. Where a block vanishes, rounding errors of about a unit of
-    /// roundoff of this are left on every route.
+    /// Returns the natural size of a block. For a derivative, it is the change per length that changes the
+    /// antiderivative by its own size. For other blocks, it is the change of the block over a length, by its
+    /// derivative. If a block vanishes, every route leaves rounding errors of about one roundoff of this size.
     pub(super) fn natural_size(&self, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
         let kind = self.declaration.kind;
         if let Some((lower, stepped)) = antiderivative(block, kind) {

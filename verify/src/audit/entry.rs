@@ -2,7 +2,7 @@ use energy_dsl::Declaration;
 
 use crate::blocks::{Block, BlockName};
 
-/// An entry by points and axes, as in `(x1.y, x3.z)`.
+/// Formats the position of an entry by points and axes, as in `(x1.y, x3.z)`.
 pub(super) fn entry_name(declaration: &Declaration, block: &Block, entry: usize) -> String {
     let coordinate = |number: usize| {
         let mut number = number;

@@ -1,11 +1,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use energy_cli::plot::{Curve, logarithmic};
+
 use super::report::{Check, Report, Section, describe_failure};
 use crate::blocks::BlockName;
-use crate::plot::{Curve, logarithmic};
 
-/// The report as one page that needs nothing else: formulas, tables, errors of differences against their step, errors by
+/// Formats the report as a self-contained page: formulas, tables, errors of differences against their step, errors by
 /// configuration, planted faults.
 #[must_use]
 pub fn html(report: &Report) -> String {
@@ -14,7 +15,8 @@ pub fn html(report: &Report) -> String {
          body{font:15px/1.45 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#222}\n\
          table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.15rem .7rem;border-bottom:1px solid #ddd;\
          text-align:left;font-variant-numeric:tabular-nums}td.n{text-align:right}\n\
-         .ok{color:#176b2c}.failed{color:#b00020;font-weight:600}pre{background:#f6f6f6;padding:.6rem;overflow-x:auto}\n\
+         .ok{color:#176b2c}.failed{color:#b00020;font-weight:600}\
+          pre{background:#f6f6f6;padding:.6rem;overflow-x:auto}\n\
          section{border-top:2px solid #444;margin-top:2rem}.plots{display:flex;flex-wrap:wrap;gap:.5rem}\n\
          .heat td{border:1px solid #fff;min-width:3.4rem;text-align:center}summary{cursor:pointer}\n\
          </style></head><body>\n<h1>Audit</h1>\n",
@@ -27,7 +29,7 @@ pub fn html(report: &Report) -> String {
     page
 }
 
-/// The characters that markup reserves, written as entities.
+/// Escapes the characters that markup reserves.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -37,7 +39,8 @@ fn overview(page: &mut String, report: &Report) {
     let class = if failed == 0 { "ok" } else { "failed" };
     let _ = writeln!(
         page,
-        "<p class=\"{class}\">{} elements, {} checks, {failed} failed.</p>\n<table><tr><th>element</th><th>worst error, u</th>\
+        "<p class=\"{class}\">{} elements, {} checks, {failed} failed.</p>\n\
+         <table><tr><th>element</th><th>worst error, u</th>\
          <th>worst error, u·κ</th><th>planted faults noticed</th><th>verdict</th></tr>",
         report.elements(),
         report.lines.len(),
@@ -50,7 +53,8 @@ fn overview(page: &mut String, report: &Report) {
         let name = escaped(section.element);
         let _ = writeln!(
             page,
-            "<tr><td><a href=\"#{name}\">{name}</a></td><td class=\"n\">{:.2}</td><td class=\"n\">{:.2}</td><td>{faults}</td>\
+            "<tr><td><a href=\"#{name}\">{name}</a></td>\
+             <td class=\"n\">{:.2}</td><td class=\"n\">{:.2}</td><td>{faults}</td>\
              {}</tr>",
             worst(|a| a.worst),
             worst(|a| a.worst_kappa),
@@ -90,13 +94,15 @@ fn element(page: &mut String, report: &Report, section: &Section) {
 
 fn accuracy(page: &mut String, section: &Section) {
     page.push_str(
-        "<h3>Accuracy against multi-precision</h3><table><tr><th>block</th><th>inputs</th><th>worst, u</th><th>entry</th>\
+        "<h3>Accuracy against multi-precision</h3>\
+         <table><tr><th>block</th><th>inputs</th><th>worst, u</th><th>entry</th>\
          <th>worst, u·κ</th></tr>",
     );
     for line in &section.accuracy {
         let _ = writeln!(
             page,
-            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2}</td><td>{}</td><td class=\"n\">{:.2}</td></tr>",
+            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2}</td><td>{}</td>\
+             <td class=\"n\">{:.2}</td></tr>",
             line.block,
             line.inputs,
             line.worst,
@@ -148,7 +154,7 @@ fn plots(page: &mut String, section: &Section) {
     page.push_str("</div>\n");
 }
 
-/// Worst error by size and shape of the configuration.
+/// Draws the worst error by size and shape of the configuration.
 fn heat_map(page: &mut String, section: &Section) {
     const SHAPES: usize = 5;
     let mut cells: BTreeMap<(BlockName, i32), [f64; SHAPES]> = BTreeMap::new();
@@ -187,7 +193,8 @@ fn faults(page: &mut String, section: &Section) {
     let Some(score) = &section.mutations else { return };
     let _ = writeln!(
         page,
-        "<h3>Planted faults</h3><p>{} of {} noticed; of others drawn, {} provably change nothing, {} change last bits only, {} change nothing at \
+        "<h3>Planted faults</h3><p>{} of {} noticed; of others drawn, {} provably change nothing, \
+         {} change last bits only, {} change nothing at \
          any input tried.</p>\
          <details><summary>which check notices which</summary><table><tr><th>fault</th><th>noticed by</th></tr>",
         score.caught(),

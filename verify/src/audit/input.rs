@@ -5,11 +5,11 @@ use serde_json::Value;
 
 use crate::sample::Sample;
 
-/// The inputs of a file: one object, a list of them, or all that the lines of a report hold, with the elements they are for where
-/// the file says so.
+/// Reads the inputs of a file: one object, a list of objects, or the inputs in a report. Returns each with the name of
+/// its element, if the file names it.
 ///
 /// # Errors
-/// When the file cannot be read, or holds no input.
+/// If the file cannot be read, or contains no input.
 pub fn read_inputs(path: &Path) -> anyhow::Result<Vec<(Option<String>, Sample)>> {
     let place = || path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", place()))?;
@@ -29,11 +29,11 @@ pub fn read_inputs(path: &Path) -> anyhow::Result<Vec<(Option<String>, Sample)>>
             inputs.push((None, sample(input).with_context(|| format!("{}", place()))?));
         }
     }
-    anyhow::ensure!(!inputs.is_empty(), "{} holds no input", place());
+    anyhow::ensure!(!inputs.is_empty(), "{} contains no input", place());
     Ok(inputs)
 }
 
 fn sample(value: &Value) -> anyhow::Result<Sample> {
     serde_json::from_value(value.clone())
-        .context("an input is an object with `positions`, `velocities`, `rest`, `parameters`")
+        .context("expected an object with `positions`, `velocities`, `rest` and `parameters`")
 }

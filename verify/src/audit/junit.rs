@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 use super::html::escaped;
 use super::report::{Report, describe_failure};
 
-/// The report as JUnit XML: a suite to each element, a case to each check of each block and to each planted fault.
+/// Formats the report as JUnit XML: one suite per element, one case per check of a block and per planted fault.
 #[must_use]
 pub fn junit(report: &Report) -> String {
     let mut suites = String::new();

@@ -1,4 +1,5 @@
-//! What a block must be whatever the formula: finite, symmetric, in balance, the same elsewhere and in other units.
+//! Laws that hold for any formula: blocks are finite, symmetric and balanced, and do not depend on the origin or the
+//! units.
 
 use energy_compiler::unit_exponents;
 use energy_dsl::Kind;
@@ -13,7 +14,7 @@ use crate::formula::rows;
 use crate::sample::{Sample, has_points};
 
 impl Auditor<'_> {
-    /// Every law at one input.
+    /// Checks every law at one input.
     pub(super) fn laws(&mut self, case: &Case, answer: &Answer) -> Result<(), NoAnswer> {
         let has_points = has_points(self.declaration);
         self.finite(&case.sample, answer);
@@ -49,7 +50,7 @@ impl Auditor<'_> {
         }
     }
 
-    /// A finding without an order.
+    /// Records a finding without an order of convergence.
     pub(super) fn note(
         &mut self,
         check: Check,
@@ -61,7 +62,7 @@ impl Auditor<'_> {
         self.record(&Finding { check, block, error, order: None, sample }, detail);
     }
 
-    /// Routines also return what comes before the block that they are for: it must be the same.
+    /// Routines also return blocks of lower order, which must be the same from each routine.
     fn repeats(&mut self, sample: &Sample, answer: &Answer) {
         let declaration = self.declaration;
         for (routine, repeat) in &answer.repeats {
@@ -100,8 +101,9 @@ impl Auditor<'_> {
         });
     }
 
-    /// Σ f = 0 follows from translation invariance for whatever has a potential, and so does Σ x × f = 0 from rotation
-    /// invariance; a force that has none may keep either law or not, so it must keep what its own textbook form keeps.
+    /// Checks momentum balance. With a potential, translation invariance implies Σ f = 0 and rotation invariance
+    /// implies Σ x × f = 0. A force without a potential may obey either law or not, and must do what its own textbook
+    /// form does.
     fn momenta(&mut self, case: &Case, answer: &Answer) {
         let sample = &case.sample;
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-10 * a.abs().max(b.abs());
@@ -112,7 +114,7 @@ impl Auditor<'_> {
         let squared = |rows: &[f64]| rows.iter().map(|c| c * c).sum::<f64>();
         let laws = match self.declaration.kind {
             Kind::Energy => vec![(BlockName::Gradient, true, invariant)],
-            // ½ k CᵀC turns with the points if ‖C‖ does; its damping force only if every row of C does.
+            // ½ k CᵀC is rotation invariant if ‖C‖ is; the damping force only if every row of C is.
             Kind::Constraint => vec![
                 (BlockName::Gradient, true, close(squared(&here), squared(&there))),
                 (BlockName::Force, true, invariant),
@@ -138,7 +140,7 @@ impl Auditor<'_> {
         }
     }
 
-    /// Moved by what keeps every difference of coordinates, all blocks have the same bits.
+    /// Checks that a translation that preserves every coordinate difference exactly preserves all bits.
     fn translation(&mut self, sample: &Sample) -> Result<(), NoAnswer> {
         const GRID: f64 = (1 << 20) as f64;
         const SHIFT: [f64; 3] = [64.0, -128.0, 32.0];
@@ -151,8 +153,8 @@ impl Auditor<'_> {
         self.same_bits(Check::Translation, &here, &there, "moved by (64, −128, 32)", |_| 0)
     }
 
-    /// In kilograms of 8, metres of ¼ and seconds of 2 all blocks are what they were, times a power of two; where the units of all
-    /// inputs are known.
+    /// Checks that a change of units to 8 kg, ¼ m and 2 s multiplies each block by a power of two. Skipped unless all
+    /// units are known.
     fn units(&mut self, sample: &Sample) -> Result<(), NoAnswer> {
         let declaration = self.declaration;
         let result = match declaration.kind {
@@ -184,7 +186,7 @@ impl Auditor<'_> {
             positions: by(&sample.positions, LENGTH),
             velocities: by(&sample.velocities, [0.0, 1.0, -1.0]),
         };
-        // Each derivative takes a length, or a velocity, away.
+        // Each derivative divides by a length or a velocity.
         let shift = |block: BlockName| {
             let lengths = match block {
                 BlockName::Gradient | BlockName::ForceByPosition => 1,
@@ -197,7 +199,7 @@ impl Auditor<'_> {
         self.same_bits(Check::Units, sample, &there, "in kilograms of 8, metres of ¼, seconds of 2", shift)
     }
 
-    /// Whether all blocks there are those here times a power of two.
+    /// Whether two lists of numbers are equal up to a power of two.
     fn same_bits(
         &mut self,
         check: Check,
@@ -227,7 +229,8 @@ impl Auditor<'_> {
         Ok(())
     }
 
-    /// A constraint's force at rest is −∇U; what velocities add to a force takes power away.
+    /// Checks that the static force of a constraint is −∇U, and that the velocity-dependent part of a force dissipates
+    /// power.
     fn damping(&mut self, sample: &Sample, answer: &Answer) -> Result<(), NoAnswer> {
         let declaration = self.declaration;
         let still = self.answer(&Sample { velocities: vec![0.0; sample.velocities.len()], ..sample.clone() })?;
@@ -243,13 +246,13 @@ impl Auditor<'_> {
             let scale = largest(&added).max(f64::EPSILON * moving.largest()) * largest(&sample.velocities);
             let error = if power <= 0.0 { 0.0 } else { power / scale };
             self.note(Check::Dissipation, BlockName::Force, error, sample, || {
-                format!("  velocities add the power {power:e}, at{}", sample.describe(declaration))
+                format!("  the velocity-dependent force adds the power {power:e}, at{}", sample.describe(declaration))
             });
         }
         Ok(())
     }
 
-    /// Whether a force is what minus the gradient of an energy says.
+    /// Checks that a force is minus the gradient of an energy.
     pub(super) fn minus_gradient(&mut self, sample: &Sample, force: &Block, expected: &[f64], of: &str) {
         let declaration = self.declaration;
         let (entry, error) = worst(&force.numbers, expected);
@@ -266,7 +269,7 @@ impl Auditor<'_> {
         });
     }
 
-    /// The Hessian at the rest shape has no negative eigenvalue.
+    /// Checks that the Hessian at the rest shape has no negative eigenvalue.
     pub(super) fn semi_definite_at_rest(&mut self, sample: &Sample, hessian: &Block) {
         let declaration = self.declaration;
         let values = eigenvalues(hessian.columns, &hessian.numbers);
@@ -281,8 +284,8 @@ impl Auditor<'_> {
     }
 }
 
-/// Whether what velocities add to a force ought to take power away: where ∂f/∂v is symmetric, or all points together feel none of it.
-/// A lift or a drive is neither.
+/// Whether the velocity-dependent part of a force should dissipate: if ∂f/∂v is symmetric, or a common velocity of all
+/// points has no effect. Lift and drive forces do neither.
 fn is_damping(added: &[f64], by_velocity: &Block) -> bool {
     let n = by_velocity.columns;
     let entry = |i: usize, j: usize| by_velocity.numbers[i * n + j];
@@ -295,19 +298,19 @@ fn is_damping(added: &[f64], by_velocity: &Block) -> bool {
 const NUMBER: [f64; 3] = [0.0; 3];
 const LENGTH: [f64; 3] = [0.0, 1.0, 0.0];
 
-/// log₂ of what the number of a quantity is multiplied by in kilograms of 8, metres of ¼ and seconds of 2.
+/// Returns log₂ of the factor by which a quantity's number changes in units of 8 kg, ¼ m and 2 s.
 fn power([kilograms, metres, seconds]: [f64; 3]) -> i32 {
-    // Exponents of declared units are whole where this is used; a half would not be a power of two, and shows as a failure.
+    // Exponents of declared units are integers here; a half would not give a power of two, and fails the check.
     (-3.0 * kilograms + 2.0 * metres - seconds).round() as i32
 }
 
-/// The unit of each number of the rest shape, then of the parameters.
+/// Returns the unit of each number of the rest shape, then of the parameters.
 fn fields(declaration: &energy_dsl::Declaration) -> impl Iterator<Item = Option<[f64; 3]>> {
     let all = declaration.rest.iter().chain(declaration.parameters);
     all.flat_map(|field| std::iter::repeat_n(unit_exponents(field.unit), field.size))
 }
 
-/// The place and size of the largest difference.
+/// Returns the position and size of the largest difference.
 fn worst(a: &[f64], b: &[f64]) -> (usize, f64) {
     let errors = a.iter().zip(b).map(|(x, y)| (x - y).abs()).enumerate();
     errors.fold((0, 0.0_f64), |most, next| if next.1 > most.1 || next.1.is_nan() { next } else { most })

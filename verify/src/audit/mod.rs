@@ -1,4 +1,4 @@
-//! What is checked of a declared element, and the report of it.
+//! Checks of declared elements, and their report.
 
 mod accuracy;
 mod auditor;
@@ -34,18 +34,18 @@ use crate::geometry::{Rotation, longest_distance, shortest_distance};
 use crate::multiprecision::TrueBlock;
 use crate::sample::{Sample, has_points};
 
-/// How thorough an audit is.
+/// Thoroughness of an audit.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Random inputs for each element.
+    /// Random inputs per element.
     pub samples: usize,
-    /// At how many of them multi-precision is computed.
+    /// Number of inputs with multi-precision results.
     pub truths: usize,
     /// Faults to plant in each element.
     pub mutations: usize,
-    /// At how many inputs a fault may show.
+    /// Number of inputs at which a fault may be noticed.
     pub trials: usize,
-    /// What the inputs are drawn from.
+    /// Seed of the random inputs.
     pub seed: u64,
 }
 
@@ -56,25 +56,25 @@ impl Default for Options {
 }
 
 impl Options {
-    /// For every change of the code: seconds for all elements.
+    /// Options for every change of the code: seconds for all elements.
     #[must_use]
     pub fn quick() -> Self {
         Self { samples: 20, truths: 5, mutations: 10, trials: 25, ..Self::default() }
     }
 }
 
-/// An audit of the elements of the catalogue with these names; of all of them for an empty list.
+/// Audits the elements of the catalogue with these names; all if the list is empty.
 ///
 /// # Errors
-/// The first name that the catalogue does not have.
+/// If the catalogue does not have one of the names.
 pub fn audit_catalogue(names: &[&str], options: Options) -> Result<Report, String> {
     Ok(audit_all(&catalogue_targets(names)?, None, options))
 }
 
-/// The elements of the catalogue with these names; all of them for an empty list.
+/// Returns the elements of the catalogue with these names; all if the list is empty.
 ///
 /// # Errors
-/// The first name that the catalogue does not have.
+/// If the catalogue does not have one of the names.
 pub fn catalogue_targets(names: &[&str]) -> Result<Vec<Target>, String> {
     let catalogue = energy_elements::catalogue();
     if let Some(unknown) = names.iter().find(|name| energy_elements::find(name).is_none()) {
@@ -85,8 +85,8 @@ pub fn catalogue_targets(names: &[&str]) -> Result<Vec<Target>, String> {
     Ok(chosen.map(Target::of_catalogue).collect())
 }
 
-/// An audit of all targets, on all processors; the report is in their order. Where an energy is given, they are forces that must be
-/// minus its gradient: at the same points, with its parameters by name.
+/// Audits all targets on all processors; the report is in their order. If an energy is given, the targets are forces
+/// that must be minus its gradient, at the same points and with its parameters by name.
 #[must_use]
 pub fn audit_all(targets: &[Target], energy: Option<&Target>, options: Options) -> Report {
     let next = AtomicUsize::new(0);
@@ -126,10 +126,10 @@ fn audit_target(target: &Target, energy: Option<&Target>, options: Options) -> R
     }
 }
 
-/// An audit of all checks at one input that was asked for.
+/// Runs all checks at one given input.
 ///
 /// # Errors
-/// When the element cannot be audited, or the input does not fit it.
+/// If the element cannot be audited, or the input does not fit it.
 pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Result<Report, String> {
     let subject = target.subject()?;
     sample.fits(subject.declaration)?;
@@ -144,7 +144,7 @@ pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Re
     Ok(Report { lines: auditor.lines, sections: vec![section], refused: Vec::new() })
 }
 
-/// Audits one generated element. Without its source compiled again, no faults are planted.
+/// Audits one generated element. No faults are planted, because that needs its source.
 #[must_use]
 pub fn audit(declaration: &'static Declaration, evaluate: Evaluate, options: Options) -> Report {
     let report = Subject::new(declaration, Box::new(evaluate), None).and_then(|subject| run(&subject, None, options));
@@ -162,7 +162,7 @@ fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<
         }
     }
     let lines = auditor.lines;
-    // Faults in what is at fault already tell nothing.
+    // Faults in a faulty element tell nothing.
     if options.mutations > 0 && lines.iter().all(|line| line.passed) {
         let score =
             subject.interpreted.as_ref().map(|i| mutations::score(i, options.mutations, options.trials, options.seed));
@@ -203,11 +203,11 @@ fn audit_case(auditor: &mut Auditor<'_>, section: &mut Section, case: &Case) -> 
     Ok(())
 }
 
-/// Holds a force against an energy at one input.
+/// Compares a force with minus the gradient of an energy at one input.
 fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case) -> Result<(), String> {
     let (force, potential) = (auditor.declaration, energy.declaration);
     if !auditor.subject.has_velocities() {
-        return Err(format!("{} is no force: it cannot be held against {}", force.name, potential.name));
+        return Err(format!("{} is not a force, so it cannot be compared with {}", force.name, potential.name));
     }
     let mut still = case.sample.clone();
     still.velocities.fill(0.0);
@@ -220,12 +220,12 @@ fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case) -> R
             (field.name == wanted.name && field.size == wanted.size).then_some(own)
         });
         let found = found.ok_or_else(|| {
-            format!("{} has a parameter `{}` that {} has not", potential.name, wanted.name, force.name)
+            format!("{} has a parameter `{}`, which {} lacks", potential.name, wanted.name, force.name)
         })?;
         sample.parameters.extend_from_slice(found);
     }
     if sample.positions.len() != potential.points.iter().map(|p| p.size).sum::<usize>() {
-        return Err(format!("{} and {} are of different numbers of points", force.name, potential.name));
+        return Err(format!("{} and {} have different numbers of points", force.name, potential.name));
     }
     let answer = auditor.answer(&still).map_err(|e| e.to_string())?;
     let gradient = energy.answer(&sample).map_err(|e| e.to_string())?;
@@ -237,7 +237,8 @@ fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case) -> R
 /// Audits an element in a test.
 ///
 /// # Panics
-/// When a check fails, with the element, the block, the entry, the values by all routes, the step of differences and the input.
+/// If a check fails. The message has the element, block and entry, the results of all routes, the step of the
+/// differences, and the input.
 pub fn assert_derivatives<E: Element>(samples: usize) {
     let options = Options { samples, truths: samples.min(5), mutations: 0, ..Options::default() };
     let report = audit(E::DECLARATION, E::evaluate::<f64>, options);

@@ -1,4 +1,4 @@
-//! How sensitive the audit is: faults are planted in compiled routines, and each must be noticed.
+//! Mutation testing of the audit: faults are planted in compiled routines, and each must be noticed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,10 +14,11 @@ use crate::blocks::{BlockName, NoAnswer};
 use crate::multiprecision::{Big, worse};
 use crate::sample::{Sample, Sampler};
 
-/// Plants up to `wanted` faults, spread over kinds and routines; each has so many inputs to show at. Faults that provably change nothing are counted apart.
+/// Plants up to `wanted` faults, spread over kinds and routines, and tries each at `trials` inputs. Faults that
+/// provably change nothing are counted separately.
 ///
 /// # Errors
-/// When an input has no answer even without a fault.
+/// If an input has no result even without a fault.
 pub(super) fn score(
     interpreted: &Interpreted,
     wanted: usize,
@@ -64,10 +65,12 @@ fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
     Subject::new(interpreted.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), None)
 }
 
-/// How much a fault that went unnoticed changes results, without rounding: the largest difference at any input, as a part of what it may be
-/// there unnoticed. That is, of a block, twice what accuracy is allowed, 8 u·max(1, κ), because rounding may hide as much; of what a
-/// routine repeats of another, what routines may differ by. The last coefficient of a series changes last bits only; an operation
-/// that no input reaches, or whose other operand is 1 wherever it counts, changes nothing.
+/// Returns by how much an unnoticed fault changes results without rounding: the largest difference at any input,
+/// relative to what may go unnoticed.
+///
+/// For a block, that is twice the allowed error of accuracy, 8 u·max(1, κ), because rounding may hide as much. For a
+/// block that another routine repeats, it is the allowed difference between routines. The last coefficient of a series
+/// changes only last bits. An operation that no input reaches, or whose other operand is always 1, changes nothing.
 fn largest_difference(subject: &Subject, sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> Option<f64> {
     let mut most = 0.0_f64;
     for Trial { case, .. } in trials {
@@ -81,7 +84,8 @@ fn largest_difference(subject: &Subject, sound: &Interpreted, broken: &Interpret
     Some(most)
 }
 
-/// The largest difference of a block in units of its largest number, without rounding; and that of what routines repeat.
+/// Returns the largest difference of a block without rounding, relative to its largest number, and the largest
+/// difference of repeated blocks.
 fn exact_differences(sound: &Interpreted, broken: &Interpreted, sample: &Sample) -> Option<[f64; 2]> {
     let big = |numbers: &[f64]| numbers.iter().map(|&x| Big::from_f64(x)).collect::<Vec<_>>();
     let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| big(list));
@@ -106,13 +110,13 @@ fn relative_difference(a: &[Big], b: &[Big]) -> f64 {
     if change == 0.0 { 0.0 } else { change / size }
 }
 
-/// An input, and the checks that fail there without any fault: near a singularity some routes lose their digits.
+/// An input, and the checks that fail there without a fault: near a singularity some routes lose their digits.
 struct Trial {
     case: Case,
     fails_anyway: Vec<Check>,
 }
 
-/// One input for each outcome of a comparison that no ordinary input has, as far as a search finds one.
+/// Searches for an input with each outcome of a comparison that ordinary inputs do not have.
 fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial], seed: u64) -> Vec<Trial> {
     const CANDIDATES: usize = 4000;
     let branches = |sample: &Sample| interpreted.branches(&sample.inputs()).ok();
@@ -136,7 +140,7 @@ fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial
         let mut auditor = Auditor::new(subject);
         let sound = look(&mut auditor, &case).is_ok();
         let fails_anyway = failed(&auditor);
-        // Where the code under audit flags its own result, or has none, nothing can be held against it.
+        // If the code under audit flags its result, or has none, there is nothing to compare.
         if sound && !fails_anyway.contains(&Check::Finite) && !fails_anyway.contains(&Check::Accuracy) {
             seen.extend(taken.into_iter().enumerate());
             found.push(Trial { case, fails_anyway });
@@ -152,11 +156,11 @@ fn failed(auditor: &Auditor<'_>) -> Vec<Check> {
     checks
 }
 
-/// The checks that fail at the first input at which one does that would not without the fault.
+/// Returns the checks that fail because of the fault, at the first input where any does.
 fn caught_by(broken: &Subject, trials: &[Trial]) -> Vec<Check> {
     for trial in trials {
         let mut auditor = Auditor::new(broken);
-        // What cannot even be evaluated is noticed too.
+        // A failed evaluation counts as noticed.
         if look(&mut auditor, &trial.case).is_err() {
             return vec![Check::Finite];
         }
@@ -176,7 +180,7 @@ fn look(auditor: &mut Auditor<'_>, case: &Case) -> Result<(), NoAnswer> {
     Ok(())
 }
 
-/// In an order that takes kinds of fault and routines by turns.
+/// Orders faults so that kinds and routines alternate.
 fn spread(mut mutations: Vec<Mutation>, seed: u64) -> Vec<Mutation> {
     Rng::with_seed(seed).shuffle(&mut mutations);
     let mut by_kind: BTreeMap<(Fault, &str), Vec<Mutation>> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Properties that a declaration claims and no proof covers.
+//! Properties that a declaration claims and the compiler does not prove.
 
 use energy_dsl::{Kind, Property};
 
@@ -14,7 +14,7 @@ impl Auditor<'_> {
         let turn = |vectors: &[f64]| case.turned(vectors);
         for property in self.declaration.properties {
             let (moved, expected) = match property {
-                // Proved when it was compiled.
+                // The compiler proved this property.
                 Property::TranslationInvariant => continue,
                 Property::RotationInvariant => (turned(sample, &turn), Expected::Turned),
                 Property::Even => (mirrored(sample), Expected::Same),
@@ -51,7 +51,7 @@ impl Auditor<'_> {
     }
 }
 
-/// What a block must be after the points have moved.
+/// The expected relation between a block before and after the points have moved.
 #[derive(Clone, Copy, PartialEq)]
 enum Expected {
     Same,
@@ -59,11 +59,11 @@ enum Expected {
     Zero,
 }
 
-/// The block that a claim is about.
+/// Returns the block that a claim is about.
 fn compared(kind: Kind, expected: Expected) -> BlockName {
     match (kind, expected) {
         (Kind::Energy | Kind::Constraint, Expected::Zero) => BlockName::Gradient,
-        // A constraint's rows may turn: its energy ½ k CᵀC does not.
+        // The rows of a constraint may rotate; its energy ½ k CᵀC may not.
         (Kind::Energy | Kind::Constraint, _) => BlockName::Energy,
         (Kind::Force, _) => BlockName::Force,
         (Kind::Residual, _) => BlockName::Residual,
@@ -78,7 +78,7 @@ fn mirrored(sample: &Sample) -> Sample {
     Sample { positions: sample.positions.iter().map(|x| -x).collect(), ..sample.clone() }
 }
 
-/// The points where the rest shape has them; a plane one lies in the plane z = 0.
+/// Moves the points to the rest shape; a plane one lies in the plane z = 0.
 fn at_rest(sample: &Sample) -> Sample {
     let points = sample.positions.len() / 3;
     let dimension = sample.rest.len() / points.max(1);

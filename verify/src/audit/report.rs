@@ -3,42 +3,42 @@ use serde::Serialize;
 use crate::blocks::BlockName;
 use crate::sample::Sample;
 
-/// What is looked at.
+/// A property that the audit checks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Check {
-    /// As accurate as the reference demands of every record, against multi-precision.
+    /// Multi-precision agrees as well as the reference demands of every record.
     Accuracy,
-    /// Equal to hyper-dual numbers run through the textbook form.
+    /// Hyper-dual numbers through the textbook form agree.
     DualNumbers,
-    /// Equal to finite differences of the block one order below.
+    /// Finite differences of the block one order below agree.
     FiniteDifferences,
-    /// The same from every routine that returns it.
+    /// All routines that return the block agree.
     Routines,
-    /// Exactly symmetric.
+    /// The block is exactly symmetric.
     Symmetry,
     /// Σ f = 0.
     LinearMomentum,
     /// Σ x × f = 0.
     AngularMomentum,
-    /// The same bits wherever it is.
+    /// A translation preserves all bits.
     Translation,
-    /// The same quantities in other units.
+    /// A change of units preserves all quantities.
     Units,
-    /// The declaration keeps what it claims: invariance, no force at rest, evenness.
+    /// Claims of the declaration hold: invariance, zero force at rest, evenness.
     Claims,
-    /// No negative eigenvalue at rest.
+    /// The Hessian at rest has no negative eigenvalue.
     RestStability,
-    /// The force without velocities is −∇U.
+    /// The force at zero velocity is −∇U.
     MinusGradient,
-    /// What velocities add to a force takes power away.
+    /// The velocity-dependent part of the force dissipates power.
     Dissipation,
-    /// No number is NaN or infinite, and no condition is flagged, at an ordinary input.
+    /// No number is NaN or infinite, and no flag is set, at an ordinary input.
     Finite,
 }
 
 impl Check {
-    /// All of them.
+    /// Every check.
     pub const ALL: [Self; 14] = [
         Self::Accuracy,
         Self::DualNumbers,
@@ -56,7 +56,7 @@ impl Check {
         Self::Finite,
     ];
 
-    /// How a person calls it.
+    /// Returns the name of the check for people.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {
@@ -77,13 +77,13 @@ impl Check {
         }
     }
 
-    /// The largest error allowed: of [`Self::Accuracy`] in units of roundoff times max(1, κ), of all others relative to the largest
-    /// number of the block (or of what is summed).
+    /// Returns the largest allowed error. For [`Self::Accuracy`] it is in units of roundoff times max(1, κ), otherwise
+    /// relative to the largest number of the block, or of the summands.
     #[must_use]
     pub fn tolerance(self) -> f64 {
         match self {
             Self::Accuracy => 8.0,
-            // The textbook form loses digits: what it leaves of them.
+            // The tolerance allows for the digits that the textbook form loses.
             Self::DualNumbers => 1e-9,
             Self::FiniteDifferences => 2e-7,
             Self::Claims => 1e-10,
@@ -96,28 +96,28 @@ impl Check {
     }
 }
 
-/// One line of the report: the worst of a check of a block over all inputs.
+/// A line of the report: the worst result of a check of a block over all inputs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
-    /// The element.
+    /// Name of the element.
     pub element: &'static str,
-    /// The block.
+    /// Name of the block.
     pub block: BlockName,
-    /// What was checked.
+    /// Property that was checked.
     pub check: Check,
-    /// At how many inputs.
+    /// Number of inputs.
     pub inputs: usize,
-    /// The worst relative error.
+    /// Worst relative error.
     pub worst: f64,
-    /// The error allowed.
+    /// Largest allowed error.
     pub tolerance: f64,
-    /// Whether it held.
+    /// Whether the check passed at every input.
     pub passed: bool,
-    /// The least order of convergence that was observed, of finite differences.
+    /// Lowest observed order of convergence of finite differences.
     pub order: Option<f64>,
-    /// Which entry, the values, which routes agree, and the input they were found at.
+    /// The entry, its values, the routes that agree, and the input.
     pub detail: String,
-    /// The input of the worst error, to be run again.
+    /// Input of the worst error, to run it again.
     pub input: Option<Sample>,
 }
 
@@ -138,22 +138,22 @@ impl Line {
     }
 }
 
-/// The accuracy of a block over all inputs that multi-precision was computed at.
+/// Accuracy of a block over all inputs with multi-precision results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Accuracy {
-    /// The block.
+    /// Name of the block.
     pub block: BlockName,
-    /// At how many inputs.
+    /// Number of inputs.
     pub inputs: usize,
     /// Worst error in units of roundoff of the block's largest number.
     pub worst: f64,
-    /// The entry it was found in.
+    /// Entry of the worst error.
     pub entry: String,
-    /// The input it was found at.
+    /// Input of the worst error.
     pub input: Option<Sample>,
     /// Worst error in units of roundoff times max(1, κ).
     pub worst_kappa: f64,
-    /// The input it was found at.
+    /// Input of `worst_kappa`.
     pub input_kappa: Option<Sample>,
 }
 
@@ -163,107 +163,108 @@ impl Accuracy {
     }
 }
 
-/// The deviation of finite differences from a block against their step, at the first input.
+/// Deviation of finite differences from a block against their step, at the first input.
 #[derive(Clone, Debug, Serialize)]
 pub struct StepCurve {
-    /// The block.
+    /// Name of the block.
     pub block: BlockName,
-    /// What was differenced.
+    /// Block whose differences were taken.
     pub of: BlockName,
-    /// Step over feature length; relative deviation of central differences, and extrapolated once.
+    /// Step relative to the feature length, and the relative deviation of central and of extrapolated differences.
     pub errors: Vec<(f64, f64, f64)>,
 }
 
 /// A planted fault.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mutant {
-    /// Where and what.
+    /// Position and kind of the fault.
     pub fault: String,
-    /// The checks that failed; none if it was missed.
+    /// Checks that failed; empty if the fault was missed.
     pub caught_by: Vec<Check>,
 }
 
-/// What became of planted faults.
+/// Results of mutation testing.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MutationScore {
-    /// The faults.
+    /// The planted faults.
     pub mutants: Vec<Mutant>,
-    /// Faults that were drawn, but proved to change nothing but rounding, and so were not planted.
+    /// Number of faults that were drawn but not planted, because they provably change only rounding.
     pub equivalent: usize,
-    /// Faults that were planted and change results, but at every input tried by less than the roundoffs that accuracy is allowed.
+    /// Number of planted faults that change results by less than the allowed roundoffs at every input tried.
     pub within_rounding: usize,
-    /// Faults that were planted and change nothing at any input tried, not even in multi-precision: what no ordinary input reaches.
+    /// Number of planted faults that change nothing at any input tried, not even in multi-precision, because ordinary
+    /// inputs do not reach them.
     pub without_effect: usize,
 }
 
 impl MutationScore {
-    /// How many were noticed.
+    /// Returns the number of faults that were noticed.
     #[must_use]
     pub fn caught(&self) -> usize {
         self.mutants.iter().filter(|mutant| !mutant.caught_by.is_empty()).count()
     }
 }
 
-/// What an input looked like, and how far off a block was there.
+/// The shape of an input and the error of a block there.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Spot {
-    /// The block.
+    /// Name of the block.
     pub block: BlockName,
-    /// Size of the configuration: the longest distance.
+    /// Longest distance between points.
     pub size: f64,
-    /// The shortest distance over the longest.
+    /// Ratio of the shortest to the longest distance.
     pub shape: f64,
     /// Error in units of roundoff.
     pub error: f64,
 }
 
-/// The audit of one element beside its lines.
+/// Data on the audit of one element, apart from its lines.
 #[derive(Clone, Debug, Serialize)]
 pub struct Section {
-    /// The element.
+    /// Name of the element.
     pub element: &'static str,
     /// `energy`, `force`, ….
     pub kind: &'static str,
-    /// Its documentation.
+    /// Documentation of the element.
     pub docs: &'static str,
-    /// Its declaration.
+    /// Declaration of the element.
     pub source: &'static str,
-    /// Its inputs drawn.
+    /// Number of inputs.
     pub inputs: usize,
-    /// Accuracy, block by block.
+    /// Accuracy of each block.
     pub accuracy: Vec<Accuracy>,
-    /// The curves of differences.
+    /// Errors of finite differences against their step.
     pub curves: Vec<StepCurve>,
     /// Errors by configuration.
     pub spots: Vec<Spot>,
-    /// Planted faults; none where the element's source is not at hand.
+    /// Planted faults; `None` if the source of the element is not available.
     pub mutations: Option<MutationScore>,
 }
 
 /// The audit of one or more elements.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
-    /// All lines, element by element.
+    /// Lines, element by element.
     pub lines: Vec<Line>,
-    /// What is known of each element beside.
+    /// Further data on each element.
     pub sections: Vec<Section>,
     /// Elements that could not be audited, with the reason.
     pub refused: Vec<(String, String)>,
 }
 
 impl Report {
-    /// Whether every check of every element held, and every planted fault was noticed.
+    /// Whether every check of every element passed, and every planted fault was noticed.
     #[must_use]
     pub fn passed(&self) -> bool {
         self.refused.is_empty() && self.lines.iter().all(|line| line.passed) && self.missed().next().is_none()
     }
 
-    /// The lines that failed.
+    /// Returns the lines that failed.
     pub fn failures(&self) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(|line| !line.passed)
     }
 
-    /// Planted faults that went unnoticed, with their elements.
+    /// Returns the planted faults that were missed, with their elements.
     pub fn missed(&self) -> impl Iterator<Item = (&'static str, &Mutant)> {
         self.sections.iter().flat_map(|section| {
             let mutants = section.mutations.iter().flat_map(|score| &score.mutants);
@@ -271,7 +272,7 @@ impl Report {
         })
     }
 
-    /// How many different elements the report is about.
+    /// Returns the number of elements in the report.
     #[must_use]
     pub fn elements(&self) -> usize {
         let mut names: Vec<&str> =
@@ -281,7 +282,7 @@ impl Report {
         names.len()
     }
 
-    /// Adds another report: of each check of a block only the worse line is kept.
+    /// Merges another report; for each check of a block, the worse line is kept.
     pub fn merge(&mut self, other: Self) {
         for line in other.lines {
             let same = |l: &&mut Line| l.element == line.element && l.check == line.check && l.block == line.block;
@@ -311,7 +312,7 @@ impl Report {
     }
 }
 
-/// A failed check in words.
+/// Describes a failed check.
 #[must_use]
 pub fn describe_failure(line: &Line) -> String {
     format!(

@@ -1,4 +1,4 @@
-//! The routes to each block, held against each other: generated code, multi-precision, dual numbers, finite differences.
+//! Comparison of the routes to each block: generated code, multi-precision, dual numbers, finite differences.
 
 use super::accuracy::{amplification, in_roundoffs};
 use super::auditor::{Auditor, Case, Finding};
@@ -7,16 +7,16 @@ use super::report::{Accuracy, Check, StepCurve};
 use crate::blocks::{Answer, Block, BlockName, NoAnswer, largest};
 use crate::finite_difference::{Sweep, antiderivative, sweep};
 
-/// A block found one way.
+/// A block as computed by one route.
 struct Route<'a> {
     name: String,
     numbers: &'a [f64],
-    /// Its own relative error, at an ordinary input.
+    /// Relative error of the route at an ordinary input.
     uncertainty: f64,
 }
 
 impl Auditor<'_> {
-    /// Compares each block with all routes to it. Returns the curves of the differences' errors against their steps.
+    /// Compares each block with all routes to it. Returns the errors of the differences against their steps.
     pub(super) fn routes(
         &mut self,
         case: &Case,
@@ -96,7 +96,7 @@ impl Auditor<'_> {
         }
     }
 
-    /// The error in units of roundoff, and over what rounded edges excuse.
+    /// Measures the error in units of roundoff, and divided by κ.
     fn measure(&mut self, case: &Case, answer: &Answer, block: &Block, accuracy: &mut Vec<Accuracy>) {
         let Some(truth) = case.truth(block.name).filter(|truth| truth.is_defined) else { return };
         let natural = self.natural_size(&case.sample, answer, block.name);
@@ -111,7 +111,7 @@ impl Auditor<'_> {
         if line.input.is_none() || error > line.worst || error.is_nan() {
             (line.worst, line.entry, line.input) = (error, entry(), Some(case.sample.clone()));
         }
-        // κ ≥ 1: where even the error itself is no worse than what is known, κ need not be.
+        // κ is at least 1: compute it only if the error without it is the worst so far.
         let by_kappa = if error > line.worst_kappa || error.is_nan() {
             error / amplification(self.subject, &case.sample, answer, block.name).max(1.0)
         } else {
@@ -143,14 +143,13 @@ fn relative(curve: &[(f64, f64, f64)], size: f64) -> Vec<(f64, f64, f64)> {
     curve.iter().map(|(step, plain, extrapolated)| (*step, plain / size, extrapolated / size)).collect()
 }
 
-/// The largest difference, and its place.
+/// Returns the largest difference and its position.
 fn distance(a: &[f64], b: &[f64]) -> (usize, f64) {
     let errors = a.iter().zip(b).map(|(x, y)| (x - y).abs()).enumerate();
     errors.fold((0, 0.0_f64), |worst, next| if next.1 > worst.1 || next.1.is_nan() { next } else { worst })
 }
 
-/// Which routes agree, and so which one to suspect: multi-precision, where it was computed, is right to all its digits; without it
-/// the majority is believed.
+/// Names the routes that agree, and so the one to suspect. Multi-precision is taken as right; without it, the majority.
 fn verdict(routes: &[Route<'_>], scale: f64) -> String {
     let agree = |a: &Route<'_>, b: &Route<'_>| {
         let allowed = a.uncertainty.max(b.uncertainty).max(1e-10) * scale;
@@ -179,7 +178,7 @@ fn verdict(routes: &[Route<'_>], scale: f64) -> String {
             let with = names(&camps[believed]);
             format!("wrong: {}; in agreement: {with}", others.join(", and otherwise "))
         }
-        None => format!("no two agree, none can be believed: {}", names(&routes.iter().collect::<Vec<_>>())),
+        None => format!("no two routes agree: {}", names(&routes.iter().collect::<Vec<_>>())),
     }
 }
 

@@ -8,32 +8,32 @@ use energy_elements::CatalogueEntry;
 use crate::blocks::{Answer, NoAnswer, evaluate};
 use crate::sample::Sample;
 
-/// How an element is evaluated.
+/// A function or closure that evaluates an element.
 pub(crate) type EvaluateAny = Box<dyn Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>>;
 
-/// What is audited: an element of the catalogue, or a declaration of a text read at run time.
+/// An element to audit: from the catalogue, or from a text read at run time.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// One declaration, and what it uses.
+    /// Source of one declaration and of the functions that it uses.
     source: String,
     name: String,
     entry: Option<&'static CatalogueEntry>,
 }
 
 impl Target {
-    /// An element of the catalogue.
+    /// Creates the target of an element of the catalogue.
     #[must_use]
     pub fn of_catalogue(entry: &'static CatalogueEntry) -> Self {
         let declaration = entry.declaration;
         Self { source: declaration.source.into(), name: declaration.name.into(), entry: Some(entry) }
     }
 
-    /// Every declaration of a text, as a `.energy` file holds it; messages call it `name`.
+    /// Returns every declaration of a text in the format of an `.energy` file; messages call it `name`.
     ///
     /// # Errors
-    /// Whatever is wrong with the text.
+    /// If the text has errors.
     pub fn of_text(text: &str, name: &str) -> Result<Vec<Self>, energy_compiler::Diagnostics> {
-        // A declaration's own source brings along what it uses, and stands alone.
+        // A declaration's source includes the functions that it uses, so it compiles on its own.
         let target = |element: &Interpreted| Self {
             source: element.declaration().source.into(),
             name: element.declaration().name.into(),
@@ -42,19 +42,19 @@ impl Target {
         Ok(Interpreted::from_file(text, name)?.iter().map(target).collect())
     }
 
-    /// Every declaration of a file.
+    /// Returns every declaration of a file.
     ///
     /// # Errors
-    /// When it cannot be read, or whatever is wrong with the text.
+    /// If the file cannot be read, or the text has errors.
     pub fn of_file(path: &Path) -> anyhow::Result<Vec<Self>> {
         let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         let targets =
             Self::of_text(&text, &path.display().to_string()).map_err(|errors| anyhow::anyhow!("{errors}"))?;
-        anyhow::ensure!(!targets.is_empty(), "{} declares nothing", path.display());
+        anyhow::ensure!(!targets.is_empty(), "{} contains no declaration", path.display());
         Ok(targets)
     }
 
-    /// Its name.
+    /// Returns the name of the element.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -74,7 +74,7 @@ impl Target {
 
     fn interpreted(&self) -> Result<Interpreted, String> {
         let mut declared = Interpreted::from_source(&self.source).map_err(|errors| errors.to_string())?;
-        declared.pop().ok_or_else(|| format!("{}: its source declares nothing", self.name))
+        declared.pop().ok_or_else(|| format!("{}: the source contains no declaration", self.name))
     }
 }
 
@@ -83,7 +83,7 @@ pub(crate) struct Subject {
     pub(crate) declaration: &'static Declaration,
     pub(crate) evaluate: EvaluateAny,
     pub(crate) formula: Textbook,
-    /// The compiled routines to plant faults in.
+    /// The compiled routines, in which faults are planted; `None` if the source is not available.
     pub(crate) interpreted: Option<Interpreted>,
 }
 

@@ -1,11 +1,11 @@
-//! a + b i with b so small that b² vanishes beside a: what the complex step needs.
+//! Complex numbers a + b i for the complex step, with b so small that b² vanishes relative to a.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use energy_dsl::{Level, Number};
 
-/// A number with an imaginary step. Comparisons and absolute values look at the real part, as they must for the derivative of what is
-/// analytic between kinks.
+/// A number with an imaginary step. Comparisons and absolute values use the real part, so that derivatives are right
+/// between kinks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Complex {
     pub(super) re: f64,
@@ -17,7 +17,7 @@ impl Complex {
         Self { re, im: 0.0 }
     }
 
-    /// f(self) with the derivative f′.
+    /// Returns f(self) for a function with value f and derivative f′.
     fn chain(self, value: f64, slope: f64) -> Self {
         Self { re: value, im: slope * self.im }
     }
@@ -136,9 +136,9 @@ mod tests {
 
     use super::*;
 
-    /// Derivatives by the complex step, to the last digits.
+    /// The complex step yields derivatives to full precision.
     #[test]
-    fn a_step_is_a_derivative() {
+    fn the_complex_step_is_a_derivative() {
         let x = Complex { re: 0.7, im: 1e-100 };
         let slope = |f: Complex| f.im / 1e-100;
         let near = |a: f64, b: f64| assert!((a - b).abs() <= 4e-16 * b.abs(), "{a} {b}");

@@ -1,4 +1,4 @@
-//! The elements that are timed: one of each family, each by every method.
+//! The elements that are timed: one of each family.
 
 use energy_dsl::{Real, Vector3};
 use energy_elements::{
@@ -12,7 +12,7 @@ use crate::sample::Sample;
 
 use super::complex::Complex;
 
-/// An element by all methods.
+/// A function that measures an element by all methods.
 pub(super) type Bench = fn(&Methods<'_>) -> Vec<Measured>;
 
 fn converted<T: Real>(numbers: &[f64]) -> Vec<T> {
@@ -29,7 +29,7 @@ fn space<T: Real>(rest: &[T], point: usize) -> Vector3<T> {
 
 macro_rules! benches {
     ($($element:ident, |$parameters:ident, $rest:ident| $make:expr;)*) => {
-        /// By name.
+        /// Benchmarks by the name of their element.
         pub(super) const ELEMENTS: &[(&str, Bench)] = &[$((stringify!($element), |methods| {
             fn make<T: Real>(sample: &Sample) -> $element<T> {
                 let ($parameters, $rest): (Vec<T>, Vec<T>) = (converted(&sample.parameters), converted(&sample.rest));
@@ -54,6 +54,8 @@ benches! {
     FlatBending, |p, r| FlatBending::new(space(&r, 0), space(&r, 1), space(&r, 2), space(&r, 3), p[0]).expect(POSITIVE);
     StVK, |p, r| StVK::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
     AsRigidAsPossible, |p, r| AsRigidAsPossible::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0]).expect(POSITIVE);
-    StableNeoHookeanLog, |p, r| StableNeoHookeanLog::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
+    StableNeoHookeanLog, |p, r| {
+        StableNeoHookeanLog::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE)
+    };
     NeoHookean, |p, r| NeoHookean::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
 }

@@ -1,4 +1,4 @@
-//! The methods: each makes the whole Hessian of an element, all from the same generated code but for multi-precision.
+//! The methods of computing an element's Hessian. All but multi-precision run the same generated code.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -17,25 +17,25 @@ use crate::geometry::longest_distance;
 use crate::multiprecision::{TrueBlock, truth, worse};
 use crate::sample::Sample;
 
-/// Digits of the truth.
+/// Digits of the reference value.
 const DIGITS: usize = 30;
-/// Elements in a batch over lanes.
+/// Elements in a batch over SIMD lanes.
 const MANY: usize = 1024;
 
-/// A method's run time and error for one element.
+/// Run time and error of a method for one element.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// The element.
+    /// Name of the element.
     pub element: &'static str,
-    /// The method.
+    /// Name of the method.
     pub method: &'static str,
-    /// For one Hessian.
+    /// Nanoseconds per Hessian.
     pub nanoseconds: f64,
-    /// The largest error over all inputs, relative to the largest entry.
+    /// Largest error over all inputs, relative to the largest entry.
     pub error: f64,
 }
 
-/// What all methods of one element have in common.
+/// Data shared by all methods of one element.
 pub(super) struct Methods<'a> {
     pub(super) subject: &'a Subject,
     pub(super) samples: &'a [Sample],
@@ -50,7 +50,7 @@ impl<'a> Methods<'a> {
         Self { subject, samples, truths }
     }
 
-    /// Every method, from least to most exact.
+    /// Measures every method, from the least to the most exact.
     pub(super) fn all<D, S, C, H>(
         &self,
         double: Make<'_, D>,
@@ -90,7 +90,7 @@ impl<'a> Methods<'a> {
         let timed = self.time(|i| discard(doubles[i].0.hessian(black_box(&doubles[i].1)).hessian));
         let error = self.error(|i| full(doubles[i].0.hessian(&doubles[i].1).hessian.as_ref(), |x| x));
         list.push(self.measured("generated, f64", timed, error));
-        // The same bits as the scalar where products and sums fuse alike.
+        // Lanes have the bits of the scalar if products and sums fuse in both.
         list.push(self.measured("generated, f64 lanes", time_lanes(&doubles), error));
         let timed = self.time(|i| discard(hessian(self.subject, &self.samples[i])));
         list.push(self.measured("multi-precision, 30 digits", timed, 1e-30));
@@ -106,7 +106,7 @@ impl<'a> Methods<'a> {
         self.measured(method, self.time(|i| discard(run(i))), error)
     }
 
-    /// Nanoseconds of one run, the least of some rounds over all inputs.
+    /// Returns the nanoseconds per run: the minimum over some rounds, each over all inputs.
     fn time(&self, run: impl Fn(usize)) -> f64 {
         let count = self.samples.len();
         least(count, || (0..count).for_each(&run))
@@ -115,26 +115,26 @@ impl<'a> Methods<'a> {
     fn error(&self, run: impl Fn(usize) -> Vec<f64>) -> f64 {
         let of = |(i, truth): (usize, &TrueBlock)| {
             let error = truth.block.numbers.iter().zip(run(i)).map(|(t, got)| t.error_of(got)).fold(0.0, worse);
-            // A Hessian of zeros (a barrier out of reach) has no size to compare with.
+            // A zero Hessian (a barrier out of reach) has no relative error.
             if error == 0.0 { 0.0 } else { error / truth.largest() }
         };
         self.truths.iter().enumerate().map(of).fold(0.0, worse)
     }
 }
 
-/// Makes a result, and does not read it.
+/// Keeps the computation of a result that is not used.
 #[inline(always)]
 fn discard<T>(result: T) {
     let _ = black_box(result);
 }
 
-/// Nanoseconds of one of the `count` things that a round does, in the fastest round.
+/// Returns the nanoseconds per item of a round of `count` items, in the fastest round.
 fn least(count: usize, round: impl Fn()) -> f64 {
     const FOR: Duration = Duration::from_millis(60);
     let start = Instant::now();
     let mut best = f64::INFINITY;
     while start.elapsed() < FOR || best.is_infinite() {
-        // Short rounds are repeated: the clock itself takes time.
+        // Short rounds are repeated, because reading the clock takes time.
         let mut repeats = 0_u32;
         let round_start = Instant::now();
         while repeats < 1 || round_start.elapsed() < Duration::from_millis(2) {
@@ -156,7 +156,7 @@ fn points<T: Real, P: Array<Vector3<T>>>(sample: &Sample) -> P {
     P::from_fn(|point| std::array::from_fn(|axis| T::from_f64(sample.positions[3 * point + axis])))
 }
 
-/// A triangle of blocks as the full matrix.
+/// Expands a triangle of blocks to the full matrix.
 fn full<T: Copy>(triangle: &[Block<T>], number: impl Fn(T) -> f64) -> Vec<f64> {
     let points = (1..).find(|n| n * (n + 1) / 2 == triangle.len()).expect("a triangle");
     let entries = (0..9 * points * points).map(|entry| (entry / (3 * points), entry % (3 * points)));
@@ -186,7 +186,7 @@ fn by_differences<E: Potential<f64>>((element, x): &(E, E::Points), stencil: &[(
     matrix
 }
 
-/// Im ∇U(x + i h e)/h.
+/// Complex step: Im ∇U(x + i h e)/h.
 fn by_complex_step<E: Potential<Complex>>((element, x): &(E, E::Points)) -> Vec<f64> {
     const H: f64 = 1e-100;
     let n = 3 * E::Points::LEN;
@@ -201,7 +201,7 @@ fn by_complex_step<E: Potential<Complex>>((element, x): &(E, E::Points)) -> Vec<
     matrix
 }
 
-/// One hyper-dual value for each pair of coordinates.
+/// Evaluates one hyper-dual value per pair of coordinates.
 fn by_hyper_dual<E: Potential<Hyper>>((element, x): &(E, E::Points)) -> Vec<f64> {
     let n = 3 * E::Points::LEN;
     let mut matrix = vec![0.0; n * n];
@@ -219,7 +219,7 @@ fn by_hyper_dual<E: Potential<Hyper>>((element, x): &(E, E::Points)) -> Vec<f64>
     matrix
 }
 
-/// Batches of Hessians that nobody reads.
+/// Computes batches of Hessians and discards them.
 struct Discarded;
 
 impl<E: PackedPotential<f64>> BatchWork<E> for Discarded {

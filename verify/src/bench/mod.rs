@@ -1,4 +1,4 @@
-//! Run time against error: what a Hessian costs, and how exact it is, by every way of getting one.
+//! Run time and error of every method of computing a Hessian.
 
 mod complex;
 mod elements;
@@ -6,25 +6,26 @@ mod methods;
 
 use std::fmt::Write as _;
 
+use energy_cli::plot::{Curve, logarithmic};
+
 pub use self::methods::Measured;
 use self::methods::Methods;
 use crate::audit::Target;
-use crate::plot::{Curve, logarithmic};
 use crate::sample::{Sample, Sampler};
 
-/// Inputs of each element.
+/// Inputs per element.
 const INPUTS: usize = 8;
 
-/// The elements that [`bench()`] knows.
+/// Returns the names of the elements that [`bench()`] can time.
 #[must_use]
 pub fn names() -> Vec<&'static str> {
     elements::ELEMENTS.iter().map(|(name, _)| *name).collect()
 }
 
-/// Times every method on the elements with these names, all of them for an empty list.
+/// Times every method on the elements with these names; all if the list is empty.
 ///
 /// # Errors
-/// The first name that is not among [`names`].
+/// If a name is not among [`names`].
 pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
     if let Some(unknown) = wanted.iter().find(|name| !names().contains(&name.as_str())) {
         return Err(format!("{unknown} is not timed; {} are", names().join(", ")));
@@ -43,7 +44,7 @@ pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
     Ok(list)
 }
 
-/// Inputs that both precisions hold exactly.
+/// Rounds an input to numbers that single precision represents exactly.
 fn in_single_precision(sample: Sample) -> Sample {
     let rounded = |numbers: Vec<f64>| numbers.into_iter().map(|x| f64::from(x as f32)).collect();
     Sample {
@@ -54,7 +55,7 @@ fn in_single_precision(sample: Sample) -> Sample {
     }
 }
 
-/// A Markdown table: a row to each method, a column to each element.
+/// Formats a Markdown table: one row per method, one column per element.
 #[must_use]
 pub fn markdown(list: &[Measured]) -> String {
     let mut text = String::from("| element | method | ns | error |\n|---|---|---:|---:|\n");
@@ -68,7 +69,7 @@ fn rounded(nanoseconds: f64) -> String {
     if nanoseconds < 100.0 { format!("{nanoseconds:.1}") } else { format!("{nanoseconds:.0}") }
 }
 
-/// The same as comma-separated values.
+/// Formats the measurements as comma-separated values.
 #[must_use]
 pub fn csv(list: &[Measured]) -> String {
     let mut text = String::from("element,method,nanoseconds,error\n");
@@ -78,7 +79,7 @@ pub fn csv(list: &[Measured]) -> String {
     text
 }
 
-/// A plot to each element, and one of all, with the names of their files.
+/// Draws one plot per element and one of all, each with its file name.
 #[must_use]
 pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
     let of = |name: &str| list.iter().filter(|m| m.element == name).cloned().collect::<Vec<_>>();
@@ -90,7 +91,7 @@ pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
         .filter_map(|(name, list)| {
             let mut curves: Vec<Curve> = Vec::new();
             for m in &list {
-                // What is exact lies at the foot of the plot.
+                // Exact results lie at the lower edge of the plot.
                 let point = (m.nanoseconds, m.error.max(1e-18));
                 match curves.iter_mut().find(|curve| curve.name == m.method) {
                     Some(curve) => curve.points.push(point),
@@ -108,7 +109,7 @@ pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
 mod tests {
     use super::*;
 
-    /// Not how fast, but how exact each method is, and that the errors rank as they should.
+    /// Checks the accuracy of each method, not its speed, and that the errors rank as expected.
     #[test]
     fn methods_agree_to_their_own_accuracy() {
         let list = bench(&["HairBend".into()]).unwrap();

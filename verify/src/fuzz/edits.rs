@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-/// One input with a few edits, at most `longest` bytes.
+/// Applies a few edits to one of the inputs and cuts it to `longest` bytes.
 pub(super) fn edited(inputs: &[String], words: &[&str], longest: usize, random: &mut Rng) -> String {
     let mut pieces = pieces(&inputs[random.usize(..inputs.len())]);
     for _ in 0..random.usize(1..6) {
@@ -40,7 +40,7 @@ fn edit(pieces: &mut Vec<String>, inputs: &[String], words: &[&str], random: &mu
             pieces.swap(at, other);
         }
         6 => pieces.insert(at, NUMBERS[random.usize(..NUMBERS.len())].to_owned()),
-        // A nest as deep as a careless parser's stack.
+        // Deep nesting, to overflow a careless parser's stack.
         7 if until > at && random.u8(..8) == 0 => {
             let repeated = pieces[at..until].concat().repeat(200);
             pieces.insert(at, repeated);
@@ -59,7 +59,7 @@ fn edit(pieces: &mut Vec<String>, inputs: &[String], words: &[&str], random: &mu
 const NUMBERS: &[&str] =
     &["0", "-1", "1e400", "1e-400", "NaN", "inf", "4294967296", "18446744073709551616", "-9223372036854775809", "0.1"];
 
-/// Words, runs of blanks, and single other characters.
+/// Splits a text into words, runs of blanks, and single other characters.
 fn pieces(text: &str) -> Vec<String> {
     let mut pieces: Vec<String> = Vec::new();
     let mut last = None;

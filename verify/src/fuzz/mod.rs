@@ -1,7 +1,7 @@
-//! Fuzzing on a stable compiler: inputs of a corpus, and what becomes of them by random edits, must neither panic nor take long.
+//! Fuzzing on a stable compiler: the inputs of a corpus and random edits of them must neither panic nor take long.
 //!
-//! Inputs whose outcome was not seen before are kept and edited further, so that a run digs into what it finds. What fails is
-//! written to the corpus, which is replayed first ever after.
+//! Inputs with a new outcome are kept and edited further, so that a run digs into what it finds. Failing inputs are
+//! written to the corpus, which every later run replays first.
 
 mod edits;
 mod targets;
@@ -17,28 +17,33 @@ use fastrand::Rng;
 
 pub use self::targets::Target;
 
-/// The longest that one input may take.
+/// Time limit of one input.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Inputs are cut to so many bytes.
+/// Inputs are cut to this many bytes.
 const LONGEST: usize = 4096;
 
-/// When to stop.
+/// File in the corpus that holds the running input, in case it ends the process.
+const CURRENT: &str = "fuzz-input";
+/// File in the corpus that lists inputs in other folders: one path per line, relative to the corpus.
+const LINKS: &str = "links";
+
+/// Limit of a run.
 #[derive(Clone, Copy, Debug)]
 pub enum Budget {
-    /// After so many edited inputs.
+    /// Number of edited inputs.
     Inputs(u64),
-    /// After so long.
+    /// Run time.
     Time(Duration),
 }
 
-/// What a run without findings did.
+/// Statistics of a run without findings.
 #[derive(Clone, Copy, Debug)]
 pub struct Summary {
     /// Inputs of the corpus.
     pub corpus: usize,
     /// Edited inputs.
     pub edited: u64,
-    /// Different outcomes.
+    /// Number of different outcomes.
     pub outcomes: usize,
 }
 
@@ -46,19 +51,20 @@ pub struct Summary {
 #[derive(Debug, thiserror::Error)]
 #[error("{why}; the input is kept as {}", .input.display())]
 pub struct Finding {
-    /// What happened.
+    /// Description of the failure.
     pub why: String,
-    /// Where the input is.
+    /// Path of the input.
     pub input: PathBuf,
 }
 
-/// Runs every input of a corpus, then edited ones. `run` answers with whatever tells one outcome from another: the message of an
-/// error, say. `words` are pieces of text that edits insert.
+/// Runs every input of a corpus, then edited ones. `run` returns a text that tells outcomes apart, such as the message
+/// of an error. `words` are pieces of text that edits insert.
 ///
-/// An input that overflows the stack ends the process: it is left in the file `fuzz-input` of the corpus.
+/// An input that overflows the stack ends the process; the file `fuzz-input` in the corpus contains it.
 ///
 /// # Errors
-/// A [`Finding`] when an input panics or takes longer than 20 seconds, or why the corpus cannot be read or written.
+/// Returns a [`Finding`] if an input panics or takes longer than 20 seconds, or an error if the corpus cannot be read
+/// or written.
 ///
 /// ```
 /// use verify::fuzz::{Budget, fuzz};
@@ -80,7 +86,7 @@ pub fn fuzz(
     run: impl Fn(&str) -> String,
 ) -> anyhow::Result<Summary> {
     let mut inputs = read(corpus)?;
-    anyhow::ensure!(!inputs.is_empty(), "{} holds no input to start from", corpus.display());
+    anyhow::ensure!(!inputs.is_empty(), "{} contains no input", corpus.display());
     let mut fuzzer = Fuzzer { corpus, run, outcomes: BTreeSet::new() };
     for input in &inputs {
         fuzzer.try_input(input)?;
@@ -109,12 +115,12 @@ struct Fuzzer<'a, F> {
 }
 
 impl<F: Fn(&str) -> String> Fuzzer<'_, F> {
-    /// Where the input that runs is left, should it end the process.
+    /// Path of the running input, in case it ends the process.
     fn current(&self) -> PathBuf {
-        self.corpus.join("fuzz-input")
+        self.corpus.join(CURRENT)
     }
 
-    /// Whether its outcome is new.
+    /// Runs an input. Returns whether its outcome is new.
     fn try_input(&mut self, input: &str) -> anyhow::Result<bool> {
         let current = self.current();
         std::fs::write(&current, input).with_context(|| format!("cannot write {}", current.display()))?;
@@ -127,7 +133,7 @@ impl<F: Fn(&str) -> String> Fuzzer<'_, F> {
             Ok(outcome) => return Ok(self.outcomes.insert(hash(&without_names(outcome)))),
         };
         let kept = self.corpus.join(format!("found-{:016x}", hash(input)));
-        crate::write_whole(&kept, input.as_bytes()).with_context(|| format!("cannot write {}", kept.display()))?;
+        energy_cli::write_file(&kept, input)?;
         Err(Finding { why, input: kept }.into())
     }
 }
@@ -139,17 +145,27 @@ fn read(corpus: &Path) -> anyhow::Result<Vec<String>> {
         files.push(entry.with_context(reading)?.path());
     }
     files.sort();
-    files
-        .iter()
-        .filter(|path| path.is_file() && path.file_name().is_some_and(|name| name != "fuzz-input"))
-        .map(|path| {
-            let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-            Ok(String::from_utf8_lossy(&bytes).into_owned())
-        })
-        .collect()
+    let mut inputs = Vec::new();
+    for path in files.iter().filter(|path| path.is_file()) {
+        match path.file_name().and_then(|name| name.to_str()) {
+            Some(CURRENT) => {}
+            Some(LINKS) => {
+                for line in read_file(path)?.lines() {
+                    inputs.push(read_file(&corpus.join(line))?);
+                }
+            }
+            _ => inputs.push(read_file(path)?),
+        }
+    }
+    Ok(inputs)
 }
 
-/// A message without the numbers and quoted text that make each one different.
+fn read_file(path: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Removes the numbers and the quoted text, which make each message different.
 fn without_names(outcome: &str) -> String {
     let unquoted = outcome.split(['`', '"']).step_by(2).collect::<String>();
     unquoted.chars().filter(|c| !c.is_numeric()).take(400).collect()
@@ -163,7 +179,7 @@ fn hash(text: &str) -> u64 {
 
 fn message(panic: &(dyn std::any::Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("of no message")
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }
 
 #[cfg(test)]
@@ -183,6 +199,20 @@ mod tests {
         assert!(finding.why.contains("two in a row"), "{finding}");
         assert!(std::fs::read_to_string(&finding.input).unwrap().contains("=="));
         assert!(fuzz(folder.path(), &["="], Budget::Inputs(0), 1, run).is_err());
+    }
+
+    #[test]
+    fn a_corpus_may_link_inputs_of_other_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        let corpus = folder.path().join("corpus");
+        std::fs::create_dir(&corpus).unwrap();
+        std::fs::write(corpus.join(LINKS), "../elsewhere\n").unwrap();
+        std::fs::write(corpus.join("own"), "own").unwrap();
+        std::fs::write(folder.path().join("elsewhere"), "linked").unwrap();
+        assert_eq!(read(&corpus).unwrap(), ["linked", "own"]);
+        let links = Target::File.corpus().join(LINKS);
+        assert!(std::fs::read_to_string(links).unwrap().contains("errata.energy"));
+        read(&Target::File.corpus()).unwrap();
     }
 
     #[test]

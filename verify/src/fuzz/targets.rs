@@ -1,21 +1,21 @@
-//! What is fuzzed here: the language.
+//! Fuzzing targets of the language.
 
 use std::path::PathBuf;
 
 use clap::ValueEnum;
 use energy_compiler::{Interpreted, Listing, compile};
 
-/// What reads the inputs.
+/// A reader of inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Target {
-    /// A formula in either spelling: as Rust tokens, and in a string as it is printed.
+    /// A formula in both notations: as Rust tokens, and as a string in mathematical notation.
     Parser,
     /// A file of declarations, compiled and listed.
     File,
 }
 
 impl Target {
-    /// Where its inputs are kept.
+    /// Returns the folder of the target's inputs.
     #[must_use]
     pub fn corpus(self) -> PathBuf {
         let folder = match self {
@@ -25,13 +25,13 @@ impl Target {
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(folder)
     }
 
-    /// Pieces of text that mean something to it.
+    /// Returns pieces of text that are meaningful to the target.
     #[must_use]
     pub fn words(self) -> &'static [&'static str] {
         WORDS
     }
 
-    /// What becomes of an input.
+    /// Runs an input and returns its outcome.
     #[must_use]
     pub fn run(self, text: &str) -> String {
         match self {

@@ -7,11 +7,11 @@ use energy_dsl::{Level, Number};
 use super::Float;
 
 thread_local! {
-    /// Bits of the numbers that are made on this thread: [`Number::from_f64`] has no other way to know.
+    /// Precision, in bits, of the numbers that this thread creates: [`Number::from_f64`] has no parameter for it.
     static PRECISION: Cell<usize> = const { Cell::new(256) };
 }
 
-/// Runs `work` where new numbers have that many bits.
+/// Runs `work` with this precision of new numbers.
 pub(super) fn with_precision<R>(bits: usize, work: impl FnOnce() -> R) -> R {
     struct Restore(usize);
     impl Drop for Restore {
@@ -23,32 +23,32 @@ pub(super) fn with_precision<R>(bits: usize, work: impl FnOnce() -> R) -> R {
     work()
 }
 
-/// A multi-precision number, or none where an operation is undefined: a quotient by zero, a logarithm of nothing. Its exponent is
-/// unlimited: it neither overflows nor underflows.
+/// A multi-precision number; `None` inside if an operation is undefined, such as a division by zero or the logarithm of
+/// zero. The exponent is unlimited, so numbers neither overflow nor underflow.
 #[derive(Clone, Debug)]
 pub struct Big(Option<Float>);
 
 impl Big {
-    /// Whether it is a number at all.
+    /// Whether the number is defined.
     #[must_use]
     pub fn is_defined(&self) -> bool {
         self.0.is_some()
     }
 
-    /// Whether it is exactly zero.
+    /// Whether the number is exactly zero.
     #[must_use]
     pub fn is_zero(&self) -> bool {
         self.0.as_ref().is_some_and(Float::is_zero)
     }
 
-    /// The nearest double: infinite or zero beyond their range, NaN where undefined.
+    /// Returns the nearest double: infinite or zero out of range, NaN if undefined.
     #[must_use]
     pub fn to_f64(&self) -> f64 {
         self.0.as_ref().map_or(f64::NAN, Float::to_f64)
     }
 
-    /// |got − self| with a relative error of a roundoff; NaN for a NaN, or where undefined. An infinite number is right where no
-    /// double is as large.
+    /// Returns |got − self| with a relative error of a roundoff; NaN if either is undefined. Infinity is correct for a
+    /// number beyond the range of doubles.
     #[must_use]
     pub fn error_of(&self, got: f64) -> f64 {
         if got.is_infinite() {
@@ -58,7 +58,7 @@ impl Big {
         (Self::from_f64(got) - self.clone()).abs().to_f64()
     }
 
-    /// The same number rounded to the digits wanted, as in `-1.25e-3`; `0` for zero, `undefined` where it is.
+    /// Formats the number with this many digits, as in `-1.25e-3`; `0` for zero, `undefined` for an undefined number.
     #[must_use]
     pub fn to_decimal(&self, digits: usize) -> String {
         let Some(x) = &self.0 else { return "undefined".into() };
@@ -68,7 +68,7 @@ impl Big {
         x.to_decimal(digits)
     }
 
-    /// The larger magnitude; an undefined one is larger than any.
+    /// Returns the larger magnitude; undefined counts as the largest.
     pub(super) fn larger(self, other: &Self) -> Self {
         match (&self.0, &other.0) {
             (None, _) => self,
@@ -77,14 +77,14 @@ impl Big {
         }
     }
 
-    /// Whether |self| ≤ |other| · 2^exponent; false where either is undefined.
+    /// Whether |self| ≤ |other| · 2^exponent; `false` if either is undefined.
     pub(super) fn is_within(&self, other: &Self, exponent: i64) -> bool {
         let (Some(a), Some(b)) = (self.clone().abs().0, other.clone().abs().0) else { return false };
         a.is_zero() || a <= b.shifted(exponent)
     }
 
     fn of(value: Float) -> Self {
-        // Infinite is what 1/0 and the like may be called; to go on with it would panic, or mean nothing.
+        // Treat 1/0 and the like as undefined: computing with infinity would panic.
         Self(value.is_finite().then_some(value))
     }
 
@@ -181,7 +181,7 @@ impl Number for Big {
         self.unary(|a| Some(if a.is_zero() { float(1.0) } else { a.cos() }))
     }
     fn exp<L: Level>(self) -> Self {
-        // Beyond this, far outside the range of doubles, digits would cost memory without end.
+        // The largest exponent, far beyond the range of doubles: larger ones would exhaust the memory.
         const LARGEST: f64 = 1e6;
         self.unary(|a| match a.to_f64() {
             x if x > LARGEST => None,
@@ -252,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_undefined_stays_so_and_never_panics() {
+    fn undefined_numbers_stay_undefined_and_never_panic() {
         let (zero, one) = (Big::from_f64(0.0), Big::from_f64(1.0));
         let nothing = [
             one.clone() / zero.clone(),
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hundredth_of_a_roundoff_is_seen_and_no_range_is_left() {
+    fn errors_of_a_hundredth_of_a_roundoff_are_visible_over_the_whole_range() {
         let third = Big::from_f64(1.0) / Big::from_f64(3.0);
         assert!((third.error_of(1.0 / 3.0) / 2.0_f64.powi(-53) - 1.0 / 6.0 * 2.0).abs() < 0.2);
         let tiny = Big::from_f64(1e-300) * Big::from_f64(1e-300);

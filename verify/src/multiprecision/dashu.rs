@@ -1,4 +1,4 @@
-//! Multi-precision numbers by dashu, which is all Rust.
+//! Multi-precision numbers by dashu, in pure Rust.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -12,7 +12,7 @@ type Binary = FBig<HalfEven, 2>;
 pub(super) struct Float(Binary);
 
 impl Float {
-    /// An exact double, with that many bits for what is computed from it. Zero for what is no number.
+    /// Converts a double exactly, with the precision for computing with it. Zero for NaN and infinity.
     pub(super) fn from_f64(value: f64, bits: usize) -> Self {
         let exact = Binary::try_from(value).unwrap_or(Binary::ZERO);
         Self(exact.with_precision(bits.max(53)).value())
@@ -26,7 +26,7 @@ impl Float {
         self.0.to_f64().value()
     }
 
-    /// With so many digits, as in `-1.25e-3`.
+    /// Formats the number with this many digits, as in `-1.25e-3`.
     pub(super) fn to_decimal(&self, digits: usize) -> String {
         format!("{:e}", self.0.clone().with_base_and_precision::<10>(digits).value())
     }
@@ -43,7 +43,7 @@ impl Float {
         self.0 > Binary::ZERO
     }
 
-    /// x · 2^exponent.
+    /// Returns x · 2^exponent.
     pub(super) fn shifted(self, exponent: i64) -> Self {
         Self(self.0 << isize::try_from(exponent).unwrap_or(isize::MIN))
     }
@@ -72,12 +72,12 @@ impl Float {
         Self(self.0.atan2(&x.0))
     }
 
-    /// The power of a positive number.
+    /// Returns the power of a positive number.
     pub(super) fn powf(self, exponent: &Self) -> Self {
         Self(self.0.powf(&exponent.0))
     }
 
-    /// The power with a whole exponent of a number that is not zero.
+    /// Returns the integer power of a non-zero number.
     pub(super) fn powi(self, exponent: i32) -> Self {
         Self(self.0.powi(exponent.into()))
     }

@@ -1,16 +1,15 @@
-//! Truth: value, gradient and Hessian of any declaration, also one read at run time, to as many digits as are asked for.
+//! True values: value, gradient and Hessian of any declaration, also one read at run time, to any number of digits.
 //!
-//! The declaration's textbook form is evaluated once over *jets*, numbers that carry their first and second derivatives by all
-//! coordinates at once, of multi-precision numbers. Nothing of the compiler's differentiation, of its robust primitives or of its
-//! rewrites takes part. The same is done at ever higher precision until two results in a row agree: cancellation, however bad,
-//! costs time and no digits.
+//! The declaration's textbook form is evaluated once over *jets* of multi-precision numbers, which carry their first
+//! and second derivatives by all coordinates. This uses neither the compiler's differentiation nor its robust
+//! primitives or rewrites. The precision is raised until two consecutive results agree, so cancellation costs time but
+//! no digits.
 //!
-//! The numbers are dashu's, which needs nothing but Rust; with the feature `rug` they are GNU MPFR's, which share no code with them.
+//! The numbers are dashu's, in pure Rust. With the feature `rug` they are GNU MPFR's, an independent implementation.
 
 mod big;
 #[cfg(not(feature = "rug"))]
 mod dashu;
-mod jet;
 #[cfg(feature = "rug")]
 mod rug;
 mod truth;
@@ -21,6 +20,5 @@ use dashu::Float;
 #[cfg(feature = "rug")]
 use rug::Float;
 
-pub(crate) use jet::{Jet, Order};
 pub use truth::{TrueBlock, truth};
 pub(crate) use truth::{truth_of_ordinary, worse};

@@ -1,4 +1,4 @@
-//! Multi-precision numbers by rug, that is by GNU MPFR: what dashu computes, by code that has nothing in common with it.
+//! Multi-precision numbers by rug, which wraps GNU MPFR: an implementation independent of dashu.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -10,7 +10,7 @@ use rug::ops::Pow;
 pub(super) struct Float(rug::Float);
 
 impl Float {
-    /// An exact double, with that many bits for what is computed from it. Zero for what is no number.
+    /// Converts a double exactly, with the precision for computing with it. Zero for NaN and infinity.
     pub(super) fn from_f64(value: f64, bits: usize) -> Self {
         Self(rug::Float::with_val(precision(bits), if value.is_finite() { value } else { 0.0 }))
     }
@@ -23,7 +23,7 @@ impl Float {
         self.0.to_f64()
     }
 
-    /// With so many digits, as in `-1.25e-3`.
+    /// Formats the number with this many digits, as in `-1.25e-3`.
     pub(super) fn to_decimal(&self, digits: usize) -> String {
         let text = format!("{:.digits$e}", self.0);
         let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -44,7 +44,7 @@ impl Float {
         self.0.cmp0() == Some(Ordering::Greater)
     }
 
-    /// x · 2^exponent.
+    /// Returns x · 2^exponent.
     pub(super) fn shifted(self, exponent: i64) -> Self {
         Self(self.0 << i32::try_from(exponent).unwrap_or(i32::MIN))
     }
@@ -73,17 +73,17 @@ impl Float {
         Self(self.0.atan2(&x.0))
     }
 
-    /// The power of a positive number.
+    /// Returns the power of a positive number.
     pub(super) fn powf(self, exponent: &Self) -> Self {
         Self(self.0.pow(&exponent.0))
     }
 
-    /// The power with a whole exponent of a number that is not zero.
+    /// Returns the integer power of a non-zero number.
     pub(super) fn powi(self, exponent: i32) -> Self {
         Self(self.0.pow(exponent))
     }
 
-    /// `work` of two numbers, as exact as the more exact of them.
+    /// Applies `work` to two numbers at the higher of their precisions.
     fn of_both(self, other: Self, work: impl FnOnce(rug::Float, rug::Float) -> rug::Float) -> Self {
         let mut left = self.0;
         if left.prec() < other.0.prec() {

@@ -7,42 +7,42 @@ use crate::blocks::Block;
 use crate::formula::blocks_over;
 use crate::sample::Sample;
 
-/// The precision from which on a block that only holds what shrinks with the precision is exactly zero: 1e-780 of what was
-/// subtracted, which is less than the square of the smallest double to that of 1.
+/// Highest precision, in bits. A block whose numbers shrink with the precision up to here is exactly zero: they are
+/// below 1e-780 of the cancelled terms, less than the square of the smallest double relative to that of 1.
 const HIGHEST: usize = 2600;
 
-/// A block of true numbers.
+/// A block of true values.
 #[derive(Clone, Debug)]
 pub struct TrueBlock {
-    /// The numbers, right to the digits asked for relative to the largest of them.
+    /// The numbers, correct to the requested digits relative to the largest of them.
     pub block: Block<Big>,
-    /// Whether it has a value: not where the formula divides by zero.
+    /// Whether the block has a value: `false` if the formula divides by zero.
     pub is_defined: bool,
 }
 
 impl TrueBlock {
-    /// The largest magnitude.
+    /// Returns the largest magnitude.
     #[must_use]
     pub fn largest(&self) -> f64 {
         largest(&self.block.numbers).to_f64()
     }
 
-    /// The largest error of numbers in units of roundoff of the block's largest (never less than the least normal double, below
-    /// which a relative error means nothing). NaN where one is NaN, infinite where the block is exactly zero and they are not.
+    /// Returns the largest error of numbers in units of roundoff of the block's largest number, or of the smallest
+    /// normal double if that is larger. NaN if a number is NaN; infinite if only the block is exactly zero.
     #[must_use]
     pub fn error_in_roundoffs(&self, got: &[f64]) -> f64 {
         let worst = self.block.numbers.iter().zip(got).map(|(t, &g)| t.error_of(g)).fold(0.0, worse);
         let largest = self.largest();
         match worst {
             0.0 => 0.0,
-            // Right where the double is infinite too; else one of them is infinitely wrong.
+            // Correct if the double is infinite too; otherwise the error is infinite.
             _ if largest.is_infinite() => worst,
             _ if largest == 0.0 && self.block.numbers.iter().all(Big::is_zero) => f64::INFINITY,
             _ => worst / largest.max(f64::MIN_POSITIVE) / (f64::EPSILON / 2.0),
         }
     }
 
-    /// The place of the largest error.
+    /// Returns the index of the largest error.
     #[must_use]
     pub fn worst_entry(&self, got: &[f64]) -> usize {
         let errors = self.block.numbers.iter().zip(got).map(|(t, &g)| t.error_of(g)).enumerate();
@@ -54,8 +54,8 @@ pub(crate) fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b <= a { a } else { b }
 }
 
-/// Every block of a declaration at one input, to `digits` decimal digits relative to each block's largest number. Entries that are
-/// nothing but rounding are exactly zero.
+/// Computes every block of a declaration at one input, to `digits` decimal digits relative to each block's largest
+/// number. Entries that consist of rounding errors only are exactly zero.
 ///
 /// ```
 /// use energy_compiler::Textbook;
@@ -79,7 +79,8 @@ pub fn truth(declaration: &Declaration, formula: &Textbook, sample: &Sample, dig
     at_rising_precision(declaration, formula, sample, digits, Zeros::Confirmed)
 }
 
-/// The same where nothing cancels to the last digit: a block that comes out as exactly zero is taken to be so.
+/// Computes every block at an input without total cancellation: a block that comes out as zero is taken as exactly
+/// zero.
 pub(crate) fn truth_of_ordinary(
     declaration: &Declaration,
     formula: &Textbook,
@@ -89,11 +90,11 @@ pub(crate) fn truth_of_ordinary(
     at_rising_precision(declaration, formula, sample, digits, Zeros::Believed)
 }
 
-/// What to make of a block that is exactly zero at some precision: 1 − x is, for x nearer to 1 than its last bit.
+/// The treatment of a block that is zero at some precision, as 1 − x is for x within the last bit of 1.
 #[derive(Clone, Copy, PartialEq)]
 enum Zeros {
     Believed,
-    /// Only at the highest precision.
+    /// Accept zero at the highest precision only.
     Confirmed,
 }
 
@@ -123,7 +124,7 @@ fn at_rising_precision(
     }
 }
 
-/// The block, if two precisions agree on it, or the higher one is the highest.
+/// Returns the block if two precisions agree on it, or if the finer precision is the highest.
 fn agreed(coarse: &Block<Big>, fine: &Block<Big>, wanted: usize, bits: usize, zeros: Zeros) -> Option<TrueBlock> {
     let wanted = -i64::try_from(wanted).unwrap_or(i64::MAX);
     let is_defined = fine.numbers.iter().all(Big::is_defined);
@@ -135,7 +136,7 @@ fn agreed(coarse: &Block<Big>, fine: &Block<Big>, wanted: usize, bits: usize, ze
         return None;
     }
     let cleaned = coarse.numbers.iter().zip(&fine.numbers).map(|(a, b)| {
-        // What two precisions do not agree on to a bit is rounding.
+        // An entry on which two precisions do not agree in any bit is rounding.
         let is_rounding = is_defined && !(a.clone() - b.clone()).is_within(b, -1);
         if is_rounding { Big::from_f64(0.0) } else { b.clone() }
     });

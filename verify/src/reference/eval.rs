@@ -6,28 +6,30 @@ use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
 use super::mapping::{is_undeclared, mapping};
-use crate::atomic_file::write_whole;
 use crate::blocks::{NoAnswer, evaluate};
 use crate::multiprecision::truth;
 
-/// What fills the blocks of evaluated records.
+/// The source of the blocks in evaluated records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The generated code: 17 digits.
+    /// The generated code, with 17 digits.
     GeneratedCode,
-    /// The formula in multi-precision: so many digits; `undefined` where it has no value.
+    /// The formula in multi-precision; `undefined` where it has no value.
     Truth {
-        /// How many.
+        /// Number of digits.
         digits: usize,
     },
 }
 
-/// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the same records with `out` filled by the
-/// generated code or the truth, and `flags` of the generated code: by block, whether it is `degenerate` or a `kink`. A degenerate rest shape, or a potential
-/// of the reference set that no element computes yet, leaves `out` empty and says so in `error`. Returns the number of records.
+/// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the records with `out` and `flags`.
+/// `out` contains the blocks by the source. `flags` says whether the generated code marks a block as `degenerate` or a
+/// `kink`. If the rest shape is degenerate, or no element computes the potential yet, `out` is empty and `error` has
+/// the reason.
+///
+/// Returns the number of records.
 ///
 /// # Errors
-/// When the input is malformed or names an unknown potential, or the output cannot be written; nothing is written then.
+/// If the input is malformed or names an unknown potential, or the output cannot be written. Nothing is written then.
 pub fn evaluate_file(input: &Path, output: &Path, source: Source) -> Result<usize, RecordError> {
     let mut file: Value = read(input)?;
     let common = file.get("potential").and_then(Value::as_str).map(str::to_owned);
@@ -43,7 +45,7 @@ pub fn evaluate_file(input: &Path, output: &Path, source: Source) -> Result<usiz
     }
     let count = records.len();
     let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
-    write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
+    energy_cli::write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
     Ok(count)
 }
 
@@ -62,7 +64,7 @@ fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result
     };
     let sample = record.sample(&mapping)?;
     let declaration = mapping.entry.declaration;
-    // Which of a constraint's blocks are meant follows from what the reference has, if it has any.
+    // For constraints, the reference's own blocks determine which are computed.
     let asked: Option<Vec<String>> = ["out", "blocks"]
         .iter()
         .find_map(|key| fields.get(*key).and_then(Value::as_object))

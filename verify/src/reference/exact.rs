@@ -2,19 +2,19 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-/// A decimal number to twice the precision of a double: `high` is it rounded, `low` what that lost.
+/// A decimal number in twice the precision of a double: `high` is the nearest double, `low` the remainder.
 ///
 /// ```
 /// use verify::reference::Truth;
 /// let third: Truth = "3.33333333333333333333333333333e-01".parse().unwrap();
-/// // A hundredth of a unit of roundoff is seen.
+/// // Errors of a hundredth of a roundoff are visible.
 /// assert!((third.error_of(1.0 / 3.0) / 2.0_f64.powi(-53) - 1.0 / 6.0).abs() < 1e-2);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// The nearest double.
+    /// Nearest double.
     pub high: f64,
-    /// The rest.
+    /// Remainder of the number.
     pub low: f64,
 }
 
@@ -38,12 +38,13 @@ impl std::str::FromStr for Truth {
             return Ok(Self { high, low: 0.0 });
         }
         let exact = decimal(text.trim()).ok_or_else(|| format!("`{text}` is not a decimal number"))?;
-        let rounded = BigRational::from_float(high).ok_or_else(|| format!("`{text}` has no double near it"))?;
+        let rounded =
+            BigRational::from_float(high).ok_or_else(|| format!("`{text}` is out of the range of doubles"))?;
         Ok(Self { high, low: (exact - rounded).to_f64().unwrap_or(0.0) })
     }
 }
 
-/// `-1.25e-3` as a fraction.
+/// Parses `-1.25e-3` as a fraction.
 fn decimal(text: &str) -> Option<BigRational> {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
@@ -61,7 +62,7 @@ mod tests {
     use super::Truth;
 
     #[test]
-    fn what_rounding_lost_is_known() {
+    fn the_remainder_of_rounding_is_known() {
         let tenth: Truth = "1.00000000000000000000000000000e-01".parse().unwrap();
         // 0.1 = 0x3fb999999999999a − 5.551115123125783e-18.
         assert_eq!(tenth.high, 0.1);

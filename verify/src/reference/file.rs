@@ -6,37 +6,37 @@ use serde_json::Value;
 
 use crate::sample::Sample;
 
-/// What is wrong with a file of records.
+/// An error in a file of records.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// It cannot be read or written.
+    /// The file cannot be read or written.
     #[error("{path}: {source}")]
     File {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is not JSON, or not of the schema.
+    /// The file is not JSON, or does not match the schema.
     #[error("{path}:{line}:{column}: {message}")]
     Syntax {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Line.
+        /// Line number.
         line: usize,
-        /// Column.
+        /// Column number.
         column: usize,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
-    /// A record is wrong.
+    /// A record has an error.
     #[error("{path}: record {record}: {message}")]
     Record {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The record's id.
+        /// Id of the record.
         record: String,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
 }
@@ -51,7 +51,7 @@ impl RecordError {
     }
 }
 
-/// Reads a JSON file into anything.
+/// Reads a JSON file.
 pub(super) fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, RecordError> {
     let text = std::fs::read_to_string(path).map_err(|e| RecordError::file(path, e))?;
     serde_json::from_str(&text).map_err(|error| RecordError::Syntax {
@@ -62,29 +62,29 @@ pub(super) fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Recor
     })
 }
 
-/// One record: where the potential is evaluated.
+/// A record: an input of a potential.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Record {
-    /// Its id.
+    /// Id of the record.
     pub id: String,
-    /// Coordinates as decimal strings that are doubles exactly.
+    /// Coordinates as decimal strings of exact doubles.
     pub x: Vec<String>,
-    /// The same doubles as big-endian hexadecimal digits, to check the reading of `x`; may be left out.
+    /// The same doubles as big-endian hexadecimal digits, to check `x`; optional.
     #[serde(default)]
     pub x_bits: Vec<String>,
-    /// Velocities likewise; of forces.
+    /// Velocities of forces, as `x`.
     #[serde(default)]
     pub v: Vec<String>,
-    /// Their bits; may be left out.
+    /// The bits of `v`; optional.
     #[serde(default)]
     pub v_bits: Vec<String>,
-    /// Parameters by name: a number as string, or a list of them.
+    /// Parameters by name: a number as a string, or a list of them.
     #[serde(default)]
     pub params: BTreeMap<String, Value>,
     /// Amplification of rounded edges, by block.
     #[serde(default)]
     pub kappa: BTreeMap<String, Option<f64>>,
-    /// Whether every difference of coordinates is a double exactly.
+    /// Whether every coordinate difference is an exact double.
     #[serde(default)]
     pub exact_edges: bool,
     /// `f64_overflow`, `f64_underflow`.
@@ -93,7 +93,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// The numbers an element takes, its parameters and rest shape found by name.
+    /// Returns the inputs of an element; finds its parameters and rest shape by name.
     pub(super) fn sample(&self, mapping: &super::Mapping) -> Result<Sample, String> {
         let positions = numbers(&self.x, &self.x_bits, "x")?;
         let expected: usize = mapping.entry.declaration.points.iter().map(|p| p.size).sum();
@@ -137,7 +137,7 @@ impl Record {
     }
 }
 
-/// Decimal strings as doubles, each held against its bits where those are given.
+/// Parses decimal strings as doubles and compares them with their bits, if given.
 fn numbers(list: &[String], bits: &[String], what: &str) -> Result<Vec<f64>, String> {
     if !bits.is_empty() && bits.len() != list.len() {
         return Err(format!("{what}_bits holds {} numbers, {what} holds {}", bits.len(), list.len()));

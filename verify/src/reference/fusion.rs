@@ -1,4 +1,5 @@
-//! The residuals of body tracking against multi-precision values (see `data/fusion/README.md`): errors in the max-norm of each array.
+//! The residuals of body tracking against multi-precision values (see `data/fusion/README.md`), with errors in the
+//! maximum norm of each array.
 
 use std::path::Path;
 
@@ -14,35 +15,34 @@ use serde_json::{Map, Value};
 use super::exact::Truth;
 use super::file::{RecordError, read};
 use super::fusion_system;
-use crate::atomic_file::write_whole;
 use crate::dual::Hyper;
 
-/// The errors of one array of one family over all cases.
+/// The error of one array of a family over all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct FamilyLine {
-    /// The family.
+    /// Name of the family.
     pub family: &'static str,
-    /// The array.
+    /// Name of the array.
     pub array: String,
-    /// Cases looked at.
+    /// Number of cases.
     pub cases: usize,
-    /// The worst error relative to the largest entry (or to what the array is a difference of).
+    /// Worst error relative to the largest entry, or to the terms of a difference.
     pub worst: f64,
-    /// Its case.
+    /// Case of the worst error.
     pub worst_case: String,
-    /// What a careful implementation keeps to, with some room.
+    /// Bound that a careful implementation meets, with a margin.
     pub bound: f64,
 }
 
 impl FamilyLine {
-    /// Whether the bound is kept; NaN never is.
+    /// Whether the bound is met; `false` for NaN.
     #[must_use]
     pub fn passed(&self) -> bool {
         self.worst <= self.bound
     }
 }
 
-/// Lines as cases come in, and what was computed for the last one.
+/// Lines of the report so far, and the arrays of the last case.
 #[derive(Default)]
 pub(super) struct Lines {
     all: Vec<FamilyLine>,
@@ -50,7 +50,7 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    /// Compares one array. `scale` is what errors are relative to; the array's largest entry if that is larger.
+    /// Compares one array. Errors are relative to `scale` or to the array's largest entry, whichever is larger.
     pub(super) fn compare(
         &mut self,
         case: &Case<'_>,
@@ -68,13 +68,13 @@ impl Lines {
         }
         let largest = truths.iter().fold(scale, |most, truth| most.max(truth.high.abs()));
         let error = found.iter().zip(&truths).map(|(found, truth)| truth.error_of(*found)).fold(0.0, worse);
-        // An array that vanishes must vanish exactly.
+        // A zero array must be exactly zero.
         let relative = if error == 0.0 { 0.0 } else { error / largest };
         self.note(case, array, relative, bound);
         Ok(())
     }
 
-    /// Notes whether something is exactly as it must be.
+    /// Records whether a condition holds exactly.
     pub(super) fn exact(&mut self, case: &Case<'_>, array: &str, right: bool) {
         if !case.evaluated_only {
             self.note(case, array, if right { 0.0 } else { f64::INFINITY }, 0.0);
@@ -97,7 +97,7 @@ impl Lines {
     }
 }
 
-/// The larger; NaN if either is.
+/// Returns the larger number; NaN if either is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }
@@ -107,17 +107,17 @@ pub(super) struct Case<'a> {
     family: &'static str,
     id: String,
     value: &'a Value,
-    /// There is no truth to compare with.
+    /// Whether there is no true value to compare with.
     evaluated_only: bool,
 }
 
 impl Case<'_> {
-    /// A field of the case.
+    /// Returns a field of the case.
     pub(super) fn field(&self, name: &str) -> Result<&Value, String> {
         self.value.get(name).ok_or_else(|| format!("`{name}` is missing"))
     }
 
-    /// A field of its results.
+    /// Returns a field of its results.
     pub(super) fn out(&self, name: &str) -> Result<&Value, String> {
         if self.evaluated_only {
             return Ok(&Value::Null);
@@ -125,29 +125,29 @@ impl Case<'_> {
         self.field("out")?.get(name).ok_or_else(|| format!("`out.{name}` is missing"))
     }
 
-    /// All numbers of a field, in order.
+    /// Returns all numbers of a field, in order.
     pub(super) fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
         numbers(self.field(name)?).map_err(|error| format!("{name}: {error}"))
     }
 
-    /// A number.
+    /// Returns a field that is one number.
     pub(super) fn number(&self, name: &str) -> Result<f64, String> {
         self.numbers(name)?.first().copied().ok_or_else(|| format!("`{name}` is empty"))
     }
 
-    /// Three numbers.
+    /// Returns a field of three numbers.
     pub(super) fn vector(&self, name: &str) -> Result<[f64; 3], String> {
         fixed(&self.numbers(name)?, name)
     }
 
-    /// The twists of all nodes.
+    /// Returns the twists of all nodes.
     pub(super) fn twists(&self) -> Result<Vec<[f64; 6]>, String> {
         let (theta, t) = (self.numbers("theta")?, self.numbers("t")?);
         let both = theta.chunks_exact(3).zip(t.chunks_exact(3));
         Ok(both.map(|(a, b)| [a[0], a[1], a[2], b[0], b[1], b[2]]).collect())
     }
 
-    /// The parameter `turn` of the declared residuals.
+    /// Returns the parameter `turn` of the declared residuals.
     pub(super) fn turn(&self) -> Result<f64, String> {
         turn(self.field("conv")?.as_str().unwrap_or_default())
     }
@@ -170,12 +170,12 @@ fn turn(convention: &str) -> Result<f64, String> {
     }
 }
 
-/// An array of known length.
+/// Converts numbers to an array of known length.
 pub(super) fn fixed<const N: usize>(numbers: &[f64], name: &str) -> Result<[f64; N], String> {
     numbers.try_into().map_err(|_| format!("`{name}` has {} numbers, expected {N}", numbers.len()))
 }
 
-/// All numbers below a value, in order.
+/// Returns all numbers in a value, in order.
 pub(super) fn numbers(value: &Value) -> Result<Vec<f64>, String> {
     let mut all = Vec::new();
     flatten(value, &mut |text| {
@@ -197,11 +197,11 @@ fn flatten(value: &Value, take: &mut impl FnMut(&str) -> Result<(), String>) -> 
 
 type Check = fn(&Case<'_>, &mut Lines) -> Result<(), String>;
 
-/// Measures the generated code against a `reference.json` of body tracking. Smoothing of attachments (`hsmooth`) involves no declared
-/// residual, and is compared where it is implemented, in `fusion-core`.
+/// Measures the generated code against a `reference.json` of body tracking. Smoothing of attachments (`hsmooth`)
+/// involves no declared residual; `fusion-core` compares it.
 ///
 /// # Errors
-/// When the file cannot be read or a case is malformed.
+/// If the file cannot be read or a case is malformed.
 pub fn fusion_reference(path: &Path) -> Result<Vec<FamilyLine>, RecordError> {
     let file: Value = read(path)?;
     let mut lines = Lines::default();
@@ -216,11 +216,12 @@ pub fn fusion_reference(path: &Path) -> Result<Vec<FamilyLine>, RecordError> {
     Ok(lines.all)
 }
 
-/// Evaluates the cases of a file of body tracking, any families of it, and writes them with `out` filled by the generated code: by array
-/// its numbers one after the other, 17 digits. Returns how many; nothing if the file has none of the families.
+/// Evaluates the cases of a file of body tracking, of any families, and writes them with `out` filled by the generated
+/// code: the numbers of each array in order, with 17 digits. Returns the number of cases; `None` if the file has none
+/// of the families.
 ///
 /// # Errors
-/// When the input is malformed, or the output cannot be written; nothing is written then.
+/// If the input is malformed, or the output cannot be written. Nothing is written then.
 pub fn evaluate_fusion(input: &Path, output: &Path) -> Result<Option<usize>, RecordError> {
     let mut file: Value = read(input)?;
     let mut count = None;
@@ -236,7 +237,7 @@ pub fn evaluate_fusion(input: &Path, output: &Path) -> Result<Option<usize>, Rec
     }
     if count.is_some() {
         let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
-        write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
+        energy_cli::write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
     }
     Ok(count)
 }
@@ -256,10 +257,10 @@ fn identity(case: &Value) -> String {
     case.get("id").and_then(Value::as_str).unwrap_or("without id").to_owned()
 }
 
-/// exp: 8 numbers and their derivatives, in both conventions, down to no turn at all.
+/// exp: 8 numbers and their derivatives, in both conventions, down to a zero rotation.
 fn exponential(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let twist = case.twists()?[0];
-    // Rounding ‖θ‖ turns by as much.
+    // Rounding ‖θ‖ changes the angle by as much.
     let length = twist[0].hypot(twist[1]).hypot(twist[2]);
     let (suffix, bound) = if length <= 3.2 { ("", 1.2e-15) } else { (", ‖θ‖ > π", 8e-15) };
     for convention in ["doc", "std"] {
@@ -286,7 +287,7 @@ fn blend(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     if aligned {
         lines.exact(case, "sign", numbers(case.out("sign")?)? == signs);
     } else {
-        // The declared blend aligns; weights with the opposite signs undo it.
+        // The declared blend aligns signs; weights with the opposite signs undo that.
         w = std::array::from_fn(|k| signs[k] * w[k]);
     }
     let unknowns = fixed::<24>(twists.as_flattened(), "twists")?;
@@ -319,7 +320,7 @@ fn blend(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     compare("T", &motion)
 }
 
-/// What the three K of the data term have in common: (v̂, n̂), (r, J), (r, J) with the normal held.
+/// Results of the data term for one K: (v̂, n̂), (r, J), and (r, J) with a frozen normal.
 struct Plane {
     moved: [f64; 6],
     r: f64,
@@ -328,7 +329,10 @@ struct Plane {
 }
 
 macro_rules! plane_of {
-    ($k:literal, $unknowns:literal, $point:ident, $plane:ident, $frozen:ident, |$w:ident, $rest:ident| $($weights:tt)*) => {
+    (
+        $k:literal, $unknowns:literal, $point:ident, $plane:ident, $frozen:ident,
+        |$w:ident, $rest:ident| $($weights:tt)*
+    ) => {
         |turn: f64, $w: &[f64], v: [f64; 3], n: [f64; 3], u: [f64; 3], twists: &[f64]| -> Result<Plane, String> {
             let unknowns = fixed::<$unknowns>(twists, "twists")?;
             let moved = plane_of!(@new $point, turn, $w, $k, [v, n], $($weights)*).residual(&unknowns).value;
@@ -344,8 +348,8 @@ macro_rules! plane_of {
     };
 }
 
-/// nonrigid: the data term for K = 1, 4, 8 with its Jacobian, full and with the normal held; the exact Hessian by dual numbers through
-/// the generated Jacobian.
+/// nonrigid: the data term for K = 1, 4, 8 with its Jacobian, full and with a frozen normal; and the exact Hessian by
+/// dual numbers through the generated Jacobian.
 fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let (turn, mut w, lambda) = (case.turn()?, case.numbers("w")?, case.number("lambda_n")?);
     let (v, n, u) = (case.vector("v")?, case.vector("n")?, case.vector("u")?);
@@ -362,7 +366,7 @@ fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
         1 => plane_of!(1, 6, BlendedPoint1, NonrigidPlane1, FrozenPlane1, |_w, rest| one)(turn, &w, v, n, u, flat)?,
         4 => plane_of!(4, 24, BlendedPoint4, NonrigidPlane4, FrozenPlane4, |w, rest| many)(turn, &w, v, n, u, flat)?,
         8 => plane_of!(8, 48, BlendedPoint8, NonrigidPlane8, FrozenPlane8, |w, rest| many)(turn, &w, v, n, u, flat)?,
-        other => return Err(format!("K = {other}: 1, 4 and 8 are declared")),
+        other => return Err(format!("expected K = 1, 4 or 8, got {other}")),
     };
     let steepest = plane.jacobian.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
     let Plane { moved, r, jacobian, frozen } = plane;
@@ -372,7 +376,7 @@ fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     };
     compare("vhat", 0.0, 4e-15, &moved[..3])?;
     compare("nhat", 0.0, 4e-15, &moved[3..])?;
-    // A difference of lengths of order one.
+    // A difference of lengths of about 1.
     compare("r", 1.0, 1.8e-15, &[r])?;
     compare("J", 0.0, 2.8e-15, &jacobian)?;
     compare("J_frozen_normal", 0.0, 2.8e-15, &frozen)?;
@@ -404,7 +408,7 @@ fn hyper_plane4(turn: f64, w: [f64; 4], v: [f64; 3], n: [f64; 3], u: [f64; 3]) -
     NonrigidPlane4::new(Hyper::constant(turn), w.map(Hyper::constant), v, n, u)
 }
 
-/// The derivatives of a generated Jacobian, by dual numbers.
+/// Computes the derivatives of a generated Jacobian by dual numbers.
 fn second_derivatives<const U: usize>(
     twists: &[[f64; 6]],
     jacobian: impl Fn([Hyper; U]) -> Vec<Hyper>,
@@ -417,7 +421,7 @@ fn second_derivatives<const U: usize>(
     Ok((0..U).flat_map(row).collect())
 }
 
-/// lbs_plane: the same for a linear blend. Cases with fewer nodes leave the others at weight zero.
+/// lbs_plane: the data term with a linear blend. Cases with fewer nodes give the others zero weight.
 fn skinned(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let (turn, w) = (case.turn()?, case.numbers("w")?);
     let (v, n, u) = (case.vector("v")?, case.vector("n")?, case.vector("u")?);
@@ -429,7 +433,7 @@ fn skinned(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let at = SkeletonPlane::new(turn, share, v, n, u).jacobian(&unknowns);
     let moved = SkeletonPoint::new(turn, share, v, n).residual(&unknowns).value;
     if at.jacobian[6 * k..].iter().any(|&entry| entry != 0.0) {
-        return Err("a node of weight zero has a derivative".into());
+        return Err("the derivative by a node of weight zero is not zero".into());
     }
     lines.compare(case, ("v", 1.0, 1.8e-15), &moved[..3], case.out("v")?)?;
     lines.compare(case, ("n", 1.0, 1.8e-15), &moved[3..], case.out("n")?)?;
@@ -468,7 +472,7 @@ fn graph(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     Ok(())
 }
 
-/// ψ as printed, of s and of √s.
+/// Returns ψ as printed, of s and of √s.
 pub(super) fn weights(s: f64, delta: f64) -> [(&'static str, f64); 3] {
     let weight = |y: f64| if y == 0.0 { 1.0 } else { HuberLoss::new(delta).jacobian(&[y]).jacobian[0] / y };
     [
@@ -496,7 +500,7 @@ fn binding(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     lines.compare(case, ("gradE", lambda, 4e-15), &gradient, case.out("gradE")?)
 }
 
-/// Σ η_j T_bj x, motions being rows of 3×4.
+/// Returns Σ η_j T_bj x, with each motion given as a 3×4 matrix by rows.
 pub(super) fn bound_place(motions: &[f64], shares: &[f64], x: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|row| {
         let of = |motion: &[f64]| {
@@ -507,7 +511,7 @@ pub(super) fn bound_place(motions: &[f64], shares: &[f64], x: &[f64; 3]) -> [f64
     })
 }
 
-/// huber: the loss, its derivative, its weight, and the form of a squared argument that solvers use.
+/// huber: the loss, its derivative, its weight, and the form with a squared argument that solvers use.
 fn huber(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let (y, delta) = (case.number("y")?, case.number("delta")?);
     let at = HuberLoss::new(delta).jacobian(&[y]);

@@ -1,4 +1,4 @@
-//! A whole system of body tracking against multi-precision values: assembled and solved by `energy-solve`.
+//! A complete system of body tracking against multi-precision values, assembled and solved by `energy-solve`.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::fusion::{Case, Lines, bound_place, fixed, numbers, weights};
 
-/// The three terms.
+/// The three terms of the system.
 struct Terms {
     data: ResidualTerm<NonrigidPlane4, 6>,
     graph: ResidualTerm<GraphEdge, 6>,
@@ -16,7 +16,7 @@ struct Terms {
     pattern: Arc<NormalPattern>,
 }
 
-/// system: r, JᵀJ, Jᵀr, the pattern of blocks, the step and what it does to the energy.
+/// system: r, JᵀJ, Jᵀr, the pattern of blocks, the step, and the energy after it.
 pub(super) fn system(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     const BOUND: f64 = 1e-12;
     let x = case.twists()?;
@@ -54,7 +54,7 @@ pub(super) fn system(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let after: Vec<[f64; 6]> = x.iter().zip(&step).map(|(x, d)| std::array::from_fn(|i| x[i] + d[i])).collect();
     let energy_after = all.iter().map(|term| term.energy(&after).energy).sum();
 
-    // It has the step's error times the slope of the energy there.
+    // Its error is the error of the step times the slope of the energy.
     let truth = case.out("E_after_full_step")?;
     lines.compare(case, ("E_after_full_step", 0.0, 10.0 * BOUND), &[energy_after], truth)?;
 
@@ -65,7 +65,7 @@ pub(super) fn system(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     Ok(())
 }
 
-/// The residuals of a term times the roots of their weights.
+/// Returns the residuals of a term times the square roots of their weights.
 fn weighted<E>(term: &ResidualTerm<E, 6>, x: &[[f64; 6]]) -> Vec<f64>
 where
     E: energy_dsl::PackedResidual<f64> + std::fmt::Debug,
@@ -89,7 +89,7 @@ impl Terms {
         let stencils = ids.iter().map(<[u32; 4]>::as_slice).chain(edges.iter().map(<[u32; 2]>::as_slice));
         let pattern = Arc::new(NormalPattern::new(nodes, stencils).map_err(|error| error.to_string())?);
         let lambda = |name: &str| -> Result<f64, String> {
-            numbers(&case.field("lambda")?[name])?.first().copied().ok_or_else(|| format!("no λ_{name}"))
+            numbers(&case.field("lambda")?[name])?.first().copied().ok_or_else(|| format!("`lambda.{name}` is empty"))
         };
         let mut data = ResidualTerm::new("nonrigid", coupled(&pattern, &ids)?, lambda("n")?);
         let mut elements = Vec::new();

@@ -1,17 +1,17 @@
 use energy_elements::{CatalogueEntry, find};
 
-/// Which element computes a reference potential, and from which of the record's parameters.
+/// The element that computes a reference potential, and the source of its parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapping {
-    /// The reference potential.
+    /// Name of the reference potential.
     pub potential: &'static str,
-    /// The element.
+    /// Element of the catalogue.
     pub entry: &'static CatalogueEntry,
-    /// The record's names of the element's parameters in order; an empty name is 0.
+    /// The record's names of the element's parameters, in order; an empty name means 0.
     pub parameters: &'static [&'static str],
     /// The record's name of the rest shape.
     pub rest: Option<&'static str>,
-    /// Whether edges rounded before they arrive are no excuse (tier B).
+    /// Whether tier B applies, which makes no allowance for rounded edges.
     pub kappa_free: bool,
 }
 
@@ -45,22 +45,22 @@ const TABLE: &[Row] = &[
     ("witkin_vector_damped", "ZeroLengthSpring", &["k_s", "k_d"], None, false),
 ];
 
-/// Potentials of the reference set whose elements are still to be declared.
+/// Reference potentials without a declared element.
 const UNDECLARED: &[&str] = &[];
 
 impl Mapping {
-    /// Whether the potential is a force, so that its records hold velocities.
+    /// Whether the potential is a force, so that its records contain velocities.
     pub(super) fn needs_velocities(&self) -> bool {
         self.entry.declaration.kind == energy_dsl::Kind::Force || self.parameters.contains(&"k_d")
     }
 }
 
-/// Whether a potential belongs to the reference set but has no element yet.
+/// Whether a reference potential has no element yet.
 pub(super) fn is_undeclared(potential: &str) -> bool {
     UNDECLARED.contains(&potential)
 }
 
-/// The element of a reference potential, if one is declared.
+/// Returns the element of a reference potential; `None` if none is declared.
 #[must_use]
 pub fn mapping(potential: &str) -> Option<Mapping> {
     let &(potential, element, parameters, rest, kappa_free) = TABLE.iter().find(|row| row.0 == potential)?;
@@ -73,7 +73,7 @@ mod tests {
     use super::{TABLE, UNDECLARED, mapping};
 
     #[test]
-    fn a_potential_is_declared_or_listed_as_not() {
+    fn each_potential_is_declared_or_listed_as_undeclared() {
         assert!(UNDECLARED.iter().all(|name| mapping(name).is_none()), "an element has come: strike it off the list");
     }
 

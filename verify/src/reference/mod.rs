@@ -1,5 +1,5 @@
-//! Generated code against multi-precision reference values (schema `potref-1`, see `data/potentials/README.md`), and against the
-//! documented behaviour at degenerate inputs (`potref-policy-1`).
+//! Generated code against multi-precision reference values (schema `potref-1`, see `data/potentials/README.md`), and
+//! against the documented results at degenerate inputs (`potref-policy-1`).
 
 mod eval;
 mod exact;

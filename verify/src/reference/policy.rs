@@ -12,20 +12,20 @@ use crate::blocks::{Answer, Block, BlockName, NoAnswer, evaluate, largest};
 use crate::formula::expected_blocks;
 use crate::sample::Sample;
 
-/// One block of one degenerate input.
+/// The result of one block at one degenerate input.
 #[derive(Clone, Debug, Serialize)]
 pub struct PolicyLine {
-    /// The record.
+    /// Id of the record.
     pub record: String,
-    /// The potential.
+    /// Name of the potential.
     pub potential: String,
-    /// The block.
+    /// Name of the block.
     pub block: String,
-    /// What is asked for: `limit`, `regular`, `infinite`, `branch`, `kink` or `singular`.
+    /// Expected behaviour: `limit`, `regular`, `infinite`, `branch`, `kink` or `singular`.
     pub status: String,
-    /// Whether the element does it; nothing where no element computes the potential.
+    /// Whether the element behaves as expected; `None` if no element computes the potential.
     pub passed: Option<bool>,
-    /// What it returned.
+    /// The result of the element.
     pub found: String,
 }
 
@@ -51,10 +51,10 @@ struct Rule {
     values: Vec<String>,
 }
 
-/// Runs the elements on the degenerate inputs of a file.
+/// Evaluates the elements at the degenerate inputs of a file.
 ///
 /// # Errors
-/// When the file cannot be read or a record is malformed.
+/// If the file cannot be read or a record is malformed.
 pub fn policy(path: &Path) -> Result<Vec<PolicyLine>, RecordError> {
     let policy: Policy = read(path)?;
     let mut lines = Vec::new();
@@ -138,15 +138,15 @@ fn same_bits(a: &Block, b: &Block) -> bool {
     a.numbers.iter().map(|x| x.to_bits()).eq(b.numbers.iter().map(|x| x.to_bits()))
 }
 
-/// Whether a block at a point where the textbook form breaks down is what that form tends to: its mean over two points on
-/// either side, which differs from it by the square of their distance.
+/// Whether a block, at a point where the textbook form breaks down, is the limit of that form. The limit is the mean
+/// over two points on either side, whose error is quadratic in their distance.
 fn continues(declaration: &Declaration, formula: &Textbook, sample: &Sample, block: &Block) -> bool {
     const TOLERANCE: f64 = 1e-2;
     let step = sample.feature_length(declaration) * 2.0_f64.powi(-9);
     let expected = |sign: f64| {
         let mut beside = sample.clone();
         for (i, x) in beside.positions.iter_mut().enumerate() {
-            // A fixed direction along nothing in particular.
+            // A fixed direction along no axis.
             *x += sign * step * (1.0 + 2.0 * i as f64 + (i * i) as f64).cos();
         }
         let blocks = expected_blocks(declaration, formula, &beside);
@@ -179,7 +179,7 @@ fn branch_value(text: &str) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A straight hair: the textbook form's Hessian loses its digits there, its neighbours' do not.
+    /// Straight hair: the textbook form's Hessian loses its digits there, but not at its neighbours.
     #[test]
     fn a_regular_block_must_continue_its_neighbours() {
         let entry = energy_elements::find("HairBend").unwrap();

@@ -10,46 +10,46 @@ use super::mapping::{Mapping, mapping};
 use super::policy::{PolicyLine, policy};
 use crate::blocks::evaluate;
 
-/// The errors of one block of one potential over all records.
+/// The errors of one block of a potential over all records.
 #[derive(Clone, Debug, Serialize)]
 pub struct BlockLine {
-    /// The potential.
+    /// Name of the potential.
     pub potential: String,
-    /// The element that computed it.
+    /// Element that computed it.
     pub element: &'static str,
-    /// The block.
+    /// Name of the block.
     pub block: String,
-    /// Records looked at.
+    /// Number of records.
     pub records: usize,
-    /// Records with a NaN.
+    /// Number of records with a NaN.
     pub nan: usize,
-    /// Worst error in units of roundoff, relative to the block's largest number, over records whose block is not zero.
+    /// Worst error over records with a non-zero block, in units of roundoff of the block's largest number.
     pub worst: f64,
-    /// Its record.
+    /// Record of `worst`.
     pub worst_record: String,
     /// Worst error in units of roundoff times max(1, κ).
     pub worst_kappa: f64,
-    /// Its record.
+    /// Record of `worst_kappa`.
     pub worst_kappa_record: String,
-    /// Worst error in u over the records whose edges are exact in doubles, where κ excuses nothing of the points. (It still
-    /// excuses rounded parameters and rest shapes, so that no bound is set.)
+    /// Worst error in u over the records with edges that are exact doubles, for which κ makes no allowance. It has no
+    /// bound, because parameters and rest shapes are still rounded.
     pub worst_exact_edges: Option<f64>,
-    /// Records beyond tier A: 8 u max(1, κ), exactly zero where the truth is.
+    /// Records beyond tier A: 8 u max(1, κ), and exactly zero for a true zero.
     pub beyond_tier_a: Vec<String>,
-    /// The κ-free bound in u, where there is one.
+    /// Bound without κ, in u; `None` if tier B does not apply.
     pub tier_b: Option<f64>,
-    /// Records beyond it.
+    /// Records beyond tier B.
     pub beyond_tier_b: Vec<String>,
 }
 
 /// A comparison with a folder of reference values.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ReferenceReport {
-    /// One line for each potential and block.
+    /// One line per potential and block.
     pub lines: Vec<BlockLine>,
     /// Potentials that no element computes yet.
     pub undeclared: Vec<String>,
-    /// Degenerate inputs, if the folder has them.
+    /// Results at degenerate inputs, if the folder has them.
     pub policy: Vec<PolicyLine>,
 }
 
@@ -59,8 +59,8 @@ struct Potential {
     records: Vec<Value>,
 }
 
-/// The bound on an error in u where edges are no excuse: 8 / 12 / 16 for value, first and second derivatives; 24 for Jacobians of
-/// forces; 16 for the Hessians of bending near rest.
+/// Returns the bound in u without allowance for edges: 8, 12 and 16 for values, first and second derivatives; 24 for
+/// Jacobians of forces; 16 for Hessians of bending near rest.
 fn tier_b(mapping: &Mapping, block: &str) -> Option<f64> {
     match (block, mapping.potential) {
         ("hess", "hinge_quadratic" | "bridson_conservative") => Some(16.0),
@@ -75,10 +75,10 @@ fn tier_b(mapping: &Mapping, block: &str) -> Option<f64> {
     }
 }
 
-/// Runs the generated code on every record of a folder.
+/// Evaluates the generated code at every record of a folder.
 ///
 /// # Errors
-/// When a file cannot be read or a record is malformed.
+/// If a file cannot be read or a record is malformed.
 pub fn reference(folder: &Path) -> Result<ReferenceReport, RecordError> {
     let entries = std::fs::read_dir(folder).map_err(|e| RecordError::file(folder, e))?;
     let mut paths: Vec<_> = entries
@@ -119,7 +119,7 @@ fn compare(path: &Path, mapping: &Mapping, records: &[Value]) -> Result<Vec<Bloc
         for (block, truth) in truths {
             let truth = truth_numbers(truth).map_err(|e| fail(format!("out.{block}: {e}")))?;
             let Some(got) = answer.blocks.iter().find(|b| b.name.name() == block) else {
-                return Err(fail(format!("{} returns no block `{block}`", mapping.entry.declaration.name)));
+                return Err(fail(format!("{} does not return a block `{block}`", mapping.entry.declaration.name)));
             };
             if got.numbers.len() != truth.len() {
                 return Err(fail(format!("out.{block} holds {} numbers, expected {}", truth.len(), got.numbers.len())));
@@ -148,7 +148,7 @@ fn compare(path: &Path, mapping: &Mapping, records: &[Value]) -> Result<Vec<Bloc
     Ok(lines)
 }
 
-/// Notes one record.
+/// Adds the result of one record.
 fn add(line: &mut BlockLine, record: &Record, got: &[f64], truth: &[Truth], kappa: Option<f64>) {
     line.records += 1;
     if got.iter().any(|x| x.is_nan()) {
@@ -159,7 +159,7 @@ fn add(line: &mut BlockLine, record: &Record, got: &[f64], truth: &[Truth], kapp
     }
     let largest = truth.iter().map(|t| t.high.abs()).fold(0.0, f64::max);
     if largest == 0.0 {
-        // Underflowed truths may come out as any number too small to be normal; exact zeros must be zero.
+        // An underflowed true value allows any subnormal result; an exact zero must be zero.
         let allowed = if record.range.iter().any(|r| r == "f64_underflow") { f64::MIN_POSITIVE } else { 0.0 };
         if got.iter().any(|x| x.abs() > allowed) {
             line.beyond_tier_a.push(record.id.clone());
@@ -173,7 +173,7 @@ fn add(line: &mut BlockLine, record: &Record, got: &[f64], truth: &[Truth], kapp
         }
         return;
     }
-    // Below the normal numbers a relative error means nothing.
+    // Relative errors mean nothing below the normal numbers.
     let scale = largest.max(f64::MIN_POSITIVE);
     let error = got.iter().zip(truth).map(|(g, t)| t.error_of(*g)).fold(0.0, f64::max) / scale / ROUNDOFF;
     let by_kappa = error / kappa.unwrap_or(1.0).max(1.0);

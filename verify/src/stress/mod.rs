@@ -1,4 +1,4 @@
-//! Sweeps towards every singularity, down to 1e-300: what the textbook form loses on the way, and what the generated code keeps.
+//! Sweeps towards every singularity, down to 1e-300, that compare the errors of generated code and textbook form.
 
 mod report;
 mod sweeps;
@@ -14,16 +14,16 @@ use crate::formula::expected_blocks;
 use crate::multiprecision::truth;
 use crate::sample::Sample;
 
-/// The errors of one block at one place of a sweep, in units of roundoff of its largest number.
+/// Errors of one block at one point of a sweep, in units of roundoff of its largest number.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
-    /// How far from the singularity: an angle, a length, a scale.
+    /// Distance from the singularity: an angle, a length or a scale.
     pub parameter: f64,
-    /// Of the generated code.
+    /// Error of the generated code.
     pub robust: f64,
-    /// Of the same over max(1, κ).
+    /// Error of the generated code divided by max(1, κ).
     pub robust_kappa: f64,
-    /// Of the textbook form by dual numbers.
+    /// Error of the textbook form by dual numbers.
     pub naive: f64,
     /// Whether the generated code returned a NaN.
     pub nan: bool,
@@ -31,29 +31,29 @@ pub struct Point {
     pub overflows: bool,
     /// Whether the generated code flagged its result.
     pub flagged: bool,
-    /// Whether the exact block has a value at all.
+    /// Whether the exact block has a value.
     pub is_defined: bool,
 }
 
 impl Point {
-    /// Whether the generated code is as accurate as its edges allow, or says that its result is a convention; never a NaN. Where
-    /// the textbook form divides 0 by 0 there may yet be a limit: the table of degenerate inputs knows it.
+    /// Whether the generated code is as accurate as its edges allow, or flags its result as a convention, without a
+    /// NaN. The textbook form may divide 0 by 0 where a limit exists; the table of degenerate inputs has these limits.
     #[must_use]
     pub fn passed(&self) -> bool {
         !self.nan && (self.flagged || !self.is_defined || self.overflows || self.robust_kappa <= 8.0)
     }
 }
 
-/// One block of one element along one sweep.
+/// One block of an element along a sweep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Track {
-    /// The element.
+    /// Name of the element.
     pub element: &'static str,
-    /// Which way.
+    /// Name of the sweep.
     pub sweep: &'static str,
-    /// The block.
+    /// Name of the block.
     pub block: BlockName,
-    /// What was found, from far to near.
+    /// Results from far to near.
     pub points: Vec<Point>,
 }
 
@@ -65,10 +65,10 @@ impl Track {
     }
 }
 
-/// Every sweep that fits an element.
+/// Runs every sweep that fits an element.
 ///
 /// # Errors
-/// When the element cannot be read.
+/// If the element cannot be read.
 pub fn stress(target: &Target) -> Result<Vec<Track>, String> {
     let subject = target.subject()?;
     let mut tracks = Vec::new();
@@ -89,7 +89,7 @@ pub fn stress(target: &Target) -> Result<Vec<Track>, String> {
     Ok(tracks)
 }
 
-/// All blocks at one input; none where the rest shape is refused.
+/// Evaluates all blocks at one input; empty if the rest shape is rejected.
 fn at(subject: &Subject, sample: &Sample, parameter: f64) -> Vec<(BlockName, Point)> {
     const DIGITS: usize = 20;
     let declaration = subject.declaration;

@@ -1,9 +1,10 @@
 use std::fmt::Write as _;
 
-use super::{Point, Track};
-use crate::plot::{Curve, logarithmic};
+use energy_cli::plot::{Curve, logarithmic};
 
-/// A Markdown table: a row to each block of each sweep of each element.
+use super::{Point, Track};
+
+/// Formats a Markdown table: one row per block of each sweep of each element.
 #[must_use]
 pub fn markdown(tracks: &[Track]) -> String {
     let mut text = String::from(
@@ -33,19 +34,20 @@ pub fn markdown(tracks: &[Track]) -> String {
     text
 }
 
-/// As a number, with an exponent only where it must be.
+/// Formats a number, with an exponent only if needed.
 fn short(value: f64) -> String {
     if value < 1e4 { format!("{value:.1}") } else { format!("{value:.0e}") }
 }
 
-/// A plot to each block of each sweep, with the name of its file: generated code and textbook form against the parameter.
+/// Draws a plot for each block of each sweep, with its file name: errors of generated code and textbook form against
+/// the parameter.
 #[must_use]
 pub fn plots(tracks: &[Track]) -> Vec<(String, String)> {
     tracks
         .iter()
         .filter_map(|track| {
             let points = |pick: fn(&Point) -> f64| {
-                // What is exact lies at the foot of the plot.
+                // Exact results lie at the lower edge of the plot.
                 track.points.iter().filter(|p| p.is_defined).map(|p| (p.parameter, pick(p).max(1e-2))).collect()
             };
             let curves = [

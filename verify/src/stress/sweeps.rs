@@ -2,16 +2,16 @@ use energy_dsl::{Declaration, Kind};
 
 use crate::sample::{Sample, Sampler, has_points};
 
-/// Inputs on the way to one singularity.
+/// Inputs on the way to a singularity.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// What is approached.
+    /// Name of the singularity.
     pub name: &'static str,
-    /// How far it is, and the input.
+    /// Distance from the singularity, and the input.
     pub inputs: Vec<(f64, Sample)>,
 }
 
-/// Places along an axis-aligned configuration, so that tiny distances are doubles exactly.
+/// Points of an axis-aligned configuration, so that tiny distances are exact doubles.
 type Place = fn(f64) -> Vec<[f64; 3]>;
 
 const ONE: &[(&str, Place)] = &[("at the origin", |t| vec![[t, 0.0, 0.0]])];
@@ -33,8 +33,9 @@ const FOUR: &[(&str, Place)] = &[
     ("short edge", |t| vec![[1.0, 0.25, 0.5], [-0.75, 0.5, 0.25], [0.0, 0.0, 0.0], [0.0, t, 0.0]]),
 ];
 
-/// The sweeps that fit a declaration of points: towards coincidence, straightness, flatness, folds and needles, to the smallest and
-/// largest scales, far from the origin, and to its own rest state. The last input of the first ones is the singularity itself.
+/// Returns the sweeps that fit a declaration of points: towards coincidence, straightness, flatness, folds and needles,
+/// to the smallest and largest scales, far from the origin, and to its rest state. The first sweeps end at the
+/// singularity itself.
 #[must_use]
 pub fn sweeps(declaration: &'static Declaration) -> Vec<Sweep> {
     if !has_points(declaration) {
@@ -47,7 +48,7 @@ pub fn sweeps(declaration: &'static Declaration) -> Vec<Sweep> {
         4 => FOUR,
         _ => &[],
     };
-    // Parameters and rest shape are those of one ordinary input throughout.
+    // Parameters and rest shape are those of one ordinary input.
     let ordinary = Sampler::new(declaration, 7).sample();
     let with = |points: Vec<[f64; 3]>| Sample { positions: points.concat(), ..ordinary.clone() };
     let mut list: Vec<Sweep> = places
@@ -67,12 +68,12 @@ pub fn sweeps(declaration: &'static Declaration) -> Vec<Sweep> {
     list
 }
 
-/// Towards the rest shape, and towards a rest length where a parameter is one.
+/// Sweeps towards the rest shape, or a rest length if a parameter is one.
 fn at_rest(declaration: &Declaration, ordinary: &Sample) -> Option<Sweep> {
     let inputs: Vec<(f64, Sample)> =
         if declaration.rest.len() == declaration.points.len() && !declaration.rest.is_empty() {
             let dimension = declaration.rest[0].size;
-            // Halves of whole numbers: sums with powers of two stay exact.
+            // Halves of integers keep sums with powers of two exact.
             let rest: Vec<f64> = [0.0, 0.0, 1.0, 0.0, 0.5, 1.5].into_iter().cycle().take(3 * dimension).collect();
             if dimension != 2 || declaration.rest.len() != 3 {
                 return None;
@@ -106,7 +107,7 @@ fn at_rest(declaration: &Declaration, ordinary: &Sample) -> Option<Sweep> {
     Some(Sweep { name: "rest", inputs })
 }
 
-/// From 0.1 to 1e-300 and 0: every decade where doubles lose their digits, every forty beyond.
+/// From 0.1 to 1e-300 and 0: every decade where doubles lose digits, then every forty.
 fn small() -> impl Iterator<Item = f64> {
     (1..20).chain((20..=300).step_by(40)).map(|k| power(-k)).chain([0.0])
 }

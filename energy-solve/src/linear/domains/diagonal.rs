@@ -6,10 +6,11 @@ use super::Wide;
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::precision::{Precision, doubled};
 
-/// C⁻¹ column by column, each with a fourth component that is zero; C Cᵀ is a block on the diagonal, or a part of it, and C lower triangular.
+/// C⁻¹ by columns, each padded with a zero, where C is lower triangular and C Cᵀ is a diagonal block or a multiple of
+/// it.
 pub(crate) type InverseFactor<T> = [Wide<T>; 3];
 
-/// In another precision.
+/// Converts C⁻¹ to another precision.
 #[inline(always)]
 pub(crate) fn rounded<T: Precision, M: Precision>(inverse: &InverseFactor<T>) -> [Wide<M>; 3] {
     let mut rounded = [[M::from_f64(0.0); 4]; 3];
@@ -21,30 +22,30 @@ pub(crate) fn rounded<T: Precision, M: Precision>(inverse: &InverseFactor<T>) ->
     rounded
 }
 
-/// C⁻¹ b.
+/// Returns C⁻¹ b.
 #[inline(always)]
 pub(crate) fn scaled<T: Precision>(inverse: &InverseFactor<T>, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
     let [[a, d, f, _], [_, e, g, _], [_, _, h, _]] = rounded::<T, f64>(inverse);
     [a * u, d * u + e * v, f * u + g * v + h * w]
 }
 
-/// C⁻ᵀ x.
+/// Returns C⁻ᵀ x.
 #[inline(always)]
 pub(crate) fn unscaled<T: Precision>(inverse: &InverseFactor<T>, [u, v, w]: &Vector3<f64>) -> Vector3<f64> {
     let [[a, b, d, _], [_, c, e, _], [_, _, f, _]] = rounded::<T, f64>(inverse);
     [a * u + b * v + d * w, c * v + e * w, f * w]
 }
 
-/// C⁻¹ of one block C Cᵀ; `None` where it is not positive definite.
+/// Returns C⁻¹ of a block C Cᵀ; `None` if the block is not positive definite.
 pub(crate) fn inverse_factor([[a, ..], [b, c, _], [d, e, f]]: &Block<f64>) -> Option<InverseFactor<f64>> {
     let (inverse, definite) = inverse_factors([*a, *b, *c, *d, *e, *f], 1.0);
     definite.then(|| by_columns(inverse))
 }
 
-/// Most lanes there are.
+/// The largest number of lanes of any SIMD level.
 const LANES: usize = 16;
 
-/// C⁻¹ of some rows, C Cᵀ = D/ω. Fails with a row whose diagonal block is not positive definite.
+/// Computes C⁻¹ of some rows, with C Cᵀ = D/ω. Fails with the first row whose diagonal block is not positive definite.
 #[inline(always)]
 pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
     matrix: &BlockMatrix<M>,
@@ -54,7 +55,7 @@ pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
 ) -> Result<(), usize> {
     let lanes = <L::F64 as Lane<f64>>::LANES;
     for (row, inverses) in rows.step_by(lanes).zip(inverses.chunks_mut(lanes)) {
-        // Lanes left over hold unit matrices.
+        // Unused lanes hold unit matrices.
         let mut numbers = [[1.0; LANES], [0.0; LANES], [1.0; LANES], [0.0; LANES], [0.0; LANES], [1.0; LANES]];
         for lane in 0..inverses.len() {
             let [[a, ..], [b, c, _], [d, e, f]] = doubled(matrix.diagonal(row + lane));
@@ -84,19 +85,20 @@ pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
     Ok(())
 }
 
-/// Of the rows of its lower triangle.
+/// Converts the rows of a lower triangle to padded columns.
 #[inline(always)]
 fn by_columns<T: Precision>(rows: [f64; 6]) -> InverseFactor<T> {
     let ([a, b, c, d, e, f], zero) = (rows.map(T::from_f64), T::from_f64(0.0));
     [[a, b, d, zero], [zero, c, e, zero], [zero, zero, f, zero]]
 }
 
-/// C⁻¹ with C Cᵀ = D/ω, D and C⁻¹ by the rows of their lower triangles, and where D is positive definite. C has the diagonal 1/x, 1/y, 1/z, and p, q, r below it.
+/// Returns C⁻¹ with C Cᵀ = D/ω, and a mask of the lanes where D is positive definite. Triangles are given by rows. C
+/// has the diagonal 1/x, 1/y, 1/z and the entries p, q, r below it.
 #[inline(always)]
 fn inverse_factors<V: Lane<f64>>([a, b, c, d, e, f]: [V; 6], relaxation: f64) -> ([V; 6], V::Mask) {
     let (one, unit) = (V::splat(1.0), V::splat(1.0 / relaxation));
     let [a, b, c, d, e, f] = [a * unit, b * unit, c * unit, d * unit, e * unit, f * unit];
-    // A negative pivot has no root, a vanishing one no reciprocal.
+    // A negative pivot has no square root, a zero pivot no reciprocal.
     let x = one / a.sqrt();
     let (p, q) = (b * x, d * x);
     let y = one / (c - p * p).sqrt();
@@ -134,7 +136,7 @@ mod tests {
             invert::<f64, f64, L>(self.0, 0..11, RELAXATION, self.1)
         }
     }
-    /// 11 rows: full registers and some left over.
+    /// 11 rows: full registers and a remainder.
     fn matrix() -> BlockMatrix<f64> {
         let mut matrix = BlockMatrix::zeros(Arc::new(Pattern::from_stencils(Storage::Upper, 11, [])));
         for row in 0..11 {
@@ -151,11 +153,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_scaled_on_both_sides_has_the_relaxation_on_its_diagonal() {
+    fn the_scaled_diagonal_is_the_relaxation_factor() {
         let matrix = matrix();
         for (row, inverse) in inverted(&matrix).unwrap().iter().enumerate() {
             let block = matrix.diagonal(row);
-            // C⁻¹ D, and then its rows times C⁻ᵀ.
+            // C⁻¹ D, then its rows times C⁻ᵀ.
             let columns: Vec<_> = (0..3).map(|j| scaled(inverse, &[block[0][j], block[1][j], block[2][j]])).collect();
             for i in 0..3 {
                 let unit = scaled(inverse, &[columns[0][i], columns[1][i], columns[2][i]]);
@@ -168,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_row_that_is_not_definite_is_named() {
+    fn the_first_indefinite_row_is_named() {
         for (row, entry) in [(2, -1.0), (9, 0.0), (10, f64::NAN), (4, f64::INFINITY)] {
             let mut matrix = matrix();
             matrix.diagonal_mut(row)[1][1] = entry;

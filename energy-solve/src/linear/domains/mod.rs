@@ -1,11 +1,13 @@
-//! Domains of consecutive rows, into which the solvers of symmetric systems divide large matrices among threads: what each relaxes on its own, what
-//! couples it with others, and where they meet. The domains depend on the matrix alone, never on the number of threads.
+//! Domains of consecutive rows, into which solvers divide large symmetric matrices.
+//!
+//! Threads relax domains independently, exchange the vectors on their borders, and meet at barriers. The domains depend
+//! on the matrix alone, never on the number of threads, so that results do not either.
 
+mod barrier;
 mod couplings;
 mod diagonal;
-mod meeting;
+mod right_hand_scale;
 mod triangle;
-mod unit;
 
 use std::ops::Range;
 
@@ -14,34 +16,37 @@ use energy_dsl::{BLOCK_NUMBERS, BlockSum, Kernel, Level};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::Pattern;
 
+pub(crate) use self::barrier::{PerDomain, SpinBarrier};
 pub(crate) use self::couplings::Couplings;
 pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
-pub(crate) use self::meeting::{Meeting, Shared};
+pub(crate) use self::right_hand_scale::RightHandScale;
 use self::triangle::Blocks;
 pub(crate) use self::triangle::{Triangle, scaled_block};
-pub(crate) use self::unit::Unit;
 pub(crate) use crate::matrix::precision::Precision;
 
-/// A vector of three in a register of four, with a last component that means nothing.
+/// A 3-vector padded to a register of four; the last component is ignored.
 pub(crate) type Wide<T> = [T; 4];
 
-/// Rows of a domain, about. A domain is what one thread at least relaxes on its own, so more of them cost iterations.
+/// Approximate number of rows per domain. Each further domain weakens the relaxation and costs iterations.
 const DOMAIN: usize = 8192;
 
-/// The rows of each domain.
+/// Returns the rows of each domain.
 pub(crate) fn ranges(rows: usize) -> Vec<Range<usize>> {
     let domains = (rows / DOMAIN).max(usize::from(rows > 0));
     (0..domains).map(|domain| domain * rows / domains..(domain + 1) * rows / domains).collect()
 }
 
-/// Domains of these consecutive rows, which make up the pattern.
-pub(crate) fn divided<T: Precision>(pattern: &Pattern, ranges: &[Range<usize>]) -> Vec<(Triangle<T>, Couplings<T>)> {
+/// Creates the domains of these ranges of rows, which make up the pattern.
+pub(crate) fn create_domains<T: Precision>(
+    pattern: &Pattern,
+    ranges: &[Range<usize>],
+) -> Vec<(Triangle<T>, Couplings<T>)> {
     let triangles: Vec<_> = ranges.iter().map(|rows| Triangle::new(pattern, rows.clone())).collect();
     let couplings = Couplings::all(pattern, ranges, &triangles);
     triangles.into_iter().zip(couplings).collect()
 }
 
-/// Takes over a domain's part of a matrix, scaled by C⁻¹ of each row.
+/// Reads a domain's part of a matrix, scaled by C⁻¹ of each row.
 pub(crate) struct Scaling<'a, T, M> {
     pub(crate) triangle: &'a mut Triangle<T>,
     pub(crate) couplings: &'a mut Couplings<T>,
@@ -61,7 +66,7 @@ impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
 
 /// v ← v − Bᵀ u.
 #[inline(always)]
-pub(crate) fn subtract_turned<T: Precision, L: Level>(v: &mut Wide<T>, block: &[T; BLOCK_NUMBERS], u: &Wide<T>) {
+pub(crate) fn subtract_transposed<T: Precision, L: Level>(v: &mut Wide<T>, block: &[T; BLOCK_NUMBERS], u: &Wide<T>) {
     let mut sum = *v;
     for row in 0..3 {
         let factor = -u[row];
@@ -72,14 +77,15 @@ pub(crate) fn subtract_turned<T: Precision, L: Level>(v: &mut Wide<T>, block: &[
     *v = sum;
 }
 
-/// A vector less the products of a row's blocks with later rows of another one.
+/// Returns `from` minus the products of a row's blocks with rows of `v`.
 #[inline(always)]
-pub(crate) fn less_products<T: Precision, L: Level>(
+pub(crate) fn minus_products<T: Precision, L: Level>(
     mut blocks: Blocks<'_, T>,
     from: Wide<T>,
     v: &[Wide<T>],
 ) -> Wide<T> {
-    // The nearest row, computed just before when going back, comes last: the others do not have to wait for it.
+    // The nearest row was computed just before in a backward sweep. It comes last, so that the others do not wait for
+    // it.
     let nearest = blocks.next();
     let mut sum = T::Sum::<L>::zero();
     for (block, column) in blocks {
@@ -95,20 +101,20 @@ pub(crate) fn less_products<T: Precision, L: Level>(
     }
 }
 
-/// The same: compilers take registers apart that are not needed whole, though what is computed for nothing costs nothing.
+/// Returns its argument. `black_box` keeps LLVM from scalarising the registers; the unused lane is free.
 #[inline(always)]
-pub(crate) fn whole<T>(registers: T) -> T {
+pub(crate) fn keep_vector<T>(registers: T) -> T {
     std::hint::black_box(registers)
 }
 
-/// The sum of the first three of four sums.
+/// Returns the sum of the first three of four sums.
 #[inline(always)]
-pub(crate) fn of_three(sums: [f64; 4]) -> f64 {
-    let [x, y, z, _] = whole(sums);
+pub(crate) fn sum_of_three(sums: [f64; 4]) -> f64 {
+    let [x, y, z, _] = keep_vector(sums);
     x + y + z
 }
 
-/// Adds products of components, in doubles.
+/// Adds the products of components, in double precision.
 #[inline(always)]
 pub(crate) fn add_products<T: Precision>(sums: &mut [f64; 4], a: &Wide<T>, b: &Wide<T>) {
     for lane in 0..4 {

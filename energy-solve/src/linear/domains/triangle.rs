@@ -2,51 +2,52 @@ use std::ops::Range;
 
 use energy_dsl::{BLOCK_NUMBERS, Block, Level};
 
-use super::{InverseFactor, Precision, Wide, rounded, whole};
+use super::{InverseFactor, Precision, Wide, keep_vector, rounded};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, index};
 
-/// Numbers read after a block's nine, of which nothing comes: see [`BlockSum`](energy_dsl::BlockSum).
+/// Padding after a block's nine numbers, which is read and ignored; see [`BlockSum`](energy_dsl::BlockSum).
 const SLACK: usize = BLOCK_NUMBERS - 9;
 
-/// What couples the rows of a domain with each other: the blocks of L̃ᵀ = C⁻¹ Lᵀ C⁻ᵀ by rows. Rows and columns are counted from its first.
+/// The blocks of L̃ᵀ = C⁻¹ Lᵀ C⁻ᵀ that couple the rows of a domain with each other, by rows. Rows and columns are
+/// counted from the domain's first.
 #[derive(Clone, Debug)]
 pub(crate) struct Triangle<T> {
     pub(crate) rows: Range<usize>,
-    /// Blocks above the diagonal in the rows before.
+    /// Number of blocks above the diagonal in the rows before the domain.
     blocks_before: usize,
-    /// For each row the first place that is no longer coupled within the domain.
+    /// For each row, the index of the first block whose column is outside the domain.
     pub(super) inner_end: Vec<u32>,
     /// The blocks, each row by row.
     numbers: Vec<T>,
 }
 
-/// The rows of a [`Triangle`]: what a sweep reads, at hand.
+/// The data of a [`Triangle`] that a sweep reads.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rows<'a, T> {
     numbers: &'a [T],
     columns: &'a [u32],
-    /// The first place and the end of each row.
+    /// The first block index and the end of each row.
     diagonals: &'a [u32],
     inner_end: &'a [u32],
-    /// The first row, and how many blocks there are before it, with those on the diagonal.
+    /// The first row, and the number of blocks before it, including diagonal ones.
     first: usize,
     before: usize,
 }
 
 impl<'a, T> Rows<'a, T> {
-    /// What couples a row with later ones of its domain.
+    /// Returns the blocks that couple a row with later rows of its domain.
     #[inline(always)]
     pub(crate) fn blocks(&self, row: usize) -> Blocks<'a, T> {
         let (diagonal, end) = (self.diagonals[row] as usize, self.inner_end[row] as usize);
         let columns = &self.columns[diagonal + 1..end];
-        // Before it, there are as many blocks on the diagonal as rows.
+        // Diagonal blocks, one per row, are not stored: subtract them.
         let numbers = &self.numbers[9 * (diagonal - (self.before + row))..][..9 * columns.len() + SLACK];
         Blocks { numbers, columns, first: self.first }
     }
 }
 
-/// The blocks of a row, with as many numbers as are read at once, and their columns.
+/// Iterator over the blocks of a row, each padded to [`BLOCK_NUMBERS`] numbers, and their columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Blocks<'a, T> {
     numbers: &'a [T],
@@ -67,7 +68,7 @@ impl<'a, T> Iterator for Blocks<'a, T> {
 }
 
 impl<T: Precision> Triangle<T> {
-    /// Of these rows of a pattern.
+    /// Creates zero blocks for these rows of a pattern.
     pub(super) fn new(pattern: &Pattern, rows: Range<usize>) -> Self {
         let before = |row: usize| pattern.above(row).start - row - 1;
         let inner_end = rows.clone().map(|row| {
@@ -81,13 +82,13 @@ impl<T: Precision> Triangle<T> {
         Self { blocks_before: before(rows.start), inner_end: inner_end.collect(), rows, numbers }
     }
 
-    /// The places in the pattern of what couples a row with later ones.
+    /// Returns the indices, in the pattern, of the blocks that couple a row with later rows of the domain.
     #[inline(always)]
     fn places(&self, pattern: &Pattern, local: usize) -> Range<usize> {
         pattern.above(self.rows.start + local).start..self.inner_end[local] as usize
     }
 
-    /// Its rows.
+    /// Returns the blocks by rows, for sweeps.
     #[inline(always)]
     pub(crate) fn by_rows<'a>(&'a self, pattern: &'a Pattern) -> Rows<'a, T> {
         Rows {
@@ -100,7 +101,7 @@ impl<T: Precision> Triangle<T> {
         }
     }
 
-    /// Takes over its part of a matrix, scaled by C⁻¹ of each row.
+    /// Reads the domain's blocks of a matrix, scaled by C⁻¹ of each row.
     #[inline(always)]
     pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
         let (pattern, values) = (matrix.pattern(), matrix.values());
@@ -117,7 +118,8 @@ impl<T: Precision> Triangle<T> {
     }
 }
 
-/// The rows of P B Qᵀ, for lower triangular P and Q given by columns: rows of B Qᵀ are sums of columns of Q, and those of the product sums of these.
+/// Returns the rows of P B Qᵀ for lower triangular P and Q, given by columns. Rows of B Qᵀ are sums of columns of Q,
+/// and rows of the product are sums of those.
 #[inline(always)]
 pub(crate) fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M>, q: &[Wide<M>; 3]) -> [Wide<M>; 3] {
     let zero = [M::from_f64(0.0); 4];
@@ -129,7 +131,7 @@ pub(crate) fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M
             }
         }
     }
-    let right = whole(right);
+    let right = keep_vector(right);
     for i in 0..3 {
         for k in 0..=i {
             for lane in 0..4 {
@@ -137,10 +139,10 @@ pub(crate) fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M
             }
         }
     }
-    whole(scaled)
+    keep_vector(scaled)
 }
 
-/// Writes three numbers of each row, and the fourth, which means nothing, where the next is written after it.
+/// Writes rows as four numbers each; the next row or block overwrites the fourth.
 #[inline(always)]
 fn store<T: Precision, M: Precision>(numbers: &mut [T], rows: &[Wide<M>; 3]) {
     for row in 0..3 {

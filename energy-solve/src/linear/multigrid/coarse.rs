@@ -7,23 +7,24 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::galerkin::GalerkinProduct;
 use super::interpolation::Interpolation;
 use super::smoother::{Inversion, Smoother};
-use crate::linear::domains::{InverseFactor, Precision, Scaling, Wide, divided, scaled, unscaled};
+use crate::linear::domains::{InverseFactor, Precision, Scaling, Wide, create_domains, scaled, unscaled};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::widened;
 
-/// Rows of the coarsest level, at most, unless they cannot be joined any further: there the matrix is factored as a dense one.
+/// The largest number of rows of the coarsest level, which is factored as a dense matrix. Levels whose rows cannot be
+/// aggregated further may be larger.
 const COARSEST: usize = 24;
 
-/// How often each level calls for the next coarser one: a W-cycle.
+/// Visits of the next coarser level per cycle: two make a W-cycle.
 const VISITS: usize = 2;
 
-/// The level below another: its Galerkin product Pᵀ A P, and how systems with that are solved, nearly.
+/// A coarse level: the Galerkin product Pᵀ A P and an approximate solver for it.
 #[derive(Clone, Debug)]
 pub(super) struct Coarse<T> {
     pub(super) interpolation: Interpolation<T>,
     product: GalerkinProduct,
-    /// Pᵀ r and e, both in the unit of the finest level's scaling.
+    /// Pᵀ r and the correction e, in the unit of the finest level's scaling.
     pub(super) restricted: Vec<Wide<T>>,
     pub(super) correction: Vec<Wide<T>>,
     inverse: Inverse<T>,
@@ -35,7 +36,7 @@ enum Inverse<T> {
     Cycle(Box<Relaxed<T>>),
 }
 
-/// A level that is relaxed, and corrected by a coarser one where its rows are coupled.
+/// A level with a smoother. Its coarser level corrects the coupled rows.
 #[derive(Clone, Debug)]
 struct Relaxed<T> {
     smoother: Smoother<T>,
@@ -43,13 +44,14 @@ struct Relaxed<T> {
     unit: f64,
     residual: Vec<Wide<T>>,
     smoothed: Vec<Wide<T>>,
-    carried: Vec<Wide<T>>,
+    prolonged: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
     next: Option<Coarse<T>>,
 }
 
 impl<T: Precision> Coarse<T> {
-    /// Below matrices of a pattern, whose rows are summed up in these ranges; `None` where none of its rows are coupled, or one with too many.
+    /// Creates the level below matrices of a pattern, whose rows are summed in these ranges. `None` if no rows are
+    /// coupled, or one row is coupled with too many.
     pub(super) fn below(pattern: &Pattern, ranges: &[Range<usize>]) -> Option<Self> {
         let interpolation = Interpolation::averaged(pattern);
         if interpolation.aggregates() == 0 {
@@ -66,7 +68,7 @@ impl<T: Precision> Coarse<T> {
         Some(Self { interpolation, product, restricted: zeros.clone(), correction: zeros, inverse })
     }
 
-    /// The blocks of this level's matrix and of those below, from here on.
+    /// Returns the number of matrix blocks of this level and of each coarser one.
     pub(super) fn blocks(&self) -> Vec<usize> {
         let mut blocks = vec![self.product.pattern().blocks()];
         if let Inverse::Cycle(relaxed) = &self.inverse
@@ -77,7 +79,7 @@ impl<T: Precision> Coarse<T> {
         blocks
     }
 
-    /// Takes over a matrix of the finer level. Fails where this shows that it is not positive definite.
+    /// Reads a matrix of the finer level. `None` if the matrix proves not to be positive definite.
     pub(super) fn take_over(&mut self, fine: &BlockMatrix<impl Precision>, unit: f64, threads: usize) -> Option<()> {
         let matrix = self.product.compute(fine, &self.interpolation, threads);
         match &mut self.inverse {
@@ -91,11 +93,12 @@ impl<T: Precision> Coarse<T> {
         }
     }
 
-    /// e ← about (Pᵀ A P)⁻¹ Pᵀ r: by a symmetric and positive definite matrix, always the same.
+    /// e ← approximately (Pᵀ A P)⁻¹ Pᵀ r. The approximation is linear, symmetric and positive definite, as
+    /// preconditioning requires.
     pub(super) fn correct(&mut self) {
         match &mut self.inverse {
             Inverse::Dense(factor) => {
-                let factor = factor.as_ref().expect("it was taken over");
+                let factor = factor.as_ref().expect("`take_over` came first");
                 let numbers = self.restricted.iter().flat_map(|&[u, v, w, _]| [u, v, w]).map(Into::into);
                 let mut e = DVector::from_iterator(3 * self.restricted.len(), numbers);
                 factor.solve_mut(&mut e);
@@ -111,7 +114,7 @@ impl<T: Precision> Coarse<T> {
 impl<T: Precision> Relaxed<T> {
     fn new(pattern: &Pattern) -> Self {
         let ranges = [Range { start: 0, end: pattern.rows() }];
-        let mut domains = divided(pattern, &ranges);
+        let mut domains = create_domains(pattern, &ranges);
         let (triangle, couplings) = domains.remove(0);
         let zeros = vec![[T::from_f64(0.0); 4]; pattern.rows()];
         Self {
@@ -120,7 +123,7 @@ impl<T: Precision> Relaxed<T> {
             unit: 1.0,
             residual: zeros.clone(),
             smoothed: zeros.clone(),
-            carried: zeros.clone(),
+            prolonged: zeros.clone(),
             solution: zeros,
             next: Coarse::below(pattern, &ranges),
         }
@@ -157,7 +160,7 @@ impl<T: Precision> Relaxed<T> {
     }
 }
 
-/// s = (I + L̃)⁻¹ r is added to the solution, r ← −(L̃ᵀ + Ẽ) s, and Pᵀ r passed on.
+/// s = (I + L̃)⁻¹ r; x ← x + s; r ← −(L̃ᵀ + Ẽ) s; restricts r to the coarser level.
 struct Down<'a, T> {
     level: &'a mut Relaxed<T>,
     pattern: &'a Pattern,
@@ -181,7 +184,7 @@ impl<T: Precision> Kernel for Down<'_, T> {
     }
 }
 
-/// c = (I + L̃ᵀ)⁻¹ (r − (L̃ + Ẽ) e), e the correction, is added to the solution, and r ← −(L̃ + Ẽ) (c − e) unless this is the last visit.
+/// c = (I + L̃ᵀ)⁻¹ (r − (L̃ + Ẽ) e) with the correction e; x ← x + c. Before another visit, r ← −(L̃ + Ẽ) (c − e).
 struct Up<'a, T> {
     level: &'a mut Relaxed<T>,
     pattern: &'a Pattern,
@@ -193,26 +196,26 @@ impl<T: Precision> Kernel for Up<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Relaxed { smoother, residual, carried, solution, next, .. } = self.level;
-        carried.fill([T::from_f64(0.0); 4]);
+        let Relaxed { smoother, residual, prolonged, solution, next, .. } = self.level;
+        prolonged.fill([T::from_f64(0.0); 4]);
         if let Some(Coarse { interpolation, correction, .. }) = next {
-            for row in 0..carried.len() {
-                carried[row] = smoother.scaled(row, &interpolation.carried::<L>(row, correction));
+            for row in 0..prolonged.len() {
+                prolonged[row] = smoother.scaled(row, &interpolation.prolonged::<L>(row, correction));
             }
-            smoother.subtract_lower::<L>(self.pattern, carried, residual);
+            smoother.subtract_lower::<L>(self.pattern, prolonged, residual);
         }
         smoother.backward::<L>(self.pattern, residual);
         add(solution, residual);
         if self.last {
             return;
         }
-        for row in 0..carried.len() {
+        for row in 0..prolonged.len() {
             for lane in 0..4 {
-                carried[row][lane] = residual[row][lane] - carried[row][lane];
+                prolonged[row][lane] = residual[row][lane] - prolonged[row][lane];
             }
         }
         residual.fill([T::from_f64(0.0); 4]);
-        smoother.subtract_lower::<L>(self.pattern, carried, residual);
+        smoother.subtract_lower::<L>(self.pattern, prolonged, residual);
     }
 }
 

@@ -9,39 +9,41 @@ use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::threads::for_each;
 
-/// Pᵀ A P, for matrices A of one pattern: where each block goes is found once.
+/// Pᵀ A P for matrices A of one pattern. The scatter maps of the product are computed once.
 ///
-/// With A = U + Uᵀ, half of each diagonal block in U, it is G + Gᵀ with G = Pᵀ (U P). The rows of U P are summed up one by one.
+/// With A = U + Uᵀ, where U has half of each diagonal block, the product is G + Gᵀ with G = Pᵀ (U P). The rows of U P
+/// are summed one at a time.
 #[derive(Clone, Debug)]
 pub(super) struct GalerkinProduct {
-    /// That of the product.
+    /// Pattern of the product.
     pattern: Arc<Pattern>,
-    /// By row, how many blocks that of U P has.
+    /// Number of blocks in each row of U P.
     sums: Vec<u16>,
-    /// By row, block of U and weight of the block's column: to which of them they add.
+    /// The block of the row of U P to which a product adds; sorted by row, block of U, and weight of the block's
+    /// column.
     slots: Vec<u16>,
-    /// By row, weight and block of U P: to which half of which block of G they add.
+    /// The half of a block of G to which a product adds; sorted by row, weight, and block of U P.
     halves: Vec<u32>,
     parts: Vec<Part>,
 }
 
-/// Rows whose contributions are summed up together.
+/// Rows whose contributions are summed together.
 #[derive(Clone, Debug)]
 struct Part {
     rows: Range<usize>,
-    /// Where those of its first row begin.
+    /// The first entries of its rows in [`GalerkinProduct::slots`] and [`GalerkinProduct::halves`].
     first_slot: usize,
     first_half: usize,
-    /// The halves of blocks that they add to, and those between.
+    /// The range of halves to which the rows add.
     touched: Range<usize>,
 }
 
-/// A block of G as it is, or the one that its mirror image adds to: by rows.
+/// A block of G, by rows: either as stored or as its transpose.
 type Half = [f64; 9];
 
 impl GalerkinProduct {
-    /// For matrices of a pattern. `ranges` of rows are summed up by themselves. `None` where a row is coupled with more aggregates than can be
-    /// counted in 16 bits.
+    /// Analyses a pattern. Each range of rows is summed on its own. `None` if a row is coupled with more aggregates
+    /// than 16 bits count.
     pub(super) fn new<T: Precision>(
         fine: &Pattern,
         interpolation: &Interpolation<T>,
@@ -59,8 +61,9 @@ impl GalerkinProduct {
         let upper = of_rows(0..fine.rows()).map(|(row, column)| (row.min(column), row.max(column)));
         let coarse = Pattern::from_pairs(Storage::Upper, interpolation.aggregates(), upper);
         let half = |(row, column): (u32, u32)| {
-            let (place, turned) = coarse.place(row as usize, column as usize).expect("it is coupled");
-            index(2 * place + usize::from(turned))
+            let (place, transposed) =
+                coarse.place(row as usize, column as usize).expect("the pattern contains every product");
+            index(2 * place + usize::from(transposed))
         };
         let mut halves = Vec::with_capacity(of_rows(0..fine.rows()).count());
         let part = |rows: &Range<usize>| {
@@ -75,12 +78,12 @@ impl GalerkinProduct {
         Some(Self { pattern: Arc::new(coarse), sums, slots, halves, parts })
     }
 
-    /// The pattern of the product.
+    /// Returns the pattern of the product.
     pub(super) fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
-    /// Computes the product, on at most so many threads.
+    /// Computes the product on at most `threads` threads.
     pub(super) fn compute<T: Precision>(
         &self,
         fine: &BlockMatrix<impl Precision>,
@@ -89,16 +92,16 @@ impl GalerkinProduct {
     ) -> BlockMatrix {
         let mut product = BlockMatrix::zeros(Arc::clone(&self.pattern));
         let blocks = product.values_mut();
-        // As many at a time as there are threads, for less memory.
+        // Limit the parts at a time to the number of threads, to save memory.
         for parts in self.parts.chunks(threads.max(1)) {
-            let contribution = |part| dispatch(Contribution { of: self, part, fine, interpolation });
+            let contribution = |part| dispatch(Contribution { product: self, part, fine, interpolation });
             let contributions = for_each(threads, parts.iter().collect(), contribution);
             for (part, contribution) in parts.iter().zip(contributions) {
                 for (half, sum) in part.touched.clone().zip(contribution) {
-                    let (block, turned) = (&mut blocks[half / 2], half % 2 == 1);
+                    let (block, transposed) = (&mut blocks[half / 2], half % 2 == 1);
                     for i in 0..3 {
                         for j in 0..3 {
-                            block[i][j] += if turned { sum[3 * j + i] } else { sum[3 * i + j] };
+                            block[i][j] += if transposed { sum[3 * j + i] } else { sum[3 * i + j] };
                         }
                     }
                 }
@@ -114,22 +117,23 @@ impl GalerkinProduct {
 
 /// The pattern of U P.
 struct UpperTimes {
-    /// The columns of its blocks, in the order in which a row comes across them, and where each row begins.
+    /// The columns of each row's blocks, in order of first occurrence, and where each row begins.
     columns: Vec<u32>,
     start: Vec<usize>,
-    /// By row, block of U and weight of the block's column: to which block of the row they add. And where each row begins.
+    /// The block of the row to which a product adds, sorted by row, block of U, and weight of the block's column; and
+    /// where each row begins.
     slots: Vec<u16>,
     slot_start: Vec<usize>,
 }
 
 impl UpperTimes {
-    /// `None` where the blocks of a row are too many to be counted in 16 bits.
+    /// `None` if a row has more blocks than 16 bits count.
     fn new<T: Precision>(fine: &Pattern, interpolation: &Interpolation<T>) -> Option<Self> {
         let mut product = Self { columns: Vec::new(), start: vec![0], slots: Vec::new(), slot_start: vec![0] };
         for row in 0..fine.rows() {
             let before = product.columns.len();
-            let carried_by = fine.row(row).flat_map(|(_, column)| interpolation.columns(column));
-            for &aggregate in carried_by {
+            let prolonged_from = fine.row(row).flat_map(|(_, column)| interpolation.columns(column));
+            for &aggregate in prolonged_from {
                 let known = product.columns[before..].iter().position(|&known| known == aggregate);
                 product.slots.push(u16::try_from(known.unwrap_or(product.columns.len() - before)).ok()?);
                 if known.is_none() {
@@ -143,9 +147,9 @@ impl UpperTimes {
     }
 }
 
-/// What the rows of a part contribute.
+/// Computes the contributions of a part's rows.
 struct Contribution<'a, T, M> {
-    of: &'a GalerkinProduct,
+    product: &'a GalerkinProduct,
     part: &'a Part,
     fine: &'a BlockMatrix<M>,
     interpolation: &'a Interpolation<T>,
@@ -156,26 +160,30 @@ impl<T: Precision, M: Precision> Kernel for Contribution<'_, T, M> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> Vec<Half> {
-        let Self { of, part, fine, interpolation } = self;
+        let Self { product, part, fine, interpolation } = self;
         let (pattern, values) = (fine.pattern(), fine.values().as_flattened().as_flattened().as_chunks::<9>().0);
         let mut sums = vec![[0.0; 9]; part.touched.len()];
         let mut row_of_product: Vec<Half> = Vec::new();
         let (mut slot, mut place) = (part.first_slot, part.first_half);
         for row in part.rows.clone() {
             row_of_product.clear();
-            row_of_product.resize(of.sums[row] as usize, [0.0; 9]);
+            row_of_product.resize(product.sums[row] as usize, [0.0; 9]);
             let diagonal = pattern.diagonal(row);
             for block in diagonal..pattern.above(row).end {
                 let share = if block == diagonal { 0.5 } else { 1.0 };
                 for &weight in interpolation.weights(pattern.columns()[block] as usize) {
                     let weight: f64 = weight.into();
-                    add_times::<M, L>(&mut row_of_product[of.slots[slot] as usize], share * weight, &values[block]);
+                    add_times::<M, L>(
+                        &mut row_of_product[product.slots[slot] as usize],
+                        share * weight,
+                        &values[block],
+                    );
                     slot += 1;
                 }
             }
             for &weight in interpolation.weights(row) {
                 for block in &row_of_product {
-                    let half = of.halves[place] as usize - part.touched.start;
+                    let half = product.halves[place] as usize - part.touched.start;
                     add_times::<f64, L>(&mut sums[half], weight.into(), block);
                     place += 1;
                 }
@@ -198,12 +206,12 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    /// A grid whose rows are coupled with those beside, below and across.
+    /// A grid whose rows are coupled with their neighbours, also diagonally.
     fn grid(side: u32) -> Pattern {
         let vertex = |i: u32, j: u32| j * side + i;
         let cell = |(i, j)| [vertex(i, j), vertex(i + 1, j), vertex(i, j + 1), vertex(i + 1, j + 1)];
         let cells: Vec<[u32; 4]> = (1..side).flat_map(|j| (1..side).map(move |i| (i - 1, j - 1))).map(cell).collect();
-        let rows = (side * side) as usize + 1; // and one that is coupled with none
+        let rows = (side * side) as usize + 1; // and one uncoupled row
         Pattern::from_stencils(Storage::Upper, rows, cells.iter().map(<[u32; 4]>::as_slice))
     }
 
@@ -213,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_dense_product() {
+    fn the_galerkin_product_is_the_dense_product() {
         let pattern = Arc::new(grid(11));
         let mut fine = BlockMatrix::zeros(Arc::clone(&pattern));
         let mut seed = 1_u64;
@@ -242,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn translations_are_carried_and_roots_by_their_own() {
+    fn prolongation_reproduces_translations_and_is_exact_at_roots() {
         let pattern = grid(11);
         let interpolation = Interpolation::<f64>::averaged(&pattern);
         let mut roots = vec![0; interpolation.aggregates()];

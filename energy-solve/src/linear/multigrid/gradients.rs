@@ -5,14 +5,16 @@ use energy_dsl::{Kernel, Level, Vector3, dispatch};
 use super::coarse::Coarse;
 use super::smoother::Smoother;
 use crate::linear::domains::{
-    InverseFactor, Meeting, Precision, Shared, Unit, Wide, add_products, of_three, scaled, unscaled,
+    InverseFactor, PerDomain, Precision, RightHandScale, SpinBarrier, Wide, add_products, scaled, sum_of_three,
+    unscaled,
 };
 use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::widened;
 
-/// How much larger a residual may be than after over-relaxation. What is left then is smooth, and the norm, in which what is smooth counts for
-/// little, is half of the error relative to the solution; here it is rough, and the norm is a little more than the error.
+/// Factor by which the tolerance may exceed that of over-relaxation. There the remaining error is smooth, and the norm,
+/// which gives smooth parts little weight, is half the relative error of the solution. Here the remaining error is
+/// rough, and the norm slightly exceeds the relative error.
 const ROUGHNESS: f64 = 2.0;
 
 /// A domain's part of the vectors of conjugate gradients.
@@ -24,11 +26,11 @@ pub(super) struct Vectors<T> {
     /// p, q = A p and u = (I + L̃)⁻¹ q.
     direction: Vec<Wide<T>>,
     product: Vec<Wide<T>>,
-    forth: Vec<Wide<T>>,
+    forward_product: Vec<Wide<T>>,
     solution: Vec<Wide<T>>,
-    /// e, what the coarse level corrects; then how far c went beyond it.
+    /// The coarse correction e; then c − e.
     change: Vec<Wide<T>>,
-    /// The residual after s; then c, by which z = M⁻¹ r = s + c.
+    /// The residual after s; then c, with z = M⁻¹ r = s + c.
     back: Vec<Wide<T>>,
 }
 
@@ -40,7 +42,7 @@ impl<T: Precision> Vectors<T> {
             smoothed: zeros.clone(),
             direction: zeros.clone(),
             product: zeros.clone(),
-            forth: zeros.clone(),
+            forward_product: zeros.clone(),
             solution: zeros.clone(),
             change: zeros.clone(),
             back: zeros,
@@ -48,24 +50,24 @@ impl<T: Precision> Vectors<T> {
     }
 }
 
-/// What all threads read that solve a system.
+/// Data shared by all threads that solve a system.
 pub(super) struct Common<'a, T> {
     pub(super) pattern: &'a Pattern,
     pub(super) options: &'a SolveOptions,
     pub(super) smoothers: &'a [Smoother<T>],
     pub(super) coarse: Option<RwLock<&'a mut Coarse<T>>>,
-    /// Of each domain what it shows of a vector on its border: of s, then of e.
+    /// The border rows of s, then of e, for each domain.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
-    /// The same of c − e, which is shown while e is still read.
+    /// The border rows of c − e for each domain, which are published while e is still read.
     changes: Vec<RwLock<Vec<Wide<T>>>>,
-    /// Its part of Pᵀ r, from which aggregate on.
+    /// For each domain, its first aggregate and its part of Pᵀ r.
     restricted: Vec<(usize, RwLock<Vec<Wide<T>>>)>,
-    meeting: Meeting,
-    unit: Unit,
-    /// s · s, r · z and p · q: each is read by all before any thread can have come round to write it again.
-    square: Shared,
-    along: Shared,
-    curvature: Shared,
+    barrier: SpinBarrier,
+    right_hand_scale: RightHandScale,
+    /// s · s, r · z and p · q. All threads read each number before any of them reaches its next update.
+    square: PerDomain,
+    along: PerDomain,
+    curvature: PerDomain,
 }
 
 impl<'a, T: Precision> Common<'a, T> {
@@ -83,7 +85,7 @@ impl<'a, T: Precision> Common<'a, T> {
         };
         let spans = smoothers.iter().map(span);
         let borders = || smoothers.iter().map(|smoother| zeros(smoother.couplings.border().len())).collect();
-        let sum = || Shared::new(smoothers.len());
+        let sum = || PerDomain::new(smoothers.len());
         Self {
             pattern,
             options,
@@ -92,32 +94,39 @@ impl<'a, T: Precision> Common<'a, T> {
             changes: borders(),
             restricted: spans.map(|span| (span.start, zeros(span.len()))).collect(),
             coarse: coarse.map(RwLock::new),
-            meeting: Meeting::new(threads.clamp(1, smoothers.len().max(1))),
-            unit: Unit::new(smoothers.len()),
+            barrier: SpinBarrier::new(threads.clamp(1, smoothers.len().max(1))),
+            right_hand_scale: RightHandScale::new(smoothers.len()),
             square: sum(),
             along: sum(),
             curvature: sum(),
         }
     }
 
-    /// Sums up the parts of Pᵀ r in the order of the domains, solves, and shows what that corrects on all borders.
+    /// Sums the parts of Pᵀ r in the order of the domains, solves on the coarse level, and publishes the correction on
+    /// all borders.
     fn correct(&self) {
         let Some(coarse) = &self.coarse else { return };
-        let mut coarse = coarse.write().expect("no thread panics");
+        let mut coarse = coarse.write().expect("no other thread panicked");
         coarse.restricted.fill([T::from_f64(0.0); 4]);
         for (first, part) in &self.restricted {
-            for (sum, part) in coarse.restricted[*first..].iter_mut().zip(&*part.read().expect("no thread panics")) {
+            for (sum, part) in
+                coarse.restricted[*first..].iter_mut().zip(&*part.read().expect("no other thread panicked"))
+            {
                 (0..4).for_each(|lane| sum[lane] = sum[lane] + part[lane]);
             }
         }
         coarse.correct();
         for (smoother, border) in self.smoothers.iter().zip(&self.borders) {
-            dispatch(Showing { smoother, coarse: &coarse, border: &mut border.write().expect("no thread panics") });
+            dispatch(PublishCorrection {
+                smoother,
+                coarse: &coarse,
+                border: &mut border.write().expect("no other thread panicked"),
+            });
         }
     }
 }
 
-/// A domain, and its rows of b and x.
+/// A domain and its rows of b and x.
 pub(super) struct Part<'a, T> {
     pub(super) number: usize,
     pub(super) vectors: &'a mut Vectors<T>,
@@ -126,19 +135,19 @@ pub(super) struct Part<'a, T> {
     pub(super) x: &'a mut [Vector3<f64>],
 }
 
-/// Conjugate gradients, as one thread sees them. See [`super::Multigrid`] for what is computed.
+/// Runs conjugate gradients in one of the threads. [`super::Multigrid`] documents the formulas.
 pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, common: &Common<'_, T>) -> SolveReport {
-    let Common { options, meeting, unit, square, along, curvature, .. } = common;
+    let Common { options, barrier, right_hand_scale, square, along, curvature, .. } = common;
     let leads = parts.iter().any(|part| part.number == 0);
     for Part { number, inverses, b, .. } in &parts {
-        unit.note(*number, inverses, b);
+        right_hand_scale.note(*number, inverses, b);
     }
-    meeting.wait();
-    let scale = unit.agreed();
+    barrier.wait();
+    let scale = right_hand_scale.combined();
     for part in &mut parts {
         square.put(part.number, dispatch(Start { part, common, scale }));
     }
-    meeting.wait();
+    barrier.wait();
     let mut sigma = square.sum();
     let initial = sigma;
     let target = (ROUGHNESS * options.relative_tolerance).powi(2) * initial;
@@ -157,21 +166,21 @@ pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, com
         for part in &mut parts {
             dispatch(Restriction { part, common });
         }
-        meeting.wait();
+        barrier.wait();
         if leads {
             common.correct();
         }
-        meeting.wait();
+        barrier.wait();
         for part in &mut parts {
             along.put(part.number, dispatch(Correction { part, common }));
         }
-        meeting.wait();
+        barrier.wait();
         let previous = std::mem::replace(&mut rho, along.sum());
         let conjugate = if iterations == 0 { 0.0 } else { rho / previous };
         for part in &mut parts {
             curvature.put(part.number, dispatch(Conjugation { part, common, conjugate }));
         }
-        meeting.wait();
+        barrier.wait();
         let bends = curvature.sum();
         if rho <= 0.0 || bends <= 0.0 {
             break StopReason::IndefiniteCurvature;
@@ -179,7 +188,7 @@ pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, com
         for part in &mut parts {
             square.put(part.number, dispatch(Advance { part, common, step: rho / bends }));
         }
-        meeting.wait();
+        barrier.wait();
         sigma = square.sum();
         iterations += 1;
     };
@@ -193,7 +202,7 @@ pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, com
     SolveReport { iterations, initial_residual, final_residual, stopped }
 }
 
-/// r ← C⁻¹ b/s, s ← (I + L̃)⁻¹ r, and zeros. Returns s · s.
+/// r ← C⁻¹ b/s, s ← (I + L̃)⁻¹ r, other vectors ← 0. Returns s · s.
 struct Start<'a, 'b, 'c, T> {
     part: &'a mut Part<'b, T>,
     common: &'a Common<'c, T>,
@@ -207,8 +216,8 @@ impl<T: Precision> Kernel for Start<'_, '_, '_, T> {
     fn run<L: Level>(self) -> f64 {
         let Part { number, vectors, inverses, b, .. } = self.part;
         let smoother = &self.common.smoothers[*number];
-        let Vectors { residual, smoothed, direction, product, forth, solution, .. } = &mut **vectors;
-        for zeros in [direction, product, forth, solution] {
+        let Vectors { residual, smoothed, direction, product, forward_product, solution, .. } = &mut **vectors;
+        for zeros in [direction, product, forward_product, solution] {
             zeros.fill([T::from_f64(0.0); 4]);
         }
         for row in 0..residual.len() {
@@ -217,16 +226,16 @@ impl<T: Precision> Kernel for Start<'_, '_, '_, T> {
         }
         smoothed.copy_from_slice(residual);
         smoother.forward::<L>(self.common.pattern, smoothed);
-        smoother.couplings.show(smoothed, &self.common.borders[*number]);
+        smoother.couplings.publish(smoothed, &self.common.borders[*number]);
         let mut squares = [0.0; 4];
         for vector in &*smoothed {
             add_products(&mut squares, vector, vector);
         }
-        of_three(squares)
+        sum_of_three(squares)
     }
 }
 
-/// The residual of s, −(L̃ᵀ + Ẽ) s, and its part of Pᵀ.
+/// Computes the residual −(L̃ᵀ + Ẽ) s and the domain's part of Pᵀ times it.
 struct Restriction<'a, 'b, 'c, T> {
     part: &'a mut Part<'b, T>,
     common: &'a Common<'c, T>,
@@ -244,9 +253,9 @@ impl<T: Precision> Kernel for Restriction<'_, '_, '_, T> {
         smoother.minus_upper::<L>(pattern, smoothed, back);
         smoother.add_coupled::<L>(-1.0, borders, smoothed, back);
         let Some(coarse) = coarse else { return };
-        let coarse = coarse.read().expect("no thread panics");
+        let coarse = coarse.read().expect("no other thread panicked");
         let (first, sums) = &restricted[*number];
-        let mut sums = sums.write().expect("no thread panics");
+        let mut sums = sums.write().expect("no other thread panicked");
         sums.fill([T::from_f64(0.0); 4]);
         let before = smoother.triangle.rows.start;
         for row in 0..back.len() {
@@ -256,14 +265,14 @@ impl<T: Precision> Kernel for Restriction<'_, '_, '_, T> {
     }
 }
 
-/// What the coarse level corrects on the border of a domain.
-struct Showing<'a, T> {
+/// Publishes the coarse correction on the border of a domain.
+struct PublishCorrection<'a, T> {
     smoother: &'a Smoother<T>,
     coarse: &'a Coarse<T>,
     border: &'a mut [Wide<T>],
 }
 
-impl<T: Precision> Kernel for Showing<'_, T> {
+impl<T: Precision> Kernel for PublishCorrection<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -271,13 +280,13 @@ impl<T: Precision> Kernel for Showing<'_, T> {
         let Self { smoother, coarse, border } = self;
         for (place, &local) in smoother.couplings.border().iter().enumerate() {
             let row = smoother.triangle.rows.start + local as usize;
-            let carried = coarse.interpolation.carried::<L>(row, &coarse.correction);
-            border[place] = smoother.scaled(local as usize, &carried);
+            let prolonged = coarse.interpolation.prolonged::<L>(row, &coarse.correction);
+            border[place] = smoother.scaled(local as usize, &prolonged);
         }
     }
 }
 
-/// c = (I + L̃ᵀ)⁻¹ (back − (L̃ + Ẽ) e) and z = s + c; e is replaced by c − e. Returns r · z.
+/// c = (I + L̃ᵀ)⁻¹ (back − (L̃ + Ẽ) e) and z = s + c; then e is replaced by c − e. Returns r · z.
 struct Correction<'a, 'b, 'c, T> {
     part: &'a mut Part<'b, T>,
     common: &'a Common<'c, T>,
@@ -295,10 +304,10 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
         let before = smoother.triangle.rows.start;
         match coarse {
             Some(coarse) => {
-                let coarse = coarse.read().expect("no thread panics");
+                let coarse = coarse.read().expect("no other thread panicked");
                 for row in 0..change.len() {
-                    let carried = coarse.interpolation.carried::<L>(before + row, &coarse.correction);
-                    change[row] = smoother.scaled(row, &carried);
+                    let prolonged = coarse.interpolation.prolonged::<L>(before + row, &coarse.correction);
+                    change[row] = smoother.scaled(row, &prolonged);
                 }
             }
             None => change.fill([T::from_f64(0.0); 4]),
@@ -315,8 +324,8 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
             }
             add_products(&mut along, &residual[row], &z);
         }
-        smoother.couplings.show(change, &self.common.changes[*number]);
-        of_three(along)
+        smoother.couplings.publish(change, &self.common.changes[*number]);
+        sum_of_three(along)
     }
 }
 
@@ -335,7 +344,7 @@ impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
         let Common { pattern, smoothers, changes, .. } = self.common;
         let Part { number, vectors, .. } = self.part;
         let smoother = &smoothers[*number];
-        let Vectors { residual, smoothed, direction, product, forth, change, back, .. } = &mut **vectors;
+        let Vectors { residual, smoothed, direction, product, forward_product, change, back, .. } = &mut **vectors;
         let conjugate = T::from_f64(self.conjugate);
         for row in 0..product.len() {
             let (mut p, mut q) = (direction[row], product[row]);
@@ -346,12 +355,12 @@ impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
             (direction[row], product[row]) = (p, q);
         }
         smoother.add_coupled::<L>(1.0, changes, change, product);
-        smoother.add_lower_and_forward::<L>(pattern, change, product, forth);
+        smoother.add_lower_and_forward::<L>(pattern, change, product, forward_product);
         let mut curvature = [0.0; 4];
         for row in 0..product.len() {
             add_products(&mut curvature, &direction[row], &product[row]);
         }
-        of_three(curvature)
+        sum_of_three(curvature)
     }
 }
 
@@ -368,7 +377,7 @@ impl<T: Precision> Kernel for Advance<'_, '_, '_, T> {
     #[inline(always)]
     fn run<L: Level>(self) -> f64 {
         let Part { number, vectors, .. } = self.part;
-        let Vectors { residual, smoothed, direction, product, forth, solution, .. } = &mut **vectors;
+        let Vectors { residual, smoothed, direction, product, forward_product, solution, .. } = &mut **vectors;
         let step = T::from_f64(self.step);
         let mut squares = [0.0; 4];
         for row in 0..residual.len() {
@@ -376,12 +385,12 @@ impl<T: Precision> Kernel for Advance<'_, '_, '_, T> {
             for lane in 0..4 {
                 x[lane] = direction[row][lane].mul_add::<L>(step, x[lane]);
                 r[lane] = product[row][lane].mul_add::<L>(-step, r[lane]);
-                s[lane] = forth[row][lane].mul_add::<L>(-step, s[lane]);
+                s[lane] = forward_product[row][lane].mul_add::<L>(-step, s[lane]);
             }
             (solution[row], residual[row], smoothed[row]) = (x, r, s);
             add_products(&mut squares, &s, &s);
         }
-        self.common.smoothers[*number].couplings.show(smoothed, &self.common.borders[*number]);
-        of_three(squares)
+        self.common.smoothers[*number].couplings.publish(smoothed, &self.common.borders[*number]);
+        sum_of_three(squares)
     }
 }

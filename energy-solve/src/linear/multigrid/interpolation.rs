@@ -5,13 +5,17 @@ use energy_dsl::Level;
 use crate::linear::domains::{Precision, Wide};
 use crate::matrix::pattern::{Pattern, index};
 
-/// How the aggregates of a coarse level carry the rows of a fine one: P, whose blocks are multiples w of the identity.
+/// The prolongation P from the aggregates of a coarse level to the rows of a fine level. Its blocks are multiples of
+/// the identity.
 ///
-/// Each row belongs to an aggregate. Its weights are the shares of the aggregates in the row and what it is coupled with: the tentative P, ones and
-/// zeros, averaged once. They sum up to one, so translations are carried exactly; and as the aggregate of a root holds all its neighbours, the
-/// root's row of P is a unit vector: P has full rank, and Pᵀ A P is positive definite if A is.
+/// Each row belongs to one aggregate. A row's weights are the averages of the tentative prolongation, which has ones
+/// and zeros, over the row and its neighbours.
 ///
-/// A row that is coupled with none is carried by none: the smoother solves for it.
+/// The weights of a row sum to 1, so P reproduces translations exactly. The neighbours of an aggregate's root all
+/// belong to that aggregate, so the root's row of P is a unit vector. So P has full rank, and Pᵀ A P is positive
+/// definite if A is.
+///
+/// A row without couplings has no weights: the smoother alone solves for it.
 #[derive(Clone, Debug)]
 pub(super) struct Interpolation<T> {
     aggregates: usize,
@@ -20,30 +24,33 @@ pub(super) struct Interpolation<T> {
     weights: Vec<T>,
 }
 
-/// Shares below this part are left out, all but that of a row's own aggregate: couplings between coarse rows for next to nothing.
+/// Weights below this fraction are dropped, except that of a row's own aggregate: they would couple coarse rows for
+/// little gain.
 const LEAST_SHARE: f64 = 0.125;
 
 impl<T: Precision> Interpolation<T> {
-    /// From aggregates of rows that the pattern couples.
+    /// Aggregates the rows of a pattern and averages the tentative prolongation.
     pub(super) fn averaged(pattern: &Pattern) -> Self {
         let neighbours = Neighbours::of(pattern);
-        let (of, aggregates) = neighbours.aggregates();
+        let (aggregate_of, aggregates) = neighbours.aggregates();
         let mut row_start = Vec::with_capacity(pattern.rows() + 1);
         row_start.push(0);
         let mut interpolation = Self { aggregates, row_start, columns: Vec::new(), weights: Vec::new() };
         let mut shares: Vec<(u32, f64)> = Vec::new();
         for row in 0..pattern.rows() {
             shares.clear();
-            if of[row] != NONE {
+            if aggregate_of[row] != NONE {
                 let with_itself = neighbours.of_row(row).len() + 1;
-                for aggregate in neighbours.of_row(row).iter().chain([&index(row)]).map(|&row| of[row as usize]) {
+                for aggregate in
+                    neighbours.of_row(row).iter().chain([&index(row)]).map(|&row| aggregate_of[row as usize])
+                {
                     match shares.iter_mut().find(|(known, _)| *known == aggregate) {
                         Some((_, share)) => *share += 1.0,
                         None => shares.push((aggregate, 1.0)),
                     }
                 }
                 let least = LEAST_SHARE * with_itself as f64;
-                shares.retain(|&(aggregate, share)| aggregate == of[row] || share >= least);
+                shares.retain(|&(aggregate, share)| aggregate == aggregate_of[row] || share >= least);
                 shares.sort_unstable_by_key(|&(aggregate, _)| aggregate);
             }
             let all: f64 = shares.iter().map(|(_, share)| share).sum();
@@ -58,30 +65,30 @@ impl<T: Precision> Interpolation<T> {
         interpolation
     }
 
-    /// The number of aggregates.
+    /// Returns the number of aggregates.
     pub(super) fn aggregates(&self) -> usize {
         self.aggregates
     }
 
-    /// Where the weights of a row are.
+    /// Returns the indices of a row's weights.
     #[inline(always)]
     pub(super) fn places(&self, row: usize) -> Range<usize> {
         self.row_start[row] as usize..self.row_start[row + 1] as usize
     }
 
-    /// The aggregates that carry a row.
+    /// Returns the aggregates from which a row is interpolated.
     #[inline(always)]
     pub(super) fn columns(&self, row: usize) -> &[u32] {
         &self.columns[self.places(row)]
     }
 
-    /// How much each of them does.
+    /// Returns the weights of these aggregates.
     #[inline(always)]
     pub(super) fn weights(&self, row: usize) -> &[T] {
         &self.weights[self.places(row)]
     }
 
-    /// The first and the last aggregate, and those between, that carry some of these rows.
+    /// Returns the range of aggregates from which these rows are interpolated.
     pub(super) fn span(&self, rows: Range<usize>) -> Range<usize> {
         let columns = &self.columns[self.row_start[rows.start] as usize..self.row_start[rows.end] as usize];
         match (columns.iter().min(), columns.iter().max()) {
@@ -90,9 +97,9 @@ impl<T: Precision> Interpolation<T> {
         }
     }
 
-    /// The part of P e in a row.
+    /// Returns the row of P e.
     #[inline(always)]
-    pub(super) fn carried<L: Level>(&self, row: usize, e: &[Wide<T>]) -> Wide<T> {
+    pub(super) fn prolonged<L: Level>(&self, row: usize, e: &[Wide<T>]) -> Wide<T> {
         let mut sum = [T::from_f64(0.0); 4];
         for place in self.places(row) {
             let (weight, from) = (self.weights[place], e[self.columns[place] as usize]);
@@ -103,7 +110,7 @@ impl<T: Precision> Interpolation<T> {
         sum
     }
 
-    /// Adds what a row contributes to Pᵀ r, counted from aggregate `first`.
+    /// Adds a row's contribution to Pᵀ r; `sums` begins with the aggregate `first`.
     #[inline(always)]
     pub(super) fn add_restricted<L: Level>(&self, row: usize, r: &Wide<T>, first: usize, sums: &mut [Wide<T>]) {
         for place in self.places(row) {
@@ -117,7 +124,7 @@ impl<T: Precision> Interpolation<T> {
     }
 }
 
-/// Of no aggregate.
+/// Marks a row without an aggregate.
 const NONE: u32 = u32::MAX;
 
 /// The other rows that each row is coupled with, ascending.
@@ -153,27 +160,28 @@ impl Neighbours {
         &self.rows[self.start[row]..self.start[row + 1]]
     }
 
-    /// The aggregate of each row, and how many there are: every row whose neighbours all are free yet makes one with them; what is left over joins one
-    /// that it is coupled with (Vaněk, Mandel and Brezina 1996, algorithm 5.1 without its last step, to which nothing is left).
+    /// Returns the aggregate of each row and the number of aggregates. A row whose neighbours are all free forms an
+    /// aggregate with them; each remaining row joins the aggregate of a neighbour (Vaněk, Mandel and Brezina 1996,
+    /// algorithm 5.1; its last step never applies).
     fn aggregates(&self) -> (Vec<u32>, usize) {
         let rows = self.start.len() - 1;
-        let (mut of, mut count) = (vec![NONE; rows], 0);
+        let (mut aggregate_of, mut count) = (vec![NONE; rows], 0);
         for row in 0..rows {
             let neighbours = self.of_row(row);
-            let free = |&row: &u32| of[row as usize] == NONE;
+            let free = |&row: &u32| aggregate_of[row as usize] == NONE;
             if !neighbours.is_empty() && free(&index(row)) && neighbours.iter().all(free) {
-                of[row] = count;
-                neighbours.iter().for_each(|&other| of[other as usize] = count);
+                aggregate_of[row] = count;
+                neighbours.iter().for_each(|&other| aggregate_of[other as usize] = count);
                 count += 1;
             }
         }
-        let roots = of.clone();
+        let roots = aggregate_of.clone();
         for row in 0..rows {
             let joined = || self.of_row(row).iter().map(|&other| roots[other as usize]).find(|&other| other != NONE);
-            if of[row] == NONE {
-                of[row] = joined().unwrap_or(NONE);
+            if aggregate_of[row] == NONE {
+                aggregate_of[row] = joined().unwrap_or(NONE);
             }
         }
-        (of, count as usize)
+        (aggregate_of, count as usize)
     }
 }

@@ -11,42 +11,47 @@ use energy_dsl::{Number, Vector3, dispatch};
 use self::coarse::Coarse;
 use self::gradients::{Common, Part, Vectors, conjugate_gradients};
 use self::smoother::{Inversion, Smoother};
-use crate::linear::domains::{InverseFactor, Precision, Scaling, divided, ranges};
+use crate::linear::domains::{InverseFactor, Precision, Scaling, create_domains, ranges};
 use crate::linear::preconditioner::SingularBlock;
 use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::threads::{for_each, in_parts, split_mut};
 
-/// Conjugate gradients with algebraic multigrid by smoothed aggregation as preconditioner, for matrices of cloth: a number of iterations that hardly
-/// depends on how fine the mesh is (Tamstorf, Jones and McCormick, "Smoothed aggregation multigrid for cloth simulation", ACM Trans. Graph. 34, 2015).
+/// Conjugate gradients preconditioned by smoothed aggregation multigrid, for matrices of cloth. The number of
+/// iterations hardly depends on the resolution of the mesh (Tamstorf, Jones and McCormick, "Smoothed aggregation
+/// multigrid for cloth simulation", ACM Trans. Graph. 34, 2015).
 ///
-/// M⁻¹ r is a cycle: with D the diagonal blocks, A = D + L + Lᵀ, D̂ = D/ω, and P as below,
+/// Let D be the diagonal blocks, A = D + L + Lᵀ, D̂ = D/ω, and P the prolongation. The preconditioner z = M⁻¹ r is one
+/// cycle,
 ///
 /// s = (D̂ + L)⁻¹ r,  e = P A_c⁻¹ Pᵀ (r − A s),  z = s + e + (D̂ + Lᵀ)⁻¹ (r − A (s + e)),  A_c = Pᵀ A P,
 ///
-/// where coarse systems are solved nearly, by two such cycles each (a W-cycle), and by Cholesky's factorisation in the end. Products with A are never
-/// computed as such: with D' = D − D̂, r − A s = −(D' + Lᵀ) s, and A z = r + (D' + L) (z − s − e). Blocks above the diagonal are read four times an iteration, where
-/// [`OverRelaxation`](crate::OverRelaxation) reads them twice.
+/// which solves coarse systems approximately by two such cycles each (a W-cycle), and the coarsest by Cholesky
+/// factorisation. Products with A are never computed: with D' = D − D̂, r − A s = −(D' + Lᵀ) s, and A z = r + (D' + L)
+/// (z − s − e). An iteration reads the blocks above the diagonal four times; [`OverRelaxation`](crate::OverRelaxation)
+/// reads them twice.
 ///
-/// P carries translations: aggregates of vertices and their neighbours, as the pattern couples them, move as wholes, and each vertex by the mean of its own
-/// and its neighbours' aggregates (smoothed aggregation with the graph's averages instead of D⁻¹A). So P is a matter of the pattern alone, its
-/// blocks are multiples of the identity, and A_c, which follows A in every iteration of Newton's method, is a weighted sum of blocks. To carry
-/// rotations too, and to smooth with D⁻¹A, saves one or two iterations on sheets of cloth, but multiplies the price of A_c.
+/// P reproduces translations. A vertex and its neighbours in the pattern form an aggregate that moves as a whole, and
+/// each vertex moves by the mean over its own and its neighbours' aggregates. This is smoothed aggregation with graph
+/// averages instead of D⁻¹A. P therefore depends on the pattern alone, and its blocks are multiples of the identity.
+/// A_c, which changes with every iteration of Newton's method, is a weighted sum of blocks. Including rotations and
+/// smoothing with D⁻¹A saves one or two iterations on sheets of cloth but makes A_c several times as expensive.
 ///
-/// Residuals are measured as √(rᵀ M⁻¹ r), M = (D̂ + L) D̂⁻¹ (D̂ + Lᵀ), the norm of over-relaxation, and may be twice as large in it: as they are rough
-/// then, where those left by over-relaxation are smooth, the same tolerance means the same error of the solution, in the norm √(eᵀ A e).
+/// Residuals are measured as in over-relaxation, by √(rᵀ M⁻¹ r) with M = (D̂ + L) D̂⁻¹ (D̂ + Lᵀ), but may be twice as
+/// large. Here they are rough, there smooth; so the same tolerance gives the same error of the solution in the norm
+/// √(eᵀ A e).
 ///
-/// Numbers are stored, and computed with, in `T`, products of vectors and A_c are summed up in doubles. Large matrices are divided into domains of
-/// consecutive rows for the finest level, each relaxed by itself; how many there are depends on the matrix alone: the solution is the same, to the last
-/// bit, for any number of threads among which they are divided. Coarser levels are relaxed by one thread.
+/// Numbers are stored and computed in `T`; dot products and A_c are summed in double precision. On the finest level,
+/// large matrices are divided into domains of consecutive rows, which are relaxed independently. The domains depend on
+/// the matrix alone, so the solution is bit-identical for any number of threads. One thread relaxes the coarser levels.
 ///
-/// Made for matrices that change and patterns that do not: [`Multigrid::take_over`] reuses everything that the pattern tells.
+/// [`Multigrid::take_over`] reuses everything that depends on the pattern alone.
 ///
 /// ```
 /// use energy_solve::{BlockMatrix, Multigrid, Pattern, SolveOptions, Storage};
 ///
-/// // A chain of a hundred masses of 0.01 kg with springs of 1 N/m between them, each pulled with 1 N.
+/// // A chain of a hundred masses of 0.01 kg with springs of 1 N/m between them. Each is pulled with 1 N.
 /// let springs: Vec<[u32; 2]> = (1..100).map(|end| [end - 1, end]).collect();
 /// let pattern = Pattern::from_stencils(Storage::Upper, 100, springs.iter().map(<[u32; 2]>::as_slice)).into();
 /// let mut matrix = BlockMatrix::zeros(std::sync::Arc::clone(&pattern));
@@ -78,29 +83,29 @@ pub struct Multigrid<T> {
     smoothers: Vec<Smoother<T>>,
     vectors: Vec<Vectors<T>>,
     coarse: Option<Coarse<T>>,
-    /// Whether no level showed that the matrix is not positive definite.
+    /// `false` if some level proved that the matrix is not positive definite.
     definite: bool,
 }
 
 impl<T: Precision> Multigrid<T> {
-    /// Prepares for matrices of a pattern, to be solved by one thread.
+    /// Analyses a pattern, for solves on one thread.
     ///
     /// # Panics
-    /// When it is not the upper triangle of a symmetric one.
+    /// If the pattern does not store an upper triangle.
     #[must_use]
     pub fn new(pattern: &Arc<Pattern>) -> Self {
         Self::with_threads(pattern, 1)
     }
 
-    /// Prepares for matrices of a pattern, to be solved by at most so many threads.
+    /// Analyses a pattern, for solves on at most `threads` threads.
     ///
     /// # Panics
-    /// When it is not the upper triangle of a symmetric one.
+    /// If the pattern does not store an upper triangle.
     #[must_use]
     pub fn with_threads(pattern: &Arc<Pattern>, threads: usize) -> Self {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices are solved by conjugate gradients");
         let ranges = ranges(pattern.rows());
-        let smoothers = divided(pattern, &ranges).into_iter();
+        let smoothers = create_domains(pattern, &ranges).into_iter();
         let smoothers = smoothers.map(|(triangle, couplings)| Smoother::new(triangle, couplings));
         Self {
             pattern: Arc::clone(pattern),
@@ -113,26 +118,26 @@ impl<T: Precision> Multigrid<T> {
         }
     }
 
-    /// The number of levels, the finest among them.
+    /// Returns the number of levels, including the finest.
     #[must_use]
     pub fn levels(&self) -> usize {
         1 + self.coarse.as_ref().map_or(0, |coarse| coarse.blocks().len())
     }
 
-    /// The blocks of all levels' matrices for one of the finest's.
+    /// Returns the number of matrix blocks of all levels divided by that of the finest.
     #[must_use]
     pub fn operator_complexity(&self) -> f64 {
         let coarse: usize = self.coarse.as_ref().map_or(0, |coarse| coarse.blocks().iter().sum());
         1.0 + coarse as f64 / self.pattern.blocks().max(1) as f64
     }
 
-    /// Takes over a matrix of the pattern: its Galerkin products, and what relaxes each of them.
+    /// Reads a matrix of the pattern, and computes the smoothers and Galerkin products of all levels.
     ///
     /// # Errors
-    /// When a diagonal block is not positive definite: then the matrix is not.
+    /// If a diagonal block is not positive definite, in which case neither is the matrix.
     ///
     /// # Panics
-    /// When the matrix has another pattern.
+    /// If the matrix has another pattern.
     pub fn take_over(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { pattern, threads, inverses, smoothers, coarse, .. } = self;
@@ -151,7 +156,8 @@ impl<T: Precision> Multigrid<T> {
         Ok(())
     }
 
-    /// Solves A x = b from x = 0. Of a matrix that a coarse level showed not to be positive definite, x = 0.
+    /// Solves A x = b, starting from x = 0. Returns x = 0 if a coarse level proved that the matrix is not positive
+    /// definite.
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
         let nothing = SolveReport { stopped: StopReason::Converged, ..SolveReport::indefinite() };
         if !self.definite {
@@ -167,7 +173,7 @@ impl<T: Precision> Multigrid<T> {
             Part { number, vectors, inverses: &inverses[rows.clone()], b: &b[rows], x }
         });
         let solved = in_parts(*threads, parts.collect(), |parts| conjugate_gradients(parts, &common));
-        // All threads come to the same.
+        // All threads return the same report.
         solved.into_iter().next().unwrap_or(nothing)
     }
 }

@@ -3,30 +3,32 @@ use std::sync::RwLock;
 use energy_dsl::{Block, Kernel, Level};
 
 use crate::linear::domains::{
-    Couplings, InverseFactor, Precision, Triangle, Wide, inverse_factor, invert, less_products, rounded, scaled_block,
-    subtract_turned,
+    Couplings, InverseFactor, Precision, Triangle, Wide, inverse_factor, invert, minus_products, rounded, scaled_block,
+    subtract_transposed,
 };
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::Pattern;
 use crate::matrix::precision::doubled;
 
-/// ω. With Gauss–Seidel relaxation, ω = 1, multigrid takes up to two iterations more on stiff sheets; from 1.3 to 1.7 about the same.
+/// ω. With 1 (Gauss–Seidel), multigrid takes up to two iterations more on stiff sheets; from 1.3 to 1.7 the count
+/// hardly changes.
 const RELAXATION: f64 = 1.5;
 
-/// Over-relaxation of the rows of a domain, forth and back: solutions with I + L̃ and I + L̃ᵀ, the matrix being scaled to
+/// Forward and backward over-relaxation of a domain: solves with I + L̃ and I + L̃ᵀ, where the matrix is scaled to
 ///
 /// C⁻¹ A C⁻ᵀ = I + L̃ + L̃ᵀ + Ẽ.
 ///
-/// C Cᵀ is D/ω, D the diagonal block, and more on the border by half of what couples the row with other domains: then the relaxation of all domains
-/// at once converges, wherever they are cut (hybrid ℓ₁ Gauss–Seidel, Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput. 33, 2011). Ẽ takes it back:
-/// it is ω − 1, less what the border has more of, and what couples the domain with others.
+/// C Cᵀ is D/ω for the diagonal block D. On the border it also contains half of the absolute row sums of the couplings
+/// with other domains, so that relaxing all domains at once converges for any choice of domains (hybrid ℓ₁
+/// Gauss–Seidel, Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput. 33, 2011). Ẽ compensates: it is ω − 1, minus the
+/// additions on the border, plus the couplings with other domains.
 #[derive(Clone, Debug)]
 pub(super) struct Smoother<T> {
     pub(super) triangle: Triangle<T>,
     pub(super) couplings: Couplings<T>,
-    /// On the border, ω times what D/ω was strengthened by: column by column.
+    /// ω times the scaled addition to D/ω for each border row, by columns.
     strengthened: Vec<[Wide<T>; 3]>,
-    /// C by rows, in a unit of its own.
+    /// C by rows, multiplied by the unit of [`Smoother::invert`].
     factors: Vec<[T; 6]>,
 }
 
@@ -38,7 +40,7 @@ impl<T: Precision> Smoother<T> {
         Self { triangle, couplings, strengthened, factors }
     }
 
-    /// C⁻¹ of its rows; fails with one whose diagonal block is not positive definite.
+    /// Computes C and C⁻¹ of the domain's rows. Fails with a row whose diagonal block is not positive definite.
     #[inline(always)]
     pub(super) fn invert<M: Precision, L: Level>(
         &mut self,
@@ -77,14 +79,14 @@ impl<T: Precision> Smoother<T> {
         Ok(())
     }
 
-    /// C r in a row.
+    /// Returns C r for a row.
     #[inline(always)]
     pub(super) fn unscaled(&self, row: usize, [u, v, w, _]: &Wide<T>) -> Wide<T> {
         let [a, b, c, d, e, f] = self.factors[row];
         [a * *u, b * *u + c * *v, d * *u + e * *v + f * *w, T::from_f64(0.0)]
     }
 
-    /// Cᵀ e in a row.
+    /// Returns Cᵀ e for a row.
     #[inline(always)]
     pub(super) fn scaled(&self, row: usize, [u, v, w, _]: &Wide<T>) -> Wide<T> {
         let [a, b, c, d, e, f] = self.factors[row];
@@ -98,7 +100,7 @@ impl<T: Precision> Smoother<T> {
         for row in 0..v.len() {
             let here = v[row];
             for (block, column) in rows.blocks(row) {
-                subtract_turned::<T, L>(&mut v[column], block, &here);
+                subtract_transposed::<T, L>(&mut v[column], block, &here);
             }
         }
     }
@@ -108,7 +110,7 @@ impl<T: Precision> Smoother<T> {
     pub(super) fn backward<L: Level>(&self, pattern: &Pattern, v: &mut [Wide<T>]) {
         let rows = self.triangle.by_rows(pattern);
         for row in (0..v.len()).rev() {
-            v[row] = less_products::<T, L>(rows.blocks(row), v[row], v);
+            v[row] = minus_products::<T, L>(rows.blocks(row), v[row], v);
         }
     }
 
@@ -118,7 +120,7 @@ impl<T: Precision> Smoother<T> {
         let rows = self.triangle.by_rows(pattern);
         for row in 0..v.len() {
             let own = plus::<T, L>([T::from_f64(0.0); 4], 1.0 - RELAXATION, &v[row]);
-            r[row] = less_products::<T, L>(rows.blocks(row), own, v);
+            r[row] = minus_products::<T, L>(rows.blocks(row), own, v);
         }
     }
 
@@ -130,7 +132,7 @@ impl<T: Precision> Smoother<T> {
             let here = v[row];
             r[row] = plus::<T, L>(r[row], 1.0 - RELAXATION, &here);
             for (block, column) in rows.blocks(row) {
-                subtract_turned::<T, L>(&mut r[column], block, &here);
+                subtract_transposed::<T, L>(&mut r[column], block, &here);
             }
         }
     }
@@ -154,13 +156,13 @@ impl<T: Precision> Smoother<T> {
             }
             (w[row], v[row]) = (own, here);
             for (block, column) in rows.blocks(row) {
-                subtract_turned::<T, L>(&mut w[column], block, &minus);
-                subtract_turned::<T, L>(&mut v[column], block, &here);
+                subtract_transposed::<T, L>(&mut w[column], block, &minus);
+                subtract_transposed::<T, L>(&mut v[column], block, &here);
             }
         }
     }
 
-    /// r ← r + s (Ẽ − ω + 1) v, v as others show it.
+    /// r ← r + s (Ẽ − ω + 1) v, where other domains have published their border rows of v.
     #[inline(always)]
     pub(super) fn add_coupled<L: Level>(
         &self,
@@ -184,7 +186,7 @@ impl<T: Precision> Smoother<T> {
     }
 }
 
-/// [`Smoother::invert`].
+/// Runs [`Smoother::invert`].
 pub(super) struct Inversion<'a, T, M> {
     pub(super) smoother: &'a mut Smoother<T>,
     pub(super) inverses: &'a mut [InverseFactor<T>],
@@ -201,13 +203,13 @@ impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
     }
 }
 
-/// D/ω.
+/// Returns D/ω.
 #[inline(always)]
 fn relaxed(diagonal: &Block<f64>) -> Block<f64> {
     diagonal.map(|row| row.map(|entry| entry / RELAXATION))
 }
 
-/// v + s u.
+/// Returns v + s u.
 #[inline(always)]
 fn plus<T: Precision, L: Level>(mut v: Wide<T>, scale: f64, u: &Wide<T>) -> Wide<T> {
     let scale = T::from_f64(scale);

@@ -6,35 +6,37 @@ use std::sync::{Arc, RwLock};
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
 use self::domain::Domain;
-use crate::linear::domains::{InverseFactor, Meeting, Precision, Scaling, Shared, Unit, Wide, divided, invert, ranges};
+use crate::linear::domains::{
+    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, SpinBarrier, Wide, create_domains, invert, ranges,
+};
 use crate::linear::preconditioner::SingularBlock;
 use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::threads::{for_each, in_parts, split_mut};
 
-/// ω. From 1.4 to 1.8 the iterations on sheets of cloth, soft and stiff, fine and coarse, differ by a fifth.
+/// ω. Between 1.4 and 1.8, the iterations on sheets of cloth (soft, stiff, fine, coarse) differ by a fifth.
 const RELAXATION: f64 = 1.6;
 
-/// Conjugate gradients with the preconditioner of symmetric successive over-relaxation, at the price of conjugate gradients without:
-/// Eisenstat's method (SIAM J. Sci. Stat. Comput. 2, 1981).
+/// Conjugate gradients preconditioned by symmetric successive over-relaxation, at the cost of plain conjugate
+/// gradients: Eisenstat's trick (SIAM J. Sci. Stat. Comput. 2, 1981).
 ///
-/// With A = D + L + Lᵀ, D its diagonal blocks and C Cᵀ = D/ω, the matrix is scaled to C⁻¹ A C⁻ᵀ = ω I + L̃ + L̃ᵀ. What conjugate
-/// gradients then multiply by,
+/// With A = D + L + Lᵀ, where D are the diagonal blocks, and C Cᵀ = D/ω, the matrix is scaled to C⁻¹ A C⁻ᵀ = ω I + L̃ +
+/// L̃ᵀ. The operator of conjugate gradients,
 ///
 /// (I + L̃)⁻¹ (ω I + L̃ + L̃ᵀ) (I + L̃ᵀ)⁻¹ p = t + (I + L̃)⁻¹ (p + (ω − 2) t),  t = (I + L̃ᵀ)⁻¹ p,
 ///
-/// takes two triangular solutions and no product with A. There is nothing to factor but the diagonal blocks, and the blocks above
-/// the diagonal are all that is read.
+/// takes two triangular solves and no product with A. Only the diagonal blocks are factored, and only the blocks above
+/// the diagonal are read.
 ///
-/// Numbers are stored, and computed with, in `T`: `f32` halves what is read from memory, which is what the time goes into, and serves
-/// where a solution is wanted to a part in a hundred, as by Newton's method; products of vectors are summed up in doubles.
+/// Numbers are stored and computed in `T`; dot products are summed in double precision. The time is spent on reading
+/// memory, of which `f32` needs half. It suffices for a relative accuracy of about 1 %, as in Newton's method.
 ///
-/// Large matrices are divided into domains of consecutive rows, and relaxation is confined to each; what couples them, Ẽ, is added to what is
-/// multiplied by: p + (ω − 2) t + Ẽ t. How many there are depends on the matrix alone, and sums run over them in order: the solution is the same,
-/// to the last bit, for any number of threads among which they are divided.
+/// Large matrices are divided into domains of consecutive rows, and relaxation is confined to each. The couplings
+/// between them, Ẽ, enter the operator: p + (ω − 2) t + Ẽ t. The domains depend on the matrix alone, and sums run over
+/// them in order, so the solution is bit-identical for any number of threads.
 ///
-/// Made for matrices that change and patterns that do not: [`OverRelaxation::scale`] reuses everything.
+/// [`OverRelaxation::scale`] reuses everything that depends on the pattern alone.
 #[derive(Debug)]
 pub struct OverRelaxation<T> {
     pattern: Arc<Pattern>,
@@ -42,28 +44,28 @@ pub struct OverRelaxation<T> {
     /// C⁻¹ of each row.
     inverses: Vec<InverseFactor<T>>,
     domains: Vec<Domain<T>>,
-    /// Of each domain t in the rows that others are coupled with.
+    /// The border rows of t for each domain.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
 }
 
 impl<T: Precision> OverRelaxation<T> {
-    /// Prepares for matrices of a pattern, to be solved by one thread.
+    /// Analyses a pattern, for solves on one thread.
     ///
     /// # Panics
-    /// When it is not the upper triangle of a symmetric one.
+    /// If the pattern does not store an upper triangle.
     #[must_use]
     pub fn new(pattern: &Arc<Pattern>) -> Self {
         Self::with_threads(pattern, 1)
     }
 
-    /// Prepares for matrices of a pattern, to be solved by at most so many threads.
+    /// Analyses a pattern, for solves on at most `threads` threads.
     ///
     /// # Panics
-    /// When it is not the upper triangle of a symmetric one.
+    /// If the pattern does not store an upper triangle.
     #[must_use]
     pub fn with_threads(pattern: &Arc<Pattern>, threads: usize) -> Self {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices are solved by conjugate gradients");
-        let domains = divided(pattern, &ranges(pattern.rows())).into_iter();
+        let domains = create_domains(pattern, &ranges(pattern.rows())).into_iter();
         let domains: Vec<_> = domains.map(|(triangle, couplings)| Domain::new(triangle, couplings)).collect();
         let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.couplings.border().len()]);
         let borders = domains.iter().map(border).collect();
@@ -71,13 +73,13 @@ impl<T: Precision> OverRelaxation<T> {
         Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders }
     }
 
-    /// Takes over a matrix of the pattern, scaled.
+    /// Reads and scales a matrix of the pattern.
     ///
     /// # Errors
-    /// When a diagonal block is not positive definite: then the matrix is not.
+    /// If a diagonal block is not positive definite, in which case neither is the matrix.
     ///
     /// # Panics
-    /// When the matrix has another pattern.
+    /// If the matrix has another pattern.
     pub fn scale(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { threads, inverses, domains, .. } = self;
@@ -92,17 +94,18 @@ impl<T: Precision> OverRelaxation<T> {
         Ok(())
     }
 
-    /// Solves A x = b from x = 0. Residuals are measured as √(rᵀ M⁻¹ r), M = (D/ω + L) (D/ω)⁻¹ (D/ω + Lᵀ).
+    /// Solves A x = b, starting from x = 0. Residuals are measured as √(rᵀ M⁻¹ r) with M = (D/ω + L) (D/ω)⁻¹ (D/ω +
+    /// Lᵀ).
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
         let Self { pattern, threads, inverses, domains, borders } = self;
         let lengths: Vec<usize> = domains.iter().map(|domain| domain.triangle.rows.len()).collect();
-        let sum = || Shared::new(lengths.len());
+        let sum = || PerDomain::new(lengths.len());
         let common = Common {
             pattern,
             options,
             borders,
-            meeting: Meeting::new((*threads).clamp(1, lengths.len().max(1))),
-            unit: Unit::new(lengths.len()),
+            barrier: SpinBarrier::new((*threads).clamp(1, lengths.len().max(1))),
+            right_hand_scale: RightHandScale::new(lengths.len()),
             first_half: sum(),
             second_half: sum(),
             square: sum(),
@@ -113,7 +116,7 @@ impl<T: Precision> OverRelaxation<T> {
             Part { number, inverses: &inverses[rows.clone()], b: &b[rows], domain, x }
         });
         let solved = in_parts(*threads, parts.collect(), |parts| dispatch(Gradients { parts, common: &common }));
-        // All threads come to the same.
+        // All threads return the same report.
         solved.into_iter().next().unwrap_or(SolveReport {
             iterations: 0,
             initial_residual: 0.0,
@@ -132,7 +135,7 @@ impl<T: Precision> Clone for OverRelaxation<T> {
     }
 }
 
-/// [`invert`].
+/// Runs [`invert`].
 struct Inversion<'a, T, M> {
     rows: Range<usize>,
     inverses: &'a mut [InverseFactor<T>],
@@ -148,20 +151,20 @@ impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
     }
 }
 
-/// What all threads read that solve a system.
+/// Data shared by all threads that solve a system.
 struct Common<'a, T> {
     pattern: &'a Pattern,
     options: &'a SolveOptions,
     borders: &'a [RwLock<Vec<Wide<T>>>],
-    meeting: Meeting,
-    unit: Unit,
-    /// p · t, p · w and r · r: each is read by all before any thread can have come round to write it again.
-    first_half: Shared,
-    second_half: Shared,
-    square: Shared,
+    barrier: SpinBarrier,
+    right_hand_scale: RightHandScale,
+    /// p · t, p · w and r · r. All threads read each number before any of them reaches its next update.
+    first_half: PerDomain,
+    second_half: PerDomain,
+    square: PerDomain,
 }
 
-/// A domain, and its rows of b and x.
+/// A domain and its rows of b and x.
 struct Part<'a, T> {
     number: usize,
     domain: &'a mut Domain<T>,
@@ -170,7 +173,7 @@ struct Part<'a, T> {
     x: &'a mut [Vector3<f64>],
 }
 
-/// Conjugate gradients, as one thread sees them.
+/// Runs conjugate gradients in one of the threads.
 struct Gradients<'a, T> {
     parts: Vec<Part<'a, T>>,
     common: &'a Common<'a, T>,
@@ -182,16 +185,17 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
     #[inline(always)]
     fn run<L: Level>(self) -> SolveReport {
         let Self { mut parts, common } = self;
-        let Common { pattern, options, borders, meeting, unit, first_half, second_half, square, .. } = common;
+        let Common { pattern, options, borders, barrier, right_hand_scale, first_half, second_half, square, .. } =
+            common;
         for Part { number, inverses, b, .. } in &parts {
-            unit.note(*number, inverses, b);
+            right_hand_scale.note(*number, inverses, b);
         }
-        meeting.wait();
-        let scale = unit.agreed();
+        barrier.wait();
+        let scale = right_hand_scale.combined();
         for Part { number, domain, inverses, b, .. } in &mut parts {
             square.put(*number, domain.start::<L>(pattern, inverses, b, scale));
         }
-        meeting.wait();
+        barrier.wait();
         let mut rho = square.sum();
         let initial = rho;
         let target = options.relative_tolerance.powi(2) * initial;
@@ -210,12 +214,12 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
             for Part { number, domain, .. } in &mut parts {
                 first_half.put(*number, domain.backward::<L>(pattern, conjugate, &borders[*number]));
             }
-            meeting.wait();
+            barrier.wait();
             for Part { number, domain, .. } in &mut parts {
                 domain.couple::<L>(borders);
                 second_half.put(*number, domain.forward::<L>(pattern));
             }
-            meeting.wait();
+            barrier.wait();
             let along = first_half.sum() + second_half.sum();
             if along <= 0.0 {
                 break StopReason::IndefiniteCurvature;
@@ -224,7 +228,7 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
             for Part { number, domain, .. } in &mut parts {
                 square.put(*number, domain.advance::<L>(rho / along));
             }
-            meeting.wait();
+            barrier.wait();
             rho = square.sum();
             conjugate = rho / previous;
             iterations += 1;

@@ -2,12 +2,12 @@ use energy_dsl::{Lane, Mask};
 
 use super::{MOST, upper_index};
 
-/// How far below zero, relative to the largest diagonal entry, an eigenvalue counts as zero: at rest a membrane's Hessian is
-/// singular, and rounding leaves its zeros on either side.
+/// Relative tolerance: an eigenvalue above −τ, with τ this fraction of the largest diagonal entry, counts as
+/// non-negative. A membrane at rest has a singular Hessian, and rounding moves its zero eigenvalues to either side.
 const TOLERANCE: f64 = 64.0 * f64::EPSILON;
 
-/// Where A + τ I has a factorisation L D Lᵀ with D > 0, so that no eigenvalue of A is below −τ. It costs n³/6 multiplications and n
-/// divisions, a small part of finding eigenvalues.
+/// Returns a mask of the lanes where A + τ I has a factorisation L D Lᵀ with D > 0, so that no eigenvalue of A is below
+/// −τ. This takes n³/6 multiplications and n divisions, far less than computing eigenvalues.
 #[inline(always)]
 pub(crate) fn is_semi_definite<V: Lane<f64>>(upper: &[V], n: usize) -> V::Mask {
     match n {
@@ -30,7 +30,7 @@ fn is_definite_enough<V: Lane<f64>, const N: usize>(upper: &[V]) -> V::Mask {
         }
         largest = largest.max(a[i][i].abs());
     }
-    // So that the zero matrix passes.
+    // The lower bound lets the zero matrix pass.
     let shift = (largest * V::splat(TOLERANCE)).max(V::splat(f64::MIN_POSITIVE));
     let mut definite = !V::Mask::none();
     for k in 0..N {

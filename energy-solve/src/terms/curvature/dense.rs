@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 use super::Curvature;
 use crate::matrix::vector::transposed;
 
-/// Changes the eigenvalues of the symmetric matrix whose triangle of blocks is given: the way of elements with more coordinates
-/// than lanes are used for, and the measure of all others. Returns whether there was a change; a matrix that is not finite
-/// stays as it is.
+/// Projects the symmetric matrix with the given triangle of blocks: the fallback for elements with more coordinates
+/// than lanes support, and the reference for all other methods. Returns whether an eigenvalue was changed. A matrix
+/// with a non-finite entry is left unchanged.
 pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {
     if !triangle.iter().flatten().flatten().all(|entry| entry.is_finite()) {
         return false;
@@ -31,7 +31,7 @@ pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curva
             let block = &mut triangle[triangle_index(points, i, j)];
             for row in 0..3 {
                 for column in 0..3 {
-                    // The mean of both halves, so that diagonal blocks stay exactly symmetric.
+                    // The mean of both halves keeps diagonal blocks exactly symmetric.
                     let (r, c) = (3 * i + row, 3 * j + column);
                     block[row][column] = 0.5 * (changed[(r, c)] + changed[(c, r)]);
                 }

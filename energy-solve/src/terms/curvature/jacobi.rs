@@ -1,14 +1,16 @@
-//! Eigenvalues by Jacobi's cyclic rotations (Golub and Van Loan, *Matrix Computations*, §8.5), one matrix a lane. A lane whose
-//! matrix is diagonal already is turned by zero: its bits do not depend on its neighbours.
+//! Eigenvalues by cyclic Jacobi rotations (Golub and Van Loan, *Matrix Computations*, §8.5), one matrix per lane.
+//!
+//! A lane whose matrix is already diagonal is rotated by zero, so that its bits do not depend on other lanes.
 
 use energy_dsl::{Lane, Level, Mask};
 
 use super::{Curvature, MOST, Square};
 
-/// Sweeps converge quadratically: six or seven do for 12×12 matrices.
+/// Upper limit of the number of sweeps. Convergence is quadratic: 12×12 matrices take six or seven.
 const MOST_SWEEPS: usize = 16;
 
-/// By how much a matrix changes when its eigenvalues do, and in which lanes; leaves it diagonal.
+/// Returns the change of the matrix that changes its eigenvalues, and a mask of the changed lanes. `a` becomes
+/// diagonal.
 #[inline(always)]
 pub(super) fn difference<L: Level, V: Lane<f64>, const N: usize>(
     a: &mut Square<V, N>,
@@ -44,10 +46,10 @@ pub(super) fn difference<L: Level, V: Lane<f64>, const N: usize>(
     (difference, changed)
 }
 
-/// Rotates a symmetric matrix until it is diagonal; the rows of `vectors` are turned along, and become eigenvectors.
+/// Rotates a symmetric matrix until it is diagonal. The rows of `vectors` are rotated too and become the eigenvectors.
 ///
-/// A sweep goes in rounds, of rotations that have no row in common, in the order of a tournament (Brent and Luk 1985): their angles do not wait for
-/// each other, and finding one takes longer than turning by it.
+/// A sweep consists of rounds of rotations without common rows, in the order of a round-robin tournament (Brent and Luk
+/// 1985). Computing an angle has a longer latency than applying it, and the angles of a round are independent.
 #[inline(always)]
 fn diagonalise<L: Level, V: Lane<f64>, const N: usize>(a: &mut Square<V, N>, vectors: &mut Square<V, N>) {
     let zero = V::splat(0.0);
@@ -59,51 +61,50 @@ fn diagonalise<L: Level, V: Lane<f64>, const N: usize>(a: &mut Square<V, N>, vec
     }
     let negligible = squares * V::splat(f64::EPSILON * f64::EPSILON / 16.0);
     for _ in 0..MOST_SWEEPS {
-        let mut turned = V::Mask::none();
+        let mut rotated = V::Mask::none();
         for round in 0..rounds(N) {
             let mut rotations = [Rotation::none(); MOST / 2];
-            for meeting in 0..N / 2 {
-                let (p, q) = pair(N, round, meeting);
-                rotations[meeting] = Rotation::between::<L>(a[p][p], a[q][q], a[p][q], negligible);
-                turned = turned | rotations[meeting].turn;
+            for slot in 0..N / 2 {
+                let (p, q) = pair(N, round, slot);
+                rotations[slot] = Rotation::between::<L>(a[p][p], a[q][q], a[p][q], negligible);
+                rotated = rotated | rotations[slot].active;
             }
-            for meeting in 0..N / 2 {
-                if rotations[meeting].turn.any() {
-                    rotations[meeting].apply::<L, N>(pair(N, round, meeting), a, vectors);
+            for slot in 0..N / 2 {
+                if rotations[slot].active.any() {
+                    rotations[slot].apply::<L, N>(pair(N, round, slot), a, vectors);
                 }
             }
         }
-        if !turned.any() {
+        if !rotated.any() {
             return;
         }
     }
 }
 
-/// Rounds in which each of n meets each other once.
+/// Returns the number of rounds in which each of n rows meets each other row once.
 const fn rounds(n: usize) -> usize {
     n - 1 + n % 2
 }
 
-/// Who meets in a round: all but one stand in a circle, and those at the same distance on either side of one of them meet; that one meets the one
-/// outside, if there is one.
+/// Returns the pair of a round. By the circle method, one row stays outside the circle if n is even.
 #[inline(always)]
-const fn pair(n: usize, round: usize, meeting: usize) -> (usize, usize) {
+const fn pair(n: usize, round: usize, slot: usize) -> (usize, usize) {
     let (circle, odd) = (rounds(n), n % 2);
-    let (p, q) = if odd + meeting == 0 {
+    let (p, q) = if odd + slot == 0 {
         (round, circle)
     } else {
-        let distance = meeting + odd;
+        let distance = slot + odd;
         ((round + distance) % circle, (round + circle - distance) % circle)
     };
     if p < q { (p, q) } else { (q, p) }
 }
 
-/// A rotation in the plane of two coordinates, p and q, that makes entry (p, q) vanish.
+/// A rotation in the plane of coordinates p and q that makes entry (p, q) zero.
 #[derive(Clone, Copy)]
 struct Rotation<V: Lane<f64>> {
-    /// In which lanes there is something to be turned.
-    turn: V::Mask,
-    /// tan φ of the smaller angle, zero elsewhere.
+    /// Mask of the lanes to rotate.
+    active: V::Mask,
+    /// tan φ of the smaller angle; zero in other lanes.
     tangent: V,
     /// sin φ.
     sine: V,
@@ -112,20 +113,21 @@ struct Rotation<V: Lane<f64>> {
 }
 
 impl<V: Lane<f64>> Rotation<V> {
-    /// Nothing is turned.
+    /// Creates a rotation by zero in all lanes.
     #[inline(always)]
     fn none() -> Self {
         let zero = V::splat(0.0);
-        Self { turn: V::Mask::none(), tangent: zero, sine: zero, half: zero }
+        Self { active: V::Mask::none(), tangent: zero, sine: zero, half: zero }
     }
 
-    /// With d and o the differences of the diagonal and twice the entry beside it, h = √(d² + o²) and n = |d| + h, tan φ is o/n up to the sign of d,
-    /// and with r = n/cos φ = √(2 h n) all that is needed has the divisor n r (n + r): dividing is what takes longest.
+    /// Let d be the difference of the diagonal entries, o twice the off-diagonal entry, h = √(d² + o²) and n = |d| + h.
+    /// Then tan φ = o/n up to the sign of d. With r = n/cos φ = √(2 h n), all results share the divisor n r (n + r), so
+    /// that one division suffices: divisions have the longest latency.
     #[inline(always)]
     fn between<L: Level>(pp: V, qq: V, off: V, negligible: V) -> Self {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let turn = negligible.less(off * off);
-        if !turn.any() {
+        let active = negligible.less(off * off);
+        if !active.any() {
             return Self::none();
         }
         let (d, o) = (qq - pp, off + off);
@@ -133,11 +135,11 @@ impl<V: Lane<f64>> Rotation<V> {
         let n = d.abs() + h;
         let r = ((h + h) * n).sqrt();
         let n_and_r = n + r;
-        // Divided where there is nothing to be turned, zero by zero would be NaN.
-        let divisor = V::select(turn, n * r * n_and_r, one);
+        // Avoids 0/0 in lanes without a rotation.
+        let divisor = V::select(active, n * r * n_and_r, one);
         let quotient = V::select(d.less(zero), -o, o) / divisor;
-        let quotient = V::select(turn, quotient, zero);
-        Self { turn, tangent: quotient * (r * n_and_r), sine: quotient * (n * n_and_r), half: quotient * (n * r) }
+        let quotient = V::select(active, quotient, zero);
+        Self { active, tangent: quotient * (r * n_and_r), sine: quotient * (n * n_and_r), half: quotient * (n * r) }
     }
 
     /// A ← Rᵀ A R, of which the upper triangle is stored, and V ← Rᵀ V.
@@ -149,27 +151,27 @@ impl<V: Lane<f64>> Rotation<V> {
         vectors: &mut Square<V, N>,
     ) {
         let (zero, off) = (V::splat(0.0), a[p][q]);
-        let shift = V::select(self.turn, self.tangent * off, zero);
+        let shift = V::select(self.active, self.tangent * off, zero);
         a[p][p] = a[p][p] - shift;
         a[q][q] = a[q][q] + shift;
-        a[p][q] = V::select(self.turn, zero, off);
+        a[p][q] = V::select(self.active, zero, off);
         for k in 0..p {
-            (a[k][p], a[k][q]) = self.turned::<L>(a[k][p], a[k][q]);
+            (a[k][p], a[k][q]) = self.rotated::<L>(a[k][p], a[k][q]);
         }
         for k in p + 1..q {
-            (a[p][k], a[k][q]) = self.turned::<L>(a[p][k], a[k][q]);
+            (a[p][k], a[k][q]) = self.rotated::<L>(a[p][k], a[k][q]);
         }
         for k in q + 1..N {
-            (a[p][k], a[q][k]) = self.turned::<L>(a[p][k], a[q][k]);
+            (a[p][k], a[q][k]) = self.rotated::<L>(a[p][k], a[q][k]);
         }
         for k in 0..N {
-            (vectors[p][k], vectors[q][k]) = self.turned::<L>(vectors[p][k], vectors[q][k]);
+            (vectors[p][k], vectors[q][k]) = self.rotated::<L>(vectors[p][k], vectors[q][k]);
         }
     }
 
-    /// (g cos φ − h sin φ, h cos φ + g sin φ).
+    /// Returns (g cos φ − h sin φ, h cos φ + g sin φ).
     #[inline(always)]
-    fn turned<L: Level>(&self, g: V, h: V) -> (V, V) {
+    fn rotated<L: Level>(&self, g: V, h: V) -> (V, V) {
         let less = (-self.sine).mul_add::<L>(g.mul_add::<L>(self.half, h), g);
         (less, self.sine.mul_add::<L>((-self.half).mul_add::<L>(h, g), h))
     }
@@ -182,13 +184,13 @@ mod tests {
     use super::{pair, rounds};
 
     #[test]
-    fn in_a_sweep_each_pair_is_turned_once_and_in_a_round_each_row() {
+    fn a_sweep_rotates_each_pair_once_and_a_round_each_row_once() {
         for n in 2..=12 {
             let mut met = BTreeSet::new();
             for round in 0..rounds(n) {
                 let mut rows = BTreeSet::new();
-                for meeting in 0..n / 2 {
-                    let (p, q) = pair(n, round, meeting);
+                for slot in 0..n / 2 {
+                    let (p, q) = pair(n, round, slot);
                     assert!(p < q && q < n, "{p} and {q} of {n}");
                     assert!(rows.insert(p) && rows.insert(q), "round {round} of {n}: {p} or {q} twice");
                     assert!(met.insert((p, q)), "{p} and {q} of {n} twice");

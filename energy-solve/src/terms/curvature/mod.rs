@@ -1,7 +1,7 @@
-//! Hessians made positive semi-definite, element by element.
+//! Projection of element Hessians to positive semi-definite matrices.
 //!
-//! The work is done on the small Hessian by an element's difference vectors (6×6 for a triangle, 3×3 for a spring), many elements
-//! at once, and yields what the same change of the full Hessian's eigenvalues would: see [`Orthonormal`].
+//! The projection works on the small Hessian by an element's difference vectors (6×6 for a triangle, 3×3 for a spring),
+//! one element per lane. The result equals the projection of the full Hessian; see [`Orthonormal`].
 
 mod definite;
 mod dense;
@@ -16,21 +16,23 @@ pub(crate) use definite::is_semi_definite;
 pub use dense::change_dense;
 pub(crate) use orthonormal::Orthonormal;
 
-/// What becomes of negative eigenvalues of the elements' Hessians. Force laws have no Hessian and are used as they are.
+/// Treatment of negative eigenvalues of element Hessians. Force laws have no Hessian; their Jacobians are used
+/// unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Curvature {
-    /// They stay; the sum may be indefinite.
+    /// Keeps negative eigenvalues; the sum may be indefinite.
     #[default]
     Exact,
-    /// They become zero: the nearest positive semi-definite matrix in the Frobenius norm (Teran, Sifakis, Irving and Fedkiw 2005, §5).
+    /// Sets negative eigenvalues to zero, which gives the nearest positive semi-definite matrix in the Frobenius norm
+    /// (Teran, Sifakis, Irving and Fedkiw 2005, §5).
     Clamped,
-    /// They become positive: directions of negative curvature are as stiff as they were soft (Chen, Hsu, Liu, Panetta, Sueda and
-    /// Bickel 2024). Steps are shorter where the energy is far from convex.
+    /// Replaces eigenvalues by their absolute values: directions of negative curvature become as stiff as they were
+    /// soft (Chen, Hsu, Liu, Panetta, Sueda and Bickel 2024). Steps are shorter where the energy is far from convex.
     Absolute,
 }
 
 impl Curvature {
-    /// By how much an eigenvalue changes.
+    /// Returns the change of an eigenvalue.
     #[inline(always)]
     fn change<V: Lane<f64>>(self, eigenvalue: V) -> V {
         let zero = V::splat(0.0);
@@ -43,19 +45,19 @@ impl Curvature {
     }
 }
 
-/// The most coordinates for which lanes are used.
+/// The largest number of coordinates that lanes support.
 pub(crate) const MOST: usize = 12;
 
-/// A square matrix over lanes.
+/// A square matrix per lane.
 type Square<V, const N: usize> = [[V; N]; N];
 
-/// The place of entry (i, j), i ≤ j, in the upper triangle of an n×n matrix, row by row.
+/// Returns the index of entry (i, j), i ≤ j, in the upper triangle of an n×n matrix, row by row.
 #[inline(always)]
 const fn upper_index(n: usize, i: usize, j: usize) -> usize {
     i * (2 * n - i + 1) / 2 + j - i
 }
 
-/// The largest magnitude.
+/// Returns the largest magnitude.
 #[inline(always)]
 fn largest_of<V: Lane<f64>>(numbers: &[V]) -> V {
     let mut largest = V::splat(0.0);
@@ -65,7 +67,7 @@ fn largest_of<V: Lane<f64>>(numbers: &[V]) -> V {
     largest
 }
 
-/// Where all of the numbers are finite.
+/// Returns a mask of the lanes in which all numbers are finite.
 #[inline(always)]
 fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
     let zero = V::splat(0.0);
@@ -76,32 +78,33 @@ fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
     products.equal(zero)
 }
 
-/// The most numbers that describe a Hessian to be changed: its upper triangle, then two difference vectors.
+/// The largest number of inputs of a projection: the upper triangle, then two difference vectors.
 pub(crate) const MOST_NUMBERS: usize = MOST * (MOST + 1) / 2 + 6;
 
-/// Hessians of `n` coordinates, one a lane, some of them indefinite. It is the same for all elements: compiled once for each level,
-/// and not into the loop over each kind of element.
+/// Projection of Hessians of `n` coordinates, one per lane, some of them indefinite. It does not depend on the type of
+/// element, so it is compiled once per SIMD level instead of into each element's loop.
 #[derive(Debug)]
 pub(crate) struct Indefinite<'a> {
     pub(crate) n: usize,
     pub(crate) curvature: Curvature,
     pub(crate) orthonormal: &'a Orthonormal,
-    /// How many difference vectors there are, if not more than two.
+    /// The number of difference vectors, if it is 1 or 2; otherwise 0.
     pub(crate) vectors: usize,
-    /// The lanes whose Hessians are indefinite, as bits.
+    /// Bit mask of the lanes with an indefinite Hessian.
     pub(crate) open: u32,
-    /// Number by number for all lanes: the upper triangles by the difference vectors of `orthonormal`, then these.
+    /// Upper triangles by the difference vectors of `orthonormal`, then these vectors; each number is stored for all
+    /// lanes together.
     pub(crate) numbers: &'a mut [f64],
 }
 
 impl Indefinite<'_> {
-    /// Changes the upper triangles. Where there is nothing to change, nothing does, to the bit. Returns as bits which lanes did.
-    /// Matrices that are not finite stay as they are.
+    /// Projects the upper triangles and returns a bit mask of the changed lanes. Lanes without a change keep their
+    /// bits, and so do lanes with a non-finite entry.
     ///
-    /// `level` is that by whose lanes the numbers are laid out.
+    /// `level` is the SIMD level whose lanes the numbers are laid out for.
     pub(crate) fn change(self, level: &str) -> u32 {
         let name = level.parse::<LevelName>().ok();
-        name.and_then(|name| dispatch_at(name, self)).expect("the caller runs at this level")
+        name.and_then(|name| dispatch_at(name, self)).expect("the caller runs at this SIMD level")
     }
 }
 
@@ -164,7 +167,7 @@ fn change<L: Level, V: Lane<f64>>(
         }
 }
 
-/// [`change`] without knowledge of any structure.
+/// [`change`] for Hessians without known structure.
 #[inline(always)]
 fn change_rest<L: Level, V: Lane<f64>, const N: usize>(
     upper: &mut [V],
@@ -184,7 +187,8 @@ fn change_rest<L: Level, V: Lane<f64>, const N: usize>(
     changed
 }
 
-/// The whole matrix, its entries brought near 1 by a power of two so that their squares neither overflow nor vanish; and the power.
+/// Returns the whole matrix, scaled by a power of two to entries of about 1, so that squares neither overflow nor
+/// vanish; and the scale.
 #[inline(always)]
 fn scaled_square<V: Lane<f64>, const N: usize>(upper: &[V]) -> (Square<V, N>, V) {
     let scale = largest_of(upper).power_of_two_scale();
@@ -199,7 +203,7 @@ fn scaled_square<V: Lane<f64>, const N: usize>(upper: &[V]) -> (Square<V, N>, V)
     (a, scale)
 }
 
-/// Adds a scaled difference where it is wanted.
+/// Adds a scaled difference in the `wanted` lanes.
 #[inline(always)]
 fn add_to<V: Lane<f64>, const N: usize>(upper: &mut [V], difference: &Square<V, N>, scale: V, wanted: V::Mask) {
     let unscale = V::splat(1.0) / scale;

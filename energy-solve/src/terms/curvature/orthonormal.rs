@@ -2,24 +2,26 @@ use energy_dsl::{Declaration, Lane};
 
 use super::{MOST, Square};
 
-/// The most difference vectors.
+/// The largest number of difference vectors.
 const VECTORS: usize = MOST / 3;
 
-/// Difference vectors of an element's points, and orthonormal ones that span the same.
+/// Transformation between an element's difference vectors and orthonormal ones with the same span.
 ///
-/// With q = D x (D ⊗ 1₃ on the points' coordinates) the Hessian by points is Dᵀ H D, where H is that by q. With D Dᵀ = L Lᵀ,
-/// Q = L⁻¹ D has orthonormal rows, and Dᵀ H D = Qᵀ (Lᵀ H L) Q: its eigenvalues are those of Lᵀ H L, and zeros. So the eigenvalues
-/// of Lᵀ H L are changed, not those of H, which differ.
+/// Let q = D x be the difference vectors (D ⊗ 1₃ acts on the points' coordinates) and H the Hessian by q. The Hessian
+/// by points is Dᵀ H D. With D Dᵀ = L Lᵀ, the rows of Q = L⁻¹ D are orthonormal, and Dᵀ H D = Qᵀ (Lᵀ H L) Q. Its
+/// eigenvalues are zeros and those of Lᵀ H L. Therefore the projection acts on Lᵀ H L, not on H, whose eigenvalues
+/// differ.
 #[derive(Clone, Debug)]
 pub(crate) struct Orthonormal {
-    /// L.
+    /// The triangle L.
     lower: [[f64; VECTORS]; VECTORS],
-    /// L⁻¹.
+    /// The triangle L⁻¹.
     inverse: [[f64; VECTORS]; VECTORS],
 }
 
 impl Orthonormal {
-    /// The vectors of a declaration. None if there are too many for lanes, or they depend on one another.
+    /// Creates the transformation for a declaration. `None` if there are too many difference vectors, or they are
+    /// linearly dependent.
     pub(crate) fn new(declaration: &Declaration) -> Option<Self> {
         let vectors = declaration.reduced_vectors;
         if vectors.is_empty() || vectors.len() > VECTORS || declaration.reduced_coordinates != 3 * vectors.len() {
@@ -68,7 +70,7 @@ impl Orthonormal {
     #[inline(always)]
     fn congruent<V: Lane<f64>, const N: usize>(&self, t: &[[f64; VECTORS]; VECTORS], h: &mut Square<V, N>) {
         if N == 3 {
-            return; // one vector is only longer or shorter
+            return; // a single vector only changes its length, which eigenvectors do not see
         }
         // Twice H ← (H T)ᵀ.
         for _ in 0..2 {
@@ -83,7 +85,7 @@ impl Orthonormal {
     }
 }
 
-/// (T ⊗ 1₃)ᵀ z, for a lower triangle T.
+/// Returns (T ⊗ 1₃)ᵀ z for a lower triangle T.
 #[inline(always)]
 fn columns_times<V: Lane<f64>, const N: usize>(t: &[[f64; VECTORS]; VECTORS], z: &[V; N]) -> [V; N] {
     let mut product = [V::splat(0.0); N];

@@ -3,13 +3,16 @@ use energy_dsl::{Lane, Level, Mask};
 use super::definite::is_semi_definite;
 use super::{Curvature, Orthonormal, Square, add_to, jacobi, scaled_square, upper_index};
 
-/// How large the entries may be that should vanish, relative to the largest.
+/// Tolerance of the entries that should vanish, relative to the largest entry.
 const TOLERANCE: f64 = 1e-10;
 
-/// A function of two vectors that no rotation or reflection changes (a membrane's energy, a hair's) has no second derivative between a
-/// displacement in their plane and one out of it. So its 6×6 Hessian falls into a 2×2 and a 4×4 matrix; compression shows in the
-/// former, and the latter is mostly definite. Changes the Hessians of the `open` lanes in which it is so (it is tested, not assumed).
-/// Returns these lanes, and which changed.
+/// Projects Hessians that split into an in-plane and an out-of-plane part.
+///
+/// If rotations and reflections leave a function of two vectors unchanged, as for membranes and hair, a displacement in
+/// their plane and one out of it have no mixed second derivative. The 6×6 Hessian then splits into a 2×2 matrix, in
+/// which compression shows, and a 4×4 matrix, which is mostly definite. Each open lane is tested for this structure.
+///
+/// Returns masks of the lanes with this structure and of the changed lanes.
 #[inline(always)]
 pub(super) fn change<L: Level, V: Lane<f64>>(
     upper: &mut [V],
@@ -102,7 +105,7 @@ fn square<V: Lane<f64>>(a: [V; 3]) -> V {
     a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 }
 
-/// A ← R A Rᵀ for a symmetric A, R acting on both vectors alike.
+/// A ← R A Rᵀ for a symmetric A, where R acts on both vectors.
 #[inline(always)]
 fn turn<V: Lane<f64>>(a: &mut Square<V, 6>, r: &[[V; 3]; 3]) {
     // Twice A ← (R A)ᵀ.

@@ -2,12 +2,13 @@ use energy_dsl::Lane;
 
 use super::{Curvature, largest_of, upper_index};
 
-/// How well a Hessian must fit the form, relative to its size.
+/// Tolerance of the deviation from the radial form, relative to the largest entry.
 const TOLERANCE: f64 = 1e-10;
 
-/// The Hessian of a function of ‖d‖ is a I + b d dᵀ: across d the eigenvalue is a (twice), along d it is λ = a + b ‖d‖², so that the
-/// changed one is a' I + (λ' − a') d dᵀ/‖d‖². Returns in which lanes the 3×3 Hessian has this form (it is tested, not assumed),
-/// and what it changes to there.
+/// Projects Hessians of functions of ‖d‖, which have the form a I + b d dᵀ. The eigenvalue across d is a (twice), along
+/// d it is λ = a + b ‖d‖²; the projected matrix is a' I + (λ' − a') d dᵀ/‖d‖².
+///
+/// Returns a mask of the lanes with this form, each of which is tested, and the projected upper triangles.
 #[inline(always)]
 pub(super) fn change<V: Lane<f64>>(upper: &[V], curvature: Curvature, d: [V; 3]) -> (V::Mask, [V; 6]) {
     let [xx, xy, xz, yy, yz, zz] = [upper[0], upper[1], upper[2], upper[3], upper[4], upper[5]];
@@ -26,7 +27,7 @@ pub(super) fn change<V: Lane<f64>>(upper: &[V], curvature: Curvature, d: [V; 3])
     (radial, form(along + curvature.change(along), across + curvature.change(across), d, per_squared))
 }
 
-/// The upper triangle of a I + (λ − a) d dᵀ/‖d‖².
+/// Returns the upper triangle of a I + (λ − a) d dᵀ/‖d‖².
 #[inline(always)]
 fn form<V: Lane<f64>>(along: V, across: V, d: [V; 3], per_squared: V) -> [V; 6] {
     let part = (along - across) * per_squared;

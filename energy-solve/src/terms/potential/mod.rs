@@ -17,8 +17,8 @@ use crate::terms::term::{Character, PlacedTerm, Term, TermDescription};
 
 /// A term with f = −∇U: independent of velocity, with symmetric Jacobians.
 ///
-/// Elements are evaluated in SIMD lanes. Sums run in the order of the elements, so results do not depend on the number of
-/// lanes.
+/// Elements are evaluated in SIMD lanes. Sums run in the order of the elements, so results do not depend on the number
+/// of lanes.
 #[derive(Debug)]
 pub struct PotentialTerm<E> {
     list: ElementList<E>,

@@ -25,7 +25,7 @@ impl<'a> PackEnergies<'a> {
         if next == BLOCK || batch.first + batch.count == self.elements {
             // Lanes past the last element hold values of an earlier pack.
             self.values[place + batch.count..].fill(0.0);
-            let sum = in_pairs::<4, 2>(in_pairs::<8, 4>(in_pairs::<BLOCK, 8>(self.values)));
+            let sum = pairwise::<4, 2>(pairwise::<8, 4>(pairwise::<BLOCK, 8>(self.values)));
             self.sums[batch.first / BLOCK].store((sum[0] + sum[1]).to_bits(), Relaxed);
         }
     }
@@ -33,7 +33,7 @@ impl<'a> PackEnergies<'a> {
 
 /// One step of a pairwise sum: adds the upper half to the lower half.
 #[inline(always)]
-fn in_pairs<const ALL: usize, const HALF: usize>(numbers: [f64; ALL]) -> [f64; HALF] {
+fn pairwise<const ALL: usize, const HALF: usize>(numbers: [f64; ALL]) -> [f64; HALF] {
     let mut sums = [0.0; HALF];
     for place in 0..HALF {
         sums[place] = numbers[place] + numbers[place + HALF];

@@ -8,15 +8,16 @@ use crate::matrix::precision::Blocks;
 use crate::terms::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::Places;
-use crate::terms::scatter::{TriangleRoom, VectorRoom, points_of_triangle};
+use crate::terms::scatter::{TriangleBuffer, VectorBuffer, points_of_triangle};
 
-/// In which of the first lanes a mask holds, as bits.
+/// Returns the first `count` lanes of a mask as bits.
 #[inline(always)]
 fn lanes_in(mask: impl Mask, count: usize) -> u32 {
     mask.bits() & (u32::MAX >> (32 - count))
 }
 
-/// How many of these lanes belong to elements whose first vertex is one of `count` from `first` on: each element counts for one share.
+/// Counts the lanes whose element has its first vertex among the `count` vertices from `first` on, so that each element
+/// counts for one share only.
 #[inline(always)]
 fn count_owned(lanes: u32, vertices: &[u32], first: usize, count: usize) -> u64 {
     if lanes == 0 {
@@ -48,11 +49,11 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Values<'_> {
     }
 }
 
-/// f ← f − ∇U of the vertices from the first on.
+/// f ← f − ∇U for the vertices from `first_vertex` on.
 pub(super) struct Gradients<'a> {
     force: &'a mut [Vector3<f64>],
     first_vertex: usize,
-    room: VectorRoom,
+    buffer: VectorBuffer,
     energies: PackEnergies<'a>,
     pub(super) flagged: u64,
 }
@@ -64,7 +65,7 @@ impl<'a> Gradients<'a> {
         first_vertex: usize,
         energies: PackEnergies<'a>,
     ) -> Self {
-        Self { force, first_vertex, room: VectorRoom::new(arity), energies, flagged: 0 }
+        Self { force, first_vertex, buffer: VectorBuffer::new(arity), energies, flagged: 0 }
     }
 }
 
@@ -74,13 +75,13 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
         let result = batch.element.gradient_at::<L>(batch.points);
         let gradient = result.gradient.as_ref();
         self.energies.note::<E, L>(&batch, result.value);
-        self.room.subtract::<E, L>(&batch, gradient, self.first_vertex, self.force);
+        self.buffer.subtract::<E, L>(&batch, gradient, self.first_vertex, self.force);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
         self.flagged += count_owned(flagged, batch.vertices(0), self.first_vertex, self.force.len());
     }
 }
 
-/// f ← f − ∇U and A ← A − α ∇²U of the vertices and blocks from the first on.
+/// f ← f − ∇U and A ← A − α ∇²U for the vertices and blocks from `first_vertex` and `first_block` on.
 pub(super) struct Hessians<'a, 'b> {
     sum: &'a mut Linearisation<'b>,
     first_vertex: usize,
@@ -89,9 +90,9 @@ pub(super) struct Hessians<'a, 'b> {
     places: &'a Places,
     mirrored: &'a Places,
     orthonormal: Option<&'a Orthonormal>,
-    vectors: VectorRoom,
-    triangles: TriangleRoom,
-    /// What [`Indefinite`] needs.
+    vectors: VectorBuffer,
+    triangles: TriangleBuffer,
+    /// Scratch buffer for [`Indefinite`].
     numbers: Vec<f64>,
     energies: PackEnergies<'a>,
     pub(super) flagged: u64,
@@ -116,8 +117,8 @@ impl<'a, 'b> Hessians<'a, 'b> {
             places,
             mirrored,
             orthonormal,
-            vectors: VectorRoom::new(arity),
-            triangles: TriangleRoom::new(arity),
+            vectors: VectorBuffer::new(arity),
+            triangles: TriangleBuffer::new(arity),
             numbers: vec![0.0; MOST_NUMBERS * BLOCK],
             energies,
             flagged: 0,
@@ -163,7 +164,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
 }
 
 impl Hessians<'_, '_> {
-    /// Changes the curvature of Hessians some of which are indefinite; returns as bits which changed.
+    /// Projects the Hessians of the `open` lanes. Returns a bit mask of the changed lanes.
     #[inline(always)]
     fn change_indefinite<E: PackedPotential<f64>, L: Level>(
         &mut self,
@@ -193,7 +194,7 @@ impl Hessians<'_, '_> {
         changed
     }
 
-    /// Turns the blocks (i, j) that are stored as (j, i).
+    /// Transposes the blocks (i, j) that are stored as (j, i).
     #[inline(always)]
     fn turn<L: Level>(&self, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
         for pair in 0..triangle.len() {
@@ -210,7 +211,7 @@ impl Hessians<'_, '_> {
         }
     }
 
-    /// Subtracts α times the blocks from those of the matrix.
+    /// Adds −α times the blocks to the matrix.
     #[inline(always)]
     fn scatter<L: Level>(&mut self, first: usize, count: usize, triangle: &[[Vector3<L::F64>; 3]]) {
         self.triangles.fill::<L>(-self.sum.weights.position, triangle);
@@ -223,7 +224,7 @@ impl Hessians<'_, '_> {
     }
 }
 
-/// The one or two difference vectors of an element.
+/// Returns the one or two difference vectors of an element.
 #[inline(always)]
 fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
     let mut vectors = [[L::F64::splat(0.0); 3]; 2];
@@ -244,7 +245,7 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
     batch: &Batch<'_, E, L::F64>,
     triangle: &[[Vector3<L::F64>; 3]],
     velocities: &[Vector3<f64>],
-    room: &mut VectorRoom,
+    buffer: &mut VectorBuffer,
     first_vertex: usize,
     product: &mut [Vector3<f64>],
 ) {
@@ -269,10 +270,10 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
             }
         }
     }
-    room.subtract::<E, L>(batch, sums, first_vertex, product);
+    buffer.subtract::<E, L>(batch, sums, first_vertex, product);
 }
 
-/// The way of elements with many coordinates. Returns as bits which changed.
+/// Fallback for elements with more coordinates than lanes support. Returns a bit mask of the changed lanes.
 #[inline(never)]
 fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usize, curvature: Curvature) -> u32 {
     let points = points_of_triangle(triangle.len());

@@ -1,24 +1,22 @@
-//! Plots as SVG.
-
 use std::ops::Range;
 
 use plotters::prelude::*;
 
-/// A named curve, or cloud of points.
+/// A named curve or point cloud.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What the legend calls it.
+    /// Name in the legend.
     pub name: String,
-    /// Across, up.
+    /// Points (x, y).
     pub points: Vec<(f64, f64)>,
-    /// Whether its points are joined.
+    /// Whether to join the points.
     pub joined: bool,
 }
 
-/// Curves over logarithmic axes, as SVG; points that are not positive and finite are left out. Nothing without a point.
+/// Draws curves over logarithmic axes, as SVG. Skips points that are not positive and finite; `None` if none is left.
 #[must_use]
 pub fn logarithmic(title: &str, (across, up): (&str, &str), curves: &[Curve], size: (u32, u32)) -> Option<String> {
-    // Logarithms on linear axes: these have labels at any range, down to 1e-300.
+    // Linear axes over logarithms have labels at any range, down to 1e-300.
     let logarithms = |curve: &Curve| -> Vec<(f64, f64)> {
         let shown = curve.points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
         shown.map(|(x, y)| (x.log10(), y.log10())).collect()
@@ -81,7 +79,7 @@ pub fn logarithmic(title: &str, (across, up): (&str, &str), curves: &[Curve], si
     Some(text)
 }
 
-/// Where a legend hides the fewest points.
+/// Returns the corner in which a legend hides the fewest points.
 fn emptiest_corner(points: &[(f64, f64)], across: Range<f64>, up: Range<f64>) -> SeriesLabelPosition {
     let part = |x: f64, range: &Range<f64>| (x - range.start) / (range.end - range.start);
     let corners = [
@@ -103,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_drawn_is_left_out() {
+    fn points_that_cannot_be_drawn_are_skipped() {
         let curve = |points: &[(f64, f64)]| [Curve { name: "error".into(), points: points.to_vec(), joined: true }];
         let axes = ("step", "error");
         assert!(logarithmic("", axes, &curve(&[(1.0, 0.0), (f64::NAN, 1.0)]), (300, 200)).is_none());

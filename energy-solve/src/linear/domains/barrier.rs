@@ -1,25 +1,25 @@
-//! Where threads that solve one system together wait for each other, and sums that all of them know.
+//! Synchronisation of the threads that solve one system.
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-/// Looks before a thread that waits lets others run.
+/// Number of spins before a waiting thread yields.
 const PATIENCE: u32 = 1 << 12;
 
-/// A barrier for waits of a few microseconds, in which no thread goes to sleep.
+/// Spin barrier for waits of a few microseconds, in which threads do not sleep.
 #[derive(Debug)]
-pub(crate) struct Meeting {
+pub(crate) struct SpinBarrier {
     participants: usize,
     arrived: AtomicUsize,
     round: AtomicUsize,
 }
 
-impl Meeting {
-    /// For so many threads.
+impl SpinBarrier {
+    /// Creates a barrier for `participants` threads.
     pub(crate) fn new(participants: usize) -> Self {
         Self { participants, arrived: AtomicUsize::new(0), round: AtomicUsize::new(0) }
     }
 
-    /// Returns when all threads have called it. What they wrote before, all can read.
+    /// Waits until all threads have called this. Everything they wrote before is visible afterwards.
     pub(crate) fn wait(&self) {
         if self.participants == 1 {
             return;
@@ -38,17 +38,17 @@ impl Meeting {
     }
 }
 
-/// One number of each domain. Written before a meeting, it can be read after it.
+/// One number per domain. A number written before a barrier can be read after it.
 #[derive(Debug)]
-pub(crate) struct Shared(Vec<AtomicU64>);
+pub(crate) struct PerDomain(Vec<AtomicU64>);
 
-impl Shared {
-    /// For so many domains.
+impl PerDomain {
+    /// Creates zeros for `domains` domains.
     pub(crate) fn new(domains: usize) -> Self {
         Self((0..domains).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// A domain's number.
+    /// Sets the number of a domain.
     pub(crate) fn put(&self, domain: usize, number: f64) {
         self.0[domain].store(number.to_bits(), Ordering::Relaxed);
     }
@@ -57,12 +57,12 @@ impl Shared {
         self.0.iter().map(|number| f64::from_bits(number.load(Ordering::Relaxed)))
     }
 
-    /// The sum, in the order of the domains, whoever wrote them.
+    /// Returns the sum in the order of the domains, so that it does not depend on the threads.
     pub(crate) fn sum(&self) -> f64 {
         self.numbers().sum()
     }
 
-    /// The largest.
+    /// Returns the largest number, or 0 if none is positive.
     pub(crate) fn largest(&self) -> f64 {
         self.numbers().fold(0.0, f64::max)
     }

@@ -1,10 +1,10 @@
-/// An error and its causes on one line. Many errors say their cause themselves: what was just said is not said again.
+/// Formats an error and its causes on one line. A cause that the text before it already ends with is not repeated.
 ///
 /// ```
 /// use anyhow::Context;
 /// let cause = anyhow::anyhow!("no such file");
 /// let error = Err::<(), _>(cause).context("cloth.obj: no such file").context("hang.toml").unwrap_err();
-/// assert_eq!(verify::message(&error), "hang.toml: cloth.obj: no such file");
+/// assert_eq!(energy_cli::message(&error), "hang.toml: cloth.obj: no such file");
 /// ```
 #[must_use]
 pub fn message(error: &anyhow::Error) -> String {

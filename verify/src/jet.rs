@@ -2,17 +2,17 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use energy_dsl::{Level, Number};
 
-/// A number with its first and second derivatives by all coordinates at once; what is `None`, or not there, is zero whatever the
-/// input.
+/// A number with its first and second derivatives by all coordinates. Missing derivatives and `None` are identically
+/// zero.
 #[derive(Clone, Debug)]
 pub(crate) struct Jet<T> {
     pub(crate) value: T,
     first: Vec<Option<T>>,
-    /// The upper triangle row by row; empty where second derivatives are not asked for.
+    /// Upper triangle of second derivatives, row by row; empty if not requested.
     second: Vec<Option<T>>,
 }
 
-/// How often to differentiate.
+/// The order of differentiation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
     First,
@@ -24,7 +24,7 @@ impl<T: Number> Jet<T> {
         Self { value, first: Vec::new(), second: Vec::new() }
     }
 
-    /// The coordinate of that number, of `count`.
+    /// Creates the variable for coordinate `number` of `count`.
     pub(crate) fn variable(value: T, number: usize, count: usize, order: Order) -> Self {
         let mut first = vec![None; count];
         first[number] = Some(T::from_f64(1.0));
@@ -32,21 +32,21 @@ impl<T: Number> Jet<T> {
         Self { value, first, second }
     }
 
-    /// ∂/∂qᵢ.
+    /// Returns ∂/∂qᵢ.
     pub(crate) fn by(&self, i: usize) -> T {
         or_zero(self.first.get(i).and_then(Option::as_ref))
     }
 
-    /// ∂²/∂qᵢ∂qⱼ.
+    /// Returns ∂²/∂qᵢ∂qⱼ.
     pub(crate) fn by_both(&self, i: usize, j: usize) -> T {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let n = self.first.len();
-        // i n − i (i + 1)/2 + j, which i ≤ n keeps from falling below zero; nothing of a constant.
+        // The index is i n − i (i + 1)/2 + j, non-negative for i ≤ n. A constant has no derivatives.
         let place = (i * n + j).checked_sub(i * (i + 1) / 2);
         or_zero(place.and_then(|place| self.second.get(place)).and_then(Option::as_ref))
     }
 
-    /// f(self) with f′ and f″ there.
+    /// Returns f(self), given f, f′ and f″ there.
     fn chain(self, f: T, first: T, second: T) -> Self {
         let weigh = |entry: &Option<T>| entry.as_ref().map(|e| first.clone() * e.clone());
         let mut triangle = Vec::with_capacity(self.second.len());
@@ -61,7 +61,7 @@ impl<T: Number> Jet<T> {
         Self { value: f, first: self.first.iter().map(weigh).collect(), second: triangle }
     }
 
-    /// Entry by entry.
+    /// Combines two jets entry by entry.
     fn linear(self, other: Self, value: T, join: impl Fn(Option<T>, Option<T>) -> Option<T>) -> Self {
         let zip = |a: Vec<Option<T>>, b: Vec<Option<T>>| -> Vec<Option<T>> {
             let (mut a, mut b) = (a.into_iter(), b.into_iter());
@@ -70,7 +70,7 @@ impl<T: Number> Jet<T> {
         Self { value, first: zip(self.first, other.first), second: zip(self.second, other.second) }
     }
 
-    /// ∂²(a b) = a ∂²b + b ∂²a + ∂a ∂bᵀ + ∂b ∂aᵀ.
+    /// Product rule: ∂²(a b) = a ∂²b + b ∂²a + ∂a ∂bᵀ + ∂b ∂aᵀ.
     fn times(self, other: Self) -> Self {
         let n = self.first.len().max(other.first.len());
         let second = self.second.len().max(other.second.len());
@@ -144,7 +144,7 @@ impl<T: Number> Mul for Jet<T> {
 impl<T: Number> Div for Jet<T> {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        // The quotient's own value, which a / b rounds once.
+        // The quotient itself is rounded once.
         let value = self.value.clone() / other.value.clone();
         Self { value, ..self.times(other.reciprocal()) }
     }
@@ -205,13 +205,14 @@ impl<T: Number<Mask = bool>> Number for Jet<T> {
         let value = self.value.clone().ln::<L>();
         self.chain(value, r.clone(), -(r.clone() * r))
     }
-    /// dφ = (x dy − y dx)/r²; its second derivatives follow from those of the two quotients.
+    /// dφ = (x dy − y dx)/r². Second derivatives follow from those of the two quotients.
     fn atan2<L: Level>(self, x: Self) -> Self {
         let y = self;
         let value = y.value.clone().atan2::<L>(x.value.clone());
         let square = x.value.clone() * x.value.clone() + y.value.clone() * y.value.clone();
         let (along, across) = (x.value.clone() / square.clone(), y.value.clone() / square);
-        // φ = φ₀ + Im ln((x + i y)/(x₀ + i y₀)): with a + i b the quotient, ∂²φ = ∂²b − (∂a ∂bᵀ + ∂b ∂aᵀ), a = 1, b = 0 there.
+        // φ = φ₀ + Im ln((x + i y)/(x₀ + i y₀)). With the quotient a + i b, ∂²φ = ∂²b − (∂a ∂bᵀ + ∂b ∂aᵀ), as a = 1 and
+        // b = 0 there.
         let constant = |value: T| Self::constant(value);
         let a = x.clone() * constant(along.clone()) + y.clone() * constant(across.clone());
         let b = y * constant(along) - x * constant(across);
@@ -220,7 +221,7 @@ impl<T: Number<Mask = bool>> Number for Jet<T> {
         Self { value, ..b - bent }
     }
     fn powf<L: Level>(self, exponent: Self) -> Self {
-        // A constant exponent allows a base that is negative or zero.
+        // A constant exponent allows a zero or negative base.
         if !exponent.is_constant() {
             return (exponent * self.ln::<L>()).exp::<L>();
         }
@@ -230,7 +231,7 @@ impl<T: Number<Mask = bool>> Number for Jet<T> {
         let value = x.clone().powf::<L>(e.clone());
         let first = e.clone() * x.clone().powf::<L>(less.clone());
         let bend = e.clone() * less;
-        // x¹ has no second derivative, also at 0, where x⁻¹ has no value.
+        // x¹ has no second derivative, even at 0, where x⁻¹ is undefined.
         let second = if bend.clone().equal(T::from_f64(0.0)) { bend } else { bend * x.powf::<L>(e - two) };
         self.chain(value, first, second)
     }
@@ -261,7 +262,7 @@ impl<T: Number<Mask = bool>> Number for Jet<T> {
 }
 
 impl<T: Number> Jet<T> {
-    /// The number without its value and bend: its square and products hold products of slopes alone.
+    /// Drops the value and the second derivatives, so that products contain products of first derivatives only.
     fn slopes_only(self) -> Self {
         let second = vec![None; self.second.len()];
         Self { value: T::from_f64(0.0), first: self.first, second }

@@ -1,0 +1,193 @@
+//! The energy λ_n E_nonrigid + λ_s E_skeleton + λ_g E_graph + λ_b E_binding over the twists of nodes, and optionally of
+//! bones.
+
+mod bones;
+mod data_term;
+mod options;
+
+use std::sync::Arc;
+
+use energy_elements::{Binding, GraphEdge, SkeletonPlane};
+use energy_solve::{CouplingError, Couplings, LeastSquaresTerm, Loss, NormalPattern, Placed, ResidualTerm};
+use nalgebra::{Isometry3, Vector3};
+
+use self::bones::{BoneStencils, BoneTerms, prior_places};
+use self::data_term::{DataTerm, data_term};
+pub use self::data_term::{Moved, Pair};
+pub use self::options::{BoneMode, EdgeWeight, EnergyOptions, NormalDerivative, TermWeights};
+use crate::model::DeformationModel;
+use crate::twist::Twist;
+
+/// An energy that cannot be created.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum EnergyError {
+    /// There are fewer bones than the four that a declared residual blends.
+    #[error("expected at least four bones if bones are unknowns, got {0}")]
+    TooFewBones(usize),
+    /// The model names a node or bone that does not exist, which is a bug.
+    #[error(transparent)]
+    Coupling(#[from] CouplingError),
+}
+
+/// The energy of a model. The data change with each search for correspondences, the other terms do not.
+///
+/// The unknowns are the twists of the nodes, followed by those of the bones if bones are unknown.
+#[derive(Debug)]
+pub struct FusionEnergy {
+    /// Options of the energy.
+    pub options: EnergyOptions,
+    pattern: Arc<NormalPattern>,
+    data: Box<dyn DataTerm>,
+    graph: ResidualTerm<GraphEdge, 6>,
+    binding: ResidualTerm<Binding, 6>,
+    bones: Option<BoneTerms>,
+}
+
+impl FusionEnergy {
+    /// Creates the energy of a model, without data.
+    ///
+    /// # Errors
+    /// If bones are unknowns and there are fewer than four.
+    pub fn new(model: &DeformationModel, options: EnergyOptions) -> Result<Self, EnergyError> {
+        let nodes = model.nodes.len();
+        let unknown_bones = options.bones == BoneMode::Unknown;
+        if unknown_bones && model.bones.len() < 4 {
+            return Err(EnergyError::TooFewBones(model.bones.len()));
+        }
+        let edges: Vec<[u32; 2]> = model
+            .graph
+            .iter()
+            .enumerate()
+            .flat_map(|(i, around)| around.iter().map(move |&j| [i as u32, j as u32]))
+            .collect();
+        let skinning = unknown_bones.then(|| BoneStencils::new(model));
+        let bone_count = skinning.as_ref().map_or(0, |_| model.bones.len());
+        let all = model
+            .vertex_nodes
+            .iter()
+            .map(Vec::as_slice)
+            .chain(edges.iter().map(<[u32; 2]>::as_slice))
+            .chain(skinning.iter().flat_map(BoneStencils::all));
+        let pattern = Arc::new(NormalPattern::new(nodes + bone_count, all)?);
+
+        let turn = options.angle.turn();
+        let data = data_term(model, &options, &pattern)?;
+        let couplings = Arc::new(Couplings::new(&pattern, &edges)?);
+        let mut graph = ResidualTerm::new("graph", couplings, options.weights.graph);
+        graph.loss = options.graph_huber.map_or(Loss::Squares, Loss::Huber);
+        graph.set_elements(edges.iter().enumerate().map(|(edge, &[i, j])| {
+            let s = model.attachments.square_distance(i as usize, j as usize);
+            Placed {
+                element: GraphEdge::new(turn, model.nodes[j as usize].into()),
+                stencil: edge as u32,
+                weight: options.edges.of(s, EdgeWeight::DELTA),
+            }
+        }));
+        let own: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
+        let binding = ResidualTerm::new("binding", Arc::new(Couplings::new(&pattern, &own)?), options.weights.binding);
+        let bones = skinning.map(|stencils| stencils.terms(model, &options, &pattern)).transpose()?;
+        Ok(Self { options, pattern, data, graph, binding, bones })
+    }
+
+    /// Returns the pattern of JᵀJ.
+    #[must_use]
+    pub fn pattern(&self) -> &Arc<NormalPattern> {
+        &self.pattern
+    }
+
+    /// Replaces the data. `moved` contains the normals for [`NormalDerivative::Frozen`].
+    pub fn set_pairs(&mut self, model: &DeformationModel, pairs: &[Pair], moved: &Moved) {
+        self.data.set_pairs(model, pairs, Some(&moved.normals));
+        if let Some(bones) = &mut self.bones {
+            let turn = self.options.angle.turn();
+            let shares = &bones.shares;
+            bones.skeleton.set_elements(pairs.iter().map(|pair| {
+                let vertex = pair.vertex as usize;
+                let (v, n) = (model.mesh.vertices[vertex].into(), model.mesh.normals[vertex].into());
+                let element = SkeletonPlane::new(turn, shares[vertex], v, n, pair.point.into());
+                Placed { element, stencil: pair.vertex, weight: 1.0 }
+            }));
+        }
+    }
+
+    /// Replaces the reported motions of the bones, in the model's coordinates. `None` releases nodes from their bones.
+    pub fn set_bones(&mut self, model: &DeformationModel, motions: Option<&[Isometry3<f64>]>) {
+        let turn = self.options.angle.turn();
+        let Some(motions) = motions else {
+            self.binding.set_elements([]);
+            if let Some(bones) = &mut self.bones {
+                bones.prior.set_elements([]);
+            }
+            return;
+        };
+        match &mut self.bones {
+            Some(bones) => bones.prior.set_elements((0..model.bones.len()).flat_map(|bone| {
+                prior_places(&model.bones[bone]).map(move |x| {
+                    let target = motions[bone].transform_point(&x.into()).coords;
+                    Placed { element: Binding::new(turn, x.into(), target.into()), stencil: bone as u32, weight: 1.0 }
+                })
+            })),
+            None => self.binding.set_elements(model.nodes.iter().enumerate().map(|(node, x)| {
+                let target = bound_place(x, &model.attachments.rows[node], motions);
+                Placed { element: Binding::new(turn, (*x).into(), target.into()), stencil: node as u32, weight: 1.0 }
+            })),
+        }
+    }
+
+    /// Returns the terms that depend on the unknowns.
+    #[must_use]
+    pub fn terms(&self) -> Vec<&dyn LeastSquaresTerm<6>> {
+        let mut terms: Vec<&dyn LeastSquaresTerm<6>> = vec![self.data.term(), &self.graph];
+        match &self.bones {
+            Some(bones) => {
+                terms.extend([
+                    &bones.skeleton as &dyn LeastSquaresTerm<6>,
+                    &bones.binding,
+                    &bones.prior,
+                    &bones.joints,
+                ]);
+            }
+            None => terms.push(&self.binding),
+        }
+        terms
+    }
+
+    /// Computes the Jacobians of all terms and discards them, to measure the cost of derivatives alone. Returns the sum
+    /// of some entries.
+    #[must_use]
+    pub fn evaluate_jacobians(&self, x: &[Twist]) -> f64 {
+        let sum = self.data.evaluate_jacobians(x) + self.graph.evaluate_jacobians(x);
+        sum + match &self.bones {
+            Some(bones) => bones.evaluate_jacobians(x),
+            None => self.binding.evaluate_jacobians(x),
+        }
+    }
+
+    /// Returns all vertices and normals, moved by the twists.
+    #[must_use]
+    pub fn moved(&self, x: &[Twist]) -> Moved {
+        self.data.moved(x)
+    }
+}
+
+/// Returns x̃ = Σ_j η_j T_bj x.
+fn bound_place(x: &Vector3<f64>, row: &[f64], motions: &[Isometry3<f64>]) -> Vector3<f64> {
+    let followed = row.iter().zip(motions).filter(|(share, _)| **share > 0.0);
+    followed.map(|(share, motion)| *share * motion.transform_point(&(*x).into()).coords).sum()
+}
+
+/// Returns λ_s E_skeleton of known bones, Σ (ñ·(ṽ − u))² over the pairs. It does not depend on the unknowns.
+#[must_use]
+pub fn skeleton_energy(model: &DeformationModel, lambda: f64, motions: &[Isometry3<f64>], pairs: &[Pair]) -> f64 {
+    let one = |pair: &Pair| {
+        let vertex = pair.vertex as usize;
+        let (v, n) = (model.mesh.vertices[vertex], model.mesh.normals[vertex]);
+        let (mut moved, mut normal) = (Vector3::zeros(), Vector3::zeros());
+        for &(bone, share) in &model.vertex_bones[vertex] {
+            moved += share * motions[bone].transform_point(&v.into()).coords;
+            normal += share * (motions[bone].rotation * n);
+        }
+        normal.dot(&(moved - pair.point)).powi(2)
+    };
+    lambda * pairs.iter().map(one).sum::<f64>()
+}

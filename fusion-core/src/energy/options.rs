@@ -1,0 +1,103 @@
+use serde::{Deserialize, Serialize};
+
+use crate::twist::AngleConvention;
+
+/// Weights λ of the terms, in 1/m² for a dimensionless energy.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TermWeights {
+    /// λ_n, distances of vertices from measured points along normals.
+    pub nonrigid: f64,
+    /// λ_s, the same for the skinned skeleton. With known bones it is only reported.
+    pub skeleton: f64,
+    /// λ_g, differences between neighbouring nodes.
+    pub graph: f64,
+    /// λ_b, distances of nodes from their bones.
+    pub binding: f64,
+    /// Distances of unknown bones from the reported ones.
+    pub prior: f64,
+    /// Gaps between unknown bones at their joints.
+    pub joints: f64,
+}
+
+impl Default for TermWeights {
+    fn default() -> Self {
+        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 3.0, joints: 1000.0 }
+    }
+}
+
+/// The weight ψ of an edge as a function of s = |H_i − H_j|².
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeWeight {
+    /// min(1, δ/s): edges within a part are stiffer than edges between parts.
+    #[default]
+    Decreasing,
+    /// min(1, δ/√s).
+    DecreasingByNorm,
+    /// Huber's loss ρ(s) itself, as printed in the paper: zero within a part, largest across joints.
+    Printed,
+    /// 1 for every edge.
+    Uniform,
+}
+
+impl EdgeWeight {
+    /// δ of the paper.
+    pub const DELTA: f64 = 0.2;
+
+    /// Returns ψ(s).
+    #[must_use]
+    pub fn of(self, s: f64, delta: f64) -> f64 {
+        match self {
+            Self::Decreasing if s <= delta => 1.0,
+            Self::Decreasing => delta / s,
+            Self::DecreasingByNorm if s.sqrt() <= delta => 1.0,
+            Self::DecreasingByNorm => delta / s.sqrt(),
+            Self::Printed if s <= delta => s * s / 2.0,
+            Self::Printed => delta * (s - delta / 2.0),
+            Self::Uniform => 1.0,
+        }
+    }
+}
+
+/// The treatment of the normal in the derivative of the data term.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NormalDerivative {
+    /// The normal moves with the nodes.
+    #[default]
+    Full,
+    /// The normal is held fixed, as in many systems.
+    Frozen,
+}
+
+/// Whether the motions of bones are known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoneMode {
+    /// Bones move as the body tracker reports.
+    #[default]
+    Known,
+    /// Each bone has six unknowns, near the reported motion.
+    Unknown,
+}
+
+/// Options of the energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EnergyOptions {
+    /// Weights λ of the terms.
+    pub weights: TermWeights,
+    /// Weights ψ of the edges.
+    pub edges: EdgeWeight,
+    /// Convention of the angle ‖θ‖.
+    pub angle: AngleConvention,
+    /// Jacobian of the data term.
+    pub normal: NormalDerivative,
+    /// Whether bones are unknowns.
+    pub bones: BoneMode,
+    /// Tukey's limit of the data term, in m; `None` for least squares.
+    pub data_tukey: Option<f64>,
+    /// Huber's limit of the graph, in m; `None` for least squares.
+    pub graph_huber: Option<f64>,
+}

@@ -1,0 +1,34 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use verify::bench::{bench, csv, markdown, plots};
+
+use super::output::{create_folder, write_text};
+
+/// Times every method of computing a Hessian on one element of each family, and measures its error against
+/// multi-precision.
+#[derive(Args)]
+pub struct Bench {
+    /// Elements to time [default: all that can be timed].
+    names: Vec<String>,
+    /// Also write `bench.md`, `bench.csv` and a plot of each element to this folder.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+impl Bench {
+    pub fn run(self) -> anyhow::Result<bool> {
+        let list = bench(&self.names).map_err(anyhow::Error::msg)?;
+        let table = markdown(&list);
+        print!("{table}");
+        if let Some(folder) = self.output {
+            create_folder(&folder)?;
+            write_text(Some(&folder.join("bench.md")), || table)?;
+            write_text(Some(&folder.join("bench.csv")), || csv(&list))?;
+            for (file, svg) in plots(&list) {
+                write_text(Some(&folder.join(file)), || svg)?;
+            }
+        }
+        Ok(true)
+    }
+}

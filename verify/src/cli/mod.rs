@@ -1,0 +1,20 @@
+//! The subcommands, one file each, and their shared code.
+
+mod audit;
+mod bench;
+mod eval;
+mod fuzz;
+mod output;
+mod policy;
+mod reference;
+mod show;
+mod stress;
+mod targets;
+
+pub use audit::Audit;
+pub use bench::Bench;
+pub use eval::Eval;
+pub use fuzz::Fuzz;
+pub use reference::Reference;
+pub use show::Show;
+pub use stress::Stress;

@@ -1,0 +1,29 @@
+//! Results at degenerate inputs, which two commands print.
+
+use verify::reference::PolicyLine;
+
+use super::output::table;
+
+/// Whether every result with a documented value is that value.
+pub fn passed(lines: &[PolicyLine]) -> bool {
+    lines.iter().all(|line| line.passed != Some(false))
+}
+
+/// Prints the results, if there are any.
+pub fn print(lines: &[PolicyLine]) {
+    if lines.is_empty() {
+        return;
+    }
+    let mut table = table(&["degenerate input", "potential", "block", "status", "returned", "verdict"], &[]);
+    for line in lines {
+        let verdict = match line.passed {
+            Some(true) => "ok",
+            Some(false) => "FAILED",
+            None => "–",
+        };
+        table.add_row([&line.record, &line.potential, &line.block, &line.status, &line.found, verdict]);
+    }
+    let judged = lines.iter().filter(|line| line.passed.is_some()).count();
+    let passed = lines.iter().filter(|line| line.passed == Some(true)).count();
+    println!("\n{table}\n\n{passed} of {judged} blocks at degenerate inputs as documented");
+}

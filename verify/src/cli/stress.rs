@@ -1,0 +1,48 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use verify::reference::policy;
+use verify::stress::{markdown, plots, stress};
+
+use super::output::{create_folder, records, write_json, write_text};
+use super::policy as documented;
+use super::targets::targets;
+
+/// Sweeps inputs towards every singularity, down to 1e-300, and compares the generated code with the textbook form;
+/// then tries every degenerate input with a documented result. Exit status 1 on a NaN, an error beyond 8 u·κ without a
+/// flag, or an undocumented result.
+#[derive(Args)]
+pub struct Stress {
+    /// Elements of the catalogue or of the file [default: all].
+    names: Vec<String>,
+    /// Sweep the declarations of this file (`.energy`) instead of the catalogue's, without degenerate inputs.
+    #[arg(long)]
+    file: Option<PathBuf>,
+    /// Also write `stress.md`, `stress.json` and a plot of each sweep to this folder.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+impl Stress {
+    pub fn run(self) -> anyhow::Result<bool> {
+        let mut tracks = Vec::new();
+        for target in targets(&self.names, self.file.as_deref())? {
+            tracks.extend(stress(&target).map_err(anyhow::Error::msg)?);
+        }
+        let table = markdown(&tracks);
+        print!("{table}");
+        if let Some(folder) = self.output {
+            create_folder(&folder)?;
+            write_text(Some(&folder.join("stress.md")), || table)?;
+            write_json(Some(&folder.join("stress.json")), &tracks)?;
+            for (file, svg) in plots(&tracks) {
+                write_text(Some(&folder.join(file)), || svg)?;
+            }
+        }
+        let degenerate = if self.file.is_some() { Vec::new() } else { policy(&records().join("policy.json"))? };
+        documented::print(&degenerate);
+        let failed = tracks.iter().filter(|track| !track.passed()).count();
+        println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
+        Ok(failed == 0 && documented::passed(&degenerate))
+    }
+}
