@@ -1,6 +1,6 @@
-//! Cloth made of declared elements: triangle meshes, fabrics, integrators, scenes and output. The binary `cloth` runs it.
+//! A cloth simulator on declared elements: meshes, fabrics, integrators, scenes and output. The binary `cloth` runs it.
 //!
-//! A [`scene::Scene`] names a mesh, a fabric, pins and an integrator; [`Simulation`] moves it.
+//! A [`scene::Scene`] describes meshes, fabrics, pins and an integrator. A [`Simulation`] steps it through time.
 //!
 //! ```
 //! use cloth_core::{Simulation, scene::Scene};

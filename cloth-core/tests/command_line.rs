@@ -123,8 +123,8 @@ fn bad_scenes_are_refused_with_place_and_reason() {
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     };
     expect("density", "densty", &["scene.toml:10:1", "unknown field `densty`", "did you mean `density`?"]);
-    expect("dt = 0.01", "dt = nan", &["scene.toml:1:6", "NaN must be a finite number above 0"]);
-    expect("50.0", "-50.0", &["scene.toml:13:21", "-50 must be"]);
+    expect("dt = 0.01", "dt = nan", &["scene.toml:1:6", "expected a finite number greater than 0, got NaN"]);
+    expect("50.0", "-50.0", &["scene.toml:13:21", "expected a finite number of at least 0, got -50"]);
     expect("nearest = [-0.5, 0.5, 0.0]", "vertex = 99", &["pins[0]: there is no vertex 99"]);
     expect("duration = 0.1", "duration = 0.1\nduration = 0.2", &["scene.toml:3:1", "duplicate"]);
     let obj = "[mesh.obj]\npath = \"missing.obj\"";
@@ -139,7 +139,7 @@ fn bad_meshes_are_refused_with_line_and_reason() {
         assert!(message.contains(part), "{message}");
     };
     expect("", "shape.obj: the mesh has 0 vertices and 0 triangles");
-    expect(&format!("{square}f 1 2 3\nf 1 3 7\n"), "shape.obj:6: the face names a vertex");
+    expect(&format!("{square}f 1 2 3\nf 1 3 7\n"), "shape.obj:6: the face refers to a vertex");
     expect(&format!("{square}f 1 2 3\nf 1 3 4\nf 3 1 2\n"), "shape.obj:7: edge 0–2 is shared by 3 triangles");
     expect(&square.replace("1 1 0", "1 nan 0"), "shape.obj");
     expect(&format!("{}f 1 2 3\nf 1 3 4\n", square.replace("1 1 0", "1 nan 0")), "shape.obj:3: vertex 2 is not finite");

@@ -85,7 +85,7 @@ fn what_was_found_out_about_solvers_is_saved() {
             whole.step().unwrap();
         }
         let theirs = whole.summary().unwrap();
-        let by = theirs.solved_by;
+        let by = theirs.totals.solved_by;
         assert!(by.multigrid > 0 && by.over_relaxation > 0, "{integrator}: not both tried, {by}");
         let text = serde_json::to_string(&half.unwrap()).unwrap();
         let mut resumed = start();
@@ -96,8 +96,8 @@ fn what_was_found_out_about_solvers_is_saved() {
         assert!(resumed.positions() == whole.positions(), "{integrator}");
         let mine = resumed.summary().unwrap();
         assert_eq!(
-            (mine.solves, mine.iterations, mine.solved_by),
-            (theirs.solves, theirs.iterations, theirs.solved_by)
+            (mine.totals.solves, mine.totals.iterations, mine.totals.solved_by),
+            (theirs.totals.solves, theirs.totals.iterations, theirs.totals.solved_by)
         );
     }
 }

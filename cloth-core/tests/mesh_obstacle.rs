@@ -94,7 +94,7 @@ fn unfit_meshes_are_refused_with_file_and_remedy() {
         assert!(text.starts_with("mesh 0: ") && parts.iter().all(|part| text.contains(part)), "{text}");
     };
     assert!(simulation(with_body(tetrahedron).path(), SCENE).is_ok());
-    expect(&tetrahedron.replace("f 1 2 4", "f 1 2 9"), &["body.obj:6: the face names a vertex"]);
+    expect(&tetrahedron.replace("f 1 2 4", "f 1 2 9"), &["body.obj:6: the face refers to a vertex"]);
     expect(&tetrahedron.replace("v 0 0 1", "v 0 0 one"), &["body.obj:4: "]);
     expect(
         &format!("{tetrahedron}v 0 0 -1\nf 1 2 5\n"),

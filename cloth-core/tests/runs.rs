@@ -158,7 +158,7 @@ fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
     assert!(
         with(of_version("2").as_bytes()).contains("has version 2, but this program reads version 3; start the run")
     );
-    assert!(with(b"something else\n").contains("is no checkpoint"));
+    assert!(with(b"something else\n").contains("is not a checkpoint"));
     std::fs::write(&checkpoint, &good).unwrap();
     let frames = path.join("out/checkpoint.frames");
     let bytes = std::fs::read(&frames).unwrap();

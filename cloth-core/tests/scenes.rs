@@ -263,9 +263,9 @@ fn scenes_that_contradict_themselves_are_refused_with_the_remedy() {
     );
     expect(fabric.split_once('\n').unwrap().1, &["unknown variant `demin`", "did you mean `denim`?"]);
     let keys = "[pins.motion]\nkeys = [{ time = 1.0 }, { time = 0.5 }]\n";
-    expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must grow"]);
+    expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must increase"]);
     let twice = "[[pins]]\nvertex = 0\n[[pins]]\nall = true\nmotion = { keys = [{ time = 0.0, angle = 5.0 }] }\n";
-    expect(&format!("{good}{twice}"), &["pins[1]: vertex 0 is held by another pin"]);
+    expect(&format!("{good}{twice}"), &["pins[1]: vertex 0 already belongs to a pin"]);
     expect(&format!("{good}[wind]\nvelocity = [1.0, 0.0, inf]\n"), &["test.toml:12:12", "finite numbers only"]);
 }
 

@@ -235,7 +235,7 @@ fn scenes_say_when_something_sleeps() {
     let sleep = with("sleep = { speed = 0.01 }").unwrap().sleep.unwrap();
     assert_eq!((sleep.speed, sleep.after), (Some(0.01), 0.5));
     assert!(with("sleep = { sped = 0.01 }").unwrap_err().contains("did you mean `speed`?"));
-    assert!(with("sleep = { after = 0.0 }").unwrap_err().contains("must be a finite number above 0"));
+    assert!(with("sleep = { after = 0.0 }").unwrap_err().contains("expected a finite number greater than 0, got 0"));
     assert!(with("sleep = 3").unwrap_err().contains("`true`, `false` or a table with `speed` and `after`"));
 }
 

@@ -7,20 +7,20 @@ use super::solid::Solid;
 use crate::geometry::{Pose, dot, norm};
 use crate::motion::Motion;
 
-/// Contact of all vertices with one solid. Only vertices nearer than the thickness are evaluated; the others count as skipped. Each adds
-/// to its own diagonal block only, so that the matrix keeps its pattern whatever touches.
+/// Contact of all vertices with one solid. Evaluates only vertices within the thickness and counts the others as
+/// skipped. Each contact changes only the diagonal block of its vertex, so the matrix pattern never changes.
 #[derive(Debug)]
 pub(super) struct ContactTerm<S> {
     name: String,
-    /// At the start, and now.
+    /// The solid before its motion, and at the end of the current step.
     solid: S,
     now: S,
     motion: Option<Motion>,
     thickness: f64,
-    /// k of each vertex, in N/m.
+    /// Contact stiffness of each vertex, in N/m.
     stiffness: Vec<f64>,
     stencils: Vec<u32>,
-    /// The free vertices and where their diagonal blocks are stored.
+    /// The free vertices, with the slots of their diagonal blocks.
     free: Vec<(usize, usize)>,
 }
 
@@ -46,7 +46,7 @@ impl<S: Solid> ContactTerm<S> {
         }
     }
 
-    /// The free vertices within reach, with their elements and places.
+    /// Iterates over the free vertices within the thickness, with their slots and elements.
     fn near<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (usize, usize, S::Contact)> + 'a {
         self.free.iter().filter_map(|&(vertex, slot)| {
             let element = self.now.touched(vertex, x[vertex], self.stiffness[vertex], self.thickness)?;
@@ -80,7 +80,7 @@ impl<S: Solid> Term for ContactTerm<S> {
         self.free = dofs.free().iter().enumerate().map(|(row, &vertex)| (vertex, pattern.diagonal(row))).collect();
     }
 
-    /// The solid is where it will be at the end of the step.
+    /// Moves the solid to its pose at the end of the step.
     fn begin_step(&mut self, start: StepStart<'_>) {
         self.move_to(start.time + start.dt);
     }
@@ -145,8 +145,9 @@ impl<S: Solid> Term for ContactTerm<S> {
     }
 }
 
-/// The part of the Hessian along the gradient. The penalty falls as the distance grows and no feature of a solid curves towards the point, so that across
-/// the gradient no curvature is positive: this is the nearest positive semi-definite matrix.
+/// Returns the nearest positive semi-definite matrix: the part of the Hessian along the gradient. The penalty decreases
+/// with distance and no feature of a solid curves towards the point, so the curvature across the gradient is never
+/// positive.
 fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
     let size = norm(gradient);
     if size == 0.0 {
@@ -157,17 +158,17 @@ fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
     std::array::from_fn(|i| std::array::from_fn(|j| curvature * n[i] * n[j]))
 }
 
-/// What friction needs to know of a contact.
+/// A contact, as friction needs it.
 pub(super) struct Touch {
     /// The vertex.
     pub vertex: usize,
-    /// The unit normal out of the solid.
+    /// Unit normal, pointing out of the solid.
     pub normal: Vector3<f64>,
-    /// The normal force, in N.
+    /// Normal force, in N.
     pub force: f64,
 }
 
-/// Which of these vertices touch a solid.
+/// Returns the contacts of the given vertices with a solid.
 pub(super) fn touches<S: Solid>(
     solid: &S,
     thickness: f64,
@@ -184,7 +185,8 @@ pub(super) fn touches<S: Solid>(
     vertices.into_iter().filter_map(touch).collect()
 }
 
-/// Where a solid takes a point of it over a step, in m/s: a point where it is at the step's start, or at its end.
+/// Returns the mean velocity, over a step, of the material point of a solid that is at x at the start (or end) of the
+/// step, in m/s.
 pub(super) fn surface_velocity(motion: Option<&Motion>, step: [f64; 2], x: Vector3<f64>, at_end: bool) -> Vector3<f64> {
     let [from, to] = step;
     let Some(motion) = motion.filter(|motion| motion.moves(from, to)) else {

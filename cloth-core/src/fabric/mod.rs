@@ -1,4 +1,4 @@
-//! What a cloth is made of: which declared elements act on which vertices, with what parameters.
+//! Fabrics: which declared elements act on which vertices of a mesh, and with what parameters.
 
 mod declared;
 mod description;
@@ -15,4 +15,4 @@ pub use description::{
 pub use hair::Hair;
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
-pub use terms::{FabricError, Garment, Place, Surroundings, hair_terms, terms, terms_at};
+pub use terms::{FabricError, FabricTerms, Place, Surroundings, hair_terms, terms, terms_at};

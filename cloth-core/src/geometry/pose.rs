@@ -2,7 +2,7 @@ use energy_dsl::Vector3;
 
 use super::{cross, dot, norm, subtract};
 
-/// A rigid map x ↦ R x + t.
+/// A rigid motion x ↦ R x + t.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     rotation: [Vector3<f64>; 3],
@@ -10,10 +10,11 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Where nothing moves.
+    /// The identity.
     pub const REST: Self = Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift: [0.0; 3] };
 
-    /// A turn by an angle in degrees about an axis through a point, right-handed (Rodrigues). Quarter turns are exact to rounding.
+    /// Returns the right-handed rotation by an angle in degrees about an axis through a point (Rodrigues' formula).
+    /// Quarter turns are exact up to rounding.
     #[must_use]
     pub fn turned(axis: Vector3<f64>, degrees: f64, centre: Vector3<f64>) -> Self {
         if degrees == 0.0 {
@@ -31,14 +32,14 @@ impl Pose {
         Self { rotation, shift: subtract(centre, turned.applied(centre)) }
     }
 
-    /// The same, then a shift.
+    /// Returns this motion followed by a translation.
     #[must_use]
     pub fn shifted(mut self, by: Vector3<f64>) -> Self {
         (0..3).for_each(|axis| self.shift[axis] += by[axis]);
         self
     }
 
-    /// This, then another.
+    /// Returns this motion followed by `next`.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         let column = |j: usize| next.turned_direction(std::array::from_fn(|i| self.rotation[i][j]));
@@ -47,19 +48,19 @@ impl Pose {
         Self { rotation, shift: next.applied(self.shift) }
     }
 
-    /// Where a point goes.
+    /// Transforms a point.
     #[must_use]
     pub fn applied(&self, point: Vector3<f64>) -> Vector3<f64> {
         std::array::from_fn(|i| dot(self.rotation[i], point) + self.shift[i])
     }
 
-    /// What becomes of a direction.
+    /// Transforms a direction: rotates without translating.
     #[must_use]
     pub fn turned_direction(&self, direction: Vector3<f64>) -> Vector3<f64> {
         self.rotation.map(|row| dot(row, direction))
     }
 
-    /// Where a point comes from.
+    /// Transforms a point by the inverse motion.
     #[must_use]
     pub fn undone(&self, point: Vector3<f64>) -> Vector3<f64> {
         let way = subtract(point, self.shift);

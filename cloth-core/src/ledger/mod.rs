@@ -1,4 +1,4 @@
-//! Where energy comes from and goes to, step by step.
+//! The energy balance of a simulation, step by step.
 
 mod account;
 
@@ -15,36 +15,37 @@ use account::works;
 
 /// Energies, work and momenta at the start and after each step.
 ///
-/// Energy is what free vertices have in their motion, and what the terms have as potential. What enters or leaves is the work of everything else:
-/// of each force that is no gradient (drag, damping, friction, wind), of pins that move, and of obstacles that move; and what little motion is left where
-/// something falls asleep. Work is the integral of power by the trapezoidal rule over each step. What is left, [`Entry::unaccounted`], is the error of the integrator.
+/// The energy is the kinetic energy of the free vertices plus the potential energy of the terms. It changes by the work
+/// of non-conservative forces (drag, damping, friction, wind), of moving pins and of moving obstacles, and by the
+/// kinetic energy removed when an island falls asleep. Work is the time integral of power, by the trapezoidal rule. The
+/// remainder, [`Entry::unaccounted`], is the error of the integrator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     potentials: Vec<String>,
     works: Vec<String>,
     entries: Vec<Entry>,
-    /// Of each island.
+    /// One account per island.
     accounts: Vec<Account>,
-    /// Of islands in the step that is under way.
+    /// Accounts that changed in the current step.
     changed: Vec<(usize, Account)>,
 }
 
-/// One line of the ledger.
+/// One row of the ledger.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// When, in s.
+    /// Time, in s.
     pub time: f64,
     /// ½ Σ m v², in J.
     pub kinetic: f64,
-    /// Of each term that has one, in J.
+    /// Potential energy of each term that has one, in J.
     pub potential: Vec<f64>,
-    /// Done so far by each force that is no gradient, in J; negative where it dissipates.
+    /// Work of each non-conservative force, in J; negative if it dissipates.
     pub work: Vec<f64>,
-    /// Done so far by pins that move, in J.
+    /// Work of moving pins, in J.
     pub pins: f64,
-    /// Done so far by obstacles that move, in J.
+    /// Work of moving obstacles, in J.
     pub obstacles: f64,
-    /// Taken so far by falling asleep, in J; negative.
+    /// Energy removed by falling asleep, in J; negative.
     pub sleep: f64,
     /// Σ m v, in kg m/s.
     pub momentum: Vector3<f64>,
@@ -72,13 +73,13 @@ impl Entry {
         self.kinetic + self.potential.iter().sum::<f64>()
     }
 
-    /// All work so far, in J.
+    /// Total work, in J.
     #[must_use]
     pub fn total_work(&self) -> f64 {
         self.work.iter().sum::<f64>() + self.pins + self.obstacles + self.sleep
     }
 
-    /// The energy since the first entry that no work accounts for, in J.
+    /// The change of energy since the first entry that no work explains, in J.
     #[must_use]
     pub fn unaccounted(&self, first: &Self) -> f64 {
         self.energy() - first.energy() - (self.total_work() - first.total_work())
@@ -86,15 +87,16 @@ impl Entry {
 }
 
 impl Ledger {
-    /// The part of the largest energy exchanged that may be unaccounted for before there is a warning.
+    /// The unexplained fraction of the largest exchanged energy above which a warning is given.
     pub const TOLERANCE: f64 = 0.02;
 
-    /// A ledger whose first entry is the bodies as they are, each with the label of each of its terms; `names` are those of labels.
+    /// Creates a ledger with the current state as its first entry. Each body comes with the label of each of its terms;
+    /// `names` holds the name of each label.
     ///
     /// # Errors
-    /// When an energy is not finite.
+    /// Returns an error if an energy is not finite.
     pub(crate) fn new(bodies: &[(&Body, &[usize])], names: &[&str], time: f64) -> Result<Self, EvaluationError> {
-        // The columns of labels.
+        // Maps each label to its column; `None` if it has none.
         let columns = |keep: fn(&dyn Term) -> bool| -> Vec<Option<usize>> {
             let mut kept = vec![false; names.len()];
             for (body, labels) in bodies {
@@ -120,41 +122,41 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// The entries: the start, then each step.
+    /// The initial state, then one entry per step.
     #[must_use]
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// The names of the terms with potentials.
+    /// Names of the terms with a potential, in the order of [`Entry::potential`].
     #[must_use]
     pub fn potentials(&self) -> &[String] {
         &self.potentials
     }
 
-    /// The names of the forces that do work.
+    /// Names of the non-conservative forces, in the order of [`Entry::work`].
     #[must_use]
     pub fn works(&self) -> &[String] {
         &self.works
     }
 
-    /// What an island has and received before the step that is under way.
+    /// The account of an island before the current step.
     pub(crate) fn account(&self, island: usize) -> &Account {
         &self.accounts[island]
     }
 
-    /// What an island has and received after it.
+    /// Records the account of an island after the current step.
     pub(crate) fn note(&mut self, island: usize, account: Account) {
         self.changed.push((island, account));
     }
 
-    /// An island whose step was noted falls asleep.
+    /// Records that an island falls asleep at the end of the current step.
     pub(crate) fn note_sleep(&mut self, island: usize) {
         let last = self.changed.iter_mut().rfind(|(number, _)| *number == island);
         last.into_iter().for_each(|(_, account)| *account = std::mem::take(account).asleep());
     }
 
-    /// The step is done: enters it.
+    /// Completes the current step and appends its entry.
     pub(crate) fn enter(&mut self, time: f64) {
         for (island, account) in self.changed.drain(..) {
             self.accounts[island] = account;
@@ -165,12 +167,13 @@ impl Ledger {
         self.entries.push(entry);
     }
 
-    /// The step failed: as if it had not begun.
+    /// Discards the current step.
     pub(crate) fn forget(&mut self) {
         self.changed.clear();
     }
 
-    /// The largest energy that was exchanged, in J: the most that kinetic energy, potentials and work changed since the start, added up without signs.
+    /// The largest exchanged energy, in J: the maximum over time of the summed absolute changes of kinetic energy,
+    /// potentials and work.
     #[must_use]
     pub fn exchanged(&self) -> f64 {
         let first = &self.entries[0];
@@ -184,28 +187,28 @@ impl Ledger {
         self.entries.iter().map(size).fold(0.0, f64::max)
     }
 
-    /// The largest energy that was unaccounted for, in J.
+    /// The largest absolute unexplained energy, in J.
     #[must_use]
     pub fn largest_unaccounted(&self) -> f64 {
         self.entries.iter().map(|entry| entry.unaccounted(&self.entries[0]).abs()).fold(0.0, f64::max)
     }
 
-    /// A warning when the balance does not close although the integrator should keep it: when more than [`Ledger::TOLERANCE`] of the largest energy
-    /// exchanged is unaccounted for. Other integrators dissipate by themselves.
+    /// Returns a warning if an integrator that should conserve energy leaves more than [`Ledger::TOLERANCE`] of the
+    /// largest exchanged energy unexplained; `None` otherwise, and for dissipative integrators.
     #[must_use]
     pub fn imbalance(&self, integrator: &str) -> Option<String> {
         let conserving = ["implicit-midpoint", "trapezoid", "verlet", "symplectic-euler"].contains(&integrator);
         let (lost, all) = (self.largest_unaccounted(), self.exchanged());
         (conserving && lost > Self::TOLERANCE * all).then(|| {
             format!(
-                "the balance of energy does not close: {lost:.3e} J of {all:.3e} J exchanged are unaccounted for, more than {} %, \
-                 although {integrator} should keep it. Try a smaller dt",
+                "the balance of energy does not close: {lost:.3e} J of {all:.3e} J exchanged are unaccounted for, \
+                 more than {} %, although {integrator} should keep it. Try a smaller dt",
                 100.0 * Self::TOLERANCE
             )
         })
     }
 
-    /// As a table of comma-separated values, one line for each entry.
+    /// Formats the ledger as CSV, one line per entry.
     #[must_use]
     pub fn csv(&self) -> String {
         let mut text = "time [s],kinetic [J]".to_owned();
@@ -228,10 +231,10 @@ impl Ledger {
         text
     }
 
-    /// As a plot over time.
+    /// Plots the ledger over time, as SVG.
     ///
     /// # Errors
-    /// When it cannot be drawn.
+    /// Returns an error if the plot cannot be drawn.
     pub fn svg(&self) -> Result<String, String> {
         let first = &self.entries[0];
         let mut curves: Vec<(String, Vec<f64>)> = Vec::new();
@@ -257,7 +260,7 @@ impl Ledger {
     }
 }
 
-/// Lines over time with their names.
+/// Plots named curves over time.
 fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn std::error::Error>> {
     let all = || curves.iter().flat_map(|(_, values)| values).copied();
     let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));

@@ -1,4 +1,4 @@
-//! A hundred thousand steps: energy neither grows nor leaks otherwise than the integrator's law says.
+//! A hundred thousand steps: energy must neither grow nor drift, except as the integrator's theory allows.
 
 use energy_dsl::Vector3;
 use energy_solve::System;
@@ -12,7 +12,8 @@ use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
 
 const GRAVITY: f64 = 9.81;
 
-/// A metre of soft cloth of 8 × 8 cells, upright and held by its two upper corners, its lower edge drawn aside; nothing resists its motion.
+/// A square metre of soft cloth of 8 × 8 cells, upright, held by its upper corners, with the lower edge drawn aside. No
+/// damping.
 fn hanging() -> Result<Body, ValidateError> {
     let sheet = Sheet {
         cells: [8, 8],
@@ -38,13 +39,13 @@ fn hanging() -> Result<Body, ValidateError> {
     Ok(Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system })
 }
 
-/// Kinetic and potential energy, in J.
+/// Returns kinetic plus potential energy, in J.
 fn energy(body: &mut Body) -> Result<f64, ValidateError> {
     let potential: f64 = body.system.energies(&body.x)?.iter().filter_map(|term| term.energy).sum();
     Ok(body.kinetic_energy() + potential)
 }
 
-/// The energies at the start and after each step.
+/// Returns the energies at the start and after each step.
 fn energies(scheme: &mut dyn Integrator, body: &mut Body, dt: f64, steps: usize) -> Result<Vec<f64>, ValidateError> {
     let mut all = vec![energy(body)?];
     for _ in 0..steps {
@@ -54,7 +55,7 @@ fn energies(scheme: &mut dyn Integrator, body: &mut Body, dt: f64, steps: usize)
     Ok(all)
 }
 
-/// The equilibrium that the body is next to.
+/// Returns the energy of the nearest equilibrium, in J.
 fn rest(body: Body) -> Result<f64, ValidateError> {
     let weight = GRAVITY * body.masses.iter().sum::<f64>();
     let heights: Vec<f64> = body.x.iter().map(|x| x[2]).collect();
@@ -63,7 +64,7 @@ fn rest(body: Body) -> Result<f64, ValidateError> {
 }
 
 pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
-    // Long steps dissipate more, so that fewer do.
+    // Long steps dissipate more, so fewer of them suffice.
     let (steps, long) = if quick { (1_500, 0.1) } else { (100_000, 0.02) };
     let swing = {
         let mut body = hanging()?;
@@ -73,7 +74,7 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
     conserving(swing, steps, tell)
 }
 
-/// Implicit Euler: energy only falls, to that of the equilibrium.
+/// Implicit Euler: energy falls monotonically to that of the equilibrium.
 fn dissipating(swing: f64, dt: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let exact = NewtonOptions { velocity_tolerance: 1e-9, linear_tolerance: 1e-6, ..NewtonOptions::default() };
     let mut body = hanging()?;
@@ -90,11 +91,11 @@ fn dissipating(swing: f64, dt: f64, steps: usize, tell: &mut dyn FnMut(Finding))
     Ok(())
 }
 
-/// The others: energy is off by as much in the last tenth as in the first, but for what goes with the motion, which becomes finer and then stays so: there is no trend in
-/// the second half.
+/// The other integrators: the energy error of the last tenth equals that of the first, except for the part that follows
+/// the motion. The motion develops finer scales and then stays so; the second half shows no trend.
 fn conserving(swing: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let exact = NewtonOptions { velocity_tolerance: 1e-10, linear_tolerance: 1e-6, ..NewtonOptions::default() };
-    // The first is of first order, so that its energy swings more.
+    // Symplectic Euler is of first order, so its energy oscillates more.
     let schemes: [(Box<dyn Integrator>, f64); 3] = [
         (Box::new(SymplecticEuler), 0.1),
         (Box::new(Verlet::default()), 0.01),

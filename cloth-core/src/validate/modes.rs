@@ -12,12 +12,12 @@ use crate::mesh::SpringNetwork;
 /// E h of membranes over the strip's weight per width.
 const MEMBRANE: f64 = 1e5;
 
-/// ω₁ √(L/g) of a chain of equal masses, one at each link's end.
+/// Returns ω₁ √(L/g) of a chain of equal masses, one at the end of each link.
 fn chain(links: usize) -> Result<f64, ValidateError> {
     let n = links as f64;
     let mass = 1.0 / n;
     let (stretched, stiffness) = (1.0 / n, 1e7 * n);
-    // Each link is as long under load as without: its rest length is shorter by what it carries.
+    // Shorten each link by its elongation under load, so that all links have equal lengths at equilibrium.
     let springs: Vec<HookeSpring> = (0..links)
         .map(|link| HookeSpring::new(stiffness, stretched - mass * (links - link) as f64 / stiffness))
         .collect();
@@ -38,7 +38,8 @@ fn chain(links: usize) -> Result<f64, ValidateError> {
     Ok(found.lowest_mode().unwrap_or(f64::NAN).sqrt())
 }
 
-/// ω₁ √(L/g) of a strip that hangs from its end (`gravity` along it), or stands on it (against it); `clamped` or hinged there.
+/// Returns ω₁ √(L/g) of a strip that hangs from its end (gravity along it) or stands on it (gravity against it),
+/// `clamped` or hinged there.
 fn strip(bending: Bending, gravity: f64, clamped: bool, segments: usize) -> Result<Option<f64>, ValidateError> {
     let spacing = if clamped { 1.0 / (segments as f64 - 0.5) } else { 1.0 / segments as f64 };
     let length = if clamped { 1.0 + 0.5 * spacing } else { 1.0 };
