@@ -10,7 +10,7 @@ pub struct Body {
     pub v: Vec<Vector3<f64>>,
     /// Masses, in kg.
     pub masses: Vec<f64>,
-    /// The forces. Pinned vertices do not respond to them.
+    /// The forces on all vertices; pinned vertices do not respond to them.
     pub system: System,
 }
 

@@ -1,4 +1,4 @@
-//! The choice of what solves the linear systems: the same motion, whichever it is, and from wherever it goes on.
+//! Linear solvers: all choices give the same motion, also after a restart.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ nearest = [0.5, 0.5, 0.0]
 }
 
 #[test]
-fn all_solvers_lead_to_the_same_motion() {
+fn all_solvers_give_the_same_motion() {
     for (integrator, solvers) in [
         ("newton", &["auto", "over-relaxation", "multigrid", "cholesky", "incomplete-cholesky"][..]),
         ("implicit-euler", &["auto", "multigrid", "cholesky"]),
@@ -73,7 +73,7 @@ fn all_solvers_lead_to_the_same_motion() {
 }
 
 #[test]
-fn what_was_found_out_about_solvers_is_saved() {
+fn the_choice_of_solver_is_saved() {
     for integrator in ["newton", "bdf2", "implicit-euler"] {
         let start = || hanging(integrator, "auto", 40, 3e4, [1e-3, 1e-2]);
         let mut whole = start();
@@ -103,7 +103,7 @@ fn what_was_found_out_about_solvers_is_saved() {
 }
 
 #[test]
-fn a_solver_that_there_is_not_is_refused() {
+fn an_unknown_solver_is_rejected() {
     let text = "dt = 0.01\nduration = 1.0\nlinear_solver = \"gauss\"\n[mesh.sheet]\n";
     let error = Scene::parse(text, Path::new("scene.toml")).unwrap_err().to_string();
     assert!(error.contains("gauss") && error.contains("multigrid"), "{error}");

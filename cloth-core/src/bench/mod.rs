@@ -86,7 +86,7 @@ const CORNER_STIFFNESS: f64 = 1e6;
 /// Gravity acts along −z, with a drag of 0.1 m v; stiff springs hold the two corners of the edge y = ½.
 ///
 /// # Errors
-/// Returns an error if there are no cells.
+/// Returns an error if `cells` is 0.
 pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
     let sheet = Sheet {
         cells: [cells, cells],
@@ -118,7 +118,7 @@ pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
 /// Measurements of one run.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Measured {
-    /// The fabric.
+    /// The fabric that hangs.
     pub cloth: Cloth,
     /// Number of vertices.
     pub vertices: usize,

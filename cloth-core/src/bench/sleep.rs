@@ -30,7 +30,7 @@ impl Default for Sizes {
 /// A comparison of two step times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
-    /// What is compared.
+    /// A description of the two steps.
     pub question: String,
     /// Lower quartile of the first step time.
     pub cost: Duration,
@@ -78,8 +78,10 @@ const PATIENCE: u64 = 20_000;
 fn garment(cells: usize, at: [f64; 2]) -> String {
     let [x, y] = at;
     format!(
-        "[[garment]]\nplacement.translate = [{x}, {y}, 0.0]\nmesh.sheet = {{ cells = [{cells}, {cells}], size = [0.5, 0.5] }}\n\
-         [garment.fabric]\ndensity = 0.15\n[garment.fabric.material.stvk]\nstretch_stiffness = 50.0\npoisson_ratio = 0.3\n\
+        "[[garment]]\nplacement.translate = [{x}, {y}, 0.0]\n\
+         mesh.sheet = {{ cells = [{cells}, {cells}], size = [0.5, 0.5] }}\n\
+         [garment.fabric]\ndensity = 0.15\n[garment.fabric.material.stvk]\n\
+         stretch_stiffness = 50.0\npoisson_ratio = 0.3\n\
          bending.flat.stiffness = 1e-5\n"
     )
 }

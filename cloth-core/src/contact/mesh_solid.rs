@@ -1,5 +1,5 @@
 //! A solid bounded by a triangle mesh. The feature nearest to a vertex is a face, an edge or a corner, each with its
-//! own declared element. Hence three solids, each active where its features are nearest.
+//! own declared element. It acts as three solids, each active where its features are nearest.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -232,7 +232,10 @@ mod tests {
         /// The cache gives correct results after any sequence of vertices and poses.
         #[test]
         fn what_is_remembered_changes_nothing(
-            walk in prop::collection::vec((0..2_usize, prop::array::uniform3(-0.4..0.4_f64), 0.0..30.0_f64, any::<bool>()), 1..40),
+            walk in prop::collection::vec(
+                (0..2_usize, prop::array::uniform3(-0.4..0.4_f64), 0.0..30.0_f64, any::<bool>()),
+                1..40,
+            ),
         ) {
             let still = CachedMesh::new(solid(0.02), 2);
             let mut x = [[0.3; 3], [-0.5; 3]];

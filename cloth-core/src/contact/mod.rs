@@ -35,7 +35,7 @@ use term::{ContactTerm, Touch, surface_velocity, touches};
 pub enum AnySolid {
     /// Everything below a plane.
     HalfSpace(HalfSpace),
-    /// A ball.
+    /// All points within a radius of a centre.
     Ball(Ball),
     /// All points within a radius of a segment.
     Capsule(Capsule),

@@ -49,7 +49,7 @@ pub struct HalfSpace {
     pub normal: Vector3<f64>,
 }
 
-/// A ball.
+/// All points within a radius of a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
     /// The centre, in m.

@@ -131,7 +131,7 @@ impl Surface {
         Ok(Self { mesh, radius, is_closed, face_normals, vertex_normals, edge_normals, hierarchy })
     }
 
-    /// The mesh.
+    /// The mesh, without rounding.
     #[must_use]
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
@@ -302,7 +302,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn distances_match_the_exact_solid(x in -1.0..3.0_f64, y in -1.0..3.0_f64, z in -1.0..2.0_f64, radius in 0.0..0.3_f64) {
+        fn distances_match_the_exact_solid(
+            x in -1.0..3.0_f64, y in -1.0..3.0_f64, z in -1.0..2.0_f64, radius in 0.0..0.3_f64,
+        ) {
             let surface = Surface::new(bracket(), radius).unwrap();
             let Nearest { distance, feature } = surface.nearest([x, y, z]);
             prop_assert!((distance - (exact([x, y, z]) - radius)).abs() < 1e-12, "{distance} {feature:?}");
@@ -326,7 +328,9 @@ mod tests {
             let vertices: Vec<Vector3<f64>> = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.4, 0.0, 1.0]];
             let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
             let wedge = Surface::new(TriangleMesh::new(vertices, triangles).unwrap(), 0.0).unwrap();
-            let height = |triangle: usize| dot(wedge.face_normals[triangle], subtract([x, y, z], wedge.mesh.corners(triangle)[0]));
+            let height = |triangle: usize| {
+                dot(wedge.face_normals[triangle], subtract([x, y, z], wedge.mesh.corners(triangle)[0]))
+            };
             // The wedge is convex: inside means below all planes.
             let highest = (0..4).map(height).fold(f64::NEG_INFINITY, f64::max);
             let distance = wedge.nearest([x, y, z]).distance;
@@ -335,7 +339,10 @@ mod tests {
 
         /// Compares with a search over all triangles.
         #[test]
-        fn the_hierarchy_finds_what_brute_force_finds(points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 9..60), x in prop::array::uniform3(-2.0..2.0_f64)) {
+        fn the_hierarchy_finds_the_nearest_triangle(
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 9..60),
+            x in prop::array::uniform3(-2.0..2.0_f64),
+        ) {
             let triangles: Vec<[Vector3<f64>; 3]> = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
             let bounds: Vec<Bounds> = triangles.iter().map(|corners| Bounds::of(corners)).collect();
             let square = |triangle: usize| {
@@ -352,7 +359,8 @@ mod tests {
                 for i in 0..=8 {
                     for j in 0..=8 - i {
                         let [u, v] = [f64::from(i) / 8.0, f64::from(j) / 8.0];
-                        let p = std::array::from_fn(|k| u * corners[0][k] + v * corners[1][k] + (1.0 - u - v) * corners[2][k]);
+                        let w = 1.0 - u - v;
+                        let p = std::array::from_fn(|k| u * corners[0][k] + v * corners[1][k] + w * corners[2][k]);
                         prop_assert!(norm(subtract(x, p)) >= least - 1e-12);
                     }
                 }

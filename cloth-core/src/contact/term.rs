@@ -160,7 +160,7 @@ fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
 
 /// A contact, as friction needs it.
 pub(super) struct Touch {
-    /// The vertex.
+    /// Index of the vertex.
     pub vertex: usize,
     /// Unit normal, pointing out of the solid.
     pub normal: Vector3<f64>,

@@ -5,7 +5,7 @@ use super::Declared;
 use super::plate::Rigidity;
 use crate::bounded::{all_positive, finite_triple, non_negative, poisson_ratio, positive};
 
-/// A fabric.
+/// A fabric: its density and its resistance to deformation.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fabric {
@@ -69,7 +69,7 @@ pub struct Rayleigh {
 pub enum Material {
     /// Springs between vertices.
     MassSpring(MassSpring),
-    /// St. Venant–Kirchhoff triangles and hinges: A (μ ‖E‖² + ½ λ tr² E), E = (FᵀF − 1)/2.
+    /// Saint Venant–Kirchhoff triangles and hinges: A (μ ‖E‖² + ½ λ tr² E), E = (FᵀF − 1)/2.
     Stvk(Membrane),
     /// Neo-Hookean triangles and hinges: A (½ μ (tr FᵀF − 2) − μ ln J + ½ λ ln² J), where J is the ratio of areas.
     /// Prevents triangles from collapsing.
@@ -78,7 +78,7 @@ pub enum Material {
     StableNeoHookean(Membrane),
     /// Stable neo-Hookean triangles with logarithm (Smith et al. 2018).
     StableNeoHookeanLog(Membrane),
-    /// As-rigid-as-possible triangles: ½ A μ ((s₁ − 1)² + (s₂ − 1)²), where s are the principal stretches.
+    /// ARAP (as-rigid-as-possible) triangles: ½ A μ ((s₁ − 1)² + (s₂ − 1)²), where s are the principal stretches.
     Arap(Arap),
     /// Stretch along warp and weft, and shear (Baraff & Witkin 1998).
     BaraffWitkin(BaraffWitkin),
@@ -88,7 +88,7 @@ pub enum Material {
     File(Declared),
 }
 
-/// As-rigid-as-possible triangles.
+/// ARAP (as-rigid-as-possible) triangles.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arap {
@@ -200,7 +200,7 @@ impl Membrane {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Bending {
-    /// No resistance.
+    /// No bending resistance.
     #[default]
     None,
     /// A plate with the given flexural rigidity, in every direction and on every mesh: the table `isotropic`,

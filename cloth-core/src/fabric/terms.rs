@@ -73,7 +73,7 @@ pub struct Place {
 pub struct FabricTerms {
     /// The mass of each vertex, in kg.
     pub masses: Vec<f64>,
-    /// The terms.
+    /// The forces of the fabric and its surroundings.
     pub terms: Vec<Box<dyn Term>>,
     /// Terms that were left out, because their stiffness is zero or they have no elements.
     pub left_out: Vec<String>,

@@ -10,7 +10,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The identity.
+    /// The motion that leaves every point in place.
     pub const REST: Self = Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift: [0.0; 3] };
 
     /// Returns the right-handed rotation by an angle in degrees about an axis through a point (Rodrigues' formula).

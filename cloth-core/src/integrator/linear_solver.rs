@@ -30,7 +30,7 @@ pub enum LinearSolverChoice {
 }
 
 impl LinearSolverChoice {
-    /// All choices.
+    /// All choices, `Auto` first.
     pub const ALL: [Self; 5] =
         [Self::Auto, Self::OverRelaxation, Self::Multigrid, Self::Cholesky, Self::IncompleteCholesky];
 

@@ -213,7 +213,7 @@ impl StepError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
-    /// Linearised implicit Euler, one linear solve per step. The default.
+    /// Linearised implicit Euler, one linear solve per step (default).
     #[default]
     ImplicitEuler,
     /// Implicit Euler by Newton's method with line search.

@@ -96,7 +96,7 @@ impl Ledger {
     /// # Errors
     /// Returns an error if an energy is not finite.
     pub(crate) fn new(bodies: &[(&Body, &[usize])], names: &[&str], time: f64) -> Result<Self, EvaluationError> {
-        // Maps each label to its column; `None` if it has none.
+        // Maps each label to its column; `None` for a label without a column.
         let columns = |keep: fn(&dyn Term) -> bool| -> Vec<Option<usize>> {
             let mut kept = vec![false; names.len()];
             for (body, labels) in bodies {

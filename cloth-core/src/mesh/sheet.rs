@@ -81,7 +81,7 @@ impl Sheet {
     /// Builds the rest mesh: two triangles per cell, anticlockwise seen from the front.
     ///
     /// # Errors
-    /// Returns an error if there are no cells or a side length is not greater than 0.
+    /// Returns an error if the number of cells or a side length is 0.
     pub fn mesh(&self) -> Result<TriangleMesh, MeshError> {
         let [columns, rows] = self.cells;
         let vertices = self.sweep(&self.flat());

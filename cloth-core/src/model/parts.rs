@@ -86,7 +86,7 @@ pub struct Model {
     pub moving: Vec<MovingPin>,
     /// The motions of pins.
     pub motions: Vec<Motion>,
-    /// The islands.
+    /// The islands, with their terms.
     pub islands: Vec<IslandModel>,
     /// The labels of all terms.
     pub labels: Vec<TermLabel>,
@@ -94,7 +94,7 @@ pub struct Model {
     pub left_out: Vec<String>,
     /// Warnings about the scene.
     pub warnings: Vec<String>,
-    /// Obstacles.
+    /// Obstacles, with their motions.
     pub obstacles: Vec<Obstacle>,
 }
 

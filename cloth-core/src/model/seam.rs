@@ -17,14 +17,17 @@ pub enum SeamError {
         seam: usize,
         error: UnknownPart,
     },
-    /// Not exactly one of `pairs` and `within` is given.
+    /// Both or neither of `pairs` and `within` are given.
     #[error("seams[{seam}]: expected either `pairs` or `within`")]
     Choice {
         /// Index of the seam, from 0.
         seam: usize,
     },
     /// The vertex does not exist.
-    #[error("seams[{seam}]: {garment} has no vertex {vertex}; it has {vertices} (0 to {})", .vertices.saturating_sub(1))]
+    #[error(
+        "seams[{seam}]: {garment} has no vertex {vertex}; it has {vertices} (0 to {})",
+        .vertices.saturating_sub(1)
+    )]
     NoSuchVertex {
         /// Index of the seam, from 0.
         seam: usize,
@@ -42,7 +45,8 @@ pub enum SeamError {
     },
     /// No two edges are within the distance.
     #[error(
-        "seams[{seam}]: no edges of {} and {} come within {within} m at the start; the nearest are {nearest:.3e} m apart",
+        "seams[{seam}]: no edges of {} and {} come within {within} m at the start; \
+         the nearest are {nearest:.3e} m apart",
         .garments[0], .garments[1]
     )]
     OutOfReach {

@@ -67,7 +67,7 @@ struct Parts {
 
 struct Shape {
     positions: Vec<[f32; 3]>,
-    /// Vertex normals; empty if there are no triangles.
+    /// Vertex normals; empty for polylines.
     normals: Vec<[f32; 3]>,
 }
 

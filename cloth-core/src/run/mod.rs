@@ -118,7 +118,7 @@ impl Run {
     /// Resumes from the checkpoint in a folder.
     ///
     /// # Errors
-    /// Returns an error if there is no checkpoint, or it is damaged, of another version, or does not fit the scene.
+    /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene.
     pub fn resume(output: &Path) -> Result<Self, RunError> {
         let file = output.join(OutputFolder::CHECKPOINT);
         let Checkpoint { scene: text, path, every, frames, frames_checksum, state } = Checkpoint::read(&file)?;

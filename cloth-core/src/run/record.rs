@@ -31,7 +31,7 @@ impl Record {
     /// Reads the record in the folder of a run.
     ///
     /// # Errors
-    /// Returns an error if there is none, or it is damaged or newer than this program.
+    /// Returns an error if the record is missing, damaged or newer than this program.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(OutputFolder::RECORD);
         let bytes = std::fs::read(&path).map_err(|source| RecordError::Unreadable { path: path.clone(), source })?;

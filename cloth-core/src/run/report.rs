@@ -145,8 +145,10 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
     page
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
-img,svg{max-width:100%;height:auto}table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
+const STYLE: &str = "\
+body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
+img,svg{max-width:100%;height:auto}\
+table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
 td,th{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:right}td:not(.text){white-space:nowrap}\
 td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;padding:1rem;overflow:auto;font-size:13px}\
 .good{color:#176617}.bad{color:#a01818}";
@@ -181,7 +183,8 @@ fn evaluated(summary: &Summary) -> String {
             term.counts.hessian.projected,
         );
         format!(
-            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}<td>{flagged}</td><td>{projected}</td><td>{}</td></tr>\n",
+            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}\
+             <td>{flagged}</td><td>{projected}</td><td>{}</td></tr>\n",
             escaped(&term.name),
             escaped(&term.element),
             term.reused
@@ -190,8 +193,10 @@ fn evaluated(summary: &Summary) -> String {
     let left_out: String =
         summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();
     format!(
-        "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th><th>gradient</th><th>skipped</th>\
-         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th><th>reused</th></tr>\n{}</table>\n{left_out}",
+        "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th>\
+         <th>gradient</th><th>skipped</th>\
+         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th><th>reused</th></tr>\n\
+         {}</table>\n{left_out}",
         rows.collect::<String>()
     )
 }

@@ -1,4 +1,4 @@
-//! Tables of what a run evaluated and skipped.
+//! Tables of evaluation counts and times.
 
 use std::fmt::Write as _;
 

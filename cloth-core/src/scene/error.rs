@@ -15,7 +15,7 @@ pub enum SceneError {
         line: usize,
         /// The column in characters, from 1.
         column: usize,
-        /// What is wrong, with a remedy if one is known.
+        /// The problem, with a remedy if one is known.
         message: String,
     },
 }

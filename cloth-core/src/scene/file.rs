@@ -25,7 +25,7 @@ pub(super) struct File {
     #[serde(default, deserialize_with = "some_fabric")]
     #[schemars(with = "Option<super::fabric_choice::FabricChoice>")]
     fabric: Option<Fabric>,
-    /// Garments.
+    /// Garments, each with its mesh and fabric.
     #[serde(default)]
     garment: Vec<Garment>,
     /// Strands of hair.
@@ -37,10 +37,10 @@ pub(super) struct File {
     /// Pinned vertices, fixed or moving. Default none.
     #[serde(default)]
     pins: Vec<Pin>,
-    /// Obstacles. Default none.
+    /// Obstacles that the cloth cannot enter. Default none.
     #[serde(default)]
     obstacles: Vec<ObstacleDescription>,
-    /// Wind. Default none.
+    /// Wind. Default still air.
     wind: Option<Wind>,
     /// Acceleration of gravity, in m/s². Default [0, 0, −9.81].
     #[serde(default = "standard_gravity", deserialize_with = "finite_triple")]

@@ -35,7 +35,7 @@ use crate::wind::Wind;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "file::File")]
 pub struct Scene {
-    /// Garments.
+    /// Garments, each with its mesh and fabric.
     pub garments: Vec<Garment>,
     /// Strands of hair.
     pub hair: Vec<Hair>,
@@ -43,7 +43,7 @@ pub struct Scene {
     pub seams: Vec<Seam>,
     /// Pinned vertices.
     pub pins: Vec<Pin>,
-    /// Obstacles.
+    /// Obstacles that the cloth cannot enter.
     pub obstacles: Vec<ObstacleDescription>,
     /// Wind; `None` for still air.
     pub wind: Option<Wind>,

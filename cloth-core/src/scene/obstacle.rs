@@ -25,11 +25,11 @@ pub struct ObstacleDescription {
 struct Keys {
     /// Everything below a plane.
     plane: Option<PlaneKeys>,
-    /// A ball.
+    /// All points within a radius of a centre.
     sphere: Option<SphereKeys>,
     /// All points within a radius of a segment.
     capsule: Option<CapsuleKeys>,
-    /// A box.
+    /// A box with edges along any directions.
     #[serde(rename = "box")]
     block: Option<BoxKeys>,
     /// A solid bounded by a triangle mesh.
@@ -49,7 +49,7 @@ struct Keys {
     /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. Default 5e6.
     #[serde(default = "stiffness", deserialize_with = "positive")]
     stiffness: f64,
-    /// Motion. Default none.
+    /// Motion over time. Default none.
     motion: Option<Motion>,
 }
 

@@ -45,7 +45,8 @@ mod tests {
 
     #[test]
     fn every_fabric_gets_the_material_and_keeps_its_density() {
-        let text = "dt = 0.01\nduration = 1.0\n[[garment]]\nfabric = \"denim\"\nmesh.disc = { radius = 1.0, rings = 2 }\n\
+        let text = "dt = 0.01\nduration = 1.0\n[[garment]]\nfabric = \"denim\"\n\
+                    mesh.disc = { radius = 1.0, rings = 2 }\n\
                     [[garment]]\nmesh.disc = { radius = 1.0, rings = 2 }\n[garment.fabric]\ndensity = 0.5\n\
                     material.arap.stretch_stiffness = 3.0\n";
         let changed = with_material(text, "own.energy".as_ref(), &[("k".to_owned(), 2.5)]);

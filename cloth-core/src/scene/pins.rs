@@ -64,7 +64,7 @@ struct Keys {
     all: bool,
     /// Name of the garment or hair to choose from. Default all.
     of: Option<String>,
-    /// Motion. Default none.
+    /// Motion over time. Default none.
     motion: Option<Motion>,
 }
 

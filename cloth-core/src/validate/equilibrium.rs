@@ -8,7 +8,7 @@ use crate::integrator::if_finite;
 /// A cloth in static equilibrium.
 #[derive(Debug)]
 pub(super) struct Equilibrium {
-    /// The forces.
+    /// The forces on the cloth.
     pub system: System,
     /// Positions, in m.
     pub x: Vec<Vector3<f64>>,

@@ -12,8 +12,8 @@ use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
 
 const GRAVITY: f64 = 9.81;
 
-/// A square metre of soft cloth of 8 × 8 cells, upright, held by its upper corners, with the lower edge drawn aside. No
-/// damping.
+/// A square metre of soft cloth of 8 × 8 cells, upright, held by its upper corners, with the lower edge drawn aside,
+/// without damping.
 fn hanging() -> Result<Body, ValidateError> {
     let sheet = Sheet {
         cells: [8, 8],

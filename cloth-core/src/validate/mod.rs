@@ -97,7 +97,8 @@ pub enum ValidateError {
     },
     /// The search for an equilibrium did not converge.
     #[error(
-        "no equilibrium: a vertex still feels {force:.2e} N of {weight:.2e} N in all; try more segments or a smaller load"
+        "no equilibrium: a vertex still feels {force:.2e} N of {weight:.2e} N in all; \
+         try more segments or a smaller load"
     )]
     NoEquilibrium {
         /// The largest remaining force, in N.

@@ -18,7 +18,7 @@ pub enum MeshKind {
 }
 
 impl MeshKind {
-    /// All kinds.
+    /// All kinds of mesh.
     pub const ALL: [Self; 4] = [Self::Equilateral, Self::Diagonal, Self::Alternating, Self::Random];
 
     /// The name on the command line.

@@ -17,8 +17,8 @@ pub struct Picked {
     pub depth: f64,
 }
 
-/// Returns the vertex under a pixel of a picture of this size; `None` if there is none. It is the nearest corner of the
-/// foremost triangle, or a joint of hair within a few pixels that the triangle does not hide.
+/// Returns the vertex under a pixel of a picture of this size; `None` for the background. It is the nearest corner of
+/// the foremost triangle, or a joint of hair within a few pixels that the triangle does not hide.
 #[must_use]
 pub fn pick(
     camera: &Orbit,

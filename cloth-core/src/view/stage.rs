@@ -52,9 +52,10 @@ pub enum ViewError {
         /// Time of the last frame, in s.
         end: f64,
     },
-    /// There is no display to open a window on.
+    /// A window needs a display.
     #[error(
-        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, or write a picture with --screenshot FILE"
+        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, \
+         or write a picture with --screenshot FILE"
     )]
     NoDisplay,
     /// The rendering engine cannot open a window.
@@ -129,7 +130,7 @@ impl Stage {
         Ok(Self { scene, simulation, rest, act: Act::Recorded { frames, now: 0 }, playing: true, due: 0.0 })
     }
 
-    /// The scene.
+    /// The scene that is shown.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene

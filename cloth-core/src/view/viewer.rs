@@ -44,7 +44,7 @@ pub enum Command {
     Step,
     /// Go back by one frame.
     StepBack,
-    /// Restart.
+    /// Start again from time 0.
     Restart,
     /// Next colouring.
     Colours,
@@ -98,13 +98,13 @@ impl Viewer {
         Self { stage, camera, colouring, wireframe, help: false, mouse, drag, most: 0.0, failure: None }
     }
 
-    /// The content.
+    /// The scene or run that is shown.
     #[must_use]
     pub fn stage(&self) -> &Stage {
         &self.stage
     }
 
-    /// The camera.
+    /// The current camera.
     #[must_use]
     pub fn camera(&self) -> &Orbit {
         &self.camera

@@ -31,7 +31,7 @@ const HAIR: Color = Color::new(0.45, 0.26, 0.13, 1.0);
 /// Opens a scene or a finished run in a window, and returns once the window is closed.
 ///
 /// # Errors
-/// Returns an error if the scene or run cannot be opened, or there is no display.
+/// Returns an error if the scene or run cannot be opened, or no display is available.
 pub fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result<(), ViewError> {
     let viewer = Viewer::new(Stage::open(path)?, colouring, wireframe);
     let is_there = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());

@@ -103,7 +103,7 @@ impl Tilts {
     }
 }
 
-/// Triangles unfolded into the plane of the first, each with the rotation of its own coordinates in that plane.
+/// Triangles unfolded into the plane of the first, each with the rotation of its coordinates in that plane.
 struct Patch<'a> {
     tilts: &'a Tilts,
     triangles: Vec<(usize, f64)>,
@@ -139,7 +139,7 @@ impl<'a> Patch<'a> {
         })
     }
 
-    /// Adds all neighbours of the patch. Returns `false` if there are none.
+    /// Adds all neighbours of the patch. Returns `false` if the patch has no neighbours.
     fn grow(&mut self) -> bool {
         let before = self.triangles.len();
         for at in 0..before {

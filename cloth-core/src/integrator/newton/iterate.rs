@@ -11,7 +11,7 @@ use super::incremental_potential::{Energy, IncrementalPotential};
 use super::line_search::{AcceptedStep, Prefetch};
 use super::{Memory, NewtonOptions, largest};
 
-/// The current iterate of a step, with what is known about it.
+/// The current iterate of a step, with the quantities evaluated there.
 pub(super) struct Iterate<'a> {
     options: NewtonOptions,
     potential: IncrementalPotential<'a>,
