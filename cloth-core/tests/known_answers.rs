@@ -38,8 +38,10 @@ fn a_short_strip_on_a_random_mesh_bends_like_the_elastica() {
 }
 
 fn squeezed() -> Body {
-    let scene = "dt = 0.1\nduration = 0.1\nadaptive = true\nintegrator = \"newton\"\n[mesh.sheet]\ncells = [4, 4]\nsize = [0.4, 0.4]\n\
-                 [fabric]\ndensity = 0.2\n[fabric.material.neo-hookean]\nstretch_stiffness = 100.0\npoisson_ratio = 0.3\n\
+    let scene = "dt = 0.1\nduration = 0.1\nadaptive = true\nintegrator = \"newton\"\n[mesh.sheet]\ncells = [4, 4]\n\
+                 size = [0.4, 0.4]\n\
+                 [fabric]\ndensity = 0.2\n[fabric.material.neo-hookean]\nstretch_stiffness = 100.0\n\
+                 poisson_ratio = 0.3\n\
                  [[pins]]\nnearest = [-0.2, 0.2, 0.0]\n";
     let scene = Scene::parse(scene, "scene.toml".as_ref()).unwrap();
     let shape = scene.garments[0].shape(&scene.folder).unwrap();

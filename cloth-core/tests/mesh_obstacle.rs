@@ -58,7 +58,8 @@ fn no_vertex_passes_through() {
     let (deepest, _) = drape(&rounded);
     assert!(deepest > 0.0, "{deepest}");
     let moving = format!(
-        "{SCENE}\n[obstacles.motion]\nkeys = [{{ time = 0.3 }}, {{ time = 0.7, angle = 30.0, translate = [0.0, 0.1, 0.1] }}]\n"
+        "{SCENE}\n[obstacles.motion]\n\
+         keys = [{{ time = 0.3 }}, {{ time = 0.7, angle = 30.0, translate = [0.0, 0.1, 0.1] }}]\n"
     );
     let (deepest, lifted) = drape(&moving);
     assert!(deepest > 0.0 && lifted > height + 0.05, "{deepest} {lifted}");

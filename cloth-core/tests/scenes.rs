@@ -3,7 +3,8 @@
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;
 
-const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\
+                    poisson_ratio = 0.3\n\
                     bending.flat.stiffness = 1e-5\n";
 
 fn started(text: &str) -> Simulation {
@@ -65,11 +66,13 @@ fn cloth_stays_outside_obstacles_and_distant_vertices_are_skipped() {
     let obstacles = [
         "sphere = { radius = 0.2, centre = [0.0, 0.0, -0.25] }",
         "capsule = { from = [-0.1, 0.0, -0.2], to = [0.1, 0.0, -0.2], radius = 0.15 }",
-        "box = { centre = [0.0, 0.0, -0.2], size = [0.3, 0.3, 0.3], rounding = 0.03, rotate = { axis = [0.0, 0.0, 1.0], angle = 30.0 } }",
+        "box = { centre = [0.0, 0.0, -0.2], size = [0.3, 0.3, 0.3], rounding = 0.03, \
+         rotate = { axis = [0.0, 0.0, 1.0], angle = 30.0 } }",
         "plane = { point = [0.0, 0.0, -0.1], normal = [0.2, 0.0, 1.0] }",
     ];
     for obstacle in obstacles {
-        let head = "dt = 0.01\nduration = 0.5\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\ndrag = 0.5";
+        let head = "dt = 0.01\nduration = 0.5\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\n\
+            drag = 0.5";
         let text = format!("{}[[obstacles]]\n{obstacle}\nfriction = 0.3\n", sheet(head, 16, 0.5));
         let mut simulation = finished(&text);
         let solid = simulation.obstacles()[0].at(0.0);
@@ -126,7 +129,8 @@ fn the_ledger_closes_for_conserving_integrators() {
     let head =
         |integrator: &str, dt: f64| format!("dt = {dt}\nduration = 0.3\nintegrator = \"{integrator}\"\ndrag = 1.0");
     let rest = "[[pins]]\nbox = { min = [-1.0, 0.099, -1.0], max = [1.0, 0.101, 1.0] }\n[pins.motion]\n\
-                keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.0, 0.15] }]\n[wind]\nvelocity = [0.0, 2.0, 1.0]\n";
+                keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.0, 0.15] }]\n[wind]\n\
+                velocity = [0.0, 2.0, 1.0]\n";
     let balance = |integrator: &str, dt: f64| {
         let mut simulation = finished(&format!("{}{rest}", sheet(&head(integrator, dt), 4, 0.2)));
         let ledger = simulation.ledger().unwrap().clone();
@@ -207,8 +211,10 @@ fn seams_pull_garments_together_and_conserve_momentum() {
 
 #[test]
 fn hair_bends_under_its_weight_like_a_beam() {
-    let text = "dt = 0.01\nduration = 4.0\nintegrator = \"newton\"\ndrag = 6.0\n[[hair]]\ncount = 2\nsegments = 40\nlength = 0.1\n\
-                last_root = [0.0, 0.1, 0.0]\ndirection = [1.0, 0.0, 0.0]\ndensity = 1e-4\nstretch_stiffness = 50.0\nbend_stiffness = 4e-6\n";
+    let text = "dt = 0.01\nduration = 4.0\nintegrator = \"newton\"\ndrag = 6.0\n[[hair]]\ncount = 2\nsegments = 40\n\
+                length = 0.1\n\
+                last_root = [0.0, 0.1, 0.0]\ndirection = [1.0, 0.0, 0.0]\ndensity = 1e-4\nstretch_stiffness = 50.0\n\
+                bend_stiffness = 4e-6\n";
     let simulation = finished(text);
     assert_eq!(simulation.positions().len(), 82);
     // The clamp ends midway between the two held vertices.
@@ -223,8 +229,10 @@ fn hair_bends_under_its_weight_like_a_beam() {
 #[test]
 fn garments_fall_from_their_placements() {
     let text = format!(
-        "dt = 0.01\nduration = 0.1\ngravity = [0.0, 0.0, 0.0]\n[[garment]]\nfabric = \"denim\"\nmesh.disc = {{ radius = 1.0, rings = 3 }}\n\
-         placement = {{ scale = 0.5, rotate = {{ axis = [1.0, 0.0, 0.0], angle = 90.0 }}, translate = [1.0, 2.0, 3.0] }}\n\
+        "dt = 0.01\nduration = 0.1\ngravity = [0.0, 0.0, 0.0]\n[[garment]]\nfabric = \"denim\"\n\
+         mesh.disc = {{ radius = 1.0, rings = 3 }}\n\
+         placement = {{ scale = 0.5, \
+         rotate = {{ axis = [1.0, 0.0, 0.0], angle = 90.0 }}, translate = [1.0, 2.0, 3.0] }}\n\
          velocity = [0.0, 0.5, 0.0]\n[[garment]]\nmesh.strip = {{ length = 0.4, width = 0.1, segments = 8 }}\n{SOFT}"
     );
     let simulation = finished(&text);

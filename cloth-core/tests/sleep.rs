@@ -5,7 +5,8 @@ use cloth_core::Simulation;
 use cloth_core::bench::sleep::{self, Sizes};
 use cloth_core::scene::Scene;
 
-const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\
+                    poisson_ratio = 0.3\n\
                     bending.flat.stiffness = 1e-5\n";
 
 fn started(text: &str) -> Simulation {
@@ -53,7 +54,8 @@ fn uncoupled_vertices_form_islands() {
     let seam = "[[seams]]\ngarments = [\"a\", \"c\"]\npairs = [[0, 24]]\nstiffness = 10.0\n";
     let sewn = format!("{two}{}{seam}", sheet("c", [0.0, 0.4, 0.0]));
     assert_eq!(islands(&sewn), [50, 25]);
-    let hair = "[[hair]]\ncount = 7\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\nbend_stiffness = 1e-7\n";
+    let hair = "[[hair]]\ncount = 7\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\n\
+        bend_stiffness = 1e-7\n";
     assert_eq!(islands(&format!("{two}{hair}")), [25, 25, 42]);
 }
 
@@ -220,7 +222,8 @@ fn gusts_prevent_sleep() {
     let even = gusts.split("[[wind.gusts]]").next().unwrap();
     assert!(settle(&mut started(&format!("{HEAD}{}{pins}{even}", sheet("a", [0.0; 3])))) < 400);
     // Wind acts on triangles only.
-    let hair = "[[hair]]\ncount = 2\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\nbend_stiffness = 1e-7\n";
+    let hair = "[[hair]]\ncount = 2\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\n\
+        bend_stiffness = 1e-7\n";
     let mut simulation = started(&format!("{HEAD}{}{hair}{pins}of = \"a\"\n{gusts}", sheet("a", [0.0; 3])));
     step(&mut simulation, 400);
     assert_eq!(awake(&simulation), [true, false]);
