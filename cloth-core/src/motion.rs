@@ -14,9 +14,9 @@ use crate::geometry::Pose;
 ///
 /// let quarter = Key { time: 1.0, angle: 90.0, translate: [0.0, 0.0, 2.0] };
 /// let motion = Motion { axis: [0.0, 0.0, 1.0], centre: [1.0, 0.0, 0.0], keys: vec![Key::default(), quarter] };
-/// let [x, y, z] = motion.pose(7.0).applied([2.0, 0.0, 0.0]);
+/// let [x, y, z] = motion.pose(7.0).transform([2.0, 0.0, 0.0]);
 /// assert!((x - 1.0).abs() < 1e-15 && (y - 1.0).abs() < 1e-15 && z == 2.0);
-/// assert_eq!(motion.pose(0.5).applied([1.0, 0.0, 0.0]), [1.0, 0.0, 1.0]);
+/// assert_eq!(motion.pose(0.5).transform([1.0, 0.0, 0.0]), [1.0, 0.0, 1.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -72,7 +72,7 @@ impl Motion {
     #[must_use]
     pub fn pose(&self, time: f64) -> Pose {
         let Key { angle, translate, .. } = self.key(time);
-        Pose::turned(self.axis, angle, self.centre).shifted(translate)
+        Pose::rotation(self.axis, angle, self.centre).translated(translate)
     }
 
     /// Whether the pose at time `from` differs from that at time `to`, in s.

@@ -177,15 +177,15 @@ fn mostly_pinned(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
     Ok(Ratio { question, cost, reference, target: 0.15 })
 }
 
-/// Measures all ratios, and calls `tell` with each.
+/// Measures all ratios, and calls `report` with each.
 ///
 /// # Errors
 /// Returns an error if a scene cannot be simulated, or does not fall asleep.
-pub fn measure(sizes: &Sizes, mut tell: impl FnMut(&Ratio)) -> Result<Vec<Ratio>, SleepBenchError> {
+pub fn measure(sizes: &Sizes, mut report: impl FnMut(&Ratio)) -> Result<Vec<Ratio>, SleepBenchError> {
     type Ask = fn(&Sizes) -> Result<Ratio, SleepBenchError>;
     let all: [Ask; 3] = [settled, one_of_many, mostly_pinned];
-    let told = all.into_iter().map(|ask| ask(sizes).inspect(&mut tell));
-    told.collect()
+    let ratios = all.into_iter().map(|ask| ask(sizes).inspect(&mut report));
+    ratios.collect()
 }
 
 /// Formats the ratios as a table.

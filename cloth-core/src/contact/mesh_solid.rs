@@ -21,7 +21,7 @@ impl MeshSolid {
     /// Creates the solid of a surface, at the pose of the surface.
     #[must_use]
     pub fn new(surface: Surface) -> Self {
-        Self { surface: Arc::new(surface), pose: Pose::REST }
+        Self { surface: Arc::new(surface), pose: Pose::IDENTITY }
     }
 
     /// The surface before its motion.
@@ -32,8 +32,8 @@ impl MeshSolid {
 
     /// Returns the current position of a point of the surface, in m.
     #[must_use]
-    pub fn placed(&self, point: Vector3<f64>) -> Vector3<f64> {
-        self.pose.applied(point)
+    pub fn transform(&self, point: Vector3<f64>) -> Vector3<f64> {
+        self.pose.transform(point)
     }
 
     pub(super) fn moved(&self, pose: &Pose) -> Self {
@@ -43,17 +43,17 @@ impl MeshSolid {
     /// Returns the signed distance of a point, in m, and the nearest feature at its current pose.
     #[must_use]
     pub fn nearest(&self, x: Vector3<f64>) -> Nearest {
-        self.placed_nearest(self.surface.nearest(self.pose.undone(x)))
+        self.transform_nearest(self.surface.nearest(self.pose.inverse_transform(x)))
     }
 
     /// Moves a feature from the pose of the surface to the current pose.
-    fn placed_nearest(&self, Nearest { distance, feature }: Nearest) -> Nearest {
+    fn transform_nearest(&self, Nearest { distance, feature }: Nearest) -> Nearest {
         let feature = match feature {
             Feature::Plane { point, normal } => {
-                Feature::Plane { point: self.placed(point), normal: self.pose.turned_direction(normal) }
+                Feature::Plane { point: self.transform(point), normal: self.pose.rotate(normal) }
             }
-            Feature::Edge(ends) => Feature::Edge(ends.map(|end| self.placed(end))),
-            Feature::Corner(corner) => Feature::Corner(self.placed(corner)),
+            Feature::Edge(ends) => Feature::Edge(ends.map(|end| self.transform(end))),
+            Feature::Corner(corner) => Feature::Corner(self.transform(corner)),
         };
         Nearest { distance, feature }
     }
@@ -95,19 +95,19 @@ impl CachedMesh {
 
     /// Returns the feature nearest to a vertex; `None` if it is not within the thickness.
     fn nearest_within(&self, vertex: usize, x: Vector3<f64>, thickness: f64) -> Option<Nearest> {
-        let (surface, at) = (&self.solid.surface, self.solid.pose.undone(x));
+        let (surface, at) = (&self.solid.surface, self.solid.pose.inverse_transform(x));
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         let nearest = match found[vertex] {
             Some(known) if known.at == at => known.nearest,
             Some(known) if known.nearest.distance - norm(subtract(at, known.at)) >= thickness => return None,
-            _ if surface.at_least(at) >= thickness => return None,
+            _ if surface.distance_bound(at) >= thickness => return None,
             _ => {
                 let nearest = surface.nearest(at);
                 found[vertex] = Some(CachedQuery { at, nearest });
                 nearest
             }
         };
-        (nearest.distance < thickness).then(|| self.solid.placed_nearest(nearest))
+        (nearest.distance < thickness).then(|| self.solid.transform_nearest(nearest))
     }
 }
 
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn each_feature_pushes_along_the_distance() {
-        let pose = Pose::turned([0.3, -1.0, 0.5], 40.0, [0.1; 3]).shifted([0.5, 0.2, -0.1]);
+        let pose = Pose::rotation([0.3, -1.0, 0.5], 40.0, [0.1; 3]).translated([0.5, 0.2, -0.1]);
         for radius in [0.0, 0.05] {
             let still = solid(radius);
             let moved = still.moved(&pose);
@@ -215,15 +215,15 @@ mod tests {
             ] {
                 let (cached, push_still) = push(&still, x);
                 assert_eq!(cached, name);
-                let (cached, push_moved) = push(&moved, pose.applied(x));
+                let (cached, push_moved) = push(&moved, pose.transform(x));
                 assert_eq!(cached, name);
-                assert!(norm(subtract(push_moved, pose.turned_direction(push_still))) < 1e-12);
+                assert!(norm(subtract(push_moved, pose.rotate(push_still))) < 1e-12);
             }
         }
         // A pose composed with a pose.
-        let again = Pose::turned([0.0, 0.0, 1.0], 25.0, [0.0; 3]);
+        let again = Pose::rotation([0.0, 0.0, 1.0], 25.0, [0.0; 3]);
         let twice = solid(0.0).moved(&pose).moved(&again);
-        let x = again.applied(pose.applied([0.2, 0.2, -0.1]));
+        let x = again.transform(pose.transform([0.2, 0.2, -0.1]));
         assert!((twice.nearest(x).distance - 0.1).abs() < 1e-12);
         assert!(CachedMesh::new(solid(0.0), 1).nearest_within(0, [9.0, 0.0, 0.0], 7.0).is_none());
     }
@@ -240,7 +240,7 @@ mod tests {
             let still = CachedMesh::new(solid(0.02), 2);
             let mut x = [[0.3; 3], [-0.5; 3]];
             for (vertex, step, angle, straight) in walk {
-                let pose = Pose::turned([1.0, 2.0, -1.0], angle, [0.0; 3]);
+                let pose = Pose::rotation([1.0, 2.0, -1.0], angle, [0.0; 3]);
                 let cached = still.moved(&pose);
                 // Straight to the surface, where the distance falls fastest, or in any other direction.
                 let Nearest { distance, feature } = cached.solid.nearest(x[vertex]);

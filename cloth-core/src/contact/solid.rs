@@ -84,7 +84,7 @@ impl Shape for HalfSpace {
     type Contact = PlaneContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { point: pose.applied(self.point), normal: pose.turned_direction(self.normal) }
+        Self { point: pose.transform(self.point), normal: pose.rotate(self.normal) }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
@@ -100,7 +100,7 @@ impl Shape for Ball {
     type Contact = SphereContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { centre: pose.applied(self.centre), ..*self }
+        Self { centre: pose.transform(self.centre), ..*self }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
@@ -116,14 +116,14 @@ impl Shape for Capsule {
     type Contact = CapsuleContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { ends: self.ends.map(|end| pose.applied(end)), ..*self }
+        Self { ends: self.ends.map(|end| pose.transform(end)), ..*self }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
         let [a, b] = self.ends;
-        let (way, edge) = (subtract(x, a), subtract(b, a));
-        let along = (dot(way, edge) / dot(edge, edge)).clamp(0.0, 1.0);
-        norm(std::array::from_fn(|axis| way[axis] - along * edge[axis])) - self.radius
+        let (offset, edge) = (subtract(x, a), subtract(b, a));
+        let along = (dot(offset, edge) / dot(edge, edge)).clamp(0.0, 1.0);
+        norm(std::array::from_fn(|axis| offset[axis] - along * edge[axis])) - self.radius
     }
 
     fn contact(&self, k: f64, thickness: f64) -> CapsuleContact {
@@ -136,12 +136,12 @@ impl Shape for RoundedBox {
     type Contact = BoxContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { centre: pose.applied(self.centre), axes: self.axes.map(|axis| pose.turned_direction(axis)), ..*self }
+        Self { centre: pose.transform(self.centre), axes: self.axes.map(|axis| pose.rotate(axis)), ..*self }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
-        let way = subtract(x, self.centre);
-        let beyond: Vector3<f64> = std::array::from_fn(|i| dot(self.axes[i], way).abs() - self.half[i]);
+        let offset = subtract(x, self.centre);
+        let beyond: Vector3<f64> = std::array::from_fn(|i| dot(self.axes[i], offset).abs() - self.half[i]);
         let deepest = beyond.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let distance = if deepest > 0.0 { norm(beyond.map(|part| part.max(0.0))) } else { deepest };
         distance - self.radius
@@ -159,10 +159,10 @@ mod tests {
 
     /// Checks that the element's force is k (δ − d)²/δ along the gradient of the signed distance.
     fn agrees(solid: impl Shape, x: Vector3<f64>, distance: f64) {
-        let pose = Pose::turned([0.3, -1.0, 0.5], 40.0, [0.1; 3]).shifted([0.5, 0.2, -0.1]);
+        let pose = Pose::rotation([0.3, -1.0, 0.5], 40.0, [0.1; 3]).translated([0.5, 0.2, -0.1]);
         let (k, thickness) = (3.0, 0.5);
         let moved = solid.moved(&pose);
-        for (solid, x) in [(solid, x), (moved, pose.applied(x))] {
+        for (solid, x) in [(solid, x), (moved, pose.transform(x))] {
             let signed = solid.signed_distance(x);
             assert!((signed - distance).abs() < 1e-12, "got {signed}, expected {distance}");
             let push = solid.contact(k, thickness).gradient(&[x]).gradient[0].map(|component| -component);

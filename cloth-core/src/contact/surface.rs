@@ -151,7 +151,7 @@ impl Surface {
 
     /// Returns a cheap lower bound on the distance of a point, in m: the distance from the bounding box.
     #[must_use]
-    pub fn at_least(&self, x: Vector3<f64>) -> f64 {
+    pub fn distance_bound(&self, x: Vector3<f64>) -> f64 {
         self.hierarchy.distance(x) - self.radius
     }
 
@@ -160,22 +160,22 @@ impl Surface {
     pub fn nearest(&self, x: Vector3<f64>) -> Nearest {
         let found = self.hierarchy.nearest(x, |triangle| {
             let (closest, region) = closest(self.mesh.corners(triangle), x);
-            let way = subtract(x, closest);
-            (dot(way, way), (triangle, closest, region))
+            let offset = subtract(x, closest);
+            (dot(offset, offset), (triangle, closest, region))
         });
         // A mesh has at least one triangle, so this never happens.
         let Some((_, (triangle, closest, region))) = found else {
             return Nearest { distance: f64::INFINITY, feature: Feature::Corner(x) };
         };
-        let way = subtract(x, closest);
+        let offset = subtract(x, closest);
         let outwards = match region {
             Region::Face => self.face_normals[triangle],
             Region::Edge(edge) => self.edge_normals[triangle][edge],
             Region::Corner(corner) => self.vertex_normals[self.mesh.triangles()[triangle][corner]],
         };
-        let is_inside = dot(way, outwards) < 0.0;
+        let is_inside = dot(offset, outwards) < 0.0;
         let corners = self.mesh.corners(triangle);
-        let length = norm(way);
+        let length = norm(offset);
         let (distance, feature) = match region {
             // The distance from the plane equals the length, without cancellation if the length is small.
             Region::Face => {
@@ -185,7 +185,7 @@ impl Surface {
                 (side * height, Feature::Plane { point: corners[0], normal })
             }
             _ if is_inside && self.is_closed => {
-                (-length, Feature::Plane { point: closest, normal: way.map(|component| -component / length) })
+                (-length, Feature::Plane { point: closest, normal: offset.map(|component| -component / length) })
             }
             Region::Edge(edge) => (length, Feature::Edge([corners[edge], corners[(edge + 1) % 3]])),
             Region::Corner(corner) => (length, Feature::Corner(corners[corner])),
@@ -234,7 +234,7 @@ fn closest([a, b, c]: [Vector3<f64>; 3], x: Vector3<f64>) -> (Vector3<f64>, Regi
     if d3 >= 0.0 && d4 <= d3 {
         return (b, Region::Corner(1));
     }
-    let on = |from: Vector3<f64>, way: Vector3<f64>, part: f64| std::array::from_fn(|i| from[i] + part * way[i]);
+    let on = |from: Vector3<f64>, offset: Vector3<f64>, part: f64| std::array::from_fn(|i| from[i] + part * offset[i]);
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
         return (on(a, ab, d1 / (d1 - d3)), Region::Edge(0));
@@ -308,14 +308,14 @@ mod tests {
             let surface = Surface::new(bracket(), radius).unwrap();
             let Nearest { distance, feature } = surface.nearest([x, y, z]);
             prop_assert!((distance - (exact([x, y, z]) - radius)).abs() < 1e-12, "{distance} {feature:?}");
-            prop_assert!(surface.at_least([x, y, z]) <= distance.max(0.0) + 1e-12);
+            prop_assert!(surface.distance_bound([x, y, z]) <= distance.max(0.0) + 1e-12);
             // The feature alone gives the same distance.
             let alone = match feature {
                 Feature::Plane { point, normal } => dot(normal, subtract([x, y, z], point)),
                 Feature::Edge([a, b]) => {
-                    let (way, edge) = (subtract([x, y, z], a), subtract(b, a));
-                    let part = (dot(way, edge) / dot(edge, edge)).clamp(0.0, 1.0);
-                    norm(std::array::from_fn(|i| way[i] - part * edge[i]))
+                    let (offset, edge) = (subtract([x, y, z], a), subtract(b, a));
+                    let part = (dot(offset, edge) / dot(edge, edge)).clamp(0.0, 1.0);
+                    norm(std::array::from_fn(|i| offset[i] - part * edge[i]))
                 }
                 Feature::Corner(corner) => norm(subtract([x, y, z], corner)),
             };
@@ -346,8 +346,8 @@ mod tests {
             let triangles: Vec<[Vector3<f64>; 3]> = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
             let bounds: Vec<Bounds> = triangles.iter().map(|corners| Bounds::of(corners)).collect();
             let square = |triangle: usize| {
-                let way = subtract(x, closest(triangles[triangle], x).0);
-                dot(way, way)
+                let offset = subtract(x, closest(triangles[triangle], x).0);
+                dot(offset, offset)
             };
             let found = Hierarchy::new(&bounds).nearest(x, |triangle| (square(triangle), ())).unwrap().0;
             let least = (0..triangles.len()).map(square).fold(f64::INFINITY, f64::min);
@@ -398,7 +398,7 @@ mod tests {
         let mixed = TriangleMesh::new(mesh.vertices().to_vec(), triangles).unwrap();
         let message = Surface::new(mixed, 0.0).unwrap_err().to_string();
         assert!(
-            message.contains("run through their edge") && message.contains("make the normals consistent"),
+            message.contains("traverse their edge") && message.contains("make the normals consistent"),
             "{message}"
         );
     }

@@ -193,6 +193,10 @@ pub(super) fn surface_velocity(motion: Option<&Motion>, step: [f64; 2], x: Vecto
         return [0.0; 3];
     };
     let [before, after]: [Pose; 2] = step.map(|time| motion.pose(time));
-    let [start, end] = if at_end { [before.applied(after.undone(x)), x] } else { [x, after.applied(before.undone(x))] };
+    let [start, end] = if at_end {
+        [before.transform(after.inverse_transform(x)), x]
+    } else {
+        [x, after.transform(before.inverse_transform(x))]
+    };
     std::array::from_fn(|axis| (end[axis] - start[axis]) / (to - from))
 }

@@ -174,9 +174,9 @@ impl Declared {
         let parameters = declaration.parameters.iter().map(parameter).collect::<Result<Vec<f64>, _>>()?;
         let at_rest: Vec<Vector3<f64>> = site.vertices.iter().map(|&vertex| target.mesh.vertices()[vertex]).collect();
         let sizes: Vec<usize> = declaration.rest.iter().map(|field| field.size).collect();
-        let rest = match (&site.laid, &sizes[..]) {
+        let rest = match (&site.corners_in_plane, &sizes[..]) {
             (_, []) => Vec::new(),
-            (Some(laid), [2, 2, 2]) => laid.as_flattened().to_vec(),
+            (Some(corners_in_plane), [2, 2, 2]) => corners_in_plane.as_flattened().to_vec(),
             (_, sizes) if sizes.len() == at_rest.len() && sizes.iter().all(|&size| size == 3) => at_rest.concat(),
             _ => return Err(unfit("an energy whose rest shape is not one point for each of its points".to_owned())),
         };
@@ -188,7 +188,7 @@ impl Declared {
 struct Site {
     vertices: Vec<usize>,
     /// For a triangle, its corners in its plane.
-    laid: Option<MaterialTriangle>,
+    corners_in_plane: Option<MaterialTriangle>,
     /// The name and value of the parameter with a default.
     default: (&'static str, f64),
 }
@@ -202,7 +202,7 @@ impl Site {
 /// Returns all vertices, edges, triangles or hinges, by the number of points; `None` for other numbers.
 fn sites(points: usize, target: &TargetMesh<'_>) -> Option<Vec<Site>> {
     let mesh = target.mesh;
-    let site = |vertices: &[usize], default| Site { vertices: vertices.to_vec(), laid: None, default };
+    let site = |vertices: &[usize], default| Site { vertices: vertices.to_vec(), corners_in_plane: None, default };
     Some(match points {
         1 => {
             let masses = lumped_masses(mesh, target.density);
@@ -214,9 +214,9 @@ fn sites(points: usize, target: &TargetMesh<'_>) -> Option<Vec<Site>> {
         }
         3 => {
             let triangles = mesh.triangles().iter().zip(target.triangles);
-            let triangle = |(corners, laid): (&[usize; 3], &MaterialTriangle)| Site {
-                laid: Some(*laid),
-                ..site(corners, ("A", super::terms::area(*laid)))
+            let triangle = |(corners, corners_in_plane): (&[usize; 3], &MaterialTriangle)| Site {
+                corners_in_plane: Some(*corners_in_plane),
+                ..site(corners, ("A", super::terms::area(*corners_in_plane)))
             };
             triangles.map(triangle).collect()
         }

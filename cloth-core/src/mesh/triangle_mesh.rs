@@ -80,7 +80,7 @@ impl TriangleMesh {
     /// Returns the mesh after a rigid motion.
     #[must_use]
     pub fn moved(self, pose: &Pose) -> Self {
-        Self { vertices: self.vertices.iter().map(|&vertex| pose.applied(vertex)).collect(), ..self }
+        Self { vertices: self.vertices.iter().map(|&vertex| pose.transform(vertex)).collect(), ..self }
     }
 
     /// Rest positions, in m.

@@ -339,9 +339,9 @@ impl<'a> Builder<'a> {
         for (vertex, motion) in held {
             model.v[vertex] = [0.0; 3];
             if let Some(motion) = motion {
-                let drawn = model.x[vertex];
-                model.moving.push(MovingPin { vertex, drawn, motion });
-                model.x[vertex] = model.motions[motion].pose(0.0).applied(drawn);
+                let initial = model.x[vertex];
+                model.moving.push(MovingPin { vertex, initial, motion });
+                model.x[vertex] = model.motions[motion].pose(0.0).transform(initial);
             }
         }
         Ok(())

@@ -42,7 +42,7 @@ pub struct MovingPin {
     /// The index of the vertex.
     pub vertex: usize,
     /// Initial position before the motion, in m.
-    pub drawn: Vector3<f64>,
+    pub initial: Vector3<f64>,
     /// An index into [`Model::motions`].
     pub motion: usize,
 }

@@ -143,8 +143,8 @@ fn draw_strand(
 ) {
     let lamp = LAMP.map(|component| component / norm(LAMP));
     for end in strand.skip(1) {
-        let way = subtract(positions[end], positions[end - 1]);
-        let along = dot(way, lamp) / norm(way).max(f64::MIN_POSITIVE);
+        let offset = subtract(positions[end], positions[end - 1]);
+        let along = dot(offset, lamp) / norm(offset).max(f64::MIN_POSITIVE);
         let brightness = 0.15 + 0.85 * (1.0 - along * along).max(0.0).sqrt();
         let [from, to] = [end - 1, end].map(|vertex| {
             let (place, depth) = camera.project(positions[vertex]);
@@ -207,8 +207,8 @@ fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
     let floor = floor.unwrap_or(low - 0.08 * (high - low));
     let cast = |p: &Vector3<f64>| {
-        let way = (p[2] - floor) / LAMP[2];
-        [p[0] - way * LAMP[0], p[1] - way * LAMP[1], floor]
+        let offset = (p[2] - floor) / LAMP[2];
+        [p[0] - offset * LAMP[0], p[1] - offset * LAMP[1], floor]
     };
     positions.iter().map(cast).collect()
 }

@@ -52,7 +52,7 @@ impl Camera {
 
     /// Returns the unit vector from a point to the eye.
     pub(crate) fn towards_eye(&self, point: Vector3<f64>) -> Vector3<f64> {
-        let way = subtract(self.eye, point);
-        way.map(|component| component / norm(way))
+        let offset = subtract(self.eye, point);
+        offset.map(|component| component / norm(offset))
     }
 }

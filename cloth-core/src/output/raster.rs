@@ -49,8 +49,8 @@ impl Canvas {
             let first = [columns.0 as f64 + 0.5, row as f64 + 0.5];
             let starts = [weight(b, c, first), weight(c, a, first), weight(a, b, first)];
             for column in columns.0..columns.1 {
-                let way = (column - columns.0) as f64;
-                let parts: [f64; 3] = std::array::from_fn(|i| starts[i] + way * steps[i]);
+                let offset = (column - columns.0) as f64;
+                let parts: [f64; 3] = std::array::from_fn(|i| starts[i] + offset * steps[i]);
                 // A tiny overlap: rounding leaves no gap between neighbours.
                 if parts.iter().any(|part| *part < -1e-9) {
                     continue;
@@ -72,12 +72,12 @@ impl Canvas {
 
     /// Draws a line with this width, in pixels.
     pub fn line(&mut self, from: Corner, to: Corner, width: f64) {
-        let way = [to.place[0] - from.place[0], to.place[1] - from.place[1]];
-        let length = way[0].hypot(way[1]);
+        let offset = [to.place[0] - from.place[0], to.place[1] - from.place[1]];
+        let length = offset[0].hypot(offset[1]);
         if length == 0.0 {
             return;
         }
-        let side = [-0.5 * width * way[1] / length, 0.5 * width * way[0] / length];
+        let side = [-0.5 * width * offset[1] / length, 0.5 * width * offset[0] / length];
         let moved = |corner: Corner, sign: f64| {
             let place = [corner.place[0] + sign * side[0], corner.place[1] + sign * side[1]];
             Corner { place, ..corner }

@@ -102,7 +102,7 @@ fn surface(solid: &MeshSolid) -> SolidMesh {
     let (mesh, radius) = (solid.surface().mesh(), solid.surface().radius());
     let normals = super::vertex_normals(mesh.vertices(), mesh.triangles());
     let moved = |(p, n): (&Vector3<f64>, Vector3<f64>)| -> Vector3<f64> {
-        solid.placed(std::array::from_fn(|axis| p[axis] + radius * n[axis]))
+        solid.transform(std::array::from_fn(|axis| p[axis] + radius * n[axis]))
     };
     SolidMesh {
         vertices: mesh.vertices().iter().zip(normals).map(moved).collect(),

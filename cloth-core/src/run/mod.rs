@@ -137,7 +137,7 @@ impl Run {
         &self.simulation
     }
 
-    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `tell` after each step.
+    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each step.
     /// The results so far are written in any case, also after a failed step.
     ///
     /// # Errors
@@ -145,7 +145,7 @@ impl Run {
     pub fn go(
         &mut self,
         stop: &AtomicBool,
-        mut tell: impl FnMut(&Simulation, &StepReport),
+        mut on_step: impl FnMut(&Simulation, &StepReport),
     ) -> Result<Ending, RunError> {
         while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
             let report = match self.simulation.step() {
@@ -155,7 +155,7 @@ impl Run {
                     return Err(error.into());
                 }
             };
-            tell(&self.simulation, &report);
+            on_step(&self.simulation, &report);
             let done = self.simulation.steps_done();
             if done.is_multiple_of(self.scene.steps_per_frame()) {
                 self.add_frame()?;

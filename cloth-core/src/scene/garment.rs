@@ -93,8 +93,8 @@ impl Placement {
     /// Returns the rotation and translation.
     #[must_use]
     pub fn pose(&self) -> Pose {
-        let turned = self.rotate.map_or(Pose::REST, |turn| Pose::turned(turn.axis, turn.angle, [0.0; 3]));
-        turned.shifted(self.translate)
+        let rotation = self.rotate.map_or(Pose::IDENTITY, |turn| Pose::rotation(turn.axis, turn.angle, [0.0; 3]));
+        rotation.translated(self.translate)
     }
 }
 
@@ -142,7 +142,7 @@ impl Garment {
             Mesh::Disc(disc) => disc.mesh()?,
             Mesh::Obj { path } => read_obj(&folder.join(path))?,
         };
-        let drawn = sheet.map_or_else(|| Ok(mesh.vertices().to_vec()), |sheet| sheet.start())?;
+        let initial = sheet.map_or_else(|| Ok(mesh.vertices().to_vec()), |sheet| sheet.start())?;
         let springs = match &sheet {
             Some(sheet) => SpringNetwork::of_sheet(sheet),
             None => SpringNetwork::of_mesh(&Topology::of(&mesh)),
@@ -150,7 +150,7 @@ impl Garment {
         let Placement { scale, translate, .. } = self.placement;
         let mesh = if scale == 1.0 { mesh } else { mesh.scaled(scale)? };
         let pose = self.placement.pose();
-        let start: Vec<Vector3<f64>> = drawn.iter().map(|p| pose.applied(p.map(|c| scale * c))).collect();
+        let start: Vec<Vector3<f64>> = initial.iter().map(|p| pose.transform(p.map(|c| scale * c))).collect();
         let velocity = |p: &Vector3<f64>| -> Vector3<f64> {
             let turning = cross(self.spin, subtract(*p, translate));
             std::array::from_fn(|axis| self.velocity[axis] + turning[axis])

@@ -218,8 +218,8 @@ impl ObstacleDescription {
                 ("capsule", AnySolid::Capsule(Capsule { ends: [from, to], radius }))
             }
             ShapeKeys::Block(BoxKeys { centre, size, rotate, rounding }) => {
-                let turn = rotate.map_or(Pose::REST, |turn| Pose::turned(turn.axis, turn.angle, [0.0; 3]));
-                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turn.applied(axis));
+                let turn = rotate.map_or(Pose::IDENTITY, |turn| Pose::rotation(turn.axis, turn.angle, [0.0; 3]));
+                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turn.transform(axis));
                 let half = size.map(|edge| 0.5 * edge - rounding);
                 ("box", AnySolid::Box(RoundedBox { centre, axes, half, radius: rounding }))
             }

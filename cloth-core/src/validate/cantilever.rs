@@ -89,7 +89,7 @@ impl Cantilever {
     }
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let (segments, gammas): (_, &[f64]) =
         if quick { (40, &[1.0, 20.0]) } else { (80, &[0.1, 1.0, 10.0, 100.0, 1000.0]) };
     let orientations: &[f64] = if quick { &[0.0, 30.0] } else { &[0.0, 30.0, 45.0, 90.0] };
@@ -98,14 +98,14 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
             for &gamma in gammas {
                 let aspect = 5.0 / segments as f64;
                 let case = Cantilever { gamma, poisson_ratio: 0.0, aspect, mesh, orientation, segments };
-                tell(case.ask()?);
+                report(case.ask()?);
             }
         }
     }
     if quick {
         return Ok(());
     }
-    tell(order()?);
+    report(order()?);
     let wide = |aspect| Cantilever {
         gamma: 5.0,
         poisson_ratio: 0.3,
@@ -115,7 +115,7 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
         segments: 40,
     };
     for aspect in [0.15, 1.0] {
-        tell(wide(aspect).ask()?);
+        report(wide(aspect).ask()?);
     }
     Ok(())
 }

@@ -36,13 +36,13 @@ fn sag(span: f64, segments: usize) -> Result<f64, ValidateError> {
     Ok(-found.x.iter().map(|x| x[2]).fold(0.0, f64::min))
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let segments = if quick { 60 } else { 120 };
     for span in [0.5, 0.75, 0.9] {
         let u = parameter(span);
         let exact = 0.5 * (u.cosh() - 1.0) / u.sinh();
         let case = format!("span {span} of the length, {segments} segments: sag");
-        tell(Finding::relative("catenary", case, sag(span, segments)?, exact, 0.01));
+        report(Finding::relative("catenary", case, sag(span, segments)?, exact, 0.01));
     }
     Ok(())
 }

@@ -80,13 +80,13 @@ impl Elastica {
     }
 }
 
-/// Integrates from the free end to the clamp and returns δ there. Calls `tell` with δ at every whole and half step.
-fn shoot(gamma: f64, tip: f64, mut tell: impl FnMut(usize, f64)) -> f64 {
+/// Integrates from the free end to the clamp and returns δ there. Calls `report` with δ at every whole and half step.
+fn shoot(gamma: f64, tip: f64, mut report: impl FnMut(usize, f64)) -> f64 {
     let h = 0.5 / STEPS as f64;
     // In t = 1 − s: δ″ = Γ t sin δ.
     let rate = |t: f64, [delta, slope]: [f64; 2]| [slope, gamma * t * delta.sin()];
     let mut y = [tip, 0.0];
-    tell(2 * STEPS, y[0]);
+    report(2 * STEPS, y[0]);
     for step in 0..2 * STEPS {
         let t = step as f64 * h;
         let along = |k: [f64; 2], part: f64| [y[0] + part * k[0], y[1] + part * k[1]];
@@ -100,7 +100,7 @@ fn shoot(gamma: f64, tip: f64, mut tell: impl FnMut(usize, f64)) -> f64 {
         if y[0] > 4.0 {
             return y[0];
         }
-        tell(2 * STEPS - step - 1, y[0]);
+        report(2 * STEPS - step - 1, y[0]);
     }
     y[0]
 }

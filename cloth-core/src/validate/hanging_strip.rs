@@ -108,7 +108,7 @@ fn measured(material: Material, segments: usize) -> Result<f64, ValidateError> {
     Ok(end.iter().sum::<f64>() / end.len() as f64)
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let segments = if quick { 40 } else { 80 };
     for Sample { name, material, density } in samples() {
         let (lambda, mu) = match &material {
@@ -120,7 +120,7 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
         };
         let case = format!("{name}, {segments} segments: ΔL/L");
         let exact = exact(density, lambda, mu);
-        tell(Finding::relative("hanging strip", case, measured(material, segments)?, exact, 0.01));
+        report(Finding::relative("hanging strip", case, measured(material, segments)?, exact, 0.01));
     }
     Ok(())
 }

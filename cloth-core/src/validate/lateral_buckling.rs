@@ -95,7 +95,7 @@ impl LateralBuckling {
     }
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let case = |poisson_ratio, aspect, mesh, orientation, segments| LateralBuckling {
         poisson_ratio,
         aspect,
@@ -104,16 +104,16 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
         segments,
     };
     if quick {
-        tell(case(0.3, 0.2, MeshKind::Diagonal, 0.0, 30).ask()?);
+        report(case(0.3, 0.2, MeshKind::Diagonal, 0.0, 30).ask()?);
         return Ok(());
     }
     for (aspect, segments) in [(0.1, 80), (0.2, 50), (0.5, 30)] {
         for poisson_ratio in [0.0, 0.3] {
-            tell(case(poisson_ratio, aspect, MeshKind::Diagonal, 0.0, segments).ask()?);
+            report(case(poisson_ratio, aspect, MeshKind::Diagonal, 0.0, segments).ask()?);
         }
     }
     for mesh in [MeshKind::Equilateral, MeshKind::Alternating, MeshKind::Random] {
-        tell(case(0.3, 0.2, mesh, 30.0, 50).ask()?);
+        report(case(0.3, 0.2, mesh, 30.0, 50).ask()?);
     }
     Ok(())
 }

@@ -63,37 +63,37 @@ fn rest(body: Body) -> Result<f64, ValidateError> {
     Ok(rest.system.energies(&rest.x)?.iter().filter_map(|term| term.energy).sum())
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     // Long steps dissipate more, so fewer of them suffice.
     let (steps, long) = if quick { (1_500, 0.1) } else { (100_000, 0.02) };
     let swing = {
         let mut body = hanging()?;
         energy(&mut body)? - rest(body)?
     };
-    dissipating(swing, long, steps, tell)?;
-    conserving(swing, steps, tell)
+    dissipating(swing, long, steps, report)?;
+    conserving(swing, steps, report)
 }
 
 /// Implicit Euler: energy falls monotonically to that of the equilibrium.
-fn dissipating(swing: f64, dt: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+fn dissipating(swing: f64, dt: f64, steps: usize, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let exact = NewtonOptions { velocity_tolerance: 1e-9, linear_tolerance: 1e-6, ..NewtonOptions::default() };
     let mut body = hanging()?;
     let all = energies(&mut Newton::with_options(exact), &mut body, dt, steps)?;
     let growth = all.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max) / swing;
     let case = |what: &str| format!("newton, {steps} steps: {what}");
-    tell(Finding::absolute("long run", case("growth in a step"), growth, 0.0, 1e-12));
+    report(Finding::absolute("long run", case("growth in a step"), growth, 0.0, 1e-12));
     let tenth = &all[all.len() - steps / 10..];
     let spread = tenth.iter().fold(f64::NEG_INFINITY, |most, e| most.max(*e))
         - tenth.iter().fold(f64::INFINITY, |least, e| least.min(*e));
     let end = all[steps];
-    tell(Finding::absolute("long run", case("change in the last tenth"), spread / swing, 0.0, 1e-9));
-    tell(Finding::absolute("long run", case("above the equilibrium"), (end - rest(body)?) / swing, 0.0, 1e-9));
+    report(Finding::absolute("long run", case("change in the last tenth"), spread / swing, 0.0, 1e-9));
+    report(Finding::absolute("long run", case("above the equilibrium"), (end - rest(body)?) / swing, 0.0, 1e-9));
     Ok(())
 }
 
 /// The other integrators: the energy error of the last tenth equals that of the first, except for the part that follows
 /// the motion. The motion develops finer scales and then stays so; the second half shows no trend.
-fn conserving(swing: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+fn conserving(swing: f64, steps: usize, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let exact = NewtonOptions { velocity_tolerance: 1e-10, linear_tolerance: 1e-6, ..NewtonOptions::default() };
     // Symplectic Euler is of first order, so its energy oscillates more.
     let schemes: [(Box<dyn Integrator>, f64); 3] = [
@@ -107,9 +107,9 @@ fn conserving(swing: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result
         let largest = all.iter().map(|e| (e - all[0]).abs() / swing).fold(0.0, f64::max);
         let case = |what: &str| format!("{}, {steps} steps: {what}", scheme.name());
         let tenth = |number: usize| mean(&all[number * steps / 10..(number + 1) * steps / 10]);
-        tell(Finding::absolute("long run", case("largest error"), largest, 0.0, limit));
-        tell(Finding::absolute("long run", case("drift"), tenth(9) - tenth(0), 0.0, 0.005));
-        tell(Finding::absolute("long run", case("drift, second half"), tenth(9) - tenth(5), 0.0, 0.1 * limit));
+        report(Finding::absolute("long run", case("largest error"), largest, 0.0, limit));
+        report(Finding::absolute("long run", case("drift"), tenth(9) - tenth(0), 0.0, 0.005));
+        report(Finding::absolute("long run", case("drift, second half"), tenth(9) - tenth(5), 0.0, 0.1 * limit));
     }
     Ok(())
 }

@@ -119,12 +119,12 @@ pub enum ValidateError {
 pub const QUESTIONS: [&str; 8] =
     ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "long-run"];
 
-/// Answers the named questions, or all if `names` is empty, and calls `tell` with each finding. `quick` skips the finer
+/// Answers the named questions, or all if `names` is empty, and calls `report` with each finding. `quick` skips the finer
 /// meshes.
 ///
 /// # Errors
 /// Returns an error if a case cannot be set up or solved.
-pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
+pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
     let all: [Ask; 8] = [
         cantilever::ask,
@@ -140,7 +140,7 @@ pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Res
     for (name, ask) in QUESTIONS.into_iter().zip(all) {
         if names.is_empty() || names.iter().any(|wanted| wanted == name) {
             ask(quick, &mut |finding| {
-                tell(&finding);
+                report(&finding);
                 findings.push(finding);
             })?;
         }

@@ -63,29 +63,29 @@ fn plate(rigidity: f64) -> Bending {
     Bending::Plate(Rigidity::Flexural { rigidity, poisson_ratio: 0.0 })
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let segments = if quick { 60 } else { 120 };
     for links in [1, 3, 20] {
         let x = zero_between(0.0, 2.5 / links as f64, |x| laguerre(links, x));
         let exact = (links as f64 * x).sqrt();
         let case = format!("chain of {links} masses: ω₁ √(L/g)");
-        tell(Finding::relative("modes", case, chain(links)?, exact, 1e-4));
+        report(Finding::relative("modes", case, chain(links)?, exact, 1e-4));
     }
     let exact = 0.5 * zero_between(2.0, 3.0, |x| bessel_core(0.0, x));
     let measured = strip(Bending::None, 1.0, false, segments)?.unwrap_or(f64::NAN);
     let case = format!("hanging sheet, {segments} segments: ω₁ √(L/g)");
-    tell(Finding::relative("modes", case, measured, exact, 0.01));
+    report(Finding::relative("modes", case, measured, exact, 0.01));
 
     let exact = std::f64::consts::TAU * (2.0_f64 / 3.0).sqrt();
     let measured = std::f64::consts::TAU / strip(plate(1e3), 1.0, false, segments)?.unwrap_or(f64::NAN);
     let case = format!("rigid hinged sheet, {segments} segments: T √(g/L)");
-    tell(Finding::relative("modes", case, measured, exact, 0.01));
+    report(Finding::relative("modes", case, measured, exact, 0.01));
 
     let root = zero_between(1.5, 2.2, |x| bessel_core(-1.0 / 3.0, x));
     let measured = critical_load("the standing strip", Symmetry::None, 4.0, |gamma| {
         Ok(strip(plate(1.0 / gamma), -1.0, true, segments)?.map(|omega| gamma * omega * omega))
     })?;
     let case = format!("standing strip, {segments} segments: Γ*");
-    tell(Finding::relative("modes", case, measured, 2.25 * root * root, 0.01));
+    report(Finding::relative("modes", case, measured, 2.25 * root * root, 0.01));
     Ok(())
 }

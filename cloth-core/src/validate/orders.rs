@@ -123,7 +123,7 @@ fn error(body: &mut Body, scheme: &mut dyn Integrator, steps: usize, truth: &Bod
     Ok(apart.fold(0.0, f64::max))
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     type Make = fn() -> Result<Body, ValidateError>;
     let steps = if quick { 800 } else { 1600 };
     for (name, make) in [("pendulum", pendulum as Make), ("4 × 4 springs", patch as Make)] {
@@ -133,7 +133,7 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
             let coarse = error(&mut make()?, &mut *scheme, steps / 2, &truth)?;
             let fine = error(&mut make()?, &mut *scheme, steps, &truth)?;
             let case = format!("{name}, {}, {} to {steps} steps", scheme.name(), steps / 2);
-            tell(Finding::absolute("order", case, (coarse / fine).log2(), order, limit));
+            report(Finding::absolute("order", case, (coarse / fine).log2(), order, limit));
         }
     }
     Ok(())

@@ -65,9 +65,9 @@ fn intersect(ray: &Ray, [a, b, c]: [Vector3<f64>; 3]) -> Option<Hit> {
     if determinant == 0.0 {
         return None;
     }
-    let way = subtract(ray.origin, a);
-    let u = dot(way, across) / determinant;
-    let turned = cross(way, ab);
+    let offset = subtract(ray.origin, a);
+    let u = dot(offset, across) / determinant;
+    let turned = cross(offset, ab);
     let v = dot(ray.direction, turned) / determinant;
     let distance = dot(ac, turned) / determinant;
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(Hit { distance, weights: [1.0 - u - v, u, v] })

@@ -15,7 +15,7 @@ pub struct Screenshot {
     pub legend: String,
 }
 
-/// Draws a moment of a scene, which is simulated up to there, or of a finished run. Needs no display. Calls `tell`
+/// Draws a moment of a scene, which is simulated up to there, or of a finished run. Needs no display. Calls `on_step`
 /// after each step.
 ///
 /// # Errors
@@ -25,10 +25,10 @@ pub fn screenshot(
     moment: Moment,
     colouring: Colouring,
     wireframe: bool,
-    tell: impl FnMut(),
+    on_step: impl FnMut(),
 ) -> Result<Screenshot, ViewError> {
     let mut stage = Stage::open(path)?;
-    stage.go_to(moment, tell)?;
+    stage.go_to(moment, on_step)?;
     let values = stage.values(colouring);
     let most = upper_end(&values);
     let colours: Vec<[f32; 3]> = values.iter().map(|&value| colour(value, most)).collect();

@@ -64,7 +64,7 @@ pub enum ViewError {
         /// Message of the engine.
         reason: String,
     },
-    /// The picture cannot be drawn.
+    /// The picture cannot be initial.
     #[error(transparent)]
     Picture(#[from] crate::output::PictureError),
 }
@@ -188,7 +188,7 @@ impl Stage {
             Colouring::Speed => match &self.act {
                 Act::Recorded { frames, now } if *now > 0 => {
                     let moved = frames[*now - 1].iter().zip(x).map(|(before, after)| norm(subtract(*after, *before)));
-                    moved.map(|way| way / self.frame_time()).collect()
+                    moved.map(|offset| offset / self.frame_time()).collect()
                 }
                 _ => self.simulation.velocities().iter().map(|&v| norm(v)).collect(),
             },
@@ -276,11 +276,11 @@ impl Stage {
         Ok(())
     }
 
-    /// Goes to a moment without showing those before it, and pauses. Calls `tell` after each step.
+    /// Goes to a moment without showing those before it, and pauses. Calls `on_step` after each step.
     ///
     /// # Errors
     /// Returns an error if a step fails, or the run has no such frame.
-    pub fn go_to(&mut self, moment: Moment, mut tell: impl FnMut()) -> Result<(), ViewError> {
+    pub fn go_to(&mut self, moment: Moment, mut on_step: impl FnMut()) -> Result<(), ViewError> {
         self.playing = false;
         let rounded = |time: f64, interval: f64| (time / interval + 1e-9).floor().max(0.0);
         let frame_time = self.frame_time();
@@ -304,7 +304,7 @@ impl Stage {
         };
         while self.simulation.steps_done() < steps {
             self.simulation.step()?;
-            tell();
+            on_step();
         }
         Ok(())
     }
