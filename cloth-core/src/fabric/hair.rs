@@ -1,7 +1,9 @@
 use energy_dsl::Vector3;
+use energy_elements::{HairBend, HookeSpring};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::{FabricError, FabricTerms, Place, Surroundings};
 use crate::bounded::{count, finite_triple, non_negative, nonzero_triple, positive};
 use crate::geometry::norm;
 
@@ -80,4 +82,27 @@ impl Hair {
             .flat_map(|_| (0..=self.segments).map(|j| if end(j) { 0.5 * segment } else { segment }))
             .collect()
     }
+}
+
+/// Creates the terms of hair, whose strands follow one another in the system.
+///
+/// # Errors
+/// Returns an error if there are more vertices than an index can hold.
+pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, place: Place) -> Result<FabricTerms, FabricError> {
+    let mut terms = FabricTerms::new(hair.masses(), place);
+    let starts = || (0..hair.count).map(|strand| strand * (hair.segments + 1));
+    let segments: Vec<[usize; 2]> =
+        starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();
+    let bends: Vec<[usize; 3]> =
+        starts().flat_map(|start| (start..start + hair.segments - 1).map(|at| [at, at + 1, at + 2])).collect();
+    let length = hair.length / hair.segments as f64;
+    let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
+    terms.add_potential("hair stretch", &segments, springs)?;
+    if !terms.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
+        // k/2 (1 − cos φ) ≈ k φ²/4 must equal the energy of a rod over one segment, B φ²/(2 l).
+        let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
+        terms.add_potential("hair bending", &bends, bending)?;
+    }
+    terms.add_surroundings(surroundings)?;
+    Ok(terms)
 }

@@ -1,54 +1,21 @@
 use energy_dsl::{Element, ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, BridsonForce, BridsonForceDamped,
-    FlatBending, Gravity, HairBend, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK,
-    StableNeoHookean, StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
+    FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
+    StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
-use super::declared::{Declared, DeclaredError, TargetMesh};
-use super::hair::Hair;
+use super::declared::{Declared, TargetMesh};
+use super::error::FabricError;
 use super::interpreted_term::InterpretedTerm;
-use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
+use super::plate::{PlateTerm, Rigidity, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
     Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, lumped_masses, material_triangle, rest_angle,
     thread_triangle,
 };
-
-/// A fabric that does not fit a mesh.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages name the fields")]
-pub enum FabricError {
-    /// A triangle is rejected as a rest shape.
-    #[error("triangle {triangle}: {source}")]
-    Rest { triangle: usize, source: RestError },
-    /// A hinge is rejected as a rest shape.
-    #[error("the hinge on vertices {vertices:?}: {source}")]
-    RestHinge { vertices: [usize; 4], source: RestError },
-    /// The bending plate is invalid.
-    #[error("bending: {0}")]
-    Plate(#[from] PlateError),
-    /// The stiffnesses of woven cloth contradict each other.
-    #[error("material.orthotropic-stvk: {0}")]
-    Woven(#[from] RigidityError),
-    /// A triangle has no warp direction.
-    #[error(transparent)]
-    Threads(#[from] ThreadError),
-    /// Elements declared in a file are invalid.
-    #[error(transparent)]
-    Declared(#[from] DeclaredError),
-    /// The strain limit acts at rest.
-    #[error("strain_limit.stretch: expected a number greater than 1, the rest length; got {stretch}")]
-    Limit {
-        /// The limit given.
-        stretch: f64,
-    },
-    /// Elements and stencils do not match.
-    #[error(transparent)]
-    List(#[from] ListError),
-}
 
 /// External forces on every cloth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,29 +47,6 @@ pub struct FabricTerms {
     /// Warnings about the fabric.
     pub warnings: Vec<String>,
     place: Place,
-}
-
-/// Creates the terms of hair, whose strands follow one another in the system.
-///
-/// # Errors
-/// Returns an error if there are more vertices than an index can hold.
-pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, place: Place) -> Result<FabricTerms, FabricError> {
-    let mut terms = FabricTerms::new(hair.masses(), place);
-    let starts = || (0..hair.count).map(|strand| strand * (hair.segments + 1));
-    let segments: Vec<[usize; 2]> =
-        starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();
-    let bends: Vec<[usize; 3]> =
-        starts().flat_map(|start| (start..start + hair.segments - 1).map(|at| [at, at + 1, at + 2])).collect();
-    let length = hair.length / hair.segments as f64;
-    let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
-    terms.add_potential("hair stretch", &segments, springs)?;
-    if !terms.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
-        // k/2 (1 − cos φ) ≈ k φ²/4 must equal the energy of a rod over one segment, B φ²/(2 l).
-        let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
-        terms.add_potential("hair bending", &bends, bending)?;
-    }
-    terms.add_surroundings(surroundings)?;
-    Ok(terms)
 }
 
 /// Creates the terms of a fabric on a mesh. Only mass–spring fabrics use `springs`.
@@ -241,7 +185,7 @@ fn stable_neo_hookean_log(
 }
 
 impl FabricTerms {
-    fn new(masses: Vec<f64>, place: Place) -> Self {
+    pub(super) fn new(masses: Vec<f64>, place: Place) -> Self {
         Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place }
     }
 
@@ -399,7 +343,7 @@ impl FabricTerms {
         }
     }
 
-    fn add_surroundings(&mut self, surroundings: &Surroundings) -> Result<(), FabricError> {
+    pub(super) fn add_surroundings(&mut self, surroundings: &Surroundings) -> Result<(), FabricError> {
         let vertices: Vec<[usize; 1]> = (0..self.masses.len()).map(|vertex| [vertex]).collect();
         if !self.leave_out("gravity", surroundings.gravity == [0.0; 3], vertices.len()) {
             let elements = self.masses.iter().map(|&mass| Gravity::new(mass, surroundings.gravity)).collect();
@@ -412,7 +356,7 @@ impl FabricTerms {
         Ok(())
     }
 
-    fn add_potential<E, const N: usize>(
+    pub(super) fn add_potential<E, const N: usize>(
         &mut self,
         name: &str,
         stencils: &[[usize; N]],
@@ -453,7 +397,7 @@ impl FabricTerms {
     }
 
     /// Records a term to be left out. Returns whether it is: its stiffness is zero, or it has no elements.
-    fn leave_out(&mut self, name: &str, is_zero: bool, elements: usize) -> bool {
+    pub(super) fn leave_out(&mut self, name: &str, is_zero: bool, elements: usize) -> bool {
         match (is_zero, elements) {
             (true, _) => self.left_out.push(format!("{}{name}: zero", self.place.prefix)),
             (false, 0) => self.left_out.push(format!("{}{name}: nothing to act on", self.place.prefix)),

@@ -137,8 +137,8 @@ impl Run {
         &self.simulation
     }
 
-    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each step.
-    /// The results so far are written in any case, also after a failed step.
+    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each
+    /// step. The results so far are written in any case, also after a failed step.
     ///
     /// # Errors
     /// Returns an error if a step fails or a file cannot be written.

@@ -119,8 +119,8 @@ pub enum ValidateError {
 pub const QUESTIONS: [&str; 8] =
     ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "long-run"];
 
-/// Answers the named questions, or all if `names` is empty, and calls `report` with each finding. `quick` skips the finer
-/// meshes.
+/// Answers the named questions, or all if `names` is empty, and calls `report` with each finding. `quick` skips the
+/// finer meshes.
 ///
 /// # Errors
 /// Returns an error if a case cannot be set up or solved.
