@@ -2,6 +2,15 @@
 //!
 //! A [`scene::Scene`] describes meshes, fabrics, pins and an integrator. A [`Simulation`] steps it through time.
 //!
+//! Modules, from the bottom up; each uses only those above it:
+//!
+//! - [`geometry`], [`mesh`], [`motion`]: vectors, rigid motions, triangle meshes, keyframes
+//! - [`fabric`], [`contact`], [`wind`]: the forces, as terms of declared elements
+//! - [`integrator`], [`ledger`]: time integration and the energy balance of a body
+//! - [`scene`], [`model`]: the file format, and its assembly into islands
+//! - [`simulation`], [`output`], [`run`]: stepping, output files, runs with checkpoints and reports
+//! - [`view`], [`demo`], [`materials`], [`bench`], [`validate`]: what the binary offers on top
+//!
 //! ```
 //! use cloth_core::{Simulation, scene::Scene};
 //!
