@@ -1,8 +1,6 @@
 //! Extreme cloths and steps: a step either completes with finite numbers, or returns an error and leaves the cloth
 //! unchanged. A table pins the outcome of each combination.
 
-use std::fmt::Write as _;
-
 use cloth_core::Body;
 use cloth_core::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroundings};
 use cloth_core::integrator::{Adaptive, Integrator, Scheme, StepError};
@@ -91,20 +89,30 @@ fn run(case: Case, material: Material, integrator: &mut dyn Integrator) -> Resul
     Ok(())
 }
 
-/// The outcome of a run as a word. Checks that an error says what failed and what to do.
-fn outcome(result: &Result<(), StepError>) -> &'static str {
-    let Err(error) = result else { return "ok" };
-    let (word, parts) = match error {
-        StepError::NotSolved { .. } => ("unsolved", ["the linear solver stopped after", "Try a smaller dt"]),
-        StepError::Stuck { .. } => ("stuck", ["no step along the direction of Newton iteration", "Try a smaller dt"]),
-        StepError::NotConverged { .. } => ("slow", ["Newton's method did not converge in 100", "Try a smaller dt"]),
-        StepError::NonFinite { .. } => ("infinite", ["would move to", "try a smaller dt"]),
-        StepError::Evaluation(_) => ("undefined", ["is not finite", ""]),
+/// How a run ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Outcome {
+    /// All steps complete.
+    Done,
+    /// The linear solver does not converge.
+    NotSolved,
+    /// Newton's method does not converge.
+    NotConverged,
+}
+
+use Outcome::{Done, NotConverged, NotSolved};
+
+/// Classifies a result. Checks that an error names what failed and a remedy.
+fn outcome(result: &Result<(), StepError>) -> Outcome {
+    let Err(error) = result else { return Done };
+    let (outcome, words) = match error {
+        StepError::NotSolved { .. } => (NotSolved, "the linear solver stopped after "),
+        StepError::NotConverged { .. } => (NotConverged, "Newton's method did not converge in 100 iterations"),
         other => panic!("unexpected error: {other}"),
     };
     let message = error.to_string();
-    assert!(parts.iter().all(|part| message.contains(part)), "{message}");
-    word
+    assert!(message.contains(words) && message.ends_with("Try a smaller dt"), "{message}");
+    outcome
 }
 
 fn cases() -> Vec<Case> {
@@ -125,21 +133,24 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// Outcomes with neo-Hookean and flat bending, stable neo-Hookean and Bridson bending, StVK and plate bending.
-const OUTCOMES: &str = "\
-";
+/// The combinations of case and integrator that fail, with the outcomes for each material of [`Case::materials`].
+const FAILURES: [(&str, Scheme, [Outcome; 3]); 2] = [
+    ("a millimetre wide", Scheme::ImplicitMidpoint, [Done, NotConverged, NotConverged]),
+    ("needles", Scheme::ImplicitEuler, [NotSolved; 3]),
+];
 
+/// The outcome of every combination is in the table, or all steps complete.
 #[test]
 fn outcomes_match_the_table() {
-    let mut table = String::new();
     for case in cases() {
         for scheme in [Scheme::Newton, Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::ImplicitMidpoint] {
             let results = case.materials().into_iter().map(|material| run(case, material, &mut *scheme.integrator()));
-            let words: Vec<&str> = results.map(|result| outcome(&result)).collect();
-            writeln!(table, "{} | {} | {}", case.name, scheme.integrator().name(), words.join(" ")).unwrap();
+            let outcomes: Vec<Outcome> = results.map(|result| outcome(&result)).collect();
+            let failure = FAILURES.iter().find(|(name, failing, _)| *name == case.name && *failing == scheme);
+            let expected = failure.map_or([Done; 3], |(.., outcomes)| *outcomes);
+            assert_eq!(outcomes, expected, "{case:?}, {scheme:?}");
         }
     }
-    assert!(table == OUTCOMES, "the outcomes are\n{table}");
 }
 
 /// Implicit Euler by Newton's method completes all cases with adaptive step sizes.
