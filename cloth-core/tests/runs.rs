@@ -425,6 +425,6 @@ fn a_material_from_a_file_moves_like_the_built_in_one() {
     expect(
         &text,
         "force F(_x: Point, v: Velocity; λ, μ: Scalar[N s/m]) { -(λ + μ) * v }",
-        &["F is a force; a material is made of energies"],
+        &["F is a force; a material consists of energies"],
     );
 }

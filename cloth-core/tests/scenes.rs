@@ -165,7 +165,7 @@ fn an_energy_balance_that_does_not_close_gives_a_warning() {
 fn vertices_that_start_inside_an_obstacle_give_a_warning() {
     let text = sheet("dt = 0.01\nduration = 0.1", 4, 0.2);
     let simulation = started(&format!("{text}[[obstacles]]\nname = \"ball\"\nsphere = {{ radius = 0.06 }}\n"));
-    assert_eq!(simulation.warnings(), ["5 vertices start inside ball; they will be thrown out of it"]);
+    assert_eq!(simulation.warnings(), ["5 vertices start inside ball; contact will throw them out"]);
 }
 
 #[test]
