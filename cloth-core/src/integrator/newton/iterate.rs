@@ -7,7 +7,7 @@ use super::super::projection::Projection;
 use super::super::trial::Trial;
 use super::super::{StepError, StepReport};
 use super::forcing::Forcing;
-use super::incremental_potential::{Energy, IncrementalPotential};
+use super::incremental_potential::{Energy, EnergyAndGradient, IncrementalPotential};
 use super::line_search::{AcceptedStep, Prefetch};
 use super::{Memory, NewtonOptions, largest};
 
@@ -58,7 +58,7 @@ impl<'a> Iterate<'a> {
     ) -> Result<Self, EvaluationError> {
         let projection = Projection::on_demand();
         let (energy, linearised) = match potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)? {
-            Some((energy, downhill)) => (energy, Some(downhill)),
+            Some(EnergyAndGradient { energy, downhill }) => (energy, Some(downhill)),
             None => {
                 let body = &*potential.body;
                 body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = body.x[vertex]);
