@@ -1,5 +1,5 @@
 //! A solid bounded by a triangle mesh. The feature nearest to a vertex is a face, an edge or a corner, each with its
-//! own declared element. It acts as three solids, each active where its features are nearest.
+//! own declared element. The mesh acts as three solids, each active where its features are nearest.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

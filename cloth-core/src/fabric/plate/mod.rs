@@ -8,8 +8,8 @@
 //! dihedral angle of [`ArcAngle`](energy_elements::ArcAngle), an arc over the facets.
 //!
 //! This is the lowest-order element of Hellan, Herrmann and Johnson (Comodi 1989), in which the normal at an edge is an
-//! independent unknown. In Grinspun, Gingold, Reisman and Zorin 2006 that normal bisects those of the two triangles (φ
-//! = 0), and only regular lattices bend like the plate. Here the *tilt* φ is chosen such that it is exact for every
+//! independent unknown. In Grinspun, Gingold, Reisman and Zorin 2006 that normal bisects those of the two triangles
+//! (φ = 0), and only regular lattices bend like the plate. Here the *tilt* φ is chosen such that it is exact for every
 //! quadratic height field. It is a combination of nearby dihedral angles, φ = Σ c (θ − θ̄), with c of minimal norm
 //! ([`Tilts`]). Then
 //!
