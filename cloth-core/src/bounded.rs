@@ -1,4 +1,4 @@
-//! Numbers with a range, so that an impossible one is refused where it is written.
+//! Deserialises numbers with range checks, so that an invalid number is reported at its place in the file.
 
 use serde::de::{Deserialize, Deserializer, Error};
 
@@ -8,11 +8,11 @@ fn checked<'de, D: Deserializer<'de>>(
     range: &str,
 ) -> Result<f64, D::Error> {
     let number = f64::deserialize(deserializer)?;
-    if fits(number) { Ok(number) } else { Err(D::Error::custom(format!("{number} must be {range}"))) }
+    if fits(number) { Ok(number) } else { Err(D::Error::custom(format!("expected {range}, got {number}"))) }
 }
 
 pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, |number| number.is_finite() && number > 0.0, "a finite number above 0")
+    checked(deserializer, |number| number.is_finite() && number > 0.0, "a finite number greater than 0")
 }
 
 pub(crate) fn some_positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
@@ -20,7 +20,7 @@ pub(crate) fn some_positive<'de, D: Deserializer<'de>>(deserializer: D) -> Resul
 }
 
 pub(crate) fn non_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, |number| number.is_finite() && number >= 0.0, "a finite number, 0 or above")
+    checked(deserializer, |number| number.is_finite() && number >= 0.0, "a finite number of at least 0")
 }
 
 pub(crate) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -29,28 +29,28 @@ pub(crate) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, 
 
 pub(crate) fn nonzero_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
     let numbers = finite_triple(deserializer)?;
-    // Its square must be a number above 0, too.
+    // The squared length must be representable.
     let square: f64 = numbers.iter().map(|number| number * number).sum();
     if square.is_normal() {
         Ok(numbers)
     } else {
-        Err(D::Error::custom(format!("{numbers:?} must be a direction: not all zero, nor beyond 1e±150")))
+        Err(D::Error::custom(format!("expected a direction, neither zero nor beyond 1e±150, got {numbers:?}")))
     }
 }
 
-/// A number of parts, at least `LEAST` and not absurd.
+/// Deserialises a number of parts, at least `LEAST`.
 pub(crate) fn count<'de, const LEAST: usize, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     const MOST: usize = 4096;
     let count = usize::deserialize(deserializer)?;
     if (LEAST..=MOST).contains(&count) {
         Ok(count)
     } else {
-        Err(D::Error::custom(format!("{count} must be between {LEAST} and {MOST}")))
+        Err(D::Error::custom(format!("expected a number from {LEAST} to {MOST}, got {count}")))
     }
 }
 
 pub(crate) fn poisson_ratio<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, |number| number > -1.0 && number < 1.0, "between −1 and 1, both excluded")
+    checked(deserializer, |number| number > -1.0 && number < 1.0, "a number strictly between −1 and 1")
 }
 
 fn all<'de, const N: usize, D: Deserializer<'de>>(
@@ -65,7 +65,7 @@ where
     if numbers.iter().all(|&number| fits(number)) {
         Ok(numbers)
     } else {
-        Err(D::Error::custom(format!("{numbers:?} must hold {range} only")))
+        Err(D::Error::custom(format!("expected {range} only, got {numbers:?}")))
     }
 }
 
@@ -73,12 +73,12 @@ pub(crate) fn finite_triple<'de, D: Deserializer<'de>>(deserializer: D) -> Resul
     all(deserializer, f64::is_finite, "finite numbers")
 }
 
-/// N numbers, each above 0.
+/// Deserialises N numbers greater than 0.
 pub(crate) fn all_positive<'de, const N: usize, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; N], D::Error>
 where
     [f64; N]: Deserialize<'de>,
 {
-    all(deserializer, |number| number.is_finite() && number > 0.0, "finite numbers above 0")
+    all(deserializer, |number| number.is_finite() && number > 0.0, "finite numbers greater than 0")
 }
 
 pub(crate) fn cell_counts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[usize; 2], D::Error> {
@@ -87,6 +87,6 @@ pub(crate) fn cell_counts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     if counts.iter().all(|count| (1..=MOST).contains(count)) {
         Ok(counts)
     } else {
-        Err(D::Error::custom(format!("{counts:?}: each number of cells must be between 1 and {MOST}")))
+        Err(D::Error::custom(format!("expected numbers of cells from 1 to {MOST}, got {counts:?}")))
     }
 }

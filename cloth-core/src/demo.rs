@@ -1,4 +1,4 @@
-//! The demonstration: a sheet of cotton, horizontal at first, held by two corners, made of elements that are audited before use.
+//! The demonstration: a horizontal cotton sheet, hung by two corners, made of elements that are audited first.
 
 use std::fmt::Write as _;
 
@@ -10,23 +10,23 @@ use crate::simulation::Simulation;
 /// The demonstration's scene, `scenes/hang.toml`.
 pub const SCENE: &str = include_str!("../../scenes/hang.toml");
 
-/// The scene.
+/// Returns the scene.
 ///
 /// # Errors
-/// Never, unless the file was changed.
+/// Returns an error only if the built-in file is invalid.
 pub fn scene() -> Result<Scene, SceneError> {
     Scene::parse(SCENE, "scenes/hang.toml".as_ref())
 }
 
-/// Elements whose derivatives are wrong, or that could not be audited.
+/// Elements with wrong derivatives, or that could not be audited.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the audit failed; nothing was simulated\n{0}")]
 pub struct AuditError(String);
 
-/// Audits every declared element that a simulation is made of, and says how far each is from independent derivatives.
+/// Audits every declared element of a simulation. Returns a table of errors relative to independent derivatives.
 ///
 /// # Errors
-/// When a check fails, with the element, the entry and both values.
+/// Returns an error if a check fails, with the element, the entry and both values.
 pub fn audit_materials(simulation: &Simulation) -> Result<String, AuditError> {
     let mut elements: Vec<&str> = simulation.terms().map(|term| term.declaration().name).collect();
     elements.sort_unstable();

@@ -1,4 +1,4 @@
-//! Forces that resist velocities in other ways than in proportion, from declared dissipation functions.
+//! Non-linear damping forces, declared as dissipation functions.
 
 use energy_dsl::{Array, Declaration, Element, Potential, Vector3};
 use energy_solve::{
@@ -6,15 +6,17 @@ use energy_solve::{
     TermDescription, TrianglePlaces, index,
 };
 
-/// Which elements act over a step: everything but velocities is held as it was at its start.
+/// Selects the elements that act during a step. Their parameters are fixed at its start; only velocities vary.
 pub(crate) trait DissipationLaw: std::fmt::Debug {
-    /// Rayleigh's dissipation function, convex, declared as an energy of the displacements in a unit of time.
+    /// The element: a convex Rayleigh dissipation function, declared as an energy of the displacements per unit of
+    /// time.
     type Element: Potential<f64> + std::fmt::Debug;
-    /// The elements that act on a stencil with a free vertex, each with the number of its stencil, ascending.
+    /// Returns the elements that act on stencils with a free vertex, each with the index of its stencil, in ascending
+    /// order.
     fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, Self::Element)>;
 }
 
-/// The force −∂R/∂v of dissipation functions R.
+/// The forces −∂R/∂v of dissipation functions R.
 #[derive(Debug)]
 pub(crate) struct DissipativeTerm<L: DissipationLaw> {
     name: String,
@@ -27,7 +29,7 @@ pub(crate) struct DissipativeTerm<L: DissipationLaw> {
 }
 
 impl<L: DissipationLaw> DissipativeTerm<L> {
-    /// A law on stencils of as many vertices as its element has points. Nothing acts before the first step begins.
+    /// Creates a term for a law whose element has N points. No element acts before the first step begins.
     pub(crate) fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
         let stencils = stencils.as_flattened().iter().copied().map(index).collect();
         let acting = Vec::new();

@@ -1,6 +1,15 @@
-//! Cloth made of declared elements: triangle meshes, fabrics, integrators, scenes and output. The binary `cloth` runs it.
+//! A cloth simulator on declared elements: meshes, fabrics, integrators, scenes and output. The binary `cloth` runs it.
 //!
-//! A [`scene::Scene`] names a mesh, a fabric, pins and an integrator; [`Simulation`] moves it.
+//! A [`scene::Scene`] describes meshes, fabrics, pins and an integrator. A [`Simulation`] steps it through time.
+//!
+//! Modules, from the bottom up; each uses only those above it:
+//!
+//! - [`geometry`], [`mesh`], [`motion`]: vectors, rigid motions, triangle meshes, keyframes
+//! - [`fabric`], [`contact`], [`wind`]: the forces, as terms of declared elements
+//! - [`integrator`], [`ledger`]: time integration and the energy balance of a body
+//! - [`scene`], [`model`]: the file format, and its assembly into islands
+//! - [`simulation`], [`output`], [`run`]: stepping, output files, runs with checkpoints and reports
+//! - [`view`], [`demo`], [`materials`], [`bench`], [`validate`]: what the binary offers on top
 //!
 //! ```
 //! use cloth_core::{Simulation, scene::Scene};

@@ -1,17 +1,17 @@
-//! The catalogue of declared elements, as text.
+//! Text descriptions of the declared elements.
 
 use std::fmt::Write as _;
 
 use energy_dsl::{Declaration, Field, OperationCount};
 
-/// Every declared element: name, kind, formula, inputs with units, and operations per routine.
+/// Describes every declared element: name, kind, formula, inputs with units, and operations per routine.
 #[must_use]
 pub fn listing() -> String {
     let entries: Vec<String> = energy_elements::catalogue().iter().map(|entry| describe(entry.declaration)).collect();
     entries.join("\n")
 }
 
-/// One declared element.
+/// Describes one declared element.
 ///
 /// ```
 /// let spring = energy_elements::find("HookeSpring").unwrap();

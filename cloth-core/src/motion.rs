@@ -1,4 +1,4 @@
-//! Rigid motions in time, by keyframes.
+//! Rigid motions over time, from keyframes.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -6,43 +6,43 @@ use serde::Deserialize;
 use crate::bounded::{finite_triple, nonzero_triple, number};
 use crate::geometry::Pose;
 
-/// A rigid motion, linear in time from key to key; before the first key and after the last it stands still. A point x goes to
-/// c + R (x − c) + t, with the centre c, the turn R about the axis and the shift t.
+/// A rigid motion, linear in time between keys and constant before the first and after the last. It maps a point x to c
+/// + R (x − c) + t, with the centre c, the rotation R about the axis, and the translation t.
 ///
 /// ```
 /// use cloth_core::motion::{Key, Motion};
 ///
 /// let quarter = Key { time: 1.0, angle: 90.0, translate: [0.0, 0.0, 2.0] };
 /// let motion = Motion { axis: [0.0, 0.0, 1.0], centre: [1.0, 0.0, 0.0], keys: vec![Key::default(), quarter] };
-/// let [x, y, z] = motion.pose(7.0).applied([2.0, 0.0, 0.0]);
+/// let [x, y, z] = motion.pose(7.0).transform([2.0, 0.0, 0.0]);
 /// assert!((x - 1.0).abs() < 1e-15 && (y - 1.0).abs() < 1e-15 && z == 2.0);
-/// assert_eq!(motion.pose(0.5).applied([1.0, 0.0, 0.0]), [1.0, 0.0, 1.0]);
+/// assert_eq!(motion.pose(0.5).transform([1.0, 0.0, 0.0]), [1.0, 0.0, 1.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// The direction that it turns about, right-handed. Default [0, 0, 1].
+    /// Direction of the axis of rotation, right-handed. Default [0, 0, 1].
     #[serde(default = "third_axis", deserialize_with = "nonzero_triple")]
     pub axis: [f64; 3],
-    /// A point of the axis, in m. Default the origin.
+    /// A point on the axis, in m. Default the origin.
     #[serde(default, deserialize_with = "finite_triple")]
     pub centre: [f64; 3],
-    /// Where it is when; times must grow.
+    /// Keyframes, with increasing times.
     #[serde(deserialize_with = "keys")]
     pub keys: Vec<Key>,
 }
 
-/// Where a motion is at one time.
+/// The pose of a motion at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Key {
-    /// When, in s.
+    /// Time, in s.
     #[serde(deserialize_with = "number")]
     pub time: f64,
-    /// How far it has turned, in degrees. Default 0.
+    /// Angle of rotation, in degrees. Default 0.
     #[serde(default, deserialize_with = "number")]
     pub angle: f64,
-    /// How far it has shifted, in m. Default not at all.
+    /// Translation, in m. Default none.
     #[serde(default, deserialize_with = "finite_triple")]
     pub translate: [f64; 3],
 }
@@ -54,11 +54,11 @@ fn third_axis() -> [f64; 3] {
 fn keys<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<Key>, D::Error> {
     let keys = Vec::<Key>::deserialize(deserializer)?;
     if keys.is_empty() {
-        return Err(serde::de::Error::custom("a motion needs at least one key, as in { time = 0.0, angle = 0.0 }"));
+        return Err(serde::de::Error::custom("expected at least one key, such as { time = 0.0, angle = 0.0 }"));
     }
     match keys.windows(2).position(|pair| pair[0].time >= pair[1].time) {
         Some(at) => Err(serde::de::Error::custom(format!(
-            "the times of keys must grow: key {} is at {} s, the next at {} s",
+            "the times of keys must increase: key {} is at {} s, the next at {} s",
             at,
             keys[at].time,
             keys[at + 1].time
@@ -68,26 +68,26 @@ fn keys<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<Key>, D
 }
 
 impl Motion {
-    /// Where it is at a time, in s.
+    /// Returns the pose at a time, in s.
     #[must_use]
     pub fn pose(&self, time: f64) -> Pose {
         let Key { angle, translate, .. } = self.key(time);
-        Pose::turned(self.axis, angle, self.centre).shifted(translate)
+        Pose::rotation(self.axis, angle, self.centre).translated(translate)
     }
 
-    /// Whether it is somewhere else at another time of this span, in s.
+    /// Whether the pose at time `from` differs from that at time `to`, in s.
     #[must_use]
     pub fn moves(&self, from: f64, to: f64) -> bool {
         self.key(from) != Key { time: from, ..self.key(to) }
     }
 
-    /// The key that stands for a time.
+    /// Interpolates the keys at a time.
     fn key(&self, time: f64) -> Key {
         let after = self.keys.partition_point(|key| key.time <= time);
         match (after.checked_sub(1).map(|before| self.keys[before]), self.keys.get(after)) {
             (Some(a), Some(b)) => {
-                let way = (time - a.time) / (b.time - a.time);
-                let between = |from: f64, to: f64| from + way * (to - from);
+                let fraction = (time - a.time) / (b.time - a.time);
+                let between = |from: f64, to: f64| from + fraction * (to - from);
                 let translate = std::array::from_fn(|axis| between(a.translate[axis], b.translate[axis]));
                 Key { time, angle: between(a.angle, b.angle), translate }
             }

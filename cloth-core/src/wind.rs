@@ -1,4 +1,4 @@
-//! Wind: an even flow of air, constant or in gusts, that pushes and drags triangles.
+//! Wind: a uniform flow of air, constant or with gusts, that acts on triangles.
 
 use std::f64::consts::TAU;
 
@@ -12,39 +12,40 @@ use crate::bounded::{finite_triple, non_negative, number, positive};
 use crate::dissipation_term::{DissipationLaw, DissipativeTerm};
 use crate::geometry::{cross, norm, subtract};
 
-/// Wind. Each triangle is pushed by ½ ρ C A u² across and along its surface, u the velocity of the air relative to it in that direction: by the
-/// element [`WindDrag`], with normals and areas as at the start of a step. Air that cloth stops or turns is not followed.
+/// Wind pushes each triangle with ½ ρ C A u² across and along its surface, where u is the relative velocity of the air
+/// in that direction (element [`WindDrag`]). Normals and areas are those at the start of a step. Cloth does not change
+/// the flow.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wind {
     /// The velocity of the air, in m/s.
     #[serde(deserialize_with = "finite_triple")]
     pub velocity: [f64; 3],
-    /// What is added to the velocity, each as a sine of time. Default nothing.
+    /// Gusts added to the velocity. Default none.
     #[serde(default)]
     pub gusts: Vec<Gust>,
-    /// The density ρ of the air, in kg/m³. Default 1.2.
+    /// Density ρ of the air, in kg/m³. Default 1.2.
     #[serde(default = "air", deserialize_with = "positive")]
     pub density: f64,
-    /// C across the surface. Default 1.2, a flat plate's.
+    /// Drag coefficient C across the surface. Default 1.2, that of a flat plate.
     #[serde(default = "plate", deserialize_with = "non_negative")]
     pub across: f64,
-    /// C along the surface. Default 0.02.
+    /// Drag coefficient C along the surface. Default 0.02.
     #[serde(default = "skin", deserialize_with = "non_negative")]
     pub along: f64,
 }
 
-/// A part of the wind that comes and goes: amplitude × sin(2π (t/period + phase)).
+/// A sinusoidal gust: amplitude × sin(2π (t/period + phase)).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gust {
     /// The largest velocity, in m/s.
     #[serde(deserialize_with = "finite_triple")]
     pub amplitude: [f64; 3],
-    /// The time from one gust to the next, in s.
+    /// The time between gusts, in s.
     #[serde(deserialize_with = "positive")]
     pub period: f64,
-    /// Where in the period it starts, as a part of it. Default 0.
+    /// Phase at time 0, as a fraction of the period. Default 0.
     #[serde(default, deserialize_with = "number")]
     pub phase: f64,
 }
@@ -62,7 +63,7 @@ fn skin() -> f64 {
 }
 
 impl Wind {
-    /// The velocity of the air at a time in s, in m/s.
+    /// Returns the velocity of the air at a time in s, in m/s.
     ///
     /// ```
     /// use cloth_core::wind::{Gust, Wind};
@@ -79,7 +80,7 @@ impl Wind {
         self.gusts.iter().fold(self.velocity, add)
     }
 
-    /// The term of the wind on these triangles.
+    /// Creates the term of the wind on these triangles.
     #[must_use]
     pub fn term(&self, triangles: &[[usize; 3]]) -> Box<dyn Term> {
         let law = WindLaw { wind: self.clone(), triangles: triangles.to_vec() };
@@ -102,7 +103,7 @@ impl DissipationLaw for WindLaw {
             let [a, b, c] = corners.map(|corner| start.state.x[corner]);
             let across = cross(subtract(b, a), subtract(c, a));
             let twice = norm(across);
-            // A triangle without area is not pushed.
+            // A degenerate triangle feels no wind.
             let per_coefficient = 0.25 * self.wind.density * twice;
             (twice > 0.0).then(|| {
                 let normal = across.map(|component| component / twice);

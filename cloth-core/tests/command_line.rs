@@ -1,4 +1,4 @@
-//! The binary from outside: what it writes, and how it refuses.
+//! The binary from outside: output files and errors.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -28,7 +28,7 @@ fn cloth(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_cloth")).args(arguments).current_dir(folder).output().unwrap()
 }
 
-/// Runs a scene that must be refused; returns what it says.
+/// Runs a scene that must be rejected, and returns the message.
 fn refused(text: &str, files: &[(&str, &str)]) -> String {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), text).unwrap();
@@ -49,7 +49,7 @@ fn refused_obj(obj: &str) -> String {
 }
 
 #[test]
-fn a_run_writes_picture_animation_and_frames() {
+fn a_run_writes_a_picture_animations_and_frames() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
     let output = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
@@ -68,7 +68,7 @@ fn a_run_writes_picture_animation_and_frames() {
     let names: Vec<_> = std::fs::read_dir(folder.path().join("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names.len(), 8, "nothing temporary is left: {names:?}");
 
-    // A second run is refused, unless told to overwrite; then no frame of the first is left.
+    // A second run is rejected without --overwrite; with it, no frame of the first remains.
     let again = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
     assert_eq!(again.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&again.stderr).contains("pass --overwrite"));
@@ -86,12 +86,12 @@ fn the_demonstration_audits_simulates_and_repeats() {
         assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
         assert!(text.starts_with("audit of 4 elements") && text.contains("150 steps"), "{text}");
     }
-    // 1.5 s at 25 frames a second, and the first frame.
+    // 1.5 s at 25 frames per second, and the initial frame.
     assert_eq!(std::fs::read_dir(folder.path().join("out/frames")).unwrap().count(), 38);
 }
 
 #[test]
-fn the_animation_is_a_glb_file_whose_parts_fit() {
+fn the_animation_is_a_valid_glb_file() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
     assert!(cloth(&["run", "scene.toml", "-o", "out"], folder.path()).status.success());
@@ -116,15 +116,15 @@ fn the_animation_is_a_glb_file_whose_parts_fit() {
 }
 
 #[test]
-fn bad_scenes_are_refused_with_place_and_reason() {
+fn invalid_scenes_are_rejected_with_place_and_reason() {
     let expect = |from: &str, to: &str, parts: &[&str]| {
         assert!(SCENE.contains(from));
         let message = refused(&SCENE.replace(from, to), &[]);
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     };
     expect("density", "densty", &["scene.toml:10:1", "unknown field `densty`", "did you mean `density`?"]);
-    expect("dt = 0.01", "dt = nan", &["scene.toml:1:6", "NaN must be a finite number above 0"]);
-    expect("50.0", "-50.0", &["scene.toml:13:21", "-50 must be"]);
+    expect("dt = 0.01", "dt = nan", &["scene.toml:1:6", "expected a finite number greater than 0, got NaN"]);
+    expect("50.0", "-50.0", &["scene.toml:13:21", "expected a finite number of at least 0, got -50"]);
     expect("nearest = [-0.5, 0.5, 0.0]", "vertex = 99", &["pins[0]: there is no vertex 99"]);
     expect("duration = 0.1", "duration = 0.1\nduration = 0.2", &["scene.toml:3:1", "duplicate"]);
     let obj = "[mesh.obj]\npath = \"missing.obj\"";
@@ -132,14 +132,14 @@ fn bad_scenes_are_refused_with_place_and_reason() {
 }
 
 #[test]
-fn bad_meshes_are_refused_with_line_and_reason() {
+fn invalid_meshes_are_rejected_with_line_and_reason() {
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     let expect = |obj: &str, part: &str| {
         let message = refused_obj(obj);
         assert!(message.contains(part), "{message}");
     };
     expect("", "shape.obj: the mesh has 0 vertices and 0 triangles");
-    expect(&format!("{square}f 1 2 3\nf 1 3 7\n"), "shape.obj:6: the face names a vertex");
+    expect(&format!("{square}f 1 2 3\nf 1 3 7\n"), "shape.obj:6: the face refers to a vertex");
     expect(&format!("{square}f 1 2 3\nf 1 3 4\nf 3 1 2\n"), "shape.obj:7: edge 0–2 is shared by 3 triangles");
     expect(&square.replace("1 1 0", "1 nan 0"), "shape.obj");
     expect(&format!("{}f 1 2 3\nf 1 3 4\n", square.replace("1 1 0", "1 nan 0")), "shape.obj:3: vertex 2 is not finite");
@@ -148,7 +148,7 @@ fn bad_meshes_are_refused_with_line_and_reason() {
 }
 
 #[test]
-fn missing_scenes_and_unwritable_folders_are_refused() {
+fn missing_scenes_and_unwritable_folders_are_rejected() {
     let folder = TempDir::new().unwrap();
     let message = |arguments: &[&str]| {
         let output = cloth(arguments, folder.path());
@@ -159,7 +159,7 @@ fn missing_scenes_and_unwritable_folders_are_refused() {
     assert!(missing.contains("cannot read the scene nothing.toml") && missing.contains("No such file"), "{missing}");
     assert!(!folder.path().join("out").exists(), "nothing is made for a scene that does not exist");
 
-    // A file where the folder should be cannot be written into by anybody, not even by root.
+    // A file in place of the folder: not even root can write into it.
     std::fs::write(folder.path().join("taken"), "").unwrap();
     std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
     let taken = message(&["run", "scene.toml", "-o", "taken"]);
@@ -168,7 +168,7 @@ fn missing_scenes_and_unwritable_folders_are_refused() {
 
 #[cfg(unix)]
 #[test]
-fn read_only_folders_are_refused() {
+fn read_only_folders_are_rejected() {
     use std::os::unix::fs::PermissionsExt;
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
@@ -193,14 +193,14 @@ fn materials_are_listed_with_formula_units_and_costs() {
 }
 
 #[test]
-fn each_run_of_the_benchmark_has_memory_of_its_own() {
+fn each_run_of_the_benchmark_measures_its_own_memory() {
     let folder = TempDir::new().unwrap();
     let sizes = ["bench", "--sizes", "65,5", "--cloth", "soft", "--threads", "1", "--seconds", "0.02"];
     let json = cloth(&[&sizes[..], &["--json"]].concat(), folder.path());
     let runs: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).unwrap();
     let of = |name: &str| runs.iter().map(|run| run[name].as_u64()).collect::<Vec<_>>();
     assert_eq!((of("vertices"), of("steps")), (vec![Some(4225), Some(25)], vec![Some(2), Some(2)]));
-    // A second run in the same process would find the memory of the first.
+    // A second run in the same process would report the memory of the first.
     if let [Some(large), Some(small)] = of("peak_memory")[..] {
         assert!(small < large, "{small} {large}");
     }

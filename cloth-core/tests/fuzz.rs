@@ -1,5 +1,5 @@
-//! Whatever is in a file, reading it ends soon, with a mesh, a scene or an error: the corpus and a few edits of it on every run, and
-//! as many minutes as one likes with `FUZZ_MINUTES=5 cargo test -p cloth-core --test fuzz -- --ignored`.
+//! Reading a file terminates with a mesh, a scene or an error, whatever the file contains. Every run replays the corpus
+//! with a few edits. `FUZZ_MINUTES=5 cargo test -p cloth-core --test fuzz -- --ignored` runs for longer.
 #![allow(missing_docs)]
 
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ fn corpus(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name)
 }
 
-/// A copy of a corpus for runs that only replay it; long runs keep what they find.
+/// Returns a copy of a corpus, for short runs that must not add to it.
 fn copied(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for entry in std::fs::read_dir(corpus(name)).unwrap() {

@@ -1,4 +1,4 @@
-//! The quicker of the known answers, and the adaptive step.
+//! The faster validation questions, and the adaptive step.
 
 use cloth_core::integrator::{Adaptive, Integrator, Newton, NewtonOptions, StepError};
 use cloth_core::scene::Scene;
@@ -13,18 +13,18 @@ fn all_pass(questions: &[&str]) {
 }
 
 #[test]
-fn integrators_have_their_orders_and_keep_what_they_promise() {
+fn integrators_have_their_orders_and_conserve_momentum() {
     all_pass(&["orders", "momentum"]);
 }
 
-/// The whole, a hundred thousand steps of each, is `cloth validate long-run`.
+/// The full question, a hundred thousand steps of each integrator, is `cloth validate long-run`.
 #[test]
 fn energy_does_not_drift_over_many_steps() {
     all_pass(&["long-run"]);
 }
 
 #[test]
-fn a_short_strip_on_a_random_mesh_bends_as_the_elastica_does() {
+fn a_short_strip_on_a_random_mesh_bends_like_the_elastica() {
     let strip = Cantilever {
         gamma: 5.0,
         poisson_ratio: 0.0,
@@ -38,8 +38,10 @@ fn a_short_strip_on_a_random_mesh_bends_as_the_elastica_does() {
 }
 
 fn squeezed() -> Body {
-    let scene = "dt = 0.1\nduration = 0.1\nadaptive = true\nintegrator = \"newton\"\n[mesh.sheet]\ncells = [4, 4]\nsize = [0.4, 0.4]\n\
-                 [fabric]\ndensity = 0.2\n[fabric.material.neo-hookean]\nstretch_stiffness = 100.0\npoisson_ratio = 0.3\n\
+    let scene = "dt = 0.1\nduration = 0.1\nadaptive = true\nintegrator = \"newton\"\n[mesh.sheet]\ncells = [4, 4]\n\
+                 size = [0.4, 0.4]\n\
+                 [fabric]\ndensity = 0.2\n[fabric.material.neo-hookean]\nstretch_stiffness = 100.0\n\
+                 poisson_ratio = 0.3\n\
                  [[pins]]\nnearest = [-0.2, 0.2, 0.0]\n";
     let scene = Scene::parse(scene, "scene.toml".as_ref()).unwrap();
     let shape = scene.garments[0].shape(&scene.folder).unwrap();
@@ -52,7 +54,7 @@ fn squeezed() -> Body {
 }
 
 #[test]
-fn a_step_that_fails_is_halved_until_it_passes_and_says_why() {
+fn a_failed_step_is_halved_until_it_succeeds_and_reports_why() {
     let hasty = |limit| NewtonOptions { iteration_limit: limit, ..NewtonOptions::default() };
     let mut body = squeezed();
     let plain = Newton::with_options(hasty(6)).step(&mut body, 0.1);
@@ -63,7 +65,7 @@ fn a_step_that_fails_is_halved_until_it_passes_and_says_why() {
     let rejection = adaptive.last_rejection().unwrap();
     assert!(rejection.dt < 0.1 + 1e-12 && matches!(rejection.reason, StepError::NotConverged { .. }));
     let smallest = adaptive.part();
-    // Once it is calm the step grows again.
+    // The step size grows back once steps succeed.
     for _ in 0..20 {
         adaptive.step(&mut body, 0.02).unwrap();
     }

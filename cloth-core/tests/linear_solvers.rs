@@ -1,4 +1,4 @@
-//! The choice of what solves the linear systems: the same motion, whichever it is, and from wherever it goes on.
+//! Linear solvers: all choices give the same motion, also after a restart.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ nearest = [0.5, 0.5, 0.0]
 }
 
 #[test]
-fn all_solvers_lead_to_the_same_motion() {
+fn all_solvers_give_the_same_motion() {
     for (integrator, solvers) in [
         ("newton", &["auto", "over-relaxation", "multigrid", "cholesky", "incomplete-cholesky"][..]),
         ("implicit-euler", &["auto", "multigrid", "cholesky"]),
@@ -73,7 +73,7 @@ fn all_solvers_lead_to_the_same_motion() {
 }
 
 #[test]
-fn what_was_found_out_about_solvers_is_saved() {
+fn the_choice_of_solver_is_saved() {
     for integrator in ["newton", "bdf2", "implicit-euler"] {
         let start = || hanging(integrator, "auto", 40, 3e4, [1e-3, 1e-2]);
         let mut whole = start();
@@ -85,7 +85,7 @@ fn what_was_found_out_about_solvers_is_saved() {
             whole.step().unwrap();
         }
         let theirs = whole.summary().unwrap();
-        let by = theirs.solved_by;
+        let by = theirs.totals.solved_by;
         assert!(by.multigrid > 0 && by.over_relaxation > 0, "{integrator}: not both tried, {by}");
         let text = serde_json::to_string(&half.unwrap()).unwrap();
         let mut resumed = start();
@@ -96,14 +96,14 @@ fn what_was_found_out_about_solvers_is_saved() {
         assert!(resumed.positions() == whole.positions(), "{integrator}");
         let mine = resumed.summary().unwrap();
         assert_eq!(
-            (mine.solves, mine.iterations, mine.solved_by),
-            (theirs.solves, theirs.iterations, theirs.solved_by)
+            (mine.totals.solves, mine.totals.iterations, mine.totals.solved_by),
+            (theirs.totals.solves, theirs.totals.iterations, theirs.totals.solved_by)
         );
     }
 }
 
 #[test]
-fn a_solver_that_there_is_not_is_refused() {
+fn an_unknown_solver_is_rejected() {
     let text = "dt = 0.01\nduration = 1.0\nlinear_solver = \"gauss\"\n[mesh.sheet]\n";
     let error = Scene::parse(text, Path::new("scene.toml")).unwrap_err().to_string();
     assert!(error.contains("gauss") && error.contains("multigrid"), "{error}");

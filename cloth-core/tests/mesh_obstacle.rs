@@ -1,4 +1,4 @@
-//! Obstacles made of triangles: nothing passes through them, and files that are none are refused.
+//! Obstacles made of triangles: no vertex passes through them, and invalid meshes are rejected.
 
 use std::path::Path;
 
@@ -33,7 +33,8 @@ fn simulation(folder: &Path, scene: &str) -> Result<Simulation, String> {
     Simulation::new(&scene).map_err(|error| error.to_string())
 }
 
-/// Simulates it; the deepest that any vertex ever was inside, and whether the cloth is held up.
+/// Simulates a scene. Returns the smallest signed distance of any vertex at any time, and the final height of the
+/// cloth.
 fn drape(scene: &str) -> (f64, f64) {
     let folder = with_body(TORUS);
     let mut simulation = simulation(folder.path(), scene).unwrap();
@@ -52,18 +53,19 @@ fn no_vertex_passes_through() {
     let (deepest, height) = drape(SCENE);
     assert!(deepest > 0.0, "{deepest}");
     assert!(height > -0.25, "it hangs on the torus: {height}");
-    // Rounded, it is larger by that; and a torus that lifts the cloth and turns under it.
+    // With rounding the torus is larger. Another torus lifts the cloth and turns under it.
     let rounded = SCENE.replace("rounding = 0.0", "rounding = 0.01").replace("0.09]", "0.1]");
     let (deepest, _) = drape(&rounded);
     assert!(deepest > 0.0, "{deepest}");
     let moving = format!(
-        "{SCENE}\n[obstacles.motion]\nkeys = [{{ time = 0.3 }}, {{ time = 0.7, angle = 30.0, translate = [0.0, 0.1, 0.1] }}]\n"
+        "{SCENE}\n[obstacles.motion]\n\
+         keys = [{{ time = 0.3 }}, {{ time = 0.7, angle = 30.0, translate = [0.0, 0.1, 0.1] }}]\n"
     );
     let (deepest, lifted) = drape(&moving);
     assert!(deepest > 0.0 && lifted > height + 0.05, "{deepest} {lifted}");
 }
 
-/// A torus of many facets acts as the smooth one does: on each is balanced, by friction alone, what slides off when there is none.
+/// A faceted torus acts like a smooth one: friction alone keeps a cloth balanced that slides off without it.
 #[test]
 fn friction_holds_on_a_mesh() {
     let turned = SCENE
@@ -83,7 +85,7 @@ fn friction_holds_on_a_mesh() {
 }
 
 #[test]
-fn unfit_meshes_are_refused_with_file_and_remedy() {
+fn invalid_meshes_are_rejected_with_file_and_remedy() {
     let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     let message = |obj: &str, scene: &str| {
         let folder = with_body(obj);
@@ -94,7 +96,7 @@ fn unfit_meshes_are_refused_with_file_and_remedy() {
         assert!(text.starts_with("mesh 0: ") && parts.iter().all(|part| text.contains(part)), "{text}");
     };
     assert!(simulation(with_body(tetrahedron).path(), SCENE).is_ok());
-    expect(&tetrahedron.replace("f 1 2 4", "f 1 2 9"), &["body.obj:6: the face names a vertex"]);
+    expect(&tetrahedron.replace("f 1 2 4", "f 1 2 9"), &["body.obj:6: the face refers to a vertex"]);
     expect(&tetrahedron.replace("v 0 0 1", "v 0 0 one"), &["body.obj:4: "]);
     expect(
         &format!("{tetrahedron}v 0 0 -1\nf 1 2 5\n"),

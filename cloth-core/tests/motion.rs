@@ -1,4 +1,4 @@
-//! Laws that any cloth obeys, and the orders of the schemes.
+//! Conservation laws and the orders of the integrators.
 
 use cloth_core::fabric::{Surroundings, terms};
 use cloth_core::integrator::{ImplicitEuler, Integrator, Newton, NewtonOptions, SymplecticEuler};
@@ -30,7 +30,7 @@ fn finished(scene: &Scene) -> Simulation {
 }
 
 #[test]
-fn free_fall_is_that_of_a_point_mass() {
+fn a_sheet_falls_like_a_point_mass() {
     for fabric in [STVK, PRINTED, SPRINGS] {
         for integrator in ["implicit-euler", "symplectic-euler", "newton"] {
             if integrator == "newton" && fabric != STVK {
@@ -41,7 +41,7 @@ fn free_fall_is_that_of_a_point_mass() {
             let (n, h) = (50.0, 0.001);
             let drop = 9.81 * h * h * n * (n + 1.0) / 2.0;
             for (now, rest) in simulation.positions().iter().zip(simulation.mesh(0).unwrap().vertices()) {
-                // Implicit steps are as exact as their linear solves.
+                // Implicit steps are as accurate as their linear solves.
                 let tolerance = if integrator == "symplectic-euler" { 1e-13 } else { 1e-5 * drop };
                 let fell = rest[2] - now[2];
                 assert!((fell - drop).abs() < tolerance, "{integrator}: fell {fell}, not {drop}");
@@ -61,13 +61,13 @@ fn drag_is_taken_at_the_end_of_an_implicit_step() {
     }
 }
 
-/// A free sheet, wrinkled and stretched, at rest and without weight.
+/// A free sheet, wrinkled and stretched, initially at rest, without gravity.
 fn distorted(fabric: &str) -> Body {
-    surrounded(fabric, &Surroundings { gravity: [0.0; 3], drag: 0.0 })
+    distorted_under(fabric, &Surroundings { gravity: [0.0; 3], drag: 0.0 })
 }
 
-/// The same with gravity and drag.
-fn surrounded(fabric: &str, surroundings: &Surroundings) -> Body {
+/// A free sheet, wrinkled and stretched, with gravity and drag.
+fn distorted_under(fabric: &str, surroundings: &Surroundings) -> Body {
     let scene = scene("dt = 1.0\nduration = 1.0", fabric);
     let shape = scene.garments[0].shape(&scene.folder).unwrap();
     let garment = terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, surroundings).unwrap();
@@ -119,10 +119,10 @@ fn newton_solves_the_equations_of_implicit_euler() {
 }
 
 #[test]
-fn newton_begins_where_the_last_accelerations_lead() {
+fn newton_starts_from_extrapolated_accelerations() {
     let options = NewtonOptions { impulse_tolerance: 1e-6, velocity_tolerance: 1e-9, ..NewtonOptions::default() };
     let solves = |keep: bool| {
-        let mut body = surrounded(NEO_HOOKEAN, &Surroundings { gravity: [0.0, 0.0, -9.81], drag: 2.0 });
+        let mut body = distorted_under(NEO_HOOKEAN, &Surroundings { gravity: [0.0, 0.0, -9.81], drag: 2.0 });
         let mut newton = Newton::with_options(options);
         let mut solves = 0;
         for _ in 0..100 {
@@ -138,7 +138,7 @@ fn newton_begins_where_the_last_accelerations_lead() {
 }
 
 #[test]
-fn newton_assembles_no_hessian_that_it_does_not_use() {
+fn newton_uses_every_assembled_hessian() {
     let options = NewtonOptions { impulse_tolerance: 1e-5, velocity_tolerance: 1e-9, ..NewtonOptions::default() };
     let mut body = distorted(NEO_HOOKEAN);
     let mut newton = Newton::with_options(options);
@@ -146,14 +146,15 @@ fn newton_assembles_no_hessian_that_it_does_not_use() {
     let (membrane, counts) = body.system.terms().next().unwrap();
     let elements = membrane.stencils().len() as u64;
     assert_eq!(counts.hessian.evaluated, solves * elements, "of {elements} elements in {solves} systems");
-    // Steps ended by their impulses, which forces alone tell, and not before every system.
+    // Steps end by the impulse test, which evaluates forces alone, but not before every system.
     let looked = counts.gradient.evaluated / elements;
     assert!((20..solves).contains(&looked), "{looked} times of {solves}");
 }
 
 #[test]
-fn newton_is_not_led_astray_by_exact_hessians() {
-    // A square of cotton that falls into folds, fast enough to buckle everywhere: with exact Hessians for ever, its 33rd step has no end.
+fn newton_converges_although_exact_hessians_are_indefinite() {
+    // A square of cotton falls into folds, fast enough to buckle everywhere. With exact Hessians only, its 33rd step
+    // does not converge.
     let text = "dt = 0.01\nduration = 0.6\nintegrator = \"newton\"\ntolerances.velocity = 1e-3\ndrag = 4.0\n\
                 [mesh.sheet]\ncells = [32, 32]\nsize = [0.5, 0.5]\n[fabric]\ndensity = 0.15\n\
                 [fabric.material.stvk]\nstretch_stiffness = 50.0\npoisson_ratio = 0.3\nbending.flat.stiffness = 1e-5\n\
@@ -163,7 +164,7 @@ fn newton_is_not_led_astray_by_exact_hessians() {
 }
 
 #[test]
-fn newton_refuses_forces_without_energy_and_says_which() {
+fn newton_rejects_forces_without_energy_by_name() {
     let mut body = distorted(PRINTED);
     let before = body.x.clone();
     let error = Newton::default().step(&mut body, 0.01).unwrap_err();
@@ -175,8 +176,9 @@ fn newton_refuses_forces_without_energy_and_says_which() {
 }
 
 #[test]
-fn a_flattened_triangle_is_no_trap_for_newton() {
-    // Two corners of the sheet pushed through each other: neo-Hookean triangles resist without end, and the step says how it went.
+fn newton_reports_a_flattened_triangle() {
+    // Two corners of the sheet are pushed through each other. Neo-Hookean triangles cannot invert, so the step must
+    // report failure.
     let mut body = distorted(NEO_HOOKEAN);
     body.v[0] = [40.0, 30.0, 5.0];
     for _ in 0..20 {
@@ -188,7 +190,7 @@ fn a_flattened_triangle_is_no_trap_for_newton() {
 }
 
 #[test]
-fn inner_forces_leave_momentum_alone() {
+fn internal_forces_conserve_momentum() {
     let precise = SolveOptions { relative_tolerance: 1e-13, iteration_limit: 10_000 };
     for fabric in [STVK, PRINTED, SPRINGS] {
         let schemes: [(Box<dyn Integrator>, f64); 2] =
@@ -241,7 +243,7 @@ fn assembled_jacobians_are_derivatives_of_the_assembled_forces() {
 }
 
 #[test]
-fn symplectic_euler_keeps_energy_and_implicit_euler_loses_it() {
+fn symplectic_euler_conserves_energy_and_implicit_euler_dissipates_it() {
     let after = |scheme: &mut dyn Integrator, dt: f64| {
         let mut body = distorted(STVK);
         let total = |body: &mut Body| {
@@ -303,7 +305,7 @@ fn schemes_and_bending_forms_agree_at_small_steps() {
     let fine = height("symplectic-euler", STVK);
     assert!(fine < -0.02);
     assert!((height("implicit-euler", STVK) / fine - 1.0).abs() < 0.01);
-    // Bending hardly matters here, so that the two forms must lie close together.
+    // Bending hardly matters here, so the two forms must agree closely.
     assert!((height("implicit-euler", PRINTED) / fine - 1.0).abs() < 0.02);
 }
 
@@ -320,7 +322,7 @@ fn a_hanging_cloth_comes_to_rest_with_its_weight_on_the_pins() {
 }
 
 #[test]
-fn the_same_scene_gives_the_same_bits() {
+fn runs_of_the_same_scene_are_bit_identical() {
     let scene = scene("dt = 0.01\nduration = 0.3", &format!("{STVK}{CORNER}"));
     let (a, b) = (finished(&scene), finished(&scene));
     assert_eq!(a.positions(), b.positions());
@@ -328,7 +330,7 @@ fn the_same_scene_gives_the_same_bits() {
 }
 
 #[test]
-fn too_large_explicit_steps_are_warned_of_and_stopped() {
+fn too_large_explicit_steps_give_a_warning_and_an_error() {
     let text = format!("{STVK}{CORNER}");
     let small =
         Simulation::new(&scene("dt = 0.001\nduration = 1.0\nintegrator = \"symplectic-euler\"", &text)).unwrap();
@@ -347,7 +349,7 @@ fn too_large_explicit_steps_are_warned_of_and_stopped() {
 }
 
 #[test]
-fn a_linear_solve_that_gives_up_leaves_the_cloth_as_it_was() {
+fn a_failed_linear_solve_leaves_the_state_unchanged() {
     let mut body = distorted(STVK);
     let before = body.x.clone();
     let hasty = SolveOptions { relative_tolerance: 1e-12, iteration_limit: 1 };
@@ -359,14 +361,15 @@ fn a_linear_solve_that_gives_up_leaves_the_cloth_as_it_was() {
 
 #[test]
 fn compressed_cloth_is_solved_again_with_projected_curvature() {
-    // Squeezed to 60 % in its plane, a membrane without bending is unstable: the exact system is indefinite.
+    // Compressed to 60 % in its plane, a membrane without bending stiffness is unstable: the exact system is
+    // indefinite.
     let mut body = distorted(STVK);
     for x in &mut body.x {
         *x = [0.6 * x[0], 0.6 * x[1], x[2] * 1e-3];
     }
     let report = ImplicitEuler::default().step(&mut body, 0.05).unwrap();
     assert!(report.projected && report.solves == 2, "{report:?}");
-    // One linear solve from so far away overshoots, but the cloth comes back to its own size.
+    // One linear solve from so far away overshoots, but the cloth returns to its size.
     for _ in 0..30 {
         ImplicitEuler::default().step(&mut body, 0.05).unwrap();
     }

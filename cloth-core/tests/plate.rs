@@ -1,4 +1,4 @@
-//! Plate bending: right on every mesh, with right derivatives.
+//! Plate bending: exact for quadratic height fields on every mesh, with correct derivatives.
 
 use cloth_core::fabric::plate::curvatures;
 use cloth_core::fabric::{PlateTerm, Rigidity};
@@ -36,7 +36,7 @@ fn quadratic_height_fields_have_their_curvature_on_every_triangle_of_every_mesh(
             assert!(inner.len() > 100);
             for field in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
                 let angles = angles(&topology, &lifted(&mesh, field));
-                // The angle is positive where the surface bends down.
+                // The dihedral angle is positive if the surface bends down.
                 for one in &inner {
                     for k in 0..3 {
                         let found: f64 = one.angles.iter().map(|(hinge, b)| -1e6 * b[k] * angles[*hinge]).sum();
@@ -49,7 +49,7 @@ fn quadratic_height_fields_have_their_curvature_on_every_triangle_of_every_mesh(
 }
 
 #[test]
-fn a_state_of_constant_curvature_leaves_inner_vertices_alone() {
+fn constant_curvature_exerts_no_force_on_interior_vertices() {
     for kind in MeshKind::ALL {
         let mesh = sheet(kind, 20.0);
         let term = PlateTerm::new("bending", &mesh, &WOVEN, [1.0, 0.0, 0.0]).unwrap();
@@ -69,7 +69,7 @@ fn a_state_of_constant_curvature_leaves_inner_vertices_alone() {
     }
 }
 
-/// A triangle with its three neighbours, creased at rest; and the same bent otherwise.
+/// A triangle with its three neighbours, creased at rest; and a differently bent state.
 fn star() -> (TriangleMesh, Vec<Vector3<f64>>) {
     let h = 0.75_f64.sqrt();
     let flat = [[0.0, 0.0], [1.0, 0.0], [0.5, h], [1.5, h], [-0.5, h], [0.5, -h]];
@@ -80,7 +80,7 @@ fn star() -> (TriangleMesh, Vec<Vector3<f64>>) {
 }
 
 #[test]
-fn on_a_lattice_it_is_the_declared_element() {
+fn on_a_lattice_it_equals_the_declared_element() {
     let h = 0.75_f64.sqrt();
     let (_, bent) = star();
     let rest: Vec<Vector3<f64>> =
@@ -96,7 +96,7 @@ fn on_a_lattice_it_is_the_declared_element() {
         .flat_map(|i| (0..3).map(move |j| (i, j)))
         .map(|(i, j)| 0.5 * one.area * kappa[i] * d[i][j] * kappa[j])
         .sum();
-    // x₀ x₁ x₂, then the corners across from each.
+    // x₀ x₁ x₂, then the corners opposite each.
     let order = [0, 1, 2, 3, 4, 5];
     let [x0, x1, x2, y0, y1, y2] = order.map(|vertex| rest[vertex]);
     let element = PlateBending::new(x0, x1, x2, y0, y1, y2, nu * rigidity, 0.5 * (1.0 - nu) * rigidity).unwrap();
@@ -133,7 +133,7 @@ fn forces_and_hessians_are_derivatives_of_the_energy() {
         };
         let (after, before) = (stepped(1.0), stepped(-1.0));
         let mut energy = |steps: f64| system.energies(&stepped(steps)).unwrap()[0].energy.unwrap();
-        // Central differences, extrapolated: the fine mesh curves much within a step.
+        // Extrapolated central differences, because the energy of a fine mesh is strongly curved.
         let (whole, half) = ((energy(1.0) - energy(-1.0)) / (2.0 * step), (energy(0.5) - energy(-0.5)) / step);
         let slope = (4.0 * half - whole) / 3.0;
         let power: f64 = linear.force.iter().zip(&moving).map(|(f, v)| (0..3).map(|k| f[k] * v[k]).sum::<f64>()).sum();
@@ -147,7 +147,7 @@ fn forces_and_hessians_are_derivatives_of_the_energy() {
                 assert!((found[axis] - expected).abs() < 1e-5 * largest, "{vertex}: {} {expected}", found[axis]);
             }
         }
-        // Without pins the product that comes along is the same.
+        // Without pins, the product with the velocities must agree.
         let mut whole = vec![[0.0; 3]; free.len()];
         options.curvature = Curvature::Exact;
         let along = system.linearise(State { x: &x, v: &moving }, options, &mut matrix).unwrap();
@@ -158,7 +158,7 @@ fn forces_and_hessians_are_derivatives_of_the_energy() {
                 assert!((found[axis] - other).abs() < 1e-10 * largest, "{vertex}: {} {other}", found[axis]);
             }
         }
-        // −∂f/∂x with clamped curvature is positive semi-definite.
+        // With clamped curvature, −∂f/∂x is positive semi-definite.
         options.curvature = Curvature::Clamped;
         system.linearise(State { x: &x, v: &still }, options, &mut matrix).unwrap();
         matrix.multiply(&system.dofs().gather(&moving), &mut whole);
@@ -178,7 +178,7 @@ fn a_creased_sheet_is_at_rest_in_its_own_shape() {
 }
 
 #[test]
-fn a_warp_across_the_cloth_is_refused() {
+fn a_warp_across_the_cloth_is_rejected() {
     let (mesh, _) = star();
     let flat =
         TriangleMesh::new(mesh.vertices().iter().map(|p| [p[0], p[1], 0.0]).collect(), mesh.triangles().to_vec());

@@ -1,4 +1,4 @@
-//! Runs from outside: interruption, checkpoints, files for other programs, reports, materials read at run time.
+//! Runs of the binary: interruption, checkpoints, output formats, reports, materials read at run time.
 
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -75,7 +75,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
     std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// Everything but the times that steps took.
+/// Returns a summary without the step times.
 const REPEATABLE: [&str; 8] = [
     "cloth.png",
     "cloth.glb",
@@ -88,10 +88,10 @@ const REPEATABLE: [&str; 8] = [
 ];
 
 /// A run that was killed after its first checkpoint.
-fn stopped_at_half(scene: &str) -> TempDir {
+fn killed_after_first_checkpoint(scene: &str) -> TempDir {
     let folder = with_scene(scene);
     let mut child = started(&["run", "scene.toml", "-o", "half", "--checkpoint", "4"], folder.path());
-    // Once there is a checkpoint it is killed without notice.
+    // Kill it without notice once there is a checkpoint.
     let (start, checkpoint) = (Instant::now(), folder.path().join("half/checkpoint"));
     while !checkpoint.exists() {
         assert!(start.elapsed() < Duration::from_secs(120), "no checkpoint was written");
@@ -113,13 +113,13 @@ fn started(arguments: &[&str], folder: &Path) -> Child {
 }
 
 #[test]
-fn a_resumed_run_is_the_same_bit_by_bit() {
+fn a_resumed_run_is_bit_identical() {
     for (integrator, adaptive) in
         [("newton", true), ("bdf2", false), ("implicit-euler", false), ("implicit-midpoint", true)]
     {
         let scene =
             SCENE.replace("integrator = \"newton\"", &format!("integrator = \"{integrator}\"\nadaptive = {adaptive}"));
-        let folder = stopped_at_half(&scene);
+        let folder = killed_after_first_checkpoint(&scene);
         succeeds(&["run", "scene.toml", "-o", "whole"], folder.path());
         let text = succeeds(&["resume", "half"], folder.path());
         assert!(text.contains("30 steps"), "{text}");
@@ -131,7 +131,7 @@ fn a_resumed_run_is_the_same_bit_by_bit() {
 }
 
 #[test]
-fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
+fn damaged_newer_and_foreign_checkpoints_are_rejected() {
     let folder = with_scene(&SCENE.replace("duration = 0.3", "duration = 0.1"));
     let path = folder.path();
     succeeds(&["run", "scene.toml", "-o", "out", "--checkpoint", "5"], path);
@@ -158,7 +158,7 @@ fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
     assert!(
         with(of_version("2").as_bytes()).contains("has version 2, but this program reads version 3; start the run")
     );
-    assert!(with(b"something else\n").contains("is no checkpoint"));
+    assert!(with(b"something else\n").contains("is not a checkpoint"));
     std::fs::write(&checkpoint, &good).unwrap();
     let frames = path.join("out/checkpoint.frames");
     let bytes = std::fs::read(&frames).unwrap();
@@ -166,7 +166,7 @@ fn checkpoints_that_are_damaged_newer_or_of_something_else_are_refused() {
     assert!(refused(&["resume", "out"], path).contains("checkpoint.frames is damaged: it is cut short"));
     std::fs::write(&frames, &bytes).unwrap();
     succeeds(&["resume", "out"], path);
-    // A mesh that is no longer the same.
+    // A mesh that has changed since.
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
     std::fs::write(path.join("shape.obj"), square).unwrap();
     let sheet = "[garment.mesh.sheet]\ncells = [8, 8]\nsize = [0.5, 0.5]\n";
@@ -196,7 +196,7 @@ fn an_interrupted_run_leaves_all_files_and_can_be_resumed() {
     let output = child.wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{message}");
-    assert!(message.contains("of 100000; go on with `cloth resume out`"), "{message}");
+    assert!(message.contains("of 100000; resume with `cloth resume out`"), "{message}");
     let out = folder.path().join("out");
     assert!(read(&out, "cloth.png").starts_with(b"\x89PNG") && read(&out, "cloth.glb").starts_with(b"glTF"));
     let record: serde_json::Value = serde_json::from_slice(&read(&out, "run.json")).unwrap();
@@ -224,11 +224,11 @@ fn a_folder_that_disappears_is_a_clear_error() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_a_clear_error_and_leaves_no_part_of_a_file() {
+fn a_full_disk_is_a_clear_error_and_leaves_no_partial_file() {
     let folder = with_scene(SCENE);
     let frames = folder.path().join("out/frames");
     std::fs::create_dir_all(&frames).unwrap();
-    // Writing to this device fails as on a full disk.
+    // Writing to this device fails like on a full disk.
     std::os::unix::fs::symlink("/dev/full", frames.join("cloth_0002.obj.part")).unwrap();
     let message = refused(&["run", "scene.toml", "-o", "out"], folder.path());
     assert!(
@@ -280,9 +280,9 @@ fn usd_ply_and_obj_hold_the_same_frames() {
     assert_eq!(numbers(triangles).len(), 3 * 128);
 }
 
-/// With `pip install usd-core pygltflib trimesh`; skipped without them.
+/// Needs `pip install usd-core pygltflib trimesh`; skipped without them.
 #[test]
-fn the_readers_of_others_find_the_same_in_all_files() {
+fn other_libraries_read_the_same_from_all_files() {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_back.py");
     let folder = with_scene(&format!("{SCENE}[output]\nply = true\n"));
     succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
@@ -298,7 +298,7 @@ fn the_readers_of_others_find_the_same_in_all_files() {
 }
 
 #[test]
-fn what_is_wanted_is_written_and_nothing_else() {
+fn only_the_requested_files_are_written() {
     let none = "[output]\npng = true\npicture = false\ngltf = false\nusd = false\nobj = false\nledger = false\n";
     let folder = with_scene(&format!("{}{none}", SCENE.replace("duration = 0.3", "duration = 0.02")));
     succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
@@ -313,7 +313,7 @@ fn what_is_wanted_is_written_and_nothing_else() {
 }
 
 #[test]
-fn a_report_is_one_page_without_anything_from_elsewhere() {
+fn a_report_is_one_self_contained_page() {
     let folder = with_scene(SCENE);
     succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
     let text = succeeds(&["report", "out"], folder.path());
@@ -330,7 +330,7 @@ fn a_report_is_one_page_without_anything_from_elsewhere() {
 }
 
 #[test]
-fn stats_say_what_each_term_evaluated_and_are_in_the_summary_too() {
+fn stats_list_evaluations_per_term_also_in_the_summary() {
     let folder = with_scene(&SCENE.replace("duration = 0.3", "duration = 0.05"));
     let plain = succeeds(&["run", "scene.toml", "-o", "plain"], folder.path());
     assert!(!plain.contains("reused"), "{plain}");
@@ -342,7 +342,7 @@ fn stats_say_what_each_term_evaluated_and_are_in_the_summary_too() {
             let row = row.unwrap_or_else(|| panic!("{name}: {text}"));
             row.split_whitespace().filter_map(|word| word.parse().ok()).collect()
         };
-        // Elements, then evaluated and skipped for values, gradients and Hessians, flagged, projected, used again.
+        // Elements; then evaluated and skipped values, gradients and Hessians; flagged, projected, reused.
         let (membrane, bending) = (row("cloth: membrane"), row("cloth: bending"));
         assert_eq!((membrane.len(), membrane[0], membrane[9], bending[0]), (10, 128, 0, 176));
         assert!(membrane[5] > 5 * 128 && bending[5] < 2 * 176 && bending[9] > 5 * 176, "{membrane:?} {bending:?}");
@@ -351,7 +351,7 @@ fn stats_say_what_each_term_evaluated_and_are_in_the_summary_too() {
 }
 
 #[test]
-fn the_schema_knows_every_key_with_its_unit() {
+fn the_schema_documents_keys_with_units() {
     let schema: serde_json::Value = serde_json::from_str(&succeeds(&["schema"], Path::new("."))).unwrap();
     let properties = schema["properties"].as_object().unwrap();
     for key in
@@ -364,7 +364,7 @@ fn the_schema_knows_every_key_with_its_unit() {
 }
 
 const OWN: &str = r#"
-/// The membrane of the library, as a file of one's own.
+/// The library's membrane, as a file.
 energy OwnMembrane(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
     rest {
         let D_m = columns(u1 - u0, u2 - u0);
@@ -381,7 +381,7 @@ energy OwnMembrane(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]
 "#;
 
 #[test]
-fn a_material_from_a_file_moves_as_the_same_formula_built_in() {
+fn a_material_from_a_file_moves_like_the_built_in_one() {
     let folder = with_scene(SCENE);
     let lame = |y: f64, nu: f64| (y * nu / (1.0 - nu * nu), y / (2.0 * (1.0 + nu)));
     let (lambda, mu) = lame(40.0, 0.3);
@@ -405,7 +405,7 @@ fn a_material_from_a_file_moves_as_the_same_formula_built_in() {
     }
     let page = succeeds(&["report", "own"], folder.path());
     assert!(page.contains("report.html"));
-    // The same by --material, which replaces what the scene says.
+    // The same with --material, which replaces the material of the scene.
     let parameter = format!("lambda={lambda},mu={mu}");
     succeeds(
         &["run", "scene.toml", "-o", "replaced", "--material", "own.energy", "--parameters", &parameter],
@@ -425,6 +425,6 @@ fn a_material_from_a_file_moves_as_the_same_formula_built_in() {
     expect(
         &text,
         "force F(_x: Point, v: Velocity; λ, μ: Scalar[N s/m]) { -(λ + μ) * v }",
-        &["F is a force; a material is made of energies"],
+        &["F is a force; a material consists of energies"],
     );
 }

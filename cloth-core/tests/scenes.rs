@@ -1,9 +1,10 @@
-//! Scenes of several parts: contact, friction, wind, pins that move, seams, hair, and the ledger's balance.
+//! Scenes with several parts: contact, friction, wind, moving pins, seams, hair, and the energy ledger.
 
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;
 
-const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\
+                    poisson_ratio = 0.3\n\
                     bending.flat.stiffness = 1e-5\n";
 
 fn started(text: &str) -> Simulation {
@@ -32,7 +33,7 @@ fn sheet(head: &str, cells: usize, size: f64) -> String {
     format!("{head}\n[[garment]]\nmesh.sheet = {{ cells = [{cells}, {cells}], size = [{size}, {size}] }}\n{SOFT}")
 }
 
-/// A sheet that lies on the plane z = 0 under gravity of a slope.
+/// A sheet on the plane z = 0, under gravity tilted as on a slope.
 fn slope(friction: f64, integrator: &str) -> Simulation {
     let (sine, cosine) = 0.4_f64.sin_cos();
     let gravity = [9.81 * sine, 0.0, -9.81 * cosine];
@@ -43,7 +44,7 @@ fn slope(friction: f64, integrator: &str) -> Simulation {
 }
 
 #[test]
-fn cloth_on_a_slope_sticks_below_the_angle_of_friction_and_slides_above_it_as_coulomb_says() {
+fn cloth_on_a_slope_obeys_coulomb_friction() {
     for integrator in ["newton", "implicit-euler"] {
         let mean = |simulation: &Simulation| {
             simulation.velocities().iter().map(|v| v[0]).sum::<f64>() / simulation.velocities().len() as f64
@@ -61,15 +62,17 @@ fn cloth_on_a_slope_sticks_below_the_angle_of_friction_and_slides_above_it_as_co
 }
 
 #[test]
-fn nothing_ends_inside_an_obstacle_and_what_is_far_is_skipped() {
+fn cloth_stays_outside_obstacles_and_distant_vertices_are_skipped() {
     let obstacles = [
         "sphere = { radius = 0.2, centre = [0.0, 0.0, -0.25] }",
         "capsule = { from = [-0.1, 0.0, -0.2], to = [0.1, 0.0, -0.2], radius = 0.15 }",
-        "box = { centre = [0.0, 0.0, -0.2], size = [0.3, 0.3, 0.3], rounding = 0.03, rotate = { axis = [0.0, 0.0, 1.0], angle = 30.0 } }",
+        "box = { centre = [0.0, 0.0, -0.2], size = [0.3, 0.3, 0.3], rounding = 0.03, \
+         rotate = { axis = [0.0, 0.0, 1.0], angle = 30.0 } }",
         "plane = { point = [0.0, 0.0, -0.1], normal = [0.2, 0.0, 1.0] }",
     ];
     for obstacle in obstacles {
-        let head = "dt = 0.01\nduration = 0.5\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\ndrag = 0.5";
+        let head = "dt = 0.01\nduration = 0.5\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\n\
+            drag = 0.5";
         let text = format!("{}[[obstacles]]\n{obstacle}\nfriction = 0.3\n", sheet(head, 16, 0.5));
         let mut simulation = finished(&text);
         let solid = simulation.obstacles()[0].at(0.0);
@@ -83,10 +86,10 @@ fn nothing_ends_inside_an_obstacle_and_what_is_far_is_skipped() {
 }
 
 #[test]
-fn a_level_sheet_falls_as_fast_as_the_air_lets_it() {
+fn a_level_sheet_reaches_its_terminal_velocity() {
     let undamped = "stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\nbending.flat.stiffness = 1e-5\n";
     let springs = "mass-spring]\nstructural = 40.0\nshear = 20.0\nbending = 1.0\ndamping = 0.01\n";
-    // Damped springs make the matrix one that is not symmetric.
+    // Damped springs make the matrix unsymmetric.
     for (integrator, fabric) in [
         ("newton", undamped),
         ("implicit-euler", undamped),
@@ -97,7 +100,7 @@ fn a_level_sheet_falls_as_fast_as_the_air_lets_it() {
         let garment = sheet(&head, 3, 0.3).replace(undamped, fabric);
         let text = format!("{garment}[wind]\nvelocity = [0.0, 0.0, 0.5]\n");
         let simulation = finished(&text);
-        // σ g = ½ ρ C u², u beyond the rising air.
+        // σ g = ½ ρ C u², with u relative to the rising air.
         let speed = (2.0_f64 * 0.2 * 9.81 / (1.2 * 1.2)).sqrt() - 0.5;
         for v in simulation.velocities() {
             assert!((v[2] / -speed - 1.0).abs() < 0.01, "{integrator}: {} of {speed}", v[2]);
@@ -106,7 +109,7 @@ fn a_level_sheet_falls_as_fast_as_the_air_lets_it() {
 }
 
 #[test]
-fn pins_go_where_they_are_told_whatever_the_integrator() {
+fn pins_follow_their_motion_with_every_integrator() {
     let keys = "keys = [{ time = 0.0 }, { time = 0.1, angle = 90.0, translate = [0.0, 0.0, 0.3] }]";
     for integrator in
         ["implicit-euler", "newton", "bdf2", "implicit-midpoint", "trapezoid", "symplectic-euler", "verlet"]
@@ -122,11 +125,12 @@ fn pins_go_where_they_are_told_whatever_the_integrator() {
 }
 
 #[test]
-fn the_ledger_closes_for_integrators_that_keep_energy() {
+fn the_ledger_closes_for_conserving_integrators() {
     let head =
         |integrator: &str, dt: f64| format!("dt = {dt}\nduration = 0.3\nintegrator = \"{integrator}\"\ndrag = 1.0");
     let rest = "[[pins]]\nbox = { min = [-1.0, 0.099, -1.0], max = [1.0, 0.101, 1.0] }\n[pins.motion]\n\
-                keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.0, 0.15] }]\n[wind]\nvelocity = [0.0, 2.0, 1.0]\n";
+                keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.0, 0.15] }]\n[wind]\n\
+                velocity = [0.0, 2.0, 1.0]\n";
     let balance = |integrator: &str, dt: f64| {
         let mut simulation = finished(&format!("{}{rest}", sheet(&head(integrator, dt), 4, 0.2)));
         let ledger = simulation.ledger().unwrap().clone();
@@ -140,14 +144,14 @@ fn the_ledger_closes_for_integrators_that_keep_energy() {
     let (fine, warnings) = balance("implicit-midpoint", 1e-3);
     assert!(fine < 0.01 && warnings.is_empty(), "{fine} {warnings:?}");
     assert!(fine < 0.5 * coarse, "{coarse} {fine}");
-    // Implicit Euler loses more, and nobody expects better.
+    // Implicit Euler dissipates more, which is expected.
     let (lost, warnings) = balance("newton", 2e-3);
     assert!(lost > fine && warnings.is_empty(), "{lost}");
 }
 
 #[test]
-fn a_balance_that_should_close_but_does_not_is_warned_of() {
-    // A pull within a step and a half.
+fn an_energy_balance_that_does_not_close_gives_a_warning() {
+    // A strong pull within one and a half steps.
     let head = "dt = 0.02\nduration = 0.3\nintegrator = \"implicit-midpoint\"";
     let pin = "[[pins]]\nbox = { min = [-1.0, 0.099, -1.0], max = [1.0, 0.101, 1.0] }\n[pins.motion]\n\
                keys = [{ time = 0.0 }, { time = 0.03, translate = [0.0, 0.02, 0.02] }]\n";
@@ -158,14 +162,14 @@ fn a_balance_that_should_close_but_does_not_is_warned_of() {
 }
 
 #[test]
-fn what_starts_inside_an_obstacle_is_warned_of() {
+fn vertices_that_start_inside_an_obstacle_give_a_warning() {
     let text = sheet("dt = 0.01\nduration = 0.1", 4, 0.2);
     let simulation = started(&format!("{text}[[obstacles]]\nname = \"ball\"\nsphere = {{ radius = 0.06 }}\n"));
-    assert_eq!(simulation.warnings(), ["5 vertices start inside ball; they will be thrown out of it"]);
+    assert_eq!(simulation.warnings(), ["5 vertices start inside ball; contact will throw them out"]);
 }
 
 #[test]
-fn obstacles_that_move_do_work_and_carry_cloth_along() {
+fn moving_obstacles_do_work_and_carry_cloth_along() {
     let head = "dt = 0.005\nduration = 0.6\nintegrator = \"newton\"";
     let lying = sheet(head, 4, 0.2)
         .replace("[garment.fabric]\n", "placement.translate = [0.0, 0.0, 0.0049]\n[garment.fabric]\n");
@@ -179,7 +183,7 @@ fn obstacles_that_move_do_work_and_carry_cloth_along() {
 }
 
 #[test]
-fn seams_pull_garments_together_without_moving_them_as_a_whole() {
+fn seams_pull_garments_together_and_conserve_momentum() {
     let head = "dt = 0.005\nduration = 1.5\nintegrator = \"newton\"\ngravity = [0.0, 0.0, 0.0]\ndrag = 2.0";
     let piece = |name: &str, x: f64| {
         format!(
@@ -206,12 +210,14 @@ fn seams_pull_garments_together_without_moving_them_as_a_whole() {
 }
 
 #[test]
-fn hair_bends_under_its_weight_as_a_beam_does() {
-    let text = "dt = 0.01\nduration = 4.0\nintegrator = \"newton\"\ndrag = 6.0\n[[hair]]\ncount = 2\nsegments = 40\nlength = 0.1\n\
-                last_root = [0.0, 0.1, 0.0]\ndirection = [1.0, 0.0, 0.0]\ndensity = 1e-4\nstretch_stiffness = 50.0\nbend_stiffness = 4e-6\n";
+fn hair_bends_under_its_weight_like_a_beam() {
+    let text = "dt = 0.01\nduration = 4.0\nintegrator = \"newton\"\ndrag = 6.0\n[[hair]]\ncount = 2\nsegments = 40\n\
+                length = 0.1\n\
+                last_root = [0.0, 0.1, 0.0]\ndirection = [1.0, 0.0, 0.0]\ndensity = 1e-4\nstretch_stiffness = 50.0\n\
+                bend_stiffness = 4e-6\n";
     let simulation = finished(text);
     assert_eq!(simulation.positions().len(), 82);
-    // The clamp ends half-way between the two vertices that are held.
+    // The clamp ends midway between the two held vertices.
     let length: f64 = 0.1 - 0.5 * 0.1 / 40.0;
     let exact = 1e-4 * 9.81 * length.powi(4) / (8.0 * 4e-6);
     for strand in simulation.strands() {
@@ -221,10 +227,12 @@ fn hair_bends_under_its_weight_as_a_beam_does() {
 }
 
 #[test]
-fn garments_fall_together_from_where_they_are_placed() {
+fn garments_fall_from_their_placements() {
     let text = format!(
-        "dt = 0.01\nduration = 0.1\ngravity = [0.0, 0.0, 0.0]\n[[garment]]\nfabric = \"denim\"\nmesh.disc = {{ radius = 1.0, rings = 3 }}\n\
-         placement = {{ scale = 0.5, rotate = {{ axis = [1.0, 0.0, 0.0], angle = 90.0 }}, translate = [1.0, 2.0, 3.0] }}\n\
+        "dt = 0.01\nduration = 0.1\ngravity = [0.0, 0.0, 0.0]\n[[garment]]\nfabric = \"denim\"\n\
+         mesh.disc = {{ radius = 1.0, rings = 3 }}\n\
+         placement = {{ scale = 0.5, \
+         rotate = {{ axis = [1.0, 0.0, 0.0], angle = 90.0 }}, translate = [1.0, 2.0, 3.0] }}\n\
          velocity = [0.0, 0.5, 0.0]\n[[garment]]\nmesh.strip = {{ length = 0.4, width = 0.1, segments = 8 }}\n{SOFT}"
     );
     let simulation = finished(&text);
@@ -238,7 +246,7 @@ fn garments_fall_together_from_where_they_are_placed() {
 }
 
 #[test]
-fn scenes_that_contradict_themselves_are_refused_with_the_remedy() {
+fn contradictory_scenes_are_rejected_with_a_remedy() {
     let good = sheet("dt = 0.01\nduration = 0.1", 2, 0.2);
     let expect = |text: &str, parts: &[&str]| {
         let message = refused(text);
@@ -263,14 +271,14 @@ fn scenes_that_contradict_themselves_are_refused_with_the_remedy() {
     );
     expect(fabric.split_once('\n').unwrap().1, &["unknown variant `demin`", "did you mean `denim`?"]);
     let keys = "[pins.motion]\nkeys = [{ time = 1.0 }, { time = 0.5 }]\n";
-    expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must grow"]);
+    expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must increase"]);
     let twice = "[[pins]]\nvertex = 0\n[[pins]]\nall = true\nmotion = { keys = [{ time = 0.0, angle = 5.0 }] }\n";
-    expect(&format!("{good}{twice}"), &["pins[1]: vertex 0 is held by another pin"]);
+    expect(&format!("{good}{twice}"), &["pins[1]: vertex 0 already belongs to a pin"]);
     expect(&format!("{good}[wind]\nvelocity = [1.0, 0.0, inf]\n"), &["test.toml:12:12", "finite numbers only"]);
 }
 
 #[test]
-fn the_scenes_of_the_gallery_are_sound() {
+fn the_scenes_of_the_gallery_are_valid() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {

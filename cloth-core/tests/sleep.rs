@@ -1,10 +1,12 @@
-//! Islands: what nothing couples moves by itself, falls asleep when it is still, wakes when it is disturbed, and costs nothing while it sleeps.
+//! Islands: uncoupled vertices move separately, fall asleep when still, wake when disturbed, and cost nothing while
+//! asleep.
 
 use cloth_core::Simulation;
 use cloth_core::bench::sleep::{self, Sizes};
 use cloth_core::scene::Scene;
 
-const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\n\
+const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\
+                    poisson_ratio = 0.3\n\
                     bending.flat.stiffness = 1e-5\n";
 
 fn started(text: &str) -> Simulation {
@@ -14,7 +16,7 @@ fn started(text: &str) -> Simulation {
     simulation
 }
 
-/// A sheet of 4 × 4 cells, 20 cm wide, there.
+/// A sheet of 4 × 4 cells, 20 cm wide, at a position.
 fn sheet(name: &str, at: [f64; 3]) -> String {
     format!(
         "[[garment]]\nname = \"{name}\"\nplacement.translate = {at:?}\n\
@@ -28,7 +30,7 @@ fn step(simulation: &mut Simulation, steps: u64) {
     }
 }
 
-/// Steps until all islands sleep; after how many steps.
+/// Simulates until all islands sleep, and returns the number of steps.
 fn settle(simulation: &mut Simulation) -> u64 {
     while !simulation.islands().iter().all(|island| island.is_asleep()) {
         assert!(simulation.steps_done() < 2000, "it does not fall asleep");
@@ -44,7 +46,7 @@ fn awake(simulation: &Simulation) -> Vec<bool> {
 const HEAD: &str = "dt = 0.01\nduration = 100.0\nintegrator = \"newton\"\ndrag = 5.0\nsleep = true\n";
 
 #[test]
-fn islands_are_what_nothing_couples() {
+fn uncoupled_vertices_form_islands() {
     let islands =
         |text: &str| -> Vec<usize> { started(text).islands().iter().map(|island| island.vertices().len()).collect() };
     let two = format!("{HEAD}{}{}", sheet("a", [0.0; 3]), sheet("b", [0.0, 0.2, 0.0]));
@@ -52,12 +54,13 @@ fn islands_are_what_nothing_couples() {
     let seam = "[[seams]]\ngarments = [\"a\", \"c\"]\npairs = [[0, 24]]\nstiffness = 10.0\n";
     let sewn = format!("{two}{}{seam}", sheet("c", [0.0, 0.4, 0.0]));
     assert_eq!(islands(&sewn), [50, 25]);
-    let hair = "[[hair]]\ncount = 7\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\nbend_stiffness = 1e-7\n";
+    let hair = "[[hair]]\ncount = 7\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\n\
+        bend_stiffness = 1e-7\n";
     assert_eq!(islands(&format!("{two}{hair}")), [25, 25, 42]);
 }
 
-/// An OBJ file of sheets of 8 × 8 cells, a metre apart, and crumbs.
-fn pieces(sheets: usize, crumbs: usize) -> String {
+/// An OBJ file of sheets of 8 × 8 cells, 1 m apart, and small pieces.
+fn pieces(sheets: usize, small_pieces: usize) -> String {
     let (mut text, mut first) = (String::new(), 1);
     for sheet in 0..sheets {
         for k in 0..81 {
@@ -69,7 +72,7 @@ fn pieces(sheets: usize, crumbs: usize) -> String {
         }
         first += 81;
     }
-    for crumb in 0..crumbs {
+    for crumb in 0..small_pieces {
         let x = crumb as f64;
         text += &format!("v {x} 5 0\nv {} 5 0\nv {x} 5.5 0\nf {first} {} {}\n", x + 0.5, first + 1, first + 2);
         first += 3;
@@ -78,7 +81,7 @@ fn pieces(sheets: usize, crumbs: usize) -> String {
 }
 
 #[test]
-fn pieces_of_one_mesh_move_as_separate_garments_do() {
+fn pieces_of_one_mesh_move_like_separate_garments() {
     let folder = tempfile::TempDir::new().unwrap();
     std::fs::write(folder.path().join("two.obj"), pieces(2, 3)).unwrap();
     std::fs::write(folder.path().join("one.obj"), pieces(1, 0)).unwrap();
@@ -98,12 +101,12 @@ fn pieces_of_one_mesh_move_as_separate_garments_do() {
     let sizes: Vec<usize> = two.islands().iter().map(|island| island.vertices().len()).collect();
     assert_eq!(sizes, [81, 81, 9]);
     assert_eq!(two.positions()[..81], *one.positions());
-    // Each term is listed once, with what it did on all islands.
+    // Each term is listed once, with its totals over all islands.
     let names = |simulation: &mut Simulation| -> Vec<String> {
         simulation.summary().unwrap().terms.into_iter().map(|term| term.name).collect()
     };
     assert_eq!(names(&mut two), names(&mut one));
-    // A triangle is called by its number in the file, whatever piece it is of.
+    // Errors number triangles as in the file, whatever piece they belong to.
     let bad = text("two.obj")
         .replace("[garment.fabric.material.stvk]", "warp = [1.0, 0.0, 0.0]\n[garment.fabric.material.stvk]");
     let bad =
@@ -117,7 +120,7 @@ fn pieces_of_one_mesh_move_as_separate_garments_do() {
 }
 
 #[test]
-fn what_is_still_stays_where_it_is_to_the_last_bit_and_its_last_motion_is_booked() {
+fn sleeping_islands_stay_bit_identical_and_the_ledger_records_their_energy() {
     let pin = "[[pins]]\nof = \"a\"\nnearest = [-0.1, 0.1, 0.0]\n";
     let mut simulation = started(&format!("{HEAD}{}{pin}", sheet("a", [0.0; 3])));
     let settled = settle(&mut simulation);
@@ -127,7 +130,7 @@ fn what_is_still_stays_where_it_is_to_the_last_bit_and_its_last_motion_is_booked
     assert!(simulation.velocities().iter().flatten().all(|component| *component == 0.0));
     assert!(before.kinetic > 0.0 && last.kinetic == 0.0 && last.momentum == [0.0; 3] && last.sleep < 0.0);
     assert!(-last.sleep < 0.5 * 0.2 * 0.04 * 3e-4_f64.powi(2), "{}", last.sleep);
-    // What implicit Euler dissipates goes on being unaccounted for; sleep adds nothing to it.
+    // The dissipation of implicit Euler stays unaccounted for; sleep adds nothing to it.
     let first = &entries[0];
     let jump = last.unaccounted(first) - before.unaccounted(first);
     assert!(jump.abs() < 0.1 * last.sleep.abs(), "{jump:e} {:e}", last.sleep);
@@ -139,19 +142,20 @@ fn what_is_still_stays_where_it_is_to_the_last_bit_and_its_last_motion_is_booked
     assert_eq!((summary.islands, summary.asleep, summary.totals.slept), (1, 1, 100));
     let line = format!("1 island, 1 asleep; 100 of their {} steps slept through", settled + 100);
     assert!(summary.to_string().contains(&line), "{summary}");
-    // Something from outside.
+    // An external force.
     simulation.wake(7);
     assert_eq!(awake(&simulation), [true]);
     simulation.step().unwrap();
     assert_ne!(simulation.positions(), x);
-    // As the scene says nothing of it, nothing sleeps.
+    // Without `sleep` in the scene, nothing sleeps.
     let text = format!("{}{}{pin}", HEAD.replace("sleep = true\n", ""), sheet("a", [0.0; 3]));
     let mut simulation = started(&text);
     step(&mut simulation, settled + 10);
     assert_eq!((awake(&simulation), simulation.summary().unwrap().totals.slept), (vec![true], 0));
 }
 
-/// Three sheets held along their edges: the pins of the first move after 4 s, a ball comes down on the second after 6 s, nothing happens to the third.
+/// Three sheets held along their edges. The pins of the first move after 4 s, a ball descends onto the second after 6
+/// s, nothing happens to the third.
 fn disturbed() -> Simulation {
     let keys = "motion.keys = [{ time = 4.0 }, { time = 4.2, translate = [0.0, 0.0, 0.02] }]\n";
     let pin = |name: &str, motion: &str| format!("[[pins]]\nof = \"{name}\"\nboundary = true\n{motion}");
@@ -163,7 +167,7 @@ fn disturbed() -> Simulation {
 }
 
 #[test]
-fn a_pin_wakes_its_island_and_an_obstacle_what_it_comes_near() {
+fn pins_wake_their_islands_and_obstacles_nearby_ones() {
     let mut simulation = disturbed();
     assert!(settle(&mut simulation) < 400);
     let mut woken = [0; 3];
@@ -179,17 +183,17 @@ fn a_pin_wakes_its_island_and_an_obstacle_what_it_comes_near() {
             }
         }
     }
-    // The ball is within reach of the sheet only after a while.
+    // The ball comes within reach of the sheet only after a while.
     assert_eq!((woken[0], woken[2]), (401, 0));
     assert!((660..700).contains(&woken[1]), "{woken:?}");
-    // The pin is where its motion took it, and the ball has pushed what it came upon.
+    // The pin followed its motion, and the ball pushed the sheet.
     let middle = |island: usize| simulation.positions()[25 * island + 12][2];
     assert!((middle(0) - middle(2) - 0.02).abs() < 1e-4 && middle(1) < middle(2) + 1e-6, "{:?}", [0, 1, 2].map(middle));
 }
 
 #[test]
-fn what_sleeps_sleeps_on_after_an_interruption() {
-    // Watched but awake; all asleep; one just woken.
+fn sleep_survives_a_restart() {
+    // Awake but still; all asleep; one just woken.
     for (interrupted, until) in [(45, 60), (399, 430), (401, 720)] {
         let mut whole = disturbed();
         step(&mut whole, interrupted);
@@ -209,7 +213,7 @@ fn what_sleeps_sleeps_on_after_an_interruption() {
 }
 
 #[test]
-fn what_the_wind_plays_with_does_not_sleep() {
+fn gusts_prevent_sleep() {
     let pins = "[[pins]]\nboundary = true\n";
     let gusts = "[wind]\nvelocity = [0.0, 0.0, 0.1]\n[[wind.gusts]]\namplitude = [0.0, 0.0, 1e-9]\nperiod = 1.0\n";
     let mut simulation = started(&format!("{HEAD}{}{pins}{gusts}", sheet("a", [0.0; 3])));
@@ -217,15 +221,16 @@ fn what_the_wind_plays_with_does_not_sleep() {
     assert_eq!(awake(&simulation), [true]);
     let even = gusts.split("[[wind.gusts]]").next().unwrap();
     assert!(settle(&mut started(&format!("{HEAD}{}{pins}{even}", sheet("a", [0.0; 3])))) < 400);
-    // Wind pushes triangles only.
-    let hair = "[[hair]]\ncount = 2\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\nbend_stiffness = 1e-7\n";
+    // Wind acts on triangles only.
+    let hair = "[[hair]]\ncount = 2\nsegments = 5\nlength = 0.1\ndensity = 1e-4\nstretch_stiffness = 5.0\n\
+        bend_stiffness = 1e-7\n";
     let mut simulation = started(&format!("{HEAD}{}{hair}{pins}of = \"a\"\n{gusts}", sheet("a", [0.0; 3])));
     step(&mut simulation, 400);
     assert_eq!(awake(&simulation), [true, false]);
 }
 
 #[test]
-fn scenes_say_when_something_sleeps() {
+fn scenes_configure_sleep() {
     let with = |sleep: &str| {
         let text = format!("{}{}", HEAD.replace("sleep = true", sleep), sheet("a", [0.0; 3]));
         Scene::parse(&text, "test.toml".as_ref()).map_err(|error| error.to_string())
@@ -235,13 +240,13 @@ fn scenes_say_when_something_sleeps() {
     let sleep = with("sleep = { speed = 0.01 }").unwrap().sleep.unwrap();
     assert_eq!((sleep.speed, sleep.after), (Some(0.01), 0.5));
     assert!(with("sleep = { sped = 0.01 }").unwrap_err().contains("did you mean `speed`?"));
-    assert!(with("sleep = { after = 0.0 }").unwrap_err().contains("must be a finite number above 0"));
+    assert!(with("sleep = { after = 0.0 }").unwrap_err().contains("expected a finite number greater than 0, got 0"));
     assert!(with("sleep = 3").unwrap_err().contains("`true`, `false` or a table with `speed` and `after`"));
 }
 
-/// Loosely: three times of what `cloth bench --sleep` is held to.
+/// A lenient check: three times the limits of `cloth bench --sleep`.
 #[test]
-fn what_sleeps_or_is_pinned_costs_next_to_nothing() {
+fn sleeping_and_pinned_vertices_cost_little() {
     let sizes = Sizes { cells: 10, cloths: 20, pinned_cells: 40, steps: 15 };
     for ratio in sleep::measure(&sizes, |_| ()).unwrap() {
         assert!(ratio.value() < 3.0 * ratio.target, "{}: {}", ratio.question, ratio.value());

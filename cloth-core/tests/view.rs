@@ -1,4 +1,4 @@
-//! `cloth view` from outside: pictures without a display, and what it says where it cannot show anything.
+//! `cloth view` from outside: pictures without a display, and errors.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -27,7 +27,7 @@ nearest = [-0.5, 0.5, 0.0]
 sphere = { radius = 0.2, centre = [0.0, 0.0, -0.3] }
 "#;
 
-/// With no display to be had.
+/// Runs the binary without a display.
 fn cloth(arguments: &[&str], folder: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cloth"));
     command.args(arguments).current_dir(folder).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
@@ -55,7 +55,7 @@ fn with_scene() -> TempDir {
 }
 
 #[test]
-fn a_screenshot_of_a_scene_is_that_of_its_run() {
+fn a_screenshot_of_a_scene_equals_that_of_its_run() {
     let folder = with_scene();
     let path = folder.path();
     succeeds(&["run", "scene.toml", "-o", "out"], path);
@@ -65,7 +65,8 @@ fn a_screenshot_of_a_scene_is_that_of_its_run() {
     assert!(read("end.png").starts_with(b"\x89PNG"));
     assert!(read("end.png") == read("out/cloth.png"), "as the run drew it");
 
-    // Moments, of the scene and of its run: frames have the digits of their files only, so that pictures may differ in a shade.
+    // The same moments, from the scene and from its run: frame files have fewer digits, so pictures may differ
+    // slightly.
     let told =
         succeeds(&["view", "scene.toml", "--screenshot", "scene.png", "--frame", "4", "--colours", "strain"], path);
     assert!(told.starts_with("wrote scene.png: t = 0.0800 s, strain from 0 to "), "{told}");
@@ -83,7 +84,7 @@ fn a_screenshot_of_a_scene_is_that_of_its_run() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_a_clear_error() {
+fn invalid_requests_are_clear_errors() {
     let folder = with_scene();
     let path = folder.path();
     assert!(refused(&["view", "nothing.toml"], path).contains(if cfg!(feature = "view") {

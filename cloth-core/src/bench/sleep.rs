@@ -1,4 +1,4 @@
-//! The other benchmark: what cannot move costs nothing. Ratios of times from one run: a step of what sleeps, or is pinned, over one of what moves.
+//! The benchmark of idle vertices: the step time of sleeping or pinned vertices over that of moving ones, from one run.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -8,16 +8,16 @@ use comfy_table::{CellAlignment, Table, presets};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 
-/// How large the scenes are.
+/// Sizes of the scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// Cells along each side of the cloth that settles, and of each of many.
+    /// Cells along each side of the cloth that settles, and of each of the many cloths.
     pub cells: usize,
-    /// How many there are, of which one moves.
+    /// Number of cloths, of which one moves.
     pub cloths: usize,
-    /// Cells along each side of the cloth that is pinned.
+    /// Cells along each side of the pinned cloth.
     pub pinned_cells: usize,
-    /// Steps that are timed of each.
+    /// Timed steps of each scene.
     pub steps: usize,
 }
 
@@ -27,83 +27,85 @@ impl Default for Sizes {
     }
 }
 
-/// What costs nothing, or should.
+/// A comparison of two step times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
-    /// What is compared with what.
+    /// A description of the two steps.
     pub question: String,
-    /// A step of the one, the lower quartile of all.
+    /// Lower quartile of the first step time.
     pub cost: Duration,
-    /// A step of the other, likewise.
+    /// Lower quartile of the second step time.
     pub reference: Duration,
-    /// The most that the one may cost of the other.
+    /// The largest acceptable ratio.
     pub target: f64,
 }
 
 impl Ratio {
-    /// The one over the other.
+    /// The ratio of the two times.
     #[must_use]
     pub fn value(&self) -> f64 {
         self.cost.as_secs_f64() / self.reference.as_secs_f64()
     }
 }
 
-/// A scene of the benchmark that could not be set up or run.
+/// A scene of the benchmark that cannot be set up or run.
 #[derive(Debug, thiserror::Error)]
 pub enum SleepBenchError {
-    /// Its text.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Setting up, or a step.
+    /// The simulation cannot be set up, or a step failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The ledger.
+    /// The ledger cannot be opened.
     #[error(transparent)]
     Evaluation(#[from] energy_solve::EvaluationError),
-    /// It should have fallen asleep.
+    /// Islands that should sleep are awake.
     #[error("after {steps} steps {awake} islands are still awake")]
     Awake {
-        /// Steps done.
+        /// Completed steps.
         steps: u64,
-        /// Islands that should sleep.
+        /// Number of islands awake.
         awake: usize,
     },
 }
 
 const HEAD: &str = "dt = 0.01\nduration = 1000.0\nintegrator = \"newton\"\ntolerances.velocity = 1e-3\n";
-/// It must be asleep after so many steps.
+/// Steps within which islands must fall asleep.
 const PATIENCE: u64 = 20_000;
 
-/// A square of cotton, half a metre wide, as one garment of several.
+/// Returns a garment: a square of cotton, 0.5 m wide, at a position.
 fn garment(cells: usize, at: [f64; 2]) -> String {
     let [x, y] = at;
     format!(
-        "[[garment]]\nplacement.translate = [{x}, {y}, 0.0]\nmesh.sheet = {{ cells = [{cells}, {cells}], size = [0.5, 0.5] }}\n\
-         [garment.fabric]\ndensity = 0.15\n[garment.fabric.material.stvk]\nstretch_stiffness = 50.0\npoisson_ratio = 0.3\n\
+        "[[garment]]\nplacement.translate = [{x}, {y}, 0.0]\n\
+         mesh.sheet = {{ cells = [{cells}, {cells}], size = [0.5, 0.5] }}\n\
+         [garment.fabric]\ndensity = 0.15\n[garment.fabric.material.stvk]\n\
+         stretch_stiffness = 50.0\npoisson_ratio = 0.3\n\
          bending.flat.stiffness = 1e-5\n"
     )
 }
 
-/// With its ledger, as `cloth run` does by default.
-fn started(text: &str) -> Result<Simulation, SleepBenchError> {
+/// Creates a simulation with a ledger, as `cloth run` does by default.
+fn simulation_with_ledger(text: &str) -> Result<Simulation, SleepBenchError> {
     let mut simulation = Simulation::new(&Scene::parse(text, "bench.toml".as_ref())?)?;
     simulation.keep_ledger()?;
     Ok(simulation)
 }
 
 fn step(simulation: &mut Simulation) -> Result<Duration, SimulationError> {
-    let started = Instant::now();
+    let simulation_with_ledger = Instant::now();
     simulation.step()?;
-    Ok(started.elapsed())
+    Ok(simulation_with_ledger.elapsed())
 }
 
-/// The lower quartile: what else the machine does only adds to times.
+/// Returns the lower quartile: other load on the machine only adds to times.
 fn typical(mut times: Vec<Duration>) -> Duration {
     times.sort_unstable();
     times.get(times.len() / 4).copied().unwrap_or_default()
 }
 
-/// Steps until no more islands than that are awake.
+/// Simulates until at most `awake` islands are awake.
 fn settle(simulation: &mut Simulation, awake: usize) -> Result<(), SleepBenchError> {
     let moving = |simulation: &Simulation| simulation.islands().iter().filter(|island| !island.is_asleep()).count();
     while moving(simulation) > awake {
@@ -115,8 +117,8 @@ fn settle(simulation: &mut Simulation, awake: usize) -> Result<(), SleepBenchErr
     Ok(())
 }
 
-/// Both in turns, so that what else the machine does is felt by both.
-fn in_turns(pair: [&mut Simulation; 2], steps: usize) -> Result<[Duration; 2], SimulationError> {
+/// Times two simulations alternately, so that other load on the machine affects both equally.
+fn time_alternately(pair: [&mut Simulation; 2], steps: usize) -> Result<[Duration; 2], SimulationError> {
     let [one, other] = pair;
     let (mut times, mut references) = (Vec::new(), Vec::new());
     for turn in 0..steps {
@@ -131,11 +133,11 @@ fn in_turns(pair: [&mut Simulation; 2], steps: usize) -> Result<[Duration; 2], S
     Ok([typical(times), typical(references)])
 }
 
-/// A cloth hung by two corners, once it has settled, over its first steps.
+/// Compares a hanging cloth after it has settled with its first steps.
 fn settled(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
     let pins = "[[pins]]\nnearest = [-0.25, 0.25, 0.0]\n[[pins]]\nnearest = [0.25, 0.25, 0.0]\n";
     let text = format!("{HEAD}drag = 4.0\nsleep = true\n{}{pins}", garment(sizes.cells, [0.0; 2]));
-    let mut simulation = started(&text)?;
+    let mut simulation = simulation_with_ledger(&text)?;
     let active = (0..sizes.steps).map(|_| step(&mut simulation)).collect::<Result<_, _>>()?;
     settle(&mut simulation, 0)?;
     let asleep = (0..sizes.steps).map(|_| step(&mut simulation)).collect::<Result<_, _>>()?;
@@ -143,7 +145,7 @@ fn settled(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
     Ok(Ratio { question, cost: typical(asleep), reference: typical(active), target: 0.01 })
 }
 
-/// Many cloths without weight, of which one is whirled around, over that one alone.
+/// Compares many weightless cloths, of which one is whirled around, with that one alone.
 fn one_of_many(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
     let keys = "keys = [{ time = 0.0 }, { time = 1000.0, angle = 3.6e5 }]";
     let pin = format!("[[pins]]\nof = \"garment 0\"\nnearest = [0.25, 0.25, 0.0]\nmotion = {{ {keys} }}\n");
@@ -153,40 +155,40 @@ fn one_of_many(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
         write!(text, "{}", garment(sizes.cells, [(number % 10) as f64, (number / 10) as f64]))
             .expect("writing to a string succeeds");
     }
-    let mut many = started(&format!("{text}{pin}"))?;
-    let mut alone = started(&format!("{head}{}{pin}", garment(sizes.cells, [0.0; 2])))?;
+    let mut many = simulation_with_ledger(&format!("{text}{pin}"))?;
+    let mut alone = simulation_with_ledger(&format!("{head}{}{pin}", garment(sizes.cells, [0.0; 2])))?;
     settle(&mut many, 1)?;
     while alone.steps_done() < many.steps_done() {
         alone.step()?;
     }
-    let [cost, reference] = in_turns([&mut many, &mut alone], sizes.steps)?;
+    let [cost, reference] = time_alternately([&mut many, &mut alone], sizes.steps)?;
     Ok(Ratio { question: format!("1 of {} cloths awake, over it alone", sizes.cloths), cost, reference, target: 1.1 })
 }
 
-/// A cloth with nine tenths of its vertices pinned, over the same held by two corners.
+/// Compares a cloth with 90 % of its vertices pinned with the same cloth held by two corners.
 fn mostly_pinned(sizes: &Sizes) -> Result<Ratio, SleepBenchError> {
     let cloth = format!("{HEAD}{}", garment(sizes.pinned_cells, [0.0; 2]));
     let corners = "[[pins]]\nnearest = [-0.25, 0.25, 0.0]\n[[pins]]\nnearest = [0.25, 0.25, 0.0]\n";
     let nine_tenths = "[[pins]]\nbox = { min = [-1.0, -0.2, -1.0], max = [1.0, 1.0, 1.0] }\n";
-    let mut pinned = started(&format!("{cloth}{nine_tenths}"))?;
-    let mut free = started(&format!("{cloth}{corners}"))?;
-    let [cost, reference] = in_turns([&mut pinned, &mut free], sizes.steps)?;
+    let mut pinned = simulation_with_ledger(&format!("{cloth}{nine_tenths}"))?;
+    let mut free = simulation_with_ledger(&format!("{cloth}{corners}"))?;
+    let [cost, reference] = time_alternately([&mut pinned, &mut free], sizes.steps)?;
     let question = format!("{} vertices, 90 % pinned, over two pinned", free.positions().len());
     Ok(Ratio { question, cost, reference, target: 0.15 })
 }
 
-/// Measures what sleeps and what is pinned, telling each ratio as it is known.
+/// Measures all ratios, and calls `report` with each.
 ///
 /// # Errors
-/// When a scene cannot be simulated, or does not fall asleep.
-pub fn measure(sizes: &Sizes, mut tell: impl FnMut(&Ratio)) -> Result<Vec<Ratio>, SleepBenchError> {
+/// Returns an error if a scene cannot be simulated, or does not fall asleep.
+pub fn measure(sizes: &Sizes, mut report: impl FnMut(&Ratio)) -> Result<Vec<Ratio>, SleepBenchError> {
     type Ask = fn(&Sizes) -> Result<Ratio, SleepBenchError>;
     let all: [Ask; 3] = [settled, one_of_many, mostly_pinned];
-    let told = all.into_iter().map(|ask| ask(sizes).inspect(&mut tell));
-    told.collect()
+    let ratios = all.into_iter().map(|ask| ask(sizes).inspect(&mut report));
+    ratios.collect()
 }
 
-/// The ratios as a table.
+/// Formats the ratios as a table.
 #[must_use]
 pub fn table(ratios: &[Ratio]) -> Table {
     let mut table = Table::new();

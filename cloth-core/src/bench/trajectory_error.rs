@@ -1,4 +1,4 @@
-//! What a step costs and what it buys: time against error of the trajectory, for each integrator.
+//! Wall time against trajectory error of each integrator.
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -14,56 +14,57 @@ use crate::validate::{ValidateError, runge_kutta};
 /// A run of an integrator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// The integrator.
+    /// The integrator's name.
     pub integrator: &'static str,
-    /// Its step, in s.
+    /// Time step, in s.
     pub dt: f64,
-    /// The time it took, in s.
-    pub wall: f64,
-    /// How far the vertex that is farthest off is from where it should be at the end, in m; or why the run failed.
+    /// Wall time, in s.
+    pub wall_time: f64,
+    /// The largest distance of a vertex from its reference position at the end, in m; or why the run failed.
     pub error: Result<f64, StepError>,
-    /// By how much halving the step from that of the run before raised the accuracy, as a power of 2.
+    /// Observed order: log₂ of the reduction of the error since the last run, which had twice the step. `None` for the
+    /// first run.
     pub order: Option<f64>,
 }
 
 /// A comparison that could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ComparisonError {
-    /// The scene.
+    /// The scene cannot be set up.
     #[error(transparent)]
     Scene(#[from] BenchError),
-    /// The reference.
+    /// The reference solution failed.
     #[error("the reference: {0}")]
     Reference(#[from] ValidateError),
-    /// The limit of stability.
+    /// The stability limit cannot be evaluated.
     #[error(transparent)]
     Limit(#[from] EvaluationError),
 }
 
 /// Cells along each side of the sheet.
 const CELLS: usize = 16;
-/// The time simulated, in s.
+/// Simulated time, in s.
 const TIME: f64 = 0.32;
 /// Steps of the reference, a Runge–Kutta method of fourth order.
 const REFERENCE_STEPS: usize = 12_800;
-/// Of the longest step, 16 ms.
+/// Number of steps of the longest step size, 16 ms.
 const FEWEST_STEPS: usize = 20;
-/// How often the step is halved.
+/// Number of times the step is halved.
 const HALVINGS: u32 = 5;
-/// How often that of a method which is stable only with short ones.
+/// The same for methods with a stability limit.
 const HALVINGS_OF_SHORT: u32 = 2;
-/// Which halving it starts from at the latest: explicit Euler is stable with no step worth trying.
+/// The last halving to start from: explicit Euler is stable for no practical step.
 const LAST_START: u32 = 10;
-/// What a method is off by that lost the cloth, in m.
+/// Error above which a run counts as unstable, in m.
 const LOST: f64 = 1.0;
 
-/// Runs the benchmark's hanging sheet of 17 × 17 vertices with steps of 16 ms halved down to 0.5 ms, for every integrator; those with a
-/// limit of stability run at the largest such step below it, halved twice.
+/// Simulates the hanging sheet of the benchmark, 17 × 17 vertices, with every integrator. Steps start at 16 ms and are
+/// halved down to 0.5 ms. Methods with a stability limit start at the largest such step below it and are halved twice.
 ///
-/// `progress` is told how many runs are done, and of how many.
+/// Calls `progress` with the number of completed runs and their total.
 ///
 /// # Errors
-/// When the scene or the reference fails. A run that fails is a result.
+/// Returns an error if the scene or the reference fails. A failed run is a result.
 pub fn compare(cloth: Cloth, mut progress: impl FnMut(usize, usize)) -> Result<Vec<Run>, ComparisonError> {
     let plan: Vec<(Scheme, Vec<usize>)> = Scheme::ALL
         .into_iter()
@@ -81,19 +82,19 @@ pub fn compare(cloth: Cloth, mut progress: impl FnMut(usize, usize)) -> Result<V
             let dt = TIME / steps as f64;
             let started = Instant::now();
             let stepped = (0..steps).try_for_each(|_| scheme.step(&mut body, dt).map(|_| ()));
-            let wall = started.elapsed().as_secs_f64();
+            let wall_time = started.elapsed().as_secs_f64();
             let off = || body.x.iter().zip(&truth.x).map(|(x, y)| norm(subtract(*x, *y))).fold(0.0, f64::max);
             let error = stepped.map(|()| off());
             let order = before.zip(error.as_ref().ok()).map(|(before, after)| (before / after).log2());
             before = error.as_ref().ok().copied();
-            runs.push(Run { integrator: scheme.name(), dt, wall, error, order });
+            runs.push(Run { integrator: scheme.name(), dt, wall_time, error, order });
             progress(runs.len(), total);
         }
     }
     Ok(runs)
 }
 
-/// The numbers of steps to run a method with.
+/// Returns the numbers of steps to run a method with.
 fn numbers_of_steps(scheme: Scheme, cloth: Cloth) -> Result<Vec<usize>, ComparisonError> {
     let limit = scheme.integrator().stable_step(&mut hang(cloth, CELLS)?)?;
     let halved = |number: u32| FEWEST_STEPS << number;
@@ -102,7 +103,7 @@ fn numbers_of_steps(scheme: Scheme, cloth: Cloth) -> Result<Vec<usize>, Comparis
     Ok((first..=first + HALVINGS_OF_SHORT).map(halved).collect())
 }
 
-/// The runs as comma-separated values.
+/// Formats the runs as CSV.
 #[must_use]
 pub fn csv(runs: &[Run]) -> String {
     let mut text = "integrator,dt_s,wall_s,error_m,order,failure\n".to_owned();
@@ -111,13 +112,13 @@ pub fn csv(runs: &[Run]) -> String {
         let failure =
             run.error.as_ref().err().map_or(String::new(), |error| error.to_string().replace(['"', '\n'], " "));
         let order = run.order.map_or(String::new(), |order| format!("{order:.3}"));
-        writeln!(text, "{},{},{:.6},{error},{order},\"{failure}\"", run.integrator, run.dt, run.wall)
+        writeln!(text, "{},{},{:.6},{error},{order},\"{failure}\"", run.integrator, run.dt, run.wall_time)
             .expect("writing to a string succeeds");
     }
     text
 }
 
-/// The runs as a table in Markdown.
+/// Formats the runs as a Markdown table.
 #[must_use]
 pub fn markdown(runs: &[Run]) -> String {
     let mut text = "| integrator | dt, ms | time, ms | error, mm | order |\n|---|---:|---:|---:|---:|\n".to_owned();
@@ -129,21 +130,21 @@ pub fn markdown(runs: &[Run]) -> String {
             Err(_) => "failed".to_owned(),
         };
         let order = run.order.map_or("–".to_owned(), |order| format!("{order:.2}"));
-        writeln!(text, "| {} | {} | {:.1} | {error} | {order} |", run.integrator, 1e3 * run.dt, 1e3 * run.wall)
+        writeln!(text, "| {} | {} | {:.1} | {error} | {order} |", run.integrator, 1e3 * run.dt, 1e3 * run.wall_time)
             .expect("writing to a string succeeds");
     }
     text
 }
 
-/// Time against error as an SVG, both axes logarithmic; runs off by more than a metre are left out.
+/// Plots wall time against error as SVG, with logarithmic axes, without unstable runs.
 ///
 /// # Errors
-/// When there is nothing to draw.
+/// Returns an error if there is nothing to plot.
 pub fn svg(runs: &[Run]) -> Result<String, String> {
     let mut curves: Vec<Curve> = Vec::new();
     for run in runs {
         let Some(&error) = run.error.as_ref().ok().filter(|error| **error < LOST) else { continue };
-        let point = (run.wall, error);
+        let point = (run.wall_time, error);
         match curves.iter_mut().find(|curve| curve.name == run.integrator) {
             Some(curve) => curve.points.push(point),
             None => curves.push(Curve { name: run.integrator.to_owned(), points: vec![point], joined: true }),

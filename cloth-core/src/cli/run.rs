@@ -23,8 +23,8 @@ pub struct RunScene {
     /// Save the state every STEPS steps, for `cloth resume`.
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: Option<u64>,
-    /// Replace the material of every fabric by the elements that this file declares. They are interpreted, hence
-    /// slower than built-in ones.
+    /// Replace the material of every fabric by the elements that this file declares. They are interpreted, which is
+    /// slower than built-in elements.
     #[arg(long, value_name = "FILE.energy")]
     material: Option<PathBuf>,
     /// Parameters of these elements, such as `k=20,nu=0.3`, in the units of the declaration.

@@ -7,18 +7,18 @@ use super::term::{surface_velocity, touches};
 use crate::dissipation_term::DissipationLaw;
 use crate::motion::Motion;
 
-/// Coulomb's friction on one solid, by [`SlidingFriction`]. Normals and normal forces are those at the start of a step, so that the friction of a
-/// step has a potential (lagged, as in Li et al. 2020, §5.5).
+/// Coulomb friction on one solid, by [`SlidingFriction`]. Normals and normal forces are lagged: taken at the start of a
+/// step, so that the friction of a step has a potential (Li et al. 2020, §5.5).
 #[derive(Debug)]
 pub(super) struct FrictionLaw<S> {
     pub solid: S,
     pub motion: Option<Motion>,
     pub thickness: f64,
-    /// k of each vertex, in N/m.
+    /// Contact stiffness of each vertex, in N/m.
     pub stiffness: Vec<f64>,
-    /// μ.
+    /// Coefficient of friction μ.
     pub coefficient: f64,
-    /// The sliding, in m/s, at which friction is μ/√2 times the normal force.
+    /// The sliding velocity at which friction is μ/√2 times the normal force, in m/s.
     pub sticking: f64,
 }
 

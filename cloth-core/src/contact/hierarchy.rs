@@ -1,8 +1,8 @@
-//! A hierarchy of boxes, to find what is nearest to a point without looking at everything.
+//! A bounding volume hierarchy for nearest-feature queries.
 
 use energy_dsl::Vector3;
 
-/// A box along the axes.
+/// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
     low: Vector3<f64>,
@@ -28,18 +28,19 @@ impl Bounds {
         0.5 * (self.low[axis] + self.high[axis])
     }
 
-    /// The square of the distance of a point, in m²; 0 inside.
+    /// Squared distance of a point, in m²; 0 inside.
     fn distance_squared(&self, x: Vector3<f64>) -> f64 {
         let beyond = |axis: usize| (self.low[axis] - x[axis]).max(x[axis] - self.high[axis]).max(0.0);
         (0..3).map(|axis| beyond(axis).powi(2)).sum()
     }
 }
 
-/// A binary tree over boxes, halved at the median of the longest axis. The children of node n are n + 1 and `second`.
+/// A binary tree of boxes, split at the median along the longest axis. The children of node n are n + 1 and the index
+/// in [`Kind::Inner`].
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Hierarchy {
     nodes: Vec<Node>,
-    /// The items in the order of the leaves.
+    /// Items, in the order of the leaves.
     items: Vec<usize>,
 }
 
@@ -51,17 +52,17 @@ struct Node {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
-    /// Items from one place to another.
+    /// The range of `items` in this leaf.
     Leaf(usize, usize),
-    /// Where the second child is.
+    /// The index of the second child.
     Inner(usize),
 }
 
-/// Items of a leaf at most.
+/// The largest number of items in a leaf.
 const LEAF: usize = 4;
 
 impl Hierarchy {
-    /// Over the boxes of items 0, 1, …; at least one.
+    /// Builds the tree over the boxes of items 0, 1, …; at least one item.
     pub fn new(bounds: &[Bounds]) -> Self {
         let mut tree = Self { nodes: Vec::new(), items: (0..bounds.len()).collect() };
         tree.build(bounds, 0, bounds.len());
@@ -86,12 +87,13 @@ impl Hierarchy {
         self.build(bounds, from + half, to);
     }
 
-    /// The distance of a point from the box around everything, in m.
+    /// Returns the distance of a point from the bounding box of all items, in m.
     pub fn distance(&self, x: Vector3<f64>) -> f64 {
         self.nodes[0].bounds.distance_squared(x).sqrt()
     }
 
-    /// What is nearest to a point by the square of its distance, which `measure` says with it; the first in the order of the tree where several are.
+    /// Returns the item with the smallest squared distance from a point. `measure` returns the squared distance of an
+    /// item, with a payload. Of several nearest items, the first in tree order wins.
     pub fn nearest<T>(&self, x: Vector3<f64>, measure: impl Fn(usize) -> (f64, T)) -> Option<(f64, T)> {
         let mut best: Option<(f64, T)> = None;
         let mut waiting = vec![(self.nodes[0].bounds.distance_squared(x), 0)];
@@ -111,7 +113,7 @@ impl Hierarchy {
                 Kind::Inner(second) => {
                     let mut children =
                         [number + 1, second].map(|child| (self.nodes[child].bounds.distance_squared(x), child));
-                    // The nearer one is looked at first.
+                    // The stack pops the nearer child first.
                     children.sort_by(|a, b| b.0.total_cmp(&a.0));
                     waiting.extend(children);
                 }

@@ -1,5 +1,5 @@
-//! A solid made of triangles. What is nearest to a vertex is a face, an edge or a corner, each with its declared element: three solids, each of which is
-//! felt where its features are nearest.
+//! A solid bounded by a triangle mesh. The feature nearest to a vertex is a face, an edge or a corner, each with its
+//! own declared element. The mesh acts as three solids, each active where its features are nearest.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,7 +10,7 @@ use super::solid::Solid;
 use super::surface::{Feature, Nearest, Surface};
 use crate::geometry::{Pose, norm, subtract};
 
-/// A surface of triangles, somewhere.
+/// A solid bounded by a triangle mesh, with a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshSolid {
     surface: Arc<Surface>,
@@ -18,64 +18,68 @@ pub struct MeshSolid {
 }
 
 impl MeshSolid {
-    /// The solid within a surface, where the surface is.
+    /// Creates the solid of a surface, at the pose of the surface.
     #[must_use]
     pub fn new(surface: Surface) -> Self {
-        Self { surface: Arc::new(surface), pose: Pose::REST }
+        Self { surface: Arc::new(surface), pose: Pose::IDENTITY }
     }
 
-    /// The surface, where it was.
+    /// The surface before its motion.
     #[must_use]
     pub fn surface(&self) -> &Surface {
         &self.surface
     }
 
-    /// Where a point of it is now, in m.
+    /// Returns the current position of a point of the surface, in m.
     #[must_use]
-    pub fn placed(&self, point: Vector3<f64>) -> Vector3<f64> {
-        self.pose.applied(point)
+    pub fn transform(&self, point: Vector3<f64>) -> Vector3<f64> {
+        self.pose.transform(point)
     }
 
     pub(super) fn moved(&self, pose: &Pose) -> Self {
         Self { surface: Arc::clone(&self.surface), pose: self.pose.then(pose) }
     }
 
-    /// The signed distance of a point, in m, with the feature that it is measured from, where it is now.
+    /// Returns the signed distance of a point, in m, and the nearest feature at its current pose.
     #[must_use]
     pub fn nearest(&self, x: Vector3<f64>) -> Nearest {
-        self.placed_nearest(self.surface.nearest(self.pose.undone(x)))
+        self.transform_nearest(self.surface.nearest(self.pose.inverse_transform(x)))
     }
 
-    /// What is nearest to a point where the surface was, where it is now.
-    fn placed_nearest(&self, Nearest { distance, feature }: Nearest) -> Nearest {
+    /// Moves a feature from the pose of the surface to the current pose.
+    fn transform_nearest(&self, Nearest { distance, feature }: Nearest) -> Nearest {
         let feature = match feature {
             Feature::Plane { point, normal } => {
-                Feature::Plane { point: self.placed(point), normal: self.pose.turned_direction(normal) }
+                Feature::Plane { point: self.transform(point), normal: self.pose.rotate(normal) }
             }
-            Feature::Edge(ends) => Feature::Edge(ends.map(|end| self.placed(end))),
-            Feature::Corner(corner) => Feature::Corner(self.placed(corner)),
+            Feature::Edge(ends) => Feature::Edge(ends.map(|end| self.transform(end))),
+            Feature::Corner(corner) => Feature::Corner(self.transform(corner)),
         };
         Nearest { distance, feature }
     }
 }
 
-/// A solid as the vertices of a cloth feel it. Of each vertex it remembers where it was looked for last, and what was nearest: no distance changes faster
-/// than a vertex moves (unless the surface cuts itself, and is not that of a solid), so that most of them need not be looked for again, and those near by only once for faces, edges and corners.
+/// A mesh solid with a cache of the last query of each vertex.
+///
+/// A distance changes by at most the motion of the vertex, so most queries are answered from the cache. Nearby vertices
+/// are searched once for faces, edges and corners. The bound does not hold for a surface that intersects itself, which
+/// bounds no solid.
 #[derive(Clone, Debug)]
-pub(super) struct Felt {
+pub(super) struct CachedMesh {
     solid: MeshSolid,
-    /// By vertex; the same for all clones, wherever they moved, since positions are those relative to the surface.
-    found: Arc<Mutex<Vec<Option<Found>>>>,
+    /// One entry per vertex, shared by all clones. Positions are relative to the surface, so moving the solid keeps
+    /// entries valid.
+    found: Arc<Mutex<Vec<Option<CachedQuery>>>>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct CachedQuery {
     at: Vector3<f64>,
     nearest: Nearest,
 }
 
-impl Felt {
-    /// By so many vertices.
+impl CachedMesh {
+    /// Creates an empty cache for `vertices` vertices.
     pub fn new(solid: MeshSolid, vertices: usize) -> Self {
         Self { solid, found: Arc::new(Mutex::new(vec![None; vertices])) }
     }
@@ -84,40 +88,40 @@ impl Felt {
         Self { solid: self.solid.moved(pose), found: Arc::clone(&self.found) }
     }
 
-    /// By how much it is rounded, in m.
+    /// The radius of the rounding, in m.
     fn radius(&self) -> f64 {
         self.solid.surface.radius()
     }
 
-    /// What is nearest to a vertex, if that is nearer than the thickness.
+    /// Returns the feature nearest to a vertex; `None` if it is not within the thickness.
     fn nearest_within(&self, vertex: usize, x: Vector3<f64>, thickness: f64) -> Option<Nearest> {
-        let (surface, at) = (&self.solid.surface, self.solid.pose.undone(x));
+        let (surface, at) = (&self.solid.surface, self.solid.pose.inverse_transform(x));
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         let nearest = match found[vertex] {
             Some(known) if known.at == at => known.nearest,
             Some(known) if known.nearest.distance - norm(subtract(at, known.at)) >= thickness => return None,
-            _ if surface.at_least(at) >= thickness => return None,
+            _ if surface.distance_bound(at) >= thickness => return None,
             _ => {
                 let nearest = surface.nearest(at);
-                found[vertex] = Some(Found { at, nearest });
+                found[vertex] = Some(CachedQuery { at, nearest });
                 nearest
             }
         };
-        (nearest.distance < thickness).then(|| self.solid.placed_nearest(nearest))
+        (nearest.distance < thickness).then(|| self.solid.transform_nearest(nearest))
     }
 }
 
-/// Its faces; from inside also its edges and corners.
+/// The faces, and from inside also the edges and corners.
 #[derive(Clone, Debug)]
-pub(super) struct Faces(pub Felt);
+pub(super) struct Faces(pub CachedMesh);
 
-/// Its edges, from outside.
+/// The edges, from outside.
 #[derive(Clone, Debug)]
-pub(super) struct Edges(pub Felt);
+pub(super) struct Edges(pub CachedMesh);
 
-/// Its corners, from outside.
+/// The corners, from outside.
 #[derive(Clone, Debug)]
-pub(super) struct Corners(pub Felt);
+pub(super) struct Corners(pub CachedMesh);
 
 impl Solid for Faces {
     type Contact = PlaneContact;
@@ -174,19 +178,20 @@ mod tests {
         MeshSolid::new(Surface::new(mesh, radius).unwrap())
     }
 
-    /// Exactly one of the three feels a point, with k (δ − d)²/δ along the way on which the distance grows fastest.
+    /// Checks that exactly one of the three solids acts on a point, with force k (δ − d)²/δ along the gradient of the
+    /// distance.
     fn push(solid: &MeshSolid, x: Vector3<f64>) -> (&'static str, Vector3<f64>) {
         let (k, thickness) = (3.0, 0.5);
-        let solid_felt = Felt::new(solid.clone(), 1);
+        let solid_felt = CachedMesh::new(solid.clone(), 1);
         let [faces, edges, corners] = [solid_felt.clone(), solid_felt.clone(), solid_felt];
-        let felt = [
+        let cached = [
             ("face", Faces(faces).touched(0, x, k, thickness).map(|one| one.gradient(&[x]).gradient[0])),
             ("edge", Edges(edges).touched(0, x, k, thickness).map(|one| one.gradient(&[x]).gradient[0])),
             ("corner", Corners(corners).touched(0, x, k, thickness).map(|one| one.gradient(&[x]).gradient[0])),
         ];
-        let mut felt = felt.into_iter().filter_map(|(name, gradient)| Some((name, gradient?)));
-        let (name, gradient) = felt.next().unwrap();
-        assert!(felt.next().is_none());
+        let mut cached = cached.into_iter().filter_map(|(name, gradient)| Some((name, gradient?)));
+        let (name, gradient) = cached.next().unwrap();
+        assert!(cached.next().is_none());
         let push = gradient.map(|component| -component);
         let distance = solid.nearest(x).distance;
         let size = k * (thickness - distance).max(0.0).powi(2) / thickness;
@@ -198,7 +203,7 @@ mod tests {
 
     #[test]
     fn each_feature_pushes_along_the_distance() {
-        let pose = Pose::turned([0.3, -1.0, 0.5], 40.0, [0.1; 3]).shifted([0.5, 0.2, -0.1]);
+        let pose = Pose::rotation([0.3, -1.0, 0.5], 40.0, [0.1; 3]).translated([0.5, 0.2, -0.1]);
         for radius in [0.0, 0.05] {
             let still = solid(radius);
             let moved = still.moved(&pose);
@@ -208,43 +213,46 @@ mod tests {
                 ([-0.1, -0.1, -0.05], "corner"),
                 ([0.1, 0.2, 0.15], "face"),
             ] {
-                let (felt, push_still) = push(&still, x);
-                assert_eq!(felt, name);
-                let (felt, push_moved) = push(&moved, pose.applied(x));
-                assert_eq!(felt, name);
-                assert!(norm(subtract(push_moved, pose.turned_direction(push_still))) < 1e-12);
+                let (cached, push_still) = push(&still, x);
+                assert_eq!(cached, name);
+                let (cached, push_moved) = push(&moved, pose.transform(x));
+                assert_eq!(cached, name);
+                assert!(norm(subtract(push_moved, pose.rotate(push_still))) < 1e-12);
             }
         }
-        // A pose after a pose.
-        let again = Pose::turned([0.0, 0.0, 1.0], 25.0, [0.0; 3]);
+        // A pose composed with a pose.
+        let again = Pose::rotation([0.0, 0.0, 1.0], 25.0, [0.0; 3]);
         let twice = solid(0.0).moved(&pose).moved(&again);
-        let x = again.applied(pose.applied([0.2, 0.2, -0.1]));
+        let x = again.transform(pose.transform([0.2, 0.2, -0.1]));
         assert!((twice.nearest(x).distance - 0.1).abs() < 1e-12);
-        assert!(Felt::new(solid(0.0), 1).nearest_within(0, [9.0, 0.0, 0.0], 7.0).is_none());
+        assert!(CachedMesh::new(solid(0.0), 1).nearest_within(0, [9.0, 0.0, 0.0], 7.0).is_none());
     }
 
     proptest! {
-        /// Whatever is remembered, of this vertex or another, of this pose or an earlier one.
+        /// The cache gives correct results after any sequence of vertices and poses.
         #[test]
         fn what_is_remembered_changes_nothing(
-            walk in prop::collection::vec((0..2_usize, prop::array::uniform3(-0.4..0.4_f64), 0.0..30.0_f64, any::<bool>()), 1..40),
+            walk in prop::collection::vec(
+                (0..2_usize, prop::array::uniform3(-0.4..0.4_f64), 0.0..30.0_f64, any::<bool>()),
+                1..40,
+            ),
         ) {
-            let still = Felt::new(solid(0.02), 2);
+            let still = CachedMesh::new(solid(0.02), 2);
             let mut x = [[0.3; 3], [-0.5; 3]];
             for (vertex, step, angle, straight) in walk {
-                let pose = Pose::turned([1.0, 2.0, -1.0], angle, [0.0; 3]);
-                let felt = still.moved(&pose);
-                // Straight to the surface, as fast as the distance can fall, or any other way.
-                let Nearest { distance, feature } = felt.solid.nearest(x[vertex]);
+                let pose = Pose::rotation([1.0, 2.0, -1.0], angle, [0.0; 3]);
+                let cached = still.moved(&pose);
+                // Straight to the surface, where the distance falls fastest, or in any other direction.
+                let Nearest { distance, feature } = cached.solid.nearest(x[vertex]);
                 let step = match feature {
                     Feature::Plane { normal, .. } if straight => normal.map(|component| (0.05 - distance) * component),
                     _ => step,
                 };
                 (0..3).for_each(|axis| x[vertex][axis] = (x[vertex][axis] + step[axis]).clamp(-1.5, 1.5));
                 for thickness in [0.1, 0.3] {
-                    let nearest = felt.solid.nearest(x[vertex]);
+                    let nearest = cached.solid.nearest(x[vertex]);
                     let expected = (nearest.distance < thickness).then_some(nearest);
-                    prop_assert_eq!(felt.nearest_within(vertex, x[vertex], thickness), expected);
+                    prop_assert_eq!(cached.nearest_within(vertex, x[vertex], thickness), expected);
                 }
             }
         }
@@ -252,13 +260,13 @@ mod tests {
 
     #[test]
     fn vertices_that_stay_far_are_looked_for_once() {
-        let felt = Felt::new(solid(0.0), 1);
-        let at = |felt: &Felt| felt.found.lock().unwrap()[0].map(|found| found.at);
-        assert!(felt.nearest_within(0, [0.6; 3], 0.1).is_none());
-        assert_eq!(at(&felt), Some([0.6; 3]));
-        assert!(felt.nearest_within(0, [0.55; 3], 0.1).is_none());
-        assert_eq!(at(&felt), Some([0.6; 3]));
-        assert!(felt.nearest_within(0, [0.35; 3], 0.1).is_some());
-        assert_eq!(at(&felt), Some([0.35; 3]));
+        let cached = CachedMesh::new(solid(0.0), 1);
+        let at = |cached: &CachedMesh| cached.found.lock().unwrap()[0].map(|found| found.at);
+        assert!(cached.nearest_within(0, [0.6; 3], 0.1).is_none());
+        assert_eq!(at(&cached), Some([0.6; 3]));
+        assert!(cached.nearest_within(0, [0.55; 3], 0.1).is_none());
+        assert_eq!(at(&cached), Some([0.6; 3]));
+        assert!(cached.nearest_within(0, [0.35; 3], 0.1).is_some());
+        assert_eq!(at(&cached), Some([0.35; 3]));
     }
 }

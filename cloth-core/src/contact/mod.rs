@@ -1,9 +1,12 @@
-//! Contact with solids: a potential of the signed distance within a thickness, and friction.
+//! Contact with solids: a penalty potential of the signed distance, and friction.
 //!
-//! Each shape has a declared element of its own, on its exact signed distance, rather than all one on the plane through the closest point: so a
-//! contact's energy is a function of the position alone, Newton's line search and the balance of energy see the same function as its forces, and
-//! the curvature of the surface is in the Hessian. Of a mesh the nearest face, edge or corner is a plane, a capsule or a sphere without radius. Vertices
-//! touch, not the triangles between them; cloth does not touch cloth.
+//! Each shape has its own declared element, a function of the exact signed distance, instead of one element for the
+//! plane through the closest point. The energy of a contact is then a function of the position alone: line search,
+//! energy balance and forces see the same function, and the Hessian includes the curvature of the surface.
+//!
+//! On a mesh, the nearest face, edge or corner acts as a plane, a capsule or a sphere of radius 0.
+//!
+//! Only vertices touch solids, not the triangles between them. Cloth does not collide with cloth.
 
 mod friction;
 mod hierarchy;
@@ -23,27 +26,27 @@ use crate::dissipation_term::DissipativeTerm;
 use crate::geometry::{Pose, dot};
 use crate::motion::Motion;
 use friction::FrictionLaw;
-use mesh_solid::{Corners, Edges, Faces, Felt};
+use mesh_solid::{CachedMesh, Corners, Edges, Faces};
 use solid::{Shape, Solid};
 use term::{ContactTerm, Touch, surface_velocity, touches};
 
-/// One of the solids.
+/// A solid of any shape.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AnySolid {
-    /// A half-space.
+    /// Everything below a plane.
     HalfSpace(HalfSpace),
-    /// A ball.
+    /// All points within a radius of a centre.
     Ball(Ball),
-    /// A capsule.
+    /// All points within a radius of a segment.
     Capsule(Capsule),
-    /// A box.
+    /// A box with rounded edges.
     Box(RoundedBox),
-    /// A surface of triangles.
+    /// A solid bounded by a triangle mesh.
     Mesh(MeshSolid),
 }
 
 impl AnySolid {
-    /// The solid after a rigid motion.
+    /// Returns the solid after a rigid motion.
     #[must_use]
     pub fn moved(&self, pose: &Pose) -> Self {
         match self {
@@ -55,7 +58,7 @@ impl AnySolid {
         }
     }
 
-    /// The distance of a point from the surface, in m; negative inside.
+    /// Returns the distance of a point from the surface, in m; negative inside.
     ///
     /// ```
     /// use cloth_core::contact::{AnySolid, Ball};
@@ -74,33 +77,33 @@ impl AnySolid {
     }
 }
 
-/// A solid in a scene.
+/// A solid in a scene, with its motion and contact parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstacle {
-    /// What it is called.
+    /// The name in the ledger and in messages.
     pub name: String,
-    /// Its shape at rest.
+    /// The solid before its motion.
     pub solid: AnySolid,
-    /// How it moves.
+    /// The motion; `None` if the obstacle is fixed.
     pub motion: Option<Motion>,
-    /// Cloth is pushed away within this distance, in m.
+    /// Contact acts within this distance of the surface, in m.
     pub thickness: f64,
-    /// k over the mass of a vertex, in 1/s².
+    /// Contact stiffness k over the mass of the vertex, in 1/s².
     pub stiffness: f64,
-    /// The coefficient of friction.
+    /// Coefficient of friction.
     pub friction: f64,
-    /// The sliding at which friction is 1/√2 of its full size, in m/s.
+    /// The sliding velocity at which friction reaches 1/√2 of its full size, in m/s.
     pub sticking: f64,
 }
 
 impl Obstacle {
-    /// The solid at a time, in s.
+    /// Returns the solid at a time, in s.
     #[must_use]
     pub fn at(&self, time: f64) -> AnySolid {
         self.motion.as_ref().map_or_else(|| self.solid.clone(), |motion| self.solid.moved(&motion.pose(time)))
     }
 
-    /// The terms of contact and friction with vertices of these masses, in kg.
+    /// Returns the terms of contact and friction with vertices of these masses, in kg.
     #[must_use]
     pub fn terms(&self, masses: &[f64]) -> Vec<Box<dyn Term>> {
         match &self.solid {
@@ -109,16 +112,17 @@ impl Obstacle {
             AnySolid::Capsule(solid) => self.terms_with("", *solid, masses),
             AnySolid::Box(solid) => self.terms_with("", *solid, masses),
             AnySolid::Mesh(solid) => {
-                let felt = Felt::new(solid.clone(), masses.len());
-                let mut terms = self.terms_with(": faces", Faces(felt.clone()), masses);
-                terms.extend(self.terms_with(": edges", Edges(felt.clone()), masses));
-                terms.extend(self.terms_with(": corners", Corners(felt), masses));
+                let cached = CachedMesh::new(solid.clone(), masses.len());
+                let mut terms = self.terms_with(": faces", Faces(cached.clone()), masses);
+                terms.extend(self.terms_with(": edges", Edges(cached.clone()), masses));
+                terms.extend(self.terms_with(": corners", Corners(cached), masses));
                 terms
             }
         }
     }
 
-    /// The power of its contact with the free vertices of a body as it moves over a step from one time to another, in W: at the step's start or at its end.
+    /// Returns the power of the contact on the free vertices of a body, in W, at the start or the end of a step. `step`
+    /// holds the times of both, in s.
     pub(crate) fn power(&self, step: [f64; 2], at_end: bool, body: &Body) -> f64 {
         if !self.motion.as_ref().is_some_and(|motion| motion.moves(step[0], step[1])) {
             return 0.0;
@@ -129,10 +133,10 @@ impl Obstacle {
             AnySolid::Capsule(solid) => self.power_of(solid, step, at_end, body),
             AnySolid::Box(solid) => self.power_of(solid, step, at_end, body),
             AnySolid::Mesh(solid) => {
-                let felt = Felt::new(solid, body.x.len());
-                self.power_of(Faces(felt.clone()), step, at_end, body)
-                    + self.power_of(Edges(felt.clone()), step, at_end, body)
-                    + self.power_of(Corners(felt), step, at_end, body)
+                let cached = CachedMesh::new(solid, body.x.len());
+                self.power_of(Faces(cached.clone()), step, at_end, body)
+                    + self.power_of(Edges(cached.clone()), step, at_end, body)
+                    + self.power_of(Corners(cached), step, at_end, body)
             }
         }
     }

@@ -5,25 +5,26 @@ use energy_elements::{BoxContact, CapsuleContact, PlaneContact, SphereContact};
 
 use crate::geometry::{Pose, dot, norm, subtract};
 
-/// What keeps cloth out: felt by the vertices that come near.
+/// A solid that acts on nearby vertices.
 pub(super) trait Solid: Clone + std::fmt::Debug + 'static {
-    /// The declared element.
+    /// The declared element of contact.
     type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
-    /// The solid after a rigid motion.
+    /// Returns the solid after a rigid motion.
     fn moved(&self, pose: &Pose) -> Self;
-    /// The element of a vertex at x with stiffness k (N/m), if it is nearer than the thickness (m).
+    /// Returns the element for a vertex at x with stiffness k (N/m); `None` if the vertex is not within the thickness
+    /// (m).
     fn touched(&self, vertex: usize, x: Vector3<f64>, k: f64, thickness: f64) -> Option<Self::Contact>;
 }
 
-/// A solid with a formula for its signed distance.
+/// A solid with a closed formula for its signed distance.
 pub(super) trait Shape: Clone + std::fmt::Debug + 'static {
-    /// The declared element.
+    /// The declared element of contact.
     type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
-    /// The shape after a rigid motion.
+    /// Returns the shape after a rigid motion.
     fn moved(&self, pose: &Pose) -> Self;
-    /// The distance of a point from the surface, in m; negative inside.
+    /// Returns the distance of a point from the surface, in m; negative inside.
     fn signed_distance(&self, x: Vector3<f64>) -> f64;
-    /// The element with stiffness k (N/m) within the thickness δ (m).
+    /// Returns the element with stiffness k (N/m) and thickness δ (m).
     fn contact(&self, k: f64, thickness: f64) -> Self::Contact;
 }
 
@@ -39,16 +40,16 @@ impl<S: Shape> Solid for S {
     }
 }
 
-/// A half-space, below a plane.
+/// Everything below a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
-    /// A point of the plane, in m.
+    /// A point on the plane, in m.
     pub point: Vector3<f64>,
-    /// The unit normal, out of the solid.
+    /// Unit normal, pointing out of the solid.
     pub normal: Vector3<f64>,
 }
 
-/// A ball.
+/// All points within a radius of a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
     /// The centre, in m.
@@ -57,25 +58,25 @@ pub struct Ball {
     pub radius: f64,
 }
 
-/// All points within a radius of a segment.
+/// A capsule: all points within a radius of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    /// The segment's ends, in m.
+    /// Ends of the segment, in m.
     pub ends: [Vector3<f64>; 2],
     /// The radius, in m.
     pub radius: f64,
 }
 
-/// All points within a radius of a box.
+/// A rounded box: all points within a radius of a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundedBox {
     /// The centre, in m.
     pub centre: Vector3<f64>,
-    /// Unit vectors along its edges.
+    /// Unit vectors along the edges.
     pub axes: [Vector3<f64>; 3],
-    /// Half the edges of the box that is rounded, in m.
+    /// Half the edge lengths of the inner box, in m.
     pub half: Vector3<f64>,
-    /// By how much it is rounded, in m.
+    /// The radius of the rounding, in m.
     pub radius: f64,
 }
 
@@ -83,7 +84,7 @@ impl Shape for HalfSpace {
     type Contact = PlaneContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { point: pose.applied(self.point), normal: pose.turned_direction(self.normal) }
+        Self { point: pose.transform(self.point), normal: pose.rotate(self.normal) }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
@@ -99,7 +100,7 @@ impl Shape for Ball {
     type Contact = SphereContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { centre: pose.applied(self.centre), ..*self }
+        Self { centre: pose.transform(self.centre), ..*self }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
@@ -115,14 +116,14 @@ impl Shape for Capsule {
     type Contact = CapsuleContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { ends: self.ends.map(|end| pose.applied(end)), ..*self }
+        Self { ends: self.ends.map(|end| pose.transform(end)), ..*self }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
         let [a, b] = self.ends;
-        let (way, edge) = (subtract(x, a), subtract(b, a));
-        let along = (dot(way, edge) / dot(edge, edge)).clamp(0.0, 1.0);
-        norm(std::array::from_fn(|axis| way[axis] - along * edge[axis])) - self.radius
+        let (offset, edge) = (subtract(x, a), subtract(b, a));
+        let along = (dot(offset, edge) / dot(edge, edge)).clamp(0.0, 1.0);
+        norm(std::array::from_fn(|axis| offset[axis] - along * edge[axis])) - self.radius
     }
 
     fn contact(&self, k: f64, thickness: f64) -> CapsuleContact {
@@ -135,12 +136,12 @@ impl Shape for RoundedBox {
     type Contact = BoxContact;
 
     fn moved(&self, pose: &Pose) -> Self {
-        Self { centre: pose.applied(self.centre), axes: self.axes.map(|axis| pose.turned_direction(axis)), ..*self }
+        Self { centre: pose.transform(self.centre), axes: self.axes.map(|axis| pose.rotate(axis)), ..*self }
     }
 
     fn signed_distance(&self, x: Vector3<f64>) -> f64 {
-        let way = subtract(x, self.centre);
-        let beyond: Vector3<f64> = std::array::from_fn(|i| dot(self.axes[i], way).abs() - self.half[i]);
+        let offset = subtract(x, self.centre);
+        let beyond: Vector3<f64> = std::array::from_fn(|i| dot(self.axes[i], offset).abs() - self.half[i]);
         let deepest = beyond.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let distance = if deepest > 0.0 { norm(beyond.map(|part| part.max(0.0))) } else { deepest };
         distance - self.radius
@@ -156,14 +157,14 @@ impl Shape for RoundedBox {
 mod tests {
     use super::*;
 
-    /// The element pushes with k (δ − d)²/δ, along the way on which the signed distance grows fastest.
+    /// Checks that the element's force is k (δ − d)²/δ along the gradient of the signed distance.
     fn agrees(solid: impl Shape, x: Vector3<f64>, distance: f64) {
-        let pose = Pose::turned([0.3, -1.0, 0.5], 40.0, [0.1; 3]).shifted([0.5, 0.2, -0.1]);
+        let pose = Pose::rotation([0.3, -1.0, 0.5], 40.0, [0.1; 3]).translated([0.5, 0.2, -0.1]);
         let (k, thickness) = (3.0, 0.5);
         let moved = solid.moved(&pose);
-        for (solid, x) in [(solid, x), (moved, pose.applied(x))] {
+        for (solid, x) in [(solid, x), (moved, pose.transform(x))] {
             let signed = solid.signed_distance(x);
-            assert!((signed - distance).abs() < 1e-12, "{signed}, not {distance}");
+            assert!((signed - distance).abs() < 1e-12, "got {signed}, expected {distance}");
             let push = solid.contact(k, thickness).gradient(&[x]).gradient[0].map(|component| -component);
             let size = k * (thickness - distance).max(0.0).powi(2) / thickness;
             assert!((norm(push) - size).abs() < 1e-12, "{push:?}");

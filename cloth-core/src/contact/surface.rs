@@ -6,46 +6,48 @@ use super::hierarchy::{Bounds, Hierarchy};
 use crate::geometry::{cross, dot, norm, subtract};
 use crate::mesh::{TriangleMesh, vertex_angles};
 
-/// Triangles that are no surface of a solid.
+/// A mesh that does not bound a solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum SurfaceError {
-    /// Two neighbours are turned differently, so that outside is on different sides of them.
+    /// Two neighbouring triangles have opposite orientations.
     #[error(
-        "triangles {} and {} run through their edge {}–{} the same way, so that one is turned inwards: make the normals consistent",
+        "triangles {} and {} traverse their edge {}–{} in the same direction, so one of them points inwards: \
+         make the normals consistent",
         .triangles[0], .triangles[1], .edge[0], .edge[1]
     )]
     Inconsistent {
-        /// The edge.
+        /// The shared edge.
         edge: [usize; 2],
-        /// The triangles.
         triangles: [usize; 2],
     },
-    /// All triangles of a closed surface are turned inwards.
+    /// A closed surface points inwards.
     #[error(
-        "the surface is inside out (it encloses {volume:.3e} m³): flip its normals, so that corners run anticlockwise seen from outside"
+        "the surface is inside out (it encloses {volume:.3e} m³): flip its normals, so that corners run anticlockwise \
+         seen from outside"
     )]
     InsideOut {
-        /// The volume that it encloses, in m³.
+        /// The signed volume of the surface, in m³.
         volume: f64,
     },
-    /// A surface with a rim encloses nothing.
+    /// An open surface without rounding encloses no volume.
     #[error(
-        "the surface is open ({edges} edges of one triangle, the first {}–{}), so that it has no inside: close it, or give it a body with \
-         `rounding`, in m",
+        "the surface is open ({edges} edges of one triangle, the first {}–{}), so it has no inside: close it, or give \
+         it a thickness with `rounding`, in m",
         .edge[0], .edge[1]
     )]
     Open {
-        /// The first edge of the rim.
+        /// The first boundary edge.
         edge: [usize; 2],
-        /// How many there are.
+        /// The number of boundary edges.
         edges: usize,
     },
 }
 
-/// The boundary of a solid made of triangles, turned outwards; with a radius by which it is rounded, that is all points within the radius are of the
-/// solid, too. A surface with a rim is a shell: the solid is those points alone.
+/// The boundary of a solid: an outward-pointing triangle mesh, optionally rounded. A rounding radius adds all points
+/// within that distance to the solid. An open surface is a shell, which consists of these points only.
 ///
-/// The sign of the distance is that of the angle-weighted normal of the nearest feature (Bærentzen & Aanæs 2005).
+/// The sign of the distance follows from the angle-weighted normal of the nearest feature (Bærentzen & Aanæs 2005).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     mesh: TriangleMesh,
@@ -53,50 +55,50 @@ pub struct Surface {
     is_closed: bool,
     face_normals: Vec<Vector3<f64>>,
     vertex_normals: Vec<Vector3<f64>>,
-    /// Of the edges from each corner of a triangle to the next.
+    /// Normals of the edges from each corner of a triangle to the next.
     edge_normals: Vec<[Vector3<f64>; 3]>,
     hierarchy: Hierarchy,
 }
 
-/// What of a surface is nearest to a point, as the solid whose distance is the same nearby.
+/// The closest feature of a surface, as a primitive with the same distance function nearby.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Feature {
-    /// The half-space beyond a plane: of a face, or inside, where an edge or a corner is nearest, across the way there.
+    /// A half-space: of a face, or, inside a solid, across the direction to the nearest edge or corner.
     Plane {
-        /// A point of the plane, in m.
+        /// A point on the plane, in m.
         point: Vector3<f64>,
-        /// The unit normal, outwards.
+        /// Unit normal, pointing out of the solid.
         normal: Vector3<f64>,
     },
-    /// The edge between two points, from outside.
+    /// An edge between two points, seen from outside.
     Edge([Vector3<f64>; 2]),
-    /// A corner, from outside.
+    /// A corner, seen from outside.
     Corner(Vector3<f64>),
 }
 
-/// The nearest feature and the distance from it, in m: negative inside.
+/// The nearest feature and the distance from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// The signed distance of the solid, its rounding included.
+    /// Signed distance from the rounded solid, in m; negative inside.
     pub distance: f64,
-    /// The feature of the surface that is not rounded.
+    /// The nearest feature of the unrounded surface.
     pub feature: Feature,
 }
 
-/// Where on a triangle the point nearest to another is.
+/// The part of a triangle that a closest point lies on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Region {
     Face,
-    /// From this corner to the next.
+    /// The edge from this corner to the next.
     Edge(usize),
     Corner(usize),
 }
 
 impl Surface {
-    /// A surface from a mesh, rounded by a radius in m.
+    /// Creates a surface from a mesh, rounded by a radius in m.
     ///
     /// # Errors
-    /// When neighbours are turned differently, a closed surface is inside out, or an open one is not rounded.
+    /// Returns an error if orientations are inconsistent, a closed surface is inside out, or an open one has radius 0.
     pub fn new(mesh: TriangleMesh, radius: f64) -> Result<Self, SurfaceError> {
         let rim = rim(&mesh)?;
         let is_closed = rim.is_empty();
@@ -129,53 +131,53 @@ impl Surface {
         Ok(Self { mesh, radius, is_closed, face_normals, vertex_normals, edge_normals, hierarchy })
     }
 
-    /// The triangles.
+    /// The mesh, without rounding.
     #[must_use]
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// By how much it is rounded, in m.
+    /// The radius of the rounding, in m.
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Whether it has an inside of its own: no rim.
+    /// Whether the mesh has no boundary edges.
     #[must_use]
     pub fn is_closed(&self) -> bool {
         self.is_closed
     }
 
-    /// A distance that the point certainly has, in m: that from a box around everything, for a quick look.
+    /// Returns a cheap lower bound on the distance of a point, in m: the distance from the bounding box.
     #[must_use]
-    pub fn at_least(&self, x: Vector3<f64>) -> f64 {
+    pub fn distance_bound(&self, x: Vector3<f64>) -> f64 {
         self.hierarchy.distance(x) - self.radius
     }
 
-    /// The signed distance of a point, and the feature that it is measured from.
+    /// Returns the signed distance of a point, and the feature that it refers to.
     #[must_use]
     pub fn nearest(&self, x: Vector3<f64>) -> Nearest {
         let found = self.hierarchy.nearest(x, |triangle| {
             let (closest, region) = closest(self.mesh.corners(triangle), x);
-            let way = subtract(x, closest);
-            (dot(way, way), (triangle, closest, region))
+            let offset = subtract(x, closest);
+            (dot(offset, offset), (triangle, closest, region))
         });
-        // There is at least one triangle.
+        // A mesh has at least one triangle, so this never happens.
         let Some((_, (triangle, closest, region))) = found else {
             return Nearest { distance: f64::INFINITY, feature: Feature::Corner(x) };
         };
-        let way = subtract(x, closest);
+        let offset = subtract(x, closest);
         let outwards = match region {
             Region::Face => self.face_normals[triangle],
             Region::Edge(edge) => self.edge_normals[triangle][edge],
             Region::Corner(corner) => self.vertex_normals[self.mesh.triangles()[triangle][corner]],
         };
-        let is_inside = dot(way, outwards) < 0.0;
+        let is_inside = dot(offset, outwards) < 0.0;
         let corners = self.mesh.corners(triangle);
-        let length = norm(way);
+        let length = norm(offset);
         let (distance, feature) = match region {
-            // The plane measures what the way measures, but keeps its digits where the way is short.
+            // The distance from the plane equals the length, without cancellation if the length is small.
             Region::Face => {
                 let height = dot(outwards, subtract(x, corners[0]));
                 let side = if is_inside && !self.is_closed { -1.0 } else { 1.0 };
@@ -183,7 +185,7 @@ impl Surface {
                 (side * height, Feature::Plane { point: corners[0], normal })
             }
             _ if is_inside && self.is_closed => {
-                (-length, Feature::Plane { point: closest, normal: way.map(|component| -component / length) })
+                (-length, Feature::Plane { point: closest, normal: offset.map(|component| -component / length) })
             }
             Region::Edge(edge) => (length, Feature::Edge([corners[edge], corners[(edge + 1) % 3]])),
             Region::Corner(corner) => (length, Feature::Corner(corners[corner])),
@@ -201,12 +203,12 @@ fn unit_normal([a, b, c]: [Vector3<f64>; 3]) -> Vector3<f64> {
     normal.map(|component| component / norm(normal))
 }
 
-/// The signed volume between a triangle and the origin.
+/// The signed volume of the tetrahedron between a triangle and the origin.
 fn cone([a, b, c]: [Vector3<f64>; 3]) -> f64 {
     dot(a, cross(b, c)) / 6.0
 }
 
-/// The edges of one triangle, each as it runs; an error where two triangles run through an edge the same way.
+/// Returns the edges with one triangle. Returns an error if two triangles traverse an edge in the same direction.
 fn rim(mesh: &TriangleMesh) -> Result<Vec<[usize; 2]>, SurfaceError> {
     let mut along: BTreeMap<[usize; 2], usize> = BTreeMap::new();
     for (triangle, &[a, b, c]) in mesh.triangles().iter().enumerate() {
@@ -219,7 +221,8 @@ fn rim(mesh: &TriangleMesh) -> Result<Vec<[usize; 2]>, SurfaceError> {
     Ok(along.keys().filter(|[from, to]| !along.contains_key(&[*to, *from])).copied().collect())
 }
 
-/// The point of a triangle nearest to x, and where on it that is (Ericson, Real-Time Collision Detection, §5.1.5).
+/// Returns the closest point of a triangle and the part that it lies on (Ericson, Real-Time Collision Detection,
+/// §5.1.5).
 fn closest([a, b, c]: [Vector3<f64>; 3], x: Vector3<f64>) -> (Vector3<f64>, Region) {
     let (ab, ac, ax) = (subtract(b, a), subtract(c, a), subtract(x, a));
     let (d1, d2) = (dot(ab, ax), dot(ac, ax));
@@ -231,7 +234,7 @@ fn closest([a, b, c]: [Vector3<f64>; 3], x: Vector3<f64>) -> (Vector3<f64>, Regi
     if d3 >= 0.0 && d4 <= d3 {
         return (b, Region::Corner(1));
     }
-    let on = |from: Vector3<f64>, way: Vector3<f64>, part: f64| std::array::from_fn(|i| from[i] + part * way[i]);
+    let on = |from: Vector3<f64>, offset: Vector3<f64>, part: f64| std::array::from_fn(|i| from[i] + part * offset[i]);
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
         return (on(a, ab, d1 / (d1 - d3)), Region::Edge(0));
@@ -259,12 +262,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// An L-shaped prism: convex and reflex edges, and corners of both kinds.
+    /// An L-shaped prism, with convex and reflex edges and corners.
     fn bracket() -> TriangleMesh {
         let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
         let at = |z: f64| outline.map(|[x, y]| [x, y, z]);
         let vertices: Vec<Vector3<f64>> = at(0.0).into_iter().chain(at(1.0)).collect();
-        // The outline cut into triangles.
+        // A triangulation of the outline.
         let top = [[0, 1, 2], [0, 2, 3], [0, 3, 5], [3, 4, 5]];
         let mut triangles: Vec<[usize; 3]> = top.iter().map(|corners| corners.map(|corner| 6 + corner)).collect();
         triangles.extend(top.iter().map(|&[a, b, c]| [a, c, b]));
@@ -275,7 +278,7 @@ mod tests {
         TriangleMesh::new(vertices, triangles).unwrap()
     }
 
-    /// The same by what the bracket is made of: the distance is the least from any rectangle, the sign from two boxes.
+    /// The exact signed distance: the smallest distance from its rectangles, with the sign from a union of two boxes.
     fn exact(x: Vector3<f64>) -> f64 {
         let within = |low: [f64; 3], high: [f64; 3]| (0..3).all(|i| x[i] >= low[i] && x[i] <= high[i]);
         let inside = within([0.0; 3], [2.0, 1.0, 1.0]) || within([0.0; 3], [1.0, 2.0, 1.0]);
@@ -299,57 +302,65 @@ mod tests {
 
     proptest! {
         #[test]
-        fn distances_are_those_of_the_solid(x in -1.0..3.0_f64, y in -1.0..3.0_f64, z in -1.0..2.0_f64, radius in 0.0..0.3_f64) {
+        fn distances_match_the_exact_solid(
+            x in -1.0..3.0_f64, y in -1.0..3.0_f64, z in -1.0..2.0_f64, radius in 0.0..0.3_f64,
+        ) {
             let surface = Surface::new(bracket(), radius).unwrap();
             let Nearest { distance, feature } = surface.nearest([x, y, z]);
             prop_assert!((distance - (exact([x, y, z]) - radius)).abs() < 1e-12, "{distance} {feature:?}");
-            prop_assert!(surface.at_least([x, y, z]) <= distance.max(0.0) + 1e-12);
-            // The feature alone has the same distance.
+            prop_assert!(surface.distance_bound([x, y, z]) <= distance.max(0.0) + 1e-12);
+            // The feature alone gives the same distance.
             let alone = match feature {
                 Feature::Plane { point, normal } => dot(normal, subtract([x, y, z], point)),
                 Feature::Edge([a, b]) => {
-                    let (way, edge) = (subtract([x, y, z], a), subtract(b, a));
-                    let part = (dot(way, edge) / dot(edge, edge)).clamp(0.0, 1.0);
-                    norm(std::array::from_fn(|i| way[i] - part * edge[i]))
+                    let (offset, edge) = (subtract([x, y, z], a), subtract(b, a));
+                    let part = (dot(offset, edge) / dot(edge, edge)).clamp(0.0, 1.0);
+                    norm(std::array::from_fn(|i| offset[i] - part * edge[i]))
                 }
                 Feature::Corner(corner) => norm(subtract([x, y, z], corner)),
             };
             prop_assert!((alone - radius - distance).abs() < 1e-12, "{alone} {distance} {feature:?}");
         }
 
-        /// Where edges are sharp, the normal of a face beside them tells the wrong side.
+        /// Next to a sharp edge, the normal of one face gives the wrong sign.
         #[test]
         fn sharp_edges_and_corners_have_an_inside(x in -0.5..1.5_f64, y in -0.3..0.3_f64, z in -0.3..1.3_f64) {
             let vertices: Vec<Vector3<f64>> = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.4, 0.0, 1.0]];
             let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
             let wedge = Surface::new(TriangleMesh::new(vertices, triangles).unwrap(), 0.0).unwrap();
-            let height = |triangle: usize| dot(wedge.face_normals[triangle], subtract([x, y, z], wedge.mesh.corners(triangle)[0]));
-            // Convex: inside is below all planes.
+            let height = |triangle: usize| {
+                dot(wedge.face_normals[triangle], subtract([x, y, z], wedge.mesh.corners(triangle)[0]))
+            };
+            // The wedge is convex: inside means below all planes.
             let highest = (0..4).map(height).fold(f64::NEG_INFINITY, f64::max);
             let distance = wedge.nearest([x, y, z]).distance;
             prop_assert_eq!(distance > 0.0, highest > 0.0, "{} {}", distance, highest);
         }
 
-        /// Every triangle looked at.
+        /// Compares with a search over all triangles.
         #[test]
-        fn the_hierarchy_finds_what_brute_force_finds(points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 9..60), x in prop::array::uniform3(-2.0..2.0_f64)) {
+        fn the_hierarchy_finds_the_nearest_triangle(
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 9..60),
+            x in prop::array::uniform3(-2.0..2.0_f64),
+        ) {
             let triangles: Vec<[Vector3<f64>; 3]> = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
             let bounds: Vec<Bounds> = triangles.iter().map(|corners| Bounds::of(corners)).collect();
             let square = |triangle: usize| {
-                let way = subtract(x, closest(triangles[triangle], x).0);
-                dot(way, way)
+                let offset = subtract(x, closest(triangles[triangle], x).0);
+                dot(offset, offset)
             };
             let found = Hierarchy::new(&bounds).nearest(x, |triangle| (square(triangle), ())).unwrap().0;
             let least = (0..triangles.len()).map(square).fold(f64::INFINITY, f64::min);
             prop_assert_eq!(found, least);
-            // No point of a triangle is nearer than the one that is said to be nearest.
+            // Every other point of the triangle is at least as far away.
             for corners in &triangles {
                 let (near, _) = closest(*corners, x);
                 let least = norm(subtract(x, near));
                 for i in 0..=8 {
                     for j in 0..=8 - i {
                         let [u, v] = [f64::from(i) / 8.0, f64::from(j) / 8.0];
-                        let p = std::array::from_fn(|k| u * corners[0][k] + v * corners[1][k] + (1.0 - u - v) * corners[2][k]);
+                        let w = 1.0 - u - v;
+                        let p = std::array::from_fn(|k| u * corners[0][k] + v * corners[1][k] + w * corners[2][k]);
                         prop_assert!(norm(subtract(x, p)) >= least - 1e-12);
                     }
                 }
@@ -358,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_surface_is_a_shell_that_is_alike_on_both_sides() {
+    fn an_open_surface_is_a_symmetric_shell() {
         let square = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let mesh = TriangleMesh::new(square, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
         let shell = Surface::new(mesh.clone(), 0.1).unwrap();
@@ -376,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_turned_wrong_are_refused() {
+    fn wrong_orientations_are_rejected() {
         let mesh = bracket();
         let flipped: Vec<[usize; 3]> = mesh.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
         let turned = TriangleMesh::new(mesh.vertices().to_vec(), flipped).unwrap();
@@ -387,7 +398,7 @@ mod tests {
         let mixed = TriangleMesh::new(mesh.vertices().to_vec(), triangles).unwrap();
         let message = Surface::new(mixed, 0.0).unwrap_err().to_string();
         assert!(
-            message.contains("run through their edge") && message.contains("make the normals consistent"),
+            message.contains("traverse their edge") && message.contains("make the normals consistent"),
             "{message}"
         );
     }

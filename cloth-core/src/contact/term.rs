@@ -8,20 +8,20 @@ use super::solid::Solid;
 use crate::geometry::{Pose, dot, norm};
 use crate::motion::Motion;
 
-/// Contact of all vertices with one solid. Only vertices nearer than the thickness are evaluated; the others count as skipped. Each adds
-/// to its own diagonal block only, so that the matrix keeps its pattern whatever touches.
+/// Contact of all vertices with one solid. Evaluates only vertices within the thickness and counts the others as
+/// skipped. Each contact changes only the diagonal block of its vertex, so the matrix pattern never changes.
 #[derive(Debug)]
 pub(super) struct ContactTerm<S> {
     name: String,
-    /// At the start, and now.
+    /// The solid before its motion, and at the end of the current step.
     solid: S,
     now: S,
     motion: Option<Motion>,
     thickness: f64,
-    /// k of each vertex, in N/m.
+    /// Contact stiffness of each vertex, in N/m.
     stiffness: Vec<f64>,
     stencils: Vec<u32>,
-    /// The free vertices and where their diagonal blocks are stored.
+    /// The free vertices, with the slots of their diagonal blocks.
     free: Vec<(usize, usize)>,
 }
 
@@ -47,7 +47,7 @@ impl<S: Solid> ContactTerm<S> {
         }
     }
 
-    /// The free vertices within reach, with their elements and places.
+    /// Iterates over the free vertices within the thickness, with their slots and elements.
     fn near<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (usize, usize, S::Contact)> + 'a {
         self.free.iter().filter_map(|&(vertex, slot)| {
             let element = self.now.touched(vertex, x[vertex], self.stiffness[vertex], self.thickness)?;
@@ -86,7 +86,7 @@ impl<S: Solid + 'static> Term for ContactTerm<S> {
 }
 
 impl<S: Solid> PlacedTerm for ContactTerm<S> {
-    /// The solid is where it will be at the end of the step.
+    /// Moves the solid to its pose at the end of the step.
     fn begin_step(&mut self, start: StepStart<'_>) {
         self.move_to(start.time + start.dt);
     }
@@ -151,8 +151,9 @@ impl<S: Solid> PlacedTerm for ContactTerm<S> {
     }
 }
 
-/// The part of the Hessian along the gradient. The penalty falls as the distance grows and no feature of a solid curves towards the point, so that across
-/// the gradient no curvature is positive: this is the nearest positive semi-definite matrix.
+/// Returns the nearest positive semi-definite matrix: the part of the Hessian along the gradient. The penalty decreases
+/// with distance and no feature of a solid curves towards the point, so the curvature across the gradient is never
+/// positive.
 fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
     let size = norm(gradient);
     if size == 0.0 {
@@ -163,17 +164,17 @@ fn along(gradient: Vector3<f64>, hessian: &Block<f64>) -> Block<f64> {
     std::array::from_fn(|i| std::array::from_fn(|j| curvature * n[i] * n[j]))
 }
 
-/// What friction needs to know of a contact.
+/// A contact, as friction needs it.
 pub(super) struct Touch {
-    /// The vertex.
+    /// Index of the vertex.
     pub vertex: usize,
-    /// The unit normal out of the solid.
+    /// Unit normal, pointing out of the solid.
     pub normal: Vector3<f64>,
-    /// The normal force, in N.
+    /// Normal force, in N.
     pub force: f64,
 }
 
-/// Which of these vertices touch a solid.
+/// Returns the contacts of the given vertices with a solid.
 pub(super) fn touches<S: Solid>(
     solid: &S,
     thickness: f64,
@@ -190,13 +191,18 @@ pub(super) fn touches<S: Solid>(
     vertices.into_iter().filter_map(touch).collect()
 }
 
-/// Where a solid takes a point of it over a step, in m/s: a point where it is at the step's start, or at its end.
+/// Returns the mean velocity, over a step, of the material point of a solid that is at x at the start (or end) of the
+/// step, in m/s.
 pub(super) fn surface_velocity(motion: Option<&Motion>, step: [f64; 2], x: Vector3<f64>, at_end: bool) -> Vector3<f64> {
     let [from, to] = step;
     let Some(motion) = motion.filter(|motion| motion.moves(from, to)) else {
         return [0.0; 3];
     };
     let [before, after]: [Pose; 2] = step.map(|time| motion.pose(time));
-    let [start, end] = if at_end { [before.applied(after.undone(x)), x] } else { [x, after.applied(before.undone(x))] };
+    let [start, end] = if at_end {
+        [before.transform(after.inverse_transform(x)), x]
+    } else {
+        [x, after.transform(before.inverse_transform(x))]
+    };
     std::array::from_fn(|axis| (end[axis] - start[axis]) / (to - from))
 }

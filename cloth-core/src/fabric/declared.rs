@@ -1,4 +1,4 @@
-//! Fabrics whose elements a file declares, read at run time.
+//! Fabrics made of elements that a file declares, read at run time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,117 +13,97 @@ use super::interpreted_term::InterpretedTerm;
 use crate::geometry::{norm, subtract};
 use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, rest_angle};
 
-/// Elements declared in a `.energy` file of the user's own. Each energy in it acts on every vertex, edge, triangle or hinge, as it has one, two, three
-/// or four points; of a hinge the first two are the apexes and the others the shared edge. They are interpreted, which is slower than
-/// generated code by a factor of some ten to a hundred.
+/// Elements declared in your own `.energy` file. Each energy acts on every vertex, edge, triangle or hinge, depending
+/// on whether it has one, two, three or four points. The points of a hinge are its two apexes, then the shared edge.
+/// The elements are interpreted, which is 10 to 100 times slower than generated code.
 ///
-/// The rest shape is the place of each point at rest (`Vec3`), or of a triangle's corners in its plane, the first axis along the warp
-/// (`Vec2`). Parameters are those given, and where the declaration has them and they are not given: `L`, the length of an edge at rest; `A`, the area of a
-/// triangle at rest; `θ0`, the angle of a hinge at rest; `m`, the mass of a vertex.
+/// A rest shape consists of the rest position of each point (`Vec3`), or, for a triangle, of the corners in its plane
+/// with the first axis along the warp (`Vec2`).
+///
+/// Parameters come from `parameters`. A parameter that is not given there has a default if its name is one of these:
+/// `L`, the rest length of an edge; `A`, the rest area of a triangle; `θ0`, the rest angle of a hinge; `m`, the mass of
+/// a vertex.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Declared {
-    /// The file, from the scene file's folder.
+    /// Path, relative to the scene file's folder.
     pub path: PathBuf,
-    /// The declarations that are used. Default all of the file.
+    /// Names of the declarations to use. Default all in the file.
     #[serde(default)]
     pub elements: Option<Vec<String>>,
-    /// Parameters by name, in the units of the declaration. `θ0`, `θ₀` and `theta0` are the same.
+    /// Parameters by name, in the units of the declaration. `θ0`, `θ₀` and `theta0` are equivalent.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
-    /// What resists bending besides. Default nothing.
+    /// Additional bending resistance. Default none.
     #[serde(default)]
     pub bending: Bending,
 }
 
-/// A file that makes no fabric.
+/// A file that cannot serve as a fabric.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum DeclaredError {
     /// The file cannot be read.
     #[error("cannot read {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It cannot be compiled.
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// The file does not compile.
     #[error("{diagnostics}")]
     Text {
-        /// What is wrong, where.
+        /// The compiler's errors, with their places.
         diagnostics: String,
     },
-    /// It declares nothing of use.
+    /// The file declares no element of this name.
     #[error("{} declares no element called `{name}`; it declares {}", .path.display(), .known.join(", "))]
     NoSuchElement {
-        /// The file.
         path: PathBuf,
-        /// The name.
         name: String,
-        /// What it declares.
+        /// The names that it declares.
         known: Vec<String>,
     },
-    /// It declares nothing.
+    /// The file declares no element.
     #[error("{} declares nothing", .path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Not an energy of one to four points.
-    #[error("{}: {element} is {what}; a material is made of energies of one to four points", .path.display())]
+    Empty { path: PathBuf },
+    /// An element is not an energy of one to four points.
+    #[error("{}: {element} is {what}; a material consists of energies of one to four points", .path.display())]
     Unfit {
-        /// The file.
         path: PathBuf,
-        /// The element.
         element: String,
-        /// What it is.
+        /// A description of the element.
         what: String,
     },
-    /// A parameter that is neither given nor known.
-    #[error("{}: {element} needs the parameter `{parameter}`{unit}; give it as `parameters.{parameter}`", .path.display())]
+    /// A parameter is not given and has no default.
+    #[error(
+        "{}: {element} needs the parameter `{parameter}`{unit}; give it as `parameters.{parameter}`",
+        .path.display()
+    )]
     Missing {
-        /// The file.
         path: PathBuf,
-        /// The element.
         element: String,
-        /// The parameter.
         parameter: String,
         /// Its unit, in brackets.
         unit: String,
     },
-    /// A parameter that no element has.
+    /// No element has a parameter of this name.
     #[error("{}: no element has a parameter `{parameter}`", .path.display())]
-    Unused {
-        /// The file.
-        path: PathBuf,
-        /// The parameter.
-        parameter: String,
-    },
-    /// A rest shape that is refused.
+    Unused { path: PathBuf, parameter: String },
+    /// An element rejects a rest shape.
     #[error("{}: on vertices {vertices:?}: {source}", .path.display())]
-    Rest {
-        /// The file.
-        path: PathBuf,
-        /// The vertices.
-        vertices: Vec<usize>,
-        /// What is wrong.
-        source: energy_dsl::RestError,
-    },
+    Rest { path: PathBuf, vertices: Vec<usize>, source: energy_dsl::RestError },
 }
 
-/// A mesh on which declared elements are laid.
-pub(super) struct Ground<'a> {
+/// The mesh that the elements act on.
+pub(super) struct TargetMesh<'a> {
     pub mesh: &'a TriangleMesh,
     pub triangles: &'a [MaterialTriangle],
     pub density: f64,
-    /// The number of its first vertex.
+    /// Offset of its vertices in the system.
     pub first: usize,
     pub prefix: &'a str,
 }
 
 impl Declared {
-    /// The terms of the declared elements.
-    pub(super) fn terms(&self, ground: &Ground<'_>) -> Result<Vec<InterpretedTerm>, DeclaredError> {
+    /// Returns a term for each element used.
+    pub(super) fn terms(&self, target: &TargetMesh<'_>) -> Result<Vec<InterpretedTerm>, DeclaredError> {
         let elements = self.read()?;
         let known: BTreeSet<String> = elements
             .iter()
@@ -133,7 +113,7 @@ impl Declared {
         if let Some(unused) = self.parameters.keys().find(|name| !known.contains(&canonical_name(name))) {
             return Err(DeclaredError::Unused { path: self.path.clone(), parameter: unused.clone() });
         }
-        elements.into_iter().map(|element| self.term(element, ground)).collect()
+        elements.into_iter().map(|element| self.term(element, target)).collect()
     }
 
     fn read(&self) -> Result<Vec<Interpreted>, DeclaredError> {
@@ -154,37 +134,37 @@ impl Declared {
         wanted.iter().map(find).collect()
     }
 
-    fn term(&self, element: Interpreted, ground: &Ground<'_>) -> Result<InterpretedTerm, DeclaredError> {
+    fn term(&self, element: Interpreted, target: &TargetMesh<'_>) -> Result<InterpretedTerm, DeclaredError> {
         let declaration = element.declaration();
         let unfit =
             |what: String| DeclaredError::Unfit { path: self.path.clone(), element: declaration.name.to_owned(), what };
         if declaration.kind != Kind::Energy {
             return Err(unfit(format!("a {}", declaration.kind.keyword())));
         }
-        let places = places(declaration.points.len(), ground)
+        let sites = sites(declaration.points.len(), target)
             .ok_or_else(|| unfit(format!("an energy of {} points", declaration.points.len())))?;
-        let inputs = places.iter().map(|place| self.inputs(declaration, place, ground, &unfit));
+        let inputs = sites.iter().map(|site| self.inputs(declaration, site, target, &unfit));
         let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
-        let stencils = places.iter().flat_map(|place| place.vertices.iter().map(|vertex| ground.first + vertex));
-        let name = format!("{}{}", ground.prefix, declaration.name);
+        let stencils = sites.iter().flat_map(|site| site.vertices.iter().map(|vertex| target.first + vertex));
+        let name = format!("{}{}", target.prefix, declaration.name);
         InterpretedTerm::new(name, element, stencils.collect(), inputs).map_err(|(number, source)| {
-            DeclaredError::Rest { path: self.path.clone(), vertices: places[number].vertices.clone(), source }
+            DeclaredError::Rest { path: self.path.clone(), vertices: sites[number].vertices.clone(), source }
         })
     }
 
-    /// The parameters and the rest shape of an element, flattened.
+    /// Returns the parameters and the rest shape of an element, flattened.
     fn inputs(
         &self,
         declaration: &Declaration,
-        place: &Place,
-        ground: &Ground<'_>,
+        site: &Site,
+        target: &TargetMesh<'_>,
         unfit: &impl Fn(String) -> DeclaredError,
     ) -> Result<(Vec<f64>, Vec<f64>), DeclaredError> {
         let given: BTreeMap<String, f64> =
             self.parameters.iter().map(|(name, value)| (canonical_name(name), *value)).collect();
         let parameter = |field: &energy_dsl::Field| {
             let name = canonical_name(field.name);
-            let value = given.get(&name).copied().or_else(|| place.known(&name)).filter(|_| field.size == 1);
+            let value = given.get(&name).copied().or_else(|| site.default_of(&name)).filter(|_| field.size == 1);
             value.ok_or_else(|| DeclaredError::Missing {
                 path: self.path.clone(),
                 element: declaration.name.to_owned(),
@@ -193,65 +173,65 @@ impl Declared {
             })
         };
         let parameters = declaration.parameters.iter().map(parameter).collect::<Result<Vec<f64>, _>>()?;
-        let at_rest: Vec<Vector3<f64>> = place.vertices.iter().map(|&vertex| ground.mesh.vertices()[vertex]).collect();
+        let at_rest: Vec<Vector3<f64>> = site.vertices.iter().map(|&vertex| target.mesh.vertices()[vertex]).collect();
         let sizes: Vec<usize> = declaration.rest.iter().map(|field| field.size).collect();
-        let rest = match (&place.laid, &sizes[..]) {
+        let rest = match (&site.corners_in_plane, &sizes[..]) {
             (_, []) => Vec::new(),
-            (Some(laid), [2, 2, 2]) => laid.as_flattened().to_vec(),
+            (Some(corners_in_plane), [2, 2, 2]) => corners_in_plane.as_flattened().to_vec(),
             (_, sizes) if sizes.len() == at_rest.len() && sizes.iter().all(|&size| size == 3) => at_rest.concat(),
-            _ => return Err(unfit("of another rest shape than one point for each of its points".to_owned())),
+            _ => return Err(unfit("an energy whose rest shape is not one point for each of its points".to_owned())),
         };
         Ok((parameters, rest))
     }
 }
 
-/// Where an element acts.
-struct Place {
+/// The vertices that one element acts on.
+struct Site {
     vertices: Vec<usize>,
-    /// Of a triangle, its corners in its plane.
-    laid: Option<MaterialTriangle>,
-    /// The parameter that it knows by itself.
-    own: (&'static str, f64),
+    /// For a triangle, its corners in its plane.
+    corners_in_plane: Option<MaterialTriangle>,
+    /// The name and value of the parameter with a default.
+    default: (&'static str, f64),
 }
 
-impl Place {
-    fn known(&self, name: &str) -> Option<f64> {
-        (self.own.0 == name).then_some(self.own.1)
+impl Site {
+    fn default_of(&self, name: &str) -> Option<f64> {
+        (self.default.0 == name).then_some(self.default.1)
     }
 }
 
-/// All vertices, edges, triangles or hinges.
-fn places(points: usize, ground: &Ground<'_>) -> Option<Vec<Place>> {
-    let mesh = ground.mesh;
-    let place = |vertices: &[usize], own| Place { vertices: vertices.to_vec(), laid: None, own };
+/// Returns all vertices, edges, triangles or hinges, by the number of points; `None` for other numbers.
+fn sites(points: usize, target: &TargetMesh<'_>) -> Option<Vec<Site>> {
+    let mesh = target.mesh;
+    let site = |vertices: &[usize], default| Site { vertices: vertices.to_vec(), corners_in_plane: None, default };
     Some(match points {
         1 => {
-            let masses = lumped_masses(mesh, ground.density);
-            masses.iter().enumerate().map(|(vertex, &mass)| place(&[vertex], ("m", mass))).collect()
+            let masses = lumped_masses(mesh, target.density);
+            masses.iter().enumerate().map(|(vertex, &mass)| site(&[vertex], ("m", mass))).collect()
         }
         2 => {
             let length = |[p, q]: [usize; 2]| norm(subtract(mesh.vertices()[p], mesh.vertices()[q]));
-            Topology::of(mesh).edges.iter().map(|edge| place(edge, ("L", length(*edge)))).collect()
+            Topology::of(mesh).edges.iter().map(|edge| site(edge, ("L", length(*edge)))).collect()
         }
         3 => {
-            let triangles = mesh.triangles().iter().zip(ground.triangles);
-            let triangle = |(corners, laid): (&[usize; 3], &MaterialTriangle)| Place {
-                laid: Some(*laid),
-                ..place(corners, ("A", super::terms::area(*laid)))
+            let triangles = mesh.triangles().iter().zip(target.triangles);
+            let triangle = |(corners, corners_in_plane): (&[usize; 3], &MaterialTriangle)| Site {
+                corners_in_plane: Some(*corners_in_plane),
+                ..site(corners, ("A", super::terms::area(*corners_in_plane)))
             };
             triangles.map(triangle).collect()
         }
         4 => {
             let hinges = Topology::of(mesh).hinges;
-            hinges.iter().map(|hinge| place(&hinge.vertices, ("theta0", rest_angle(mesh, hinge)))).collect()
+            hinges.iter().map(|hinge| site(&hinge.vertices, ("theta0", rest_angle(mesh, hinge)))).collect()
         }
         _ => return None,
     })
 }
 
 impl Declared {
-    /// The same with its file sought from a folder.
-    pub(crate) fn seek_in(&mut self, folder: &Path) {
+    /// Resolves the path of the file relative to a folder.
+    pub(crate) fn resolve_path(&mut self, folder: &Path) {
         self.path = folder.join(&self.path);
     }
 }

@@ -1,45 +1,47 @@
 use energy_dsl::Vector3;
+use energy_elements::{HairBend, HookeSpring};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::{FabricError, FabricTerms, Place, Surroundings};
 use crate::bounded::{count, finite_triple, non_negative, nonzero_triple, positive};
 use crate::geometry::norm;
 
-/// Strands of hair, straight at rest: springs along their segments and bending at the vertices between.
+/// Strands of hair, straight at rest: springs along the segments, bending at the vertices between them.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hair {
-    /// What pins and seams call it. Default `hair` and its number from 0.
+    /// Name for pins and seams. Default `hair` and its index from 0.
     #[serde(default)]
     pub name: Option<String>,
-    /// Strands. Their roots are spread evenly from `root` to `last_root`.
+    /// Number of strands. Roots are evenly spaced from `root` to `last_root`.
     #[serde(deserialize_with = "count::<1, _>")]
     pub count: usize,
-    /// Segments of a strand.
+    /// Segments per strand.
     #[serde(deserialize_with = "count::<2, _>")]
     pub segments: usize,
-    /// The length of a strand, in m.
+    /// Length of a strand, in m.
     #[serde(deserialize_with = "positive")]
     pub length: f64,
-    /// The root of the first strand, in m. Default the origin.
+    /// Root of the first strand, in m. Default the origin.
     #[serde(default, deserialize_with = "finite_triple")]
     pub root: [f64; 3],
-    /// The root of the last strand, in m. Default that of the first.
+    /// Root of the last strand, in m. Default the root of the first.
     #[serde(default)]
     pub last_root: Option<[f64; 3]>,
-    /// Where the strands grow at the start. Default [0, 0, −1].
+    /// Initial direction of the strands, away from the root. Default [0, 0, −1].
     #[serde(default = "down", deserialize_with = "nonzero_triple")]
     pub direction: [f64; 3],
     /// Mass per length, in kg/m.
     #[serde(deserialize_with = "positive")]
     pub density: f64,
-    /// The tension over the strain, Young's modulus times the cross-section, in N.
+    /// Tension over strain, in N: Young's modulus times the area of the cross-section.
     #[serde(deserialize_with = "positive")]
     pub stretch_stiffness: f64,
-    /// The bending moment over the curvature, Young's modulus times the second moment of the cross-section, in N m².
+    /// Bending moment over curvature, in N m²: Young's modulus times the second moment of area of the cross-section.
     #[serde(deserialize_with = "non_negative")]
     pub bend_stiffness: f64,
-    /// Whether roots keep their place and direction. Default true.
+    /// Whether the roots keep their position and direction. Default true.
     #[serde(default = "yes")]
     pub rooted: bool,
 }
@@ -53,7 +55,7 @@ fn yes() -> bool {
 }
 
 impl Hair {
-    /// The vertices at the start, strand by strand from the root, in m.
+    /// Returns the initial vertices, strand by strand from the root, in m.
     #[must_use]
     pub fn vertices(&self) -> Vec<Vector3<f64>> {
         let last = self.last_root.unwrap_or(self.root);
@@ -71,7 +73,7 @@ impl Hair {
         vertices
     }
 
-    /// The mass of each vertex, in kg: half of each of its segments.
+    /// Returns the mass of each vertex, in kg: half the mass of each adjacent segment.
     #[must_use]
     pub fn masses(&self) -> Vec<f64> {
         let segment = self.density * self.length / self.segments as f64;
@@ -80,4 +82,27 @@ impl Hair {
             .flat_map(|_| (0..=self.segments).map(|j| if end(j) { 0.5 * segment } else { segment }))
             .collect()
     }
+}
+
+/// Creates the terms of hair, whose strands follow one another in the system.
+///
+/// # Errors
+/// Returns an error if there are more vertices than an index can hold.
+pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, place: Place) -> Result<FabricTerms, FabricError> {
+    let mut terms = FabricTerms::new(hair.masses(), place);
+    let starts = || (0..hair.count).map(|strand| strand * (hair.segments + 1));
+    let segments: Vec<[usize; 2]> =
+        starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();
+    let bends: Vec<[usize; 3]> =
+        starts().flat_map(|start| (start..start + hair.segments - 1).map(|at| [at, at + 1, at + 2])).collect();
+    let length = hair.length / hair.segments as f64;
+    let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
+    terms.add_potential("hair stretch", &segments, springs)?;
+    if !terms.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
+        // k/2 (1 − cos φ) ≈ k φ²/4 must equal the energy of a rod over one segment, B φ²/(2 l).
+        let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
+        terms.add_potential("hair bending", &bends, bending)?;
+    }
+    terms.add_surroundings(surroundings)?;
+    Ok(terms)
 }

@@ -5,8 +5,8 @@ use energy_solve::{
     TermDescription, TrianglePlaces, change_dense, index,
 };
 
-/// Elements of a declaration that was read at run time. Their compiled routines are interpreted, operation by operation: some ten to a hundred times
-/// slower than generated code, with the same results to rounding.
+/// A term of a declaration that was read at run time. Interprets its compiled routines operation by operation: 10 to
+/// 100 times slower than generated code, with the same results up to rounding.
 #[derive(Debug)]
 pub(crate) struct InterpretedTerm {
     name: String,
@@ -14,12 +14,12 @@ pub(crate) struct InterpretedTerm {
     stencils: Vec<u32>,
     arity: usize,
     bound: Vec<Bound>,
-    /// The elements with a free vertex.
+    /// Indices of the elements with a free vertex.
     active: Vec<usize>,
     places: TrianglePlaces,
 }
 
-/// One element's own numbers.
+/// The constants of one element.
 #[derive(Debug)]
 struct Bound {
     parameters: Vec<f64>,
@@ -27,14 +27,15 @@ struct Bound {
     precomputed: Vec<f64>,
 }
 
-/// What a routine returns: its numbers by group, and whether a condition was met.
+/// The results of a routine, by group, and whether an element was flagged.
 type Results = (Vec<Vec<f64>>, bool);
 
 impl InterpretedTerm {
-    /// Elements on stencils of as many vertices as the declaration has points, each with its parameters and rest shape, flattened.
+    /// Creates a term. Each stencil has as many vertices as the declaration has points; `inputs` holds the flattened
+    /// parameters and rest shape of each element.
     ///
     /// # Errors
-    /// The first element that refuses its rest shape.
+    /// Returns the index of the first element that rejects its rest shape, and why.
     pub(crate) fn new(
         name: String,
         element: Interpreted,
@@ -70,14 +71,14 @@ impl InterpretedTerm {
         Tally { evaluated, skipped: self.bound.len() as u64 - evaluated, flagged, projected }
     }
 
-    /// Subtracts an element's gradient.
-    fn push(&self, number: usize, gradient: &[f64], force: &mut [Vector3<f64>]) {
+    /// Subtracts an element's gradient from the forces.
+    fn subtract_gradient(&self, number: usize, gradient: &[f64], force: &mut [Vector3<f64>]) {
         for (point, &vertex) in self.stencil(number).iter().enumerate() {
             (0..3).for_each(|axis| force[vertex as usize][axis] -= gradient[3 * point + axis]);
         }
     }
 
-    /// Subtracts ∇²U v of an element.
+    /// Subtracts an element's ∇²U v from the product.
     fn subtract_product(
         &self,
         number: usize,
@@ -151,7 +152,7 @@ impl PlacedTerm for InterpretedTerm {
         let mut flagged = 0;
         for &number in &self.active {
             let (groups, flag) = self.run("gradient", number, state.x);
-            self.push(number, &groups[1], force);
+            self.subtract_gradient(number, &groups[1], force);
             flagged += u64::from(flag);
         }
         self.tally(flagged, 0)
@@ -161,7 +162,7 @@ impl PlacedTerm for InterpretedTerm {
         let (mut flagged, mut projected) = (0, 0);
         for &number in &self.active {
             let (groups, flag) = self.run("hessian", number, x);
-            self.push(number, &groups[1], sum.force);
+            self.subtract_gradient(number, &groups[1], sum.force);
             let mut triangle: Vec<Block<f64>> = groups[2]
                 .chunks_exact(9)
                 .map(|block| std::array::from_fn(|i| std::array::from_fn(|j| block[3 * i + j])))

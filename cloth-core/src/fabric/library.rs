@@ -1,15 +1,15 @@
-//! Fabrics that were measured: tables for scene files, each with its source.
+//! Measured fabrics, as tables for scene files, each with its source.
 
-/// A fabric that was measured.
+/// A measured fabric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeasuredFabric {
-    /// What it is called.
+    /// The name in scene files.
     pub name: &'static str,
-    /// The table `[fabric]` of a scene file, with the source of its values.
+    /// The table `[fabric]` of a scene file, with the source of its values as a comment.
     pub table: &'static str,
 }
 
-/// The measured fabrics.
+/// All measured fabrics.
 ///
 /// ```
 /// use cloth_core::fabric::MEASURED;

@@ -1,7 +1,8 @@
-//! What a cloth is made of: which declared elements act on which vertices, with what parameters.
+//! Fabrics: which declared elements act on which vertices of a mesh, and with what parameters.
 
 mod declared;
 mod description;
+mod error;
 mod hair;
 mod interpreted_term;
 mod library;
@@ -12,7 +13,8 @@ pub use declared::{Declared, DeclaredError};
 pub use description::{
     Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Rayleigh, StrainLimit, Woven,
 };
-pub use hair::Hair;
+pub use error::FabricError;
+pub use hair::{Hair, hair_terms};
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
-pub use terms::{FabricError, Garment, Place, Surroundings, hair_terms, terms, terms_at};
+pub use terms::{FabricTerms, Place, Surroundings, terms, terms_at};

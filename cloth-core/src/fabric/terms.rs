@@ -1,15 +1,15 @@
 use energy_dsl::{Element, ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, BridsonForce, BridsonForceDamped,
-    FlatBending, Gravity, HairBend, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK,
-    StableNeoHookean, StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
+    FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
+    StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
 use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term, TermDescription};
 
-use super::declared::{Declared, DeclaredError, Ground};
-use super::hair::Hair;
+use super::declared::{Declared, TargetMesh};
+use super::error::FabricError;
 use super::interpreted_term::InterpretedTerm;
-use super::plate::{PlateError, PlateTerm, Rigidity, RigidityError, ThreadError};
+use super::plate::{PlateTerm, Rigidity, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
@@ -17,49 +17,7 @@ use crate::mesh::{
     thread_triangle,
 };
 
-/// A fabric that cannot be laid on a mesh.
-#[derive(Debug, thiserror::Error)]
-pub enum FabricError {
-    /// An element refused its rest shape.
-    #[error("triangle {triangle}: {source}")]
-    Rest {
-        /// The triangle.
-        triangle: usize,
-        /// What is wrong.
-        source: RestError,
-    },
-    /// A hinge refused its rest shape.
-    #[error("the hinge on vertices {vertices:?}: {source}")]
-    RestHinge {
-        /// Its vertices.
-        vertices: [usize; 4],
-        /// What is wrong.
-        source: RestError,
-    },
-    /// The plate.
-    #[error("bending: {0}")]
-    Plate(#[from] PlateError),
-    /// The stiffnesses of woven cloth.
-    #[error("material.orthotropic-stvk: {0}")]
-    Woven(#[from] RigidityError),
-    /// The directions of the threads.
-    #[error(transparent)]
-    Threads(#[from] ThreadError),
-    /// Elements of a file.
-    #[error(transparent)]
-    Declared(#[from] DeclaredError),
-    /// A limit that is met at rest.
-    #[error("strain_limit.stretch must be above 1, the length at rest; it is {stretch}")]
-    Limit {
-        /// As given.
-        stretch: f64,
-    },
-    /// Elements and stencils do not fit.
-    #[error(transparent)]
-    List(#[from] ListError),
-}
-
-/// What acts on every cloth.
+/// External forces on every cloth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Acceleration of gravity, in m/s².
@@ -68,109 +26,83 @@ pub struct Surroundings {
     pub drag: f64,
 }
 
-/// Where a mesh stands among others.
+/// The position of a mesh among several in one system.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// The number of its first vertex.
+    /// Offset of its vertices in the system.
     pub first: usize,
-    /// What its terms' names start with.
+    /// Prefix of its terms' names.
     pub prefix: String,
 }
 
 /// The terms of a fabric on a mesh, or of hair.
 #[derive(Debug)]
-pub struct Garment {
+pub struct FabricTerms {
     /// The mass of each vertex, in kg.
     pub masses: Vec<f64>,
-    /// Everything that acts.
+    /// The forces of the fabric and its surroundings.
     pub terms: Vec<Box<dyn Term>>,
-    /// What was left out because its stiffness is zero, or there is nothing for it to act on.
+    /// Terms that were left out, because their stiffness is zero or they have no elements.
     pub left_out: Vec<String>,
-    /// What should be known about it.
+    /// Warnings about the fabric.
     pub warnings: Vec<String>,
     place: Place,
 }
 
-/// Lays hair, whose strands stand one after the other.
+/// Creates the terms of a fabric on a mesh. Only mass–spring fabrics use `springs`.
 ///
 /// # Errors
-/// When there are more vertices than indices.
-pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, place: Place) -> Result<Garment, FabricError> {
-    let mut garment = Garment::new(hair.masses(), place);
-    let starts = || (0..hair.count).map(|strand| strand * (hair.segments + 1));
-    let segments: Vec<[usize; 2]> =
-        starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();
-    let bends: Vec<[usize; 3]> =
-        starts().flat_map(|start| (start..start + hair.segments - 1).map(|at| [at, at + 1, at + 2])).collect();
-    let length = hair.length / hair.segments as f64;
-    let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
-    garment.add_potential("hair stretch", &segments, springs)?;
-    if !garment.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
-        // k/2 (1 − cos φ) is k φ²/4, and a rod's energy over a segment is B φ²/(2 l).
-        let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
-        garment.add_potential("hair bending", &bends, bending)?;
-    }
-    garment.add_surroundings(surroundings)?;
-    Ok(garment)
-}
-
-/// Lays a fabric on a mesh. `springs` is used by mass–spring fabrics only.
-///
-/// # Errors
-/// When an element refuses its rest shape.
+/// Returns an error if the fabric is invalid, or an element rejects its rest shape.
 pub fn terms(
     fabric: &Fabric,
     mesh: &TriangleMesh,
     springs: &SpringNetwork,
     surroundings: &Surroundings,
-) -> Result<Garment, FabricError> {
+) -> Result<FabricTerms, FabricError> {
     terms_at(fabric, mesh, springs, surroundings, Place::default())
 }
 
-/// Lays a fabric on a mesh that is one of several.
+/// Creates the terms of a fabric on one of several meshes in a system.
 ///
 /// # Errors
-/// When an element refuses its rest shape.
+/// Returns an error if the fabric is invalid, or an element rejects its rest shape.
 pub fn terms_at(
     fabric: &Fabric,
     mesh: &TriangleMesh,
     springs: &SpringNetwork,
     surroundings: &Surroundings,
     place: Place,
-) -> Result<Garment, FabricError> {
+) -> Result<FabricTerms, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
-    let mut garment = Garment::new(masses, place);
-    let cloth = Laid { mesh, triangles: laid(mesh, fabric)?, warp: fabric.warp };
-    // λ and μ of small strains, for damping.
+    let mut terms = FabricTerms::new(masses, place);
+    let cloth = MaterialMesh { mesh, triangles: material_triangles(mesh, fabric)?, warp: fabric.warp };
+    // λ and μ for small strains; damping is proportional to them.
     let (stiffness, bending) = match &fabric.material {
         Material::MassSpring(material) => {
-            garment.add_springs(material, mesh, springs)?;
+            terms.add_springs(material, mesh, springs)?;
             ((0.0, 0.0), None)
         }
-        Material::Stvk(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), StVK::new)?, Some(&material.bending))
-        }
+        Material::Stvk(material) => (terms.add_isotropic(&cloth, material.lame(), StVK::new)?, Some(&material.bending)),
         Material::NeoHookean(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), NeoHookean::new)?, Some(&material.bending))
+            (terms.add_isotropic(&cloth, material.lame(), NeoHookean::new)?, Some(&material.bending))
         }
         Material::StableNeoHookean(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?, Some(&material.bending))
+            (terms.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?, Some(&material.bending))
         }
         Material::StableNeoHookeanLog(material) => {
-            (garment.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?, Some(&material.bending))
+            (terms.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?, Some(&material.bending))
         }
         Material::Arap(material) => {
             let mu = material.stretch_stiffness;
-            garment
-                .add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
+            terms.add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
             ((0.0, 0.5 * mu), Some(&material.bending))
         }
         Material::BaraffWitkin(material) => {
             let ([b_u, b_v], stretch, shear) = (material.rest_stretch, material.stretch, material.shear);
-            garment.add_membrane("stretch", stretch == 0.0, &cloth, |[u0, u1, u2]| {
+            terms.add_membrane("stretch", stretch == 0.0, &cloth, |[u0, u1, u2]| {
                 BaraffWitkinStretch::new(u0, u1, u2, stretch / area([u0, u1, u2]), b_u, b_v)
             })?;
-            garment.add_membrane("shear", shear == 0.0, &cloth, |[u0, u1, u2]| {
+            terms.add_membrane("shear", shear == 0.0, &cloth, |[u0, u1, u2]| {
                 BaraffWitkinShear::new(u0, u1, u2, shear / area([u0, u1, u2]))
             })?;
             ((0.0, 0.5 * stretch), Some(&material.bending))
@@ -183,38 +115,38 @@ pub fn terms_at(
                 poisson_ratio: material.poisson_ratio,
             };
             let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = strips.matrix()?;
-            garment.add_membrane("membrane", false, &cloth, |[u0, u1, u2]| {
+            terms.add_membrane("membrane", false, &cloth, |[u0, u1, u2]| {
                 OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
             })?;
             ((c_uv, c_ss), Some(&material.bending))
         }
         Material::File(declared) => {
-            garment.add_declared(declared, &cloth, fabric.density)?;
+            terms.add_declared(declared, &cloth, fabric.density)?;
             ((0.0, 0.0), Some(&declared.bending))
         }
     };
     if let Some(limit) = &fabric.strain_limit {
-        garment.add_strain_limit(limit, &cloth)?;
+        terms.add_strain_limit(limit, &cloth)?;
     }
     if let Some(bending) = bending {
-        garment.add_bending(bending, &cloth)?;
+        terms.add_bending(bending, &cloth)?;
     }
     if let Some(rayleigh) = &fabric.rayleigh {
-        garment.add_rayleigh(rayleigh, stiffness, bending.unwrap_or(&Bending::None), &cloth)?;
+        terms.add_rayleigh(rayleigh, stiffness, bending.unwrap_or(&Bending::None), &cloth)?;
     }
-    garment.add_surroundings(surroundings)?;
-    Ok(garment)
+    terms.add_surroundings(surroundings)?;
+    Ok(terms)
 }
 
-/// A mesh with the directions of its threads.
-struct Laid<'a> {
+/// A mesh with its triangles in material coordinates.
+struct MaterialMesh<'a> {
     mesh: &'a TriangleMesh,
     triangles: Vec<MaterialTriangle>,
     warp: Vector3<f64>,
 }
 
-/// Every triangle in the plane: along warp and weft, where that matters.
-fn laid(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, ThreadError> {
+/// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it.
+fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, ThreadError> {
     let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::File(_));
     let all = 0..mesh.triangles().len();
     if !woven && fabric.strain_limit.is_none() {
@@ -228,7 +160,8 @@ pub(super) fn area([a, b, c]: MaterialTriangle) -> f64 {
     0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 }
 
-/// Of small strains ε the declared element's density is ½ μ (ε₁ − ε₂)² + ½ λ (ε₁ + ε₂)²; Hooke's has λ + μ there.
+/// For small strains ε, the density of the declared element is ½ μ (ε₁ − ε₂)² + ½ λ (ε₁ + ε₂)². Hooke's law has λ + μ
+/// in place of λ.
 fn stable_neo_hookean(
     u0: [f64; 2],
     u1: [f64; 2],
@@ -239,8 +172,8 @@ fn stable_neo_hookean(
     StableNeoHookean::new(u0, u1, u2, lambda + mu, mu)
 }
 
-/// Of small strains ε the declared element's density is ⅓ μ (ε₁ − ε₂)² + (μ/9 + λ/2) (ε₁ + ε₂)²; Hooke's is ½ μ (ε₁ − ε₂)² +
-/// ½ (λ + μ) (ε₁ + ε₂)².
+/// For small strains ε, the density of the declared element is ⅓ μ (ε₁ − ε₂)² + (μ/9 + λ/2) (ε₁ + ε₂)². Hooke's law has
+/// ½ μ (ε₁ − ε₂)² + ½ (λ + μ) (ε₁ + ε₂)².
 fn stable_neo_hookean_log(
     u0: [f64; 2],
     u1: [f64; 2],
@@ -251,8 +184,8 @@ fn stable_neo_hookean_log(
     StableNeoHookeanLog::new(u0, u1, u2, lambda + 2.0 / 3.0 * mu, 1.5 * mu)
 }
 
-impl Garment {
-    fn new(masses: Vec<f64>, place: Place) -> Self {
+impl FabricTerms {
+    pub(super) fn new(masses: Vec<f64>, place: Place) -> Self {
         Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place }
     }
 
@@ -290,7 +223,7 @@ impl Garment {
         &mut self,
         name: &str,
         is_zero: bool,
-        cloth: &Laid<'_>,
+        cloth: &MaterialMesh<'_>,
         element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
     ) -> Result<(), FabricError>
     where
@@ -303,10 +236,10 @@ impl Garment {
         self.add_potential(name, cloth.mesh.triangles(), elements)
     }
 
-    /// Returns λ and μ again.
+    /// Adds a membrane and returns its λ and μ.
     fn add_isotropic<E>(
         &mut self,
-        cloth: &Laid<'_>,
+        cloth: &MaterialMesh<'_>,
         (lambda, mu): (f64, f64),
         element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
     ) -> Result<(f64, f64), FabricError>
@@ -317,19 +250,19 @@ impl Garment {
         Ok((lambda, mu))
     }
 
-    fn add_declared(&mut self, declared: &Declared, cloth: &Laid<'_>, density: f64) -> Result<(), FabricError> {
+    fn add_declared(&mut self, declared: &Declared, cloth: &MaterialMesh<'_>, density: f64) -> Result<(), FabricError> {
         let Place { first, prefix } = &self.place;
         let (mesh, triangles) = (cloth.mesh, cloth.triangles.as_slice());
-        let terms = declared.terms(&Ground { mesh, triangles, density, first: *first, prefix })?;
+        let terms = declared.terms(&TargetMesh { mesh, triangles, density, first: *first, prefix })?;
         let slow = |term: &InterpretedTerm| {
-            format!("{} is interpreted, ten to a hundred times slower than an element that is built in", term.name())
+            format!("{} is interpreted, which is 10 to 100 times slower than a built-in element", term.name())
         };
         self.warnings.extend(terms.iter().map(slow));
         self.terms.extend(terms.into_iter().map(|term| -> Box<dyn Term> { Box::new(term) }));
         Ok(())
     }
 
-    fn add_strain_limit(&mut self, limit: &StrainLimit, cloth: &Laid<'_>) -> Result<(), FabricError> {
+    fn add_strain_limit(&mut self, limit: &StrainLimit, cloth: &MaterialMesh<'_>) -> Result<(), FabricError> {
         let StrainLimit { stretch, stiffness } = *limit;
         if stretch <= 1.0 {
             return Err(FabricError::Limit { stretch });
@@ -344,7 +277,7 @@ impl Garment {
         rayleigh: &Rayleigh,
         (lambda, mu): (f64, f64),
         bending: &Bending,
-        cloth: &Laid<'_>,
+        cloth: &MaterialMesh<'_>,
     ) -> Result<(), FabricError> {
         let beta = rayleigh.stretching;
         if !self.leave_out("membrane damping", beta * mu == 0.0, cloth.triangles.len()) {
@@ -355,14 +288,14 @@ impl Garment {
         let hinges = Topology::of(cloth.mesh).hinges;
         if !self.leave_out("bending damping", beta * rigidity == 0.0, hinges.len()) {
             let stencils: Vec<[usize; 4]> = hinges.iter().map(|hinge| hinge.vertices).collect();
-            // c ‖e‖²/(A₁ + A₂) θ² bends a sheet with regular diagonals along its grid with the rigidity 2c.
+            // c ‖e‖²/(A₁ + A₂) θ² gives a sheet with regular diagonals the rigidity 2c along its grid.
             let element = |hinge| HingeDamping::new(2.0 * beta * rigidity * shape_factor(cloth.mesh, hinge));
             self.add_force("bending damping", &stencils, hinges.iter().map(element).collect())?;
         }
         Ok(())
     }
 
-    fn add_bending(&mut self, bending: &Bending, cloth: &Laid<'_>) -> Result<(), FabricError> {
+    fn add_bending(&mut self, bending: &Bending, cloth: &MaterialMesh<'_>) -> Result<(), FabricError> {
         let mesh = cloth.mesh;
         if let Bending::Plate(rigidity) = bending {
             let is_zero = rigidity_along_grid(bending)? == 0.0;
@@ -410,7 +343,7 @@ impl Garment {
         }
     }
 
-    fn add_surroundings(&mut self, surroundings: &Surroundings) -> Result<(), FabricError> {
+    pub(super) fn add_surroundings(&mut self, surroundings: &Surroundings) -> Result<(), FabricError> {
         let vertices: Vec<[usize; 1]> = (0..self.masses.len()).map(|vertex| [vertex]).collect();
         if !self.leave_out("gravity", surroundings.gravity == [0.0; 3], vertices.len()) {
             let elements = self.masses.iter().map(|&mass| Gravity::new(mass, surroundings.gravity)).collect();
@@ -423,7 +356,7 @@ impl Garment {
         Ok(())
     }
 
-    fn add_potential<E, const N: usize>(
+    pub(super) fn add_potential<E, const N: usize>(
         &mut self,
         name: &str,
         stencils: &[[usize; N]],
@@ -449,22 +382,22 @@ impl Garment {
         Ok(())
     }
 
-    /// A list of elements on vertices of the mesh.
+    /// Creates a list of elements on vertices of the mesh.
     fn list<E: Element, const N: usize>(
         &self,
         name: &str,
         mut elements: Vec<E>,
         stencils: &[[usize; N]],
     ) -> Result<ElementList<E>, ListError> {
-        // They stay for as long as the cloth does.
+        // The list lives as long as the cloth: release spare capacity.
         elements.shrink_to_fit();
         let Place { first, prefix } = &self.place;
         let stencils: Vec<[usize; N]> = stencils.iter().map(|stencil| stencil.map(|vertex| first + vertex)).collect();
         ElementList::new(format!("{prefix}{name}"), elements, &stencils)
     }
 
-    /// Whether a term acts on nothing or with nothing; notes it if so.
-    fn leave_out(&mut self, name: &str, is_zero: bool, elements: usize) -> bool {
+    /// Records a term to be left out. Returns whether it is: its stiffness is zero, or it has no elements.
+    pub(super) fn leave_out(&mut self, name: &str, is_zero: bool, elements: usize) -> bool {
         match (is_zero, elements) {
             (true, _) => self.left_out.push(format!("{}{name}: zero", self.place.prefix)),
             (false, 0) => self.left_out.push(format!("{}{name}: nothing to act on", self.place.prefix)),
@@ -474,7 +407,7 @@ impl Garment {
     }
 }
 
-/// The flexural rigidity along the warp, in N m; of hinges, on a sheet with regular diagonals.
+/// Returns the flexural rigidity along the warp, in N m. For hinges, that of a sheet with regular diagonals.
 fn rigidity_along_grid(bending: &Bending) -> Result<f64, FabricError> {
     Ok(match bending {
         Bending::None => 0.0,
@@ -484,18 +417,18 @@ fn rigidity_along_grid(bending: &Bending) -> Result<f64, FabricError> {
     })
 }
 
-/// An element for each triangle.
+/// Creates an element for each triangle.
 fn elements<E>(
-    cloth: &Laid<'_>,
+    cloth: &MaterialMesh<'_>,
     element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
 ) -> Result<Vec<E>, FabricError> {
-    let one = |(triangle, laid): (usize, &MaterialTriangle)| {
-        element(*laid).map_err(|source| FabricError::Rest { triangle, source })
+    let one = |(triangle, material_triangles): (usize, &MaterialTriangle)| {
+        element(*material_triangles).map_err(|source| FabricError::Rest { triangle, source })
     };
     cloth.triangles.iter().enumerate().map(one).collect()
 }
 
-/// ‖Ē‖²/(‖N̄₁‖ + ‖N̄₂‖) of a hinge at rest.
+/// Returns ‖Ē‖²/(‖N̄₁‖ + ‖N̄₂‖) of a hinge at rest.
 fn shape_factor(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
     let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
     let edge = subtract(x4, x3);

@@ -1,4 +1,4 @@
-//! Vectors in space and rigid motions.
+//! Vector arithmetic and rigid motions.
 
 mod pose;
 

@@ -2,22 +2,24 @@ use energy_dsl::Vector3;
 
 use super::{cross, dot, norm, subtract};
 
-/// A rigid map x ↦ R x + t.
+/// A rigid motion x ↦ R x + t.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     rotation: [Vector3<f64>; 3],
-    shift: Vector3<f64>,
+    translation: Vector3<f64>,
 }
 
 impl Pose {
-    /// Where nothing moves.
-    pub const REST: Self = Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift: [0.0; 3] };
+    /// The motion that leaves every point in place.
+    pub const IDENTITY: Self =
+        Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
-    /// A turn by an angle in degrees about an axis through a point, right-handed (Rodrigues). Quarter turns are exact to rounding.
+    /// Returns the right-handed rotation by an angle in degrees about an axis through a point (Rodrigues' formula).
+    /// Quarter turns are exact up to rounding.
     #[must_use]
-    pub fn turned(axis: Vector3<f64>, degrees: f64, centre: Vector3<f64>) -> Self {
+    pub fn rotation(axis: Vector3<f64>, degrees: f64, centre: Vector3<f64>) -> Self {
         if degrees == 0.0 {
-            return Self::REST;
+            return Self::IDENTITY;
         }
         let n = axis.map(|component| component / norm(axis));
         let (sine, cosine) = degrees.to_radians().sin_cos();
@@ -25,45 +27,45 @@ impl Pose {
             let (across, along) = (cross(n, unit), dot(n, unit));
             std::array::from_fn(|i| cosine * unit[i] + sine * across[i] + (1.0 - cosine) * along * n[i])
         };
-        let columns = Self::REST.rotation.map(column);
+        let columns = Self::IDENTITY.rotation.map(column);
         let rotation = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
-        let turned = Self { rotation, shift: [0.0; 3] };
-        Self { rotation, shift: subtract(centre, turned.applied(centre)) }
+        let rotated = Self { rotation, translation: [0.0; 3] };
+        Self { rotation, translation: subtract(centre, rotated.transform(centre)) }
     }
 
-    /// The same, then a shift.
+    /// Returns this motion followed by a translation.
     #[must_use]
-    pub fn shifted(mut self, by: Vector3<f64>) -> Self {
-        (0..3).for_each(|axis| self.shift[axis] += by[axis]);
+    pub fn translated(mut self, by: Vector3<f64>) -> Self {
+        (0..3).for_each(|axis| self.translation[axis] += by[axis]);
         self
     }
 
-    /// This, then another.
+    /// Returns this motion followed by `next`.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
-        let column = |j: usize| next.turned_direction(std::array::from_fn(|i| self.rotation[i][j]));
+        let column = |j: usize| next.rotate(std::array::from_fn(|i| self.rotation[i][j]));
         let columns = [0, 1, 2].map(column);
         let rotation = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
-        Self { rotation, shift: next.applied(self.shift) }
+        Self { rotation, translation: next.transform(self.translation) }
     }
 
-    /// Where a point goes.
+    /// Transforms a point.
     #[must_use]
-    pub fn applied(&self, point: Vector3<f64>) -> Vector3<f64> {
-        std::array::from_fn(|i| dot(self.rotation[i], point) + self.shift[i])
+    pub fn transform(&self, point: Vector3<f64>) -> Vector3<f64> {
+        std::array::from_fn(|i| dot(self.rotation[i], point) + self.translation[i])
     }
 
-    /// What becomes of a direction.
+    /// Transforms a direction: rotates without translating.
     #[must_use]
-    pub fn turned_direction(&self, direction: Vector3<f64>) -> Vector3<f64> {
+    pub fn rotate(&self, direction: Vector3<f64>) -> Vector3<f64> {
         self.rotation.map(|row| dot(row, direction))
     }
 
-    /// Where a point comes from.
+    /// Transforms a point by the inverse motion.
     #[must_use]
-    pub fn undone(&self, point: Vector3<f64>) -> Vector3<f64> {
-        let way = subtract(point, self.shift);
-        std::array::from_fn(|j| (0..3).map(|i| self.rotation[i][j] * way[i]).sum())
+    pub fn inverse_transform(&self, point: Vector3<f64>) -> Vector3<f64> {
+        let offset = subtract(point, self.translation);
+        std::array::from_fn(|j| (0..3).map(|i| self.rotation[i][j] * offset[i]).sum())
     }
 }
 
@@ -73,13 +75,13 @@ mod tests {
 
     #[test]
     fn poses_undo_themselves_and_keep_distances() {
-        let pose = Pose::turned([1.0, 2.0, -0.5], 77.0, [0.3, 0.2, 0.1]).shifted([1.0, -2.0, 3.0]);
+        let pose = Pose::rotation([1.0, 2.0, -0.5], 77.0, [0.3, 0.2, 0.1]).translated([1.0, -2.0, 3.0]);
         let (p, q) = ([0.4, -0.7, 1.1], [1.4, 0.7, -0.1]);
-        let there = pose.applied(p);
-        let back = pose.undone(there);
+        let there = pose.transform(p);
+        let back = pose.inverse_transform(there);
         assert!(norm(subtract(back, p)) < 1e-14, "{back:?}");
-        let apart = norm(subtract(there, pose.applied(q)));
+        let apart = norm(subtract(there, pose.transform(q)));
         assert!((apart - norm(subtract(p, q))).abs() < 1e-14);
-        assert!(norm(subtract(pose.turned_direction(subtract(q, p)), subtract(pose.applied(q), there))) < 1e-14);
+        assert!(norm(subtract(pose.rotate(subtract(q, p)), subtract(pose.transform(q), there))) < 1e-14);
     }
 }

@@ -4,47 +4,48 @@ use super::substep::Substep;
 use super::{Integrator, IntegratorMemory, StepError, StepReport};
 use crate::body::Body;
 
-/// Another scheme with a step of its own choice: a step that fails is rejected and tried again at half its size; after
-/// [`Adaptive::PATIENCE`] successes in a row the size doubles, up to that asked for. A step fails when it cannot be completed with
-/// finite numbers: NaN, a triangle turned over under a material that forbids it, a line search that is stuck, too many
-/// iterations.
+/// Adaptive step sizes for another integrator. A failed step is rejected and retried at half its size. After
+/// [`Adaptive::PATIENCE`] successes in a row the size doubles, up to the requested one.
+///
+/// A step fails if it cannot be completed with finite numbers: NaN, an inverted triangle under a material that forbids
+/// it, a line search without success, too many iterations.
 #[derive(Debug)]
 pub struct Adaptive {
     inner: Box<dyn Integrator>,
-    /// The size of the next step over that asked for, a power of ½.
+    /// The next step is 2^−halvings of the requested one.
     halvings: u32,
     successes: u32,
     last_rejection: Option<Rejection>,
 }
 
-/// A step that was rejected.
+/// A rejected step.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(missing_docs, reason = "the fields say it")]
 pub struct Rejection {
-    /// Its size, in s.
+    /// Step size, in s.
     pub dt: f64,
-    /// Why.
     pub reason: StepError,
 }
 
 impl Adaptive {
-    /// Successes before the step grows.
+    /// Successes in a row before the step size doubles.
     pub const PATIENCE: u32 = 4;
-    /// Halvings after which a step counts as hopeless: a millionth of that asked for.
+    /// Halvings before a step fails for good: about a millionth of the requested size.
     pub const MOST_HALVINGS: u32 = 20;
 
-    /// Steps of `inner`.
+    /// Wraps an integrator.
     #[must_use]
     pub fn new(inner: Box<dyn Integrator>) -> Self {
         Self { inner, halvings: 0, successes: 0, last_rejection: None }
     }
 
-    /// The last step that was rejected, and why.
+    /// The last rejected step; `None` if no step was rejected.
     #[must_use]
     pub fn last_rejection(&self) -> Option<&Rejection> {
         self.last_rejection.as_ref()
     }
 
-    /// The part of a whole step that is tried next.
+    /// The size of the next step over the requested one.
     #[must_use]
     pub fn part(&self) -> f64 {
         0.5_f64.powi(self.halvings as i32)
@@ -56,15 +57,15 @@ impl Integrator for Adaptive {
         self.inner.name()
     }
 
-    /// Advances by `dt`, in as many steps as it takes.
+    /// Advances by `dt` in one or more steps.
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
         let start = Substep::of(body);
         let mut report = StepReport::default();
-        // The time done, in units of the smallest step, so that parts add up exactly.
+        // Time in units of the smallest step, so that parts add up exactly.
         let (mut done, whole) = (0_u64, 1_u64 << Self::MOST_HALVINGS);
         while done < whole {
             let mut part = whole >> self.halvings;
-            // A longer step fits only where it ends on a multiple of itself.
+            // Steps end on multiples of their size, so that a doubled step still fits.
             while done % part != 0 {
                 part /= 2;
             }
@@ -103,7 +104,7 @@ impl Integrator for Adaptive {
         self.inner.restore(memory);
     }
 
-    /// None: it finds its own.
+    /// `None`: unstable steps are rejected.
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {
         Ok(None)
     }

@@ -8,13 +8,14 @@ use super::{
 };
 use crate::body::Body;
 
-/// The backward differentiation formula of two steps (Curtiss and Hirschfelder 1952): with y = (x, v) and y₋ that of the step before,
+/// The two-step backward differentiation formula (Curtiss and Hirschfelder 1952): with y = (x, v) and y₋ one step
+/// earlier,
 ///
 /// y' = (4 y − y₋)/3 + ⅔ h ẏ'.
 ///
-/// Second order; it damps what it does not resolve in time, much less than implicit Euler what it does. It is implicit Euler with ⅔ of the
-/// step from (4 y − y₋)/3, found by [`Newton`] on the incremental potential. The first step, and any after the step size or the body was
-/// changed from outside, is one of the midpoint rule.
+/// Second order. Damps motions that the step does not resolve, and resolved ones much less than implicit Euler. It
+/// equals implicit Euler with ⅔ of the step from (4 y − y₋)/3, which [`Newton`] solves. The first step, and every step
+/// after a change of the step size or of the body from outside, is a step of the implicit midpoint rule.
 #[derive(Clone, Debug)]
 pub struct Bdf2 {
     newton: Newton,
@@ -31,7 +32,7 @@ pub(crate) struct History {
 }
 
 impl History {
-    /// Whether the free vertices are where they were after that step.
+    /// Whether the free vertices are still at the end of that step.
     fn leads_to(&self, body: &Body) -> bool {
         let same = |&vertex: &usize| self.after.x[vertex] == body.x[vertex] && self.after.v[vertex] == body.v[vertex];
         body.system.dofs().free().iter().all(same)
@@ -45,7 +46,7 @@ impl Default for Bdf2 {
 }
 
 impl Bdf2 {
-    /// With other tolerances.
+    /// Creates an integrator with these tolerances.
     #[must_use]
     pub fn with_options(options: NewtonOptions) -> Self {
         Self { newton: Newton::with_options(options), first: ImplicitMidpoint::with_options(options), history: None }
@@ -65,7 +66,7 @@ impl Integrator for Bdf2 {
                     x: extrapolated(&here.x, &history.before.x),
                     v: extrapolated(&here.v, &history.before.v),
                 };
-                // Those that are pinned go as they are told: two thirds of the step are yet to come.
+                // Pinned vertices move by their velocities: Newton's step will add the other two thirds.
                 let third = moved_by_velocities(body, dt / 3.0);
                 for vertex in (0..third.len()).filter(|&vertex| body.system.dofs().place(vertex).is_none()) {
                     (from.x[vertex], from.v[vertex]) = (third[vertex], here.v[vertex]);
@@ -97,7 +98,7 @@ impl Integrator for Bdf2 {
     }
 }
 
-/// (4 y − y₋)/3, written so that what does not move stays where it is to the last bit.
+/// (4 y − y₋)/3, written so that points at rest stay bit-identical.
 fn extrapolated(here: &[Vector3<f64>], before: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let one = |(y, last): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
         std::array::from_fn(|axis| y[axis] + (y[axis] - last[axis]) / 3.0)

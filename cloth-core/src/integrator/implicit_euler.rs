@@ -13,13 +13,13 @@ use crate::body::Body;
 ///
 /// (M − h ∂f/∂v − h² ∂f/∂x) Δv = h (f + h (∂f/∂x) v),  v' = v + Δv,  x' = x + h v',
 ///
-/// with all of ∂f/∂x and ∂f/∂v. First order and dissipative. Conjugate gradients solve it when every term's Jacobians are symmetric,
-/// else BiCGSTAB.
+/// with the complete ∂f/∂x and ∂f/∂v. First order and dissipative. Solved by conjugate gradients if the Jacobians of
+/// all terms are symmetric, otherwise by BiCGSTAB.
 ///
-/// Compressed elements can make the matrix indefinite, and then its solution may run uphill. When conjugate gradients meet
-/// such curvature, the step is solved again with each element's Hessian projected to positive semi-definite on both
-/// sides of the equation; the [`StepReport`] says so. One linear solve may overshoot when a single step undoes a strong
-/// compression: energy is not guaranteed to fall.
+/// Compressed elements can make the matrix indefinite, and the solution may then point uphill. If conjugate gradients
+/// detect this, the step is solved again with each element's Hessian projected to positive semi-definite on both sides
+/// of the equation, and [`StepReport::projected`] is set. One linear solve may overshoot when a single step undoes a
+/// strong compression: energy is not guaranteed to fall.
 #[derive(Clone, Debug, Default)]
 pub struct ImplicitEuler {
     options: Options,
@@ -28,33 +28,33 @@ pub struct ImplicitEuler {
     memory: Option<Memory>,
 }
 
-/// What stays from one step to the next.
+/// Allocations kept from one step to the next.
 #[derive(Clone, Debug)]
 struct Memory {
     matrix: BlockMatrix,
-    /// For symmetric matrices.
+    /// The solver, if the matrix is symmetric; otherwise `None`, for BiCGSTAB.
     solver: Option<LinearSolver<f64>>,
 }
 
-/// How exactly the linear systems are solved.
+/// Accuracy of the linear systems.
 #[derive(Clone, Copy, Debug)]
 struct Options(SolveOptions);
 
 impl Default for Options {
-    /// A residual of 10⁻⁵ of the right-hand side is far below the scheme's own error at any useful step.
+    /// A relative residual of 10⁻⁵ is far below the scheme's own error at any useful step.
     fn default() -> Self {
         Self(SolveOptions { relative_tolerance: 1e-5, iteration_limit: 5_000 })
     }
 }
 
 impl ImplicitEuler {
-    /// With other tolerances for the linear systems.
+    /// Creates an integrator with these tolerances for the linear systems.
     #[must_use]
     pub fn with_options(options: SolveOptions) -> Self {
         Self { options: Options(options), ..Self::default() }
     }
 
-    /// With a solver of the linear systems, where they are symmetric.
+    /// Creates an integrator with this solver for symmetric linear systems.
     #[must_use]
     pub fn solved_by(linear_solver: LinearSolverChoice) -> Self {
         Self { linear_solver, ..Self::default() }
@@ -71,32 +71,32 @@ impl ImplicitEuler {
         let weights = Weights { position: -dt * dt, velocity: -dt };
         let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
         let linear = body.system.linearise_with_masses(state, options, &body.masses, matrix)?;
-        let right = |&vertex: &usize| -> Vector3<f64> {
+        let rhs = |&vertex: &usize| -> Vector3<f64> {
             let (force, change) = (linear.force[vertex], linear.stiffness_times_velocity[vertex]);
             std::array::from_fn(|axis| dt * (force[axis] + dt * change[axis]))
         };
-        let right: Vec<_> = body.system.dofs().free().iter().map(right).collect();
-        let mut delta = vec![[0.0; 3]; right.len()];
+        let rhs: Vec<_> = body.system.dofs().free().iter().map(rhs).collect();
+        let mut delta = vec![[0.0; 3]; rhs.len()];
         let options = &self.options.0;
-        let other = |report| (report, SolvedBy::default());
+        let unsymmetric = |report| (report, SolvedBy::default());
         let (report, solved_by) = match solver {
-            None => other(bicgstab(matrix, &BlockJacobi::new(matrix)?, &right, &mut delta, options)),
+            None => unsymmetric(bicgstab(matrix, &BlockJacobi::new(matrix)?, &rhs, &mut delta, options)),
             Some(solver) => match solver.prepare(matrix, &self.trial) {
-                Ok(()) => solver.solve(matrix, &right, &mut delta, options, &mut self.trial),
-                // A block on the diagonal already proves what a direction would.
-                Err(_) if curvature == Curvature::Exact => other(SolveReport::indefinite()),
+                Ok(()) => solver.solve(matrix, &rhs, &mut delta, options, &mut self.trial),
+                // A diagonal block with negative curvature proves that the matrix is indefinite.
+                Err(_) if curvature == Curvature::Exact => unsymmetric(SolveReport::indefinite()),
                 Err(error) => return Err(error),
             },
         };
-        Ok(Solution { delta, right, report, solved_by })
+        Ok(Solution { delta, rhs, report, solved_by })
     }
 
     fn failure(&self, solution: &Solution, matrix: &BlockMatrix, free: &[usize]) -> StepError {
         let mut residual = vec![[0.0; 3]; free.len()];
         matrix.multiply(&solution.delta, &mut residual);
         let size = |place: usize| {
-            let error: Vector3<f64> = std::array::from_fn(|axis| solution.right[place][axis] - residual[place][axis]);
-            // NaN counts as the worst.
+            let error: Vector3<f64> = std::array::from_fn(|axis| solution.rhs[place][axis] - residual[place][axis]);
+            // Rank NaN as the largest.
             let size = crate::geometry::norm(error);
             if size.is_nan() { f64::INFINITY } else { size }
         };
@@ -114,7 +114,7 @@ impl ImplicitEuler {
 
 struct Solution {
     delta: Vec<Vector3<f64>>,
-    right: Vec<Vector3<f64>>,
+    rhs: Vec<Vector3<f64>>,
     report: SolveReport,
     solved_by: SolvedBy,
 }

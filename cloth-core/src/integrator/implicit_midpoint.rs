@@ -4,11 +4,12 @@ use super::substep::{Substep, start_from};
 use super::{Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport};
 use crate::body::Body;
 
-/// The implicit midpoint rule: x' = x + h ½(v + v'), v' = v + h M⁻¹ f(½(x + x'), ½(v + v')). Second order; keeps momentum and
-/// angular momentum exactly, and does not damp.
+/// The implicit midpoint rule: x' = x + h ½(v + v'), v' = v + h M⁻¹ f(½(x + x'), ½(v + v')). Second order. Conserves
+/// momentum and angular momentum exactly, and has no numerical damping.
 ///
-/// Its midpoint is what implicit Euler yields after half a step, found by [`Newton`] on the incremental potential; the end of the step lies
-/// as far beyond it. So nothing tends to rest that is not damped, and wrinkles that are not resolved in time ring on.
+/// The midpoint is half a step of implicit Euler, which [`Newton`] solves; the end of the step is the reflection of the
+/// start at the midpoint. Without damping in the scene nothing comes to rest, and wrinkles that the step does not
+/// resolve keep ringing.
 #[derive(Clone, Debug)]
 pub struct ImplicitMidpoint {
     newton: Newton,
@@ -21,7 +22,7 @@ impl Default for ImplicitMidpoint {
 }
 
 impl ImplicitMidpoint {
-    /// With other tolerances.
+    /// Creates an integrator with these tolerances.
     #[must_use]
     pub fn with_options(options: NewtonOptions) -> Self {
         Self { newton: Newton::with_options(options) }

@@ -11,29 +11,30 @@ use serde::{Deserialize, Serialize};
 use super::StepError;
 use super::trial::Trial;
 
-/// What solves the symmetric linear systems of implicit integrators.
+/// The solver of the symmetric linear systems of implicit integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearSolverChoice {
-    /// Over-relaxation for sheets, or multigrid where that takes so many iterations that multigrid is faster; incomplete Cholesky for strands.
+    /// For sheets, over-relaxation, or multigrid once over-relaxation needs too many iterations. For strands,
+    /// incomplete Cholesky.
     #[default]
     Auto,
     /// Conjugate gradients with symmetric over-relaxation.
     OverRelaxation,
     /// Conjugate gradients with multigrid.
     Multigrid,
-    /// A sparse factorisation of every matrix.
+    /// Sparse Cholesky factorisation of every matrix.
     Cholesky,
-    /// Conjugate gradients with an incomplete factorisation.
+    /// Conjugate gradients with an incomplete Cholesky factorisation.
     IncompleteCholesky,
 }
 
 impl LinearSolverChoice {
-    /// All.
+    /// All choices, `Auto` first.
     pub const ALL: [Self; 5] =
         [Self::Auto, Self::OverRelaxation, Self::Multigrid, Self::Cholesky, Self::IncompleteCholesky];
 
-    /// What it is called in scenes.
+    /// The name in scene files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -46,21 +47,21 @@ impl LinearSolverChoice {
     }
 }
 
-/// How many linear systems were solved by what.
+/// Numbers of linear systems solved, by solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SolvedBy {
-    /// [`OverRelaxation`].
+    /// Solves by [`OverRelaxation`].
     pub over_relaxation: u64,
-    /// [`Multigrid`].
+    /// Solves by [`Multigrid`].
     pub multigrid: u64,
-    /// [`BlockCholesky`].
+    /// Solves by [`BlockCholesky`].
     pub cholesky: u64,
-    /// [`IncompleteCholesky`].
+    /// Solves by [`IncompleteCholesky`].
     pub incomplete_cholesky: u64,
-    /// The most levels of multigrid, the finest among them.
+    /// The largest number of multigrid levels, including the finest.
     pub levels: usize,
-    /// The blocks of all levels for one of the finest: the most.
+    /// The largest operator complexity: blocks of all levels over blocks of the finest.
     pub complexity: f64,
 }
 
@@ -96,12 +97,12 @@ impl std::fmt::Display for SolvedBy {
     }
 }
 
-/// What solves the symmetric systems of an integrator.
+/// A linear solver for the symmetric systems of an integrator.
 #[derive(Debug)]
 pub(super) struct LinearSolver<T> {
     choice: LinearSolverChoice,
     threads: usize,
-    /// What the matrix was prepared for; others are set up again when they are called for, rather than kept.
+    /// The solver of the last matrix. Solvers of other kinds are set up again when needed, to save memory.
     solver: Option<Solver<T>>,
 }
 
@@ -114,7 +115,7 @@ enum Solver<T> {
 }
 
 impl<T: Precision> Solver<T> {
-    /// For matrices of a pattern. What is chosen automatically is over-relaxation.
+    /// Creates a solver for matrices of this pattern. `Auto` creates over-relaxation.
     fn set_up(choice: LinearSolverChoice, pattern: &Arc<Pattern>, threads: usize) -> Result<Self, StepError> {
         Ok(match choice {
             LinearSolverChoice::Multigrid => Self::Multigrid(Multigrid::with_threads(pattern, threads).into()),
@@ -126,7 +127,6 @@ impl<T: Precision> Solver<T> {
         })
     }
 
-    /// What it is.
     fn choice(&self) -> LinearSolverChoice {
         match self {
             Self::OverRelaxation(_) => LinearSolverChoice::OverRelaxation,
@@ -137,7 +137,7 @@ impl<T: Precision> Solver<T> {
     }
 }
 
-/// Without what can be set up again.
+/// Clones the settings only: the solver is set up again when needed.
 impl<T: Precision> Clone for LinearSolver<T> {
     fn clone(&self) -> Self {
         Self { choice: self.choice, threads: self.threads, solver: None }
@@ -145,10 +145,10 @@ impl<T: Precision> Clone for LinearSolver<T> {
 }
 
 impl<T: Precision> LinearSolver<T> {
-    /// For matrices of the pattern of this one, to be solved by at most so many threads.
+    /// Creates a solver for matrices with the pattern of this one, with at most `threads` threads.
     pub(super) fn new(choice: LinearSolverChoice, matrix: &BlockMatrix<impl Precision>, threads: usize) -> Self {
-        // Where elimination vertex by vertex makes no new couplings, the incomplete factorisation is complete, and relaxation would carry news from one
-        // end to the other by a few vertices an iteration.
+        // If elimination causes no fill-in, as on strands, the incomplete factorisation is exact. Relaxation would
+        // propagate changes by a few vertices per iteration only.
         let choice = match choice {
             LinearSolverChoice::Auto if !matrix.pattern().fills_in() => LinearSolverChoice::IncompleteCholesky,
             choice => choice,
@@ -156,7 +156,7 @@ impl<T: Precision> LinearSolver<T> {
         Self { choice, threads, solver: None }
     }
 
-    /// Takes over a matrix.
+    /// Prepares the solver for a matrix.
     pub(super) fn prepare(&mut self, matrix: &BlockMatrix<impl Precision>, trial: &Trial) -> Result<(), StepError> {
         let (pattern, threads) = (matrix.pattern(), self.threads);
         let wanted = match self.choice {
@@ -164,7 +164,7 @@ impl<T: Precision> LinearSolver<T> {
             LinearSolverChoice::Auto => LinearSolverChoice::OverRelaxation,
             choice => choice,
         };
-        // One that is not wanted any more goes before another is set up: there is not to be memory for both.
+        // Drop an unwanted solver before setting up another: memory for both may be lacking.
         let known = self.solver.take().filter(|solver| solver.choice() == wanted);
         let solver = known.map_or_else(|| Solver::set_up(wanted, pattern, threads), Ok)?;
         match self.solver.insert(solver) {
@@ -176,7 +176,7 @@ impl<T: Precision> LinearSolver<T> {
         Ok(())
     }
 
-    /// Solves A x = b from x = 0, A the matrix that was prepared, and notes what it took.
+    /// Solves A x = b from x = 0, where A is the prepared matrix, and records the iterations in `trial`.
     pub(super) fn solve(
         &mut self,
         matrix: &BlockMatrix<impl Precision>,

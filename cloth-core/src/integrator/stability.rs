@@ -1,10 +1,10 @@
-//! How large an explicit step may be.
+//! Stability limits of explicit steps.
 
 use energy_solve::{Curvature, EvaluationError, LinearisationOptions, Weights};
 
 use crate::body::Body;
 
-/// Bounds on the motions of a body about its state, x″ = −ω² x − d x′.
+/// Bounds on the rates of a body's motions about its state, x″ = −ω² x − d x′.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rates {
     /// ω², in 1/s².
@@ -14,7 +14,7 @@ pub(super) struct Rates {
 }
 
 impl Rates {
-    /// The largest absolute row sums of M⁻¹ ∂f/∂x and M⁻¹ ∂f/∂v (Gershgorin): a little pessimistic.
+    /// Computes the largest absolute row sums of M⁻¹ ∂f/∂x and M⁻¹ ∂f/∂v (Gershgorin), which are slightly pessimistic.
     pub fn of(body: &mut Body) -> Result<Self, EvaluationError> {
         let frequency_squared = largest_row_sum(body, Weights { position: 1.0, velocity: 0.0 })?;
         let damping = if body.system.character().velocity_dependent {
@@ -25,7 +25,7 @@ impl Rates {
         Ok(Self { frequency_squared, damping })
     }
 
-    /// The limit of symplectic Euler, 4/(d + √(d² + 4ω²)).
+    /// The limit of symplectic Euler, 4/(d + √(d² + 4ω²)); `None` if every step is stable.
     pub fn symplectic_limit(self) -> Option<f64> {
         let rate = self.damping + (self.damping * self.damping + 4.0 * self.frequency_squared).sqrt();
         (rate > 0.0).then(|| 4.0 / rate)

@@ -1,4 +1,4 @@
-//! Implicit Euler from another state than the body's: what the midpoint rule, the trapezoidal rule and BDF2 come down to.
+//! Implicit Euler from a state other than the body's. The midpoint rule, the trapezoidal rule and BDF2 reduce to it.
 
 use energy_dsl::Vector3;
 use serde::{Deserialize, Serialize};
@@ -6,23 +6,23 @@ use serde::{Deserialize, Serialize};
 use super::{Integrator, Newton, StepError, StepReport};
 use crate::body::Body;
 
-/// Where implicit Euler starts from.
+/// A starting state for implicit Euler.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Substep {
-    /// X, in m.
+    /// Positions X, in m.
     pub x: Vec<Vector3<f64>>,
-    /// V, in m/s.
+    /// Velocities V, in m/s.
     pub v: Vec<Vector3<f64>>,
 }
 
 impl Substep {
-    /// The body's own state.
+    /// Returns the body's own state.
     pub fn of(body: &Body) -> Self {
         Self { x: body.x.clone(), v: body.v.clone() }
     }
 }
 
-/// Solves x' = X + h v', v' = V + h M⁻¹ f(x', v') of the body. On an error it has the state `before` again.
+/// Solves x' = X + h v', v' = V + h M⁻¹ f(x', v'). On an error the body is reset to `before`.
 pub(super) fn start_from(
     body: &mut Body,
     before: &Substep,

@@ -4,8 +4,8 @@ use super::stability::Rates;
 use super::{Integrator, StepError, StepReport, advance, kicked};
 use crate::body::Body;
 
-/// Symplectic (semi-implicit) Euler: v' = v + h M⁻¹ f(x, v), x' = x + h v'. First order; stable for small steps only. Without damping it
-/// keeps momentum and angular momentum.
+/// Symplectic (semi-implicit) Euler: v' = v + h M⁻¹ f(x, v), x' = x + h v'. First order, stable for small steps only.
+/// Conserves momentum and angular momentum without damping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SymplecticEuler;
 
@@ -21,8 +21,8 @@ impl Integrator for SymplecticEuler {
         Ok(StepReport::default())
     }
 
-    /// 4/(d + √(d² + 4ω²)), the limit of x″ = −ω²x − d x′, with ω² and d bounded by the largest absolute row sums of M⁻¹ ∂f/∂x and
-    /// M⁻¹ ∂f/∂v (Gershgorin): a little pessimistic.
+    /// 4/(d + √(d² + 4ω²)), the limit of x″ = −ω²x − d x′. The largest absolute row sums of M⁻¹ ∂f/∂x and M⁻¹ ∂f/∂v
+    /// (Gershgorin) bound ω² and d, so the estimate is slightly pessimistic.
     fn stable_step(&self, body: &mut Body) -> Result<Option<f64>, EvaluationError> {
         Ok(Rates::of(body)?.symplectic_limit())
     }

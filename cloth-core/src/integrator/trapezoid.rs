@@ -4,12 +4,12 @@ use super::substep::{Substep, start_from};
 use super::{Integrator, IntegratorMemory, Newton, NewtonOptions, StepError, StepReport, moved_by_velocities};
 use crate::body::Body;
 
-/// The trapezoidal rule, which is Newmark's method of average acceleration (β = ¼, γ = ½; Newmark 1959):
+/// The trapezoidal rule, equal to Newmark's method of average acceleration (β = ¼, γ = ½; Newmark 1959):
 ///
 /// x' = x + ½ h (v + v'),  v' = v + ½ h M⁻¹ (f(x, v) + f(x', v')).
 ///
-/// Second order, without damping of its own. It is implicit Euler with half the step from where an explicit half step leads, found by
-/// [`Newton`] on the incremental potential.
+/// Second order, without numerical damping. It equals an explicit half step followed by an implicit half step, which
+/// [`Newton`] solves.
 #[derive(Clone, Debug)]
 pub struct Trapezoid {
     newton: Newton,
@@ -22,7 +22,7 @@ impl Default for Trapezoid {
 }
 
 impl Trapezoid {
-    /// With other tolerances.
+    /// Creates an integrator with these tolerances.
     #[must_use]
     pub fn with_options(options: NewtonOptions) -> Self {
         Self { newton: Newton::with_options(options) }

@@ -1,46 +1,48 @@
 use serde::{Deserialize, Serialize};
 
-/// Which of two solvers of sheets is faster, over-relaxation or multigrid: found out by counting their iterations, never by the clock, so that it is the
-/// same in every run, on any number of threads, and after a run was resumed.
+/// Chooses between over-relaxation and multigrid for sheets. Counts iterations instead of measuring time, so the choice
+/// is the same in every run, for every number of threads, and after a resumed run.
 ///
-/// Over-relaxation comes first. When it takes more iterations than multigrid is expected to cost, multigrid takes over, until it costs more than
-/// over-relaxation did, and otherwise for so many solutions; then over-relaxation is tried again.
+/// Over-relaxation comes first. Multigrid takes over once over-relaxation needs more iterations than multigrid is
+/// expected to cost. It stays until it costs more than over-relaxation did, or until [`PATIENCE`] rounds have passed;
+/// then over-relaxation is tried again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Trial {
     multigrid: bool,
-    /// The solutions of this round, their iterations, and the decimal digits that they were solved to, in thousandths.
+    /// This round: solves, their iterations, and the decimal digits they were solved to, in thousandths.
     count: u32,
     iterations: u32,
     digits: u32,
-    /// Rounds since the last change.
+    /// Rounds since the last change of solver.
     rounds: u32,
-    /// Iterations a digit, in thousandths: of over-relaxation in its last round; of multigrid, recent rounds counting more, 0 if that is long ago.
+    /// Iterations per decimal digit, in thousandths: of over-relaxation in its last round, and a moving average of
+    /// multigrid's rounds. 0 if multigrid has not run recently.
     relaxations: u32,
     cycles: u32,
 }
 
-/// Solutions of a round.
+/// Solves per round.
 const ROUND: u32 = 3;
 /// Rounds until the other solver is tried again.
 const PATIENCE: u32 = 60;
-/// What it costs to take over a matrix, more than over-relaxation does: in iterations of over-relaxation.
-const TAKE_OVER: f64 = 6.0;
-/// What an iteration of multigrid costs: in iterations of over-relaxation, which reads the blocks above the diagonal half as often, has no coarse levels,
-/// and fewer vectors.
-const CYCLE: f64 = 3.6;
-/// Iterations of multigrid for each decimal digit, on real cotton, in thousandths.
-const A_DIGIT: u32 = 4000;
-/// By how much one must be cheaper than the other to replace it.
+/// Extra cost of multigrid's set-up for a new matrix, in iterations of over-relaxation.
+const SETUP_COST: f64 = 6.0;
+/// Cost of an iteration of multigrid, in iterations of over-relaxation. Over-relaxation reads the blocks above the
+/// diagonal half as often, has no coarse levels, and needs fewer vectors.
+const CYCLE_COST: f64 = 3.6;
+/// Initial guess of multigrid's iterations per decimal digit, in thousandths: measured on cotton.
+const INITIAL_ITERATIONS_PER_DIGIT: u32 = 4000;
+/// Factor by which one solver must be cheaper than the other to replace it.
 const MARGIN: f64 = 1.2;
 
 impl Trial {
-    /// Whether multigrid is next.
+    /// Whether the next system goes to multigrid.
     pub(super) fn multigrid(&self) -> bool {
         self.multigrid
     }
 
-    /// Takes note of a solution by what is in use.
+    /// Records a solve by the solver in use, and decides which one comes next.
     pub(super) fn note(&mut self, iterations: usize, relative_tolerance: f64) {
         self.count += 1;
         self.iterations += iterations as u32;
@@ -51,34 +53,34 @@ impl Trial {
         let digits = f64::from(self.digits) / f64::from(1000 * ROUND);
         let found = (f64::from(self.iterations) / f64::from(ROUND) / digits * 1000.0) as u32;
         (self.count, self.iterations, self.digits, self.rounds) = (0, 0, 0, self.rounds + 1);
-        let was = self.multigrid;
+        let was_multigrid = self.multigrid;
         if self.multigrid {
-            // A few systems that are nearly indefinite take long with either.
+            // Average: a few nearly indefinite systems take long with either solver.
             self.cycles = if self.cycles == 0 { found } else { (self.cycles + found) / 2 };
-            let served = cycling(self.cycles, digits) <= MARGIN * relaxing(self.relaxations, digits);
+            let served = multigrid_cost(self.cycles, digits) <= MARGIN * relaxation_cost(self.relaxations, digits);
             self.multigrid = served && self.rounds < PATIENCE;
         } else {
             self.relaxations = found;
             if self.rounds >= PATIENCE {
                 (self.cycles, self.rounds) = (0, 0);
             }
-            let expected = if self.cycles == 0 { A_DIGIT } else { self.cycles };
-            self.multigrid = relaxing(found, digits) > MARGIN * cycling(expected, digits);
+            let expected = if self.cycles == 0 { INITIAL_ITERATIONS_PER_DIGIT } else { self.cycles };
+            self.multigrid = relaxation_cost(found, digits) > MARGIN * multigrid_cost(expected, digits);
         }
-        if was != self.multigrid {
+        if was_multigrid != self.multigrid {
             self.rounds = 0;
         }
     }
 }
 
-/// What a solution by over-relaxation costs, in its iterations.
-fn relaxing(a_digit: u32, digits: f64) -> f64 {
-    1e-3 * f64::from(a_digit) * digits
+/// The cost of a solve by over-relaxation, in its iterations.
+fn relaxation_cost(per_digit: u32, digits: f64) -> f64 {
+    1e-3 * f64::from(per_digit) * digits
 }
 
-/// What one by multigrid costs, in iterations of over-relaxation.
-fn cycling(a_digit: u32, digits: f64) -> f64 {
-    TAKE_OVER + CYCLE * 1e-3 * f64::from(a_digit) * digits
+/// The cost of a solve by multigrid, in iterations of over-relaxation.
+fn multigrid_cost(per_digit: u32, digits: f64) -> f64 {
+    SETUP_COST + CYCLE_COST * 1e-3 * f64::from(per_digit) * digits
 }
 
 #[cfg(test)]
@@ -95,29 +97,29 @@ mod tests {
     }
 
     #[test]
-    fn few_iterations_of_over_relaxation_are_left_alone() {
+    fn few_iterations_keep_over_relaxation() {
         let mut trial = Trial::default();
         assert_eq!(after(&mut trial, 1000, |multigrid| if multigrid { 6 } else { 20 }), 0);
     }
 
     #[test]
-    fn many_are_not_but_it_is_tried_again_now_and_then() {
+    fn many_iterations_switch_to_multigrid_with_occasional_retries() {
         let mut trial = Trial::default();
         let by_multigrid = after(&mut trial, 1000, |multigrid| if multigrid { 7 } else { 80 });
         assert!((950..1000 - 3).contains(&by_multigrid), "{by_multigrid}");
-        // The sheet has become soft.
+        // Now over-relaxation converges fast.
         assert!(after(&mut trial, 1000, |multigrid| if multigrid { 3 } else { 8 }) < 200);
     }
 
     #[test]
-    fn what_was_expected_in_vain_is_given_up() {
+    fn multigrid_is_dropped_if_it_does_not_pay() {
         let mut trial = Trial::default();
         let by_multigrid = after(&mut trial, 1000, |multigrid| if multigrid { 30 } else { 50 });
         assert!((3..60).contains(&by_multigrid), "{by_multigrid}");
     }
 
     #[test]
-    fn how_many_digits_are_asked_for_does_not_matter() {
+    fn the_choice_does_not_depend_on_the_tolerance() {
         let mut trial = Trial::default();
         let mut by_multigrid = 0;
         for solution in 0..300 {
@@ -129,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_saved_goes_on_in_the_same_way() {
+    fn the_state_survives_serialisation() {
         let mut trial = Trial::default();
         after(&mut trial, 100, |multigrid| if multigrid { 7 } else { 80 });
         let text = serde_json::to_string(&trial).unwrap();

@@ -2,21 +2,21 @@ use energy_dsl::Vector3;
 use energy_solve::{EvaluationError, State};
 
 use super::stability::Rates;
-use super::{Integrator, StepError, StepReport, kicked, place};
+use super::{Integrator, StepError, StepReport, kicked, move_by};
 use crate::body::Body;
 
 /// Velocity Verlet (Swope, Andersen, Berens and Wilson 1982):
 ///
-/// v½ = v + ½ h M⁻¹ f(x, v),  x' = x + h v½,  v' = v½ + ½ h M⁻¹ f(x', v + h M⁻¹ f(x, v)).
-///
-/// Second order, stable for small steps only. Without damping it is symplectic, keeps momentum and angular momentum, and needs one
-/// evaluation of the forces a step: the last is kept.
+/// v½ = v + ½ h M⁻¹ f(x, v),  x' = x + h v½,  v' = v½ + ½ h M⁻¹ f(x', v + h M⁻¹ f(x, v)). Second order, stable for
+/// small steps only. Without damping it is symplectic, conserves momentum and angular momentum, and evaluates the
+/// forces once per step, because the forces at the end are those at the start of the next step. evaluation of the
+/// forces a step: the last is kept.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verlet {
     last: Option<Forces>,
 }
 
-/// Forces that depend on positions only, and where they were evaluated.
+/// Forces that depend on positions only, with the positions of their evaluation.
 #[derive(Clone, Debug, PartialEq)]
 struct Forces {
     x: Vec<Vector3<f64>>,
@@ -37,7 +37,7 @@ impl Integrator for Verlet {
         let (x, v) = (body.x.clone(), body.v.clone());
         let half = kicked(body, &v, &force, 0.5 * dt);
         let predicted = if damped { kicked(body, &v, &force, dt) } else { half.clone() };
-        place(body, &half, dt, &predicted)?;
+        move_by(body, &half, dt, &predicted)?;
         let force = match body.system.forces(State { x: &body.x, v: &body.v }) {
             Ok(force) => force,
             Err(error) => {
@@ -53,7 +53,7 @@ impl Integrator for Verlet {
         Ok(StepReport::default())
     }
 
-    /// That of [`super::SymplecticEuler`].
+    /// The limit of [`super::SymplecticEuler`].
     fn stable_step(&self, body: &mut Body) -> Result<Option<f64>, EvaluationError> {
         Ok(Rates::of(body)?.symplectic_limit())
     }

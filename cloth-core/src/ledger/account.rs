@@ -1,4 +1,4 @@
-//! What one island has and received: the ledger is their sum.
+//! The energy account of one island. The ledger is the sum of the accounts.
 
 use energy_dsl::Vector3;
 use energy_solve::{EvaluationError, PlacedTerm, State};
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
 
-/// The energy, the momenta, and the work so far of an island.
+/// Energy and momenta of an island, and the work done on it so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Account {
     /// ½ Σ m v², in J.
     pub kinetic: f64,
-    /// Of each term that has one, by its column in the ledger, in J.
+    /// Potential energies in J, with the ledger column of each term.
     pub potential: Vec<(usize, f64)>,
-    /// Done so far by each force that is no gradient, likewise.
+    /// Work of each non-conservative force in J, with its ledger column.
     pub work: Vec<(usize, f64)>,
-    /// Done so far by pins that move, in J.
+    /// Work of moving pins, in J.
     pub pins: f64,
-    /// Done so far by obstacles that move, in J.
+    /// Work of moving obstacles, in J.
     pub obstacles: f64,
-    /// Taken so far by falling asleep, in J; negative.
+    /// Energy removed by falling asleep, in J; negative.
     pub sleep: f64,
     /// Σ m v, in kg m/s.
     pub momentum: Vector3<f64>,
@@ -27,24 +27,24 @@ pub(crate) struct Account {
     pub angular_momentum: Vector3<f64>,
 }
 
-/// A step that has begun.
+/// Quantities at the start of a step, for the trapezoidal rule.
 #[derive(Debug)]
 pub(crate) struct Opening {
     powers: Vec<f64>,
-    /// Forces of potentials on pinned vertices that move, and where they were.
+    /// Moving pinned vertices: index, force of the potentials in N, position in m.
     pins: Vec<(usize, Vector3<f64>, Vector3<f64>)>,
-    /// Of obstacles that move, in W.
+    /// Power of moving obstacles, in W.
     obstacles: f64,
 }
 
 impl Account {
-    /// Of a body as it is, whose terms with potentials and those that do work have these columns.
+    /// Opens an account for a body. `potentials` and `works` hold the ledger columns of its terms.
     pub(crate) fn open(body: &Body, potentials: Vec<usize>, works: Vec<usize>) -> Result<Self, EvaluationError> {
-        let nothing = |columns: Vec<usize>| columns.into_iter().map(|column| (column, 0.0)).collect();
-        Self { potential: nothing(potentials), work: nothing(works), ..Self::default() }.now(body)
+        let zeros = |columns: Vec<usize>| columns.into_iter().map(|column| (column, 0.0)).collect();
+        Self { potential: zeros(potentials), work: zeros(works), ..Self::default() }.now(body)
     }
 
-    /// Energies and momenta as they are now; the work is that of before.
+    /// Updates energies and momenta to the current state, and keeps the work.
     fn now(&self, body: &Body) -> Result<Self, EvaluationError> {
         let columns = self.potential.iter().map(|(column, _)| *column);
         Ok(Self {
@@ -56,13 +56,13 @@ impl Account {
         })
     }
 
-    /// Called once all terms know that the step begins; `obstacles` is the power of those that move, in W.
+    /// Starts a step, after the terms were told of it. `obstacles` is the power of moving obstacles, in W.
     pub(crate) fn begin(body: &Body, obstacles: f64) -> Opening {
-        let pins = pulls(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
+        let pins = pin_forces(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
         Opening { powers: powers(body), pins, obstacles }
     }
 
-    /// What it is after the step.
+    /// Returns the account after the step.
     pub(crate) fn after(
         &self,
         body: &Body,
@@ -74,7 +74,7 @@ impl Account {
         for (((_, work), before), now) in after.work.iter_mut().zip(&opening.powers).zip(powers(body)) {
             *work += 0.5 * dt * (before + now);
         }
-        for ((vertex, before, from), (_, now)) in opening.pins.iter().zip(pulls(body)) {
+        for ((vertex, before, from), (_, now)) in opening.pins.iter().zip(pin_forces(body)) {
             let part = |axis: usize| 0.5 * (before[axis] + now[axis]) * (body.x[*vertex][axis] - from[axis]);
             after.pins -= (0..3).map(part).sum::<f64>();
         }
@@ -82,19 +82,19 @@ impl Account {
         Ok(after)
     }
 
-    /// The same asleep: what was left of its motion is gone.
+    /// Returns the account of the island asleep: its kinetic energy moves to `sleep`.
     pub(crate) fn asleep(self) -> Self {
         let sleep = self.sleep - self.kinetic;
         Self { kinetic: 0.0, sleep, momentum: [0.0; 3], angular_momentum: [0.0; 3], ..self }
     }
 }
 
-/// Whether a term does work that is no change of its potential.
+/// Whether a term does work that is not a change of its potential.
 pub(crate) fn works(term: &dyn PlacedTerm) -> bool {
     !term.has_energy() || term.character().velocity_dependent
 }
 
-/// The energy of each term that has one.
+/// Returns the energy of each term that has one.
 fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
     let energy = |term: &dyn PlacedTerm| term.energy(&body.x).map(|(energy, _)| energy);
     let all: Vec<f64> = body.system.terms().filter_map(|(term, _)| energy(term)).collect();
@@ -104,7 +104,7 @@ fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
     }
 }
 
-/// The power of each force that is no gradient on the free vertices, in W.
+/// Returns the power of each non-conservative force on the free vertices, in W.
 fn powers(body: &Body) -> Vec<f64> {
     let still = vec![[0.0; 3]; body.v.len()];
     let power = |term: &dyn PlacedTerm| {
@@ -126,8 +126,8 @@ fn dot_of_free(body: &Body, force: &[Vector3<f64>]) -> f64 {
     body.system.dofs().free().iter().map(one).sum()
 }
 
-/// The forces of potentials on pinned vertices that move, in N.
-fn pulls(body: &Body) -> Vec<(usize, Vector3<f64>)> {
+/// Returns the forces of the potentials on moving pinned vertices, in N.
+fn pin_forces(body: &Body) -> Vec<(usize, Vector3<f64>)> {
     let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
     let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
     if moving.is_empty() {

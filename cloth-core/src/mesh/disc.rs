@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{MeshError, TriangleMesh};
 
-/// A round sheet, built in: centred on the origin in z = 0, the front upwards.
+/// A built-in disc, centred on the origin in z = 0 with its front upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Disc {
@@ -19,7 +19,7 @@ pub struct Disc {
 }
 
 impl Disc {
-    /// The disc as a mesh: the centre is vertex 0, then ring by ring, anticlockwise from the first axis.
+    /// Builds the mesh. Vertex 0 is the centre; then ring by ring, anticlockwise from the first axis.
     ///
     /// ```
     /// use cloth_core::mesh::{Disc, lumped_masses};
@@ -31,7 +31,7 @@ impl Disc {
     /// ```
     ///
     /// # Errors
-    /// When its triangles have no area.
+    /// Returns an error if its triangles have no area.
     pub fn mesh(&self) -> Result<TriangleMesh, MeshError> {
         let mut vertices: Vec<Vector3<f64>> = vec![[0.0; 3]];
         let mut triangles = Vec::with_capacity(6 * self.rings * self.rings);
@@ -54,7 +54,7 @@ impl Disc {
     }
 }
 
-/// The vertex at a place of a ring.
+/// Returns the index of a vertex, given its ring and its position along the ring.
 fn vertex(ring: usize, place: usize) -> usize {
     if ring == 0 { 0 } else { 1 + 3 * ring * (ring - 1) + place % (6 * ring) }
 }

@@ -1,4 +1,4 @@
-//! Triangle meshes: reading, building, validation and topology.
+//! Triangle meshes: reading, building, validation, topology, rest geometry.
 
 mod disc;
 mod obj;
@@ -11,7 +11,7 @@ mod triangle_mesh;
 
 pub use disc::Disc;
 pub use obj::{ObjError, read_obj};
-pub(crate) use pieces::Groups;
+pub(crate) use pieces::DisjointSets;
 pub(crate) use rest::area;
 pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle, vertex_angles};
 pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};

@@ -5,53 +5,46 @@ use tobj::{LoadError, LoadOptions};
 
 use super::{MeshError, TriangleMesh};
 
-/// An OBJ file that is no cloth.
+/// An OBJ file that is not a valid mesh.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ObjError {
     /// The file cannot be read.
     #[error("cannot read {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A line cannot be understood.
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// A line is malformed.
     #[error("{}:{line}: {reason}: `{text}`", .path.display())]
     Line {
-        /// The file.
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What is wrong.
         reason: String,
-        /// What it says.
+        /// The text of the line.
         text: String,
     },
-    /// The lines can be understood but the mesh is unfit.
+    /// The mesh is invalid.
     #[error("{}{}: {source}", .path.display(), .line.map(|line| format!(":{line}")).unwrap_or_default())]
     Unfit {
-        /// The file.
         path: PathBuf,
-        /// The line of the vertex or triangle to blame, from 1.
+        /// The line of the invalid vertex or triangle, from 1; `None` if no single line is at fault.
         line: Option<usize>,
-        /// What is wrong.
         source: MeshError,
     },
 }
 
-/// Reads a mesh from an OBJ file. Polygons are cut into fans; groups, normals, texture coordinates and materials are ignored.
-/// Vertices are numbered as in the file, but from 0.
+/// Reads a mesh from an OBJ file. Polygons are split into triangle fans; groups, normals, texture coordinates and
+/// materials are ignored. Vertices keep the order of the file, with indices from 0.
 ///
 /// # Errors
-/// When the file cannot be read, a line cannot be understood, or the mesh is unfit; with the line's number where one is to blame.
+/// Returns an error if the file cannot be read, a line is malformed, or the mesh is invalid, with the line number if
+/// one line is at fault.
 pub fn read_obj(path: &Path) -> Result<TriangleMesh, ObjError> {
     let text =
         std::fs::read_to_string(path).map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
     Lines::of(&text).read(path)
 }
 
-/// The lines of an OBJ file that make its shape, with their numbers from 1.
+/// The vertex and face lines of an OBJ file, with line numbers from 1.
 struct Lines<'a> {
     vertices: Vec<(usize, &'a str)>,
     faces: Vec<(usize, &'a str)>,
@@ -96,8 +89,9 @@ impl<'a> Lines<'a> {
         })
     }
 
-    /// The shape as one object. The parser numbers vertices by first use and drops unused ones; an element of one point for every
-    /// vertex ahead of the faces keeps the file's own numbers, which pins refer to, and lets unused vertices be reported.
+    /// Returns the shape as a single object. The parser numbers vertices by first use and drops unused ones. Point
+    /// elements for all vertices before the faces preserve the numbering of the file, which pins refer to, and keep
+    /// unused vertices, which are then reported.
     fn single_object(&self) -> String {
         let mut text = String::new();
         for (_, line) in &self.vertices {
@@ -114,7 +108,7 @@ impl<'a> Lines<'a> {
         text
     }
 
-    /// The corners of each face, the point elements left out.
+    /// Returns the corners of each face, without the point elements.
     fn polygons(&self, mesh: &tobj::Mesh) -> Vec<Vec<usize>> {
         let mut start = 0;
         let all = mesh.face_arities.iter().map(|&arity| {
@@ -125,18 +119,18 @@ impl<'a> Lines<'a> {
         all.skip(self.vertices.len()).collect()
     }
 
-    /// The first line that the parser's complaint can be about.
+    /// Returns an error at the first line that can be the cause of the parser's error.
     fn locate(&self, path: &Path, error: LoadError) -> ObjError {
         let fails_alone = |line: &&(usize, &str)| match parse(line.1) {
             Err(LoadError::FaceVertexOutOfBounds) | Ok(_) => false,
             Err(_) => true,
         };
         let broken = self.vertices.iter().chain(&self.faces).find(fails_alone);
-        let culprit = broken.or_else(|| self.faces.iter().find(|(_, line)| self.is_out_of_range(line)));
-        match culprit {
+        let cause = broken.or_else(|| self.faces.iter().find(|(_, line)| self.is_out_of_range(line)));
+        match cause {
             Some(&(line, text)) => {
                 let reason = match (broken, self.vertices.len()) {
-                    (None, count) => format!("the face names a vertex that is not among the {count} of the file"),
+                    (None, count) => format!("the face refers to a vertex that is not among the {count} of the file"),
                     (Some(_), _) => error.to_string(),
                 };
                 ObjError::Line { path: path.to_owned(), line, reason, text: text.to_owned() }
@@ -183,7 +177,7 @@ mod tests {
         let message = |more: &str| read(&format!("{VERTICES}{more}")).unwrap_err();
         assert!(read("").unwrap_err().starts_with("sheet.obj: the mesh has 0 vertices"));
         assert!(
-            message("f 1 2 3\nf 1 3 9\n").starts_with("sheet.obj:7: the face names a vertex"),
+            message("f 1 2 3\nf 1 3 9\n").starts_with("sheet.obj:7: the face refers to a vertex"),
             "{}",
             message("f 1 3 9\n")
         );

@@ -1,58 +1,59 @@
-//! What hangs together.
+//! Connected components.
 
 use super::{SpringNetwork, TriangleMesh};
 
-/// Things in groups that grow together (disjoint sets with path halving; the first of a group stands for it).
+/// Disjoint sets with path halving. The smallest member of a set is its representative.
 #[derive(Clone, Debug)]
-pub(crate) struct Groups {
+pub(crate) struct DisjointSets {
     parent: Vec<usize>,
 }
 
-impl Groups {
-    /// Each thing in a group of its own.
-    pub(crate) fn apart(count: usize) -> Self {
+impl DisjointSets {
+    /// Creates sets of one member each.
+    pub(crate) fn singletons(count: usize) -> Self {
         Self { parent: (0..count).collect() }
     }
 
-    /// The first of the group of a thing.
-    pub(crate) fn first(&mut self, mut thing: usize) -> usize {
-        while self.parent[thing] != thing {
-            self.parent[thing] = self.parent[self.parent[thing]];
-            thing = self.parent[thing];
+    /// Returns the representative of a member's set.
+    pub(crate) fn representative(&mut self, mut member: usize) -> usize {
+        while self.parent[member] != member {
+            self.parent[member] = self.parent[self.parent[member]];
+            member = self.parent[member];
         }
-        thing
+        member
     }
 
-    /// Makes one group of two.
+    /// Merges the sets of two members.
     pub(crate) fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.first(a), self.first(b));
+        let (a, b) = (self.representative(a), self.representative(b));
         self.parent[a.max(b)] = a.min(b);
     }
 
-    /// The number of each thing's group; groups are numbered in the order of their first things.
+    /// Returns the index of each member's set. Sets are numbered in the order of their representatives.
     pub(crate) fn numbers(mut self) -> Vec<usize> {
         let (mut numbers, mut count) = (vec![0; self.parent.len()], 0);
-        for thing in 0..numbers.len() {
-            let first = self.first(thing);
-            numbers[thing] = if first == thing { count } else { numbers[first] };
-            count += usize::from(first == thing);
+        for member in 0..numbers.len() {
+            let representative = self.representative(member);
+            numbers[member] = if representative == member { count } else { numbers[representative] };
+            count += usize::from(representative == member);
         }
         numbers
     }
 }
 
 impl TriangleMesh {
-    /// The vertices of each connected piece, ascending. All pieces of fewer than `least` vertices count as one, in the place of the first of them.
+    /// Returns the vertices of each connected component, in ascending order. Components of fewer than `least` vertices
+    /// are merged into one.
     pub(crate) fn pieces(&self, least: usize) -> Vec<Vec<usize>> {
         let count = self.vertices().len();
-        let mut groups = Groups::apart(count);
+        let mut groups = DisjointSets::singletons(count);
         for &[a, b, c] in self.triangles() {
             groups.join(a, b);
             groups.join(a, c);
         }
         let mut sizes = vec![0; count];
-        (0..count).for_each(|vertex| sizes[groups.first(vertex)] += 1);
-        let small: Vec<usize> = (0..count).filter(|&vertex| sizes[groups.first(vertex)] < least).collect();
+        (0..count).for_each(|vertex| sizes[groups.representative(vertex)] += 1);
+        let small: Vec<usize> = (0..count).filter(|&vertex| sizes[groups.representative(vertex)] < least).collect();
         small.iter().for_each(|&vertex| groups.join(small[0], vertex));
         let numbers = groups.numbers();
         let mut pieces = vec![Vec::new(); numbers.iter().max().map_or(0, |last| last + 1)];
@@ -60,22 +61,22 @@ impl TriangleMesh {
         pieces
     }
 
-    /// One of its pieces, with the springs of it.
+    /// Returns the component with these vertices, and its springs.
     pub(crate) fn piece(&self, vertices: &[usize], springs: &SpringNetwork) -> (Self, SpringNetwork) {
         let mut place = vec![usize::MAX; self.vertices().len()];
         vertices.iter().enumerate().for_each(|(number, &vertex)| place[vertex] = number);
-        let inside = |pairs: &[[usize; 2]]| -> Vec<[usize; 2]> {
+        let renumbered = |pairs: &[[usize; 2]]| -> Vec<[usize; 2]> {
             let moved = pairs.iter().map(|pair| pair.map(|vertex| place[vertex]));
             moved.filter(|pair| !pair.contains(&usize::MAX)).collect()
         };
         let springs = SpringNetwork {
-            structural: inside(&springs.structural),
-            shear: inside(&springs.shear),
-            bending: inside(&springs.bending),
+            structural: renumbered(&springs.structural),
+            shear: renumbered(&springs.shear),
+            bending: renumbered(&springs.bending),
         };
         let triangles = self.triangles().iter().map(|corners| corners.map(|corner| place[corner]));
         let triangles = triangles.filter(|corners| corners[0] != usize::MAX).collect();
-        (Self::of_valid(vertices.iter().map(|&vertex| self.vertices()[vertex]).collect(), triangles), springs)
+        (Self::from_valid(vertices.iter().map(|&vertex| self.vertices()[vertex]).collect(), triangles), springs)
     }
 }
 
@@ -85,7 +86,7 @@ mod tests {
     use crate::mesh::Topology;
 
     #[test]
-    fn pieces_are_what_triangles_hold_together_and_crumbs_count_as_one() {
+    fn pieces_are_connected_components_and_small_ones_are_merged() {
         let at = |n: usize| [n as f64, (n * n) as f64, 0.0];
         let triangles = vec![[0, 3, 6], [1, 2, 4], [3, 6, 5], [7, 8, 9]];
         let mesh = TriangleMesh::new((0..10).map(at).collect(), triangles).unwrap();

@@ -4,10 +4,10 @@ use super::TriangleMesh;
 use super::topology::Hinge;
 use crate::geometry::{cross, dot, norm, subtract};
 
-/// A triangle at rest, laid in its own plane: the 2-D material coordinates of its corners, in m, anticlockwise.
+/// A triangle at rest, in its own plane: material coordinates of its corners in m, anticlockwise.
 pub type MaterialTriangle = [[f64; 2]; 3];
 
-/// Lays a triangle in the plane: the first corner at the origin, the second on the positive first axis.
+/// Maps a triangle to its plane: the first corner to the origin, the second to the positive first axis.
 ///
 /// ```
 /// use cloth_core::mesh::material_triangle;
@@ -21,8 +21,8 @@ pub fn material_triangle([a, b, c]: [Vector3<f64>; 3]) -> MaterialTriangle {
     [[0.0; 2], [length, 0.0], [dot(base, side) / length, norm(cross(base, side)) / length]]
 }
 
-/// Lays a triangle in the plane with the first axis along the warp, projected on it: the first corner at the origin. `None` when the warp
-/// stands across the triangle.
+/// Maps a triangle to its plane, with the first corner at the origin and the first axis along the projected warp.
+/// `None` if the warp is perpendicular to the triangle.
 ///
 /// ```
 /// use cloth_core::mesh::thread_triangle;
@@ -44,12 +44,12 @@ pub fn thread_triangle([a, b, c]: [Vector3<f64>; 3], warp: Vector3<f64>) -> Opti
     Some([[0.0; 2], [dot(base, u), dot(base, v)], [dot(side, u), dot(side, v)]])
 }
 
-/// The area of a triangle in space: ½ ‖(b − a) × (c − a)‖.
+/// Returns the area of a triangle in space, ½ ‖(b − a) × (c − a)‖.
 pub(crate) fn area([a, b, c]: [Vector3<f64>; 3]) -> f64 {
     0.5 * norm(cross(subtract(b, a), subtract(c, a)))
 }
 
-/// The mass of each vertex, in kg: a third of σ A of every triangle it is a corner of. σ in kg/m².
+/// Returns the mass of each vertex, in kg: a third of σ A of each adjacent triangle, with the density σ in kg/m².
 #[must_use]
 pub fn lumped_masses(mesh: &TriangleMesh, density: f64) -> Vec<f64> {
     let mut masses = vec![0.0; mesh.vertices().len()];
@@ -62,7 +62,7 @@ pub fn lumped_masses(mesh: &TriangleMesh, density: f64) -> Vec<f64> {
     masses
 }
 
-/// The dihedral angle of a hinge at rest, in radians: 0 when flat, in (−π, π].
+/// Returns the dihedral angle of a hinge at rest, in radians: in (−π, π], 0 if flat.
 ///
 /// With E = x₄ − x₃, N₁ = E × (x₁ − x₃), N₂ = −E × (x₂ − x₃): cos θ = n₁·n₂, sin θ = (n₁ × n₂)·E/‖E‖.
 #[must_use]
@@ -73,7 +73,7 @@ pub fn rest_angle(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
     (dot(cross(n1, n2), edge) / norm(edge)).atan2(dot(n1, n2))
 }
 
-/// The angles of a triangle at its corners, in radians.
+/// Returns the angles of a triangle at its corners, in radians.
 ///
 /// ```
 /// let [a, b, c] = cloth_core::mesh::vertex_angles([[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_corner_carries_a_third() {
+    fn each_corner_carries_a_third_of_the_mass() {
         let vertices = vec![[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 3.0, 1.0], [0.0, 3.0, 1.0]];
         let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
         let masses = lumped_masses(&mesh, 0.5);

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{MeshError, TriangleMesh};
 
-/// How the cells of a sheet are cut into triangles.
+/// How the cells of a sheet are split into triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Diagonals {
@@ -17,25 +17,25 @@ pub enum Diagonals {
     Alternating,
 }
 
-/// How a sheet lies at the start. It is centred on the origin either way.
+/// The initial plane of a sheet, which is centred on the origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Plane {
-    /// In z = 0, the front upwards.
+    /// The plane z = 0, front upwards.
     #[default]
     Horizontal,
-    /// In y = 0, the second direction along z, the front towards −y.
+    /// The plane y = 0, second direction along z, front towards −y.
     Vertical,
 }
 
-/// A rectangular sheet, built in.
+/// A built-in rectangular sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sheet {
-    /// Cells along its two directions.
+    /// Cells along both directions.
     #[serde(deserialize_with = "crate::bounded::cell_counts")]
     pub cells: [usize; 2],
-    /// Lengths along its two directions, in m.
+    /// Side lengths, in m.
     #[serde(deserialize_with = "crate::bounded::all_positive")]
     pub size: [f64; 2],
     /// `regular` (the default) or `alternating`.
@@ -44,25 +44,25 @@ pub struct Sheet {
     /// `horizontal` (the default) or `vertical`.
     #[serde(default)]
     pub plane: Plane,
-    /// Folds at the start. Default none.
+    /// Initial folds. Default none.
     #[serde(default)]
     pub pleats: Option<Pleats>,
 }
 
-/// Regular folds across the first direction, out of the sheet's plane, at the start. The shape at rest stays flat, and no cell is
-/// stretched: the sheet becomes narrower instead.
+/// Regular initial folds across the first direction, out of the sheet's plane. The rest shape stays flat and no cell is
+/// stretched: the folds make the sheet narrower.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pleats {
-    /// How many.
+    /// Number of folds.
     #[serde(deserialize_with = "crate::bounded::positive")]
     pub count: f64,
-    /// Out of the plane to either side, in m.
+    /// Amplitude out of the plane, in m.
     #[serde(deserialize_with = "crate::bounded::non_negative")]
     pub depth: f64,
 }
 
-/// Pleats deeper than the cloth between them allows.
+/// Pleats that need more cloth than there is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{count} pleats of depth {depth} m need more cloth than {width} m; make them fewer or shallower")]
 pub struct PleatsError {
@@ -72,16 +72,16 @@ pub struct PleatsError {
 }
 
 impl Sheet {
-    /// The vertex at a grid point.
+    /// Returns the vertex at a grid point.
     #[must_use]
     pub fn vertex(&self, column: usize, row: usize) -> usize {
         row * (self.cells[0] + 1) + column
     }
 
-    /// The sheet as a mesh: two triangles per cell, anticlockwise seen from the front.
+    /// Builds the rest mesh: two triangles per cell, anticlockwise seen from the front.
     ///
     /// # Errors
-    /// When there are no cells or the size is not a positive number.
+    /// Returns an error if the number of cells or a side length is 0.
     pub fn mesh(&self) -> Result<TriangleMesh, MeshError> {
         let [columns, rows] = self.cells;
         let vertices = self.sweep(&self.flat());
@@ -100,10 +100,10 @@ impl Sheet {
         TriangleMesh::new(vertices, triangles)
     }
 
-    /// Where the vertices are at the start, in m.
+    /// Returns the initial positions, in m.
     ///
     /// # Errors
-    /// When the pleats are too deep.
+    /// Returns an error if the pleats are too deep.
     pub fn start(&self) -> Result<Vec<Vector3<f64>>, PleatsError> {
         let Some(Pleats { count, depth }) = self.pleats else { return Ok(self.sweep(&self.flat())) };
         let (columns, width) = (self.cells[0], self.size[0]);
@@ -121,13 +121,13 @@ impl Sheet {
         Ok(self.sweep(&profile))
     }
 
-    /// The profile without pleats.
+    /// Returns the profile of a row without pleats: position along the first direction, and out of the plane.
     fn flat(&self) -> Vec<[f64; 2]> {
         let columns = self.cells[0];
         (0..=columns).map(|column| [self.size[0] * column as f64 / columns as f64, 0.0]).collect()
     }
 
-    /// The vertices when each row has the given profile: along the first direction, and out of the plane.
+    /// Returns the vertices, given the profile of each row.
     fn sweep(&self, profile: &[[f64; 2]]) -> Vec<Vector3<f64>> {
         let (rows, width) = (self.cells[1], profile.last().map_or(0.0, |last| last[0]));
         let mut vertices = Vec::with_capacity(profile.len() * (rows + 1));

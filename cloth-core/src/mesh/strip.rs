@@ -3,17 +3,17 @@ use serde::Deserialize;
 
 use super::{Diagonals, Plane, Sheet};
 
-/// A narrow sheet along the first axis, built in: cells that are nearly square, their diagonals alternating.
+/// A built-in strip along the first axis, with nearly square cells and alternating diagonals.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Strip {
-    /// Its length along the first axis, in m.
+    /// Length along the first axis, in m.
     #[serde(deserialize_with = "crate::bounded::positive")]
     pub length: f64,
-    /// Its width, in m.
+    /// Width, in m.
     #[serde(deserialize_with = "crate::bounded::positive")]
     pub width: f64,
-    /// Cells along its length.
+    /// Cells along the length.
     #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
     pub segments: usize,
     /// `horizontal` (the default) or `vertical`.
@@ -22,7 +22,7 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// The sheet that it is.
+    /// Returns the strip as a sheet.
     ///
     /// ```
     /// let strip = cloth_core::mesh::Strip { length: 1.0, width: 0.1, segments: 40, plane: Default::default() };

@@ -3,24 +3,24 @@ use super::{Sheet, TriangleMesh};
 /// Two triangles that share an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hinge {
-    /// [x₁, x₂, x₃, x₄]: the two apexes, then the shared edge, which the triangle of x₁ runs through from x₃ to x₄. The normals
-    /// E × (x₁ − x₃) and −E × (x₂ − x₃), E = x₄ − x₃, point to the same side when the hinge is flat.
+    /// [x₁, x₂, x₃, x₄]: the two apexes, then the shared edge. The triangle of x₁ traverses the edge from x₃ to x₄.
+    /// With E = x₄ − x₃, the normals E × (x₁ − x₃) and −E × (x₂ − x₃) agree if the hinge is flat.
     pub vertices: [usize; 4],
     /// The triangles of x₁ and x₂.
     pub triangles: [usize; 2],
 }
 
-/// The edges of a mesh and the hinges along its inner edges, each ordered by their vertices.
+/// The edges and hinges of a mesh, both ordered by their vertices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
-    /// Every edge once, the smaller vertex first.
+    /// Every edge once, with the smaller vertex first.
     pub edges: Vec<[usize; 2]>,
-    /// Every pair of triangles along an edge.
+    /// One hinge per interior edge.
     pub hinges: Vec<Hinge>,
 }
 
 impl Topology {
-    /// The edges and hinges of a mesh.
+    /// Finds the edges and hinges of a mesh.
     #[must_use]
     pub fn of(mesh: &TriangleMesh) -> Self {
         let sides = Side::all(mesh);
@@ -38,19 +38,19 @@ impl Topology {
         }
     }
 
-    /// The vertices on the edge of the mesh, ascending.
+    /// Returns the boundary vertices of a mesh, in ascending order.
     #[must_use]
     pub fn boundary(mesh: &TriangleMesh) -> Vec<usize> {
         let sides = Side::all(mesh);
-        let lonely = sides.chunk_by(|a, b| a.ends() == b.ends()).filter(|sides| sides.len() == 1);
-        let mut vertices: Vec<usize> = lonely.flat_map(|sides| sides[0].edge).collect();
+        let boundary = sides.chunk_by(|a, b| a.ends() == b.ends()).filter(|sides| sides.len() == 1);
+        let mut vertices: Vec<usize> = boundary.flat_map(|sides| sides[0].edge).collect();
         vertices.sort_unstable();
         vertices.dedup();
         vertices
     }
 }
 
-/// A triangle along an edge, which it runs through from the first to the second end.
+/// A side of a triangle, directed as the triangle traverses it.
 struct Side {
     triangle: usize,
     apex: usize,
@@ -58,38 +58,38 @@ struct Side {
 }
 
 impl Side {
-    /// Those of all triangles, the ones along an edge one after the other, edges ascending.
+    /// Returns the sides of all triangles, sorted by edge.
     fn all(mesh: &TriangleMesh) -> Vec<Self> {
         let of = |(triangle, &[a, b, c]): (usize, &[usize; 3])| {
             [(a, b, c), (b, c, a), (c, a, b)].map(|(start, end, apex)| Self { triangle, apex, edge: [start, end] })
         };
         let mut sides: Vec<Self> = mesh.triangles().iter().enumerate().flat_map(of).collect();
-        // Triangles along an edge keep their order.
+        // Stable sort: the triangles of an edge keep their order.
         sides.sort_by_key(Self::ends);
         sides
     }
 
-    /// The smaller vertex first.
+    /// The ends, with the smaller vertex first.
     fn ends(&self) -> [usize; 2] {
         let [start, end] = self.edge;
         [start.min(end), start.max(end)]
     }
 }
 
-/// The vertex pairs that a mass-spring fabric joins.
+/// The vertex pairs joined by the springs of a mass–spring fabric.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct SpringNetwork {
     /// Neighbours along warp and weft.
     pub structural: Vec<[usize; 2]>,
-    /// Across the cells.
+    /// Diagonals of the cells.
     pub shear: Vec<[usize; 2]>,
-    /// Second neighbours, which come closer when the fabric bends.
+    /// Second neighbours, which approach each other when the fabric bends.
     pub bending: Vec<[usize; 2]>,
 }
 
 impl SpringNetwork {
-    /// On a sheet: structural springs along the grid lines, shear springs along both diagonals of each cell, bending springs
-    /// between second neighbours along the grid lines.
+    /// Creates the network of a sheet: structural springs along the grid lines, shear springs along both diagonals of
+    /// each cell, bending springs between second neighbours along the grid lines.
     #[must_use]
     pub fn of_sheet(sheet: &Sheet) -> Self {
         let [columns, rows] = sheet.cells.map(|cells| cells + 1);
@@ -115,8 +115,8 @@ impl SpringNetwork {
         network
     }
 
-    /// On any mesh: structural springs along the edges, bending springs between the apexes of each hinge, which also resist
-    /// shear; no separate shear springs.
+    /// Creates the network of any mesh: structural springs along the edges, and bending springs between the apexes of
+    /// each hinge, which also resist shear. It has no separate shear springs.
     #[must_use]
     pub fn of_mesh(topology: &Topology) -> Self {
         let apexes = |hinge: &Hinge| [hinge.vertices[0], hinge.vertices[1]];
@@ -150,8 +150,9 @@ mod tests {
     }
 
     #[test]
-    fn the_angle_grows_when_apexes_turn_against_the_normals() {
-        // x₃ = 0, x₄ along x; the apexes to both sides in y; the normals up; the second apex folded down by 0.3 rad.
+    fn the_angle_is_positive_when_apexes_turn_against_the_normals() {
+        // x₃ = 0 and x₄ on the x axis; apexes on both sides in y; normals up; the second apex is folded down by 0.3
+        // rad.
         let (sine, cosine) = 0.3_f64.sin_cos();
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, -cosine, -sine]];
         let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [1, 0, 3]]).unwrap();

@@ -2,62 +2,40 @@ use energy_dsl::Vector3;
 
 use crate::geometry::{Pose, cross, norm, subtract};
 
-/// What makes vertices and triangles unfit to be a cloth or an obstacle. Vertices and triangles are numbered from 0.
+/// Why vertices and triangles do not form a valid mesh. Indices start from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum MeshError {
-    /// There is nothing to simulate.
+    /// The mesh has no triangles.
     #[error("the mesh has {vertices} vertices and {triangles} triangles; at least one triangle is needed")]
-    Empty {
-        /// Vertices given.
-        vertices: usize,
-        /// Triangles given.
-        triangles: usize,
-    },
-    /// A vertex is not a point.
+    Empty { vertices: usize, triangles: usize },
+    /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} is not finite: {position:?}")]
-    NonFiniteVertex {
-        /// The vertex.
-        vertex: usize,
-        /// Its coordinates.
-        position: Vector3<f64>,
-    },
-    /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} names vertex {vertex}, but there are only {vertices} vertices")]
-    VertexOutOfRange {
-        /// The triangle.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: usize,
-        /// The number of vertices.
-        vertices: usize,
-    },
-    /// A triangle has no area, so that its rest shape is undefined.
+    NonFiniteVertex { vertex: usize, position: Vector3<f64> },
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to vertex {vertex}, but there are only {vertices} vertices")]
+    VertexOutOfRange { triangle: usize, vertex: usize, vertices: usize },
+    /// A triangle has no area, so its rest shape is undefined.
     #[error("triangle {triangle} (vertices {corners:?}) has no area; remove it or move a corner")]
-    ZeroArea {
-        /// The triangle.
-        triangle: usize,
-        /// Its vertices.
-        corners: [usize; 3],
-    },
-    /// More than two triangles meet along an edge.
-    #[error("edge {}–{} is shared by {} triangles {triangles:?}; a surface has at most two along an edge", .edge[0], .edge[1], .triangles.len())]
-    NonManifoldEdge {
-        /// Its ends.
-        edge: [usize; 2],
-        /// The triangles along it.
-        triangles: Vec<usize>,
-    },
-    /// A vertex of no triangle would have no mass.
+    ZeroArea { triangle: usize, corners: [usize; 3] },
+    /// An edge belongs to more than two triangles.
+    #[error(
+        "edge {}–{} is shared by {} triangles {triangles:?}; a surface has at most two along an edge",
+        .edge[0], .edge[1], .triangles.len()
+    )]
+    NonManifoldEdge { edge: [usize; 2], triangles: Vec<usize> },
+    /// A vertex belongs to no triangle, so it would have no mass.
     #[error("vertex {vertex} belongs to no triangle, so it would have no mass ({count} such vertices); remove it")]
     Unreferenced {
         /// The first such vertex.
         vertex: usize,
-        /// How many there are.
+        /// The number of such vertices.
         count: usize,
     },
 }
 
-/// A mesh of triangles that passed validation: finite, no zero areas, at most two triangles along an edge, no loose vertices.
+/// A validated triangle mesh: finite coordinates, no degenerate triangles, at most two triangles per edge, no unused
+/// vertices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
     vertices: Vec<Vector3<f64>>,
@@ -65,10 +43,10 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// A mesh from its rest positions, in m, and triangles, anticlockwise seen from the front.
+    /// Creates a mesh from rest positions in m and triangles, anticlockwise seen from the front.
     ///
     /// # Errors
-    /// The first thing wrong; see [`MeshError`].
+    /// Returns the first problem found; see [`MeshError`].
     pub fn new(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Result<Self, MeshError> {
         if triangles.is_empty() {
             return Err(MeshError::Empty { vertices: vertices.len(), triangles: 0 });
@@ -85,24 +63,24 @@ impl TriangleMesh {
         Ok(Self { vertices, triangles })
     }
 
-    /// What was found valid before.
-    pub(super) fn of_valid(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Self {
+    /// Creates a mesh without validation, from parts of a valid one.
+    pub(super) fn from_valid(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Self {
         Self { vertices, triangles }
     }
 
-    /// The same, this many times as large.
+    /// Returns the mesh scaled by a factor.
     ///
     /// # Errors
-    /// When it becomes so large or small that it is no cloth any more.
+    /// Returns an error if the scaled mesh is invalid, because a number overflows or a triangle loses its area.
     pub fn scaled(self, factor: f64) -> Result<Self, MeshError> {
         let larger = |vertex: Vector3<f64>| vertex.map(|coordinate| factor * coordinate);
         Self::new(self.vertices.into_iter().map(larger).collect(), self.triangles)
     }
 
-    /// The same, somewhere else.
+    /// Returns the mesh after a rigid motion.
     #[must_use]
     pub fn moved(self, pose: &Pose) -> Self {
-        Self { vertices: self.vertices.iter().map(|&vertex| pose.applied(vertex)).collect(), ..self }
+        Self { vertices: self.vertices.iter().map(|&vertex| pose.transform(vertex)).collect(), ..self }
     }
 
     /// Rest positions, in m.
@@ -111,13 +89,13 @@ impl TriangleMesh {
         &self.vertices
     }
 
-    /// The corners of each triangle.
+    /// The corners of each triangle, as vertex indices.
     #[must_use]
     pub fn triangles(&self) -> &[[usize; 3]] {
         &self.triangles
     }
 
-    /// The rest positions of a triangle's corners.
+    /// Returns the rest positions of a triangle's corners, in m.
     #[must_use]
     pub fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
         self.triangles[triangle].map(|corner| self.vertices[corner])
@@ -131,9 +109,9 @@ fn check_triangle(triangle: usize, corners: [usize; 3], positions: &[Vector3<f64
     }
     let [a, b, c] = corners.map(|corner| positions[corner]);
     let longest = norm(subtract(b, a)).max(norm(subtract(c, b))).max(norm(subtract(a, c)));
-    // Relative to the triangle's own size: below this, a corner's rounding error decides the shape.
-    let negligible = 1e-14 * longest * longest;
-    if norm(cross(subtract(b, a), subtract(c, a))) <= negligible {
+    // Relative to the size of the triangle: below this, rounding decides the shape.
+    let threshold = 1e-14 * longest * longest;
+    if norm(cross(subtract(b, a), subtract(c, a))) <= threshold {
         return Err(MeshError::ZeroArea { triangle, corners });
     }
     Ok(())
@@ -171,10 +149,10 @@ mod tests {
     }
 
     #[test]
-    fn unfit_meshes_are_refused_with_numbers() {
+    fn invalid_meshes_are_rejected_with_indices() {
         let message = |vertices, triangles| TriangleMesh::new(vertices, triangles).unwrap_err().to_string();
         assert!(message(square(), vec![]).contains("0 triangles"));
-        assert!(message(square(), vec![[0, 1, 2], [0, 2, 9]]).starts_with("triangle 1 names vertex 9"));
+        assert!(message(square(), vec![[0, 1, 2], [0, 2, 9]]).starts_with("triangle 1 refers to vertex 9"));
         let mut broken = square();
         broken[3][2] = f64::NAN;
         assert!(message(broken, vec![[0, 1, 2], [0, 2, 3]]).starts_with("vertex 3 is not finite"));
@@ -186,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_third_triangle_along_an_edge_is_refused() {
+    fn a_third_triangle_along_an_edge_is_rejected() {
         let mut vertices = square();
         vertices.push([0.5, 0.5, 1.0]);
         let error = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3], [0, 2, 4]]).unwrap_err();
@@ -195,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn tiny_but_well_shaped_triangles_are_fine() {
+    fn tiny_but_well_shaped_triangles_are_accepted() {
         let vertices = square().into_iter().map(|p| p.map(|c| c * 1e-9)).collect();
         assert!(TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).is_ok());
     }

@@ -1,4 +1,4 @@
-//! How a scene is put together: shapes first, then what hangs together, then everything that acts.
+//! Assembles a scene in three passes: parts and their meshes; islands; terms, pins and obstacles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -10,44 +10,44 @@ use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, Te
 use super::seam::Side;
 use super::{PinError, SeamError, pins, seam};
 use crate::fabric::{self, Hair, Place, Surroundings};
-use crate::mesh::{Groups, SpringNetwork, Topology, TriangleMesh};
+use crate::mesh::{DisjointSets, SpringNetwork, Topology, TriangleMesh};
 use crate::scene::{Garment, ObstacleError, Pin, Scene, Seam, Shape};
 
-/// A model while it grows.
+/// A model under construction.
 pub(super) struct Builder<'a> {
     scene: &'a Scene,
     model: Model,
-    /// The vertices on the edges of cloth.
+    /// Boundary vertices of all garments.
     edge: Vec<usize>,
-    several: bool,
+    prefix_names: bool,
     pieces: Vec<Piece>,
-    /// What springs would join, of each garment.
+    /// The spring network of each garment, for mass–spring fabrics.
     springs: Vec<SpringNetwork>,
     homes: Vec<Home>,
 }
 
-/// What hangs together of a part without its seams.
+/// A connected component of a part, before seams join it to others.
 struct Piece {
     part: usize,
-    /// Its vertices, counted within the part.
+    /// Its vertices, numbered within the part.
     vertices: Vec<usize>,
 }
 
-/// Where a vertex is: its island, and its place among the vertices of it.
+/// The location of a vertex: its island, and its index within the island.
 #[derive(Clone, Copy, Default)]
 struct Home {
     island: usize,
     place: usize,
 }
 
-/// Pieces of a garment with fewer vertices are one body: what each costs by itself would be more than what its sleep could save.
-const CRUMB: usize = 64;
+/// Components of a garment with fewer vertices are grouped: the overhead of an island exceeds what its sleep saves.
+const SMALL_PIECE: usize = 64;
 
 impl<'a> Builder<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
-        let several = scene.garments.len() + scene.hair.len() > 1;
+        let prefix_names = scene.garments.len() + scene.hair.len() > 1;
         let (model, edge, pieces) = (Model::default(), Vec::new(), Vec::new());
-        Self { scene, model, edge, several, pieces, springs: Vec::new(), homes: Vec::new() }
+        Self { scene, model, edge, prefix_names, pieces, springs: Vec::new(), homes: Vec::new() }
     }
 
     pub(super) fn model(mut self) -> Result<Model, ModelError> {
@@ -60,8 +60,8 @@ impl<'a> Builder<'a> {
         self.check_names()?;
         let seams = self.seams()?;
         self.divide(&seams);
-        self.lay_garments()?;
-        self.lay_hair()?;
+        self.apply_fabrics()?;
+        self.apply_hair()?;
         self.add_seams(&seams)?;
         self.add_wind();
         self.add_obstacles()?;
@@ -73,12 +73,12 @@ impl<'a> Builder<'a> {
         Surroundings { gravity: self.scene.gravity, drag: self.scene.drag }
     }
 
-    /// A part whose vertices were just added, and its pieces.
+    /// Adds a part whose vertices were just added, and its pieces.
     fn add_part(&mut self, name: String, vertices: usize, kind: PartKind) {
         let (part, first) = (self.model.parts.len(), self.model.x.len() - vertices);
         let pieces = match &kind {
-            PartKind::Cloth(mesh) => mesh.pieces(CRUMB),
-            // Strands are few vertices each.
+            PartKind::Cloth(mesh) => mesh.pieces(SMALL_PIECE),
+            // Strands have few vertices each, so all of them form one piece.
             PartKind::Hair { .. } => vec![(0..vertices).collect()],
         };
         self.pieces.extend(pieces.into_iter().map(|vertices| Piece { part, vertices }));
@@ -124,12 +124,12 @@ impl<'a> Builder<'a> {
         found.ok_or_else(|| UnknownPart { name: name.to_owned(), known: known() })
     }
 
-    /// The vertices on the edge of a range, counted within it.
+    /// Returns the boundary vertices of a range, numbered within it.
     fn edge_within(&self, range: &Range<usize>) -> Vec<usize> {
         self.edge.iter().filter(|vertex| range.contains(vertex)).map(|vertex| vertex - range.start).collect()
     }
 
-    /// The pairs of vertices that each seam joins.
+    /// Returns the pairs of vertices that each seam joins.
     fn seams(&self) -> Result<Vec<Vec<[usize; 2]>>, ModelError> {
         let joined = |(number, description): (usize, &Seam)| {
             let [first, second] = &description.garments;
@@ -143,14 +143,14 @@ impl<'a> Builder<'a> {
         self.scene.seams.iter().enumerate().map(joined).collect()
     }
 
-    /// Makes islands of the pieces: those that seams join are one.
+    /// Merges pieces that seams join, and makes an island of each group.
     fn divide(&mut self, seams: &[Vec<[usize; 2]>]) {
         let mut piece_of = vec![0; self.model.x.len()];
         for (number, piece) in self.pieces.iter().enumerate() {
             let first = self.model.parts[piece.part].vertices.start;
             piece.vertices.iter().for_each(|vertex| piece_of[first + vertex] = number);
         }
-        let mut groups = Groups::apart(self.pieces.len());
+        let mut groups = DisjointSets::singletons(self.pieces.len());
         seams.iter().flatten().for_each(|&[p, q]| groups.join(piece_of[p], piece_of[q]));
         self.homes = vec![Home::default(); self.model.x.len()];
         for (piece, island) in self.pieces.iter().zip(groups.numbers()) {
@@ -166,7 +166,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds a term to an island. If another island has the same one among the labels from `since` on, they are summed up as one.
+    /// Adds a term to an island. Reuses a matching label among those from index `since` on.
     fn add_term(&mut self, island: usize, since: usize, term: Box<dyn Term>) {
         let (name, element) = (term.name(), term.declaration().name);
         let labels = &mut self.model.labels;
@@ -180,80 +180,80 @@ impl<'a> Builder<'a> {
         island.terms.push(term);
     }
 
-    /// Where a piece stands among the vertices of its island, and how the names of its terms start.
+    /// Returns the island of a piece, the piece's offset within it, and the prefix of its terms' names.
     fn place(&self, piece: &Piece) -> (usize, Place) {
         let part = &self.model.parts[piece.part];
         let Home { island, place } = self.homes[part.vertices.start + piece.vertices[0]];
-        let prefix = if self.several { format!("{}: ", part.name) } else { String::new() };
+        let prefix = if self.prefix_names { format!("{}: ", part.name) } else { String::new() };
         (island, Place { first: place, prefix })
     }
 
-    /// Adds what was laid on a piece; `since` is the number of labels before its part.
-    fn add_laid(&mut self, piece: &Piece, since: usize, laid: fabric::Garment) {
+    /// Adds the terms of a fabric on a piece. `since` is the number of labels before its part.
+    fn add_applied(&mut self, piece: &Piece, since: usize, applied: fabric::FabricTerms) {
         let (island, _) = self.place(piece);
         let first = self.model.parts[piece.part].vertices.start;
-        piece.vertices.iter().zip(laid.masses).for_each(|(vertex, mass)| self.model.masses[first + vertex] = mass);
-        laid.terms.into_iter().for_each(|term| self.add_term(island, since, term));
+        piece.vertices.iter().zip(applied.masses).for_each(|(vertex, mass)| self.model.masses[first + vertex] = mass);
+        applied.terms.into_iter().for_each(|term| self.add_term(island, since, term));
         let acts = |reason: &String| {
             self.model.labels[since..].iter().any(|label| *reason == format!("{}: nothing to act on", label.name))
         };
-        let left_out: Vec<String> = laid.left_out.into_iter().filter(|reason| !acts(reason)).collect();
+        let left_out: Vec<String> = applied.left_out.into_iter().filter(|reason| !acts(reason)).collect();
         add_once(&mut self.model.left_out, left_out);
-        add_once(&mut self.model.warnings, laid.warnings);
+        add_once(&mut self.model.warnings, applied.warnings);
     }
 
-    fn lay_garments(&mut self) -> Result<(), ModelError> {
+    fn apply_fabrics(&mut self) -> Result<(), ModelError> {
         self.model.masses = vec![0.0; self.model.x.len()];
         let springs = std::mem::take(&mut self.springs);
         for (part, (garment, springs)) in self.scene.garments.iter().zip(&springs).enumerate() {
             let since = self.model.labels.len();
             let pieces: Vec<Piece> = self.take_pieces(part);
             for piece in &pieces {
-                let laid = self.laid(garment, piece, springs, pieces.len() == 1);
-                self.add_laid(piece, since, laid?);
+                let applied = self.applied(garment, piece, springs, pieces.len() == 1);
+                self.add_applied(piece, since, applied?);
             }
         }
         Ok(())
     }
 
-    /// The pieces of a part, which come first now.
+    /// Removes and returns the pieces of a part, which come first.
     fn take_pieces(&mut self, part: usize) -> Vec<Piece> {
         let count = self.pieces.iter().take_while(|piece| piece.part == part).count();
         self.pieces.drain(..count).collect()
     }
 
-    /// The terms of a garment on one of its pieces, which may be the whole.
-    fn laid(
+    /// Applies the fabric of a garment to one of its pieces. `is_whole` if it is the only piece.
+    fn applied(
         &self,
         garment: &Garment,
         piece: &Piece,
         springs: &SpringNetwork,
         is_whole: bool,
-    ) -> Result<fabric::Garment, ModelError> {
+    ) -> Result<fabric::FabricTerms, ModelError> {
         let part = &self.model.parts[piece.part];
         let PartKind::Cloth(mesh) = &part.kind else { unreachable!("garments come before hair") };
         let (_, place) = self.place(piece);
-        let lay = |mesh: &TriangleMesh, springs: &SpringNetwork| {
+        let apply = |mesh: &TriangleMesh, springs: &SpringNetwork| {
             fabric::terms_at(&garment.fabric, mesh, springs, &self.surroundings(), place.clone())
         };
-        let laid = if is_whole {
-            lay(mesh, springs)
+        let applied = if is_whole {
+            apply(mesh, springs)
         } else {
             let (mesh_of_piece, springs_of_piece) = mesh.piece(&piece.vertices, springs);
-            // Errors name triangles: the whole has them by the numbers that users know.
-            lay(&mesh_of_piece, &springs_of_piece).or_else(|error| lay(mesh, springs).and(Err(error)))
+            // Apply it to the whole garment, so that the error names triangles by the user's numbers.
+            apply(&mesh_of_piece, &springs_of_piece).or_else(|error| apply(mesh, springs).and(Err(error)))
         };
-        laid.map_err(|source| ModelError::Fabric { part: part.name.clone(), source })
+        applied.map_err(|source| ModelError::Fabric { part: part.name.clone(), source })
     }
 
-    fn lay_hair(&mut self) -> Result<(), ModelError> {
+    fn apply_hair(&mut self) -> Result<(), ModelError> {
         for (number, hair) in self.scene.hair.iter().enumerate() {
             let (part, since) = (self.scene.garments.len() + number, self.model.labels.len());
             for piece in self.take_pieces(part) {
-                let laid = fabric::hair_terms(hair, &self.surroundings(), self.place(&piece).1);
+                let applied = fabric::hair_terms(hair, &self.surroundings(), self.place(&piece).1);
                 let name = || self.model.parts[part].name.clone();
-                let laid = laid.map_err(|source| ModelError::Fabric { part: name(), source })?;
-                self.add_laid(&piece, since, laid);
+                let applied = applied.map_err(|source| ModelError::Fabric { part: name(), source })?;
+                self.add_applied(&piece, since, applied);
             }
         }
         Ok(())
@@ -261,7 +261,7 @@ impl<'a> Builder<'a> {
 
     fn add_seams(&mut self, seams: &[Vec<[usize; 2]>]) -> Result<(), ModelError> {
         for (seam, (description, joined)) in self.scene.seams.iter().zip(seams).enumerate() {
-            // Its pairs may be on several islands, as where a mesh of many pieces is sewn to itself.
+            // The pairs of a seam may lie on several islands, if a garment of many pieces is sewn to itself.
             let mut pairs: BTreeMap<usize, Vec<[usize; 2]>> = BTreeMap::new();
             for pair in joined.iter().map(|pair| pair.map(|vertex| self.homes[vertex])) {
                 pairs.entry(pair[0].island).or_default().push(pair.map(|home| home.place));
@@ -339,9 +339,9 @@ impl<'a> Builder<'a> {
         for (vertex, motion) in held {
             model.v[vertex] = [0.0; 3];
             if let Some(motion) = motion {
-                let drawn = model.x[vertex];
-                model.moving.push(MovingPin { vertex, drawn, motion });
-                model.x[vertex] = model.motions[motion].pose(0.0).applied(drawn);
+                let initial = model.x[vertex];
+                model.moving.push(MovingPin { vertex, initial, motion });
+                model.x[vertex] = model.motions[motion].pose(0.0).transform(initial);
             }
         }
         Ok(())
@@ -357,7 +357,7 @@ impl<'a> Builder<'a> {
         Ok(chosen.into_iter().map(|vertex| range.start + vertex).collect())
     }
 
-    /// The first two vertices of each rooted strand: they keep its place and direction.
+    /// The first two vertices of each rooted strand; pinned, they fix its position and direction.
     fn roots(&self) -> Vec<usize> {
         let hairs = self.model.parts.iter().filter(|part| matches!(part.kind, PartKind::Hair { .. }));
         let rooted = hairs.zip(&self.scene.hair).filter(|(_, hair)| hair.rooted);

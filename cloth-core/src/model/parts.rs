@@ -1,4 +1,4 @@
-//! What a scene is made of, on one numbering of vertices.
+//! The parts of a scene and the assembled model.
 
 use std::ops::Range;
 
@@ -16,22 +16,22 @@ use crate::scene::{MeshSourceError, ObstacleError, Scene};
 /// A garment or hair of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// What pins and seams call it.
+    /// The name that pins and seams refer to.
     pub name: String,
-    /// Its vertices.
+    /// Its vertices in the model.
     pub vertices: Range<usize>,
-    /// What it is.
+    /// Cloth or hair.
     pub kind: PartKind,
 }
 
-/// What a part is.
+/// The kind of a part.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PartKind {
-    /// Cloth, of this mesh.
+    /// Cloth, with its rest mesh.
     Cloth(TriangleMesh),
-    /// Strands, each of that many vertices.
+    /// Strands of hair.
     Hair {
-        /// Vertices of a strand.
+        /// Vertices of each strand.
         joints: usize,
     },
 }
@@ -39,31 +39,31 @@ pub enum PartKind {
 /// A pinned vertex that moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingPin {
-    /// The vertex.
+    /// The index of the vertex.
     pub vertex: usize,
-    /// Where it is drawn, in m; the motion starts from there.
-    pub drawn: Vector3<f64>,
-    /// Which of [`Model::motions`].
+    /// Initial position before the motion, in m.
+    pub initial: Vector3<f64>,
+    /// An index into [`Model::motions`].
     pub motion: usize,
 }
 
-/// Vertices that nothing couples to others, with everything that acts on them.
+/// A set of vertices that no force couples to the others, with the forces on them.
 #[derive(Debug, Default)]
 pub struct IslandModel {
-    /// Its vertices, by their numbers in the whole.
+    /// Indices of the vertices in the model.
     pub vertices: Vec<usize>,
-    /// Everything that acts, on vertices counted within the island.
+    /// The terms, with vertices numbered within the island.
     pub terms: Vec<Box<dyn Term>>,
-    /// Which of [`Model::labels`] each term has.
+    /// For each term, an index into [`Model::labels`].
     pub labels: Vec<usize>,
 }
 
-/// What a term is called, which may act on several islands.
+/// The label of a term. Terms of several islands that belong to one garment, obstacle or seam share a label.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TermLabel {
-    /// Its name.
+    /// The term's name.
     pub name: String,
-    /// The declared element it is made of.
+    /// The name of its declared element.
     pub element: &'static str,
 }
 
@@ -72,91 +72,79 @@ pub struct TermLabel {
 pub struct Model {
     /// Garments, then hair.
     pub parts: Vec<Part>,
-    /// Positions at the start, in m.
+    /// Initial positions, in m.
     pub x: Vec<Vector3<f64>>,
-    /// Velocities at the start, in m/s; zero for pinned vertices.
+    /// Initial velocities, in m/s; zero for pinned vertices.
     pub v: Vec<Vector3<f64>>,
     /// Masses, in kg.
     pub masses: Vec<f64>,
-    /// All triangles.
+    /// The triangles of all garments.
     pub triangles: Vec<[usize; 3]>,
     /// Whether each vertex is pinned.
     pub pinned: Vec<bool>,
     /// Pinned vertices that move.
     pub moving: Vec<MovingPin>,
-    /// How they move.
+    /// The motions of pins.
     pub motions: Vec<Motion>,
-    /// What moves on its own.
+    /// The islands, with their terms.
     pub islands: Vec<IslandModel>,
-    /// What the terms of the islands are called.
+    /// The labels of all terms.
     pub labels: Vec<TermLabel>,
-    /// What was left out because its stiffness is zero, or there is nothing for it to act on.
+    /// Terms that were left out, because their stiffness is zero or they have no elements.
     pub left_out: Vec<String>,
-    /// What should be known about it.
+    /// Warnings about the scene.
     pub warnings: Vec<String>,
-    /// Solids.
+    /// Obstacles, with their motions.
     pub obstacles: Vec<Obstacle>,
 }
 
-/// A name that no garment or hair has.
+/// A reference to a garment or hair that does not exist.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("there is no garment or hair called `{name}`; there are {}", .known.join(", "))]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub struct UnknownPart {
-    /// The name.
     pub name: String,
-    /// Those that there are.
+    /// The existing names.
     pub known: Vec<String>,
 }
 
 /// A scene whose parts do not fit together.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ModelError {
-    /// A shape.
+    /// The mesh of a garment is invalid.
     #[error("{part}: {source}")]
-    Mesh {
-        /// The garment.
-        part: String,
-        /// What is wrong.
-        source: MeshSourceError,
-    },
-    /// A fabric.
+    Mesh { part: String, source: MeshSourceError },
+    /// A fabric does not fit its mesh.
     #[error("{part}: {source}")]
-    Fabric {
-        /// The garment.
-        part: String,
-        /// What is wrong.
-        source: FabricError,
-    },
-    /// Two parts of one name.
+    Fabric { part: String, source: FabricError },
+    /// Two parts have the same name.
     #[error("two garments or hairs are called `{name}`")]
-    SameName {
-        /// The name.
-        name: String,
-    },
-    /// A pin.
+    SameName { name: String },
+    /// A pin is invalid.
     #[error(transparent)]
     Pin(#[from] PinError),
-    /// A seam.
+    /// A seam is invalid.
     #[error(transparent)]
     Seam(#[from] SeamError),
-    /// The mesh of an obstacle.
+    /// The mesh of an obstacle is invalid.
     #[error(transparent)]
     Obstacle(#[from] ObstacleError),
-    /// Hair or stitches that do not fit.
+    /// Elements and stencils of hair or stitches do not match.
     #[error(transparent)]
     List(#[from] ListError),
 }
 
 impl Model {
-    /// Puts a scene together.
+    /// Assembles a scene.
     ///
     /// # Errors
-    /// When a part is unfit, or a name or vertex does not exist.
+    /// Returns an error if a part is invalid, or a name or vertex does not exist.
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
         Builder::new(scene).model()
     }
 
-    /// The strands of hair, each as its vertices.
+    /// Returns the vertex range of each strand of hair.
     pub fn strands(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.parts.iter().flat_map(|part| {
             let joints = if let PartKind::Hair { joints } = part.kind { joints } else { usize::MAX };

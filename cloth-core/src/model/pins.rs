@@ -4,57 +4,56 @@ use super::UnknownPart;
 use crate::geometry::{norm, subtract};
 use crate::scene::{Pin, PinBox, PinChoice};
 
-/// A pin that holds nothing.
+/// A pin that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PinError {
-    /// No such part.
+    /// `of` refers to an unknown part.
     #[error("pins[{pin}]: {0}", .error)]
     Name {
-        /// Which pin, from 0.
+        /// Index of the pin, from 0.
         pin: usize,
-        /// What is wrong.
         error: UnknownPart,
     },
-    /// No such vertex.
+    /// The vertex does not exist.
     #[error("pins[{pin}]: there is no vertex {vertex}; the mesh has {vertices} (0 to {})", .vertices.saturating_sub(1))]
     NoSuchVertex {
-        /// Which pin, from 0.
+        /// Index of the pin, from 0.
         pin: usize,
-        /// The vertex it names.
         vertex: usize,
-        /// The number of vertices.
         vertices: usize,
     },
-    /// An empty box.
+    /// No vertex lies in the box.
     #[error("pins[{pin}]: no vertex lies in the box {min:?} to {max:?} (in m)")]
     EmptyBox {
-        /// Which pin, from 0.
+        /// Index of the pin, from 0.
         pin: usize,
         /// Its smallest corner.
         min: Vector3<f64>,
         /// Its largest corner.
         max: Vector3<f64>,
     },
-    /// Nothing with an edge.
-    #[error("pins[{pin}]: what it chooses from has no edge")]
+    /// The part has no boundary.
+    #[error("pins[{pin}]: the chosen part has no boundary")]
     NoBoundary {
-        /// Which pin, from 0.
+        /// Index of the pin, from 0.
         pin: usize,
     },
-    /// Two pins that want different things.
-    #[error("pins[{pin}]: vertex {vertex} is held by another pin already, which moves it otherwise")]
+    /// Two pins give a vertex different motions.
+    #[error("pins[{pin}]: vertex {vertex} already belongs to a pin with a different motion")]
     Twice {
-        /// Which pin, from 0.
+        /// Index of the pin, from 0.
         pin: usize,
-        /// The vertex, counted through all garments.
+        /// The vertex, numbered through the whole scene.
         vertex: usize,
     },
 }
 
-/// The vertices it holds, of those at the start; `edge` are those on the edge of the cloth. `pin` is its number, for messages.
+/// Returns the vertices that a pin chooses, given initial positions and boundary vertices. `pin` is its index, for
+/// messages.
 ///
 /// # Errors
-/// When it chooses no vertex.
+/// Returns an error if the pin chooses no vertex.
 pub(super) fn chosen(
     description: &Pin,
     pin: usize,

@@ -6,69 +6,71 @@ use super::UnknownPart;
 use crate::geometry::{norm, subtract};
 use crate::scene::Seam;
 
-/// A seam that joins nothing.
+/// A seam that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum SeamError {
-    /// No such part.
+    /// A garment does not exist.
     #[error("seams[{seam}]: {0}", .error)]
     Name {
-        /// Which seam, from 0.
+        /// Index of the seam, from 0.
         seam: usize,
-        /// What is wrong.
         error: UnknownPart,
     },
-    /// Neither or both ways to choose vertices.
-    #[error("seams[{seam}]: give either `pairs` or `within`")]
+    /// Both or neither of `pairs` and `within` are given.
+    #[error("seams[{seam}]: expected either `pairs` or `within`")]
     Choice {
-        /// Which seam, from 0.
+        /// Index of the seam, from 0.
         seam: usize,
     },
-    /// No such vertex.
-    #[error("seams[{seam}]: {garment} has no vertex {vertex}; it has {vertices} (0 to {})", .vertices.saturating_sub(1))]
+    /// The vertex does not exist.
+    #[error(
+        "seams[{seam}]: {garment} has no vertex {vertex}; it has {vertices} (0 to {})",
+        .vertices.saturating_sub(1)
+    )]
     NoSuchVertex {
-        /// Which seam, from 0.
+        /// Index of the seam, from 0.
         seam: usize,
-        /// The garment.
         garment: String,
-        /// The vertex it names.
         vertex: usize,
-        /// The number of vertices.
         vertices: usize,
     },
-    /// A vertex joined to itself.
+    /// A vertex is joined to itself.
     #[error("seams[{seam}]: vertex {vertex} of {garment} is joined to itself")]
     Itself {
-        /// Which seam, from 0.
+        /// Index of the seam, from 0.
         seam: usize,
-        /// The garment.
         garment: String,
-        /// The vertex.
         vertex: usize,
     },
-    /// Nothing within reach.
-    #[error("seams[{seam}]: no edges of {} and {} come within {within} m at the start; the nearest are {nearest:.3e} m apart", .garments[0], .garments[1])]
+    /// No two edges are within the distance.
+    #[error(
+        "seams[{seam}]: no edges of {} and {} come within {within} m at the start; \
+         the nearest are {nearest:.3e} m apart",
+        .garments[0], .garments[1]
+    )]
     OutOfReach {
-        /// Which seam, from 0.
+        /// Index of the seam, from 0.
         seam: usize,
-        /// The two.
+        /// The names of the two garments.
         garments: [String; 2],
-        /// As given, in m.
+        /// The distance given, in m.
         within: f64,
-        /// How far they are apart, in m.
+        /// The smallest distance between edges, in m.
         nearest: f64,
     },
 }
 
-/// One end of a seam: a part of the scene.
+/// A part joined by a seam.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side<'a> {
-    /// Its vertices at the start.
+    /// Initial positions of its vertices, in m.
     pub start: &'a [Vector3<f64>],
-    /// Those on its edge.
+    /// Its boundary vertices.
     pub edge: &'a [usize],
 }
 
-/// The pairs of vertices that it joins, each counted within its part.
+/// Returns the pairs of vertices that a seam joins, numbered within their parts.
 pub(super) fn joined(description: &Seam, seam: usize, sides: [Side<'_>; 2]) -> Result<Vec<[usize; 2]>, SeamError> {
     let same = description.garments[0] == description.garments[1];
     let pairs = match (&description.pairs, description.within) {

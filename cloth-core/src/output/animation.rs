@@ -14,23 +14,23 @@ use super::vertex_normals;
 /// An animation that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 pub enum AnimationError {
-    /// A binary glTF file holds less than 4 GiB.
+    /// The file exceeds 4 GiB, the limit of binary glTF.
     #[error("the animation would take {bytes} bytes, but a .glb file holds less than 4 GiB; write fewer frames")]
     TooLarge {
-        /// What it would take.
+        /// The size it would have, in bytes.
         bytes: usize,
     },
-    /// The JSON part.
-    #[error("the animation's JSON part")]
+    /// The JSON part cannot be written.
+    #[error("cannot encode the JSON part of the animation")]
     Json(#[from] gltf_json::Error),
 }
 
-/// An animation as one binary glTF 2.0 file (`.glb`), which common viewers play: of each thing that moves the first frame is the mesh, each later
-/// one a morph target, and the animation moves the weight from one to the next. `frame_time` is in s. glTF's y points up: (x, y, z) becomes
-/// (x, z, −y).
+/// Encodes an animation as a binary glTF 2.0 file (`.glb`). The first frame of a moving object is its mesh. Each later
+/// frame is a morph target, and the animation moves the weight from one target to the next. `frame_time` is in s.
+/// glTF's y axis points up: (x, y, z) becomes (x, z, −y).
 ///
 /// # Errors
-/// When the file would be too large or its JSON part cannot be written.
+/// Returns an error if the file would be too large or its JSON part cannot be written.
 pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, AnimationError> {
     let mut file = File::default();
     let mut nodes = Vec::new();
@@ -43,7 +43,7 @@ pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, A
         let attributes = file.attributes(&first);
         let targets: Vec<MorphTarget> =
             later.iter().map(|frame| file.morph(&Shape::of(frame, triangles), &first)).collect();
-        let node = file.thing(track, Parts { attributes, indices, mode, targets });
+        let node = file.object(track, Parts { attributes, indices, mode, targets });
         if !later.is_empty() {
             moving.push((node, later.len()));
         }
@@ -57,7 +57,7 @@ pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, A
     file.finish()
 }
 
-/// What a mesh is put together from.
+/// The accessors of a mesh.
 struct Parts {
     attributes: BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>>,
     indices: Index<Accessor>,
@@ -67,7 +67,7 @@ struct Parts {
 
 struct Shape {
     positions: Vec<[f32; 3]>,
-    /// Empty where there are no triangles.
+    /// Vertex normals; empty for polylines.
     normals: Vec<[f32; 3]>,
 }
 
@@ -83,7 +83,7 @@ fn differences(to: &[[f32; 3]], from: &[[f32; 3]]) -> Vec<[f32; 3]> {
     to.iter().zip(from).map(|(a, b)| std::array::from_fn(|axis| a[axis] - b[axis])).collect()
 }
 
-/// A glTF document and its binary part.
+/// A glTF document with its binary buffer.
 #[derive(Default)]
 struct File {
     root: Root,
@@ -114,7 +114,7 @@ impl File {
         type_: Type,
         bounds: Option<(Vec<f32>, Vec<f32>)>,
     ) -> Index<Accessor> {
-        // Every number has four bytes, so that everything stays aligned as glTF asks.
+        // All components have four bytes, so every view has the alignment that glTF requires.
         let view = self.root.push(View {
             buffer: Index::new(0),
             byte_length: USize64::from(bytes.len()),
@@ -171,7 +171,7 @@ impl File {
         MorphTarget { positions, normals, tangents: None }
     }
 
-    fn thing(&mut self, track: &Track<'_>, parts: Parts) -> Index<Node> {
+    fn object(&mut self, track: &Track<'_>, parts: Parts) -> Index<Node> {
         let [red, green, blue] = track.colour;
         let mut material = Material { double_sided: true, ..Material::default() };
         material.pbr_metallic_roughness.base_color_factor.0 = [red, green, blue, 1.0];
@@ -198,7 +198,7 @@ impl File {
         self.root.push(Node { mesh: Some(mesh), name: Some(track.name.to_owned()), ..Node::default() })
     }
 
-    /// At frame f the weight of target f − 1 is 1, and of all others 0.
+    /// Adds an animation with weight 1 for target f − 1 at frame f, and 0 for the others.
     fn animate(&mut self, moving: &[(Index<Node>, usize)], frame_time: f64) {
         let (mut channels, mut samplers) = (Vec::new(), Vec::new());
         for &(node, targets) in moving {
@@ -222,7 +222,7 @@ impl File {
         self.root.push(Animation { channels, samplers, name, extensions: None, extras: Default::default() });
     }
 
-    /// The two chunks of a `.glb` file behind its header.
+    /// Writes the header and the two chunks of a `.glb` file.
     fn finish(mut self) -> Result<Vec<u8>, AnimationError> {
         self.root.push(Buffer {
             byte_length: USize64::from(self.data.len()),

@@ -2,63 +2,54 @@ use std::path::{Path, PathBuf};
 
 /// A folder or file that cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum OutputError {
-    /// The folder cannot be made or written to.
+    /// The folder cannot be created or written to.
     #[error("cannot write to the folder {}; choose another with -o", .path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Results of an earlier run are in the way.
+    Folder { path: PathBuf, source: std::io::Error },
+    /// The folder holds the results of an earlier run.
     #[error("{} exists; choose another folder with -o, or pass --overwrite", .path.display())]
     Exists {
-        /// The file.
+        /// A file of the earlier run.
         path: PathBuf,
     },
     /// A file cannot be written.
     #[error("cannot write {}", .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    File { path: PathBuf, source: std::io::Error },
 }
 
-/// Where a run's files go: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `summary.txt`, `run.json`,
-/// `frames/cloth_0000.obj`, … and the checkpoint. Each file appears under its name only once it is complete.
+/// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `summary.txt`,
+/// `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are written atomically.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,
 }
 
 impl OutputFolder {
-    /// The picture's name.
+    /// File name of the picture.
     pub const PICTURE: &'static str = "cloth.png";
-    /// The animation's name.
+    /// File name of the glTF animation.
     pub const ANIMATION: &'static str = "cloth.glb";
-    /// The name of the animation as USD.
+    /// File name of the USD animation.
     pub const USD: &'static str = "cloth.usda";
-    /// The ledger's name.
+    /// File name of the ledger.
     pub const LEDGER: &'static str = "ledger.csv";
-    /// The name of its plot.
+    /// File name of the plot of the ledger.
     pub const LEDGER_PLOT: &'static str = "ledger.svg";
-    /// The name of what a run says of itself.
+    /// File name of the machine-readable record.
     pub const RECORD: &'static str = "run.json";
-    /// The name of the report.
+    /// File name of the report.
     pub const REPORT: &'static str = "report.html";
-    /// The checkpoint's name.
+    /// File name of the checkpoint.
     pub const CHECKPOINT: &'static str = "checkpoint";
-    /// The name of the frames beside it.
+    /// File name of the frames saved with the checkpoint.
     pub const SAVED_FRAMES: &'static str = "checkpoint.frames";
-    /// The summary's name.
+    /// File name of the summary.
     pub const SUMMARY: &'static str = "summary.txt";
-    /// The name of the folder of frames.
+    /// Name of the folder of frames.
     pub const FRAMES: &'static str = "frames";
 
-    /// All files of a run but the frames.
+    /// All files of a run except the frames.
     const RESULTS: [&'static str; 10] = [
         Self::PICTURE,
         Self::ANIMATION,
@@ -72,11 +63,11 @@ impl OutputFolder {
         Self::SAVED_FRAMES,
     ];
 
-    /// Makes the folder and checks that it can be written to, before anything is computed. The files of an earlier run are removed when
-    /// overwriting, so that nothing mixes two runs.
+    /// Creates the folder and checks that it can be written to, before anything is computed. With `overwrite`, removes
+    /// the files of an earlier run, so that two runs never mix.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to, or holds results that are not to be overwritten.
+    /// Returns an error if the folder cannot be created or written to, or holds results and `overwrite` is not set.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, OutputError> {
         let folder = Self::reopen(path)?;
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
@@ -91,10 +82,10 @@ impl OutputFolder {
         }
     }
 
-    /// The folder of a run that goes on, once it is known that it can be written to.
+    /// Opens the folder of a run that is resumed or reported, and checks that it can be written to.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to.
+    /// Returns an error if the folder cannot be written to.
     pub fn reopen(path: &Path) -> Result<Self, OutputError> {
         let folder = Self { path: path.to_owned() };
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
@@ -106,26 +97,26 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// The folder.
+    /// Path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes a file, under a temporary name first.
+    /// Writes a file atomically and returns its path.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self, name: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
         let path = self.path.join(name);
         verify::write_whole(&path, contents).map_err(|source| OutputError::File { path: path.clone(), source })?;
         Ok(path)
     }
 
-    /// Writes frame `number` in the format of that extension.
+    /// Writes frame `number` in the format of the extension, and returns its path.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write_frame(&self, number: usize, extension: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
         self.write(&format!("{}/cloth_{number:04}.{extension}", Self::FRAMES), contents)
     }

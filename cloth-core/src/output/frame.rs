@@ -5,7 +5,7 @@ use energy_dsl::Vector3;
 
 use super::vertex_normals;
 
-/// A frame as OBJ text: vertices in m, to 9 digits, with normals; strands of hair as lines.
+/// Formats a frame as OBJ: vertices in m with 9 digits and normals, hair as polylines.
 #[must_use]
 pub fn obj_text(positions: &[Vector3<f64>], triangles: &[[usize; 3]], strands: &[Range<usize>]) -> String {
     let mut text = String::with_capacity(80 * positions.len() + 32 * triangles.len());

@@ -1,4 +1,4 @@
-//! Files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
+//! Output files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
 
 mod animation;
 mod folder;
@@ -26,7 +26,7 @@ use energy_dsl::Vector3;
 
 use crate::geometry::{cross, norm, subtract};
 
-/// Unit normals at the vertices, each the mean of its triangles' by area.
+/// Returns unit vertex normals: the area-weighted mean of the adjacent triangles' normals.
 #[must_use]
 pub fn vertex_normals(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Vec<Vector3<f64>> {
     let mut normals = vec![[0.0; 3]; positions.len()];
@@ -39,7 +39,7 @@ pub fn vertex_normals(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> V
     }
     for normal in &mut normals {
         let length = norm(*normal);
-        // Triangles folded onto each other may cancel: any unit vector will do for shading.
+        // The normals of folded triangles may cancel; any unit vector is good enough for shading.
         *normal = if length > 0.0 { normal.map(|component| component / length) } else { [0.0, 0.0, 1.0] };
     }
     normals

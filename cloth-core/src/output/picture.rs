@@ -12,11 +12,11 @@ use super::solid_mesh::SolidMesh;
 use super::vertex_normals;
 use crate::geometry::{cross, dot, norm, subtract};
 
-/// Of solids and of hair.
+/// Dark and bright colours of solids and of hair.
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
 const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
-/// How wide hair and edges are drawn, in pixels before averaging.
+/// Line width of hair and edges, in pixels before downsampling.
 const STRAND: f64 = 3.0;
 
 /// A picture that cannot be encoded.
@@ -26,47 +26,48 @@ pub struct PictureError(String);
 
 const WIDTH: u32 = 1200;
 const HEIGHT: u32 = 1000;
-/// Drawn this many times larger and averaged: triangles without smoothed edges leave no seams between them.
+/// Supersampling factor: anti-aliases without seams between triangles.
 const OVERSAMPLING: u32 = 2;
-/// From the cloth to the eye and to the lamp.
+/// Directions from the cloth to the eye and to the lamp.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
 const LAMP: Vector3<f64> = [-0.25, -0.45, 1.0];
-/// Darkest and brightest colour of the front and of the back.
+/// Dark and bright colours of the front and of the back.
 const FRONT: Colours = [[0.03, 0.10, 0.19], [0.40, 0.66, 0.86]];
 const BACK: Colours = [[0.20, 0.08, 0.05], [0.94, 0.66, 0.46]];
 
-/// What is shown in a picture.
+/// The contents of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Where the vertices are, in m.
+    /// Positions of the vertices, in m.
     pub positions: &'a [Vector3<f64>],
-    /// Cloth.
+    /// Triangles of the cloth.
     pub triangles: &'a [[usize; 3]],
-    /// Hair, each strand as its vertices.
+    /// Vertex range of each strand of hair.
     pub strands: &'a [Range<usize>],
-    /// Solids.
+    /// Surfaces of the solids.
     pub solids: &'a [SolidMesh],
-    /// The height of the floor, in m; a little below everything if there is none.
+    /// Height of the floor, in m; `None` for slightly below everything.
     pub floor: Option<f64>,
-    /// Points that are to be in the picture, too, in m: those of other frames.
+    /// Points of other frames that must also fit into the picture, in m.
     pub framed: &'a [Vector3<f64>],
-    /// How cloth and hair are drawn.
+    /// Appearance of cloth and hair.
     pub look: Look<'a>,
 }
 
-/// How cloth and hair are drawn.
+/// The appearance of cloth and hair.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Look<'a> {
-    /// The colour of each vertex, red, green and blue from 0 to 1; without, each side of cloth and hair have their own.
+    /// RGB colour of each vertex, from 0 to 1; `None` for the default colours of cloth and hair.
     pub colours: Option<&'a Vec<[f32; 3]>>,
-    /// Whether the edges of triangles are drawn.
+    /// Whether to draw the edges of triangles.
     pub wireframe: bool,
 }
 
-/// A shaded picture of cloth, hair and solids as PNG: both sides of cloth are lit, each in its own colour, with shadows on the floor below. z is up.
+/// Draws cloth, hair and solids as PNG. The two sides of cloth have different colours; the floor receives shadows. z is
+/// up.
 ///
 /// # Errors
-/// When the picture cannot be encoded.
+/// Returns an error if the picture cannot be encoded.
 pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     let [width, height] = [WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING];
     let mut background = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
@@ -97,7 +98,7 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     small.encode_png().map_err(|error| PictureError(error.to_string()))
 }
 
-/// The triangles of cloth and solids on one numbering of vertices.
+/// Returns the triangles of cloth and solids in one vertex numbering.
 fn all_triangles(view: &View<'_>) -> Vec<[usize; 3]> {
     let mut all = view.triangles.to_vec();
     let mut first = view.positions.len();
@@ -132,7 +133,7 @@ fn draw_surface(
     }
 }
 
-/// Brighter where it lies across the light.
+/// Draws a strand; segments across the light are brighter.
 fn draw_strand(
     canvas: &mut Canvas,
     camera: &Camera,
@@ -142,8 +143,8 @@ fn draw_strand(
 ) {
     let lamp = LAMP.map(|component| component / norm(LAMP));
     for end in strand.skip(1) {
-        let way = subtract(positions[end], positions[end - 1]);
-        let along = dot(way, lamp) / norm(way).max(f64::MIN_POSITIVE);
+        let offset = subtract(positions[end], positions[end - 1]);
+        let along = dot(offset, lamp) / norm(offset).max(f64::MIN_POSITIVE);
         let brightness = 0.15 + 0.85 * (1.0 - along * along).max(0.0).sqrt();
         let [from, to] = [end - 1, end].map(|vertex| {
             let (place, depth) = camera.project(positions[vertex]);
@@ -153,7 +154,7 @@ fn draw_strand(
     }
 }
 
-/// The edges of triangles, a little nearer than they are so that they lie on top.
+/// Draws the edges of triangles, slightly nearer than they are, so that they lie on top.
 fn draw_edges(canvas: &mut Canvas, camera: &Camera, positions: &[Vector3<f64>], triangles: &[[usize; 3]]) {
     let corner = |vertex: usize| {
         let (place, depth) = camera.project(positions[vertex]);
@@ -166,7 +167,7 @@ fn draw_edges(canvas: &mut Canvas, camera: &Camera, positions: &[Vector3<f64>], 
     }
 }
 
-/// A colour in the shade and in the light.
+/// Returns a colour in shade and in light.
 fn lit(colour: &[f32; 3]) -> Colours {
     [colour.map(|channel| 0.35 * channel), *colour]
 }
@@ -175,7 +176,7 @@ fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {
     std::array::from_fn(|channel| dark[channel] + brightness as f32 * (bright[channel] - dark[channel]))
 }
 
-/// Lamp, a weaker light from the eye, sky, and a sheen where the cloth turns away.
+/// Returns the brightness from the lamp, a weaker light at the eye, the sky, and a sheen at grazing angles.
 fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>) -> f64 {
     let facing = dot(normal, eye).clamp(0.0, 1.0);
     let sheen = 0.16 * (1.0 - facing).powi(3);
@@ -200,19 +201,19 @@ fn draw_background(canvas: &mut Pixmap) {
     }
 }
 
-/// The points' shadows on the floor.
+/// Returns the shadows of the points on the floor.
 fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<f64>> {
     let range = |pick: fn(f64, f64) -> f64, start| positions.iter().map(|p| p[2]).fold(start, pick);
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
     let floor = floor.unwrap_or(low - 0.08 * (high - low));
     let cast = |p: &Vector3<f64>| {
-        let way = (p[2] - floor) / LAMP[2];
-        [p[0] - way * LAMP[0], p[1] - way * LAMP[1], floor]
+        let offset = (p[2] - floor) / LAMP[2];
+        [p[0] - offset * LAMP[0], p[1] - offset * LAMP[1], floor]
     };
     positions.iter().map(cast).collect()
 }
 
-/// Drawn small and enlarged, which makes it soft.
+/// Draws the shadow at low resolution; upscaling softens it.
 fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], triangles: &[[usize; 3]]) {
     const COARSENESS: u32 = 20;
     let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
@@ -220,7 +221,7 @@ fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], tr
     for corners in triangles {
         let mut seen = corners.map(|corner| camera.project(shadow[corner]).0);
         let [p, q, r] = seen;
-        // All the same way round, so that overlapping folds add up instead of cancelling.
+        // Same orientation for all triangles, so that overlapping folds add up instead of cancelling.
         if (q[0] - p[0]) * (r[1] - p[1]) < (q[1] - p[1]) * (r[0] - p[0]) {
             seen.swap(1, 2);
         }
@@ -244,7 +245,7 @@ fn append_polygon(path: &mut PathBuilder, corners: &[[f64; 2]]) {
     path.close();
 }
 
-/// The picture at its final size, each pixel the mean of those drawn for it.
+/// Downsamples to the final size by averaging.
 fn averaged(canvas: &Pixmap) -> Option<Pixmap> {
     let mut small = Pixmap::new(WIDTH, HEIGHT)?;
     let (source, row) = (canvas.data(), 4 * canvas.width() as usize);

@@ -1,6 +1,6 @@
 use energy_dsl::Vector3;
 
-/// A frame as binary PLY: vertices with positions (m) and velocities (m/s) in single precision, and triangles.
+/// Encodes a frame as binary PLY: positions in m and velocities in m/s in single precision, and triangles.
 ///
 /// ```
 /// let x = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

@@ -2,18 +2,19 @@ use energy_dsl::Vector3;
 
 use crate::geometry::{cross, dot, norm, subtract};
 
-/// A camera that sees a whole set of points: z is up.
+/// A perspective camera that frames a set of points; z is up.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Camera {
     eye: Vector3<f64>,
-    /// Right, down and forward.
+    /// Unit vectors to the right, down and forward.
     axes: [Vector3<f64>; 3],
     centre: [f64; 2],
     scale: f64,
 }
 
 impl Camera {
-    /// Looks at the points from `direction` (from them to the eye), filling `fill` of a picture of the given size.
+    /// Creates a camera that looks at the points from `direction` (from the points to the eye). They fill the fraction
+    /// `fill` of a picture of this size.
     pub(crate) fn framing(points: &[Vector3<f64>], direction: Vector3<f64>, size: [f64; 2], fill: f64) -> Self {
         let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
             std::array::from_fn(|axis| points.iter().map(|p| p[axis]).fold(start, pick))
@@ -27,7 +28,7 @@ impl Camera {
         let right = right.map(|component| component / norm(right));
         let down = cross(right, backward);
         let axes = [right, down, backward.map(|component| -component)];
-        // Centre and scale what is seen, not the box around it.
+        // Fit the projections of the points rather than their bounding box.
         let mut camera = Self { eye, axes, centre: [0.0; 2], scale: 1.0 };
         let seen: Vec<[f64; 2]> = points.iter().map(|p| camera.project(*p).0).collect();
         let range = |axis: usize| {
@@ -42,16 +43,16 @@ impl Camera {
         camera
     }
 
-    /// Where a point is seen, in pixels, and how deep it lies, in m.
+    /// Returns the position in pixels and the depth in m of a point.
     pub(crate) fn project(&self, point: Vector3<f64>) -> ([f64; 2], f64) {
         let [right, down, depth] = self.axes.map(|axis| dot(axis, subtract(point, self.eye)));
         let image = [right / depth, down / depth];
         (std::array::from_fn(|axis| self.centre[axis] + self.scale * image[axis]), depth)
     }
 
-    /// The unit vector from a point to the eye.
+    /// Returns the unit vector from a point to the eye.
     pub(crate) fn towards_eye(&self, point: Vector3<f64>) -> Vector3<f64> {
-        let way = subtract(self.eye, point);
-        way.map(|component| component / norm(way))
+        let offset = subtract(self.eye, point);
+        offset.map(|component| component / norm(offset))
     }
 }

@@ -1,15 +1,15 @@
-//! Triangles drawn with depth, so that what is nearer hides what is farther whatever the order.
+//! A rasteriser with a depth buffer.
 
 use tiny_skia::Pixmap;
 
-/// A picture with the depth of what is seen in each pixel.
+/// A picture with a depth buffer.
 pub(super) struct Canvas {
     pub pixels: Pixmap,
-    /// 1/depth, in 1/m; 0 where nothing is.
+    /// 1/depth in 1/m; 0 for the background.
     nearness: Vec<f32>,
 }
 
-/// A corner as seen: place in pixels, depth in m, colour.
+/// A projected corner: position in pixels, depth in m, colour.
 #[derive(Clone, Copy)]
 pub(super) struct Corner {
     pub place: [f64; 2],
@@ -23,7 +23,7 @@ impl Canvas {
         Self { pixels, nearness }
     }
 
-    /// Fills a triangle, colours and nearness linear over it.
+    /// Fills a triangle; interpolates colour and 1/depth linearly.
     pub fn triangle(&mut self, corners: [Corner; 3]) {
         let [a, b, c] = corners.map(|corner| corner.place);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -38,7 +38,7 @@ impl Canvas {
         };
         let (columns, rows) = (range(0, self.pixels.width()), range(1, self.pixels.height()));
         let width = self.pixels.width() as usize;
-        // The weight of the corner across from p → q, and how it changes from column to column.
+        // The barycentric weight opposite the edge p → q, and its change per column.
         let weight = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
             ((q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])) / area
         };
@@ -49,9 +49,9 @@ impl Canvas {
             let first = [columns.0 as f64 + 0.5, row as f64 + 0.5];
             let starts = [weight(b, c, first), weight(c, a, first), weight(a, b, first)];
             for column in columns.0..columns.1 {
-                let way = (column - columns.0) as f64;
-                let parts: [f64; 3] = std::array::from_fn(|i| starts[i] + way * steps[i]);
-                // Neighbours overlap by less than is seen, so that rounding leaves no gap between them.
+                let offset = (column - columns.0) as f64;
+                let parts: [f64; 3] = std::array::from_fn(|i| starts[i] + offset * steps[i]);
+                // A tiny overlap: rounding leaves no gap between neighbours.
                 if parts.iter().any(|part| *part < -1e-9) {
                     continue;
                 }
@@ -70,14 +70,14 @@ impl Canvas {
         }
     }
 
-    /// A line of that width in pixels.
+    /// Draws a line with this width, in pixels.
     pub fn line(&mut self, from: Corner, to: Corner, width: f64) {
-        let way = [to.place[0] - from.place[0], to.place[1] - from.place[1]];
-        let length = way[0].hypot(way[1]);
+        let offset = [to.place[0] - from.place[0], to.place[1] - from.place[1]];
+        let length = offset[0].hypot(offset[1]);
         if length == 0.0 {
             return;
         }
-        let side = [-0.5 * width * way[1] / length, 0.5 * width * way[0] / length];
+        let side = [-0.5 * width * offset[1] / length, 0.5 * width * offset[0] / length];
         let moved = |corner: Corner, sign: f64| {
             let place = [corner.place[0] + sign * side[0], corner.place[1] + sign * side[1]];
             Corner { place, ..corner }

@@ -6,29 +6,29 @@ use crate::contact::AnySolid;
 use crate::model::PartKind;
 use crate::simulation::Simulation;
 
-/// Garments in turn; solids.
+/// Colours of garments (cyclic), of hair and of solids.
 const COLOURS: [[f32; 3]; 5] =
     [[0.16, 0.34, 0.52], [0.55, 0.20, 0.14], [0.20, 0.42, 0.24], [0.58, 0.42, 0.12], [0.36, 0.22, 0.44]];
 const HAIR: [f32; 3] = [0.28, 0.15, 0.07];
 const SOLID: [f32; 3] = [0.50, 0.48, 0.45];
 
-/// What a run shows: the frames of its parts, and its solids.
+/// The visible content of a run: the frames of its parts, and its solids.
 #[derive(Debug)]
 pub struct Show<'a> {
     simulation: &'a Simulation,
     frames: &'a [Vec<Vector3<f64>>],
-    /// The triangles of each garment, counted within it; the strands of each hair.
+    /// For each garment its triangles, numbered within it; for each hair its strands.
     triangles: Vec<Vec<[usize; 3]>>,
     strands: Vec<Vec<std::ops::Range<usize>>>,
-    /// Each solid in each frame, in one only where it does not move.
+    /// Each solid in each frame; in a single frame if it does not move.
     solids: Vec<Vec<SolidMesh>>,
-    /// The middle of everything at the start, and how much of a plane is shown, in m.
+    /// Centre of everything at the start, and side of the visible part of a plane, in m.
     centre: Vector3<f64>,
     size: f64,
 }
 
 impl<'a> Show<'a> {
-    /// Of a simulation with these frames, that many seconds apart.
+    /// Collects the content of a simulation with these frames, `frame_time` seconds apart.
     #[must_use]
     pub fn new(simulation: &'a Simulation, frames: &'a [Vec<Vector3<f64>>], frame_time: f64) -> Self {
         let points = || frames.iter().flatten();
@@ -61,7 +61,7 @@ impl<'a> Show<'a> {
         show
     }
 
-    /// Every garment, hair and solid.
+    /// Returns a track for every garment, hair and solid.
     #[must_use]
     pub fn tracks(&self) -> Vec<Track<'_>> {
         let mut tracks = Vec::new();
@@ -81,19 +81,19 @@ impl<'a> Show<'a> {
         tracks
     }
 
-    /// A picture of the vertices at a time, in s; one of a sequence shows as much as all its frames need. A level plane is the floor on which shadows
-    /// fall.
+    /// Draws the vertices at a time, in s. Pictures of a `sequence` are framed for all frames. A horizontal plane
+    /// serves as the floor that receives shadows.
     ///
     /// # Errors
-    /// When it cannot be encoded.
+    /// Returns an error if the picture cannot be encoded.
     pub fn picture(&self, positions: &[Vector3<f64>], time: f64, sequence: bool) -> Result<Vec<u8>, PictureError> {
         self.picture_with(positions, time, sequence, &Look::default())
     }
 
-    /// The same in other colours or with edges.
+    /// Draws the vertices with another appearance.
     ///
     /// # Errors
-    /// When it cannot be encoded.
+    /// Returns an error if the picture cannot be encoded.
     pub fn picture_with(
         &self,
         positions: &[Vector3<f64>],

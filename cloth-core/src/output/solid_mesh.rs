@@ -1,4 +1,4 @@
-//! Solids as triangles, for pictures and animations.
+//! Triangle meshes of solids, for pictures and animations.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -7,24 +7,25 @@ use energy_dsl::Vector3;
 use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, RoundedBox};
 use crate::geometry::{cross, norm, subtract};
 
-/// The surface of a solid as vertices and triangles.
+/// The surface of a solid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidMesh {
-    /// In m.
+    /// Vertices, in m.
     pub vertices: Vec<Vector3<f64>>,
-    /// Anticlockwise seen from outside.
+    /// Triangles, anticlockwise seen from outside.
     pub triangles: Vec<[usize; 3]>,
 }
 
-/// Steps around a ball; half as many from pole to pole.
+/// Segments around a ball; from pole to pole it has half as many.
 const AROUND: usize = 64;
-/// Points along an edge of the cube that a rounded box is made of; even, so that none is in the middle.
+/// Points along an edge of a rounded box before rounding. Even, so that no point lies in the middle.
 const ALONG: usize = 12;
-/// Cells along a side of the piece of a plane that is shown.
+/// Cells along a side of the visible part of a plane.
 const CELLS: usize = 24;
 
 impl SolidMesh {
-    /// The surface of a solid; of a half-space a square of that size, in m, about the point of the plane nearest to `centre`.
+    /// Builds the surface of a solid. For a half-space, builds a square with side `size` in m, centred on the point of
+    /// the plane nearest to `centre`.
     #[must_use]
     pub fn of(solid: &AnySolid, centre: Vector3<f64>, size: f64) -> Self {
         match solid {
@@ -37,7 +38,7 @@ impl SolidMesh {
     }
 }
 
-/// Two unit vectors across a direction, right-handed with it.
+/// Returns two unit vectors that form a right-handed basis with a direction.
 fn across(direction: Vector3<f64>) -> [Vector3<f64>; 2] {
     let least = (0..3).min_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs())).unwrap_or(0);
     let mut axis = [0.0; 3];
@@ -58,7 +59,7 @@ fn plane(solid: &HalfSpace, centre: Vector3<f64>, size: f64) -> SolidMesh {
     grid(CELLS + 1, CELLS + 1, point)
 }
 
-/// A rectangular grid of points, two triangles to a cell.
+/// Builds a rectangular grid of points with two triangles per cell.
 fn grid(rows: usize, columns: usize, point: impl Fn(usize, usize) -> Vector3<f64>) -> SolidMesh {
     let vertices = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
     let vertices = vertices.map(|(row, column)| point(row, column)).collect();
@@ -72,14 +73,14 @@ fn grid(rows: usize, columns: usize, point: impl Fn(usize, usize) -> Vector3<f64
     SolidMesh { vertices, triangles }
 }
 
-/// A ball cut in two at its equator, the halves at the ends.
+/// Builds a capsule: a ball, cut at its equator, with the halves at the ends.
 fn capsule(solid: &Capsule) -> SolidMesh {
     let [a, b] = solid.ends;
     let way = subtract(b, a);
     let axis = if norm(way) > 0.0 { way.map(|component| component / norm(way)) } else { [0.0, 0.0, 1.0] };
     let [u, v] = across(axis);
     let half = AROUND / 4;
-    // Rows from the pole at a to that at b, the equator twice where the halves are apart.
+    // Rows run from the pole at a to the pole at b, with the equator twice to join the halves.
     let apart = usize::from(a != b);
     let point = |row: usize, column: usize| -> Vector3<f64> {
         let (end, step) = if row <= half { (a, row) } else { (b, row - apart) };
@@ -89,19 +90,19 @@ fn capsule(solid: &Capsule) -> SolidMesh {
         std::array::from_fn(|i| end[i] + solid.radius * (up * axis[i] + out * (cosine * u[i] + sine * v[i])))
     };
     let mut mesh = grid(2 * half + 1 + apart, AROUND + 1, point);
-    // The last column is the first again: joined, so that shading runs on across it.
+    // Join the last column to the first, so that shading is continuous.
     for corner in mesh.triangles.as_flattened_mut() {
         *corner -= if *corner % (AROUND + 1) == AROUND { AROUND } else { 0 };
     }
     mesh
 }
 
-/// The triangles themselves, moved out by the rounding; of a shell the side that its triangles show.
+/// Builds the surface of a mesh solid, offset by its rounding. For a shell, builds the front side only.
 fn surface(solid: &MeshSolid) -> SolidMesh {
     let (mesh, radius) = (solid.surface().mesh(), solid.surface().radius());
     let normals = super::vertex_normals(mesh.vertices(), mesh.triangles());
     let moved = |(p, n): (&Vector3<f64>, Vector3<f64>)| -> Vector3<f64> {
-        solid.placed(std::array::from_fn(|axis| p[axis] + radius * n[axis]))
+        solid.transform(std::array::from_fn(|axis| p[axis] + radius * n[axis]))
     };
     SolidMesh {
         vertices: mesh.vertices().iter().zip(normals).map(moved).collect(),
@@ -109,7 +110,8 @@ fn surface(solid: &MeshSolid) -> SolidMesh {
     }
 }
 
-/// The six faces of a cube, each point pushed out on a ball of the radius and then to its corner of the box.
+/// Builds a rounded box from the faces of a cube: each point is projected onto a ball, then moved to its corner of the
+/// box.
 fn rounded_box(solid: &RoundedBox) -> SolidMesh {
     let mut all = SolidMesh { vertices: Vec::new(), triangles: Vec::new() };
     let points = if solid.radius > 0.0 { ALONG } else { 2 };
@@ -139,7 +141,7 @@ mod tests {
     use super::*;
     use crate::geometry::dot;
 
-    /// ⅓ Σ of the cone volumes over all triangles, which is the volume when the surface is closed and turned outwards.
+    /// Returns the enclosed volume, ⅓ Σ of the cones over all triangles, if the surface is closed and points outwards.
     fn volume(mesh: &SolidMesh) -> f64 {
         let cone = |corners: &[usize; 3]| {
             let [a, b, c] = corners.map(|corner| mesh.vertices[corner]);

@@ -4,8 +4,8 @@ use energy_dsl::Vector3;
 
 use super::track::{Joined, Track};
 
-/// An animation as USD text (`.usda`): a mesh for each garment and solid, curves for hair, with a time sample of the points for each frame. Lengths
-/// are in m, z is up, and frame n has time code n.
+/// Formats an animation as USD text (`.usda`): a mesh for each garment and solid, curves for hair, one time sample per
+/// frame. Lengths are in m, z is up, and frame n has time code n.
 #[must_use]
 pub fn usd_text(tracks: &[Track<'_>], frames_per_second: f64) -> String {
     let frames = tracks.iter().map(|track| track.frames.len()).max().unwrap_or(1);
@@ -84,7 +84,7 @@ impl Usd {
         }
     }
 
-    /// A name as USD allows it: letters, digits and underscores, not a digit first, and no name twice.
+    /// Returns a unique USD identifier: letters, digits and underscores, not starting with a digit.
     fn identifier(&mut self, name: &str) -> String {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let plain = if plain.starts_with(|c: char| c.is_ascii_alphabetic()) { plain } else { format!("_{plain}") };
@@ -99,7 +99,7 @@ impl Usd {
     }
 }
 
-/// Points are single precision in USD; more digits would be lost.
+/// Formats points with the digits of single precision, the type of points in USD.
 fn tuples(points: &[Vector3<f64>]) -> String {
     let one = |p: &Vector3<f64>| format!("({}, {}, {})", p[0] as f32, p[1] as f32, p[2] as f32);
     points.iter().map(one).collect::<Vec<_>>().join(", ")
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_made_fit_and_different() {
+    fn names_become_unique_identifiers() {
         let triangles = [[0, 1, 2]];
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]];
         let track = |name| Track {

@@ -4,79 +4,64 @@ use serde::{Deserialize, Serialize};
 
 use crate::simulation::{RestoreError, SavedState};
 
-/// The version of checkpoints that this program writes and reads.
+/// The version of checkpoints that this program reads and writes.
 const VERSION: u32 = 3;
-/// How a checkpoint starts; then follow its version, the length and the CRC-32 of the rest.
+/// The first word of a checkpoint; version, length and CRC-32 of the rest follow.
 const KEYWORD: &str = "cloth-checkpoint";
 
-/// A checkpoint of a run: the scene, the state, and how far its output has got.
+/// A checkpoint of a run: the scene, the state, and the progress of the output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
     /// The text of the scene file.
     pub scene: String,
-    /// Its path.
+    /// The path of the scene file.
     pub path: PathBuf,
-    /// Steps from one checkpoint to the next.
+    /// Steps between checkpoints.
     pub every: u64,
-    /// Frames kept so far in the file beside it, and the CRC-32 of them.
+    /// Number of frames in the frame file next to the checkpoint.
     pub frames: usize,
-    /// See `frames`.
+    /// CRC-32 of these frames.
     pub frames_checksum: u32,
-    /// The state.
+    /// The state of the simulation.
     pub state: SavedState,
 }
 
 /// A checkpoint that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CheckpointError {
     /// The file cannot be read.
     #[error("cannot read the checkpoint {}; was the run started with --checkpoint?", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is no checkpoint.
-    #[error("{} is no checkpoint of a run", .path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// It was changed or cut short.
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// The file is not a checkpoint.
+    #[error("{} is not a checkpoint of a run", .path.display())]
+    Foreign { path: PathBuf },
+    /// The file was modified or truncated.
     #[error("the checkpoint {} is damaged: {reason}. Start the run again", .path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// It was written by a newer program.
-    #[error("the checkpoint {} has version {version}, but this program reads version {VERSION}; use the newer program", .path.display())]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        version: u32,
-    },
-    /// It was written by an older program.
-    #[error("the checkpoint {} has version {version}, but this program reads version {VERSION}; start the run again", .path.display())]
-    Older {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        version: u32,
-    },
+    Damaged { path: PathBuf, reason: String },
+    /// The file was written by a newer program.
+    #[error(
+        "the checkpoint {} has version {version}, but this program reads version {VERSION}; use the newer program",
+        .path.display()
+    )]
+    Newer { path: PathBuf, version: u32 },
+    /// The file was written by an older program.
+    #[error(
+        "the checkpoint {} has version {version}, but this program reads version {VERSION}; start the run again",
+        .path.display()
+    )]
+    Older { path: PathBuf, version: u32 },
     /// The saved state does not fit the scene.
     #[error(transparent)]
     State(#[from] RestoreError),
 }
 
 impl Checkpoint {
-    /// As the contents of a file: a line of text with version, length and checksum, then JSON, whose numbers are exact.
+    /// Encodes the checkpoint as the contents of a file: a line of text with version, length and checksum, then JSON
+    /// with exact numbers.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// Returns an error if a number is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, serde_json::Error> {
         let body = serde_json::to_vec(self)?;
         let mut file = format!("{KEYWORD} {VERSION} {} {:08x}\n", body.len(), crc32fast::hash(&body)).into_bytes();
@@ -87,17 +72,17 @@ impl Checkpoint {
     /// Reads a checkpoint.
     ///
     /// # Errors
-    /// When it cannot be read, is damaged, or was written by another version of this program.
+    /// Returns an error if the file cannot be read, is damaged, or has another version.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         let file =
             std::fs::read(path).map_err(|source| CheckpointError::Unreadable { path: path.to_owned(), source })?;
         Self::from_bytes(&file, path)
     }
 
-    /// Reads a checkpoint from the contents of a file; the path is for messages.
+    /// Decodes a checkpoint from the contents of a file. The path is used in messages.
     ///
     /// # Errors
-    /// When it is damaged, or was written by another version of this program.
+    /// Returns an error if the contents are damaged or have another version.
     pub fn from_bytes(file: &[u8], path: &Path) -> Result<Self, CheckpointError> {
         let path = path.to_owned();
         let end = file.iter().position(|&byte| byte == b'\n').unwrap_or(file.len());

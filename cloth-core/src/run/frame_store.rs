@@ -1,4 +1,4 @@
-//! The frames of a run: in memory, and beside a checkpoint in a file that only grows.
+//! The frames of a run, in memory and in an append-only file next to the checkpoint.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -9,7 +9,8 @@ use energy_dsl::Vector3;
 use super::checkpoint::CheckpointError;
 use crate::output::OutputError;
 
-/// Frames, each the positions of all vertices; in the file as double precision, little-endian, one after the other.
+/// Frames, each with the positions of all vertices. The file holds them one after the other, in little-endian double
+/// precision.
 #[derive(Debug)]
 pub(crate) struct FrameStore {
     frames: Vec<Vec<Vector3<f64>>>,
@@ -18,7 +19,7 @@ pub(crate) struct FrameStore {
 }
 
 impl FrameStore {
-    /// An empty store, with that file if there is to be one.
+    /// Creates an empty store, backed by a file if a path is given.
     pub(crate) fn new(path: Option<PathBuf>) -> Result<Self, OutputError> {
         let open = |path: PathBuf| match File::create(&path) {
             Ok(file) => Ok((path, file)),
@@ -27,7 +28,7 @@ impl FrameStore {
         Ok(Self { frames: Vec::new(), file: path.map(open).transpose()?, checksum: crc32fast::Hasher::new() })
     }
 
-    /// The first frames of a file; what follows them was written after the checkpoint and is dropped.
+    /// Reads the first frames of a file and truncates it after them: later frames were written after the checkpoint.
     pub(crate) fn reopen(path: &Path, count: usize, vertices: usize, checksum: u32) -> Result<Self, CheckpointError> {
         let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
         let bytes = std::fs::read(path).map_err(unreadable)?;
@@ -52,7 +53,7 @@ impl FrameStore {
         &self.frames
     }
 
-    /// The CRC-32 of all frames.
+    /// CRC-32 of all frames.
     pub(crate) fn checksum(&self) -> u32 {
         self.checksum.clone().finalize()
     }
@@ -67,7 +68,7 @@ impl FrameStore {
         Ok(())
     }
 
-    /// Makes sure that what was added is on the disk.
+    /// Flushes added frames to the disk.
     pub(crate) fn sync(&self) -> Result<(), OutputError> {
         let Some((path, file)) = &self.file else { return Ok(()) };
         file.sync_data().map_err(|source| OutputError::File { path: path.clone(), source })

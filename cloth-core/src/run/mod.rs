@@ -1,4 +1,4 @@
-//! A run from start to end: steps, frames, checkpoints, and the files that it leaves.
+//! Runs a scene from start to end, and writes frames, checkpoints and results.
 
 mod checkpoint;
 mod frame_store;
@@ -25,39 +25,39 @@ use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError, Summary};
 use frame_store::FrameStore;
 
-/// A run that cannot go on.
+/// A run that cannot be started or completed.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The scene.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Setting up, or a step.
+    /// The simulation cannot be set up, or a step failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The checkpoint.
+    /// The checkpoint cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// A file.
+    /// A file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// The animation.
+    /// The animation cannot be encoded.
     #[error(transparent)]
     Animation(#[from] AnimationError),
-    /// A picture.
+    /// A picture cannot be drawn.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// The plot of the ledger.
+    /// The ledger cannot be drawn.
     #[error("cannot draw the ledger: {0}")]
     Plot(String),
-    /// What is left at the end.
+    /// The final state cannot be evaluated.
     #[error("after the last step: {0}")]
     Evaluation(#[from] EvaluationError),
-    /// Numbers that JSON cannot hold.
+    /// The state contains numbers that JSON cannot represent.
     #[error("cannot save the state: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// A scene on its way.
+/// A simulation with its output.
 #[derive(Debug)]
 pub struct Run {
     scene: Scene,
@@ -66,35 +66,36 @@ pub struct Run {
     folder: OutputFolder,
     simulation: Simulation,
     frames: FrameStore,
-    /// Steps from one checkpoint to the next.
-    every: Option<u64>,
+    /// Steps between checkpoints; `None` for no checkpoints.
+    checkpoint_interval: Option<u64>,
 }
 
-/// How a run ended.
+/// The outcome of a run.
 #[derive(Debug)]
 pub struct Ending {
-    /// What was done.
+    /// Totals and final state.
     pub summary: Summary,
-    /// The files that were written.
+    /// The files written.
     pub files: Vec<PathBuf>,
-    /// Frames written.
+    /// Number of frames written.
     pub frames: usize,
-    /// Whether all steps were done.
+    /// Whether all steps were completed.
     pub finished: bool,
 }
 
 impl Run {
-    /// A run of the text of a scene file, whose path is for messages and for relative paths in it. Everything that can be wrong with it is found
-    /// before the folder is touched. `every` is the number of steps from one checkpoint to the next, if there are to be any.
+    /// Creates a run from the text of a scene file. `path` is used in messages and as the base of relative paths.
+    /// `checkpoint_interval` is the number of steps between checkpoints, `None` for no checkpoints. The output folder
+    /// is touched only after the scene has been validated.
     ///
     /// # Errors
-    /// When the scene is unfit or the folder cannot be written to.
+    /// Returns an error if the scene is invalid or the folder cannot be written to.
     pub fn new(
         text: String,
         path: &Path,
         output: &Path,
         overwrite: bool,
-        every: Option<u64>,
+        checkpoint_interval: Option<u64>,
     ) -> Result<Self, RunError> {
         let scene = Scene::parse(&text, path)?;
         let mut simulation = Simulation::new(&scene)?;
@@ -102,22 +103,22 @@ impl Run {
             simulation.keep_ledger()?;
         }
         let folder = OutputFolder::open(output, overwrite)?;
-        let frames = FrameStore::new(every.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES)))?;
-        let mut run = Self { scene, text, path: path.to_owned(), folder, simulation, frames, every };
+        let frames = FrameStore::new(checkpoint_interval.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES)))?;
+        let mut run = Self { scene, text, path: path.to_owned(), folder, simulation, frames, checkpoint_interval };
         run.add_frame()?;
         Ok(run)
     }
 
-    /// The same on at most so many threads; see [`Simulation::with_threads`].
+    /// Limits the number of threads; see [`Simulation::with_threads`].
     #[must_use]
     pub fn with_threads(self, threads: usize) -> Self {
         Self { simulation: self.simulation.with_threads(threads), ..self }
     }
 
-    /// Goes on from the checkpoint in a folder.
+    /// Resumes from the checkpoint in a folder.
     ///
     /// # Errors
-    /// When there is none, it is damaged, newer than this program, or no longer fits the scene.
+    /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene.
     pub fn resume(output: &Path) -> Result<Self, RunError> {
         let file = output.join(OutputFolder::CHECKPOINT);
         let Checkpoint { scene: text, path, every, frames, frames_checksum, state } = Checkpoint::read(&file)?;
@@ -127,24 +128,24 @@ impl Run {
         let vertices = simulation.positions().len();
         let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
         let folder = OutputFolder::reopen(output)?;
-        Ok(Self { scene, text, path, folder, simulation, frames, every: Some(every) })
+        Ok(Self { scene, text, path, folder, simulation, frames, checkpoint_interval: Some(every) })
     }
 
-    /// The simulation.
+    /// The simulation of the run.
     #[must_use]
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// Steps to the end, or until `stop` is set: then after the step that is under way. Whatever happens, the files of what was done are written.
-    /// `tell` hears of each step.
+    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each
+    /// step. The results so far are written in any case, also after a failed step.
     ///
     /// # Errors
-    /// When a step fails or a file cannot be written.
+    /// Returns an error if a step fails or a file cannot be written.
     pub fn go(
         &mut self,
         stop: &AtomicBool,
-        mut tell: impl FnMut(&Simulation, &StepReport),
+        mut on_step: impl FnMut(&Simulation, &StepReport),
     ) -> Result<Ending, RunError> {
         while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
             let report = match self.simulation.step() {
@@ -154,16 +155,16 @@ impl Run {
                     return Err(error.into());
                 }
             };
-            tell(&self.simulation, &report);
+            on_step(&self.simulation, &report);
             let done = self.simulation.steps_done();
             if done.is_multiple_of(self.scene.steps_per_frame()) {
                 self.add_frame()?;
             }
-            if self.every.is_some_and(|every| done.is_multiple_of(every)) {
+            if self.checkpoint_interval.is_some_and(|steps| done.is_multiple_of(steps)) {
                 self.save()?;
             }
         }
-        if self.every.is_some() && !self.simulation.is_finished() {
+        if self.checkpoint_interval.is_some() && !self.simulation.is_finished() {
             self.save()?;
         }
         self.finish()
@@ -188,7 +189,7 @@ impl Run {
         let checkpoint = Checkpoint {
             scene: self.text.clone(),
             path: self.absolute_path(),
-            every: self.every.unwrap_or(u64::MAX),
+            every: self.checkpoint_interval.unwrap_or(u64::MAX),
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),
             state: self.simulation.save(),
@@ -197,7 +198,7 @@ impl Run {
         Ok(())
     }
 
-    /// Writes everything that is made of the whole run.
+    /// Writes the files that cover the whole run.
     fn finish(&mut self) -> Result<Ending, RunError> {
         let summary = self.simulation.summary()?;
         let (wanted, frames) = (self.scene.output, self.frames.frames());
@@ -238,20 +239,21 @@ impl Run {
         Ok(Ending { summary, files, frames, finished })
     }
 
-    /// That of the scene file, which relative paths in it start from: the run may be read from elsewhere.
+    /// The absolute path of the scene file, so that its relative paths still resolve when the run is read from
+    /// elsewhere.
     fn absolute_path(&self) -> PathBuf {
         std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone())
     }
 
-    /// The folder of its files.
+    /// The output folder.
     #[must_use]
     pub fn folder(&self) -> &OutputFolder {
         &self.folder
     }
 
-    /// Whether it leaves checkpoints to resume from.
+    /// Whether the run writes checkpoints.
     #[must_use]
     pub fn leaves_checkpoints(&self) -> bool {
-        self.every.is_some()
+        self.checkpoint_interval.is_some()
     }
 }

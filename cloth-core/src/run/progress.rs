@@ -1,4 +1,4 @@
-//! What people see while a run is under way: how far it is, how long it will take, and whether it is stuck.
+//! Progress of a run: how far it is, how long it will take, and whether it is stuck.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -8,30 +8,30 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::integrator::StepReport;
 
-/// A progress line on standard error, hidden where that is no terminal, and a watch that warns when no step ends for long: for 20 s and for 20 times as
-/// long as steps took so far.
+/// A progress bar on standard error, hidden unless that is a terminal, and a watchdog. The watchdog warns if no step
+/// ends for 20 s and for 20 times the mean step time.
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
     steps: Option<Sender<u64>>,
-    watch: Option<JoinHandle<()>>,
+    watchdog: Option<JoinHandle<()>>,
     recent: Recent,
 }
 
-/// Means over the last steps or so.
+/// Moving averages over recent steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Recent {
     solves: f64,
     iterations: f64,
 }
 
-/// No shorter silence is worth a warning.
+/// Minimum time without a completed step before a warning.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// How many times as long as others a step must take.
+/// Minimum time without a completed step, in mean step times.
 const FACTOR: u32 = 20;
 
 impl Progress {
-    /// Of that many steps, some of which are done.
+    /// Starts the display for `steps` steps, of which `done` are completed.
     #[must_use]
     pub fn new(steps: u64, done: u64) -> Self {
         let style = ProgressStyle::with_template("{wide_bar} step {pos}/{len}, {eta} left{msg}");
@@ -39,13 +39,13 @@ impl Progress {
         bar.reset_eta();
         let (sender, receiver) = channel::<u64>();
         let shown = bar.clone();
-        let watch = std::thread::spawn(move || {
-            watch(&receiver, done, PATIENCE, |warning| shown.suspend(|| eprintln!("{warning}")));
+        let watchdog = std::thread::spawn(move || {
+            watchdog(&receiver, done, PATIENCE, |warning| shown.suspend(|| eprintln!("{warning}")));
         });
-        Self { bar, steps: Some(sender), watch: Some(watch), recent: Recent::default() }
+        Self { bar, steps: Some(sender), watchdog: Some(watchdog), recent: Recent::default() }
     }
 
-    /// A step ended.
+    /// Records a completed step.
     pub fn step(&mut self, step: u64, report: &StepReport) {
         let blend = |mean: &mut f64, new: u64| *mean += (new as f64 - *mean) / 8.0;
         blend(&mut self.recent.solves, report.solves);
@@ -55,22 +55,23 @@ impl Progress {
             self.bar.set_message(format!(", {solves:.1} solves of {:.0} iterations a step", iterations / solves));
         }
         self.bar.set_position(step);
-        // The watch listens until this goes.
+        // The watchdog stops once the sender is dropped, so sending cannot fail before that.
         let _ = self.steps.as_ref().map(|steps| steps.send(step));
     }
 
-    /// Takes the line away.
+    /// Removes the progress bar and stops the watchdog.
     pub fn finish(mut self) {
         self.bar.finish_and_clear();
         drop(self.steps.take());
-        if let Some(watch) = self.watch.take() {
-            let _ = watch.join();
+        if let Some(watchdog) = self.watchdog.take() {
+            let _ = watchdog.join();
         }
     }
 }
 
-/// Listens to the steps that end until there will be no more, and warns when none does for that long and for [`FACTOR`] times as long as others took.
-fn watch(steps: &Receiver<u64>, done: u64, patience: Duration, mut warn: impl FnMut(String)) {
+/// Receives completed steps until the sender is dropped. Warns if none arrives for `patience` and for [`FACTOR`] times
+/// the mean step time.
+fn watchdog(steps: &Receiver<u64>, done: u64, patience: Duration, mut warn: impl FnMut(String)) {
     let (start, mut last, mut ended, mut count) = (Instant::now(), done, Instant::now(), 0);
     loop {
         let mean = ended.duration_since(start) / count.max(1);
@@ -82,11 +83,11 @@ fn watch(steps: &Receiver<u64>, done: u64, patience: Duration, mut warn: impl Fn
     }
 }
 
-/// The warning.
+/// Formats the warning.
 fn stuck(last: u64, silent: Duration, mean: Duration) -> String {
     format!(
-        "warning: the step after {last} has taken {:.0} s so far, others took {:.2} s: it may be stuck. Interrupt with Ctrl-C; a smaller dt or \
-         `adaptive = true` may help",
+        "warning: the step after {last} has taken {:.0} s so far, others took {:.2} s: it may be stuck. \
+         Interrupt with Ctrl-C; a smaller dt or `adaptive = true` may help",
         silent.as_secs_f64(),
         mean.as_secs_f64()
     )
@@ -100,7 +101,7 @@ mod tests {
     fn the_warning_says_which_step_and_for_how_long() {
         let text = stuck(41, Duration::from_secs(30), Duration::from_millis(250));
         assert!(text.contains("after 41 has taken 30 s so far, others took 0.25 s"), "{text}");
-        // The watch ends with the progress.
+        // Finishing joins the watchdog.
         let mut progress = Progress::new(10, 3);
         progress.step(4, &StepReport::default());
         progress.finish();
@@ -111,7 +112,7 @@ mod tests {
         let (steps, ended) = channel();
         let (warn, warnings) = channel();
         let watching = std::thread::spawn(move || {
-            watch(&ended, 7, Duration::from_millis(100), |warning| warn.send(warning).expect("somebody listens"));
+            watchdog(&ended, 7, Duration::from_millis(100), |warning| warn.send(warning).expect("somebody listens"));
         });
         for step in 8..12 {
             steps.send(step).unwrap();

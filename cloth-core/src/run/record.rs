@@ -1,4 +1,4 @@
-//! What a finished run says of itself.
+//! The machine-readable record of a finished run.
 
 use std::path::{Path, PathBuf};
 
@@ -7,31 +7,31 @@ use serde::{Deserialize, Serialize};
 use crate::output::OutputFolder;
 use crate::simulation::Summary;
 
-/// What a finished run says of itself, in `run.json`.
+/// The record of a finished run, `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// The version of this record.
+    /// Version of the format.
     pub version: u32,
     /// The text of the scene file.
     pub scene: String,
-    /// Its path.
+    /// The path of the scene file.
     pub path: PathBuf,
-    /// Whether all steps were done.
+    /// Whether all steps were completed.
     pub finished: bool,
-    /// Frames written.
+    /// Number of frames written.
     pub frames: usize,
-    /// What was done.
+    /// Totals and final state.
     pub summary: Summary,
 }
 
 impl Record {
-    /// The version of records that this program writes.
+    /// The version that this program writes.
     pub const VERSION: u32 = 1;
 
-    /// The record in the folder of a run.
+    /// Reads the record in the folder of a run.
     ///
     /// # Errors
-    /// When there is none, or it is damaged or newer than this program.
+    /// Returns an error if the record is missing, damaged or newer than this program.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(OutputFolder::RECORD);
         let bytes = std::fs::read(&path).map_err(|source| RecordError::Unreadable { path: path.clone(), source })?;
@@ -44,37 +44,26 @@ impl Record {
     }
 }
 
-/// The part of a record that says how to read the rest.
+/// The part of a record that tells how to read the rest.
 #[derive(Deserialize)]
 struct Version {
     version: u32,
 }
 
-/// A folder that is not that of a finished run.
+/// A folder that does not hold a finished run.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum RecordError {
-    /// It is not there.
+    /// The file cannot be read.
     #[error("cannot read {}; is this the folder of a finished run?", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It cannot be understood.
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// The file is not a valid record.
     #[error("{} is damaged: {source}", .path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
-    /// It was written by a newer program.
-    #[error("{} has version {version}, but this program reads version {}; use the newer program", .path.display(), Record::VERSION)]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        version: u32,
-    },
+    Damaged { path: PathBuf, source: serde_json::Error },
+    /// The file was written by a newer program.
+    #[error(
+        "{} has version {version}, but this program reads version {}; use the newer program",
+        .path.display(), Record::VERSION
+    )]
+    Newer { path: PathBuf, version: u32 },
 }

@@ -1,4 +1,4 @@
-//! A page on a finished run: pictures, energies, times, what was evaluated, and the audit of what it was made of.
+//! An HTML page on a finished run: pictures, energies, times, evaluation counts, and the audit of its elements.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,30 +14,26 @@ use crate::output::{OutputError, OutputFolder};
 use crate::scene::Scene;
 use crate::simulation::Summary;
 
-/// A folder of which no page can be made.
+/// A folder for which no page can be made.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ReportError {
-    /// What the run says of itself.
+    /// The record of the run cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A picture or plot is there but cannot be read.
+    /// A picture or plot exists but cannot be read.
     #[error("cannot read {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Unreadable { path: PathBuf, source: std::io::Error },
     /// The page cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }
 
-/// Makes `report.html` from the files of a finished run, one page without anything from elsewhere; returns its path. Everything that the run was made of
-/// is audited again.
+/// Writes `report.html` from the files of a finished run and returns its path. The page is self-contained. The elements
+/// of the run are audited again.
 ///
 /// # Errors
-/// When a file is missing, damaged or newer than this program, or the page cannot be written.
+/// Returns an error if a file is missing, damaged or newer than this program, or the page cannot be written.
 pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
     let record = Record::read(folder)?;
     let picture = optional(&folder.join(OutputFolder::PICTURE))?;
@@ -51,12 +47,12 @@ fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
     std::fs::read(path).map_err(|source| ReportError::Unreadable { path: path.to_owned(), source })
 }
 
-/// A file that the scene may have done without.
+/// Reads a file that the scene may have disabled; `None` if it does not exist.
 fn optional(path: &Path) -> Result<Option<Vec<u8>>, ReportError> {
     if path.exists() { read(path).map(Some) } else { Ok(None) }
 }
 
-/// What the audit says of one element.
+/// The result of the audit of one element.
 struct Verdict {
     element: String,
     passed: bool,
@@ -73,7 +69,7 @@ fn audited(record: &Record) -> Vec<Verdict> {
         declared.or_else(|| energy_elements::find(name).map(Target::of_catalogue))
     };
     let verdict = |name: &str| match target(name) {
-        Some(target) => judged(name, &audit_all(&[target], None, Options::default())),
+        Some(target) => verdict_on(name, &audit_all(&[target], None, Options::default())),
         None => {
             let text = "its declaration is no longer where the scene had it".to_owned();
             Verdict { element: name.to_owned(), passed: false, text }
@@ -82,7 +78,7 @@ fn audited(record: &Record) -> Vec<Verdict> {
     elements.into_iter().map(verdict).collect()
 }
 
-fn judged(name: &str, report: &Report) -> Verdict {
+fn verdict_on(name: &str, report: &Report) -> Verdict {
     let worst = |check: Check| {
         let lines = report.lines.iter().filter(|line| line.check == check);
         lines.map(|line| line.worst).reduce(f64::max).map_or("–".into(), |worst| format!("{worst:.0e}"))
@@ -102,7 +98,7 @@ fn judged(name: &str, report: &Report) -> Verdict {
     Verdict { element: name.to_owned(), passed: all.is_empty(), text }
 }
 
-/// The declarations of the scene's own files.
+/// Returns the declarations in the scene's own files.
 fn own_targets(record: &Record) -> Vec<Target> {
     let Ok(scene) = Scene::parse(&record.scene, &record.path) else { return Vec::new() };
     let files = scene.garments.iter().filter_map(|garment| match &garment.fabric.material {
@@ -124,7 +120,8 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
     let Summary { vertices, pinned, triangles, integrator, dt, .. } = &record.summary;
     let steps = record.summary.totals.steps;
     add(format_args!(
-        "<p>{vertices} vertices ({pinned} pinned), {triangles} triangles; {steps} steps of {dt} s by {}; {} frames.{}</p>",
+        "<p>{vertices} vertices ({pinned} pinned), {triangles} triangles; \
+         {steps} steps of {dt} s by {}; {} frames.{}</p>",
         escaped(integrator),
         record.frames,
         if record.finished { "" } else { " <b>Stopped before its end.</b>" }
@@ -148,8 +145,10 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
     page
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
-img,svg{max-width:100%;height:auto}table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
+const STYLE: &str = "\
+body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
+img,svg{max-width:100%;height:auto}\
+table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
 td,th{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:right}td:not(.text){white-space:nowrap}\
 td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;padding:1rem;overflow:auto;font-size:13px}\
 .good{color:#176617}.bad{color:#a01818}";
@@ -168,7 +167,8 @@ fn times(summary: &Summary) -> String {
     let mean = summary.totals.iterations as f64 / summary.totals.solves.max(1) as f64;
     format!(
         "<table><tr><th>phase</th><th>s</th><th>ms per step</th><th>%</th></tr>\n{rows}</table>\n\
-         <p>{} linear solves, {mean:.1} iterations each; {} steps solved again with projected curvature; {} rejected.</p>",
+         <p>{} linear solves, {mean:.1} iterations each; \
+         {} steps with projected Hessians; {} rejected.</p>",
         summary.totals.solves, summary.totals.projected, summary.totals.rejected
     )
 }
@@ -183,7 +183,8 @@ fn evaluated(summary: &Summary) -> String {
             term.counts.hessian.projected,
         );
         format!(
-            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}<td>{flagged}</td><td>{projected}</td><td>{}</td></tr>\n",
+            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}\
+             <td>{flagged}</td><td>{projected}</td><td>{}</td></tr>\n",
             escaped(&term.name),
             escaped(&term.element),
             term.reused
@@ -192,8 +193,10 @@ fn evaluated(summary: &Summary) -> String {
     let left_out: String =
         summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();
     format!(
-        "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th><th>gradient</th><th>skipped</th>\
-         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th><th>reused</th></tr>\n{}</table>\n{left_out}",
+        "<table><tr><th>term</th><th>element</th><th>energy, J</th><th>value</th><th>skipped</th>\
+         <th>gradient</th><th>skipped</th>\
+         <th>Hessian</th><th>skipped</th><th>flagged</th><th>projected</th><th>reused</th></tr>\n\
+         {}</table>\n{left_out}",
         rows.collect::<String>()
     )
 }

@@ -1,4 +1,4 @@
-//! What a run evaluated and what it could leave out, as tables.
+//! Tables of evaluation counts and times.
 
 use std::fmt::Write as _;
 
@@ -8,9 +8,9 @@ use energy_solve::Tally;
 use crate::integrator::SolvedBy;
 use crate::simulation::Summary;
 
-/// For each term its elements and, for values, gradients and Hessians, how many were evaluated and skipped (all their vertices are pinned); how many were
-/// flagged or had negative curvature changed, and how many Hessians were known already because they are constant. Then islands, asleep or not, what solved the linear systems, and the
-/// time of each phase, where the integrator tells.
+/// Formats a table with one row per term: its elements; the values, gradients and Hessians that were evaluated or
+/// skipped, because all their vertices are pinned; and the numbers of flagged, projected and reused ones. Islands,
+/// linear solvers and the time of each phase follow, if the integrator measures it.
 ///
 /// ```
 /// use cloth_core::{Simulation, run::stats};
@@ -85,7 +85,7 @@ fn plain<const N: usize>(head: [&str; N]) -> Table {
     table
 }
 
-/// Numbers to the right.
+/// Right-aligns all columns except the first.
 fn aligned(mut table: Table) -> Table {
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);

@@ -2,25 +2,20 @@ use std::path::{Path, PathBuf};
 
 /// A scene file that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum SceneError {
     /// The file cannot be read.
     #[error("cannot read the scene {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Something in it is wrong.
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// The text is not a valid scene.
     #[error("{}:{line}:{column}: {message}", .path.display())]
     Invalid {
-        /// The file.
         path: PathBuf,
         /// The line, from 1.
         line: usize,
         /// The column in characters, from 1.
         column: usize,
-        /// What is wrong, and what would fix it.
+        /// The problem, with a remedy if one is known.
         message: String,
     },
 }
@@ -33,9 +28,9 @@ impl SceneError {
         let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
         let suggestion = suggest(error.message()).map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
         let message = match error.message() {
-            // The parser's words for a table that stands for a choice.
+            // serde's message for a table that stands for an enum.
             several if several.starts_with("wanted exactly 1 element") => {
-                "exactly one of the alternatives must be given here".to_owned()
+                "expected exactly one of the alternatives here".to_owned()
             }
             other => format!("{}{suggestion}", other.replace('\n', " ")),
         };
@@ -43,7 +38,7 @@ impl SceneError {
     }
 }
 
-/// The known name closest to the unknown one in "unknown field `a`, expected one of `b`, `c`".
+/// Returns the known name closest to the unknown one in "unknown field `a`, expected one of `b`, `c`".
 fn suggest(message: &str) -> Option<&str> {
     let mut names = message.strip_prefix("unknown ")?.split('`').skip(1).step_by(2);
     let unknown = names.next()?;
@@ -90,7 +85,7 @@ stiffness = 1e-5
         assert!(text.starts_with("s.toml:10:1: ") && text.ends_with("did you mean `poisson_ratio`?"), "{text}");
         let text = message("[fabric.material.stvk]", "[fabric.material.mass-spring]\n[fabric.material.stvk]");
         assert!(
-            text.starts_with("s.toml:8:") && text.ends_with("exactly one of the alternatives must be given here"),
+            text.starts_with("s.toml:8:") && text.ends_with("expected exactly one of the alternatives here"),
             "{text}"
         );
         assert!(!message("density", "colour").contains("did you mean"));
@@ -102,12 +97,12 @@ stiffness = 1e-5
             let text = message(from, to);
             assert!(text.starts_with(start) && text.contains(part), "{text}");
         };
-        expect("dt = 0.01", "dt = nan", "s.toml:1:6: ", "NaN must be a finite number above 0");
-        expect("0.15", "-0.15", "s.toml:7:11: ", "must be a finite number above 0");
-        expect("50.0", "inf", "s.toml:9:21: ", "must be a finite number, 0 or above");
+        expect("dt = 0.01", "dt = nan", "s.toml:1:6: ", "expected a finite number greater than 0, got NaN");
+        expect("0.15", "-0.15", "s.toml:7:11: ", "expected a finite number greater than 0, got -0.15");
+        expect("50.0", "inf", "s.toml:9:21: ", "expected a finite number of at least 0, got inf");
         expect("0.3", "1.0", "s.toml:10:17: ", "between −1 and 1");
-        expect("[4, 4]", "[0, 4]", "s.toml:4:9: ", "between 1 and 4096");
-        expect("[1.0, 1.0]", "[1.0, nan]", "s.toml:5:8: ", "above 0 only");
+        expect("[4, 4]", "[0, 4]", "s.toml:4:9: ", "from 1 to 4096");
+        expect("[1.0, 1.0]", "[1.0, nan]", "s.toml:5:8: ", "greater than 0 only");
         expect("density = 0.15", "", "s.toml:6:1: ", "missing field `density`");
         expect("dt = 0.01", "dt = ", "s.toml:1:", "");
         expect("1e-5", "\"soft\"", "s.toml:12:13: ", "invalid type");

@@ -1,4 +1,4 @@
-//! A fabric, in place or by name.
+//! A fabric in a scene file: described in place, or chosen by name.
 
 use std::fmt;
 
@@ -8,10 +8,10 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
 use crate::fabric::{Fabric, MEASURED};
 
-/// What a scene file may say of a fabric.
+/// A fabric in a scene file, for the schema.
 #[derive(JsonSchema)]
 #[serde(untagged)]
-#[expect(dead_code, reason = "it is there for its schema")]
+#[expect(dead_code, reason = "for the schema only")]
 pub(crate) enum FabricChoice {
     /// The name of a measured fabric.
     Name(String),
@@ -19,7 +19,7 @@ pub(crate) enum FabricChoice {
     Described(Box<Fabric>),
 }
 
-/// A measured fabric alone in a text.
+/// A file that consists of a measured fabric.
 #[derive(serde::Deserialize)]
 struct Alone {
     fabric: Fabric,
@@ -31,7 +31,7 @@ impl<'de> Visitor<'de> for Choice {
     type Value = Fabric;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a table that describes a fabric, or the name of a measured one")
+        f.write_str("the table of a fabric, or the name of a measured one")
     }
 
     fn visit_str<E: Error>(self, name: &str) -> Result<Fabric, E> {

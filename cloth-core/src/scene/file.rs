@@ -11,21 +11,21 @@ use crate::wind::Wind;
 /// The version of scene files that this program reads.
 const VERSION: u32 = 1;
 
-/// What a scene file may say.
+/// The keys of a scene file.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "A scene of `cloth run`")]
 pub(super) struct File {
-    /// The version of the format: 1, the default.
+    /// Version of the format. Default 1.
     #[serde(default = "newest")]
     version: u32,
-    /// The shape of the only garment, beside `fabric`; for several say `[[garment]]`.
+    /// The mesh of a single garment, with `fabric`. For several garments use `[[garment]]`.
     mesh: Option<Mesh>,
-    /// What the only garment is made of: a table, or the name of a measured fabric.
+    /// The fabric of the single garment: a table, or the name of a measured fabric.
     #[serde(default, deserialize_with = "some_fabric")]
     #[schemars(with = "Option<super::fabric_choice::FabricChoice>")]
     fabric: Option<Fabric>,
-    /// Pieces of cloth.
+    /// Garments, each with its mesh and fabric.
     #[serde(default)]
     garment: Vec<Garment>,
     /// Strands of hair.
@@ -34,13 +34,13 @@ pub(super) struct File {
     /// Stitches between garments. Default none.
     #[serde(default)]
     seams: Vec<Seam>,
-    /// Vertices that do not move, or move as they are told. Default none.
+    /// Pinned vertices, fixed or moving. Default none.
     #[serde(default)]
     pins: Vec<Pin>,
-    /// Solids that keep cloth out. Default none.
+    /// Obstacles that the cloth cannot enter. Default none.
     #[serde(default)]
     obstacles: Vec<ObstacleDescription>,
-    /// Wind. Default none.
+    /// Wind. Default still air.
     wind: Option<Wind>,
     /// Acceleration of gravity, in m/s². Default [0, 0, −9.81].
     #[serde(default = "standard_gravity", deserialize_with = "finite_triple")]
@@ -48,34 +48,35 @@ pub(super) struct File {
     /// Drag per mass, in 1/s: the force −drag m v on every vertex. Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     drag: f64,
-    /// `implicit-euler` (the default), `newton`, `bdf2`, `implicit-midpoint`, `trapezoid`, `symplectic-euler`, `verlet`, `explicit-euler` or
-    /// `explicit-euler-as-printed`.
+    /// `implicit-euler` (the default), `newton`, `bdf2`, `implicit-midpoint`, `trapezoid`, `symplectic-euler`,
+    /// `verlet`, `explicit-euler` or `explicit-euler-as-printed`.
     #[serde(default)]
     integrator: Scheme,
-    /// How exactly Newton's method solves a step, for the integrators that use it. Default each integrator's own.
+    /// Convergence criteria of Newton's method, for the integrators that use it. Default depends on the integrator.
     #[serde(default)]
     tolerances: Tolerances,
-    /// What solves the linear systems of implicit integrators, where they are symmetric: `auto` (the default), `over-relaxation`, `multigrid`, `cholesky`
-    /// or `incomplete-cholesky`.
+    /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
+    /// `multigrid`, `cholesky` or `incomplete-cholesky`.
     #[serde(default)]
     linear_solver: LinearSolverChoice,
-    /// Whether a step that fails is tried again with half its size, and so on. Default false.
+    /// Retry a failed step with half its size, and so on. Default false.
     #[serde(default)]
     adaptive: bool,
-    /// Whether and when what is still falls asleep and costs nothing: `true`, or a table. Default `false`: sleep leaves out what little motion is left.
+    /// Let islands that are still fall asleep, which costs nothing per step: `true`, or a table. Default `false`,
+    /// because sleep discards slow residual motion.
     #[serde(default, deserialize_with = "super::sleep::sleep")]
     #[schemars(with = "super::sleep::SleepChoice")]
     sleep: Option<Sleep>,
     /// Time step h, in s.
     #[serde(deserialize_with = "positive")]
     dt: f64,
-    /// Time to simulate, in s; rounded to whole steps.
+    /// Simulated time, in s; rounded to whole steps.
     #[serde(deserialize_with = "non_negative")]
     duration: f64,
     /// Frames written per simulated second, rounded to whole steps per frame. Default 25.
     #[serde(default = "frame_rate", deserialize_with = "positive")]
     frames_per_second: f64,
-    /// Which files are written.
+    /// The files to write.
     #[serde(default)]
     output: OutputChoice,
 }
@@ -111,14 +112,12 @@ impl TryFrom<File> for Scene {
                 let only = Garment { name: None, mesh, fabric, placement, velocity: [0.0; 3], spin: [0.0; 3] };
                 garments.insert(0, only);
             }
-            (Some(_), None) => return Err("missing field `fabric`: what the mesh is made of".to_owned()),
-            (None, Some(_)) => return Err("missing field `mesh`: the shape of the fabric".to_owned()),
+            (Some(_), None) => return Err("missing field `fabric`, the material of the mesh".to_owned()),
+            (None, Some(_)) => return Err("missing field `mesh`, the shape of the fabric".to_owned()),
             (None, None) => {}
         }
         if garments.is_empty() && file.hair.is_empty() {
-            return Err(
-                "there is nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned()
-            );
+            return Err("nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned());
         }
         Ok(Self {
             garments,

@@ -15,27 +15,27 @@ use crate::mesh::{
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Garment {
-    /// What pins and seams call it. Default `garment` and its number from 0.
+    /// Name for pins and seams. Default `garment` and its index from 0.
     #[serde(default)]
     pub name: Option<String>,
-    /// Its shape: the table `sheet`, `disc`, `strip` or `obj`.
+    /// Shape: the table `sheet`, `disc`, `strip` or `obj`.
     pub mesh: Mesh,
-    /// What it is made of: a table, or the name of a measured fabric (see `cloth fabrics`).
+    /// Fabric: a table, or the name of a measured fabric (see `cloth fabrics`).
     #[serde(deserialize_with = "super::fabric_choice::fabric")]
     #[schemars(with = "super::fabric_choice::FabricChoice")]
     pub fabric: Fabric,
-    /// Where it is at the start. Default as built.
+    /// Initial placement. Default as built.
     #[serde(default)]
     pub placement: Placement,
-    /// Its velocity at the start, in m/s. Default 0.
+    /// Initial velocity, in m/s. Default 0.
     #[serde(default, deserialize_with = "finite_triple")]
     pub velocity: [f64; 3],
-    /// Its spin at the start about where its origin was placed, in rad/s. Default 0.
+    /// Initial angular velocity about the placed origin, in rad/s. Default 0.
     #[serde(default, deserialize_with = "finite_triple")]
     pub spin: [f64; 3],
 }
 
-/// The cloth's shape at rest and at the start.
+/// The rest shape and initial shape of a garment.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Mesh {
@@ -47,34 +47,34 @@ pub enum Mesh {
     Strip(Strip),
     /// An OBJ file, with lengths in m.
     Obj {
-        /// Its path, from the scene file's folder.
+        /// Path, relative to the scene file's folder.
         path: PathBuf,
     },
 }
 
-/// Scaled, which also scales the shape at rest, then turned, then shifted.
+/// Scales, then rotates, then translates. Scaling also scales the rest shape.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Placement {
-    /// How many times as large. Default 1.
+    /// Scale factor. Default 1.
     #[serde(default = "one", deserialize_with = "positive")]
     pub scale: f64,
-    /// A turn about an axis through the origin. Default none.
+    /// Rotation about an axis through the origin. Default none.
     #[serde(default)]
     pub rotate: Option<Turn>,
-    /// A shift, in m. Default none.
+    /// Translation, in m. Default none.
     #[serde(default, deserialize_with = "finite_triple")]
     pub translate: [f64; 3],
 }
 
-/// A turn about an axis, right-handed.
+/// A right-handed rotation about an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Turn {
-    /// The direction of the axis.
+    /// Direction of the axis.
     #[serde(deserialize_with = "nonzero_triple")]
     pub axis: [f64; 3],
-    /// How far, in degrees.
+    /// Angle, in degrees.
     #[serde(deserialize_with = "number")]
     pub angle: f64,
 }
@@ -90,46 +90,46 @@ impl Default for Placement {
 }
 
 impl Placement {
-    /// The turn and the shift.
+    /// Returns the rotation and translation.
     #[must_use]
     pub fn pose(&self) -> Pose {
-        let turned = self.rotate.map_or(Pose::REST, |turn| Pose::turned(turn.axis, turn.angle, [0.0; 3]));
-        turned.shifted(self.translate)
+        let rotation = self.rotate.map_or(Pose::IDENTITY, |turn| Pose::rotation(turn.axis, turn.angle, [0.0; 3]));
+        rotation.translated(self.translate)
     }
 }
 
-/// A mesh that cannot be had.
+/// A mesh that cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshSourceError {
-    /// The OBJ file.
+    /// The OBJ file is invalid.
     #[error(transparent)]
     Obj(#[from] ObjError),
-    /// A built-in shape, or one that was scaled.
+    /// A built-in or scaled mesh is invalid.
     #[error("mesh: {0}")]
     Built(#[from] MeshError),
-    /// Its folds.
+    /// The pleats of a sheet are too deep.
     #[error("mesh.sheet.pleats: {0}")]
     Pleats(#[from] PleatsError),
 }
 
-/// The shape of a cloth.
+/// The shape of a garment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// At rest.
+    /// The rest mesh.
     pub mesh: TriangleMesh,
-    /// The vertices at the start, in m.
+    /// Initial positions, in m.
     pub start: Vec<Vector3<f64>>,
-    /// Their velocities, in m/s.
+    /// Initial velocities, in m/s.
     pub velocities: Vec<Vector3<f64>>,
-    /// The pairs of vertices that springs would join.
+    /// The vertex pairs that a mass–spring fabric joins.
     pub springs: SpringNetwork,
 }
 
 impl Garment {
-    /// Its shape. Relative paths start from `folder`.
+    /// Builds the shape. Relative paths refer to `folder`.
     ///
     /// # Errors
-    /// When the file cannot be read or the mesh is unfit.
+    /// Returns an error if the file cannot be read or the mesh is invalid.
     pub fn shape(&self, folder: &Path) -> Result<Shape, MeshSourceError> {
         let sheet = match &self.mesh {
             Mesh::Sheet(sheet) => Some(*sheet),
@@ -142,7 +142,7 @@ impl Garment {
             Mesh::Disc(disc) => disc.mesh()?,
             Mesh::Obj { path } => read_obj(&folder.join(path))?,
         };
-        let drawn = sheet.map_or_else(|| Ok(mesh.vertices().to_vec()), |sheet| sheet.start())?;
+        let initial = sheet.map_or_else(|| Ok(mesh.vertices().to_vec()), |sheet| sheet.start())?;
         let springs = match &sheet {
             Some(sheet) => SpringNetwork::of_sheet(sheet),
             None => SpringNetwork::of_mesh(&Topology::of(&mesh)),
@@ -150,7 +150,7 @@ impl Garment {
         let Placement { scale, translate, .. } = self.placement;
         let mesh = if scale == 1.0 { mesh } else { mesh.scaled(scale)? };
         let pose = self.placement.pose();
-        let start: Vec<Vector3<f64>> = drawn.iter().map(|p| pose.applied(p.map(|c| scale * c))).collect();
+        let start: Vec<Vector3<f64>> = initial.iter().map(|p| pose.transform(p.map(|c| scale * c))).collect();
         let velocity = |p: &Vector3<f64>| -> Vector3<f64> {
             let turning = cross(self.spin, subtract(*p, translate));
             std::array::from_fn(|axis| self.velocity[axis] + turning[axis])

@@ -1,4 +1,4 @@
-//! Scene files: what to simulate, in TOML. Every key is a field below, with its unit; unknown keys are refused.
+//! Scene files in TOML. Each key is a field below, with its unit; unknown keys are errors.
 
 mod error;
 mod fabric_choice;
@@ -31,45 +31,45 @@ use crate::fabric::Material;
 use crate::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
 
-/// A scene.
+/// A scene: what to simulate, and which files to write.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "file::File")]
 pub struct Scene {
-    /// Pieces of cloth.
+    /// Garments, each with its mesh and fabric.
     pub garments: Vec<Garment>,
     /// Strands of hair.
     pub hair: Vec<Hair>,
     /// Stitches between garments.
     pub seams: Vec<Seam>,
-    /// Vertices that do not move, or move as they are told.
+    /// Pinned vertices.
     pub pins: Vec<Pin>,
-    /// Solids that keep cloth out.
+    /// Obstacles that the cloth cannot enter.
     pub obstacles: Vec<ObstacleDescription>,
-    /// Wind.
+    /// Wind; `None` for still air.
     pub wind: Option<Wind>,
     /// Acceleration of gravity, in m/s².
     pub gravity: [f64; 3],
     /// Drag per mass, in 1/s: the force −drag m v on every vertex.
     pub drag: f64,
-    /// How time advances.
+    /// The time integrator.
     pub integrator: Scheme,
-    /// How exactly Newton's method solves a step.
+    /// Convergence criteria of Newton's method.
     pub tolerances: Tolerances,
-    /// What solves its linear systems.
+    /// The linear solver of implicit integrators.
     pub linear_solver: LinearSolverChoice,
-    /// Whether a step that fails is tried again with half its size, and so on; see [`Adaptive`].
+    /// Whether a failed step is retried with smaller sizes; see [`Adaptive`].
     pub adaptive: bool,
-    /// When what is still falls asleep; `None` for never.
+    /// When islands fall asleep; `None` for never.
     pub sleep: Option<Sleep>,
     /// Time step h, in s.
     pub dt: f64,
-    /// Time to simulate, in s; rounded to whole steps.
+    /// Simulated time, in s; rounded to whole steps.
     pub duration: f64,
     /// Frames written per simulated second, rounded to whole steps per frame.
     pub frames_per_second: f64,
-    /// Which files are written.
+    /// The files to write.
     pub output: OutputChoice,
-    /// The folder that relative paths start from: that of the scene file.
+    /// The folder of the scene file, which relative paths refer to.
     pub folder: PathBuf,
 }
 
@@ -77,48 +77,48 @@ impl Scene {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// When the file cannot be read or a key is unknown, missing or has an impossible value.
+    /// Returns an error if the file cannot be read, or a key is unknown, missing or invalid.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         Self::parse(&Self::text(path)?, path)
     }
 
-    /// The text of a scene file.
+    /// Returns the text of a scene file.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// Returns an error if the file cannot be read.
     pub fn text(path: &Path) -> Result<String, SceneError> {
         std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
     }
 
-    /// Reads a scene from text. The path is for messages, and its folder is where relative paths start.
+    /// Parses a scene. `path` is used in messages and as the base of relative paths.
     ///
     /// # Errors
-    /// When a key is unknown, missing or has an impossible value.
+    /// Returns an error if a key is unknown, missing or invalid.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::invalid(path, text, &error))?;
         scene.folder = path.parent().map(Path::to_owned).unwrap_or_default();
         for garment in &mut scene.garments {
             if let Material::File(declared) = &mut garment.fabric.material {
-                declared.seek_in(&scene.folder);
+                declared.resolve_path(&scene.folder);
             }
         }
         Ok(scene)
     }
 
-    /// The integrator.
+    /// Creates the integrator.
     #[must_use]
     pub fn stepper(&self) -> Box<dyn Integrator> {
         let scheme = self.integrator.with_options(self.tolerances, self.linear_solver);
         if self.adaptive { Box::new(Adaptive::new(scheme)) } else { scheme }
     }
 
-    /// The number of steps.
+    /// Number of steps.
     #[must_use]
     pub fn steps(&self) -> u64 {
         (self.duration / self.dt).round() as u64
     }
 
-    /// Steps from one frame to the next.
+    /// Number of steps per frame, at least 1.
     #[must_use]
     pub fn steps_per_frame(&self) -> u64 {
         ((1.0 / (self.frames_per_second * self.dt)).round() as u64).max(1)

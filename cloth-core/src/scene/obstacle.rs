@@ -10,7 +10,7 @@ use crate::geometry::{Pose, norm};
 use crate::mesh::{MeshError, ObjError, read_obj};
 use crate::motion::Motion;
 
-/// A solid that keeps cloth out: exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`.
+/// An obstacle: exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys")]
 #[schemars(with = "Keys")]
@@ -19,36 +19,37 @@ pub struct ObstacleDescription {
     rest: Common,
 }
 
-/// What a scene file says.
+/// The keys of an obstacle in a scene file.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Everything below a plane.
     plane: Option<PlaneKeys>,
-    /// A ball.
+    /// All points within a radius of a centre.
     sphere: Option<SphereKeys>,
     /// All points within a radius of a segment.
     capsule: Option<CapsuleKeys>,
-    /// A box.
+    /// A box with edges along any directions.
     #[serde(rename = "box")]
     block: Option<BoxKeys>,
-    /// A surface of triangles.
+    /// A solid bounded by a triangle mesh.
     mesh: Option<MeshKeys>,
-    /// What the ledger calls it. Default the shape's name and its number from 0.
+    /// Name in the ledger and in messages. Default the shape's name and the obstacle's index from 0.
     name: Option<String>,
-    /// The coefficient of friction. Default 0.
+    /// Coefficient of friction. Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     friction: f64,
-    /// The sliding velocity at which friction is 1/√2 of its full size, in m/s: below it cloth sticks, though it creeps. Default 0.001.
+    /// Sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Slower cloth sticks, but creeps.
+    /// Default 0.001.
     #[serde(default = "sticking", deserialize_with = "positive")]
     sticking: f64,
-    /// Cloth is pushed away within this distance, in m. Default 0.005.
+    /// Contact acts within this distance of the surface, in m. Default 0.005.
     #[serde(default = "thickness", deserialize_with = "positive")]
     thickness: f64,
-    /// How hard: at the surface with this times the thickness as acceleration; in 1/s². Default 5e6.
+    /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. Default 5e6.
     #[serde(default = "stiffness", deserialize_with = "positive")]
     stiffness: f64,
-    /// How it moves. Default not at all.
+    /// Motion over time. Default none.
     motion: Option<Motion>,
 }
 
@@ -74,10 +75,10 @@ enum ShapeKeys {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PlaneKeys {
-    /// A point of it, in m. Default the origin.
+    /// A point on the plane, in m. Default the origin.
     #[serde(default, deserialize_with = "finite_triple")]
     point: [f64; 3],
-    /// Where cloth may be. Default [0, 0, 1].
+    /// Normal, pointing to the side of the cloth. Default [0, 0, 1].
     #[serde(default = "up", deserialize_with = "nonzero_triple")]
     normal: [f64; 3],
 }
@@ -113,13 +114,13 @@ struct BoxKeys {
     /// The centre, in m. Default the origin.
     #[serde(default, deserialize_with = "finite_triple")]
     centre: [f64; 3],
-    /// Its edges, in m.
+    /// Edge lengths, in m.
     #[serde(deserialize_with = "all_positive")]
     size: [f64; 3],
-    /// A turn about its centre. Default none.
+    /// Rotation about the centre. Default none.
     #[serde(default)]
     rotate: Option<Turn>,
-    /// The radius of its rounded edges, within its size, in m. Default 0.
+    /// Radius of the rounded edges, which stay within the size, in m. Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     rounding: f64,
 }
@@ -127,45 +128,30 @@ struct BoxKeys {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MeshKeys {
-    /// An OBJ file, with lengths in m, from the scene file's folder. Corners run anticlockwise seen from outside; a surface with a rim is a shell.
+    /// An OBJ file, with lengths in m, relative to the scene file's folder. Corners run anticlockwise seen from
+    /// outside. An open mesh is a shell.
     path: PathBuf,
-    /// Where it is at the start. Default as in the file.
+    /// Initial placement. Default as in the file.
     #[serde(default)]
     placement: Placement,
-    /// All points within this distance of the surface are of the solid, too, in m; needed where the surface has a rim. Default 0.
+    /// Extends the solid by this distance from the surface, in m. Required for an open mesh. Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     rounding: f64,
 }
 
-/// A mesh that is no obstacle.
+/// A mesh that cannot be an obstacle.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ObstacleError {
-    /// The OBJ file.
+    /// The OBJ file is invalid.
     #[error("{name}: {source}")]
-    Obj {
-        /// The obstacle.
-        name: String,
-        /// What is wrong.
-        source: ObjError,
-    },
-    /// Its size.
+    Obj { name: String, source: ObjError },
+    /// The scaled mesh is invalid.
     #[error("{name}: {source}")]
-    Scaled {
-        /// The obstacle.
-        name: String,
-        /// What is wrong.
-        source: MeshError,
-    },
-    /// How its triangles are turned.
+    Scaled { name: String, source: MeshError },
+    /// The mesh does not bound a solid.
     #[error("{name}: {}: {source}", .path.display())]
-    Surface {
-        /// The obstacle.
-        name: String,
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: SurfaceError,
-    },
+    Surface { name: String, path: PathBuf, source: SurfaceError },
 }
 
 fn up() -> [f64; 3] {
@@ -198,14 +184,16 @@ impl TryFrom<Keys> for ObstacleDescription {
         ];
         let mut given = shapes.into_iter().flatten();
         let (Some(shape), None) = (given.next(), given.next()) else {
-            return Err("an obstacle is exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`".to_owned());
+            return Err("expected exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`".to_owned());
         };
         match &shape {
             ShapeKeys::Capsule(CapsuleKeys { from, to, .. }) if from == to => {
-                return Err("the ends of a capsule must differ; for a ball say `sphere`".to_owned());
+                return Err("the ends of a capsule must differ; use `sphere` for a ball".to_owned());
             }
             ShapeKeys::Block(BoxKeys { size, rounding, .. }) if size.iter().any(|edge| 0.5 * edge <= *rounding) => {
-                return Err(format!("a box of {size:?} m cannot be rounded by {rounding} m: that is half an edge"));
+                return Err(format!(
+                    "a box of {size:?} m cannot be rounded by {rounding} m, which is at least half an edge"
+                ));
             }
             _ => {}
         }
@@ -214,10 +202,10 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
-    /// The obstacle, of this number among those of the scene. Relative paths start from `folder`.
+    /// Builds the obstacle with index `number` in the scene. Relative paths refer to `folder`.
     ///
     /// # Errors
-    /// When the file of a mesh cannot be read or is no surface of a solid.
+    /// Returns an error if the file of a mesh cannot be read or does not bound a solid.
     pub fn obstacle(&self, number: usize, folder: &Path) -> Result<Obstacle, ObstacleError> {
         let named = |shape: &str| self.rest.name.clone().unwrap_or_else(|| format!("{shape} {number}"));
         let (shape, solid) = match self.shape.clone() {
@@ -230,8 +218,8 @@ impl ObstacleDescription {
                 ("capsule", AnySolid::Capsule(Capsule { ends: [from, to], radius }))
             }
             ShapeKeys::Block(BoxKeys { centre, size, rotate, rounding }) => {
-                let turn = rotate.map_or(Pose::REST, |turn| Pose::turned(turn.axis, turn.angle, [0.0; 3]));
-                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turn.applied(axis));
+                let turn = rotate.map_or(Pose::IDENTITY, |turn| Pose::rotation(turn.axis, turn.angle, [0.0; 3]));
+                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turn.transform(axis));
                 let half = size.map(|edge| 0.5 * edge - rounding);
                 ("box", AnySolid::Box(RoundedBox { centre, axes, half, radius: rounding }))
             }

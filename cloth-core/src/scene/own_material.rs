@@ -1,4 +1,4 @@
-//! A scene with another material: elements of a file for those that it names.
+//! Replaces the materials of a scene by elements of a file.
 
 use std::path::Path;
 
@@ -6,8 +6,9 @@ use toml::{Table, Value};
 
 use crate::fabric::MEASURED;
 
-/// The text of a scene in which every fabric is made of the elements of a `.energy` file with these parameters. The fabrics' densities stay, and what
-/// resisted bending in them goes with their materials. A text that is no TOML comes back as it is: reading it will say what is wrong.
+/// Returns the text of a scene with the material of every fabric replaced by the elements of a `.energy` file.
+/// Densities stay; bending that is part of a material goes with it. Text that is not TOML is returned unchanged:
+/// parsing it will report the error.
 #[must_use]
 pub fn with_material(scene: &str, file: &Path, parameters: &[(String, f64)]) -> String {
     let Ok(mut table) = scene.parse::<Table>() else { return scene.to_owned() };
@@ -24,7 +25,7 @@ pub fn with_material(scene: &str, file: &Path, parameters: &[(String, f64)]) -> 
     table.to_string()
 }
 
-/// Replaces the material of `fabric`, if there is one.
+/// Replaces the material of `fabric`, if the table has one.
 fn replace(holder: &mut Table, material: &Value) {
     let Some(fabric) = holder.get_mut("fabric") else { return };
     let measured = fabric.as_str().and_then(|name| MEASURED.iter().find(|one| one.name == name));
@@ -44,7 +45,8 @@ mod tests {
 
     #[test]
     fn every_fabric_gets_the_material_and_keeps_its_density() {
-        let text = "dt = 0.01\nduration = 1.0\n[[garment]]\nfabric = \"denim\"\nmesh.disc = { radius = 1.0, rings = 2 }\n\
+        let text = "dt = 0.01\nduration = 1.0\n[[garment]]\nfabric = \"denim\"\n\
+                    mesh.disc = { radius = 1.0, rings = 2 }\n\
                     [[garment]]\nmesh.disc = { radius = 1.0, rings = 2 }\n[garment.fabric]\ndensity = 0.5\n\
                     material.arap.stretch_stiffness = 3.0\n";
         let changed = with_material(text, "own.energy".as_ref(), &[("k".to_owned(), 2.5)]);

@@ -5,29 +5,29 @@ use serde::Deserialize;
 use crate::bounded::finite_triple;
 use crate::motion::Motion;
 
-/// Vertices that do not move, or move as they are told.
+/// Pinned vertices, fixed or moving.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys")]
 #[schemars(with = "Keys")]
 pub struct Pin {
-    /// Which vertices, chosen at the start.
+    /// The pinned vertices, chosen at the start.
     pub choice: PinChoice,
-    /// The garment or hair that they are chosen from; `None` for all.
+    /// The garment or hair to choose from; `None` for the whole scene.
     pub of: Option<String>,
-    /// How they move.
+    /// The motion; `None` if the vertices are fixed.
     pub motion: Option<Motion>,
 }
 
-/// Which vertices are pinned.
+/// A choice of vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PinChoice {
-    /// The vertex of this number, from 0.
+    /// The vertex with this index, from 0.
     Vertex(usize),
     /// Every vertex in an axis-aligned box.
     Box(PinBox),
     /// The vertex nearest to a point, in m.
     Nearest(Vector3<f64>),
-    /// Every vertex on the edge of the cloth.
+    /// Every boundary vertex of the cloth.
     Boundary,
     /// Every vertex.
     All,
@@ -45,26 +45,26 @@ pub struct PinBox {
     pub max: Vector3<f64>,
 }
 
-/// What a scene file says: exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`.
+/// The keys of a pin: exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
-    /// The vertex of this number, from 0, within `of`.
+    /// The vertex with this index, from 0, within `of`.
     vertex: Option<usize>,
     /// Every vertex in an axis-aligned box.
     #[serde(rename = "box")]
     inside: Option<PinBox>,
     /// The vertex nearest to a point, in m.
     nearest: Option<Point>,
-    /// `true`: every vertex on the edge of the cloth.
+    /// `true`: every boundary vertex of the cloth.
     #[serde(default)]
     boundary: bool,
     /// `true`: every vertex.
     #[serde(default)]
     all: bool,
-    /// The name of the garment or hair that the vertices are chosen from. Default all.
+    /// Name of the garment or hair to choose from. Default all.
     of: Option<String>,
-    /// How they move. Default not at all.
+    /// Motion over time. Default none.
     motion: Option<Motion>,
 }
 
@@ -88,13 +88,13 @@ impl TryFrom<Keys> for Pin {
         let given: Vec<PinChoice> = choices.into_iter().flatten().collect();
         match given[..] {
             [choice] => Ok(Self { choice, of, motion }),
-            _ => Err("a pin is exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`".to_owned()),
+            _ => Err("expected exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`".to_owned()),
         }
     }
 }
 
 impl Pin {
-    /// A pin that does not move, on vertices of all parts.
+    /// Creates a fixed pin that chooses from the whole scene.
     #[must_use]
     pub fn fixed(choice: PinChoice) -> Self {
         Self { choice, of: None, motion: None }

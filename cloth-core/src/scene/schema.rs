@@ -1,6 +1,6 @@
 use super::file::File;
 
-/// The JSON schema of scene files, for editors that complete and check TOML by one.
+/// Returns the JSON schema of scene files, for editors that complete and check TOML.
 ///
 /// ```
 /// let schema = cloth_core::scene::schema();

@@ -3,23 +3,25 @@ use serde::Deserialize;
 
 use crate::bounded::{non_negative, positive};
 
-/// Stitches between two garments: springs without rest length, ½ K ‖x_P − x_Q‖². Either `pairs` or `within` says which vertices.
+/// Stitches between two garments: springs with rest length 0, energy ½ K ‖x_P − x_Q‖². Exactly one of `pairs` and
+/// `within` chooses the vertices.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Seam {
-    /// The names of the two; twice the same for a seam of a garment with itself.
+    /// Names of the two garments; twice the same name for a seam within one garment.
     pub garments: [String; 2],
-    /// Pairs of vertices, the first of the first garment, both counted from 0 within their garment.
+    /// Pairs of vertices, one of each garment, both with indices from 0 within their garment.
     #[serde(default)]
     pub pairs: Option<Vec<[usize; 2]>>,
-    /// Joins each vertex of the first garment's edge to the nearest of the second's, where that lies within this distance at the start, in m.
+    /// Joins each boundary vertex of the first garment to the nearest one of the second, if they are at most this far
+    /// apart at the start, in m.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub within: Option<f64>,
-    /// K of a stitch, in N/m.
+    /// Stiffness K of a stitch, in N/m.
     #[serde(deserialize_with = "positive")]
     pub stiffness: f64,
-    /// k_d of the force −k_d (v_P − v_Q) of a stitch, in N s/m. Default 0.
+    /// Damping k_d of a stitch, in N s/m: the force −k_d (v_P − v_Q). Default 0.
     #[serde(default, deserialize_with = "non_negative")]
     pub damping: f64,
 }

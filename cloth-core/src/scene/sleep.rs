@@ -6,18 +6,20 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
 use crate::bounded::{positive, some_positive};
 
-/// When islands (vertices that nothing couples to others) fall asleep: once each of their vertices was slower than `speed` for the time `after`, and changed
-/// its velocity over that time by no more than half of that, and nothing that acts on them moves. An island that sleeps is not stepped: it stays
-/// where it is to the last bit, until a pin of it or an obstacle near it moves.
+/// When islands (sets of vertices that no force couples) fall asleep. An island falls asleep once, for the time
+/// `after`, every vertex was slower than `speed` and changed its velocity by at most half of `speed`, and no pin or
+/// obstacle that acts on it moves. A sleeping island is not stepped. It stays bit-identical until one of its pins or a
+/// nearby obstacle moves.
 ///
-/// What is frozen so may have had a little way to go. A motion that dies down as exp(−t/τ) and is as slow as `speed` comes no further than `speed` × τ.
+/// Sleep discards slow residual motion. A motion that decays as exp(−t/τ) would have travelled at most `speed` × τ
+/// further.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sleep {
-    /// In m/s. Default a thousandth of the island's size a second: of the diagonal of the box around it at the start.
+    /// Speed limit, in m/s. Default 0.001/s times the diagonal of the island's initial bounding box.
     #[serde(default, deserialize_with = "some_positive")]
     pub speed: Option<f64>,
-    /// In s. Default 0.5.
+    /// Time below the speed limit, in s. Default 0.5.
     #[serde(default = "half_a_second", deserialize_with = "positive")]
     pub after: f64,
 }
@@ -32,14 +34,14 @@ impl Default for Sleep {
     }
 }
 
-/// What a scene file may say of sleep.
+/// The value of `sleep` in a scene file, for the schema.
 #[derive(JsonSchema)]
 #[serde(untagged)]
-#[expect(dead_code, reason = "it is there for its schema")]
+#[expect(dead_code, reason = "for the schema only")]
 pub(super) enum SleepChoice {
-    /// `true`: with all defaults; `false`: never.
+    /// `true`: sleep with all defaults; `false`: never sleep.
     Whether(bool),
-    /// With these.
+    /// Sleep with these settings.
     With(Sleep),
 }
 

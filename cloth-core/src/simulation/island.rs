@@ -125,7 +125,7 @@ impl Island {
     ) -> Result<(StepReport, Option<Account>), StepError> {
         let dt = context.dt;
         for pin in &self.moving {
-            let target = context.motions[pin.motion].pose(context.end).applied(pin.drawn);
+            let target = context.motions[pin.motion].pose(context.end).transform(pin.initial);
             let here = self.body.x[pin.vertex];
             self.body.v[pin.vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / dt);
         }

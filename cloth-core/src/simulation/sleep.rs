@@ -51,7 +51,7 @@ pub(super) struct StepContext<'a> {
     pub dt: f64,
     /// Motions of the pins.
     pub motions: &'a [Motion],
-    /// All obstacles.
+    /// Obstacles of the scene.
     pub obstacles: &'a [Obstacle],
     /// Obstacles that move during the step: the solid at the start and at the end, and the thickness in m.
     moving: Vec<([AnySolid; 2], f64)>,

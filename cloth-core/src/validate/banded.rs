@@ -1,18 +1,19 @@
 use energy_dsl::Vector3;
 use energy_solve::BlockMatrix;
 
-/// A Cholesky factor of a symmetric matrix whose rows, in a given order, couple to near ones only.
+/// A banded Cholesky factor.
 #[derive(Clone, Debug)]
 pub(super) struct Banded {
-    /// The place of each block row in the order.
+    /// Position of each block row in the ordering.
     place: Vec<usize>,
-    /// Numbers in a row of the band, the diagonal last.
+    /// Entries in a row of the band, the diagonal last.
     width: usize,
     rows: Vec<f64>,
 }
 
 impl Banded {
-    /// L of A + σ diag(weights) = L Lᵀ; `None` when that is not positive definite.
+    /// Factors A + σ diag(weights) = L Lᵀ; `None` if the sum is not positive definite. In the given order, rows couple
+    /// to nearby rows only.
     pub fn factor(matrix: &BlockMatrix, order: &[usize], weights: &[f64], shift: f64) -> Option<Self> {
         let mut place = vec![0; order.len()];
         order.iter().enumerate().for_each(|(at, &row)| place[row] = at);
@@ -50,7 +51,7 @@ impl Banded {
         &mut self.rows[row * self.width + self.width - 1 - (row - column)]
     }
 
-    /// Row by row: l_ij = (a_ij − Σ l_ik l_jk)/l_jj.
+    /// Eliminates row by row: l_ij = (a_ij − Σ l_ik l_jk)/l_jj. Returns `false` if a pivot is not positive.
     fn eliminate(&mut self) -> bool {
         let (width, n) = (self.width, self.rows.len() / self.width);
         for i in 0..n {
@@ -68,7 +69,7 @@ impl Banded {
             }
             let square: f64 = here[..width - 1].iter().map(|l| l * l).sum();
             let pivot = here[width - 1] - square;
-            // Rounding decides below this.
+            // A pivot below this is rounding error.
             if pivot.is_nan() || pivot <= 1e-15 * here[width - 1].abs() {
                 return false;
             }
@@ -77,7 +78,7 @@ impl Banded {
         true
     }
 
-    /// A⁻¹ b.
+    /// Returns A⁻¹ b.
     pub fn solve(&self, b: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let (width, n) = (self.width, self.rows.len() / self.width);
         let mut y = vec![0.0; n];

@@ -6,35 +6,37 @@ use crate::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroun
 use crate::mesh::SpringNetwork;
 use energy_solve::System;
 
-/// A strip clamped horizontally at one end that bends under its own weight: Γ = σ g L³/D.
+/// A strip clamped horizontally at one end that bends under its own weight, with the load Γ = σ g L³/D.
 ///
-/// Two columns of vertices are clamped; its length L counts from midway between them.
+/// Two columns of vertices are clamped. The length L counts from midway between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cantilever {
-    /// Γ.
+    /// Load Γ.
     pub gamma: f64,
-    /// Poisson's ratio ν of the plate. The rigidity of a strip with free edges lies between (1 − ν²) D, narrow, and D, wide.
+    /// Poisson's ratio ν of the plate. The rigidity of a strip with free edges lies between (1 − ν²) D (narrow) and D
+    /// (wide).
     pub poisson_ratio: f64,
     /// Width over length.
     pub aspect: f64,
-    /// The mesh.
+    /// Kind of mesh.
     pub mesh: MeshKind,
-    /// The angle of the mesh to the strip, in degrees.
+    /// Angle between mesh and strip, in degrees.
     pub orientation: f64,
-    /// Edges along the strip, from the first of the clamped columns on.
+    /// Edges along the strip, starting at the first clamped column.
     pub segments: usize,
 }
 
-/// E h of the membrane over the strip's weight per width: stiff enough not to stretch, soft enough to let flat triangles bend across their edges.
+/// E h of the membrane over the strip's weight per width: stiff enough not to stretch, soft enough for flat triangles
+/// to bend across their edges.
 const MEMBRANE: f64 = 1e3;
 
 impl Cantilever {
-    /// The Γ that the strip's shape stands for: that of the elastica with the same drop over reach.
+    /// Returns the Γ of the elastica with the same ratio of drop and reach.
     ///
     /// # Errors
-    /// When the strip cannot be meshed or comes to no rest.
+    /// Returns an error if the strip cannot be meshed or finds no equilibrium.
     pub fn fit(&self) -> Result<f64, ValidateError> {
-        // In units of the length, the density and gravity.
+        // Units: the strip's length, its density and gravity are 1.
         let spacing = 1.0 / (self.segments as f64 - 0.5);
         let origin = 0.5 * spacing;
         let strip = Strip {
@@ -67,10 +69,10 @@ impl Cantilever {
         Ok(Elastica::fit(-mean(2) / (mean(0) - origin)))
     }
 
-    /// The finding that the fitted Γ is Γ, over the rigidity of a narrow strip where ν is not 0.
+    /// Compares the fitted Γ with the load; for ν ≠ 0, relative to the rigidity of a narrow strip.
     ///
     /// # Errors
-    /// As [`Self::fit`].
+    /// Same as [`Self::fit`].
     pub fn ask(&self) -> Result<Finding, ValidateError> {
         let limit = if self.gamma > 100.0 { 0.02 } else { 0.01 };
         let measured = self.fit()?;
@@ -79,7 +81,7 @@ impl Cantilever {
         if self.poisson_ratio == 0.0 {
             return Ok(Finding::relative("cantilever", case, measured, self.gamma, limit));
         }
-        // Anything between a narrow and a wide strip is right.
+        // Any value between those of a narrow and a wide strip is correct.
         let narrow = self.gamma / (1.0 - self.poisson_ratio * self.poisson_ratio);
         case += &format!(", ν = {}, b/L = {}", self.poisson_ratio, self.aspect);
         let exact = measured.clamp(self.gamma.min(narrow), self.gamma.max(narrow));
@@ -87,7 +89,7 @@ impl Cantilever {
     }
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let (segments, gammas): (_, &[f64]) =
         if quick { (40, &[1.0, 20.0]) } else { (80, &[0.1, 1.0, 10.0, 100.0, 1000.0]) };
     let orientations: &[f64] = if quick { &[0.0, 30.0] } else { &[0.0, 30.0, 45.0, 90.0] };
@@ -96,14 +98,14 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
             for &gamma in gammas {
                 let aspect = 5.0 / segments as f64;
                 let case = Cantilever { gamma, poisson_ratio: 0.0, aspect, mesh, orientation, segments };
-                tell(case.ask()?);
+                report(case.ask()?);
             }
         }
     }
     if quick {
         return Ok(());
     }
-    tell(order()?);
+    report(order()?);
     let wide = |aspect| Cantilever {
         gamma: 5.0,
         poisson_ratio: 0.3,
@@ -113,12 +115,12 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
         segments: 40,
     };
     for aspect in [0.15, 1.0] {
-        tell(wide(aspect).ask()?);
+        report(wide(aspect).ask()?);
     }
     Ok(())
 }
 
-/// The error falls with the square of the segments' length.
+/// Measures the order of convergence: the error should fall with the square of the segment length.
 fn order() -> Result<Finding, ValidateError> {
     let error = |segments: usize| -> Result<f64, ValidateError> {
         let aspect = 0.1;

@@ -9,12 +9,12 @@ use energy_solve::System;
 /// E h of the membrane over the strip's weight per width.
 const MEMBRANE: f64 = 1e5;
 
-/// u = d/(2a) of the catenary y = a cosh(x/a) of span d and length S: sinh u/u = S/d.
+/// Returns u = d/(2a) of the catenary y = a cosh(x/a) of span d and length S, from sinh u/u = S/d.
 fn parameter(span: f64) -> f64 {
     zero_between(1e-6, 20.0, |u| u.sinh() / u - 1.0 / span)
 }
 
-/// The sag over the length of an inextensible strip without bending stiffness, held by its ends.
+/// Returns the sag over the length of an inextensible strip without bending stiffness, held at both ends.
 fn sag(span: f64, segments: usize) -> Result<f64, ValidateError> {
     let strip = Strip::narrow(segments);
     let mesh = strip.mesh()?;
@@ -25,7 +25,7 @@ fn sag(span: f64, segments: usize) -> Result<f64, ValidateError> {
     let rest = mesh.vertices();
     let held: Vec<bool> = rest.iter().map(|p| p[0] < 1e-9 || p[0] > 1.0 - 1e-9).collect();
     let system = System::new(garment.terms, &held)?;
-    // By arc length from the middle: x = a asinh(s/a), y = √(a² + s²).
+    // Start on the catenary: by arc length from the middle, x = a asinh(s/a), y = √(a² + s²).
     let a = 0.5 * span / parameter(span);
     let top = a.hypot(0.5);
     let start = rest.iter().map(|p| {
@@ -36,13 +36,13 @@ fn sag(span: f64, segments: usize) -> Result<f64, ValidateError> {
     Ok(-found.x.iter().map(|x| x[2]).fold(0.0, f64::min))
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let segments = if quick { 60 } else { 120 };
     for span in [0.5, 0.75, 0.9] {
         let u = parameter(span);
         let exact = 0.5 * (u.cosh() - 1.0) / u.sinh();
         let case = format!("span {span} of the length, {segments} segments: sag");
-        tell(Finding::relative("catenary", case, sag(span, segments)?, exact, 0.01));
+        report(Finding::relative("catenary", case, sag(span, segments)?, exact, 0.01));
     }
     Ok(())
 }
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exact_sags_are_those_of_the_table() {
+    fn exact_sags_match_the_table() {
         for (span, sag) in [(0.5, 0.398_194), (0.75, 0.294_334), (0.9, 0.190_709)] {
             let u = parameter(span);
             assert!((0.5 * (u.cosh() - 1.0) / u.sinh() - sag).abs() < 1e-6);

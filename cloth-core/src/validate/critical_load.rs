@@ -1,15 +1,16 @@
 use super::ValidateError;
 
-/// How the stiffness depends on the load's sign.
+/// How the stiffness depends on the sign of the load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Symmetry {
-    /// Not at all: it falls with the load's square.
+    /// Even: the stiffness falls with the square of the load.
     Even,
-    /// It falls with the load.
+    /// No symmetry: the stiffness falls with the load.
     None,
 }
 
-/// The load Γ at which a stiffness, measured below it and `None` beyond, vanishes: by secants within the bounds found so far.
+/// Returns the load Γ at which a stiffness vanishes, by secants within the bounds found so far. The stiffness can be
+/// measured below that load only; above, it is `None`.
 pub(super) fn critical_load(
     what: &'static str,
     symmetry: Symmetry,
@@ -30,7 +31,7 @@ pub(super) fn critical_load(
                     return Ok(zero);
                 }
                 low = (gamma, left);
-                // Not quite up to where it should vanish: beyond it nothing can be measured.
+                // Stop short of the predicted zero: beyond it nothing can be measured.
                 let next = if slope < 0.0 { gamma + 0.97 * (zero - gamma) } else { 2.0 * gamma };
                 gamma = next.min(2.0 * gamma).min(if high.is_finite() { 0.5 * (gamma + high) } else { f64::INFINITY });
             }
@@ -51,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_found_from_below() {
+    fn the_critical_load_is_found_from_below() {
         for (symmetry, power) in [(Symmetry::Even, 2), (Symmetry::None, 1)] {
             let stiffness = |gamma: f64| {
                 let left = 1.0 - (gamma / 17.0).powi(power) - 0.05 * (gamma / 17.0).powi(4);

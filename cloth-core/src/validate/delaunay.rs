@@ -3,8 +3,8 @@
 /// A point in the plane.
 pub(super) type Point = [f64; 2];
 
-/// The triangles, anticlockwise, of the points' convex hull (Bowyer 1981; Watson 1981). Points should not lie on a common circle by fours: then
-/// one of the possible answers results.
+/// Returns the anticlockwise triangles of the points' convex hull (Bowyer 1981; Watson 1981). If four points lie on a
+/// common circle, returns one of the possible triangulations.
 pub(super) fn triangulate(points: &[Point]) -> Vec<[usize; 3]> {
     let n = points.len();
     let reach = points.iter().flatten().fold(1.0_f64, |reach, c| reach.max(c.abs()));
@@ -31,7 +31,7 @@ pub(super) fn triangulate(points: &[Point]) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// Whether a point lies inside the circle around an anticlockwise triangle.
+/// Whether a point lies inside the circumcircle of an anticlockwise triangle.
 fn in_circle(corners: [Point; 3], p: Point) -> bool {
     let [a, b, c] = corners.map(|q| {
         let d = [q[0] - p[0], q[1] - p[1]];
@@ -40,7 +40,7 @@ fn in_circle(corners: [Point; 3], p: Point) -> bool {
     a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]) > 0.0
 }
 
-/// Twice the signed area.
+/// Returns twice the signed area.
 pub(super) fn double_area(a: Point, b: Point, c: Point) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

@@ -4,11 +4,11 @@ use std::f64::consts::FRAC_PI_2;
 
 /// The shape of a strip of length 1, clamped horizontally at one end, with Γ = σ g L³/D.
 ///
-/// δ = π/2 − θ, the angle from the vertical, obeys δ″ = Γ (1 − s) sin δ with δ′(1) = 0 and δ(0) = π/2: it is shot from the free end, whose δ may be as
-/// small as it likes, and found by its logarithm.
+/// The angle from the vertical, δ = π/2 − θ, obeys δ″ = Γ (1 − s) sin δ with δ′(1) = 0 and δ(0) = π/2. It is found by
+/// shooting from the free end, on the logarithm of δ(1), which can be arbitrarily small.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Elastica {
-    /// At equal steps of arc length from the clamp: reach, drop, and the angle θ downwards.
+    /// Reach, drop and downward angle θ, at equal steps of arc length from the clamp.
     pub points: Vec<[f64; 3]>,
 }
 
@@ -16,7 +16,7 @@ pub struct Elastica {
 const STEPS: usize = 1000;
 
 impl Elastica {
-    /// The shape for Γ > 0.
+    /// Computes the shape for Γ > 0.
     ///
     /// ```
     /// use cloth_core::validate::Elastica;
@@ -27,7 +27,7 @@ impl Elastica {
     #[must_use]
     pub fn new(gamma: f64) -> Self {
         let clamped = |logarithm: f64| shoot(gamma, logarithm.exp(), |_, _| {}) - FRAC_PI_2;
-        // δ(0) grows with δ(1).
+        // Bisection: δ(0) grows with δ(1).
         let (mut low, mut high) = (-2.0 * gamma.sqrt() - 10.0, FRAC_PI_2.ln());
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
@@ -38,20 +38,20 @@ impl Elastica {
         Self { points: integrate(&angles) }
     }
 
-    /// H/W, the drop of the tip over its reach.
+    /// Returns H/W, the drop of the tip over its reach.
     #[must_use]
     pub fn drop_over_reach(&self) -> f64 {
         let [reach, drop, _] = self.points[STEPS];
         drop / reach
     }
 
-    /// θ(1), in radians.
+    /// Returns θ(1), in radians.
     #[must_use]
     pub fn tip_angle(&self) -> f64 {
         self.points[STEPS][2]
     }
 
-    /// Reach and drop at the arc length s; straight on beyond either end.
+    /// Returns reach and drop at arc length s; continues straight beyond the ends.
     #[must_use]
     pub fn at(&self, s: f64) -> [f64; 2] {
         let place = (s * STEPS as f64).clamp(0.0, STEPS as f64 - 1.0);
@@ -60,10 +60,10 @@ impl Elastica {
         [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])]
     }
 
-    /// The Γ whose strip hangs with that H/W.
+    /// Returns the Γ of the strip with this H/W.
     #[must_use]
     pub fn fit(drop_over_reach: f64) -> f64 {
-        // By secants: ln H/W grows with ln Γ, nearly straight on, with slopes from ½ to 1.
+        // Secants: ln H/W grows almost linearly with ln Γ, with slopes from ½ to 1.
         let miss = |logarithm: f64| (Self::new(logarithm.exp()).drop_over_reach() / drop_over_reach).ln();
         let mut last = (8.0 * drop_over_reach).ln();
         let mut off = miss(last);
@@ -80,13 +80,13 @@ impl Elastica {
     }
 }
 
-/// Integrates from the free end to the clamp and returns δ there, telling δ at every whole and half step.
-fn shoot(gamma: f64, tip: f64, mut tell: impl FnMut(usize, f64)) -> f64 {
+/// Integrates from the free end to the clamp and returns δ there. Calls `report` with δ at every whole and half step.
+fn shoot(gamma: f64, tip: f64, mut report: impl FnMut(usize, f64)) -> f64 {
     let h = 0.5 / STEPS as f64;
-    // By t = 1 − s: δ″ = Γ t sin δ.
+    // In t = 1 − s: δ″ = Γ t sin δ.
     let rate = |t: f64, [delta, slope]: [f64; 2]| [slope, gamma * t * delta.sin()];
     let mut y = [tip, 0.0];
-    tell(2 * STEPS, y[0]);
+    report(2 * STEPS, y[0]);
     for step in 0..2 * STEPS {
         let t = step as f64 * h;
         let along = |k: [f64; 2], part: f64| [y[0] + part * k[0], y[1] + part * k[1]];
@@ -100,12 +100,12 @@ fn shoot(gamma: f64, tip: f64, mut tell: impl FnMut(usize, f64)) -> f64 {
         if y[0] > 4.0 {
             return y[0];
         }
-        tell(2 * STEPS - step - 1, y[0]);
+        report(2 * STEPS - step - 1, y[0]);
     }
     y[0]
 }
 
-/// Simpson's rule over whole steps of δ at whole and half ones.
+/// Integrates by Simpson's rule over whole steps, given δ at whole and half steps.
 fn integrate(angles: &[f64]) -> Vec<[f64; 3]> {
     let h = 1.0 / STEPS as f64;
     let mut points = vec![[0.0, 0.0, FRAC_PI_2 - angles[0]]];
@@ -122,7 +122,7 @@ fn integrate(angles: &[f64]) -> Vec<[f64; 3]> {
 mod tests {
     use super::*;
 
-    /// H/W and the tip's angle in degrees, from two independent solvers.
+    /// Γ, H/W and the tip's angle in degrees, from two independent solvers.
     const TABLE: [(f64, f64, f64); 10] = [
         (0.1, 0.012_499_55, 0.955),
         (0.5, 0.062_444_46, 4.763),
@@ -137,14 +137,14 @@ mod tests {
     ];
 
     #[test]
-    fn shapes_agree_with_the_table() {
+    fn shapes_match_the_table() {
         for (gamma, ratio, degrees) in TABLE {
             let strip = Elastica::new(gamma);
             let found = strip.drop_over_reach();
-            // Half a unit of the last digit printed.
+            // Half a unit of the last printed digit.
             assert!(
                 (found - ratio).abs() < f64::max(5.001e-9, 5e-8 * ratio),
-                "Γ = {gamma}: {found} instead of {ratio}"
+                "Γ = {gamma}: got {found}, expected {ratio}"
             );
             assert!((strip.tip_angle().to_degrees() - degrees).abs() < 6e-4, "Γ = {gamma}: {}", strip.tip_angle());
         }

@@ -5,35 +5,36 @@ use super::ValidateError;
 use super::banded::Banded;
 use crate::integrator::if_finite;
 
-/// A cloth at rest under its loads.
+/// A cloth in static equilibrium.
 #[derive(Debug)]
 pub(super) struct Equilibrium {
-    /// The forces.
+    /// The forces on the cloth.
     pub system: System,
     /// Positions, in m.
     pub x: Vec<Vector3<f64>>,
-    /// The mass of each vertex, in kg.
+    /// Masses, in kg.
     pub masses: Vec<f64>,
-    /// The free block rows in an order in which they couple to near ones.
+    /// Free block rows, in an order in which they couple to nearby rows only.
     order: Vec<usize>,
     /// ∂²U/∂x² at the equilibrium.
     matrix: BlockMatrix,
 }
 
-/// Newton iterations before the search is given up.
+/// Newton iterations before the search fails.
 const ITERATIONS: usize = 400;
-/// A force that is no more than this part of all weight counts as none.
+/// Largest acceptable residual force, relative to the total weight.
 const FORCE: f64 = 1e-10;
-/// Where no step leads further down, a force that is no more than this part counts as rounding.
+/// Residual force that is attributed to rounding if no step lowers the energy, relative to the total weight.
 const ROUNDED: f64 = 1e-7;
-/// A step that moves no vertex by more than this part of the size of the whole is the last.
+/// Relative step length below which the search ends.
 const SHORTEST: f64 = 1e-13;
-/// The most a vertex may move in an iteration, over the size of the whole.
+/// Largest step per iteration, relative to the size of the cloth.
 const STRIDE: f64 = 0.1;
 
 impl Equilibrium {
-    /// The nearest equilibrium from `start`: Newton's method on the energy with a direct solver, with the exact Hessian where it is positive
-    /// definite, else with each element's clamped, and a line search. `along` is the direction in which the mesh is long.
+    /// Finds an equilibrium near `start`: Newton's method on the energy, with a direct solver and a line search. Uses
+    /// the exact Hessian if it is positive definite, otherwise clamps each element's. `along` is the long direction of
+    /// the mesh.
     pub fn find(
         system: System,
         start: Vec<Vector3<f64>>,
@@ -77,7 +78,7 @@ impl Equilibrium {
                 break;
             }
         }
-        // Stiff membranes round their forces to no better.
+        // Rounding of stiff membranes limits the accuracy of forces.
         if force <= ROUNDED * weight {
             found.linearise(Curvature::Exact)?;
             return Ok(found);
@@ -85,14 +86,14 @@ impl Equilibrium {
         Err(ValidateError::NoEquilibrium { force, weight })
     }
 
-    /// U, and the size of what it is a sum of.
+    /// Returns U, and the sum of the magnitudes of its terms.
     fn energy(&mut self, x: &[Vector3<f64>]) -> Result<(f64, f64), ValidateError> {
         let Some(energies) = if_finite(self.system.energies(x))? else { return Ok((f64::INFINITY, 0.0)) };
         let all = energies.iter().filter_map(|term| term.energy);
         Ok(all.fold((0.0, 0.0), |(sum, size), energy| (sum + energy, size + energy.abs())))
     }
 
-    /// −∇U of the free vertices; the Hessian goes to the matrix.
+    /// Assembles the Hessian and returns −∇U of the free vertices.
     fn linearise(&mut self, curvature: Curvature) -> Result<Vec<Vector3<f64>>, ValidateError> {
         let still = vec![[0.0; 3]; self.x.len()];
         let weights = Weights { position: -1.0, velocity: 0.0 };
@@ -101,7 +102,7 @@ impl Equilibrium {
         Ok(self.system.dofs().gather(&linear.force))
     }
 
-    /// Downhill.
+    /// Returns a descent direction.
     fn direction(&mut self, down: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, ValidateError> {
         if let Some(factor) = self.factor(0.0) {
             return Ok(factor.solve(down));
@@ -116,25 +117,25 @@ impl Equilibrium {
         }
     }
 
-    /// The largest stiffness over mass.
+    /// Returns the largest stiffness over mass.
     fn stiffest(&self) -> f64 {
         let free = self.system.dofs().free();
         let one = |(row, &vertex): (usize, &usize)| self.matrix.diagonal(row)[0][0].abs() / self.masses[vertex];
         free.iter().enumerate().map(one).fold(0.0, f64::max)
     }
 
-    /// The factor of the Hessian + `shift` M; `None` where it is not positive definite.
+    /// Factors the Hessian + `shift` M; `None` if the sum is not positive definite.
     pub fn factor(&self, shift: f64) -> Option<Banded> {
         let masses: Vec<f64> = self.system.dofs().free().iter().map(|&vertex| self.masses[vertex]).collect();
         Banded::factor(&self.matrix, &self.order, &masses, shift)
     }
 
-    /// The smallest ω² of small motions about the equilibrium, by inverse iteration; `None` where it is unstable.
+    /// Returns the smallest ω² of small motions about the equilibrium, by inverse iteration; `None` if it is unstable.
     pub fn lowest_mode(&self) -> Option<f64> {
         let factor = self.factor(0.0)?;
         let free = self.system.dofs().free();
         let masses: Vec<f64> = free.iter().map(|&vertex| self.masses[vertex]).collect();
-        // Any start that is not orthogonal to the mode.
+        // Any start vector that is not orthogonal to the mode.
         let mut u: Vec<Vector3<f64>> =
             (0..free.len()).map(|row| [1.0, 0.7, 1.3].map(|c| c + 0.1 * ((row * 37 % 101) as f64 / 101.0))).collect();
         let mut omega_squared = f64::INFINITY;
@@ -162,7 +163,7 @@ impl Equilibrium {
     }
 }
 
-/// The longest side of the box around points.
+/// Returns the longest side of the bounding box.
 fn extent(points: &[Vector3<f64>]) -> f64 {
     let side = |axis: usize| {
         let (low, high) = points

@@ -6,17 +6,17 @@ use crate::fabric::{self, Arap, BaraffWitkin, Bending, Fabric, Material, Membran
 use crate::mesh::SpringNetwork;
 use energy_solve::System;
 
-/// The energy per area of the principal stretches s₁ and s₂.
+/// Energy per area as a function of λ, μ and the principal stretches s₁, s₂.
 type Density = fn(f64, f64, f64, f64) -> f64;
 
-/// A material, what it is called, and its density as a function of λ, μ, s₁ and s₂.
+/// A material with its name and density.
 struct Sample {
     name: &'static str,
     material: Material,
     density: Density,
 }
 
-/// E h = 10 of the strip's weight per width: it stretches by about 5 %.
+/// E h over the strip's weight per width; the strip stretches by about 5 %.
 const STIFFNESS: f64 = 10.0;
 
 fn samples() -> Vec<Sample> {
@@ -34,7 +34,7 @@ fn samples() -> Vec<Sample> {
         0.5 * mu * (a * a + b * b - 2.0) - mu * j + 0.5 * (lambda + mu) * j * j
     };
     let stable_log: Density = |lambda, mu, a, b| {
-        // The source's constants for Hooke's λ and μ.
+        // The constants of the source for Hooke's λ and μ.
         let (lambda, mu) = (lambda + 2.0 / 3.0 * mu, 1.5 * mu);
         let i = a * a + b * b;
         let alpha = 1.0 + 2.0 / 3.0 * mu / lambda;
@@ -78,7 +78,7 @@ fn samples() -> Vec<Sample> {
     ]
 }
 
-/// ΔL/L of a narrow strip of length 1 under its own weight, whose tension at X is 1 − X.
+/// Returns the exact ΔL/L of a narrow strip of length 1 under its own weight; its tension at X is 1 − X.
 fn exact(density: Density, lambda: f64, mu: f64) -> f64 {
     let derivative = |f: &dyn Fn(f64) -> f64, at: f64| (f(at + 1e-5) - f(at - 1e-5)) / 2e-5;
     let narrowed = |a: f64| zero_between(0.3, 2.0, |b| derivative(&|b| density(lambda, mu, a, b), b));
@@ -101,14 +101,14 @@ fn measured(material: Material, segments: usize) -> Result<f64, ValidateError> {
     let rest = mesh.vertices();
     let held: Vec<bool> = rest.iter().map(|p| p[0] < 1e-9).collect();
     let system = System::new(garment.terms, &held)?;
-    // Stretched a little, so that it is in tension from the start.
+    // A small initial stretch puts the strip in tension from the start.
     let start = rest.iter().map(|p| [p[0] + 0.1 * (p[0] - 0.5 * p[0] * p[0]), p[1], 0.0]);
     let found = Equilibrium::find(system, start.collect(), garment.masses, strip.width, |vertex| rest[vertex][0])?;
     let end: Vec<f64> = rest.iter().zip(&found.x).filter(|(p, _)| p[0] > 1.0 - 1e-9).map(|(_, x)| x[0] - 1.0).collect();
     Ok(end.iter().sum::<f64>() / end.len() as f64)
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let segments = if quick { 40 } else { 80 };
     for Sample { name, material, density } in samples() {
         let (lambda, mu) = match &material {
@@ -120,7 +120,7 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
         };
         let case = format!("{name}, {segments} segments: ΔL/L");
         let exact = exact(density, lambda, mu);
-        tell(Finding::relative("hanging strip", case, measured(material, segments)?, exact, 0.01));
+        report(Finding::relative("hanging strip", case, measured(material, segments)?, exact, 0.01));
     }
     Ok(())
 }
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exact_stretches_are_those_of_the_table() {
+    fn exact_stretches_match_the_table() {
         let found = |name: &str| {
             let sample = samples().into_iter().find(|sample| sample.name == name).unwrap();
             exact(sample.density, 0.0, 0.5 * STIFFNESS)

@@ -6,43 +6,44 @@ use crate::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroun
 use crate::mesh::SpringNetwork;
 use energy_solve::System;
 
-/// A strip clamped at one end that stands on edge: above Γ* = σ g L³/D it tips over under its own weight.
+/// A strip on edge, clamped at one end. Above the critical load Γ* = σ g L³/D it buckles sideways under its own weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LateralBuckling {
     /// Poisson's ratio ν of the plate.
     pub poisson_ratio: f64,
     /// Width over length.
     pub aspect: f64,
-    /// The mesh.
+    /// Kind of mesh.
     pub mesh: MeshKind,
-    /// The angle of the mesh to the strip, in degrees.
+    /// Angle between mesh and strip, in degrees.
     pub orientation: f64,
     /// Edges along the strip.
     pub segments: usize,
 }
 
-/// E h of the membrane over the strip's weight per width: it must not bend in its plane.
+/// E h of the membrane over the strip's weight per width: the strip must not bend in its plane.
 const MEMBRANE: f64 = 1e6;
 
-/// Γ* of Kirchhoff plates: b/L, ν = 0, ν = 0.3; ± 10⁻³.
+/// Γ* of Kirchhoff plates, ± 10⁻³: b/L, for ν = 0, for ν = 0.3.
 const PLATES: [(f64, f64, f64); 3] = [(0.1, 19.35, 15.67), (0.2, 20.64, 17.00), (0.5, 24.96, 21.60)];
 
 impl LateralBuckling {
-    /// Γ* of a thin beam, 12.853763 √(2 (1 − ν) (1 − ν²)).
+    /// Returns Γ* of a slender beam, 12.853763 √(2 (1 − ν) (1 − ν²)).
     #[must_use]
     pub fn slender(poisson_ratio: f64) -> f64 {
         12.853_763 * (2.0 * (1.0 - poisson_ratio) * (1.0 - poisson_ratio * poisson_ratio)).sqrt()
     }
 
-    /// The load at which the flat strip's lowest mode loses its stiffness. Upside down the strip is as stable, so that ω² falls with Γ² near Γ*.
+    /// Returns the load at which the lowest mode of the flat strip loses its stiffness. A strip upside down is equally
+    /// stable, so ω² falls with Γ² near Γ*.
     ///
     /// # Errors
-    /// When the strip cannot be meshed, or does not buckle.
+    /// Returns an error if the strip cannot be meshed or does not buckle.
     pub fn critical(&self) -> Result<f64, ValidateError> {
         critical_load("the strip", Symmetry::Even, 10.0, |gamma| self.stiffness(gamma))
     }
 
-    /// D-scaled ω² of the lowest mode of the strip in its plane; `None` beyond Γ*.
+    /// Returns ω² of the lowest mode of the flat strip, scaled by D; `None` above Γ*.
     fn stiffness(&self, gamma: f64) -> Result<Option<f64>, ValidateError> {
         let spacing = 1.0 / (self.segments as f64 - 0.5);
         let strip = Strip {
@@ -54,7 +55,7 @@ impl LateralBuckling {
             clamped: true,
         };
         let mesh = strip.mesh()?;
-        // The weight is the same for all, and the plate gets softer.
+        // Larger Γ by a softer plate under the same weight.
         let plate = Rigidity::Flexural { rigidity: 1.0 / gamma, poisson_ratio: self.poisson_ratio };
         let membrane =
             Membrane { stretch_stiffness: MEMBRANE, poisson_ratio: self.poisson_ratio, bending: Bending::Plate(plate) };
@@ -69,17 +70,17 @@ impl LateralBuckling {
         Ok(found.lowest_mode().map(|squared| gamma * squared))
     }
 
-    /// The finding that it buckles where a plate does.
+    /// Compares the critical load with that of a plate.
     ///
     /// # Errors
-    /// As [`Self::critical`].
+    /// Same as [`Self::critical`].
     pub fn ask(&self) -> Result<Finding, ValidateError> {
         let known = PLATES.iter().find(|(aspect, ..)| (aspect / self.aspect - 1.0).abs() < 1e-9);
         let (exact, limit) = match known {
             Some(&(_, none, usual)) if self.poisson_ratio == 0.0 || self.poisson_ratio == 0.3 => {
                 (if self.poisson_ratio == 0.0 { none } else { usual }, 0.01)
             }
-            // Only the slender limit is known, and how fast plates rise above it.
+            // Other widths: only the slender limit and its slope are known.
             _ => (Self::slender(self.poisson_ratio), 0.1 + 1.5 * self.aspect),
         };
         let case = format!(
@@ -94,7 +95,7 @@ impl LateralBuckling {
     }
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let case = |poisson_ratio, aspect, mesh, orientation, segments| LateralBuckling {
         poisson_ratio,
         aspect,
@@ -103,16 +104,16 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
         segments,
     };
     if quick {
-        tell(case(0.3, 0.2, MeshKind::Diagonal, 0.0, 30).ask()?);
+        report(case(0.3, 0.2, MeshKind::Diagonal, 0.0, 30).ask()?);
         return Ok(());
     }
     for (aspect, segments) in [(0.1, 80), (0.2, 50), (0.5, 30)] {
         for poisson_ratio in [0.0, 0.3] {
-            tell(case(poisson_ratio, aspect, MeshKind::Diagonal, 0.0, segments).ask()?);
+            report(case(poisson_ratio, aspect, MeshKind::Diagonal, 0.0, segments).ask()?);
         }
     }
     for mesh in [MeshKind::Equilateral, MeshKind::Alternating, MeshKind::Random] {
-        tell(case(0.3, 0.2, mesh, 30.0, 50).ask()?);
+        report(case(0.3, 0.2, mesh, 30.0, 50).ask()?);
     }
     Ok(())
 }

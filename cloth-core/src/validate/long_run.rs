@@ -1,4 +1,4 @@
-//! A hundred thousand steps: energy neither grows nor leaks otherwise than the integrator's law says.
+//! A hundred thousand steps: energy must neither grow nor drift, except as the integrator's theory allows.
 
 use energy_dsl::Vector3;
 use energy_solve::System;
@@ -12,7 +12,8 @@ use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
 
 const GRAVITY: f64 = 9.81;
 
-/// A metre of soft cloth of 8 × 8 cells, upright and held by its two upper corners, its lower edge drawn aside; nothing resists its motion.
+/// A square metre of soft cloth of 8 × 8 cells, upright, held by its upper corners, with the lower edge drawn aside,
+/// without damping.
 fn hanging() -> Result<Body, ValidateError> {
     let sheet = Sheet {
         cells: [8, 8],
@@ -38,13 +39,13 @@ fn hanging() -> Result<Body, ValidateError> {
     Ok(Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system })
 }
 
-/// Kinetic and potential energy, in J.
+/// Returns kinetic plus potential energy, in J.
 fn energy(body: &mut Body) -> Result<f64, ValidateError> {
     let potential: f64 = body.system.energies(&body.x)?.iter().filter_map(|term| term.energy).sum();
     Ok(body.kinetic_energy() + potential)
 }
 
-/// The energies at the start and after each step.
+/// Returns the energies at the start and after each step.
 fn energies(scheme: &mut dyn Integrator, body: &mut Body, dt: f64, steps: usize) -> Result<Vec<f64>, ValidateError> {
     let mut all = vec![energy(body)?];
     for _ in 0..steps {
@@ -54,7 +55,7 @@ fn energies(scheme: &mut dyn Integrator, body: &mut Body, dt: f64, steps: usize)
     Ok(all)
 }
 
-/// The equilibrium that the body is next to.
+/// Returns the energy of the nearest equilibrium, in J.
 fn rest(body: Body) -> Result<f64, ValidateError> {
     let weight = GRAVITY * body.masses.iter().sum::<f64>();
     let heights: Vec<f64> = body.x.iter().map(|x| x[2]).collect();
@@ -62,39 +63,39 @@ fn rest(body: Body) -> Result<f64, ValidateError> {
     Ok(rest.system.energies(&rest.x)?.iter().filter_map(|term| term.energy).sum())
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
-    // Long steps dissipate more, so that fewer do.
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    // Long steps dissipate more, so fewer of them suffice.
     let (steps, long) = if quick { (1_500, 0.1) } else { (100_000, 0.02) };
     let swing = {
         let mut body = hanging()?;
         energy(&mut body)? - rest(body)?
     };
-    dissipating(swing, long, steps, tell)?;
-    conserving(swing, steps, tell)
+    dissipating(swing, long, steps, report)?;
+    conserving(swing, steps, report)
 }
 
-/// Implicit Euler: energy only falls, to that of the equilibrium.
-fn dissipating(swing: f64, dt: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+/// Implicit Euler: energy falls monotonically to that of the equilibrium.
+fn dissipating(swing: f64, dt: f64, steps: usize, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let exact = NewtonOptions { velocity_tolerance: 1e-9, linear_tolerance: 1e-6, ..NewtonOptions::default() };
     let mut body = hanging()?;
     let all = energies(&mut Newton::with_options(exact), &mut body, dt, steps)?;
     let growth = all.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max) / swing;
     let case = |what: &str| format!("newton, {steps} steps: {what}");
-    tell(Finding::absolute("long run", case("growth in a step"), growth, 0.0, 1e-12));
+    report(Finding::absolute("long run", case("growth in a step"), growth, 0.0, 1e-12));
     let tenth = &all[all.len() - steps / 10..];
     let spread = tenth.iter().fold(f64::NEG_INFINITY, |most, e| most.max(*e))
         - tenth.iter().fold(f64::INFINITY, |least, e| least.min(*e));
     let end = all[steps];
-    tell(Finding::absolute("long run", case("change in the last tenth"), spread / swing, 0.0, 1e-9));
-    tell(Finding::absolute("long run", case("above the equilibrium"), (end - rest(body)?) / swing, 0.0, 1e-9));
+    report(Finding::absolute("long run", case("change in the last tenth"), spread / swing, 0.0, 1e-9));
+    report(Finding::absolute("long run", case("above the equilibrium"), (end - rest(body)?) / swing, 0.0, 1e-9));
     Ok(())
 }
 
-/// The others: energy is off by as much in the last tenth as in the first, but for what goes with the motion, which becomes finer and then stays so: there is no trend in
-/// the second half.
-fn conserving(swing: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+/// The other integrators: the energy error of the last tenth equals that of the first, except for the part that follows
+/// the motion. The motion develops finer scales and then stays so; the second half shows no trend.
+fn conserving(swing: f64, steps: usize, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let exact = NewtonOptions { velocity_tolerance: 1e-10, linear_tolerance: 1e-6, ..NewtonOptions::default() };
-    // The first is of first order, so that its energy swings more.
+    // Symplectic Euler is of first order, so its energy oscillates more.
     let schemes: [(Box<dyn Integrator>, f64); 3] = [
         (Box::new(SymplecticEuler), 0.1),
         (Box::new(Verlet::default()), 0.01),
@@ -106,9 +107,9 @@ fn conserving(swing: f64, steps: usize, tell: &mut dyn FnMut(Finding)) -> Result
         let largest = all.iter().map(|e| (e - all[0]).abs() / swing).fold(0.0, f64::max);
         let case = |what: &str| format!("{}, {steps} steps: {what}", scheme.name());
         let tenth = |number: usize| mean(&all[number * steps / 10..(number + 1) * steps / 10]);
-        tell(Finding::absolute("long run", case("largest error"), largest, 0.0, limit));
-        tell(Finding::absolute("long run", case("drift"), tenth(9) - tenth(0), 0.0, 0.005));
-        tell(Finding::absolute("long run", case("drift, second half"), tenth(9) - tenth(5), 0.0, 0.1 * limit));
+        report(Finding::absolute("long run", case("largest error"), largest, 0.0, limit));
+        report(Finding::absolute("long run", case("drift"), tenth(9) - tenth(0), 0.0, 0.005));
+        report(Finding::absolute("long run", case("drift, second half"), tenth(9) - tenth(5), 0.0, 0.1 * limit));
     }
     Ok(())
 }

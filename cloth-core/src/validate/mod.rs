@@ -1,6 +1,7 @@
-//! Known answers: what cloth does that theory can say exactly, measured on the simulator.
+//! Validation against exact results of the theory of strips, sheets and motions.
 //!
-//! Each file holds one of them. Static shapes are found by Newton's method on the energy with a direct solver; motions are stepped.
+//! One file per question. Static shapes are computed by Newton's method on the energy, with a direct solver; motions
+//! are simulated.
 
 mod banded;
 mod cantilever;
@@ -30,20 +31,20 @@ use crate::fabric::FabricError;
 use crate::integrator::StepError;
 use crate::mesh::MeshError;
 
-/// One answer, measured.
+/// A measured result with its exact value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What was asked.
+    /// The question, as on the command line or in the table.
     pub question: &'static str,
-    /// Of what.
+    /// The case within the question.
     pub case: String,
-    /// What the simulator says.
+    /// The simulator's result.
     pub measured: f64,
-    /// What theory says.
+    /// The exact result.
     pub exact: f64,
-    /// How far apart they are, as `limit` counts it.
+    /// The error, relative or absolute.
     pub error: f64,
-    /// How far they may be.
+    /// The largest acceptable error.
     pub limit: f64,
 }
 
@@ -54,75 +55,76 @@ impl Finding {
         self.error.abs() <= self.limit
     }
 
-    /// The error is measured/exact − 1.
+    /// Creates a finding with the error measured/exact − 1.
     fn relative(question: &'static str, case: String, measured: f64, exact: f64, limit: f64) -> Self {
         Self { question, case, measured, exact, error: measured / exact - 1.0, limit }
     }
 
-    /// The error is measured − exact.
+    /// Creates a finding with the error measured − exact.
     fn absolute(question: &'static str, case: String, measured: f64, exact: f64, limit: f64) -> Self {
         Self { question, case, measured, exact, error: measured - exact, limit }
     }
 }
 
-/// A case that could not be set up or solved.
+/// A case that cannot be set up or solved.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ValidateError {
-    /// A mesh.
+    /// The mesh is invalid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A fabric.
+    /// The fabric does not fit the mesh.
     #[error(transparent)]
     Fabric(#[from] FabricError),
-    /// A list of elements.
+    /// Elements and stencils do not match.
     #[error(transparent)]
     List(#[from] ListError),
-    /// A sum of terms.
+    /// The terms cannot be assembled into a system.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// Forces or energies.
+    /// Forces or energies cannot be evaluated.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),
-    /// A step.
+    /// A step failed.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// A strip that its triangles do not cover.
-    #[error("the triangles cover {area:.6} m² of {strip:?}; choose a width of some spacings, or another spacing")]
+    /// The triangles do not cover the strip.
+    #[error("the triangles cover {area:.6} m² of {strip:?}; choose a width of several spacings, or another spacing")]
     Strip {
-        /// The strip.
         strip: Strip,
-        /// What is covered, in m².
+        /// The covered area, in m².
         area: f64,
     },
-    /// No equilibrium was found.
+    /// The search for an equilibrium did not converge.
     #[error(
-        "no equilibrium: a vertex still feels {force:.2e} N, of {weight:.2e} N in all; try more segments or a smaller load"
+        "no equilibrium: a vertex still feels {force:.2e} N of {weight:.2e} N in all; \
+         try more segments or a smaller load"
     )]
     NoEquilibrium {
-        /// The largest force left, in N.
+        /// The largest remaining force, in N.
         force: f64,
-        /// The weight, in N.
+        /// The total weight, in N.
         weight: f64,
     },
-    /// No instability was found.
+    /// The structure does not become unstable.
     #[error("{what} is stable up to Γ = {gamma}")]
     Stable {
-        /// What was loaded.
         what: &'static str,
         /// The largest load tried.
         gamma: f64,
     },
 }
 
-/// The questions.
+/// Names of the questions.
 pub const QUESTIONS: [&str; 8] =
     ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "long-run"];
 
-/// Asks the questions named (all, if none is), telling each finding as it is made. `quick` leaves out the finer meshes.
+/// Answers the named questions, or all if `names` is empty, and calls `report` with each finding. `quick` skips the
+/// finer meshes.
 ///
 /// # Errors
-/// When a case cannot be set up or solved.
-pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
+/// Returns an error if a case cannot be set up or solved.
+pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
     let all: [Ask; 8] = [
         cantilever::ask,
@@ -138,7 +140,7 @@ pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Res
     for (name, ask) in QUESTIONS.into_iter().zip(all) {
         if names.is_empty() || names.iter().any(|wanted| wanted == name) {
             ask(quick, &mut |finding| {
-                tell(&finding);
+                report(&finding);
                 findings.push(finding);
             })?;
         }
@@ -146,7 +148,7 @@ pub fn ask(names: &[String], quick: bool, mut tell: impl FnMut(&Finding)) -> Res
     Ok(findings)
 }
 
-/// The head of the table that [`line()`] makes.
+/// Returns the header of the table whose rows [`line()`] formats.
 #[must_use]
 pub fn head() -> String {
     format!(
@@ -155,7 +157,7 @@ pub fn head() -> String {
     )
 }
 
-/// One finding as a line.
+/// Formats a finding as a row.
 #[must_use]
 pub fn line(finding: &Finding) -> String {
     format!(

@@ -10,7 +10,7 @@ use crate::integrator::{
 };
 use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
 
-/// A free sheet of 0.3 m × 0.25 m under gravity, 6 × 5 cells.
+/// A free sheet of 0.3 m × 0.25 m under gravity, with 6 × 5 cells.
 fn sheet(gravity: f64) -> Result<Body, ValidateError> {
     let sheet = Sheet {
         cells: [6, 5],
@@ -30,7 +30,7 @@ fn sheet(gravity: f64) -> Result<Body, ValidateError> {
     Ok(Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system })
 }
 
-/// The sheet stretched, wrinkled, moving and spinning at 10 rad/s, without weight.
+/// A weightless sheet, stretched and wrinkled, that moves and spins at 10 rad/s.
 fn spinning() -> Result<Body, ValidateError> {
     let mut body = sheet(0.0)?;
     for (x, v) in body.x.iter_mut().zip(&mut body.v) {
@@ -53,13 +53,13 @@ fn drift(now: Vector3<f64>, before: Vector3<f64>, scale: f64) -> f64 {
     norm(subtract(now, before)) / scale
 }
 
-pub(super) fn ask(_: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
-    momenta(tell)?;
-    free_fall(tell)
+pub(super) fn ask(_: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    momenta(report)?;
+    free_fall(report)
 }
 
-/// Momentum is kept by all, angular momentum by those that say so.
-fn momenta(tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+/// All integrators conserve momentum; some conserve angular momentum.
+fn momenta(report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let schemes: [(Box<dyn Integrator>, f64, bool); 5] = [
         (Box::new(SymplecticEuler), 1e-4, true),
         (Box::new(Verlet::default()), 1e-4, true),
@@ -77,18 +77,18 @@ fn momenta(tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
         let mass: f64 = body.masses.iter().sum();
         let case = format!("spinning sheet, {}, {steps} steps: momentum", scheme.name());
         let scale = norm(momentum).max(mass);
-        tell(Finding::absolute("momentum", case, drift(body.momentum(), momentum, scale), 0.0, 1e-12));
+        report(Finding::absolute("momentum", case, drift(body.momentum(), momentum, scale), 0.0, 1e-12));
         let lost = drift(body.angular_momentum(), spin, norm(spin));
         let case = format!("spinning sheet, {}, {steps} steps: spin", scheme.name());
-        // The others lose some, in proportion to the step.
-        tell(Finding::absolute("momentum", case, lost, 0.0, if keeps_spin { 1e-12 } else { 0.2 }));
+        // The others lose some, in proportion to the step size.
+        report(Finding::absolute("momentum", case, lost, 0.0, if keeps_spin { 1e-12 } else { 0.2 }));
     }
     Ok(())
 }
 
-/// After n steps: g h² n (n ± 1)/2 for the Eulers, g t²/2 for the second order.
-fn free_fall(tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
-    // Stable for the explicit ones too, in which rounding would grow.
+/// Free fall after n steps: g h² n (n ± 1)/2 for the Euler methods, g t²/2 for methods of second order.
+fn free_fall(report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    // Stable for explicit methods too; otherwise rounding errors would grow.
     let (g, h, n) = (9.81, 2e-4, 100.0);
     let after = g * h * h * n * (n + 1.0) / 2.0;
     let before = g * h * h * n * (n - 1.0) / 2.0;
@@ -106,10 +106,10 @@ fn free_fall(tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
         for _ in 0..100 {
             scheme.step(&mut body, h)?;
         }
-        // The vertex that fell the least or most.
+        // The vertex with the largest error.
         let worst = body.x.iter().map(|x| -x[2]).max_by(|a, b| (a - drop).abs().total_cmp(&(b - drop).abs()));
         let case = format!("free fall, {}: drop in m", scheme.name());
-        tell(Finding::relative("momentum", case, worst.unwrap_or(f64::NAN), drop, 1e-10));
+        report(Finding::relative("momentum", case, worst.unwrap_or(f64::NAN), drop, 1e-10));
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use crate::integrator::{
 };
 use energy_solve::SolveOptions;
 
-/// A spring pendulum: 1 kg on 1 m of 400 N/m, let go from the horizontal.
+/// A spring pendulum: 1 kg on a spring of 1 m and 400 N/m, released from the horizontal.
 fn pendulum() -> Result<Body, ValidateError> {
     let springs = PotentialTerm::new(ElementList::new("rod", vec![HookeSpring::new(400.0, 1.0)], &[[0, 1]])?);
     let weight = PotentialTerm::new(ElementList::new("weight", vec![Gravity::new(1.0, [0.0, 0.0, -9.81])], &[[1]])?);
@@ -56,7 +56,7 @@ fn patch() -> Result<Body, ValidateError> {
     Ok(Body { v, x, masses: vec![0.02; 16], system })
 }
 
-/// The classical Runge–Kutta method, of fourth order: the truth, at steps small enough.
+/// The classical Runge–Kutta method of fourth order; the reference at small steps.
 pub(crate) fn runge_kutta(body: &mut Body, time: f64, steps: usize) -> Result<(), ValidateError> {
     let h = time / steps as f64;
     let free = body.system.dofs().free().to_vec();
@@ -91,7 +91,7 @@ pub(crate) fn runge_kutta(body: &mut Body, time: f64, steps: usize) -> Result<()
     Ok(())
 }
 
-/// The schemes with their orders, solved so exactly that only their own error is left.
+/// Returns the integrators with their orders and tolerances, solved so accurately that only their own error remains.
 fn schemes() -> Vec<(Box<dyn Integrator>, f64, f64)> {
     let exact = NewtonOptions {
         velocity_tolerance: 1e-11,
@@ -112,7 +112,7 @@ fn schemes() -> Vec<(Box<dyn Integrator>, f64, f64)> {
     ]
 }
 
-/// The time that is stepped over, in s.
+/// Simulated time, in s.
 const TIME: f64 = 0.2;
 
 fn error(body: &mut Body, scheme: &mut dyn Integrator, steps: usize, truth: &Body) -> Result<f64, ValidateError> {
@@ -123,7 +123,7 @@ fn error(body: &mut Body, scheme: &mut dyn Integrator, steps: usize, truth: &Bod
     Ok(apart.fold(0.0, f64::max))
 }
 
-pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     type Make = fn() -> Result<Body, ValidateError>;
     let steps = if quick { 800 } else { 1600 };
     for (name, make) in [("pendulum", pendulum as Make), ("4 × 4 springs", patch as Make)] {
@@ -133,7 +133,7 @@ pub(super) fn ask(quick: bool, tell: &mut dyn FnMut(Finding)) -> Result<(), Vali
             let coarse = error(&mut make()?, &mut *scheme, steps / 2, &truth)?;
             let fine = error(&mut make()?, &mut *scheme, steps, &truth)?;
             let case = format!("{name}, {}, {} to {steps} steps", scheme.name(), steps / 2);
-            tell(Finding::absolute("order", case, (coarse / fine).log2(), order, limit));
+            report(Finding::absolute("order", case, (coarse / fine).log2(), order, limit));
         }
     }
     Ok(())

@@ -4,24 +4,24 @@ use super::ValidateError;
 use super::delaunay::{Point, double_area, triangulate};
 use crate::mesh::TriangleMesh;
 
-/// How a strip is meshed.
+/// The kind of mesh of a strip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, ValueEnum)]
 pub enum MeshKind {
     /// Equilateral triangles.
     Equilateral,
-    /// Squares with all diagonals alike.
+    /// Squares with parallel diagonals.
     Diagonal,
     /// Squares with alternating diagonals.
     Alternating,
-    /// The Delaunay triangulation of random points.
+    /// Delaunay triangulation of random points.
     Random,
 }
 
 impl MeshKind {
-    /// All.
+    /// All kinds of mesh.
     pub const ALL: [Self; 4] = [Self::Equilateral, Self::Diagonal, Self::Alternating, Self::Random];
 
-    /// What it is called.
+    /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -33,38 +33,38 @@ impl MeshKind {
     }
 }
 
-/// A strip [0, length] × [0, width] with straight edges, whose mesh may lie at any angle to it.
+/// A strip [0, length] × [0, width] with straight edges. Its mesh may lie at any angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Strip {
-    /// The mesh.
+    /// Kind of mesh.
     pub kind: MeshKind,
-    /// The angle of the mesh's first direction to the strip, in degrees.
+    /// Angle between the mesh's first direction and the strip, in degrees.
     pub orientation: f64,
-    /// Along the first axis.
+    /// Length along the first axis, in m.
     pub length: f64,
-    /// Along the second axis.
+    /// Width along the second axis, in m.
     pub width: f64,
-    /// Vertices along its edges are about this far apart, inside as well.
+    /// Approximate distance between neighbouring vertices, in m.
     pub spacing: f64,
-    /// Whether a second column of vertices stands one spacing from the first, to clamp both.
+    /// Whether to place a second column of vertices one spacing from the first, to clamp both.
     pub clamped: bool,
 }
 
-/// How near to an edge, over the spacing, a vertex inside may lie.
+/// Smallest distance of an interior vertex from an edge, over the spacing.
 const CLEARANCE: f64 = 0.45;
 
 impl Strip {
-    /// A strip of length 1, two squares wide, with all diagonals alike.
+    /// Creates a strip of length 1, two squares wide, with parallel diagonals.
     pub(super) fn narrow(segments: usize) -> Self {
         let spacing = 1.0 / segments as f64;
         let width = 2.0 * spacing;
         Self { kind: MeshKind::Diagonal, orientation: 0.0, length: 1.0, width, spacing, clamped: false }
     }
 
-    /// The strip as a mesh in the first two axes; lengths are in m.
+    /// Builds the mesh in the plane of the first two axes; lengths in m.
     ///
     /// # Errors
-    /// When it cannot be meshed.
+    /// Returns an error if the strip cannot be meshed.
     pub fn mesh(&self) -> Result<TriangleMesh, ValidateError> {
         let columns = (self.length / self.spacing).round().max(1.0);
         let s = self.length / columns;
@@ -92,7 +92,7 @@ impl Strip {
         Ok(TriangleMesh::new(vertices, triangles)?)
     }
 
-    /// Vertices along the four edges, and the second column.
+    /// Returns the vertices on the four edges and in the second column.
     fn edges(&self, columns: usize, s: f64) -> Vec<Point> {
         let rows = (self.width / s).round().max(1.0) as usize;
         let at = |row: usize| self.width * row as f64 / rows as f64;
@@ -108,7 +108,7 @@ impl Strip {
         points
     }
 
-    /// The points of the lattice that may lie in the strip, each with its indices.
+    /// Returns the lattice points that may lie in the strip, with their indices.
     fn lattice(&self, s: f64) -> Vec<([i64; 2], Point)> {
         let (sine, cosine) = self.orientation.to_radians().sin_cos();
         let up = if self.kind == MeshKind::Equilateral { [0.5, 0.75_f64.sqrt()] } else { [0.0, 1.0] };
@@ -130,10 +130,10 @@ impl Strip {
         points
     }
 
-    /// Turns the diagonals of whole cells inside the strip to where they belong.
+    /// Flips the diagonals of whole cells inside the strip to the requested direction.
     fn choose_diagonals(&self, points: &[Point], cells: &[Option<[i64; 2]>], s: f64, triangles: &mut [[usize; 3]]) {
         let (sine, cosine) = self.orientation.to_radians().sin_cos();
-        // Vertices on the edges belong to cells where they lie on the lattice.
+        // An edge vertex belongs to a cell if it lies on the lattice.
         let cell = |vertex: usize| -> Option<[i64; 2]> {
             cells[vertex].or_else(|| {
                 let [x, y] = points[vertex];
@@ -170,13 +170,13 @@ impl Strip {
     }
 }
 
-/// Moved at random by a little, so that no four lie on a circle.
+/// Returns the points with small random displacements, so that no four lie on a circle.
 fn perturbed(points: &[Point], by: f64) -> Vec<Point> {
     let mut random = random_numbers(99);
     points.iter().map(|&[x, y]| [x + by * random(), y + by * random()]).collect()
 }
 
-/// Numbers in [−½, ½) by a linear congruence, the same on every machine.
+/// Returns a linear congruential generator of numbers in [−½, ½), identical on every machine.
 fn random_numbers(seed: u32) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -202,12 +202,12 @@ mod tests {
     }
 
     #[test]
-    fn squares_have_the_diagonals_that_were_asked_for() {
+    fn squares_have_the_requested_diagonals() {
         for (kind, expected) in [(MeshKind::Diagonal, 48), (MeshKind::Alternating, 24)] {
             let strip = Strip { kind, orientation: 0.0, length: 0.6, width: 0.4, spacing: 0.05, clamped: false };
             let mesh = strip.mesh().unwrap();
             assert_eq!(mesh.triangles().len(), 192);
-            // Along (+, +), inside the outer ring of cells, whose corners' diagonals Delaunay chooses.
+            // Count inner cells only: in the outer ring, the Delaunay triangulation chooses the diagonals.
             let inner = |p: &[f64; 3]| p[0] > 0.049 && p[0] < 0.551 && p[1] > 0.049 && p[1] < 0.351;
             let mut rising = 0;
             for triangle in 0..mesh.triangles().len() {

@@ -10,22 +10,22 @@ use crate::mesh::material_triangle;
 use crate::model::PartKind;
 use crate::simulation::Simulation;
 
-/// What colours show.
+/// The quantity that colours show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Colouring {
-    /// Nothing: each side of the cloth has its colour.
+    /// None: each side of the cloth has its own colour.
     #[default]
     Plain,
-    /// How much a piece is stretched or squeezed where it is most, |σ − 1| with σ a principal stretch; of hair its segments.
+    /// Largest strain |σ − 1|, with the principal stretches σ; for hair, the strain of the segments.
     Strain,
-    /// Energy stored by deformation, in J/kg: of all elements on two vertices or more.
+    /// Stored deformation energy, in J/kg: of all elements with at least two vertices.
     Energy,
-    /// ‖v‖, in m/s.
+    /// Speed ‖v‖, in m/s.
     Speed,
 }
 
 impl Colouring {
-    /// The one after this.
+    /// Returns the next colouring.
     #[must_use]
     pub fn next(self) -> Self {
         match self {
@@ -36,7 +36,7 @@ impl Colouring {
         }
     }
 
-    /// What the colours from 0 to `most` mean, with a unit.
+    /// Describes the colours from 0 to `most`, with a unit.
     #[must_use]
     pub fn legend(self, most: f64) -> String {
         match self {
@@ -48,16 +48,17 @@ impl Colouring {
     }
 }
 
-/// The colour of a number from 0 to `most`: viridis, dark blue to yellow, red, green and blue from 0 to 1 as screens show them.
+/// Maps a number from 0 to `most` to viridis, from dark blue to yellow, as sRGB from 0 to 1.
 #[must_use]
 pub fn colour(value: f64, most: f64) -> [f32; 3] {
     let part = if most > 0.0 { (value / most).clamp(0.0, 1.0) } else { 0.0 };
-    // Not a number where a state is not: drawn as 0.
+    // NaN, from a failed state, is drawn as 0.
     let rgb = ViridisRGB::get_color(if part.is_nan() { 0.0 } else { part });
     [rgb.0, rgb.1, rgb.2].map(|channel| f32::from(channel) / 255.0)
 }
 
-/// The value that two in a hundred are above: what colours go up to, so that a single vertex at a pin does not make all others dark.
+/// Returns the 98th percentile as the upper end of the colour scale, so that a single vertex at a pin does not make all
+/// others dark.
 #[must_use]
 pub fn upper_end(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
@@ -65,17 +66,17 @@ pub fn upper_end(values: &[f64]) -> f64 {
     sorted.get((sorted.len() * 98 / 100).min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
-/// The shape at rest, to which strains refer.
+/// The rest shape, which strains refer to.
 #[derive(Clone, Debug)]
 pub struct RestShape {
-    /// Of each triangle: its corners, its edges in its plane (l, x, y: the corners are at 0, (l, 0) and (x, y)), in m.
+    /// For each triangle: its corners, and (l, x, y) such that in its plane they lie at 0, (l, 0) and (x, y), in m.
     triangles: Vec<([usize; 3], [f64; 3])>,
-    /// Of each segment of hair: its ends, and its length in m.
+    /// For each hair segment: its ends, and its length in m.
     segments: Vec<([usize; 2], f64)>,
 }
 
 impl RestShape {
-    /// Of a simulation that has not begun: hair is at rest then.
+    /// Creates the rest shape of a simulation that has not started; hair is at rest then.
     #[must_use]
     pub fn of(simulation: &Simulation) -> Self {
         let flat = |corners: [Vector3<f64>; 3]| {
@@ -97,7 +98,7 @@ impl RestShape {
         Self { triangles: triangles.collect(), segments }
     }
 
-    /// The strain at each vertex: the mean of its triangles' by area, or of its segments'.
+    /// Returns the strain at each vertex: the area-weighted mean of its triangles, or the mean of its segments.
     #[must_use]
     pub fn strains(&self, x: &[Vector3<f64>]) -> Vec<f64> {
         let (mut sums, mut weights) = (vec![0.0; x.len()], vec![0.0; x.len()]);
@@ -122,7 +123,7 @@ impl RestShape {
     }
 }
 
-/// max |σ − 1| of the deformation gradient with these columns: σ² are the eigenvalues of FᵀF.
+/// Returns max |σ − 1| of the deformation gradient F with these columns; σ² are the eigenvalues of FᵀF.
 fn largest_strain(first: Vector3<f64>, second: Vector3<f64>) -> f64 {
     let (a, b, c) = (dot(first, first), dot(first, second), dot(second, second));
     let (middle, apart) = (0.5 * (a + c), (0.5 * (a - c)).hypot(b));
@@ -132,7 +133,8 @@ fn largest_strain(first: Vector3<f64>, second: Vector3<f64>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The energy stored at each vertex over its mass, in J/kg: every element's is divided evenly among its vertices.
+/// Returns the stored energy at each vertex over its mass, in J/kg. The energy of an element is divided evenly among
+/// its vertices.
 #[must_use]
 pub fn stored_energies(simulation: &Simulation, x: &[Vector3<f64>]) -> Vec<f64> {
     let mut energies = vec![0.0; x.len()];
@@ -151,7 +153,7 @@ pub fn stored_energies(simulation: &Simulation, x: &[Vector3<f64>]) -> Vec<f64> 
     energies.iter().zip(simulation.masses()).map(|(energy, mass)| energy / mass).collect()
 }
 
-/// An element's energy divided evenly among its vertices. Stencils of unequal size are filled up by repeating a vertex, which counts once.
+/// Divides an element's energy evenly among its vertices. Stencils padded by repeating a vertex count it once.
 fn shares(stencil: impl Iterator<Item = u32>, energy: f64) -> impl Iterator<Item = (usize, f64)> {
     let vertices: BTreeSet<usize> = stencil.map(|vertex| vertex as usize).collect();
     let share = energy / vertices.len() as f64;
@@ -174,12 +176,12 @@ mod tests {
     }
 
     #[test]
-    fn strain_is_that_of_the_stretch() {
+    fn strain_is_the_largest_change_of_length() {
         let simulation = simulation("");
         let rest = RestShape::of(&simulation);
         let x = simulation.positions();
         assert!(rest.strains(x).iter().all(|strain| strain.abs() < 1e-14));
-        // Turned and stretched by 10 % along x, squeezed by 30 % along y: 30 % counts. Hair grows by 25 % along z.
+        // Rotated, stretched by 10 % along x and compressed by 30 % along y: the strain is 30 %. Hair is 25 % longer.
         let stretched: Vec<Vector3<f64>> = x.iter().map(|&[x, y, z]| [0.7 * y, -1.1 * x, 1.25 * z]).collect();
         for (vertex, strain) in rest.strains(&stretched).into_iter().enumerate() {
             let expected = if vertex < 20 { 0.3 } else { 0.25 };
@@ -188,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn stored_energy_is_all_energy_but_that_of_gravity_and_contact() {
+    fn stored_energy_excludes_gravity_and_contact() {
         for bending in
             ["bending.flat.stiffness = 1e-3", "bending.plate.flexural = { rigidity = 1e-3, poisson_ratio = 0.2 }"]
         {
@@ -213,12 +215,12 @@ mod tests {
     }
 
     #[test]
-    fn a_vertex_that_fills_up_a_stencil_counts_once() {
+    fn padding_of_a_stencil_counts_once() {
         assert_eq!(shares([3, 5, 3, 3].into_iter(), 1.0).collect::<Vec<_>>(), [(3, 0.5), (5, 0.5)]);
     }
 
     #[test]
-    fn colours_go_from_dark_to_bright_and_forgive_peaks() {
+    fn colours_go_from_dark_to_bright_and_ignore_peaks() {
         let brightness = |value: f64| colour(value, 2.0).iter().sum::<f32>();
         assert!(brightness(0.0) < brightness(1.0) && brightness(1.0) < brightness(2.0));
         assert_eq!(colour(3.0, 2.0), colour(2.0, 2.0));

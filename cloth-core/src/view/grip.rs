@@ -11,7 +11,7 @@ use energy_solve::{
 use crate::geometry::dot;
 use crate::model::{IslandModel, TermLabel};
 
-/// A hand: a soft pin that holds one vertex while the mouse does, by the declared [`ZeroLengthSpring`] to where the mouse is.
+/// A soft pin for the mouse: pulls one vertex to a target by the declared [`ZeroLengthSpring`].
 #[derive(Clone, Debug)]
 pub(super) struct Grip {
     held: Rc<Cell<Option<Held>>>,
@@ -25,16 +25,16 @@ struct Held {
 }
 
 impl Grip {
-    /// How far the spring stretches under the weight of everything, in m.
+    /// Elongation of the spring under the weight of the whole scene, in m.
     const STRETCH: f64 = 0.02;
 
-    /// One that can carry all these masses, in kg.
+    /// Creates a grip that is stiff enough for these masses, in kg.
     pub(super) fn carrying(masses: &[f64]) -> Self {
         let stiffness = 9.81 * masses.iter().sum::<f64>() / Self::STRETCH;
         Self { held: Rc::default(), spring: ZeroLengthSpring::new(stiffness, 0.0) }
     }
 
-    /// Holds a vertex there.
+    /// Starts pulling a vertex to a target.
     pub(super) fn hold(&self, vertex: usize, target: Vector3<f64>) {
         self.held.set(Some(Held { vertex, target }));
     }
@@ -44,17 +44,17 @@ impl Grip {
         self.held.get().map(|held| held.vertex)
     }
 
-    pub(super) fn let_go(&self) {
+    pub(super) fn release(&self) {
         self.held.set(None);
     }
 
-    /// What its terms are called.
+    /// Label of the grip's terms.
     pub(super) fn label() -> TermLabel {
         TermLabel { name: NAME.to_owned(), element: <ZeroLengthSpring as Element>::DECLARATION.name }
     }
 
-    /// Adds its force to those of an island.
-    pub(super) fn hold_on(&self, island: &mut IslandModel, label: usize) {
+    /// Adds the grip to the terms of an island.
+    pub(super) fn add_to(&self, island: &mut IslandModel, label: usize) {
         let vertices = island.vertices.clone();
         let (stencils, slots) = ((0..index(vertices.len())).collect(), vec![None; vertices.len()]);
         island.terms.push(Box::new(GripTerm { grip: self.clone(), vertices, stencils, slots }));
@@ -64,19 +64,21 @@ impl Grip {
 
 const NAME: &str = "mouse";
 
-/// Any vertex may be held; the blocks are on the diagonal, so that the pattern of the matrix never changes.
+/// The term of the grip on one island. It may act on any vertex, through a diagonal block, so that the matrix pattern
+/// never changes.
 #[derive(Debug)]
 struct GripTerm {
     grip: Grip,
-    /// By their numbers in the whole.
+    /// Vertices of the island, as indices into the scene.
     vertices: Vec<usize>,
     stencils: Vec<u32>,
-    /// Where the diagonal block of each vertex is stored; `None` where it is pinned.
+    /// Slot of the diagonal block of each vertex; `None` if it is pinned.
     slots: Vec<Option<usize>>,
 }
 
 impl GripTerm {
-    /// What is held and free, counted within the island, with its block's place.
+    /// Returns the held vertex, as an index within the island, with the slot of its block; `None` if it is pinned or
+    /// elsewhere.
     fn held(&self) -> Option<(Held, usize)> {
         let held = self.grip.held.get()?;
         let vertex = self.vertices.iter().position(|&vertex| vertex == held.vertex)?;
@@ -133,7 +135,7 @@ impl PlacedTerm for GripTerm {
         self.tally()
     }
 
-    /// A spring without rest length has no negative curvature to take away.
+    /// The Hessian of a spring with rest length 0 is positive semi-definite, so projection changes nothing.
     fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
         if let Some((Held { vertex, target }, slot)) = self.held() {
             let result = self.grip.spring.hessian(&[x[vertex], target]);

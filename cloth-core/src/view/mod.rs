@@ -1,7 +1,10 @@
-//! Looking at scenes and finished runs: what `cloth view` does, but for its window, which is in the feature `view`.
+//! Views of scenes and finished runs: everything of `cloth view` except the window, which needs the feature `view`.
 //!
-//! [`Stage`] is what is shown and how time passes, [`Orbit`] the camera, [`pick`] finds the vertex under the mouse, [`Colouring`] what colours mean.
-//! [`screenshot`] needs no display.
+//! - [`Stage`] holds the content and advances time.
+//! - [`Orbit`] is the camera.
+//! - [`pick`] finds the vertex under the mouse.
+//! - [`Colouring`] maps quantities to colours.
+//! - [`screenshot`] needs no display.
 
 mod colouring;
 mod grip;

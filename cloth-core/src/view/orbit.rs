@@ -2,46 +2,46 @@ use energy_dsl::Vector3;
 
 use crate::geometry::{cross, dot, norm, subtract};
 
-/// A camera that turns about a point; z is up. Pixels count from the upper left corner of the picture.
+/// A camera that orbits a point; z is up. Pixels count from the upper left corner of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    /// What it looks at, in m.
+    /// The point it looks at, in m.
     pub target: Vector3<f64>,
-    /// How far the eye is from there, in m.
+    /// Distance of the eye from the target, in m.
     pub distance: f64,
-    /// The direction from the target to the eye: the angle about z from x, in radians.
+    /// Azimuth of the direction from the target to the eye: the angle about z from x, in radians.
     pub azimuth: f64,
-    /// The angle of that direction above the horizon, in radians; never quite upright.
+    /// Elevation of that direction above the horizon, in radians; never vertical.
     pub elevation: f64,
 }
 
-/// A half-line from the eye.
+/// A ray from the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// The eye, in m.
+    /// Position of the eye, in m.
     pub origin: Vector3<f64>,
-    /// A unit vector.
+    /// Unit direction.
     pub direction: Vector3<f64>,
 }
 
-/// A point as it is seen.
+/// A projected point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// Where, in pixels.
+    /// Position, in pixels.
     pub pixel: [f64; 2],
-    /// How far in front of the eye, along its view, in m.
+    /// Depth along the view direction, in m.
     pub depth: f64,
 }
 
 impl Orbit {
-    /// The vertical angle of view, in radians.
+    /// Vertical angle of view, in radians.
     pub const FIELD_OF_VIEW: f64 = 0.6;
-    /// How much wider than what is to be seen the view is.
+    /// Size of the view over the size of its content.
     const MARGIN: f64 = 1.05;
-    /// The steepest view.
+    /// Largest elevation, in radians.
     const STEEPEST: f64 = 1.55;
 
-    /// Looks at all points from in front, from a little above, and sees them whole.
+    /// Creates a camera that sees all points, from the front and slightly above.
     #[must_use]
     pub fn framing(points: &[Vector3<f64>]) -> Self {
         let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
@@ -54,20 +54,20 @@ impl Orbit {
         Self { target, distance: Self::MARGIN * radius / (0.5 * Self::FIELD_OF_VIEW).sin(), azimuth, elevation }
     }
 
-    /// The radius of the ball about the target that [`Self::framing`] would see from here, in m.
+    /// Returns the radius, in m, of the ball about the target that [`Self::framing`] would show from here.
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.distance * (0.5 * Self::FIELD_OF_VIEW).sin() / Self::MARGIN
     }
 
-    /// Where the eye is, in m.
+    /// Position of the eye, in m.
     #[must_use]
     pub fn eye(&self) -> Vector3<f64> {
         let backward = self.backward();
         std::array::from_fn(|axis| self.target[axis] + self.distance * backward[axis])
     }
 
-    /// From the target to the eye.
+    /// Unit vector from the target to the eye.
     fn backward(&self) -> Vector3<f64> {
         let ((s, c), (up, out)) = (self.azimuth.sin_cos(), self.elevation.sin_cos());
         [out * c, out * s, up]
@@ -82,14 +82,14 @@ impl Orbit {
         [right, cross(backward, right), backward]
     }
 
-    /// Turns about the target by a drag of the mouse, in pixels of a picture of that height.
+    /// Rotates about the target by a mouse drag, in pixels of a picture of this height.
     pub fn turn(&mut self, drag: [f64; 2], height: f64) {
         let angle = std::f64::consts::PI / height;
         self.azimuth -= drag[0] * angle;
         self.elevation = (self.elevation + drag[1] * angle).clamp(-Self::STEEPEST, Self::STEEPEST);
     }
 
-    /// Shifts what is seen by a drag of the mouse: what was at the target's depth follows the mouse.
+    /// Translates by a mouse drag; a point at the target's depth follows the mouse.
     pub fn shift(&mut self, drag: [f64; 2], height: f64) {
         let [right, up, _] = self.axes();
         let metre = self.distance / focal_length(height);
@@ -98,38 +98,38 @@ impl Orbit {
         }
     }
 
-    /// Comes closer by so many notches of the mouse wheel, or goes away.
+    /// Moves towards the target by notches of the mouse wheel; away from it if negative.
     pub fn approach(&mut self, notches: f64) {
         self.distance = (self.distance * 0.9_f64.powf(notches)).clamp(1e-4, 1e6);
     }
 
-    /// Where a point is seen in a picture of that size; `None` behind the eye.
+    /// Projects a point into a picture of this size; `None` if it is behind the eye.
     #[must_use]
     pub fn project(&self, point: Vector3<f64>, size: [f64; 2]) -> Option<Seen> {
         let [right, up, backward] = self.axes();
-        let way = subtract(point, self.eye());
-        let depth = -dot(backward, way);
+        let through_pixel = subtract(point, self.eye());
+        let depth = -dot(backward, through_pixel);
         let scale = focal_length(size[1]) / depth;
-        let pixel = [0.5 * size[0] + scale * dot(right, way), 0.5 * size[1] - scale * dot(up, way)];
+        let pixel = [0.5 * size[0] + scale * dot(right, through_pixel), 0.5 * size[1] - scale * dot(up, through_pixel)];
         (depth > 0.0).then_some(Seen { pixel, depth })
     }
 
-    /// The half-line through a pixel.
+    /// Returns the ray through a pixel.
     #[must_use]
     pub fn ray(&self, pixel: [f64; 2], size: [f64; 2]) -> Ray {
-        let way = self.way(pixel, size);
-        Ray { origin: self.eye(), direction: way.map(|component| component / norm(way)) }
+        let through_pixel = self.through_pixel(pixel, size);
+        Ray { origin: self.eye(), direction: through_pixel.map(|component| component / norm(through_pixel)) }
     }
 
-    /// The point seen in a pixel at that depth, in m.
+    /// Returns the point at this depth under a pixel, in m.
     #[must_use]
     pub fn at_depth(&self, pixel: [f64; 2], depth: f64, size: [f64; 2]) -> Vector3<f64> {
-        let (eye, way) = (self.eye(), self.way(pixel, size));
-        std::array::from_fn(|axis| eye[axis] + depth * way[axis])
+        let (eye, through_pixel) = (self.eye(), self.through_pixel(pixel, size));
+        std::array::from_fn(|axis| eye[axis] + depth * through_pixel[axis])
     }
 
-    /// From the eye to what a pixel shows at depth 1.
-    fn way(&self, pixel: [f64; 2], size: [f64; 2]) -> Vector3<f64> {
+    /// Returns the vector from the eye to the point at depth 1 under a pixel.
+    fn through_pixel(&self, pixel: [f64; 2], size: [f64; 2]) -> Vector3<f64> {
         let [right, up, backward] = self.axes();
         let f = focal_length(size[1]);
         let [x, y] = [(pixel[0] - 0.5 * size[0]) / f, (0.5 * size[1] - pixel[1]) / f];
@@ -137,7 +137,7 @@ impl Orbit {
     }
 }
 
-/// Pixels to a metre at a distance of 1 m.
+/// Returns the focal length, in pixels.
 fn focal_length(height: f64) -> f64 {
     0.5 * height / (0.5 * Orbit::FIELD_OF_VIEW).tan()
 }
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_and_points_undo_each_other() {
+    fn projection_and_rays_are_inverse() {
         let camera = camera();
         let point = [0.3, -0.2, 1.7];
         let seen = camera.project(point, SIZE).unwrap();
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_framed_is_in_the_picture() {
+    fn framed_points_are_in_the_picture() {
         let corners: Vec<Vector3<f64>> =
             (0..8).map(|i| std::array::from_fn(|axis| if i >> axis & 1 == 0 { -1.5 } else { 0.5 })).collect();
         let camera = Orbit::framing(&corners);

@@ -5,20 +5,20 @@ use energy_dsl::Vector3;
 use super::orbit::{Orbit, Ray};
 use crate::geometry::{cross, dot, subtract};
 
-/// How near a joint of hair must be to the mouse, in pixels.
+/// Largest distance between mouse and a joint of hair, in pixels.
 const REACH: f64 = 8.0;
 
-/// A vertex under the mouse.
+/// The vertex under the mouse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picked {
-    /// The vertex.
+    /// Index of the vertex.
     pub vertex: usize,
-    /// Its depth, in m.
+    /// Depth of the vertex, in m.
     pub depth: f64,
 }
 
-/// The vertex under a pixel of a picture of that size: the corner nearest to where the foremost triangle is met, or a joint of hair within a few pixels
-/// and not behind it.
+/// Returns the vertex under a pixel of a picture of this size; `None` for the background. It is the nearest corner of
+/// the foremost triangle, or a joint of hair within a few pixels that the triangle does not hide.
 #[must_use]
 pub fn pick(
     camera: &Orbit,
@@ -29,7 +29,8 @@ pub fn pick(
     strands: &[Range<usize>],
 ) -> Option<Picked> {
     let ray = camera.ray(pixel, size);
-    let met = |&corners: &[usize; 3]| meets(&ray, corners.map(|corner| positions[corner])).map(|hit| (corners, hit));
+    let met =
+        |&corners: &[usize; 3]| intersect(&ray, corners.map(|corner| positions[corner])).map(|hit| (corners, hit));
     let foremost = triangles.iter().filter_map(met).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
     let seen = |vertex: usize| {
         let depth = camera.project(positions[vertex], size)?.depth;
@@ -48,25 +49,25 @@ pub fn pick(
     joints.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, joint)| joint).or(on_cloth)
 }
 
-/// Where a half-line meets a triangle.
+/// The intersection of a ray with a triangle.
 struct Hit {
-    /// From its origin, in m.
+    /// Distance from the ray's origin, in m.
     distance: f64,
-    /// Of the corners; they add up to 1.
+    /// Barycentric weights of the corners.
     weights: [f64; 3],
 }
 
-/// From either side (Möller & Trumbore 1997).
-fn meets(ray: &Ray, [a, b, c]: [Vector3<f64>; 3]) -> Option<Hit> {
+/// Intersects a ray with a two-sided triangle (Möller & Trumbore 1997).
+fn intersect(ray: &Ray, [a, b, c]: [Vector3<f64>; 3]) -> Option<Hit> {
     let (ab, ac) = (subtract(b, a), subtract(c, a));
     let across = cross(ray.direction, ac);
     let determinant = dot(ab, across);
     if determinant == 0.0 {
         return None;
     }
-    let way = subtract(ray.origin, a);
-    let u = dot(way, across) / determinant;
-    let turned = cross(way, ab);
+    let offset = subtract(ray.origin, a);
+    let u = dot(offset, across) / determinant;
+    let turned = cross(offset, ab);
     let v = dot(ray.direction, turned) / determinant;
     let distance = dot(ac, turned) / determinant;
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(Hit { distance, weights: [1.0 - u - v, u, v] })
@@ -80,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_foremost_corner_under_the_mouse_is_picked() {
-        // Two squares, one behind the other as seen from −y.
+        // Two squares, one behind the other seen from −y.
         let square = |y: f64| [[-1.0, y, -1.0], [1.0, y, -1.0], [1.0, y, 1.0], [-1.0, y, 1.0]];
         let positions: Vec<Vector3<f64>> = square(1.0).into_iter().chain(square(0.0)).collect();
         let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
@@ -91,7 +92,7 @@ mod tests {
             let picked = pick(&camera, pixel, SIZE, &positions, &triangles, &[]).unwrap();
             assert_eq!(picked.vertex, vertex);
             assert_eq!(picked.depth, camera.project(positions[vertex], SIZE).unwrap().depth);
-            // From behind it is the other square.
+            // From behind, the other square is in front.
             let turned = Orbit { azimuth: -camera.azimuth, ..camera };
             let pixel = turned.project(positions[vertex - 4].map(|c| 0.95 * c), SIZE).unwrap().pixel;
             assert_eq!(pick(&turned, pixel, SIZE, &positions, &triangles, &[]).unwrap().vertex, vertex - 4);

@@ -7,27 +7,28 @@ use crate::output::{Look, Show};
 /// A picture of one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Screenshot {
-    /// As PNG.
+    /// The picture, as PNG.
     pub png: Vec<u8>,
-    /// The time shown, in s.
+    /// Time of the moment, in s.
     pub time: f64,
-    /// What the colours mean.
+    /// Description of the colours.
     pub legend: String,
 }
 
-/// A picture of a scene, simulated up to there, or of a finished run, drawn without any display. `tell` hears of each step.
+/// Draws a moment of a scene, which is simulated up to there, or of a finished run. Needs no display. Calls `on_step`
+/// after each step.
 ///
 /// # Errors
-/// When it cannot be opened or simulated, or the run has no such frame.
+/// Returns an error if the scene or run cannot be opened or simulated, or the run has no such frame.
 pub fn screenshot(
     path: &Path,
     moment: Moment,
     colouring: Colouring,
     wireframe: bool,
-    tell: impl FnMut(),
+    on_step: impl FnMut(),
 ) -> Result<Screenshot, ViewError> {
     let mut stage = Stage::open(path)?;
-    stage.go_to(moment, tell)?;
+    stage.go_to(moment, on_step)?;
     let values = stage.values(colouring);
     let most = upper_end(&values);
     let colours: Vec<[f32; 3]> = values.iter().map(|&value| colour(value, most)).collect();

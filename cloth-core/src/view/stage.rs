@@ -11,77 +11,76 @@ use crate::run::{Record, RecordError};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 
-/// Something that cannot be viewed.
+/// A scene or run that cannot be viewed.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ViewError {
-    /// The scene.
+    /// The scene file is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Its parts.
+    /// The parts of the scene do not fit together.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Setting up, or a step.
+    /// The simulation cannot be set up, or a step failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// What a run says of itself.
+    /// The record of the run cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A frame.
-    #[error("cannot read {}; frames are shown from OBJ files: was the run made with `output.obj = false`?", .path.display())]
-    Frame {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A frame that is not of this scene.
+    /// A frame cannot be read.
+    #[error(
+        "cannot read {}; frames are shown from OBJ files: was the run made with `output.obj = false`?",
+        .path.display()
+    )]
+    Frame { path: PathBuf, source: std::io::Error },
+    /// A frame does not fit the scene.
     #[error("{} is damaged: it has {found} vertices, the scene {expected}", .path.display())]
     Damaged {
-        /// The file.
         path: PathBuf,
-        /// Vertices that can be read in it.
+        /// Number of vertices in the file.
         found: usize,
         /// Vertices of the scene.
         expected: usize,
     },
-    /// A frame or time that was not simulated.
+    /// The requested frame or time is not part of the run.
     #[error("the run has frames 0 to {last}, up to {end:.4} s; {asked} is not among them")]
     NoSuchFrame {
-        /// What was asked for.
+        /// The requested frame or time.
         asked: String,
-        /// The last frame.
+        /// Index of the last frame.
         last: usize,
-        /// Its time, in s.
+        /// Time of the last frame, in s.
         end: f64,
     },
-    /// A window needs a screen.
+    /// A window needs a display.
     #[error(
-        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, or write a picture with --screenshot FILE"
+        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, \
+         or write a picture with --screenshot FILE"
     )]
     NoDisplay,
-    /// The engine cannot open one.
+    /// The rendering engine cannot open a window.
     #[error("cannot open a window: {reason}; write a picture with --screenshot FILE")]
     NoWindow {
-        /// What the engine says.
+        /// Message of the engine.
         reason: String,
     },
-    /// The picture.
+    /// The picture cannot be initial.
     #[error(transparent)]
     Picture(#[from] crate::output::PictureError),
 }
 
-/// A moment of what is viewed.
+/// A moment of a scene or run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Moment {
-    /// A frame, from 0.
+    /// A frame, counted from 0.
     Frame(usize),
-    /// A time, in s: the last frame or step that is not after it.
+    /// A time, in s: shows the last frame or step up to it.
     Time(f64),
-    /// The last frame of a run; the end of a scene.
+    /// The last frame of a run, or the end of a scene.
     End,
 }
 
-/// A cloth on show: a scene that is simulated while it is watched, or the frames of a finished run.
+/// The content of a view: a scene that is simulated live, or the frames of a finished run.
 #[derive(Debug)]
 pub struct Stage {
     scene: Scene,
@@ -89,7 +88,7 @@ pub struct Stage {
     rest: RestShape,
     act: Act,
     playing: bool,
-    /// Time that passed but was not shown yet, in s.
+    /// Elapsed time that has not been shown yet, in s.
     due: f64,
 }
 
@@ -100,10 +99,10 @@ enum Act {
 }
 
 impl Stage {
-    /// Opens a scene file, to be simulated, or the folder of a finished run, to be played; it plays at once.
+    /// Opens a scene file, to simulate it live, or the folder of a finished run, to play it. Starts playing.
     ///
     /// # Errors
-    /// When the scene is unfit, or the folder is not that of a finished run with frames.
+    /// Returns an error if the scene is invalid, or the folder does not hold a finished run with frames.
     pub fn open(path: &Path) -> Result<Self, ViewError> {
         if path.is_dir() { Self::recorded(path) } else { Self::live(Scene::read(path)?) }
     }
@@ -112,7 +111,7 @@ impl Stage {
         let mut model = Model::new(&scene)?;
         let grip = Grip::carrying(&model.masses);
         for island in &mut model.islands {
-            grip.hold_on(island, model.labels.len());
+            grip.add_to(island, model.labels.len());
         }
         model.labels.push(Grip::label());
         let simulation = Simulation::from_model(&scene, model)?;
@@ -131,25 +130,25 @@ impl Stage {
         Ok(Self { scene, simulation, rest, act: Act::Recorded { frames, now: 0 }, playing: true, due: 0.0 })
     }
 
-    /// The scene.
+    /// The scene that is shown.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// What the vertices belong to; of a recorded run at its start.
+    /// The simulation; for a recorded run, at its start.
     #[must_use]
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// Whether it is simulated while it is watched.
+    /// Whether the scene is simulated live.
     #[must_use]
     pub fn is_live(&self) -> bool {
         matches!(self.act, Act::Live { .. })
     }
 
-    /// The time shown, in s.
+    /// Time of the current content, in s.
     #[must_use]
     pub fn time(&self) -> f64 {
         match &self.act {
@@ -158,18 +157,18 @@ impl Stage {
         }
     }
 
-    /// From one frame to the next, in s.
+    /// Time between frames, in s.
     #[must_use]
     pub fn frame_time(&self) -> f64 {
         self.scene.steps_per_frame() as f64 * self.scene.dt
     }
 
-    /// From one thing shown to the next: a step, or a frame of a run; in s.
+    /// Time between updates, in s: a step of a scene, a frame of a run.
     fn interval(&self) -> f64 {
         if self.is_live() { self.scene.dt } else { self.frame_time() }
     }
 
-    /// Where the vertices are, in m.
+    /// Current positions of the vertices, in m.
     #[must_use]
     pub fn positions(&self) -> &[Vector3<f64>] {
         match &self.act {
@@ -178,7 +177,7 @@ impl Stage {
         }
     }
 
-    /// The number that a colour shows at each vertex; 0 where colours are plain.
+    /// Returns the quantity shown at each vertex; 0 for plain colours.
     #[must_use]
     pub fn values(&self, colouring: Colouring) -> Vec<f64> {
         let x = self.positions();
@@ -189,29 +188,29 @@ impl Stage {
             Colouring::Speed => match &self.act {
                 Act::Recorded { frames, now } if *now > 0 => {
                     let moved = frames[*now - 1].iter().zip(x).map(|(before, after)| norm(subtract(*after, *before)));
-                    moved.map(|way| way / self.frame_time()).collect()
+                    moved.map(|offset| offset / self.frame_time()).collect()
                 }
                 _ => self.simulation.velocities().iter().map(|&v| norm(v)).collect(),
             },
         }
     }
 
-    /// Whether time passes.
+    /// Whether time advances.
     #[must_use]
     pub fn is_playing(&self) -> bool {
         self.playing
     }
 
-    /// Stops or goes on.
+    /// Pauses or resumes.
     pub fn toggle(&mut self) {
         self.playing = !self.playing;
         self.due = 0.0;
     }
 
-    /// From the start again.
+    /// Starts again from time 0.
     ///
     /// # Errors
-    /// When the scene has become unfit, as when a file of it changed.
+    /// Returns an error if the scene has become invalid, because one of its files changed.
     pub fn restart(&mut self) -> Result<(), ViewError> {
         let playing = self.playing;
         match &mut self.act {
@@ -222,16 +221,16 @@ impl Stage {
         Ok(())
     }
 
-    /// One step, or one frame of a run, further; then it pauses. At the end of a run it stays.
+    /// Advances by one step, or one frame of a run, and pauses. Does nothing at the end of a run.
     ///
     /// # Errors
-    /// When the step fails; the cloth is then left as it was.
+    /// Returns an error if the step fails; the state is then unchanged.
     pub fn step(&mut self) -> Result<(), ViewError> {
         self.playing = false;
         self.forward()
     }
 
-    /// One frame of a run back; what is simulated cannot go back.
+    /// Goes back by one frame of a run. A live scene cannot go back.
     pub fn step_back(&mut self) {
         self.playing = false;
         if let Act::Recorded { now, .. } = &mut self.act {
@@ -242,7 +241,7 @@ impl Stage {
     fn forward(&mut self) -> Result<(), ViewError> {
         match &mut self.act {
             Act::Live { .. } => self.simulation.step().map(|_| ()).map_err(|error| {
-                // What failed once would fail again.
+                // A step that failed once would fail again.
                 self.playing = false;
                 error.into()
             }),
@@ -253,11 +252,11 @@ impl Stage {
         }
     }
 
-    /// Lets time pass, in s: as many steps or frames as are due, unless `is_late` says that it is time to draw; then what was missed is dropped, and the
-    /// motion is slower than it would be. A run begins again after its end.
+    /// Advances time by `seconds`, with as many steps or frames as are due. Once `is_late` returns `true`, drops the
+    /// rest, so that the motion is slower than real time. A run restarts after its end.
     ///
     /// # Errors
-    /// When a step fails; then it pauses.
+    /// Returns an error if a step fails, and pauses.
     pub fn advance(&mut self, seconds: f64, mut is_late: impl FnMut() -> bool) -> Result<(), ViewError> {
         if !self.playing {
             return Ok(());
@@ -277,11 +276,11 @@ impl Stage {
         Ok(())
     }
 
-    /// Goes to a moment without showing what is between; then it pauses.
+    /// Goes to a moment without showing those before it, and pauses. Calls `on_step` after each step.
     ///
     /// # Errors
-    /// When a step fails, or a run has no such frame.
-    pub fn go_to(&mut self, moment: Moment, mut tell: impl FnMut()) -> Result<(), ViewError> {
+    /// Returns an error if a step fails, or the run has no such frame.
+    pub fn go_to(&mut self, moment: Moment, mut on_step: impl FnMut()) -> Result<(), ViewError> {
         self.playing = false;
         let rounded = |time: f64, interval: f64| (time / interval + 1e-9).floor().max(0.0);
         let frame_time = self.frame_time();
@@ -305,12 +304,13 @@ impl Stage {
         };
         while self.simulation.steps_done() < steps {
             self.simulation.step()?;
-            tell();
+            on_step();
         }
         Ok(())
     }
 
-    /// Holds a vertex there, in m, by a soft spring; whether it can be held: it is simulated and not pinned.
+    /// Pulls a vertex to a point, in m, by a soft spring. Returns whether that is possible: the scene is live and the
+    /// vertex is not pinned.
     pub fn hold(&mut self, vertex: usize, target: Vector3<f64>) -> bool {
         match &self.act {
             Act::Live { grip } if !self.simulation.is_pinned(vertex) => {
@@ -322,7 +322,7 @@ impl Stage {
         }
     }
 
-    /// The vertex that is held.
+    /// The vertex that is held; `None` if none is.
     #[must_use]
     pub fn held(&self) -> Option<usize> {
         match &self.act {
@@ -331,16 +331,16 @@ impl Stage {
         }
     }
 
-    /// Lets go of what is held.
+    /// Releases the vertex.
     pub fn let_go(&mut self) {
         if let (Act::Live { grip }, Some(vertex)) = (&self.act, self.held()) {
-            grip.let_go();
+            grip.release();
             self.simulation.wake(vertex);
         }
     }
 }
 
-/// The vertices of a frame that `cloth run` wrote.
+/// Reads the vertices of a frame that `cloth run` wrote.
 fn read_frame(folder: &Path, number: usize, expected: usize) -> Result<Vec<Vector3<f64>>, ViewError> {
     let path = folder.join(OutputFolder::FRAMES).join(format!("cloth_{number:04}.obj"));
     let text = std::fs::read_to_string(&path).map_err(|source| ViewError::Frame { path: path.clone(), source })?;
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn time_passes_only_while_it_plays_and_no_faster_than_it_can() {
+    fn time_advances_while_playing_and_drops_late_steps() {
         let mut stage = stage();
         stage.advance(0.035, || false).unwrap();
         assert_eq!(stage.simulation.steps_done(), 3);
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_follows_the_mouse_and_falls_when_let_go() {
+    fn a_held_vertex_follows_the_mouse_and_falls_when_released() {
         let mut stage = stage();
         let target = [0.15, 0.15, 0.1];
         assert!(stage.hold(24, target) && stage.held() == Some(24));
@@ -415,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn unheld_it_moves_as_the_run_does() {
+    fn without_a_grip_the_stage_moves_like_a_run() {
         let (mut stage, scene) = (stage(), Scene::parse(SCENE, "s.toml".as_ref()).unwrap());
         let mut plain = Simulation::new(&scene).unwrap();
         stage.go_to(Moment::End, || ()).unwrap();

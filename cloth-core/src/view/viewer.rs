@@ -8,59 +8,60 @@ use crate::contact::AnySolid;
 use crate::geometry::norm;
 use crate::output::SolidMesh;
 
-/// What a person does to the window.
+/// A user input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
-    /// The mouse is there now, in pixels from the upper left.
+    /// The mouse moved to this position, in pixels from the upper left corner.
     Move([f64; 2]),
-    /// A button goes down. The left one takes hold of the vertex under it, if there is one to be had; otherwise it turns.
+    /// A button was pressed. The left button takes hold of the vertex under the mouse, if possible, and otherwise
+    /// rotates.
     Press(Button),
-    /// It goes up.
+    /// The button was released.
     Release(Button),
-    /// The wheel turns by so many notches, away from the person.
+    /// The wheel was turned by this many notches; positive away from the user.
     Scroll(f64),
-    /// A key.
+    /// A key was pressed.
     Command(Command),
 }
 
-/// A button of the mouse.
+/// A mouse button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
-    /// The left one.
+    /// The left button.
     Left,
-    /// The left one with the shift key: never takes hold.
+    /// The left button with the shift key, which never takes hold of a vertex.
     ShiftLeft,
-    /// Any other.
+    /// Any other button.
     Other,
 }
 
-/// What a key does.
+/// The command of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Stop or go on.
+    /// Pause or resume.
     Toggle,
-    /// One step or frame.
+    /// Advance by one step or frame.
     Step,
-    /// One frame back.
+    /// Go back by one frame.
     StepBack,
-    /// From the start.
+    /// Start again from time 0.
     Restart,
-    /// The next colours.
+    /// Next colouring.
     Colours,
-    /// Edges or none.
+    /// Show or hide edges.
     Wireframe,
-    /// See everything.
+    /// Frame everything.
     Frame,
-    /// The list of keys.
+    /// Show or hide the list of keys.
     Help,
 }
 
-/// What the keys and buttons do, a line each.
-pub const HELP: &str = "space: pause, go on\nright: one step or frame\nleft: one frame back, of a run\nr: from the start\n\
-c: colours plain, strain, energy, speed\nw: edges\nf: see everything\nh: this help\n\
-drag: hold a vertex; elsewhere, or with shift, turn\ndrag with the right button: shift\nwheel: approach\nesc: close";
+/// Description of keys and buttons, one per line.
+pub const HELP: &str = "space: pause, resume\nright: one step or frame\nleft: one frame back, of a run\nr: restart\n\
+c: colours plain, strain, energy, speed\nw: edges\nf: frame everything\nh: this help\n\
+drag: hold a vertex; elsewhere, or with shift: rotate\ndrag with the right button: move\nwheel: zoom\nesc: close";
 
-/// Everything about the viewer but its window: what is shown, from where, and what the mouse is doing.
+/// The state of the viewer, independent of the window: content, camera, and mouse.
 #[derive(Debug)]
 pub struct Viewer {
     stage: Stage,
@@ -70,9 +71,9 @@ pub struct Viewer {
     help: bool,
     mouse: [f64; 2],
     drag: Drag,
-    /// What the colours go up to: what it was at most since they or the motion began.
+    /// Upper end of the colour scale: the maximum since the last restart or change of colouring.
     most: f64,
-    /// What went wrong last.
+    /// Message of the last failure.
     failure: Option<String>,
 }
 
@@ -81,7 +82,7 @@ enum Drag {
     Nothing,
     Turn,
     Shift,
-    /// A vertex, at that depth.
+    /// A vertex at this depth.
     Hold {
         vertex: usize,
         depth: f64,
@@ -89,7 +90,7 @@ enum Drag {
 }
 
 impl Viewer {
-    /// Shows a stage whole.
+    /// Creates a viewer that frames the whole stage.
     #[must_use]
     pub fn new(stage: Stage, colouring: Colouring, wireframe: bool) -> Self {
         let camera = Orbit::framing(&extent(&stage));
@@ -97,19 +98,19 @@ impl Viewer {
         Self { stage, camera, colouring, wireframe, help: false, mouse, drag, most: 0.0, failure: None }
     }
 
-    /// What is shown.
+    /// The scene or run that is shown.
     #[must_use]
     pub fn stage(&self) -> &Stage {
         &self.stage
     }
 
-    /// From where.
+    /// The current camera.
     #[must_use]
     pub fn camera(&self) -> &Orbit {
         &self.camera
     }
 
-    /// What colours show.
+    /// The current colouring.
     #[must_use]
     pub fn colouring(&self) -> Colouring {
         self.colouring
@@ -121,7 +122,7 @@ impl Viewer {
         self.wireframe
     }
 
-    /// Where the held vertex is and where it is pulled to, in a window of that size.
+    /// Returns the position of the held vertex and the target of the grip, in a window of this size.
     #[must_use]
     pub fn pull(&self, size: [f64; 2]) -> Option<[Vector3<f64>; 2]> {
         match self.drag {
@@ -132,20 +133,20 @@ impl Viewer {
         }
     }
 
-    /// The number that the colour of each vertex shows, and what colours go up to.
+    /// Returns the quantity shown at each vertex, and the upper end of the colour scale.
     pub fn values(&mut self) -> (Vec<f64>, f64) {
         let values = self.stage.values(self.colouring);
         self.most = self.most.max(upper_end(&values));
         (values, self.most)
     }
 
-    /// Lets time pass, in s; `is_late` says when it is time to draw. A failure pauses, and is shown.
+    /// Advances time by `seconds`, until `is_late` returns `true`. A failure pauses, and is displayed.
     pub fn advance(&mut self, seconds: f64, is_late: impl FnMut() -> bool) {
         let advanced = self.stage.advance(seconds, is_late);
         self.note(advanced);
     }
 
-    /// Does what a person does to a window of that size, in pixels.
+    /// Handles an input, in a window of this size in pixels.
     pub fn handle(&mut self, input: Input, size: [f64; 2]) {
         match input {
             Input::Move(mouse) => {
@@ -160,7 +161,7 @@ impl Viewer {
                     }
                 }
             }
-            Input::Press(Button::Left) => self.drag = self.taken(size).unwrap_or(Drag::Turn),
+            Input::Press(Button::Left) => self.drag = self.grab(size).unwrap_or(Drag::Turn),
             Input::Press(Button::ShiftLeft) => self.drag = Drag::Turn,
             Input::Press(Button::Other) => self.drag = Drag::Shift,
             Input::Release(_) => {
@@ -168,12 +169,12 @@ impl Viewer {
                 self.stage.let_go();
             }
             Input::Scroll(notches) => self.camera.approach(notches),
-            Input::Command(command) => self.obey(command),
+            Input::Command(command) => self.execute(command),
         }
     }
 
-    /// The vertex under the mouse, if it can be held.
-    fn taken(&mut self, size: [f64; 2]) -> Option<Drag> {
+    /// Returns the vertex under the mouse, if it can be held.
+    fn grab(&mut self, size: [f64; 2]) -> Option<Drag> {
         let simulation = self.stage.simulation();
         let (triangles, strands) = (simulation.triangles(), simulation.strands());
         let picked = pick(&self.camera, self.mouse, size, self.stage.positions(), triangles, strands)?;
@@ -181,7 +182,7 @@ impl Viewer {
         self.stage.hold(picked.vertex, here).then_some(Drag::Hold { vertex: picked.vertex, depth: picked.depth })
     }
 
-    fn obey(&mut self, command: Command) {
+    fn execute(&mut self, command: Command) {
         match command {
             Command::Toggle => self.stage.toggle(),
             Command::Step => {
@@ -205,7 +206,7 @@ impl Viewer {
         self.failure = result.err().map(|error| verify::message(&error.into())).or(self.failure.take());
     }
 
-    /// What stands in the corner of the window.
+    /// The text in the corner of the window.
     #[must_use]
     pub fn text(&self) -> String {
         let time = format!("t = {:.3} s", self.stage.time());
@@ -216,7 +217,7 @@ impl Viewer {
     }
 }
 
-/// The points that a first look should see: of the cloth, where it may fall, and of solids that end somewhere.
+/// Returns the points to frame at first: the cloth, the region below it where it may fall, and bounded solids.
 fn extent(stage: &Stage) -> Vec<Vector3<f64>> {
     let solids = stage.simulation().obstacles().iter().map(|obstacle| obstacle.at(stage.time()));
     let bounded = solids.filter(|solid| !matches!(solid, AnySolid::HalfSpace(_)));
@@ -224,7 +225,7 @@ fn extent(stage: &Stage) -> Vec<Vector3<f64>> {
     let mut points: Vec<Vector3<f64>> = stage.positions().to_vec();
     let gravity = stage.scene().gravity;
     if stage.is_live() && norm(gravity) > 0.0 {
-        // Half as far as it is long.
+        // Half the size of the cloth downwards.
         let fall = Orbit::framing(&points).radius() / norm(gravity);
         points.extend(
             stage.positions().iter().map(|p| -> Vector3<f64> { std::array::from_fn(|i| p[i] + fall * gravity[i]) }),
@@ -273,7 +274,7 @@ mod tests {
         let mut viewer = viewer();
         let corner = 48;
         let start = viewer.stage.positions()[corner];
-        // A little towards the middle, on the outermost triangle.
+        // Towards the middle, on the outermost triangle.
         let seen = viewer.camera.project(start.map(|c| 0.98 * c), SIZE).unwrap().pixel;
         let camera = viewer.camera;
         viewer.handle(Input::Move(seen), SIZE);
@@ -292,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn elsewhere_dragging_turns_and_shifts_the_view() {
+    fn dragging_elsewhere_moves_the_camera() {
         let mut viewer = viewer();
         let before = viewer.camera;
         viewer.handle(Input::Move([2.0, 2.0]), SIZE);
@@ -311,7 +312,7 @@ mod tests {
         assert!(viewer.camera.distance < turned.distance);
         viewer.handle(Input::Command(Command::Frame), SIZE);
         assert_eq!(viewer.camera, before);
-        // With shift, even on the cloth.
+        // With shift, a drag on the cloth rotates as well.
         let seen = viewer.camera.project([0.1, 0.1, 0.0], SIZE).unwrap().pixel;
         viewer.handle(Input::Move(seen), SIZE);
         viewer.handle(Input::Press(Button::ShiftLeft), SIZE);
@@ -319,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_do_what_the_help_says() {
+    fn keys_work_as_the_help_says() {
         let mut viewer = viewer();
         let mut press = |command| {
             viewer.handle(Input::Command(command), SIZE);

@@ -1,4 +1,4 @@
-//! The window: events in, triangles out. Everything else is [`Viewer`]'s.
+//! The window: translates events for the [`Viewer`], and draws its triangles.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -19,7 +19,7 @@ use super::stage::{Stage, ViewError};
 use super::viewer::{Button, Command, Input, Viewer};
 use crate::output::{SolidMesh, vertex_normals};
 
-/// How long steps may take before it is time to draw.
+/// Time for steps between two pictures.
 const PATIENCE: Duration = Duration::from_millis(25);
 const BACKGROUND: Color = Color::new(0.93, 0.93, 0.94, 1.0);
 const INK: Color = Color::new(0.08, 0.09, 0.11, 1.0);
@@ -28,10 +28,10 @@ const BACK: Color = Color::new(0.86, 0.55, 0.36, 1.0);
 const SOLID: Color = Color::new(0.74, 0.71, 0.66, 1.0);
 const HAIR: Color = Color::new(0.45, 0.26, 0.13, 1.0);
 
-/// Opens a scene or a finished run in a window and shows it until the window is closed.
+/// Opens a scene or a finished run in a window, and returns once the window is closed.
 ///
 /// # Errors
-/// When it cannot be opened, or there is no display.
+/// Returns an error if the scene or run cannot be opened, or no display is available.
 pub fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result<(), ViewError> {
     let viewer = Viewer::new(Stage::open(path)?, colouring, wireframe);
     let is_there = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
@@ -43,7 +43,8 @@ pub fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result
     Ok(())
 }
 
-/// A window. The engine panics where the display cannot be reached or nothing can draw; that is an error like others.
+/// Opens a window. The engine panics if it cannot reach a display or has no graphics device; this is turned into an
+/// error.
 fn window(title: &str) -> Result<Window, ViewError> {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| ()));
@@ -51,7 +52,7 @@ fn window(title: &str) -> Result<Window, ViewError> {
     std::panic::set_hook(hook);
     opened.map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
-        ViewError::NoWindow { reason: text.unwrap_or("the engine does not say why").to_owned() }
+        ViewError::NoWindow { reason: text.unwrap_or("the engine gives no reason").to_owned() }
     })
 }
 
@@ -85,7 +86,7 @@ async fn show(mut viewer: Viewer, mut window: Window) {
     }
 }
 
-/// What an event means, if it is not the window's own business.
+/// Translates an event; `None` if it does not concern the viewer.
 fn input(event: WindowEvent) -> Option<Input> {
     Some(match event {
         WindowEvent::CursorPos(x, y, _) => Input::Move([x, y]),
@@ -117,17 +118,17 @@ fn single(point: Vector3<f64>) -> Vec3 {
     Vec3::new(point[0] as f32, point[1] as f32, point[2] as f32)
 }
 
-/// What is drawn: the two sides of the cloth, since each has its colour and normals, and the solids.
+/// The models to draw: the two sides of the cloth, each with its colour and normals, and the solids.
 struct Models {
     scene: SceneNode3d,
     sides: [SceneNode3d; 2],
     solids: Vec<SceneNode3d>,
-    /// Of triangles, each once.
+    /// Edges of the triangles, without duplicates.
     edges: Vec<[usize; 2]>,
-    /// The middle of everything at the start, and how much of a plane is shown, in m.
+    /// Centre of everything at the start, and side of the visible part of a plane, in m.
     middle: Vector3<f64>,
     size: f64,
-    /// White, and the colours of numbers from 0 to 1.
+    /// A white texture, and the colour scale from 0 to 1.
     white: Arc<Texture>,
     scale: Arc<Texture>,
 }
@@ -186,7 +187,7 @@ impl Models {
             side.set_texture(texture.clone()).set_color(colour);
         }
         if viewer.wireframe() {
-            // A little nearer to the eye than they are, so that they lie on top.
+            // Slightly nearer to the eye, so that edges lie on top.
             let eye = single(viewer.camera().eye());
             let corner = |vertex: usize| single(positions[vertex]).lerp(eye, 1e-3);
             for &[from, to] in &self.edges {
@@ -204,13 +205,13 @@ impl Models {
     }
 }
 
-/// The solids where they are now.
+/// Returns the surfaces of the solids at the current time.
 fn surfaces(viewer: &Viewer, middle: Vector3<f64>, size: f64) -> Vec<SolidMesh> {
     let obstacles = viewer.stage().simulation().obstacles().iter();
     obstacles.map(|obstacle| SolidMesh::of(&obstacle.at(viewer.stage().time()), middle, size)).collect()
 }
 
-/// Moves the points of a mesh.
+/// Sets the positions and normals of a mesh.
 fn fill(node: &mut SceneNode3d, positions: &[Vector3<f64>], normals: impl Iterator<Item = Vector3<f64>> + Clone) {
     node.modify_vertices(&mut |all| {
         all.clear();
@@ -227,7 +228,7 @@ fn face([a, b, c]: [usize; 3], turned: bool) -> [u32; 3] {
     if turned { [a, c, b] } else { [a, b, c] }
 }
 
-/// The colours of 0 to 1 from left to right.
+/// Returns the colour scale from 0 to 1, left to right, as PNG.
 fn scale_png() -> Vec<u8> {
     let colours = (0..256).flat_map(|step| {
         let [red, green, blue] = colour(f64::from(step), 255.0).map(|channel| (255.0 * channel).round() as u8);
@@ -238,7 +239,7 @@ fn scale_png() -> Vec<u8> {
     pixels.and_then(|pixels| pixels.encode_png().ok()).expect("256 pixels can be encoded")
 }
 
-/// The viewer's camera as the engine wants it.
+/// The camera, as the engine's trait requires it.
 struct Eye {
     orbit: Orbit,
     size: [f64; 2],

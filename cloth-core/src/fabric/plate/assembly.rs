@@ -1,4 +1,4 @@
-//! The two parts of a plate's Hessian, added to the matrix.
+//! Assembly of the two parts of a plate's Hessian.
 
 use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Number, Potential, Vector3};
 use energy_elements::ArcAngle;
@@ -6,11 +6,11 @@ use energy_solve::{Linearisation, Precision};
 
 use super::term::{Angles, PlateTerm, Row};
 
-/// Numbers of the upper triangle of ∇²θ.
+/// Number of entries in the upper triangle of ∇²θ.
 const HESSIAN: usize = 90;
 
-/// Adds −Σ m ∇²θ and its product with v.
-pub(super) struct Turning<'a, 'b> {
+/// Adds −Σ m ∇²θ to the matrix, and its product with v.
+pub(super) struct CurvedPart<'a, 'b> {
     of: &'a PlateTerm,
     moments: &'a [f64],
     v: &'a [Vector3<f64>],
@@ -18,7 +18,7 @@ pub(super) struct Turning<'a, 'b> {
     rows: [f64; HESSIAN * BLOCK],
 }
 
-impl BatchWork<ArcAngle> for Turning<'_, '_> {
+impl BatchWork<ArcAngle> for CurvedPart<'_, '_> {
     #[inline(always)]
     fn batch<L: Level>(&mut self, batch: Batch<'_, ArcAngle, L::F64>) {
         let result = batch.element.hessian_at::<L>(batch.points);
@@ -30,7 +30,7 @@ impl BatchWork<ArcAngle> for Turning<'_, '_> {
     }
 }
 
-impl<'a, 'b> Turning<'a, 'b> {
+impl<'a, 'b> CurvedPart<'a, 'b> {
     pub(super) fn new(
         of: &'a PlateTerm,
         moments: &'a [f64],
@@ -40,7 +40,7 @@ impl<'a, 'b> Turning<'a, 'b> {
         Self { of, moments, v, sum, rows: [0.0; HESSIAN * BLOCK] }
     }
 
-    /// Adds what one hinge contributes, whose Hessian is in a row.
+    /// Adds the contribution of one hinge, whose Hessian is in row `row`.
     fn add(&mut self, number: usize, row: usize) {
         let hinge = self.of.needed[number];
         let weight = -self.moments[hinge];
@@ -60,20 +60,20 @@ impl<'a, 'b> Turning<'a, 'b> {
     }
 }
 
-/// A block from its rows.
+/// Returns a block, given its entries by rows.
 fn block_of(numbers: &[f64]) -> Block<f64> {
     std::array::from_fn(|row| std::array::from_fn(|column| numbers[3 * row + column]))
 }
 
-fn add_times(sum: &mut Vector3<f64>, block: &Block<f64>, v: &Vector3<f64>, turned: bool) {
+fn add_times(sum: &mut Vector3<f64>, block: &Block<f64>, v: &Vector3<f64>, transposed: bool) {
     for row in 0..3 {
         for column in 0..3 {
-            sum[row] += if turned { block[column][row] } else { block[row][column] } * v[column];
+            sum[row] += if transposed { block[column][row] } else { block[row][column] } * v[column];
         }
     }
 }
 
-/// Adds s Σ ∇r ∇rᵀ.
+/// Adds s Σ ∇r ∇rᵀ to the matrix.
 pub(super) struct OuterProducts<'a, T> {
     pub(super) of: &'a PlateTerm,
     pub(super) angles: &'a Angles<'a>,
@@ -107,7 +107,7 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
     }
 }
 
-/// s Σ aₖ bₖᵀ by rows, with a last column that means nothing.
+/// Returns s Σ aₖ bₖᵀ by rows. The last column is padding.
 #[inline(always)]
 fn outer_product<L: Level>(s: f64, a: &Row, b: &Row) -> Row {
     let mut product = [[0.0; 4]; 3];

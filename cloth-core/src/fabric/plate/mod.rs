@@ -1,21 +1,24 @@
-//! Mesh-independent plate bending: a curvature tensor for each triangle, made of dihedral angles.
+//! Mesh-independent plate bending: a curvature tensor per triangle, from dihedral angles.
 //!
-//! On triangle T with area A, edges of length ‖e‖ and normals n in its plane that point outwards,
+//! On a triangle T with area A, edges of length ‖e‖ and outward in-plane normals n,
 //!
 //! A κ = Σ ‖e‖ p n ⊗ n,  p = ½ (θ − θ̄) ± φ,  U = Σ ½ A κᵀ D κ,
 //!
-//! p the angle between T's own normal and the surface's normal at the middle of the edge, and θ the dihedral angle as the arc over the facets has it
-//! ([`ArcAngle`](energy_elements::ArcAngle)). That is the lowest element of Hellan, Herrmann
-//! and Johnson (Comodi 1989), where the normal at an edge is an unknown of its own; in Grinspun, Gingold, Reisman and Zorin 2006 it
-//! is half-way between the two triangles' (φ = 0), with which only regular lattices bend as the plate does. Here the *tilt* φ is what it
-//! must be for every quadratic height field, written with the dihedral angles θ near the edge: φ = Σ c (θ − θ̄), c of least norm
-//! ([`Tilts`]). So
+//! where p is the angle between the normal of T and the normal of the surface at the midpoint of the edge, and θ is the
+//! dihedral angle of [`ArcAngle`](energy_elements::ArcAngle), an arc over the facets.
 //!
-//! * κ is the curvature tensor wherever that is constant: the energy is exact there;
-//! * what leaves a triangle through an edge enters its neighbour (± φ): in a state of constant curvature no inner vertex feels a force.
+//! This is the lowest-order element of Hellan, Herrmann and Johnson (Comodi 1989), in which the normal at an edge is an
+//! independent unknown. In Grinspun, Gingold, Reisman and Zorin 2006 that normal bisects those of the two triangles
+//! (φ = 0), and only regular lattices bend like the plate. Here the *tilt* φ is chosen such that it is exact for every
+//! quadratic height field. It is a combination of nearby dihedral angles, φ = Σ c (θ − θ̄), with c of minimal norm
+//! ([`Tilts`]). Then
 //!
-//! Both together are the patch test: a flat sheet has the rigidity D in every direction on every mesh, for any D. At free edges p is eliminated
-//! by its natural condition, no bending moment.
+//! * κ is the exact curvature tensor wherever that is constant, and so is the energy;
+//! * the moment that leaves a triangle through an edge enters its neighbour (± φ): in a state of constant curvature, no
+//!   interior vertex feels a force.
+//!
+//! Both together are the patch test: a flat sheet has the rigidity D in every direction on every mesh, for any D. At
+//! free edges the natural condition, zero bending moment, eliminates p.
 
 mod assembly;
 mod rigidity;
@@ -29,31 +32,32 @@ pub use tilt::Tilts;
 use crate::mesh::{Topology, TriangleMesh, area, material_triangle, thread_triangle};
 use energy_dsl::Vector3;
 
-/// A mesh whose triangles cannot be given the directions of the threads.
+/// A triangle without a warp direction.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("triangle {triangle} stands across the warp direction {warp:?}; choose a warp direction along the cloth")]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub struct ThreadError {
-    /// The triangle.
     pub triangle: usize,
     /// The direction of the warp.
     pub warp: Vector3<f64>,
 }
 
-/// How the curvature of one triangle depends on dihedral angles: κ = Σ b (θ − θ̄).
+/// The curvature of one triangle as a function of dihedral angles: κ = Σ b (θ − θ̄).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curvature {
-    /// The triangle's area at rest, in m².
+    /// Rest area, in m².
     pub area: f64,
-    /// The hinges and their b, in 1/m, on (κ_uu, κ_vv, 2κ_uv) along warp and weft.
+    /// Hinges and their b, in 1/m: the components (κ_uu, κ_vv, 2κ_uv) along warp and weft.
     pub angles: Vec<(usize, [f64; 3])>,
-    /// ‖e‖/A n ⊗ n of the free edges, in 1/m, laid out likewise.
+    /// ‖e‖/A n ⊗ n of the free edges, in 1/m, in the same components.
     pub free: Vec<[f64; 3]>,
 }
 
-/// The curvatures of all triangles by the hinges of `topology`; along each triangle's first edge where there is no warp.
+/// Returns the curvatures of all triangles, in terms of the hinges of `topology`. Without a warp, components are along
+/// each triangle's first edge.
 ///
 /// # Errors
-/// When the warp stands across a triangle.
+/// Returns an error if a triangle is perpendicular to the warp.
 pub fn curvatures(
     mesh: &TriangleMesh,
     topology: &Topology,
@@ -95,8 +99,12 @@ fn add(angles: &mut Vec<(usize, [f64; 3])>, hinge: usize, scale: f64, weight: [f
     }
 }
 
-/// The corners laid in the plane: along warp and weft, or along the first edge.
-fn laid(mesh: &TriangleMesh, triangle: usize, warp: Option<Vector3<f64>>) -> Result<[[f64; 2]; 3], ThreadError> {
+/// Maps a triangle to its plane, with the first axis along the warp or along the first edge.
+fn material_coordinates(
+    mesh: &TriangleMesh,
+    triangle: usize,
+    warp: Option<Vector3<f64>>,
+) -> Result<[[f64; 2]; 3], ThreadError> {
     let corners = mesh.corners(triangle);
     match warp {
         None => Ok(material_triangle(corners)),

@@ -3,86 +3,86 @@ use serde::Deserialize;
 
 use crate::bounded::{non_negative, poisson_ratio, positive};
 
-/// How stiff a plate is against bending.
+/// The flexural rigidity of a plate.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Rigidity {
-    /// Alike in all directions: D = E h³/(12 (1 − ν²)).
+    /// An isotropic plate: D = E h³/(12 (1 − ν²)).
     Isotropic {
         /// Young's modulus E, in Pa.
         #[serde(deserialize_with = "non_negative")]
         young_modulus: f64,
-        /// The thickness h, in m.
+        /// Thickness h, in m.
         #[serde(deserialize_with = "positive")]
         thickness: f64,
         /// Poisson's ratio ν, in (−1, 1).
         #[serde(deserialize_with = "poisson_ratio")]
         poisson_ratio: f64,
     },
-    /// Alike in all directions, by its flexural rigidity.
+    /// An isotropic plate, given its flexural rigidity.
     Flexural {
-        /// D, in N m.
+        /// Flexural rigidity D, in N m.
         #[serde(deserialize_with = "non_negative")]
         rigidity: f64,
         /// Poisson's ratio ν, in (−1, 1).
         #[serde(deserialize_with = "poisson_ratio")]
         poisson_ratio: f64,
     },
-    /// Woven: what narrow strips cut along warp, weft and the bias show in a cantilever test, per width.
+    /// A woven plate, from cantilever tests of narrow strips along warp, weft and bias, per width.
     Orthotropic {
-        /// Of a strip along the warp, in N m.
+        /// Rigidity of a strip along the warp, in N m.
         #[serde(deserialize_with = "positive")]
         warp: f64,
-        /// Of a strip along the weft, in N m.
+        /// Rigidity of a strip along the weft, in N m.
         #[serde(deserialize_with = "positive")]
         weft: f64,
-        /// Of a strip at 45° to both, in N m.
+        /// Rigidity of a strip at 45° to both, in N m.
         #[serde(deserialize_with = "positive")]
         bias: f64,
-        /// By what part of its curvature a strip along the warp curls across, the other way. Default 0.
+        /// Opposite curvature across a strip along the warp, relative to the curvature along it. Default 0.
         #[serde(default, deserialize_with = "poisson_ratio")]
         poisson_ratio: f64,
     },
 }
 
-/// Stiffnesses that no plate has.
+/// Rigidities that contradict each other.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigidityError {
     /// Twist would have negative energy.
     #[error(
-        "a strip on the bias with {bias} N m is stiffer than warp {warp} N m and weft {weft} N m with Poisson's ratio {poisson_ratio} allow; \
-         at most {most:.4e} N m"
+        "a strip on the bias with {bias} N m is stiffer than warp {warp} N m and weft {weft} N m with Poisson's ratio \
+         {poisson_ratio} allow; at most {most:.4e} N m"
     )]
     Bias {
-        /// As given, in N m.
+        /// Rigidity along the warp, in N m.
         warp: f64,
-        /// As given, in N m.
+        /// Rigidity along the weft, in N m.
         weft: f64,
-        /// As given, in N m.
+        /// Rigidity on the bias, in N m.
         bias: f64,
-        /// As given.
+        /// Poisson's ratio.
         poisson_ratio: f64,
-        /// What the bias must stay below, in N m.
+        /// Upper bound of the rigidity on the bias, in N m.
         most: f64,
     },
-    /// Warp and weft curl each other too much.
+    /// Poisson's ratio is too large for the ratio of warp and weft.
     #[error("Poisson's ratio {poisson_ratio} must be below √(warp/weft) = {most:.4}")]
     Poisson {
-        /// As given.
+        /// Poisson's ratio.
         poisson_ratio: f64,
-        /// Its bound.
+        /// Its upper bound.
         most: f64,
     },
 }
 
 impl Rigidity {
-    /// D of the energy density ½ κᵀ D κ on (κ_uu, κ_vv, 2κ_uv), in N m.
+    /// Returns D of the energy density ½ κᵀ D κ with κ = (κ_uu, κ_vv, 2κ_uv), in N m.
     ///
-    /// Of woven cloth it is the inverse of the compliance S with S₁₁ = 1/warp, S₂₂ = 1/weft, S₁₂ = −ν/warp, and S₆₆ such that a strip at 45°,
-    /// whose compliance is ¼ (S₁₁ + S₂₂ + 2 S₁₂ + S₆₆), has the bias' rigidity.
+    /// For woven cloth, D is the inverse of the compliance S with S₁₁ = 1/warp, S₂₂ = 1/weft, S₁₂ = −ν/warp. S₆₆
+    /// follows from the strip at 45°, whose compliance ¼ (S₁₁ + S₂₂ + 2 S₁₂ + S₆₆) is the inverse of the bias rigidity.
     ///
     /// # Errors
-    /// When no plate is like that.
+    /// Returns an error if the rigidities contradict each other.
     ///
     /// ```
     /// use cloth_core::fabric::Rigidity;
@@ -120,7 +120,7 @@ fn isotropic(d: f64, nu: f64) -> [[f64; 3]; 3] {
     [[d, nu * d, 0.0], [nu * d, d, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu) * d]]
 }
 
-/// L of D = L Lᵀ; rows of zeros where D has none.
+/// Returns L of D = L Lᵀ. Zero pivots give columns of zeros.
 pub(super) fn cholesky(d: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let mut l = [[0.0; 3]; 3];
     for i in 0..3 {
@@ -141,11 +141,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strips_of_woven_cloth_have_the_rigidities_that_were_measured() {
+    fn strips_of_woven_cloth_have_the_measured_rigidities() {
         let woven = Rigidity::Orthotropic { warp: 3.0, weft: 1.0, bias: 1.2, poisson_ratio: 0.2 };
         let d = woven.matrix().unwrap();
-        // A strip along the direction a bends to κ = D⁻¹ m, m = (a₁², a₂², a₁a₂), and shows 1/(mᵀ D⁻¹ m).
-        let shown = |a: [f64; 2]| {
+        // A strip along the direction a bends to κ = D⁻¹ m, m = (a₁², a₂², a₁a₂); its rigidity is 1/(mᵀ D⁻¹ m).
+        let measured = |a: [f64; 2]| {
             let m = [a[0] * a[0], a[1] * a[1], a[0] * a[1]];
             let determinant = d[0][0] * d[1][1] - d[0][1] * d[0][1];
             let k = [
@@ -157,7 +157,7 @@ mod tests {
         };
         let half = 0.5_f64.sqrt();
         for (direction, expected) in [([1.0, 0.0], 3.0), ([0.0, 1.0], 1.0), ([half, half], 1.2), ([half, -half], 1.2)] {
-            assert!((shown(direction) - expected).abs() < 1e-12, "{direction:?}: {}", shown(direction));
+            assert!((measured(direction) - expected).abs() < 1e-12, "{direction:?}: {}", measured(direction));
         }
         let l = cholesky(&d);
         for i in 0..3 {
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_plates_are_refused() {
+    fn impossible_plates_are_rejected() {
         let stiff = Rigidity::Orthotropic { warp: 1.0, weft: 1.0, bias: 2.5, poisson_ratio: 0.0 };
         assert!(stiff.matrix().unwrap_err().to_string().ends_with("at most 2.0000e0 N m"));
         let curling = Rigidity::Orthotropic { warp: 1.0, weft: 4.0, bias: 0.5, poisson_ratio: 0.6 };

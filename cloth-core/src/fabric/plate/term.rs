@@ -4,48 +4,49 @@ use energy_dsl::{
 };
 use energy_elements::ArcAngle;
 use energy_solve::{
-    Blocks, Character, Curvature as Negative, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity, State,
-    Stencils, Storage, Tally, Term, TermDescription, TrianglePlaces, index,
+    Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity,
+    State, Stencils, Storage, Tally, Term, TermDescription, TrianglePlaces, index,
 };
 
-use super::assembly::{OuterProducts, Turning};
+use super::assembly::{CurvedPart, OuterProducts};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
 use crate::geometry::dot;
 use crate::mesh::{Topology, TriangleMesh};
 
-/// Plate bending of a whole mesh: Σ ½ ‖r‖² over the triangles, r = Σ b (θ − θ̄) three combinations of dihedral angles, as arcs have them.
+/// Plate bending of a mesh: Σ ½ ‖r‖² over the triangles. Each r = Σ b (θ − θ̄) consists of three combinations of the
+/// dihedral angles of [`ArcAngle`].
 ///
-/// Every dihedral angle is evaluated once, by the declared element [`ArcAngle`], whichever triangles need it. The Hessian is
-/// Σ ∇r ∇rᵀ, positive semi-definite, where negative curvature is to go; the rest of it, Σ m ∇²θ with the moments m = ∂U/∂θ, is smaller by the
-/// angle between neighbours and belongs to the exact Hessian only.
+/// Each dihedral angle is evaluated once, even if several triangles need it. The Gauss–Newton part of the Hessian, Σ ∇r
+/// ∇rᵀ, is positive semi-definite and serves as the projected Hessian. The exact Hessian adds Σ m ∇²θ with the moments
+/// m = ∂U/∂θ, which is smaller by a factor of the angle between neighbours.
 #[derive(Clone, Debug)]
 pub struct PlateTerm {
     name: String,
     pub(super) hinges: Vec<[usize; 4]>,
     rest: Vec<f64>,
     pub(super) patches: Vec<Patch>,
-    /// The vertices of the patches, each filled up to the most by repeating its first.
+    /// Vertices of the patches, padded to the same number by repeating the first.
     stencils: Vec<u32>,
     arity: usize,
-    /// The patches with a free vertex, and what else is known once vertices have places.
+    /// Patches with a free vertex, and the slots of their blocks; set by [`Term::place`].
     pub(super) active: Vec<usize>,
     pub(super) places: Vec<PatchPlaces>,
-    /// The hinges that active patches need, the same packed, and where their blocks are stored.
+    /// Hinges that active patches need; the same, packed; and the slots of their blocks.
     pub(super) needed: Vec<usize>,
     packed: Packed<ArcAngle>,
     pub(super) hinge_places: TrianglePlaces,
 }
 
-/// Three vectors, each with a fourth component that is nothing.
+/// Three vectors, each padded to four components.
 pub(super) type Row = [[f64; 4]; 3];
 
 /// A triangle and the hinges that its curvature depends on.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
-    /// Its vertices, ascending.
+    /// Its vertices, in ascending order.
     vertices: Vec<usize>,
-    /// The hinges: their number, b, and the places of their points among the vertices.
+    /// Its hinges: their indices, their b, and the positions of their points in `vertices`.
     angles: Vec<Angle>,
 }
 
@@ -56,29 +57,30 @@ struct Angle {
     local: [u8; 4],
 }
 
-/// Where the blocks of a patch are stored: of pairs (i, j), i ≤ j, and mirrored if all blocks are.
+/// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
 #[derive(Clone, Debug)]
 pub(super) struct PatchPlaces {
     pub(super) slots: Vec<u32>,
     pub(super) mirrored: Vec<u32>,
 }
 
-/// A plate that cannot be laid on a mesh.
+/// A plate that does not fit a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlateError {
-    /// The stiffnesses.
+    /// The rigidities contradict each other.
     #[error(transparent)]
     Rigidity(#[from] RigidityError),
-    /// The directions of the threads.
+    /// A triangle has no warp direction.
     #[error(transparent)]
     Threads(#[from] ThreadError),
 }
 
 impl PlateTerm {
-    /// Plate bending of a mesh from its rest shape, which may be curved. The warp lies along the given direction, projected on each triangle.
+    /// Creates the term from the rest shape of a mesh, which may be curved. `warp` is projected onto each triangle.
     ///
     /// # Errors
-    /// When no plate has such stiffnesses, or the warp of woven cloth stands across a triangle.
+    /// Returns an error if the rigidities contradict each other, or a triangle of woven cloth is perpendicular to the
+    /// warp.
     pub fn new(
         name: impl Into<String>,
         mesh: &TriangleMesh,
@@ -114,7 +116,7 @@ impl PlateTerm {
         })
     }
 
-    /// The same on the vertices from `first` on, where the mesh is one of several.
+    /// Shifts the vertex indices by `first`, for a mesh that is one of several in a system.
     #[must_use]
     pub fn on_vertices_from(mut self, first: usize) -> Self {
         self.hinges.iter_mut().flatten().for_each(|vertex| *vertex += first);
@@ -123,7 +125,7 @@ impl PlateTerm {
         self
     }
 
-    /// The number of triangles that resist bending.
+    /// Number of triangles that resist bending.
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.patches.len()
@@ -134,7 +136,7 @@ impl PlateTerm {
         Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
     }
 
-    /// θ − θ̄ of all hinges that are needed.
+    /// Evaluates θ − θ̄ of all needed hinges.
     fn values(&self, x: &[Vector3<f64>]) -> Values<'_> {
         let mut values =
             Values { needed: &self.needed, angles: self.rest.iter().map(|rest| -rest).collect(), flagged: 0 };
@@ -142,7 +144,7 @@ impl PlateTerm {
         values
     }
 
-    /// ½ ‖r‖² of each patch with a free vertex.
+    /// Returns ½ ‖r‖² of each patch with a free vertex.
     fn half_squares<'a>(&'a self, values: &'a Values<'_>) -> impl Iterator<Item = (usize, f64)> + 'a {
         let half_square = |patch: usize| {
             let r = self.patches[patch].residual(&values.angles);
@@ -151,7 +153,7 @@ impl PlateTerm {
         self.active.iter().map(move |&patch| (patch, half_square(patch)))
     }
 
-    /// θ − θ̄ and ∇θ of all hinges that are needed.
+    /// Evaluates θ − θ̄ and ∇θ of all needed hinges.
     fn angles(&self, x: &[Vector3<f64>]) -> Angles<'_> {
         let mut angles = Angles {
             needed: &self.needed,
@@ -164,7 +166,7 @@ impl PlateTerm {
         angles
     }
 
-    /// m = ∂U/∂θ of all hinges.
+    /// Returns m = ∂U/∂θ of all hinges.
     fn moments(&self, angles: &Angles<'_>) -> Vec<f64> {
         let mut moments = vec![0.0; self.hinges.len()];
         for &patch in &self.active {
@@ -187,14 +189,14 @@ impl PlateTerm {
         }
     }
 
-    /// Adds −Σ m ∇²θ and its product with v.
-    fn add_turning(&self, moments: &[f64], state: State<'_>, sum: &mut Linearisation<'_>) {
-        let mut turning = Turning::new(self, moments, state.v, sum);
-        for_each_batch(&self.packed, state.x, &mut turning);
+    /// Adds −Σ m ∇²θ to the matrix, and its product with v.
+    fn add_curved_part(&self, moments: &[f64], state: State<'_>, sum: &mut Linearisation<'_>) {
+        let mut curved_part = CurvedPart::new(self, moments, state.v, sum);
+        for_each_batch(&self.packed, state.x, &mut curved_part);
     }
 }
 
-/// θ − θ̄ of each hinge, −θ̄ at first.
+/// θ − θ̄ of each hinge; starts at −θ̄.
 struct Values<'a> {
     needed: &'a [usize],
     angles: Vec<f64>,
@@ -212,7 +214,7 @@ impl BatchWork<ArcAngle> for Values<'_> {
     }
 }
 
-/// θ − θ̄, −θ̄ at first, and ∇θ of each hinge.
+/// θ − θ̄ (starts at −θ̄) and ∇θ of each hinge.
 pub(super) struct Angles<'a> {
     needed: &'a [usize],
     values: Vec<f64>,
@@ -235,13 +237,14 @@ impl BatchWork<ArcAngle> for Angles<'_> {
     }
 }
 
-/// How many of the first lanes are flagged.
+/// Counts the flagged lanes among the first `count`.
 fn flagged(lanes: u32, count: usize) -> u64 {
     u64::from((lanes & (u32::MAX >> (32 - count))).count_ones())
 }
 
 impl Patch {
-    /// r = √A (1 − Q Qᵀ) Lᵀ κ with D = L Lᵀ: Q spans what the free edges' angles can reach, and would make zero. `None` when nothing is left.
+    /// Sets r = √A (1 − Q Qᵀ) Lᵀ κ with D = L Lᵀ. Q spans the directions that the angles at free edges can reach;
+    /// minimising over them makes these components 0. Returns `None` if nothing remains.
     fn new(curvature: &Curvature, factor: &[[f64; 3]; 3], hinges: &[[usize; 4]]) -> Option<Self> {
         let scaled = |b: &[f64; 3]| -> [f64; 3] {
             std::array::from_fn(|k| curvature.area.sqrt() * (0..3).map(|i| factor[i][k] * b[i]).sum::<f64>())
@@ -250,7 +253,7 @@ impl Patch {
         for free in &curvature.free {
             let mut direction = scaled(free);
             let before = dot(direction, direction);
-            directions.iter().for_each(|q| remove(&mut direction, q));
+            directions.iter().for_each(|q| project_out(&mut direction, q));
             let length = dot(direction, direction);
             if length > 1e-20 * before {
                 directions.push(direction.map(|component| component / length.sqrt()));
@@ -259,7 +262,7 @@ impl Patch {
         let mut angles = Vec::new();
         for &(hinge, b) in &curvature.angles {
             let mut b = scaled(&b);
-            directions.iter().for_each(|q| remove(&mut b, q));
+            directions.iter().for_each(|q| project_out(&mut b, q));
             angles.push(Angle { hinge, b, local: [0; 4] });
         }
         let largest = angles.iter().map(|angle| dot(angle.b, angle.b)).fold(0.0, f64::max);
@@ -285,7 +288,7 @@ impl Patch {
         r
     }
 
-    /// ∇r: for each vertex, three vectors.
+    /// Computes ∇r: three vectors per vertex.
     #[inline(always)]
     pub(super) fn gradients(&self, gradients: &[[f64; 12]], rows: &mut Vec<Row>) {
         rows.clear();
@@ -304,7 +307,7 @@ impl Patch {
     }
 }
 
-fn remove(vector: &mut [f64; 3], unit: &[f64; 3]) {
+fn project_out(vector: &mut [f64; 3], unit: &[f64; 3]) {
     let part = dot(*vector, *unit);
     (0..3).for_each(|k| vector[k] -= part * unit[k]);
 }
@@ -351,7 +354,7 @@ impl Term for PlateTerm {
             let vertices = &self.patches[patch].vertices;
             let pairs =
                 || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
-            // Vertices ascend, and so do their rows: no block of the upper triangle is turned.
+            // Vertices ascend, and so do their rows: no block of the upper triangle needs transposing.
             let slots = pairs().map(|(i, j)| slot(i, j)).collect();
             let mirrored = match pattern.storage() {
                 Storage::Upper => Vec::new(),
@@ -394,8 +397,8 @@ impl PlacedTerm for PlateTerm {
         if let Some(product) = &mut sum.stiffness_times_velocity {
             self.subtract_products(&angles, state.v, product);
         }
-        if sum.curvature == Negative::Exact {
-            self.add_turning(&moments, state, sum);
+        if sum.curvature == CurvaturePolicy::Exact {
+            self.add_curved_part(&moments, state, sum);
         }
         self.tally(angles.flagged)
     }
@@ -411,12 +414,12 @@ impl PlacedTerm for PlateTerm {
 }
 
 impl PlateTerm {
-    /// Adds s Σ ∇r ∇rᵀ.
+    /// Adds s Σ ∇r ∇rᵀ to the matrix.
     fn add_outer_products<T: Precision>(&self, angles: &Angles<'_>, s: f64, matrix: &mut [Block<T>]) {
         dispatch(OuterProducts { of: self, angles, s, matrix });
     }
 
-    /// Subtracts Σ ∇r (∇r · v).
+    /// Subtracts Σ ∇r (∇r · v) from the product.
     fn subtract_products(&self, angles: &Angles<'_>, v: &[Vector3<f64>], product: &mut [Vector3<f64>]) {
         let mut rows = Vec::new();
         for patch in self.active.iter().map(|&patch| &self.patches[patch]) {

@@ -1,55 +1,58 @@
 use energy_dsl::Vector3;
 
-use super::{ThreadError, laid};
+use super::{ThreadError, material_coordinates};
 use crate::mesh::{Topology, TriangleMesh};
 
-/// How far the surface's normal at the middle of each edge lies from half-way between its two triangles'.
+/// For each edge, the deviation of the surface's normal at the midpoint from the bisector of the triangles' normals.
 ///
-/// For a quadratic height field with curvature H, the slope at the middle of an edge, outwards and relative to the slope of the flat
-/// triangle, is p = (½ (H_tt τ² − 2 H_tn τ η + H_nn η²) − ⅛ H_tt L²)/η: t along the edge of length L, n outwards, the apex at (τ, −η) from
-/// the middle. The dihedral angle is p + p′ of the two triangles, the tilt ½ (p − p′).
+/// Consider a quadratic height field with curvature H. The slope at the midpoint of an edge, outwards and relative to
+/// the flat triangle, is p = (½ (H_tt τ² − 2 H_tn τ η + H_nn η²) − ⅛ H_tt L²)/η. Here t is the direction of the edge of
+/// length L, n the outward normal, and (τ, −η) the position of the apex relative to the midpoint. The dihedral angle is
+/// the sum p + p′ over the two triangles, the tilt ½ (p − p′).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tilts {
-    /// Of each hinge, φ = Σ c (θ − θ̄): other hinges and their c, seen from its first triangle.
+    /// For each hinge, the coefficients c of φ = Σ c (θ − θ̄) and their hinges, seen from the first triangle.
     pub tilts: Vec<Vec<(usize, f64)>>,
     /// The three sides of each triangle.
     pub(super) sides: Vec<[Side; 3]>,
 }
 
-/// A side of a triangle, in its coordinates along warp and weft.
+/// A side of a triangle, in the triangle's coordinates along warp and weft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Side {
-    /// In m.
+    /// Length, in m.
     pub length: f64,
-    /// Outwards.
+    /// Outward unit normal.
     pub normal: [f64; 2],
-    /// The hinge, if there is a triangle across.
+    /// The hinge; `None` on the boundary.
     pub hinge: Option<usize>,
-    /// The triangle across.
+    /// The triangle on the other side; `None` on the boundary.
     across: Option<usize>,
-    /// Of the apex: τ and η.
+    /// τ and η of the apex, in m.
     apex: [f64; 2],
 }
 
-/// A row that takes (H_uu, H_vv, 2H_uv) to a number.
+/// A linear form on (H_uu, H_vv, 2H_uv).
 type Row = [f64; 3];
 
-/// How many rings of triangles around an edge are tried before its tilt is given up to least squares.
+/// The largest number of rings of triangles around an edge whose hinges determine its tilt. If they do not suffice, the
+/// tilt is a least-squares fit.
 const RINGS: usize = 4;
-/// Below this part of its scale a tilt is rounding.
+/// Relative size below which a tilt counts as rounding error.
 const NEGLIGIBLE: f64 = 1e-11;
-/// The smallest determinant of MᵀM, over the cube of a third of its trace, with which hinges determine a curvature.
+/// The smallest determinant of MᵀM, relative to the cube of a third of its trace, for which hinges determine a
+/// curvature.
 const WELL_POSED: f64 = 1e-3;
 
 impl Tilts {
-    /// The tilts of a mesh at rest.
+    /// Computes the tilts of a mesh at rest.
     ///
     /// # Errors
-    /// When the warp stands across a triangle.
+    /// Returns an error if a triangle is perpendicular to the warp.
     pub fn of(mesh: &TriangleMesh, topology: &Topology, warp: Option<Vector3<f64>>) -> Result<Self, ThreadError> {
         let mut sides = Vec::with_capacity(mesh.triangles().len());
         for triangle in 0..mesh.triangles().len() {
-            sides.push(sides_of(laid(mesh, triangle, warp)?));
+            sides.push(sides_of(material_coordinates(mesh, triangle, warp)?));
         }
         for (number, hinge) in topology.hinges.iter().enumerate() {
             let [_, _, start, end] = hinge.vertices;
@@ -70,10 +73,10 @@ impl Tilts {
         Ok(tilts)
     }
 
-    /// The tilt of one hinge: the combination of least norm of the angles around it.
+    /// Returns the tilt of one hinge: the combination of nearby angles with minimal norm.
     fn tilt(&self, hinge: usize, [first, second]: [usize; 2]) -> Vec<(usize, f64)> {
         let mut patch = Patch::new(self, first);
-        patch.enter(second);
+        patch.unfold(second);
         let sides = [first, second].map(|triangle| (triangle, self.side(triangle, hinge)));
         let rows = sides.map(|(triangle, side)| side.slope(patch.turn(triangle)));
         let wanted: Row = std::array::from_fn(|k| 0.5 * (rows[0][k] - rows[1][k]));
@@ -100,7 +103,7 @@ impl Tilts {
     }
 }
 
-/// Triangles unfolded into the plane of the first, each with the angle by which its own coordinates are turned there.
+/// Triangles unfolded into the plane of the first, each with the rotation of its coordinates in that plane.
 struct Patch<'a> {
     tilts: &'a Tilts,
     triangles: Vec<(usize, f64)>,
@@ -119,14 +122,14 @@ impl<'a> Patch<'a> {
         self.triangles.iter().any(|(known, _)| *known == triangle)
     }
 
-    /// Unfolds a neighbour of one that is there.
-    fn enter(&mut self, triangle: usize) {
+    /// Unfolds a neighbour of a triangle in the patch.
+    fn unfold(&mut self, triangle: usize) {
         if let Some(turn) = self.turn_across(triangle) {
             self.triangles.push((triangle, turn));
         }
     }
 
-    /// How a neighbour of one that is there is turned: what is outwards for the one is inwards for the other.
+    /// Returns the rotation of a neighbour of a triangle in the patch. Outward normals across their edge are opposite.
     fn turn_across(&self, triangle: usize) -> Option<f64> {
         let sides = &self.tilts.sides[triangle];
         sides.iter().find_map(|side| {
@@ -136,20 +139,20 @@ impl<'a> Patch<'a> {
         })
     }
 
-    /// Adds all neighbours; false when there are none.
+    /// Adds all neighbours of the patch. Returns `false` if the patch has no neighbours.
     fn grow(&mut self) -> bool {
         let before = self.triangles.len();
         for at in 0..before {
             for side in self.tilts.sides[self.triangles[at].0] {
                 if let Some(across) = side.across.filter(|&across| !self.contains(across)) {
-                    self.enter(across);
+                    self.unfold(across);
                 }
             }
         }
         self.triangles.len() > before
     }
 
-    /// The hinges along the sides of its triangles, and their dihedral angles in a quadratic height field.
+    /// Returns the hinges in the patch, with their dihedral angles as functions of the curvature.
     fn angles(&self) -> Vec<(usize, Row)> {
         let mut angles: Vec<(usize, Row)> = Vec::new();
         for &(triangle, turn) in &self.triangles {
@@ -169,10 +172,10 @@ impl<'a> Patch<'a> {
 }
 
 impl Side {
-    /// p of a quadratic height field, in coordinates in which the triangle's own are turned.
+    /// Returns p as a function of the curvature, in coordinates that are rotated by `turn`.
     fn slope(&self, turn: f64) -> Row {
         let angle = direction(self.normal) + turn;
-        // t is n turned to the left: the triangle lies to the left of its side.
+        // t is n rotated to the left, because a triangle lies to the left of its directed sides.
         let (n, m) = (angle.cos(), angle.sin());
         let [tau, eta] = self.apex;
         let [tt, tn, nn] = [0.5 * (tau * tau - 0.25 * self.length * self.length) / eta, -tau, 0.5 * eta];
@@ -223,7 +226,7 @@ fn determinant(m: &[Row; 3]) -> f64 {
     m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
 }
 
-/// (G + ε)⁻¹ b, ε a part of 10⁻¹² of G: directions that no hinge sees get nothing.
+/// Solves (G + ε) x = b with ε = 10⁻¹² tr G, so that directions that no hinge determines give 0.
 fn solve_positive(mut gram: [Row; 3], mut b: Row) -> Row {
     let small = 1e-12 * (gram[0][0] + gram[1][1] + gram[2][2]);
     (0..3).for_each(|k| gram[k][k] += small);

@@ -40,7 +40,8 @@ impl NewtonOptions {
     }
 
     /// Whether the next iterate may be balanced. A solve to relative tolerance t leaves a residual of about t ‖∇E‖: if
-    /// that is below the impulse tolerance, forces are evaluated first, and Hessians only if they turn out to be needed.
+    /// that is below the impulse tolerance, forces are evaluated first, and Hessians only if they turn out to be
+    /// needed.
     pub(super) fn may_be_balanced(&self, last: Forcing, dt: f64) -> bool {
         last.tolerance * last.gradient < dt * self.impulse_tolerance
     }

@@ -23,6 +23,13 @@ pub(super) struct Energy {
     pub magnitude: f64,
 }
 
+/// E and −∇E at one point.
+pub(super) struct EnergyAndGradient {
+    pub energy: Energy,
+    /// −∇E of the free vertices.
+    pub downhill: Vec<Vector3<f64>>,
+}
+
 impl<'a> IncrementalPotential<'a> {
     pub(super) fn new(body: &'a mut Body, dt: f64) -> Self {
         Self { body, dt, report: StepReport::default() }
@@ -84,10 +91,10 @@ impl<'a> IncrementalPotential<'a> {
         x: &[Vector3<f64>],
         curvature: Curvature,
         matrix: &mut BlockMatrix<f32>,
-    ) -> Result<Option<(Energy, Vec<Vector3<f64>>)>, EvaluationError> {
+    ) -> Result<Option<EnergyAndGradient>, EvaluationError> {
         let Some(downhill) = if_finite(self.linearise(x, curvature, matrix))? else { return Ok(None) };
         let energy = self.energy(x)?;
-        Ok(energy.value.is_finite().then_some((energy, downhill)))
+        Ok(energy.value.is_finite().then_some(EnergyAndGradient { energy, downhill }))
     }
 
     /// Returns −∇E.

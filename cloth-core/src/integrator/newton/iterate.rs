@@ -7,11 +7,11 @@ use super::super::projection::Projection;
 use super::super::trial::Trial;
 use super::super::{StepError, StepReport};
 use super::forcing::Forcing;
-use super::incremental_potential::{Energy, IncrementalPotential};
+use super::incremental_potential::{Energy, EnergyAndGradient, IncrementalPotential};
 use super::line_search::{AcceptedStep, Prefetch};
 use super::{Memory, NewtonOptions, largest};
 
-/// The current iterate of a step, with what is known about it.
+/// The current iterate of a step, with the quantities evaluated there.
 pub(super) struct Iterate<'a> {
     options: NewtonOptions,
     potential: IncrementalPotential<'a>,
@@ -58,7 +58,7 @@ impl<'a> Iterate<'a> {
     ) -> Result<Self, EvaluationError> {
         let projection = Projection::on_demand();
         let (energy, linearised) = match potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)? {
-            Some((energy, downhill)) => (energy, Some(downhill)),
+            Some(EnergyAndGradient { energy, downhill }) => (energy, Some(downhill)),
             None => {
                 let body = &*potential.body;
                 body.system.dofs().free().iter().for_each(|&vertex| x[vertex] = body.x[vertex]);

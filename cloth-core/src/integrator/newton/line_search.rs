@@ -36,8 +36,8 @@ pub(super) struct AcceptedStep {
 }
 
 impl IncrementalPotential<'_> {
-    /// Returns the first of x + d, x + d/2, … that decreases E sufficiently (Armijo); `None` if none does. Directions of
-    /// projected Hessians are too short, if anything: a full step along one is doubled while that lowers E.
+    /// Returns the first of x + d, x + d/2, … that decreases E sufficiently (Armijo); `None` if none does. Directions
+    /// of projected Hessians are too short, if anything: a full step along one is doubled while that lowers E.
     pub(super) fn line_search(
         &mut self,
         x: &[Vector3<f64>],

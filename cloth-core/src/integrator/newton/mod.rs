@@ -31,9 +31,8 @@ use iterate::Iterate;
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
 ///
-/// Needs an energy or a dissipation function of every force other than drag. For
-/// [`crate::fabric::Bending::BridsonForce`], which has none, and springs damped along their length, whose Jacobians are
-/// not symmetric, use [`super::ImplicitEuler`].
+/// Every force other than drag needs an energy or a dissipation function. [`crate::fabric::Bending::BridsonForce`] has
+/// neither, and springs damped along their length have unsymmetric Jacobians: use [`super::ImplicitEuler`] for both.
 #[derive(Clone, Debug, Default)]
 pub struct Newton {
     options: NewtonOptions,

@@ -1,0 +1,38 @@
+use energy_dsl::RestError;
+use energy_solve::ListError;
+
+use super::declared::DeclaredError;
+use super::plate::{PlateError, RigidityError, ThreadError};
+
+/// A fabric that does not fit a mesh.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
+pub enum FabricError {
+    /// A triangle is rejected as a rest shape.
+    #[error("triangle {triangle}: {source}")]
+    Rest { triangle: usize, source: RestError },
+    /// A hinge is rejected as a rest shape.
+    #[error("the hinge on vertices {vertices:?}: {source}")]
+    RestHinge { vertices: [usize; 4], source: RestError },
+    /// The bending plate is invalid.
+    #[error("bending: {0}")]
+    Plate(#[from] PlateError),
+    /// The stiffnesses of woven cloth contradict each other.
+    #[error("material.orthotropic-stvk: {0}")]
+    Woven(#[from] RigidityError),
+    /// A triangle has no warp direction.
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
+    /// Elements declared in a file are invalid.
+    #[error(transparent)]
+    Declared(#[from] DeclaredError),
+    /// The strain limit acts at rest.
+    #[error("strain_limit.stretch: expected a number greater than 1, the rest length; got {stretch}")]
+    Limit {
+        /// The limit given.
+        stretch: f64,
+    },
+    /// Elements and stencils do not match.
+    #[error(transparent)]
+    List(#[from] ListError),
+}
