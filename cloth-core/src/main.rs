@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     // Exit quietly if the reader closes the pipe (`| head`).
     sigpipe::reset();
     run(Arguments::parse().command).unwrap_or_else(|error| {
-        eprintln!("error: {}", verify::message(&error));
+        eprintln!("error: {}", energy_cli::message(&error));
         ExitCode::FAILURE
     })
 }

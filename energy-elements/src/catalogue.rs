@@ -1,19 +1,4 @@
-use energy_dsl::{Declaration, Element, Inputs, Outputs, RestError};
-
-/// An element of this crate, for tools that handle all elements in the same way.
-#[derive(Clone, Copy, Debug)]
-pub struct CatalogueEntry {
-    /// The declaration.
-    pub declaration: &'static Declaration,
-    /// Evaluates every block in double precision.
-    pub evaluate: fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,
-}
-
-impl CatalogueEntry {
-    const fn of<E: Element>() -> Self {
-        Self { declaration: E::DECLARATION, evaluate: E::evaluate::<f64> }
-    }
-}
+use energy_dsl::AnyElement;
 
 /// Calls a macro with the names of all elements of this crate, in alphabetical order.
 ///
@@ -90,15 +75,15 @@ macro_rules! for_each_element {
 }
 
 macro_rules! entries {
-    ($($name:ident),* $(,)?) => { &[$(CatalogueEntry::of::<crate::$name<f64>>()),*] };
+    ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<crate::$name<f64>>()),*] };
 }
 
 /// All elements of this crate, in alphabetical order.
 // Not inlined: a crate that inlines it compiles every element again.
 #[inline(never)]
 #[must_use]
-pub fn catalogue() -> &'static [CatalogueEntry] {
-    const CATALOGUE: &[CatalogueEntry] = for_each_element!(entries);
+pub fn catalogue() -> &'static [AnyElement] {
+    const CATALOGUE: &[AnyElement] = for_each_element!(entries);
     CATALOGUE
 }
 
@@ -109,6 +94,6 @@ pub fn catalogue() -> &'static [CatalogueEntry] {
 /// assert!(spring.declaration.translation_invariant);
 /// ```
 #[must_use]
-pub fn find(name: &str) -> Option<&'static CatalogueEntry> {
+pub fn find(name: &str) -> Option<&'static AnyElement> {
     catalogue().iter().find(|entry| entry.declaration.name == name)
 }

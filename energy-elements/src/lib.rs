@@ -17,7 +17,8 @@
 
 mod catalogue;
 
-pub use catalogue::{CatalogueEntry, catalogue, find};
+pub use catalogue::{catalogue, find};
+pub use energy_dsl::AnyElement as CatalogueEntry;
 
 macro_rules! elements {
     ($($file:ident: $($name:ident),+;)*) => {

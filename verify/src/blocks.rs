@@ -104,11 +104,15 @@ pub struct Block<T = f64> {
 }
 
 impl<T: Clone> Block<T> {
-    pub(crate) fn new(name: BlockName, columns: usize, numbers: Vec<T>) -> Self {
+    /// Creates a block from its entries, row by row.
+    #[must_use]
+    pub fn new(name: BlockName, columns: usize, numbers: Vec<T>) -> Self {
         Self { name, columns, numbers }
     }
 
-    pub(crate) fn from_rows(name: BlockName, rows: &[Vec<T>]) -> Self {
+    /// Creates a block from its rows.
+    #[must_use]
+    pub fn from_rows(name: BlockName, rows: &[Vec<T>]) -> Self {
         Self { name, columns: rows.first().map_or(0, Vec::len), numbers: rows.concat() }
     }
 }
@@ -122,7 +126,7 @@ impl Block {
 }
 
 /// Returns the largest magnitude; NaN if the numbers contain one.
-pub(crate) fn largest(numbers: &[f64]) -> f64 {
+pub fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().map(|x| x.abs()).fold(0.0, |most, x| if most.is_nan() || x <= most { most } else { x })
 }
 

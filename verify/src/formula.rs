@@ -21,18 +21,18 @@ struct Expansion<T> {
 }
 
 /// Evaluates the rows of a formula in plain double precision.
-pub(crate) fn rows(formula: &Textbook, sample: &Sample) -> Vec<f64> {
+pub fn rows(formula: &Textbook, sample: &Sample) -> Vec<f64> {
     formula.evaluate(&sample.inputs())
 }
 
 /// Computes every block of a declaration from its formula alone, by hyper-dual numbers.
-pub(crate) fn expected_blocks(declaration: &Declaration, formula: &Textbook, sample: &Sample) -> Vec<Block> {
+pub fn expected_blocks(declaration: &Declaration, formula: &Textbook, sample: &Sample) -> Vec<Block> {
     blocks(declaration.kind, expand(formula, sample, order(declaration.kind) == Order::Second), sample)
 }
 
 /// Computes every block over any number type, by jets. Creates the numbers itself, so that they have the caller's
 /// precision.
-pub(crate) fn blocks_over<T: Number<Mask = bool>>(
+pub fn blocks_over<T: Number<Mask = bool>>(
     declaration: &Declaration,
     formula: &Textbook,
     sample: &Sample,

@@ -2,10 +2,12 @@
 
 /// A rotation about the origin, by rows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rotation([[f64; 3]; 3]);
+pub struct Rotation([[f64; 3]; 3]);
 
 impl Rotation {
-    pub(crate) fn from_unit_quaternion([w, x, y, z]: [f64; 4]) -> Self {
+    /// Returns the rotation matrix of a unit quaternion.
+    #[must_use]
+    pub fn from_unit_quaternion([w, x, y, z]: [f64; 4]) -> Self {
         Self([
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
             [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
@@ -15,21 +17,23 @@ impl Rotation {
 }
 
 /// Returns the rotated vector.
-pub(crate) fn rotate(Rotation(rows): &Rotation, v: &[f64]) -> [f64; 3] {
+pub fn rotate(Rotation(rows): &Rotation, v: &[f64]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
 /// Rotates each vector of a flattened list.
-pub(crate) fn rotate_all(rotation: &Rotation, vectors: &[f64]) -> Vec<f64> {
+pub fn rotate_all(rotation: &Rotation, vectors: &[f64]) -> Vec<f64> {
     vectors.chunks(3).flat_map(|v| rotate(rotation, v)).collect()
 }
 
-pub(crate) fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+/// Returns a − b.
+#[must_use]
+pub fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 /// Returns a × b.
-pub(crate) fn cross(a: &[f64], b: &[f64]) -> [f64; 3] {
+pub fn cross(a: &[f64], b: &[f64]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
@@ -42,14 +46,14 @@ fn norm(a: &[f64]) -> f64 {
 }
 
 /// Returns the shortest positive distance between two points in space; `None` if there is none.
-pub(crate) fn shortest_distance(points: &[f64]) -> Option<f64> {
+pub fn shortest_distance(points: &[f64]) -> Option<f64> {
     let points: Vec<&[f64]> = points.chunks(3).collect();
     let distances = pairs(points.len()).map(|(i, j)| norm(&difference(points[i], points[j])));
     distances.filter(|&d| d > 0.0).min_by(f64::total_cmp)
 }
 
 /// Returns the longest distance between two points in space; `None` for fewer than two points.
-pub(crate) fn longest_distance(points: &[f64]) -> Option<f64> {
+pub fn longest_distance(points: &[f64]) -> Option<f64> {
     let points: Vec<&[f64]> = points.chunks(3).collect();
     pairs(points.len()).map(|(i, j)| norm(&difference(points[i], points[j]))).max_by(f64::total_cmp)
 }
@@ -61,7 +65,7 @@ fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
 /// Whether points are well separated, with no three near a line and no four (in space) near a plane. Textbook forms
 /// lose digits near these configurations, and the audit would measure that loss. `demand` scales the required distances
 /// and angles from 1 downwards: many points do not fit into a box otherwise.
-pub(crate) fn is_well_shaped(points: &[f64], dimension: usize, demand: f64) -> bool {
+pub fn is_well_shaped(points: &[f64], dimension: usize, demand: f64) -> bool {
     let points: Vec<&[f64]> = points.chunks(dimension).collect();
     let edge = |i: usize, j: usize| difference(points[j], points[i]);
     let apart = pairs(points.len()).all(|(i, j)| norm(&edge(i, j)) > 0.4 * demand);

@@ -7,8 +7,7 @@
 //! * finite differences of the block one order below, at the step where they vary least.
 //!
 //! If routes disagree, the audit names the one to suspect. It also checks the laws that a declaration implies, and
-//! plants faults that must be noticed ([`audit`](mod@audit)). [`reference`](mod@reference) measures errors against
-//! recorded values, [`stress`](mod@stress) on the way to every singularity.
+//! plants faults that must be noticed ([`audit`](mod@audit)).
 //!
 //! ```
 //! use energy_elements::HairBend;
@@ -19,27 +18,19 @@
 #![forbid(unsafe_code)]
 
 pub mod audit;
-pub mod bench;
-mod blocks;
+pub mod blocks;
 pub mod dual;
 mod eigenvalues;
 mod finite_difference;
-mod formula;
+pub mod formula;
 pub mod fuzz;
-mod geometry;
+pub mod geometry;
 mod jet;
-mod listings;
 pub mod multiprecision;
-pub mod reference;
-mod sample;
-pub mod stress;
+pub mod sample;
 
 pub use audit::assert_derivatives;
 pub use blocks::{Answer, Block, BlockName, Evaluate, NoAnswer, evaluate};
-pub use listings::listings;
-// Temporary, for cloth-core only: remove once it depends on energy-cli itself.
-#[doc(hidden)]
-pub use energy_cli::{message, plot, write_whole};
 pub use sample::Sample;
 
 /// Audits an element in a test: `assert_derivatives!(MyMaterial)`, or with `samples = 200` random inputs. See

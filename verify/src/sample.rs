@@ -60,7 +60,7 @@ impl Sample {
     }
 
     /// Returns k_s and k_d, the last two parameters of a constraint.
-    pub(crate) fn stiffness_and_damping(&self) -> (f64, f64) {
+    pub fn stiffness_and_damping(&self) -> (f64, f64) {
         match self.parameters[..] {
             [.., stiffness, damping] => (stiffness, damping),
             _ => (1.0, 0.0),
@@ -69,12 +69,12 @@ impl Sample {
 
     /// Returns the length over which an element may change: the shortest distance between points, or 1 for fewer than
     /// two points.
-    pub(crate) fn feature_length(&self, declaration: &Declaration) -> f64 {
+    pub fn feature_length(&self, declaration: &Declaration) -> f64 {
         if has_points(declaration) { shortest_distance(&self.positions).unwrap_or(1.0) } else { 1.0 }
     }
 
     /// Formats the numbers by name with 17 significant digits, from which the same doubles can be read back.
-    pub(crate) fn describe(&self, declaration: &Declaration) -> String {
+    pub fn describe(&self, declaration: &Declaration) -> String {
         let mut text = String::new();
         let mut add = |title: &str, fields: &[(String, usize)], numbers: &[f64]| {
             let mut rest = numbers;
@@ -116,19 +116,19 @@ impl fmt::Display for Numbers<'_> {
 }
 
 /// Whether the positions are points in space, rather than other unknowns.
-pub(crate) fn has_points(declaration: &Declaration) -> bool {
+pub fn has_points(declaration: &Declaration) -> bool {
     !declaration.points.is_empty() && declaration.points.iter().all(|point| point.size == 3)
 }
 
 /// Draws samples for one declaration.
-pub(crate) struct Sampler {
+pub struct Sampler {
     declaration: &'static Declaration,
     random: Rng,
 }
 
 impl Sampler {
     /// Creates a sampler whose samples depend on the seed and the declaration's name only.
-    pub(crate) fn new(declaration: &'static Declaration, seed: u64) -> Self {
+    pub fn new(declaration: &'static Declaration, seed: u64) -> Self {
         // FNV-1a.
         let name = declaration
             .name
@@ -147,7 +147,7 @@ impl Sampler {
     }
 
     /// Draws an input: points at distances of about one to eight, within a few units of the origin.
-    pub(crate) fn sample(&mut self) -> Sample {
+    pub fn sample(&mut self) -> Sample {
         let declaration = self.declaration;
         let count: usize = declaration.points.iter().map(|point| point.size).sum();
         let positions = if has_points(declaration) { self.points(count) } else { self.unknowns(count) };
@@ -177,7 +177,7 @@ impl Sampler {
     }
 
     /// Draws an input whose points have small integer coordinates: edges along axes, right angles, zero components.
-    pub(crate) fn lattice_sample(&mut self) -> Sample {
+    pub fn lattice_sample(&mut self) -> Sample {
         let sample = self.sample();
         // A function of the coordinates themselves may have a kink at any integer.
         if !has_points(self.declaration) || !self.declaration.translation_invariant {
@@ -197,7 +197,7 @@ impl Sampler {
 
     /// Draws an unusual but non-degenerate input: unknowns and parameters, or distances between points, of very
     /// different sizes.
-    pub(crate) fn odd_sample(&mut self) -> Sample {
+    pub fn odd_sample(&mut self) -> Sample {
         let mut sample = self.sample();
         let shrink = |numbers: &mut [f64], random: &mut Rng| {
             let all = random.bool().then(|| random.i32(-20..1));
@@ -259,7 +259,7 @@ impl Sampler {
     }
 
     /// Draws a rotation.
-    pub(crate) fn rotation(&mut self) -> Rotation {
+    pub fn rotation(&mut self) -> Rotation {
         loop {
             let quaternion = [(); 4].map(|()| self.uniform(-1.0, 1.0));
             let length = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();

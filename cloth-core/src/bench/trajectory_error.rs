@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
+use energy_cli::plot::{Curve, logarithmic};
 use energy_solve::EvaluationError;
-use verify::plot::{Curve, logarithmic};
 
 use super::{BenchError, Cloth, hang};
 use crate::geometry::{norm, subtract};

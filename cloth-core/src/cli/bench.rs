@@ -146,7 +146,8 @@ fn compare_integrators(cloth: Cloth, output: Option<&Path>) -> Result<()> {
         let picture = trajectory_error::svg(&runs).map_err(anyhow::Error::msg)?;
         for (extension, text) in [("csv", trajectory_error::csv(&runs)), ("md", table), ("svg", picture)] {
             let file = path.join(format!("{}-error.{extension}", cloth.name()));
-            verify::write_whole(&file, text.as_bytes()).with_context(|| format!("cannot write {}", file.display()))?;
+            energy_cli::write_whole(&file, text.as_bytes())
+                .with_context(|| format!("cannot write {}", file.display()))?;
         }
     }
     Ok(())

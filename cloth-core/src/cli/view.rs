@@ -46,7 +46,7 @@ impl View {
         let shot = view::screenshot(&self.shown, moment, self.colours, self.wireframe, || progress.inc(1));
         progress.finish_and_clear();
         let Screenshot { png, time, legend } = shot?;
-        verify::write_whole(file, &png).with_context(|| format!("cannot write {}", file.display()))?;
+        energy_cli::write_whole(file, &png).with_context(|| format!("cannot write {}", file.display()))?;
         print(&format!("wrote {}: t = {time:.4} s, {legend}\n", file.display()))
     }
 }

@@ -109,7 +109,7 @@ impl OutputFolder {
     /// Returns an error if the file cannot be written.
     pub fn write(&self, name: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
         let path = self.path.join(name);
-        verify::write_whole(&path, contents).map_err(|source| OutputError::File { path: path.clone(), source })?;
+        energy_cli::write_whole(&path, contents).map_err(|source| OutputError::File { path: path.clone(), source })?;
         Ok(path)
     }
 

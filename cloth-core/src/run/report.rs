@@ -66,7 +66,7 @@ fn audited(record: &Record) -> Vec<Verdict> {
     let own = own_targets(record);
     let target = |name: &str| {
         let declared = own.iter().find(|target| target.name() == name).cloned();
-        declared.or_else(|| energy_elements::find(name).map(Target::of_catalogue))
+        declared.or_else(|| energy_elements::find(name).map(Target::of_element))
     };
     let verdict = |name: &str| match target(name) {
         Some(target) => verdict_on(name, &audit_all(&[target], None, Options::default())),

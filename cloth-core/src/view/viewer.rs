@@ -203,7 +203,7 @@ impl Viewer {
     }
 
     fn note(&mut self, result: Result<(), ViewError>) {
-        self.failure = result.err().map(|error| verify::message(&error.into())).or(self.failure.take());
+        self.failure = result.err().map(|error| energy_cli::message(&error.into())).or(self.failure.take());
     }
 
     /// The text in the corner of the window.

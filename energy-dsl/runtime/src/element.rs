@@ -96,6 +96,23 @@ pub trait Element: Copy {
     fn evaluate<T: Real>(inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError>;
 }
 
+/// An element behind a function pointer, for tools that treat all elements in the same way.
+#[derive(Clone, Copy, Debug)]
+pub struct AnyElement {
+    /// The declaration.
+    pub declaration: &'static Declaration,
+    /// Evaluates all blocks in double precision, as [`Element::evaluate`] does.
+    pub evaluate: fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,
+}
+
+impl AnyElement {
+    /// Creates the entry of a generated element.
+    #[must_use]
+    pub const fn of<E: Element>() -> Self {
+        Self { declaration: E::DECLARATION, evaluate: E::evaluate::<f64> }
+    }
+}
+
 /// A potential energy U(x).
 pub trait Potential<T: Real>: Element {
     /// One vector per point: `[Vector3<T>; N]`.

@@ -35,8 +35,8 @@ pub use cpu::{
 };
 pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
-    Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual, RestError, Vector3,
-    triangle_index,
+    AnyElement, Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual,
+    RestError, Vector3, triangle_index,
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use flags::{Flag, Flags};

@@ -58,10 +58,11 @@ impl Demo {
 /// Compares the derivatives of every term with dual numbers and finite differences.
 #[cfg(feature = "audit")]
 fn audit() -> Result<()> {
-    use verify::audit::{Options, audit_catalogue, describe_failure};
+    use verify::audit::{Options, audit_all, describe_failure, targets_in};
 
     let options = Options { samples: 50, ..Options::default() };
-    let report = audit_catalogue(&TERMS, options).map_err(anyhow::Error::msg)?;
+    let targets = targets_in(energy_elements::catalogue(), &TERMS).map_err(anyhow::Error::msg)?;
+    let report = audit_all(&targets, None, options);
     if !report.passed() {
         let failures: Vec<String> = report.failures().map(describe_failure).collect();
         bail!("the audit failed; nothing was tracked\n{}", failures.join("\n"));

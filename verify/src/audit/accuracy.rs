@@ -25,7 +25,7 @@ pub(super) fn in_roundoffs(truth: &TrueBlock, got: &[f64], natural: f64) -> f64 
 /// between points and of the rest shape's edges. Inputs that are not points are perturbed themselves. κ is the maximum
 /// over sixteen random sign patterns. Code that computes edges in working precision cannot in general be more accurate
 /// than κ roundoffs.
-pub(crate) fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
+pub fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
     // Large compared with rounding, small compared with everything else.
     const PERTURBATION: f64 = 1.0 / (1 << 20) as f64;
     let here = answer.block(block);
@@ -110,7 +110,7 @@ mod tests {
         let evaluations = energy_elements::for_each_element!(single_precision);
         for (entry, evaluate) in energy_elements::catalogue().iter().zip(evaluations) {
             let declaration = entry.declaration;
-            let subject = Target::of_catalogue(entry).subject().unwrap();
+            let subject = Target::of_element(entry).subject().unwrap();
             let auditor = Auditor::new(&subject);
             let mut sampler = Sampler::new(declaration, 5);
             for _ in 0..6 {

@@ -17,9 +17,9 @@ mod subject;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use energy_dsl::{Declaration, Element};
+use energy_dsl::{AnyElement, Declaration, Element};
 
-pub(crate) use self::accuracy::amplification;
+pub use self::accuracy::amplification;
 use self::auditor::{Auditor, Case, case, cases};
 pub use self::html::html;
 pub use self::input::read_inputs;
@@ -27,8 +27,7 @@ pub use self::junit::junit;
 pub use self::report::{
     Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, describe_failure,
 };
-pub(crate) use self::subject::Subject;
-pub use self::subject::Target;
+pub use self::subject::{EvaluateAny, Subject, Target};
 use crate::blocks::{BlockName, Evaluate, NoAnswer};
 use crate::geometry::{Rotation, longest_distance, shortest_distance};
 use crate::multiprecision::TrueBlock;
@@ -63,26 +62,18 @@ impl Options {
     }
 }
 
-/// Audits the elements of the catalogue with these names; all if the list is empty.
+/// Returns the elements of a catalogue with these names; all if the list is empty.
 ///
 /// # Errors
 /// If the catalogue does not have one of the names.
-pub fn audit_catalogue(names: &[&str], options: Options) -> Result<Report, String> {
-    Ok(audit_all(&catalogue_targets(names)?, None, options))
-}
-
-/// Returns the elements of the catalogue with these names; all if the list is empty.
-///
-/// # Errors
-/// If the catalogue does not have one of the names.
-pub fn catalogue_targets(names: &[&str]) -> Result<Vec<Target>, String> {
-    let catalogue = energy_elements::catalogue();
-    if let Some(unknown) = names.iter().find(|name| energy_elements::find(name).is_none()) {
+pub fn targets_in(catalogue: &'static [AnyElement], names: &[&str]) -> Result<Vec<Target>, String> {
+    let has = |name: &str| catalogue.iter().any(|entry| entry.declaration.name == name);
+    if let Some(unknown) = names.iter().find(|name| !has(name)) {
         let known = catalogue.iter().map(|entry| entry.declaration.name).collect::<Vec<_>>().join(", ");
         return Err(format!("no declared element is called {unknown}; there are {known}"));
     }
     let chosen = catalogue.iter().filter(|e| names.is_empty() || names.contains(&e.declaration.name));
-    Ok(chosen.map(Target::of_catalogue).collect())
+    Ok(chosen.map(Target::of_element).collect())
 }
 
 /// Audits all targets on all processors; the report is in their order. If an energy is given, the targets are forces

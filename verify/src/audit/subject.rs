@@ -2,14 +2,13 @@ use std::path::Path;
 
 use anyhow::Context;
 use energy_compiler::{Interpreted, Textbook};
-use energy_dsl::{Declaration, Inputs, Kind, Outputs, RestError};
-use energy_elements::CatalogueEntry;
+use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs, RestError};
 
 use crate::blocks::{Answer, NoAnswer, evaluate};
 use crate::sample::Sample;
 
 /// A function or closure that evaluates an element.
-pub(crate) type EvaluateAny = Box<dyn Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>>;
+pub type EvaluateAny = Box<dyn Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>>;
 
 /// An element to audit: from the catalogue, or from a text read at run time.
 #[derive(Clone, Debug)]
@@ -17,13 +16,13 @@ pub struct Target {
     /// Source of one declaration and of the functions that it uses.
     source: String,
     name: String,
-    entry: Option<&'static CatalogueEntry>,
+    entry: Option<&'static AnyElement>,
 }
 
 impl Target {
     /// Creates the target of an element of the catalogue.
     #[must_use]
-    pub fn of_catalogue(entry: &'static CatalogueEntry) -> Self {
+    pub fn of_element(entry: &'static AnyElement) -> Self {
         let declaration = entry.declaration;
         Self { source: declaration.source.into(), name: declaration.name.into(), entry: Some(entry) }
     }
@@ -60,7 +59,11 @@ impl Target {
         &self.name
     }
 
-    pub(crate) fn subject(&self) -> Result<Subject, String> {
+    /// Returns the element in the form that audits need.
+    ///
+    /// # Errors
+    /// If the declaration does not compile.
+    pub fn subject(&self) -> Result<Subject, String> {
         let interpreted = self.interpreted()?;
         match self.entry {
             Some(entry) => Subject::new(entry.declaration, Box::new(entry.evaluate), Some(interpreted)),
@@ -79,16 +82,23 @@ impl Target {
 }
 
 /// An element under audit.
-pub(crate) struct Subject {
-    pub(crate) declaration: &'static Declaration,
-    pub(crate) evaluate: EvaluateAny,
-    pub(crate) formula: Textbook,
+pub struct Subject {
+    /// The declaration.
+    pub declaration: &'static Declaration,
+    /// Evaluates all blocks of the element.
+    pub evaluate: EvaluateAny,
+    /// The textbook form.
+    pub formula: Textbook,
     /// The compiled routines, in which faults are planted; `None` if the source is not available.
-    pub(crate) interpreted: Option<Interpreted>,
+    pub interpreted: Option<Interpreted>,
 }
 
 impl Subject {
-    pub(crate) fn new(
+    /// Creates the subject of an audit.
+    ///
+    /// # Errors
+    /// If the source of the declaration does not compile.
+    pub fn new(
         declaration: &'static Declaration,
         evaluate: EvaluateAny,
         interpreted: Option<Interpreted>,
@@ -97,11 +107,17 @@ impl Subject {
         Ok(Self { declaration, evaluate, formula, interpreted })
     }
 
-    pub(crate) fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
+    /// Evaluates all blocks at an input.
+    ///
+    /// # Errors
+    /// If the rest shape is degenerate or a block has the wrong size.
+    pub fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
         evaluate(self.declaration, &self.evaluate, &sample.inputs())
     }
 
-    pub(crate) fn has_velocities(&self) -> bool {
+    /// Returns whether the element depends on velocities.
+    #[must_use]
+    pub fn has_velocities(&self) -> bool {
         matches!(self.declaration.kind, Kind::Force | Kind::Constraint)
     }
 }

@@ -4,7 +4,6 @@
 //! written to the corpus, which every later run replays first.
 
 mod edits;
-mod targets;
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -14,8 +13,6 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use fastrand::Rng;
-
-pub use self::targets::Target;
 
 /// Time limit of one input.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -20,5 +20,6 @@ use dashu::Float;
 #[cfg(feature = "rug")]
 use rug::Float;
 
+pub(crate) use truth::truth_of_ordinary;
+pub use truth::worse;
 pub use truth::{TrueBlock, truth};
-pub(crate) use truth::{truth_of_ordinary, worse};

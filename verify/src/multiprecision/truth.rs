@@ -50,7 +50,9 @@ impl TrueBlock {
     }
 }
 
-pub(crate) fn worse(a: f64, b: f64) -> f64 {
+/// Returns the larger error. NaN counts as the largest.
+#[must_use]
+pub fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b <= a { a } else { b }
 }
 

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use verify::reference::{Source, evaluate_file};
+use verify_command::reference::{Source, evaluate_file};
 
 /// Evaluates the records of a file and writes them with the results of the generated code (17 digits) and flags.
 #[derive(Args)]

@@ -5,7 +5,7 @@ use num_traits::{One, ToPrimitive, Zero};
 /// A decimal number in twice the precision of a double: `high` is the nearest double, `low` the remainder.
 ///
 /// ```
-/// use verify::reference::Truth;
+/// use verify_command::reference::Truth;
 /// let third: Truth = "3.33333333333333333333333333333e-01".parse().unwrap();
 /// // Errors of a hundredth of a roundoff are visible.
 /// assert!((third.error_of(1.0 / 3.0) / 2.0_f64.powi(-53) - 1.0 / 6.0).abs() < 1e-2);

@@ -33,7 +33,7 @@ pub fn table(headings: &[&str], numeric: &[usize]) -> Table {
 
 /// The reference data in this repository.
 pub fn data() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../data")
 }
 
 /// The reference records of potentials in this repository.

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use verify::reference::{evaluate_fusion, fusion_reference};
+use verify_command::reference::{evaluate_fusion, fusion_reference};
 
 fn file() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/fusion/reference.json")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/fusion/reference.json")
 }
 
 #[test]

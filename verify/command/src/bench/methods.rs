@@ -10,12 +10,12 @@ use energy_dsl::{
 use serde::Serialize;
 
 use super::complex::Complex;
-use crate::audit::Subject;
-use crate::blocks::BlockName;
-use crate::dual::Hyper;
-use crate::geometry::longest_distance;
-use crate::multiprecision::{TrueBlock, truth, worse};
-use crate::sample::Sample;
+use verify::audit::Subject;
+use verify::blocks::BlockName;
+use verify::dual::Hyper;
+use verify::geometry::longest_distance;
+use verify::multiprecision::{TrueBlock, truth, worse};
+use verify::sample::Sample;
 
 /// Digits of the reference value.
 const DIGITS: usize = 30;

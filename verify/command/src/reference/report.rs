@@ -8,7 +8,7 @@ use super::exact::Truth;
 use super::file::{Record, RecordError, read};
 use super::mapping::{Mapping, mapping};
 use super::policy::{PolicyLine, policy};
-use crate::blocks::evaluate;
+use verify::blocks::evaluate;
 
 /// The errors of one block of a potential over all records.
 #[derive(Clone, Debug, Serialize)]

@@ -19,7 +19,7 @@ pub struct Show {
 
 impl Show {
     pub fn run(self) -> anyhow::Result<bool> {
-        for listing in verify::listings(&self.name)? {
+        for listing in verify_command::listings(&self.name)? {
             match &self.routine {
                 _ if self.plan => print!("{}", listing.plans()),
                 _ if self.counts => print!("{}", listing.counts()),

@@ -1,8 +1,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use verify::reference::policy;
-use verify::stress::{markdown, plots, stress};
+use verify_command::reference::policy;
+use verify_command::stress::{markdown, plots, stress};
 
 use super::output::{create_folder, records, write_json, write_text};
 use super::policy as documented;

@@ -4,7 +4,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::sample::Sample;
+use verify::sample::Sample;
 
 /// An error in a file of records.
 #[derive(Debug, thiserror::Error)]

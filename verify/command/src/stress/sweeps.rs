@@ -1,6 +1,6 @@
 use energy_dsl::{Declaration, Kind};
 
-use crate::sample::{Sample, Sampler, has_points};
+use verify::sample::{Sample, Sampler, has_points};
 
 /// Inputs on the way to a singularity.
 #[derive(Clone, Debug)]

@@ -8,11 +8,11 @@ pub use sweeps::{Sweep, sweeps};
 
 use serde::Serialize;
 
-use crate::audit::{Subject, Target, amplification};
-use crate::blocks::BlockName;
-use crate::formula::expected_blocks;
-use crate::multiprecision::truth;
-use crate::sample::Sample;
+use verify::audit::{Subject, Target, amplification};
+use verify::blocks::BlockName;
+use verify::formula::expected_blocks;
+use verify::multiprecision::truth;
+use verify::sample::Sample;
 
 /// Errors of one block at one point of a sweep, in units of roundoff of its largest number.
 #[derive(Clone, Debug, Serialize)]
@@ -96,7 +96,7 @@ fn at(subject: &Subject, sample: &Sample, parameter: f64) -> Vec<(BlockName, Poi
     let Ok(answer) = subject.answer(sample) else { return Vec::new() };
     let naive = expected_blocks(declaration, &subject.formula, sample);
     let truths = truth(declaration, &subject.formula, sample, DIGITS);
-    let point = |block: &crate::blocks::Block| {
+    let point = |block: &verify::blocks::Block| {
         let truth = truths.iter().find(|t| t.block.name == block.name)?;
         let naive = naive.iter().find(|n| n.name == block.name)?;
         let nan = block.numbers.iter().any(|x| x.is_nan());

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
-use verify::reference::{Source, Truth, evaluate_file};
+use verify_command::reference::{Source, Truth, evaluate_file};
 
 fn data() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/potentials")
 }
 
 fn json(path: &Path) -> Value {

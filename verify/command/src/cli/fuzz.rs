@@ -3,7 +3,8 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
-use verify::fuzz::{Budget, Finding, Summary, Target, fuzz};
+use verify::fuzz::{Budget, Finding, Summary, fuzz};
+use verify_command::fuzz_targets::Target;
 
 /// Feeds the compiler with edited inputs of a corpus. Exit status 1 on a panic, or an input that takes more than 20
 /// seconds; that input is added to the corpus.

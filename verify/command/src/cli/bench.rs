@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use verify::bench::{bench, csv, markdown, plots};
+use verify_command::bench::{bench, csv, markdown, plots};
 
 use super::output::{create_folder, write_text};
 

@@ -6,8 +6,8 @@ use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
 use super::mapping::{is_undeclared, mapping};
-use crate::blocks::{NoAnswer, evaluate};
-use crate::multiprecision::truth;
+use verify::blocks::{NoAnswer, evaluate};
+use verify::multiprecision::truth;
 
 /// The source of the blocks in evaluated records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,9 +8,9 @@ use serde_json::Value;
 
 use super::file::{Record, RecordError, read};
 use super::mapping::mapping;
-use crate::blocks::{Answer, Block, BlockName, NoAnswer, evaluate, largest};
-use crate::formula::expected_blocks;
-use crate::sample::Sample;
+use verify::blocks::{Answer, Block, BlockName, NoAnswer, evaluate, largest};
+use verify::formula::expected_blocks;
+use verify::sample::Sample;
 
 /// The result of one block at one degenerate input.
 #[derive(Clone, Debug, Serialize)]

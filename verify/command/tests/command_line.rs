@@ -12,7 +12,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 fn data(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/potentials").join(file)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/potentials").join(file)
 }
 
 #[test]

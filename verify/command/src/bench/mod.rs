@@ -10,8 +10,8 @@ use energy_cli::plot::{Curve, logarithmic};
 
 pub use self::methods::Measured;
 use self::methods::Methods;
-use crate::audit::Target;
-use crate::sample::{Sample, Sampler};
+use verify::audit::Target;
+use verify::sample::{Sample, Sampler};
 
 /// Inputs per element.
 const INPUTS: usize = 8;
@@ -36,7 +36,7 @@ pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
             continue;
         }
         let entry = energy_elements::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
-        let subject = Target::of_catalogue(entry).subject()?;
+        let subject = Target::of_element(entry).subject()?;
         let mut sampler = Sampler::new(subject.declaration, 3);
         let samples: Vec<Sample> = (0..INPUTS).map(|_| in_single_precision(sampler.sample())).collect();
         list.extend(run(&Methods::new(&subject, &samples)));

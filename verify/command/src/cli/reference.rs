@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use verify::reference::{BlockLine, FamilyLine, ReferenceReport, fusion_reference, reference};
+use verify_command::reference::{BlockLine, FamilyLine, ReferenceReport, fusion_reference, reference};
 
 use super::output::{data, records, table, write_json};
 use super::policy;

@@ -7,8 +7,8 @@ use energy_elements::{
 };
 
 use super::methods::{Measured, Methods};
-use crate::dual::Hyper;
-use crate::sample::Sample;
+use verify::dual::Hyper;
+use verify::sample::Sample;
 
 use super::complex::Complex;
 

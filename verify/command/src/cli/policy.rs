@@ -1,6 +1,6 @@
 //! Results at degenerate inputs, which two commands print.
 
-use verify::reference::PolicyLine;
+use verify_command::reference::PolicyLine;
 
 use super::output::table;
 

@@ -15,7 +15,7 @@ use serde_json::{Map, Value};
 use super::exact::Truth;
 use super::file::{RecordError, read};
 use super::fusion_system;
-use crate::dual::Hyper;
+use verify::dual::Hyper;
 
 /// The error of one array of a family over all cases.
 #[derive(Clone, Debug, Serialize)]
