@@ -45,7 +45,7 @@ fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Returns the shortest positive distance between two points in space; `None` if there is none.
+/// Returns the shortest positive distance between two points in space; `None` if all points coincide.
 pub fn shortest_distance(points: &[f64]) -> Option<f64> {
     let points: Vec<&[f64]> = points.chunks(3).collect();
     let distances = pairs(points.len()).map(|(i, j)| norm(&difference(points[i], points[j])));

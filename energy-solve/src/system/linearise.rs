@@ -125,8 +125,8 @@ impl System {
         self.constants.iter().position(|part| part.is_in(contents))
     }
 
-    /// Evaluates the masses and the Jacobians of the quadratic terms, and writes them to the matrix. Returns the index of
-    /// their constant part, and the identity of the matrix's contents. Drops the parts of matrices that are gone.
+    /// Evaluates the masses and the Jacobians of the quadratic terms, and writes them to the matrix. Returns the index
+    /// of their constant part, and the identity of the matrix's contents. Drops the parts of matrices that are gone.
     fn constant<T: Precision>(
         &mut self,
         state: State<'_>,

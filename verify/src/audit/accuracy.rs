@@ -66,7 +66,7 @@ fn perturbed(declaration: &Declaration, sample: &Sample, by: f64, random: &mut R
     Sample { parameters, rest, positions, velocities }
 }
 
-/// Returns the dimension of the rest shape's points; `None` if it has none.
+/// Returns the dimension of the rest shape's points; `None` if the rest shape has no points.
 fn dimension(rest: &[Field]) -> Option<usize> {
     let dimension = rest.first()?.size;
     ((2..=3).contains(&dimension) && rest.iter().all(|field| field.size == dimension)).then_some(dimension)

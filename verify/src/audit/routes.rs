@@ -203,6 +203,6 @@ mod tests {
             "wrong: dual numbers; in agreement: generated code, multi-precision, differences of `energy`"
         );
         let tie = [route("generated code", &[1.0], 0.0), route("dual numbers", &[2.0], 1e-9)];
-        assert!(verdict(&tie, 2.0).starts_with("no two agree"));
+        assert!(verdict(&tie, 2.0).starts_with("no two routes agree"));
     }
 }
