@@ -9,7 +9,7 @@
 //! - [`integrator`], [`ledger`]: time integration and the energy balance of a body
 //! - [`scene`], [`model`]: the file format, and its assembly into islands
 //! - [`simulation`], [`output`], [`run`]: stepping, output files, runs with checkpoints and reports
-//! - [`view`], [`demo`], [`materials`], [`bench`], [`validate`]: what the binary offers on top
+//! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
 //!
 //! ```
 //! use cloth_core::{Simulation, scene::Scene};
