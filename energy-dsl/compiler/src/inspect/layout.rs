@@ -66,7 +66,7 @@ fn pieces(code: TokenStream) -> Vec<Piece> {
                 Some(Piece::Symbol(quote)) if quote == "'" => *quote = format!("'{name}"),
                 _ => pieces.push(Piece::Word(name.to_string())),
             },
-            TokenTree::Literal(literal) => pieces.push(Piece::Word(without_type(&literal.to_string()).into())),
+            TokenTree::Literal(literal) => pieces.push(Piece::Word(without_type(&literal.to_string()))),
         }
     }
     pieces
@@ -77,11 +77,16 @@ fn is_operator(first: &str, second: char) -> bool {
     ["::", "->", "=>", "==", "!=", "<=", ">=", "..", "&&", "||"].contains(&format!("{first}{second}").as_str())
 }
 
-/// A number without the suffix of its type.
-fn without_type(literal: &str) -> &str {
-    let types = ["usize", "u32", "u8", "f64"];
-    let plain = types.iter().find_map(|suffix| literal.strip_suffix(suffix));
-    plain.filter(|_| literal.starts_with(|c: char| c.is_ascii_digit())).unwrap_or(literal)
+/// Returns a number without the suffix of its type.
+fn without_type(literal: &str) -> String {
+    if !literal.starts_with(|c: char| c.is_ascii_digit()) {
+        return literal.to_owned();
+    }
+    match literal.strip_suffix("f64") {
+        Some(number) if number.contains(['.', 'e']) => number.to_owned(),
+        Some(number) => format!("{number}.0"),
+        None => literal.trim_end_matches("usize").trim_end_matches("u32").trim_end_matches("u8").to_owned(),
+    }
 }
 
 fn is_word(piece: &Piece, word: &str) -> bool {
@@ -225,6 +230,7 @@ mod tests {
 
     #[test]
     fn code_is_spaced_as_people_write_it() {
+        assert_eq!(laid_out("f (1f64 , 2usize , 0.5f64)"), "f(1.0, 2, 0.5)\n");
         assert_eq!(
             laid_out("let a : :: x :: Y < T > = - b * c . d :: < L > ( e , - f ) ;"),
             "let a: ::x::Y<T> = -b * c.d::<L>(e, -f);\n"
