@@ -7,8 +7,8 @@ use verify::audit::{Check, Options, Report, audit_all, describe_failure, targets
 use crate::scene::{Scene, SceneError};
 use crate::simulation::Simulation;
 
-/// The demonstration's scene, `scenes/hang.toml`.
-pub const SCENE: &str = include_str!("../../scenes/hang.toml");
+/// The demonstration's scene: a copy of `scenes/hang.toml`, so that the crate is complete on its own.
+pub const SCENE: &str = include_str!("hang.toml");
 
 /// Returns the scene.
 ///
@@ -65,6 +65,12 @@ fn worst_error(report: &Report, element: &str, check: Check) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_scene_is_that_of_the_gallery() {
+        let gallery = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/hang.toml")).unwrap();
+        assert_eq!(SCENE, gallery);
+    }
 
     #[test]
     fn the_audit_covers_what_the_demonstration_is_made_of() {

@@ -17,8 +17,8 @@ pub struct MeasuredFabric {
 /// assert!(denim.table.contains("Wang, O'Brien and Ramamoorthi"));
 /// ```
 pub const MEASURED: [MeasuredFabric; 4] = [
-    MeasuredFabric { name: "denim", table: include_str!("../../../scenes/fabrics/denim.toml") },
-    MeasuredFabric { name: "interlock", table: include_str!("../../../scenes/fabrics/interlock.toml") },
-    MeasuredFabric { name: "ribbon", table: include_str!("../../../scenes/fabrics/ribbon.toml") },
-    MeasuredFabric { name: "dots", table: include_str!("../../../scenes/fabrics/dots.toml") },
+    MeasuredFabric { name: "denim", table: include_str!("measured/denim.toml") },
+    MeasuredFabric { name: "interlock", table: include_str!("measured/interlock.toml") },
+    MeasuredFabric { name: "ribbon", table: include_str!("measured/ribbon.toml") },
+    MeasuredFabric { name: "dots", table: include_str!("measured/dots.toml") },
 ];
