@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use proc_macro2::{TokenStream, TokenTree};
 
 /// Crates whose import cycles are still to be untied.
-const MODULE_CYCLES: &[&str] = &["cloth-core", "energy-dsl"];
+const MODULE_CYCLES: &[&str] = &[];
 
 /// Dependencies still to be removed: (crate, dependency).
-const CRATE_CYCLES: &[(&str, &str)] = &[("energy-dsl", "energy-macros")];
+const CRATE_CYCLES: &[(&str, &str)] = &[];
 
 /// The nodes that each node points to.
 type Graph = BTreeMap<String, BTreeSet<String>>;

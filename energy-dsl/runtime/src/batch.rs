@@ -7,12 +7,12 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::aligned::Aligned;
-use super::array::Array;
-use super::cpu::{Kernel, Lane, Level, dispatch};
-use super::element::{Element, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
-use super::flags::Flags;
-use super::real::{Mask, Real};
+use crate::aligned::Aligned;
+use crate::array::Array;
+use crate::element::{Element, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
+use crate::numbers::Flags;
+use crate::numbers::{Kernel, Lane, Level, dispatch};
+use crate::numbers::{Mask, Real};
 
 /// Elements in a packed block: the number of `f32` lanes in the widest register.
 pub const BLOCK: usize = 16;

@@ -1,8 +1,8 @@
-use super::array::Array;
-use super::element::{Block, Vector3};
-use super::flags::Flags;
-use super::real::Real;
-use super::results::{
+use crate::array::Array;
+use crate::element::{Block, Vector3};
+use crate::numbers::Flags;
+use crate::numbers::Real;
+use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };

@@ -1,9 +1,9 @@
 //! Evaluation of all blocks on flattened inputs, for tools that treat all elements in the same way.
 
-use super::array::Array;
-use super::element::{Block, Constraint, ForceLaw, Inputs, Outputs, Potential, Residual, Vector3, triangle_index};
-use super::flags::Flags;
-use super::real::Real;
+use crate::array::Array;
+use crate::element::{Block, Constraint, ForceLaw, Inputs, Outputs, Potential, Residual, Vector3, triangle_index};
+use crate::numbers::Flags;
+use crate::numbers::Real;
 
 fn points<T: Real, P: Array<Vector3<T>>>(numbers: &[T]) -> P {
     P::from_fn(|i| std::array::from_fn(|axis| numbers.get(3 * i + axis).copied().unwrap_or_else(|| T::from_f64(0.0))))

@@ -4,17 +4,12 @@
 mod aligned;
 mod array;
 mod batch;
-mod call;
 mod choose;
-mod cpu;
 mod declaration;
 mod element;
-mod elementary;
 mod evaluate;
-mod flags;
-mod real;
+mod numbers;
 mod results;
-mod unbounded;
 
 pub use aligned::Aligned;
 pub use array::Array;
@@ -23,30 +18,25 @@ pub use batch::{
     WidePoints, for_each_batch, for_each_batch_in,
 };
 #[doc(hidden)]
-pub use call::{
-    ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
-    HessianVectorCall, JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall,
-};
-#[doc(hidden)]
 pub use choose::Choose;
-pub use cpu::{
-    BLOCK_NUMBERS, Baseline, BlockSum, Kernel, Lane, Level, LevelName, UnknownLevel, available, dispatch, dispatch_at,
-    level,
-};
 pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
 pub use element::{
     AnyElement, Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual,
     RestError, Vector3, triangle_index,
 };
+#[doc(hidden)]
+pub use element::{
+    ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
+    HessianVectorCall, JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall,
+};
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
-pub use flags::{Flag, Flags};
-pub use real::{Mask, Number, Real};
+pub use numbers::{
+    BLOCK_NUMBERS, Baseline, BlockSum, Flag, Flags, Kernel, Lane, Level, LevelName, Mask, Number, Real, Unbounded,
+    UnknownLevel, available, dispatch, dispatch_at, level,
+};
+#[doc(hidden)]
+pub use numbers::{Precautions, WithCare, settle, with_care};
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
-pub use unbounded::Unbounded;
-#[doc(hidden)]
-pub use unbounded::settle;
-#[doc(hidden)]
-pub use unbounded::{Precautions, WithCare, with_care};

@@ -1,7 +1,7 @@
 //! Results of routines.
 
-use super::flags::Flags;
-use super::real::Number;
+use crate::numbers::Flags;
+use crate::numbers::Number;
 
 /// The value of an energy.
 #[derive(Clone, Copy, Debug)]

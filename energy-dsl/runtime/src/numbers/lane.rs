@@ -1,4 +1,4 @@
-use crate::real::{Number, Real};
+use super::real::{Number, Real};
 
 /// Several numbers of type `S` in one SIMD register. A scalar is a lane of one.
 ///

@@ -3,11 +3,11 @@
 //! A caller has often just stored the points one number at a time. A vector load of them would stall until these stores
 //! retire (failed store forwarding), so the points are read one number at a time, too.
 
-use super::array::Array;
-use super::cpu::{Kernel, Level, read_alone};
-use super::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
-use super::real::Real;
-use super::results::{
+use crate::array::Array;
+use crate::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
+use crate::numbers::Real;
+use crate::numbers::{Kernel, Level, read_alone};
+use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };

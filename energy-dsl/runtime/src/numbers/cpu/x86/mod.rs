@@ -11,9 +11,10 @@ mod avx512;
 mod block_sum;
 mod transpose;
 
-use super::block_sum::Rows;
+use super::LevelName;
 use super::lanes::Lanes;
-use super::{Baseline, Kernel, Level, LevelName};
+use crate::numbers::block_sum::Rows;
+use crate::numbers::level::{Baseline, Kernel, Level};
 use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
 
 /// The level with AVX2 and FMA.
@@ -166,7 +167,7 @@ macro_rules! mask {
             }
         }
 
-        impl crate::real::Mask for $mask {
+        impl crate::numbers::real::Mask for $mask {
             #[inline(always)]
             fn none() -> Self {
                 // SAFETY: as for registers.

@@ -1,6 +1,6 @@
 use super::exponential::LN_2;
 use super::{Double, Unary, fast_sum, polynomial};
-use crate::cpu::Level;
+use crate::numbers::level::Level;
 
 /// The natural logarithm.
 pub struct Ln;

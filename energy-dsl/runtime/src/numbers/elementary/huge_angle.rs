@@ -1,8 +1,8 @@
 //! Reduction of angles of any size by the method of Payne and Hanek. Of the product with 2/π, only the bits around the
 //! binary point are computed, in integers.
 
-use crate::cpu::Baseline;
-use crate::real::Number;
+use crate::numbers::level::Baseline;
+use crate::numbers::real::Number;
 
 use super::{ROUND, power_of_two};
 

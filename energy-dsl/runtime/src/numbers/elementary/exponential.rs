@@ -1,5 +1,5 @@
 use super::{Double, ROUND, Unary, fast_sum, polynomial};
-use crate::cpu::Level;
+use crate::numbers::level::Level;
 
 /// The exponential function.
 pub struct Exp;

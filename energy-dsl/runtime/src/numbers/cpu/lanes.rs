@@ -3,12 +3,12 @@
 use std::fmt::{self, Debug};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lane::Lane;
 use super::register::{DoubleRegister, Register, Scalar};
-use super::{Kernel, Level};
-use crate::elementary::{Atan2, Cos, Double, Exp, Ln, ModerateAtan2, Pow, Sin};
-use crate::real::Number;
-use crate::unbounded::Unbounded;
+use crate::numbers::elementary::{Atan2, Cos, Double, Exp, Ln, ModerateAtan2, Pow, Sin};
+use crate::numbers::lane::Lane;
+use crate::numbers::level::{Kernel, Level};
+use crate::numbers::real::Number;
+use crate::numbers::unbounded::Unbounded;
 
 /// A register with the arithmetic of a number.
 #[derive(Clone, Copy)]

@@ -1,5 +1,5 @@
 use super::{Binary, Double, fast_sum, polynomial, power_of_two};
-use crate::cpu::Level;
+use crate::numbers::level::Level;
 
 /// The angle of the point (x, y); y is the first argument.
 pub struct Atan2;

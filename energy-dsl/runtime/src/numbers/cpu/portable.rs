@@ -5,9 +5,9 @@ use std::ops::{BitAnd, BitOr, Not};
 
 use super::lanes::Lanes;
 use super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
-use super::{Baseline, Kernel, Level};
-use crate::elementary::{Binary, Double, Unary, sin_cos};
-use crate::real::Mask;
+use crate::numbers::elementary::{Binary, Double, Unary, sin_cos};
+use crate::numbers::level::{Baseline, Kernel, Level};
+use crate::numbers::real::Mask;
 
 /// A register of two doubles.
 #[derive(Clone, Copy)]

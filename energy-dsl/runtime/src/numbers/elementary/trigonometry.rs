@@ -1,6 +1,6 @@
 use super::{Double, ROUND, Unary, huge_angle, polynomial};
-use crate::cpu::Level;
-use crate::real::Mask;
+use crate::numbers::level::Level;
+use crate::numbers::real::Mask;
 
 /// The sine.
 pub struct Sin;

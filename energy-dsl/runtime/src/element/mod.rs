@@ -8,16 +8,20 @@
 //!   (1,1), …; see [`triangle_index`].
 //! - A *square* holds all N×N blocks, row by row.
 
-use super::array::Array;
-use super::call::{HessianCall, ResidualJacobianCall, WrittenTo};
-use super::cpu::Level;
-use super::declaration::Declaration;
-use super::flags::Flags;
-use super::real::{Number, Real};
-use super::results::{
+mod call;
+
+use crate::array::Array;
+use crate::declaration::Declaration;
+use crate::numbers::Flags;
+use crate::numbers::Level;
+use crate::numbers::{Number, Real};
+use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
+use call::WrittenTo;
+#[doc(hidden)]
+pub use call::*;
 
 /// A point or vector in space.
 pub type Vector3<T> = [T; 3];

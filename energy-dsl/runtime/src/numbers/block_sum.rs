@@ -1,8 +1,8 @@
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
-use super::Level;
-use crate::real::Real;
+use super::level::Level;
+use super::real::Real;
 
 /// Numbers that a [`BlockSum`] reads from the start of a block. Only the first nine belong to the block; the others do
 /// not affect the result.

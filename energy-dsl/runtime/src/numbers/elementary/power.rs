@@ -1,7 +1,7 @@
 use super::exponential::{LN_2, exp_of_sum};
 use super::logarithm::decompose;
 use super::{Binary, Double, Exp, Ln, Unary, fast_sum, polynomial, power_of_two};
-use crate::cpu::Level;
+use crate::numbers::level::Level;
 
 /// A number to a real power.
 pub struct Pow;

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::super::block_sum::{BLOCK_NUMBERS, BlockSum};
+use crate::numbers::block_sum::{BLOCK_NUMBERS, BlockSum};
 
 /// Products of entries, row by row, in the first nine lanes: one load and one operation per block. The other lanes are
 /// unused.

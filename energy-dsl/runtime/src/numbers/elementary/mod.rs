@@ -20,7 +20,8 @@ pub(crate) use logarithm::Ln;
 pub(crate) use power::Pow;
 pub(crate) use trigonometry::{Cos, Sin, sin_cos};
 
-use super::cpu::{Lane, Level};
+use super::lane::Lane;
+use super::level::Level;
 use super::real::Number;
 
 /// Doubles with access to their bits.

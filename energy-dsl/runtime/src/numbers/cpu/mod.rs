@@ -8,43 +8,21 @@
 //! The environment variable `ENERGY_LEVEL` (`baseline`, `avx2` or `avx512`) caps the level; it is read once. With it,
 //! one machine reproduces the results of a lesser one. It cannot go below what the program was compiled to require.
 
-mod block_sum;
-mod lane;
 mod lanes;
 mod portable;
 mod register;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use std::fmt::{self, Debug, Display};
+use std::fmt::{self, Display};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use block_sum::Rows;
-pub use block_sum::{BLOCK_NUMBERS, BlockSum};
-pub use lane::Lane;
 use lanes::Lanes;
 pub(crate) use register::Scalar;
 
-/// A set of instructions that kernels are compiled for.
-pub trait Level: Copy + Debug + 'static {
-    /// Name of the level.
-    const NAME: &'static str;
-    /// Whether a · b + c is rounded once.
-    const FUSED: bool;
-    /// The widest register of doubles.
-    type F64: Lane<f64>;
-    /// The widest register of single-precision numbers.
-    type F32: Lane<f32>;
-    /// Running sum for sweeps over sparse matrices of doubles.
-    type Sum64: BlockSum<f64>;
-    /// Running sum for sweeps over sparse matrices of single-precision numbers.
-    type Sum32: BlockSum<f32>;
-}
-
-/// The level that every processor of the target has.
-#[derive(Clone, Copy, Debug)]
-pub struct Baseline;
+use super::block_sum::Rows;
+use super::level::{Baseline, Kernel, Level};
 
 impl Level for Baseline {
     const NAME: &'static str = LevelName::Baseline.as_str();
@@ -66,14 +44,6 @@ impl Level for Fused {
     type F32 = Lanes<portable::F32x4>;
     type Sum64 = Rows<f64, Self>;
     type Sum32 = Rows<f32, Self>;
-}
-
-/// Code that can be compiled for any [`Level`].
-pub trait Kernel {
-    /// The result.
-    type Output;
-    /// Runs the code. Mark implementations `#[inline(always)]`: only inlined code is compiled for the level.
-    fn run<L: Level>(self) -> Self::Output;
 }
 
 /// The SIMD levels, in increasing order. A level includes the instructions of all lower ones.

@@ -1,9 +1,10 @@
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-use super::cpu::{Baseline, Kernel, Level, Scalar, dispatch_scalar};
+use super::cpu::{Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
 use super::flags::Flags;
+use super::level::{Baseline, Kernel, Level};
 use super::unbounded::{Unbounded, WithCare};
 
 /// The outcome of a comparison: a `bool`, or one per lane.

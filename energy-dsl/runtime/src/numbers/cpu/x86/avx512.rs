@@ -2,12 +2,12 @@
 
 use std::arch::x86_64::*;
 
-use super::super::lane::check_transposed;
 use super::super::lanes::Lanes;
 use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
-use super::super::{Kernel, Level};
 use super::{intrinsics, mask, run_avx512, transpose};
-use crate::elementary::{Binary, Unary, sin_cos};
+use crate::numbers::elementary::{Binary, Unary, sin_cos};
+use crate::numbers::lane::check_transposed;
+use crate::numbers::level::{Kernel, Level};
 
 mask!(Mask8(__mmask8), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _, and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m);
 

@@ -2,8 +2,9 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::cpu::{Fused, Level, Scalar};
+use super::cpu::{Fused, Scalar};
 use super::flags::Flags;
+use super::level::Level;
 use super::real::{Mask, Number, Real};
 
 /// The number significand · 2^exponent. It rounds as the floating-point type does, but intermediate results neither
@@ -400,8 +401,8 @@ pub fn settle<T: Number>(inputs: &[T], results: &mut [T], flags: &mut Flags<T>) 
 
 #[cfg(test)]
 mod tests {
-    use super::super::cpu::Baseline;
     use super::*;
+    use crate::numbers::level::Baseline;
 
     fn of<S: Scalar>(value: S) -> Unbounded<S> {
         Unbounded::of(value)

@@ -1,12 +1,12 @@
 //! The operations of a processor's register. [`super::lanes`] turns registers into numbers.
 
-use super::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use super::lanes::Lanes;
-use super::{Kernel, Level};
-use crate::elementary::{Binary, Unary};
-use crate::flags::Flags;
-use crate::real::{Mask, Number};
-use crate::unbounded::{Unbounded, WithCare};
+use crate::numbers::elementary::{Binary, Unary};
+use crate::numbers::flags::Flags;
+use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
+use crate::numbers::level::{Kernel, Level};
+use crate::numbers::real::{Mask, Number};
+use crate::numbers::unbounded::{Unbounded, WithCare};
 
 /// A floating-point number that lanes are made of, with the bit patterns of its format.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::super::lanes::Lanes;
 use super::super::register::Register;
 
-/// [`super::super::Lane::store_transposed`] by squares of 4×4; the remainder goes number by number.
+/// [`crate::Lane::store_transposed`] by squares of 4×4; the remainder goes number by number.
 ///
 /// # Safety
 /// There must be (count − 1) · stride + numbers places.
@@ -28,7 +28,7 @@ pub unsafe fn store_4(numbers: &[Lanes<__m256d>], count: usize, out: &mut [f64],
     store_rest(rest, 4 * squares.len(), count, out, stride);
 }
 
-/// [`super::super::Lane::store_transposed`] by squares of 8×8; a small remainder goes number by number.
+/// [`crate::Lane::store_transposed`] by squares of 8×8; a small remainder goes number by number.
 ///
 /// # Safety
 /// There must be (count − 1) · stride + numbers places.

@@ -1,0 +1,19 @@
+//! Numbers that generated code runs on: floating-point numbers, SIMD lanes of them, and numbers with an extended exponent.
+
+mod block_sum;
+mod cpu;
+mod elementary;
+mod flags;
+mod lane;
+mod level;
+mod real;
+mod unbounded;
+
+pub use block_sum::{BLOCK_NUMBERS, BlockSum};
+pub(crate) use cpu::read_alone;
+pub use cpu::{LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
+pub use flags::{Flag, Flags};
+pub use lane::Lane;
+pub use level::{Baseline, Kernel, Level};
+pub use real::{Mask, Number, Real};
+pub use unbounded::{Precautions, Unbounded, WithCare, settle, with_care};
