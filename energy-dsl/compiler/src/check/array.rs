@@ -55,7 +55,7 @@ impl<'a> Checker<'a> {
                     "`.{}`: only vectors and quaternions have named components, but this is {other}",
                     name.text
                 );
-                self.diagnostics.push(Diagnostic::new(&name.span, message).help("entries of arrays are a[0], a[1], …"));
+                self.diagnostics.push(Diagnostic::new(&name.span, message).help("array entries are a[0], a[1], …"));
                 return None;
             }
         };
