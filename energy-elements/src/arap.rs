@@ -1,16 +1,19 @@
 use energy_dsl::energy;
 
 energy! {
-    /// As-rigid-as-possible membrane on a triangle: A μ/2 ((s₁ − 1)² + (s₂ − 1)²), s the singular values of F = D D_m⁻¹ (Sorkine &
-    /// Alexa 2007). Half the squares of their sum less 2, (I + 2J − 4)/(√(I + 2J) + 2), and of their difference, which keeps its digits
-    /// near rest; I = tr FᵀF, J = ‖w_u × w_v‖. Where J = 0 its derivatives are 0 of J and flagged.
+    /// As-rigid-as-possible membrane on a triangle (Sorkine & Alexa 2007): A μ/2 ((s₁ − 1)² + (s₂ − 1)²) with the
+    /// singular values s of F = D D_m⁻¹.
+    ///
+    /// With I = tr FᵀF and J = ‖w_u × w_v‖ it is computed as half the sum of (s₁ + s₂ − 2)² and (s₁ − s₂)², where s₁ +
+    /// s₂ − 2 = (I + 2J − 4)/(√(I + 2J) + 2). Both squares keep their digits near rest. Where J = 0, the derivatives of
+    /// J are taken as 0 and flagged.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
     pub energy AsRigidAsPossible(x0, x1, x2: Point; rest u0, u1, u2: Vec2; μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaled, so that triangles of any size are computed near 1.
+            // Scaling by a power of two brings triangles of any size near 1.
             let d = det(D_m);
             let s = power_of_two(d);
             let B = adjugate(D_m) * s;

@@ -1,8 +1,10 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Stretch of a triangle along warp and weft, k/2 A² ((‖w_u‖ − b_u)² + (‖w_v‖ − b_v)²), [w_u w_v] = D D_m⁻¹ (Baraff & Witkin 1998:
-    /// the condition carries the area A). The division by det D_m = 2A cancels against A², so that there is none.
+    /// Stretch of a triangle along warp and weft, k/2 A² ((‖w_u‖ − b_u)² + (‖w_v‖ − b_v)²) with [w_u w_v] = D D_m⁻¹
+    /// (Baraff & Witkin 1998, whose condition carries the area A).
+    ///
+    /// The division by det D_m = 2A cancels against A², so the code has no division.
     #[audit]
     #[invariant(translation, rotation)]
     pub energy BaraffWitkinStretch(x0, x1, x2: Point; rest u0, u1, u2: Vec2; k: Scalar, b_u, b_v: Scalar) {

@@ -78,8 +78,8 @@ macro_rules! entries {
     ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<crate::$name<f64>>()),*] };
 }
 
-/// All elements of this crate, in alphabetical order.
-// Not inlined: a crate that inlines it compiles every element again.
+/// Returns all elements of this crate, in alphabetical order.
+// `#[inline(never)]`: a crate that inlines this function compiles every element again.
 #[inline(never)]
 #[must_use]
 pub fn catalogue() -> &'static [AnyElement] {
@@ -87,7 +87,7 @@ pub fn catalogue() -> &'static [AnyElement] {
     CATALOGUE
 }
 
-/// The element of this name; `None` if the crate has no such element.
+/// Returns the element of this name; `None` if the crate has no such element.
 ///
 /// ```
 /// let spring = energy_elements::find("Spring").unwrap();

@@ -1,7 +1,7 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Bending of a hair at the middle one of three points: 0 when its two segments are in line, k when it is folded back
+    /// Bending of a hair at the middle of three points: 0 if its two segments are collinear, k if it is folded back
     /// (Khungurn 2019, §6).
     #[audit]
     #[invariant(translation, rotation)]

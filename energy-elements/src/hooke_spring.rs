@@ -1,8 +1,8 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Hooke's spring of the mass–spring cloth model: F_P = K (PQ − L P̂Q), PQ = Q − P (the source prints the opposite sign). It is the
-    /// gradient of −K/2 (‖PQ‖ − L)².
+    /// Hooke's spring of the mass–spring cloth model: F_P = K (PQ − L P̂Q) with PQ = Q − P, the gradient of −K/2 (‖PQ‖
+    /// − L)². The source prints the opposite sign.
     #[audit]
     #[invariant(translation, rotation)]
     #[even]
@@ -12,9 +12,9 @@ energy! {
     }
 }
 
-/// A spring between neighbours along the threads of the sheet, which resists stretch.
+/// A spring between neighbours along warp or weft; resists stretch.
 pub type StructuralSpring<T = f64> = HookeSpring<T>;
-/// A spring across a cell of the sheet, which resists shear.
+/// A spring across a cell of the sheet; resists shear.
 pub type ShearSpring<T = f64> = HookeSpring<T>;
-/// A spring between second neighbours along the threads, which resists bending.
+/// A spring between second neighbours along warp or weft; resists bending.
 pub type BendingSpring<T = f64> = HookeSpring<T>;

@@ -1,6 +1,7 @@
-//! Declared energies, constraints and forces, one file each: formula, source and audited properties.
+//! The standard library of declared energies, constraints, forces and residuals, one file each.
 //!
-//! The crate `verify` depends on this one, so the audits that `#[audit]` asks for run in its `tests/elements.rs`.
+//! The audits that `#[audit]` asks for run in `verify/command/tests/elements.rs`, because `verify` depends on this
+//! crate.
 //!
 //! ```
 //! use energy_dsl::Potential;
@@ -12,7 +13,7 @@
 //! assert_eq!(at.value, 1.5);
 //! ```
 #![forbid(unsafe_code)]
-// Formulas keep the symbols of their sources; these lints look at the whole crate, so only the crate can allow them.
+// Formulas keep the symbols of their sources. Only a crate can allow these lints.
 #![allow(confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
 mod catalogue;
@@ -70,7 +71,7 @@ elements! {
     zero_length_spring: ZeroLengthSpring;
 }
 
-/// The README's example, run as a test.
+/// Runs the README's examples as tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 struct Readme;

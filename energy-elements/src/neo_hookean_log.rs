@@ -1,17 +1,19 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Stable neo-Hookean membrane on a triangle with logarithm (Smith et al. 2018), stable at rest in two dimensions:
-    /// A (μ/2 (I − 2) − μ/2 ln((I + 1)/3) + λ/2 ((J − α)² − (1 − α)²)), α = 1 + 2μ/(3λ). I = tr FᵀF, J = ‖w_u × w_v‖. What is linear in the
-    /// strain cancels and is not formed: I − 2J = (s₁ − s₂)² comes from the anisotropy of FᵀF. Where J = 0 its derivatives are 0
-    /// of J and flagged.
+    /// Stable neo-Hookean membrane on a triangle with a logarithm (Smith et al. 2018), adapted to rest stability in two
+    /// dimensions: A (μ/2 (I − 2) − μ/2 ln((I + 1)/3) + λ/2 ((J − α)² − (1 − α)²)) with α = 1 + 2μ/(3λ), I = tr FᵀF and
+    /// J = ‖w_u × w_v‖.
+    ///
+    /// Terms that are linear in the strain cancel and are not computed. I − 2J = (s₁ − s₂)² comes from the anisotropy
+    /// of FᵀF. Where J = 0, the derivatives of J are taken as 0 and flagged.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
     pub energy StableNeoHookeanLog(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaled, so that triangles of any size are computed near 1.
+            // Scaling by a power of two brings triangles of any size near 1.
             let d = det(D_m);
             let s = power_of_two(d);
             let B = adjugate(D_m) * s;
@@ -26,30 +28,34 @@ energy! {
         let f_v = F * vector(0, 1);
         let uu = norm_squared(f_u);
         let vv = norm_squared(f_v);
-        // J − 1, and I − 2.
+        // J − 1 and I − 2.
         let area = norm(cross(a, b));
         let j = (area - d) * per_d;
         let i = ((uu - d2) + (vv - d2)) * per_d2;
         let I = (uu + vv) * per_d2;
-        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        // (s₁ + s₂)² = I + 2J and (s₁² − s₂²)².
         let square = I + 2 * area * per_d;
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
         let shape = anisotropy / square;
-        // I − 2 − ln((I + 1)/3) = 2x − (ln(1 + x) − x), x = (I − 2)/3; of 2x the part 4j/3 cancels, and 2 shape/3 is left.
+        // With x = (I − 2)/3: I − 2 − ln((I + 1)/3) = 2x − (ln(1 + x) − x). The part 4j/3 of 2x cancels; 2 shape/3
+        // remains.
         d / 4 * (μ * (2/3 * shape - log1pmx(i / 3, (I + 1) / 3)) + λ * j^2)
     }
 
-    /// Neo-Hookean membrane on a triangle: A (μ/2 (I − 2) − μ ln J + λ/2 ln² J), I = tr FᵀF, J = ‖w_u × w_v‖ (Bonet and Wood, *Nonlinear
-    /// Continuum Mechanics for Finite Element Analysis*, §6.4, in two dimensions). λ and μ are per length, as for `StVK`. Infinite where the
-    /// triangle has no area: no step of a solver that lowers the energy turns it over. I − 2 − 2 ln J is formed as
-    /// (s₁ − s₂)² + 2 (j − ln(1 + j)), j = J − 1, neither of which cancels near rest; above J = 2 as it stands.
+    /// Neo-Hookean membrane on a triangle: A (μ/2 (I − 2) − μ ln J + λ/2 ln² J) with I = tr FᵀF and J = ‖w_u × w_v‖
+    /// (Bonet and Wood, *Nonlinear Continuum Mechanics for Finite Element Analysis*, §6.4, in two dimensions). λ and μ
+    /// are per length, as for `StVK`.
+    ///
+    /// The energy is infinite for a triangle of area 0, so a solver that lowers the energy cannot invert it. With j = J
+    /// − 1, I − 2 − 2 ln J is computed as (s₁ − s₂)² + 2 (j − ln(1 + j)): neither part cancels near rest. Above J = 2
+    /// it is computed as printed.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
     pub energy NeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaled, so that triangles of any size are computed near 1.
+            // Scaling by a power of two brings triangles of any size near 1.
             let d = det(D_m);
             let s = power_of_two(d);
             let B = adjugate(D_m) * s;
@@ -67,12 +73,12 @@ energy! {
         let area = norm(cross(a, b));
         let j = (area - d) * per_d;
         let J = area * per_d;
-        // I, (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        // I, (s₁ + s₂)² = I + 2J and (s₁² − s₂²)².
         let I = (uu + vv) * per_d2;
         let square = I + 2 * J;
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
         let l = log1p(j, J);
-        // Far from rest 2J would cancel between the two.
+        // Far from rest, 2J would cancel between the two parts.
         let distortion = if j > 1 { I - 2 - 2 * l } else { anisotropy / square - 2 * log1pmx(j, J) };
         d / 4 * (μ * distortion + λ * l^2)
     }

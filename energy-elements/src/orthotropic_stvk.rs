@@ -1,24 +1,27 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Orthotropic St. Venant–Kirchhoff membrane on a triangle: A (½ C_u E_uu² + ½ C_v E_vv² + ½ C_uv (E_uu + E_vv)² + 2 C_ss E_uv²),
-    /// E = (FᵀF − 1)/2 the Green strain along warp (u) and weft (v), the directions of the rest shape's coordinates. Stiffnesses are per
-    /// length: moduli times thickness. In the stiffness matrix of warp and weft C_u + C_uv and C_v + C_uv are on the diagonal and C_uv
-    /// beside it; written so, no positive numbers make it unstable. A polynomial, regular everywhere.
+    /// Orthotropic St. Venant–Kirchhoff membrane on a triangle: A (½ C_u E_uu² + ½ C_v E_vv² + ½ C_uv (E_uu + E_vv)² +
+    /// 2 C_ss E_uv²). E = (FᵀF − 1)/2 is the Green strain along warp (u) and weft (v), the axes of the rest
+    /// coordinates.
+    ///
+    /// Stiffnesses are per length: moduli times thickness. The stiffness matrix of warp and weft has C_u + C_uv and C_v
+    /// + C_uv on its diagonal and C_uv off it, so it is positive definite for all positive parameters. A polynomial,
+    /// regular everywhere.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
     pub energy OrthotropicStVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; C_u, C_v, C_uv, C_ss: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaled, so that triangles of any size are computed near 1.
+            // Scaling by a power of two brings triangles of any size near 1.
             let s = power_of_two(det(D_m));
             let B = adjugate(D_m) * s;
             let d = (det(D_m) * s)^2;
             let per_d = 1 / (2 * d);
             let A = det(D_m) / 2;
         }
-        // F = D D_m⁻¹, its division by s det D_m left to the end: edges that are exact give an exact zero at rest.
+        // F = D D_m⁻¹ times s det D_m. Dividing last gives an exact zero at rest for exactly representable edges.
         let F = columns(x1 - x0, x2 - x0) * B;
         let C = transpose(F) * F - d * identity(2);
         let c_u = C * vector(1, 0);

@@ -1,8 +1,10 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Contact of a point with a ball of radius r: k/(3δ) max(δ − d, 0)³ of the signed distance d = ‖x − c‖ − r. Nothing from the thickness
-    /// δ on, twice differentiable there; the push is k δ at the surface and grows inside. At the centre it has no direction and is flagged.
+    /// Contact of a point with a ball of radius r: k/(3δ) max(δ − d, 0)³ of the signed distance d = ‖x − c‖ − r.
+    ///
+    /// The energy is 0 beyond the thickness δ and twice differentiable there. The force is k δ at the surface and grows
+    /// inside. At the centre the direction is undefined and flagged.
     #[audit]
     pub energy SphereContact(x: Point; c: Vec3[m], r: Scalar[m], k: Scalar[N/m], δ: Scalar[m]) {
         let d = norm(x - c) - r;

@@ -1,16 +1,18 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Stable neo-Hookean membrane on a triangle without logarithm: A (μ/2 (I − 2) − μ (J − 1) + λ/2 (J − 1)²) (after Smith et al.
-    /// 2018). I = tr FᵀF, J = ‖w_u × w_v‖; I − 2J = (s₁ − s₂)² is formed from the anisotropy of FᵀF, which keeps its digits near rest.
-    /// Where J = 0 its derivatives are 0 of J and flagged.
+    /// Stable neo-Hookean membrane on a triangle without a logarithm: A (μ/2 (I − 2) − μ (J − 1) + λ/2 (J − 1)²) with I
+    /// = tr FᵀF and J = ‖w_u × w_v‖ (after Smith et al. 2018).
+    ///
+    /// I − 2J = (s₁ − s₂)² comes from the anisotropy of FᵀF, which keeps its digits near rest. Where J = 0, the
+    /// derivatives of J are taken as 0 and flagged.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
     pub energy StableNeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaled, so that triangles of any size are computed near 1.
+            // Scaling by a power of two brings triangles of any size near 1.
             let d = det(D_m);
             let s = power_of_two(d);
             let B = adjugate(D_m) * s;
@@ -28,7 +30,7 @@ energy! {
         // J − 1.
         let area = norm(cross(a, b));
         let j = (area - d) * per_d;
-        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
+        // (s₁ + s₂)² = I + 2J and (s₁² − s₂²)².
         let square = (uu + vv) * per_d2 + 2 * area * per_d;
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
         let shape = anisotropy / square;

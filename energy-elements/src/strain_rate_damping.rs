@@ -1,9 +1,11 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Damping of a membrane on a triangle in proportion to its rate of strain: minus the derivative by velocities of
-    /// A (η_μ ‖Ė‖² + ½ η_λ tr² Ė), Ė = sym(FᵀḞ) the rate of Green's strain (Kelvin and Voigt's solid). It takes no part in rigid motions, and with
-    /// η = β (λ, μ) it is Rayleigh damping of `StVK` at rest. ∂f/∂x is not symmetric.
+    /// Damping of a membrane in proportion to its strain rate: minus the velocity gradient of A (η_μ ‖Ė‖² + ½ η_λ tr²
+    /// Ė), where Ė = sym(FᵀḞ) is the rate of the Green strain (Kelvin–Voigt solid).
+    ///
+    /// It does not resist rigid motions. With η = β (λ, μ) it is Rayleigh damping of `StVK` at rest. ∂f/∂x is not
+    /// symmetric.
     #[audit]
     pub force StrainRateDamping(x0, x1, x2: Point, v0, v1, v2: Velocity; rest u0, u1, u2: Vec2; η_λ, η_μ: Scalar[N s/m]) {
         rest {

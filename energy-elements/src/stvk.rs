@@ -1,9 +1,11 @@
 use energy_dsl::energy;
 
 energy! {
-    /// St. Venant–Kirchhoff membrane on a triangle: A (μ ‖E‖² + λ/2 tr² E), E = (FᵀF − 1)/2 the Green strain. λ and μ are per length: for
-    /// Young's modulus Y, Poisson's ratio ν and thickness h in plane stress, λ = Y h ν/(1 − ν²), μ = Y h/(2 (1 + ν)). The rest shape
-    /// is given by material coordinates in its plane, of positive area; a polynomial, regular everywhere.
+    /// St. Venant–Kirchhoff membrane on a triangle: A (μ ‖E‖² + λ/2 tr² E) with the Green strain E = (FᵀF − 1)/2.
+    ///
+    /// λ and μ are per length. For Young's modulus Y, Poisson's ratio ν and thickness h in plane stress, λ = Y h ν/(1 −
+    /// ν²) and μ = Y h/(2 (1 + ν)). The rest shape is given by planar coordinates and must have a positive area. A
+    /// polynomial, regular everywhere.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
@@ -13,9 +15,9 @@ energy! {
             let d2 = u2 - u0;
             let det = det(columns(d1, d2));
             let n = norm_squared(d1);
-            // Scaled, so that triangles of any size are computed near 1.
+            // Scaling by a power of two brings triangles of any size near 1.
             let s = power_of_two(n);
-            // p d2 − q d1 is perpendicular to d1; m is its square.
+            // p d2 − q d1 is perpendicular to d1; m is its squared length.
             let p = n * s;
             let q = dot(d1, d2) * s;
             let m = p * (det * s) * det;
@@ -26,8 +28,8 @@ energy! {
             let per_nm = 1 / (sqrt(2 * n) * sqrt(m));
             let A = det / 2;
         }
-        // E in the directions along the first edge at rest and across it, where the metric at rest is diagonal; of it only p d2 − q d1
-        // can cancel. Nothing is divided before n and m are subtracted: edges that are exact give an exact zero at rest.
+        // E along and across the first rest edge, where the rest metric is diagonal; only p d2 − q d1 can cancel.
+        // Dividing after the subtraction of n and m gives an exact zero at rest for exactly representable edges.
         let a = x1 - x0;
         let b = p * (x2 - x0) - q * a;
         let along = per_n * (norm_squared(a) / 2 - half_n);

@@ -1,8 +1,8 @@
 use energy_dsl::energy;
 
 energy! {
-    /// Strain limiting along warp and weft: A k/3 (o_u³ + o_v³), o = max(‖F u‖ − s, 0) the stretch of a thread beyond its limit s > 1.
-    /// Nothing below the limit; twice differentiable at it.
+    /// Strain limiting along warp and weft: A k/3 (o_u³ + o_v³), where o = max(‖F u‖ − s, 0) is the stretch of a thread
+    /// beyond its limit s > 1. The energy is 0 below the limit and twice differentiable at it.
     #[audit]
     #[invariant(translation, rotation)]
     pub energy ThreadLimit(x0, x1, x2: Point; rest u0, u1, u2: Vec2; k: Scalar[N/m], s: Scalar[1]) {

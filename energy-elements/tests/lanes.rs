@@ -1,4 +1,4 @@
-//! Elements over lanes: the bits of the scalar, also where one lane is degenerate and another far beyond the ordinary range.
+//! Elements in SIMD lanes are bit-identical to scalars, also if one lane is degenerate and another far out of range.
 #![allow(missing_docs)]
 #![allow(mixed_script_confusables)] // θ0 is what the declaration calls it
 
@@ -11,7 +11,7 @@ use energy_elements::{
     GraphEdge, HairBend, NeoHookean, QuadraticHinge, SquaredDistanceBarrier, StableNeoHookean, StableNeoHookeanLog,
 };
 
-/// More than one full batch, and a ragged one.
+/// One full batch and a partial one.
 const COUNT: usize = 21;
 
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
@@ -22,7 +22,7 @@ fn numbers(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Points of ordinary elements; of every fifth, coincident ones, and of every seventh, tiny ones.
+/// Ordinary points. Every fifth element has coincident points, every seventh tiny ones.
 fn points<const N: usize>() -> Vec<Vector3<f64>> {
     let mut draw = numbers(7);
     let element = |number: usize| -> [Vector3<f64>; N] {
@@ -79,7 +79,7 @@ fn potentials_over_lanes_have_the_bits_of_scalars() {
     potential(QuadraticHinge::new(1.5, 0.25));
 }
 
-/// Jacobians of all elements in lanes.
+/// Jacobians of all elements, evaluated in lanes.
 struct Jacobians<'a, E>(&'a [E], &'a [Vec<f64>]);
 
 impl<E: PackedResidual<f64>> Kernel for Jacobians<'_, E> {
@@ -111,7 +111,7 @@ fn residual<E: PackedResidual<f64>>(elements: &[E]) {
     let declaration = E::DECLARATION;
     let unknowns: usize = declaration.points.iter().map(|field| field.size).sum();
     let mut draw = numbers(11);
-    // Among them none, tiny ones, and a half turn.
+    // Includes zero and tiny motions and a half turn.
     let size = |number: usize| [1.0, 0.0, 1e-160, 1e-9, 3.0][number % 5];
     let inputs: Vec<Vec<f64>> =
         (0..elements.len()).map(|number| (0..unknowns).map(|_| size(number) * draw()).collect()).collect();

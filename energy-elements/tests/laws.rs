@@ -1,4 +1,4 @@
-//! Laws that hold to the last bit, and values known by hand.
+//! Laws that hold exactly, and values known in closed form.
 #![allow(missing_docs)]
 
 use energy_dsl::{ForceLaw, Inputs, Kind, Outputs, Potential};
@@ -16,12 +16,12 @@ fn block<'a>(outputs: &'a Outputs<f64>, name: &str) -> &'a [f64] {
     &outputs.blocks.iter().find(|(n, _)| *n == name).unwrap().1
 }
 
-/// Positions on a grid of 2⁻²⁰, so that a translation on the same grid is exact.
+/// Positions on a grid of 2⁻²⁰, so that translations on the same grid are exact.
 fn points(n: usize) -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec((-(1_i32 << 20)..(1 << 20)).prop_map(|i| f64::from(i) / f64::from(1 << 20)), 3 * n)
 }
 
-/// Parameters and rest shape with which an element is an ordinary one.
+/// Typical parameters and rest shape of an element.
 fn ordinary(name: &str) -> (Vec<f64>, Vec<f64>) {
     let declaration = find(name).unwrap().declaration;
     let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
@@ -39,7 +39,7 @@ fn ordinary(name: &str) -> (Vec<f64>, Vec<f64>) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// An exactly representable translation changes no bit of any element that sees differences only.
+    /// An exactly representable translation changes no bit of elements that depend on differences only.
     #[test]
     fn translation_is_exact(x in points(6), shift in points(1), v in points(6)) {
         for entry in catalogue().iter().filter(|e| e.declaration.translation_invariant) {
@@ -51,7 +51,7 @@ proptest! {
         }
     }
 
-    /// Angles do not change, and lengths scale exactly, when space is scaled by a power of two.
+    /// Scaling space by a power of two keeps angles and scales lengths exactly.
     #[test]
     fn scaling_by_a_power_of_two_is_exact(x in points(4), exponent in -300_i32..300) {
         let factor = 2.0_f64.powi(exponent);
@@ -68,7 +68,7 @@ proptest! {
         }
     }
 
-    /// One triangle is computed: the Hessian is symmetric to the last bit, and so are its diagonal blocks.
+    /// Only one triangle of the Hessian is computed, so the Hessian and its diagonal blocks are exactly symmetric.
     #[test]
     fn hessians_are_exactly_symmetric(x in points(6)) {
         for entry in catalogue().iter().filter(|e| e.declaration.kind == Kind::Energy) {
@@ -84,7 +84,7 @@ proptest! {
         }
     }
 
-    /// A body that moves as a whole is not damped.
+    /// A uniform translation is not damped.
     #[test]
     fn rigid_translation_is_not_damped(x in points(4), velocity in points(1)) {
         let v = velocity.repeat(4);
@@ -118,7 +118,7 @@ fn coincident_points_return_what_is_documented() {
     }
     assert_eq!(PowerLaw::new(2.0).hessian(&both).hessian[0], [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]);
     assert_eq!(PowerLaw::new(-1.0).value(&both).value, f64::INFINITY);
-    // Without rest length the spring is regular; with one its direction is lost.
+    // Without rest length the spring is regular. With one, its direction is undefined.
     let slack = Spring::new(0.0, 100.0, 0.0).hessian(&both);
     assert_eq!((slack.hessian[0][0], slack.flags.any()), ([100.0, 0.0, 0.0], false));
     let collapsed = Spring::new(0.5, 100.0, 0.0).hessian(&both);
@@ -181,7 +181,7 @@ fn membranes_stretch_and_refuse_a_flat_rest_shape() {
     let green = strain + strain * strain / 2.0;
     assert_eq!(at.value, 0.5 * (mu + lambda / 2.0) * green * green);
     assert!(StVK::new([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], lambda, mu).is_err());
-    // Turned by the angle of the 3-4-5 triangle, whose edges are exact, it is exactly at rest.
+    // Rotated by the angle of the 3-4-5 triangle, whose edges are exact, it is exactly at rest.
     let sheet = StVK::new([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], lambda, mu).unwrap();
     let turned = sheet.gradient(&[ORIGIN, [3.0, 4.0, 0.0], [-4.0, 3.0, 0.0]]);
     assert_eq!((turned.value, turned.gradient), (0.0, [ORIGIN; 3]));
@@ -195,7 +195,7 @@ fn weight_and_drag() {
     assert_eq!((drag.force[0], drag.by_velocity[0][1]), ([-1.0, 0.0, 2.0], [0.0, -0.5, 0.0]));
 }
 
-/// What a solver may rely on is proved on the expression graph, not claimed.
+/// The properties that solvers rely on are proved on the expression graph.
 #[test]
 fn declarations_say_what_solvers_may_skip() {
     for (name, curved, velocity_dependent, symmetric) in [

@@ -1,5 +1,5 @@
-//! What routines cost: operations for energy, gradient and Hessian in reduced coordinates and ordinary configurations, a fused
-//! multiply-add counted as two and an exact rounding-error term as one.
+//! Operation counts for energy, gradient and reduced Hessian on the ordinary path. A fused multiply-add counts as two,
+//! an exact rounding-error term as one.
 #![allow(missing_docs, mixed_script_confusables)]
 
 use energy_dsl::Element;
@@ -7,7 +7,7 @@ use energy_dsl::energy;
 use energy_elements::find;
 
 energy! {
-    /// The membrane as a function of F's columns.
+    /// The membrane as a function of the columns of F.
     energy OnF(f1, f2: Point; A: Scalar, λ, μ: Scalar) {
         let F = columns(f1, f2);
         let E = (transpose(F) * F - identity(2)) / 2;
@@ -33,7 +33,7 @@ fn hessians_stay_small() {
     }
     let count = operations(<OnF as Element>::DECLARATION, "hessian");
     assert!(count <= 200, "StVK on F: {count} operations");
-    // What the rotation keeps is not rotated, and a blend takes each weight five times.
+    // Vectors that a rotation preserves are not rotated, and a blend uses each weight five times.
     let count = operations(find("PointToPlane").unwrap().declaration, "jacobian");
     assert!(count <= 780, "point to plane: {count} operations");
 }
@@ -48,7 +48,7 @@ fn routines_leave_out_what_was_not_asked_for() {
         let [value, gradient, hessian, product] =
             ["value", "gradient", "hessian", "hessian_vector"].map(|routine| operations(declaration, routine));
         assert!(value < gradient && gradient <= hessian, "{}: {value}, {gradient}, {hessian}", declaration.name);
-        // At worst the Hessian and a product with it.
+        // Upper bound: the Hessian and one product with it.
         let multiplied = 2 * declaration.reduced_coordinates * (declaration.reduced_coordinates + 1);
         assert!(product <= hessian + multiplied, "{}: {product} for the product, {hessian} for all", declaration.name);
     }
@@ -56,8 +56,8 @@ fn routines_leave_out_what_was_not_asked_for() {
     assert!(10 * operations(membrane, "hessian_vector") < 7 * operations(membrane, "hessian"));
 }
 
-/// A blend's row is contracted to eight numbers first and carried to each node then, by reverse accumulation that the planner finds,
-/// in spite of the signs that are chosen on the way.
+/// Reverse accumulation contracts a row of the blend to eight numbers before it carries them to the nodes. The planner
+/// finds this in spite of the sign choices in between.
 #[test]
 fn a_row_of_the_data_term_grows_with_its_nodes_only() {
     let jacobian = |name| operations(find(name).unwrap().declaration, "jacobian");

@@ -24,7 +24,7 @@ mod syntax;
 
 pub use check::unit_exponents;
 pub use diagnostic::{Diagnostic, Diagnostics};
-pub use functions::{Function, all as functions};
+pub use functions::{Function, all as functions, robust_spellings};
 pub use inspect::{Fault, Interpreted, Listing, Mutation, Path, Textbook, mathml};
 pub use passes::{compile, compile_file};
 pub use syntax::canonical as canonical_name;

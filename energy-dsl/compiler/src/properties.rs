@@ -44,7 +44,7 @@ fn translation(program: &Program, routines: &Routines) -> Option<(String, &'stat
     let by_itself = used_by_itself(&routines.graph, &values);
     let name = by_itself.and_then(|point| program.moving.get(point)).map_or("a point", |input| input.name.as_str());
     let message =
-        format!("translation invariance cannot be proved: `{name}` is used by itself, not in a difference of points");
+        format!("translation invariance cannot be proved: `{name}` is used on its own, not in a difference of points");
     Some((message, "form the difference first, as in dot(n, p - q) for dot(n, p) - dot(n, q)"))
 }
 

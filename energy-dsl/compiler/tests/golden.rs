@@ -66,7 +66,7 @@ fn mistakes_in_a_file_are_shown_in_it() {
 #[test]
 fn claims_are_proved_or_refused() {
     for (source, expected) in [
-        ("#[invariant(translation)] energy A(p, q: Point) { norm(p - q) + dot(q, p - q) }", "`q` is used by itself"),
+        ("#[invariant(translation)] energy A(p, q: Point) { norm(p - q) + dot(q, p - q) }", "`q` is used on its own"),
         ("#[invariant(translation)] residual A(p: Vec3) { p }", "has no invariance of points"),
         ("#[even] energy A(p: Point) { norm(p) }", "nothing checks the claim `even`"),
         (

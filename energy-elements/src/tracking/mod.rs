@@ -1,8 +1,9 @@
-//! Residuals of tracking a deforming body by nodes that each move rigidly, E = λ_n E_nonrigid + λ_s E_skeleton + λ_g E_graph +
-//! λ_b E_binding (Yu et al., *BodyFusion*, 2017; Newcombe et al., *DynamicFusion*, 2015).
+//! Residuals that track a deforming body, whose nodes each move rigidly: E = λ_n E_nonrigid + λ_s E_skeleton + λ_g
+//! E_graph + λ_b E_binding (Yu et al., *BodyFusion*, 2017; Newcombe et al., *DynamicFusion*, 2015).
 //!
-//! A node moves by exp(ξ), ξ = (θ, t): a turn about θ, then a shift by t. How far it turns is the parameter `turn`: by 2 `turn` ‖θ‖.
-//! At 1 θ is half the rotation vector, as the papers' formulas have it; at ½ it is the rotation vector itself.
+//! A node moves by exp(ξ), ξ = (θ, t): a rotation about θ, then a translation by t. The angle of rotation is 2 `turn`
+//! ‖θ‖. With `turn` = 1, θ is half the rotation vector, as in the papers' formulas. With `turn` = ½, θ is the rotation
+//! vector itself.
 //!
 //! Energies are sums of squared residuals without a factor ½: E = Σ λ ‖r‖², ∇E = 2 λ Jᵀ r.
 

@@ -20,14 +20,15 @@ energy! {
         w[0] * q[0] + sum(k in 1..8, w[k] * hemisphere(q[k], q[0]) * q[k])
     }
 
-    /// The eight numbers (w, x, y, z | w, x, y, z) of a node's motion: q = (cos φ, θ sin φ/‖θ‖) with φ = turn ‖θ‖, and ½ (0, t) q.
+    /// The motion of a node as eight numbers (w, x, y, z | w, x, y, z): q = (cos φ, θ sin φ/‖θ‖) with φ = turn ‖θ‖,
+    /// then ½ (0, t) q.
     #[audit]
     pub residual TwistMotion(ξ: Twist; turn: Scalar[1]) {
         numbers(motion(ξ, turn))
     }
 
-    /// The blend of four motions, step by step: the sum b = Σ s_k w_k q_k (8 rows), the unit dual quaternion (8), a moved point v̂ and a
-    /// moved normal n̂ (3 each).
+    /// The steps of blending four motions: the sum b = Σ s_k w_k q_k (8 rows), the unit dual quaternion (8), a moved
+    /// point v̂ (3) and a moved normal n̂ (3).
     #[audit]
     pub residual BlendedMotion4(ξ: [Twist; 4]; turn: Scalar[1], w: [Scalar[1]; 4], v: Vec3, n: Vec3) {
         let b = sum4(ξ, turn, w);
@@ -43,14 +44,14 @@ energy! {
         [transform(B, v), rotate(B, n)]
     }
 
-    /// A vertex and its normal, moved by the blend of four nodes; see [`NonrigidPlane4`](crate::NonrigidPlane4).
+    /// A vertex and its normal, moved by the blend of four nodes. See [`NonrigidPlane4`](crate::NonrigidPlane4).
     #[audit]
     pub residual BlendedPoint4(ξ: [Twist; 4]; turn: Scalar[1], w: [Scalar[1]; 4], v: Vec3, n: Vec3) {
         let B = unit(sum4(ξ, turn, w));
         [transform(B, v), rotate(B, n)]
     }
 
-    /// A vertex and its normal, moved by the blend of eight nodes.
+    /// A vertex and its normal, moved by the blend of eight nodes. See [`NonrigidPlane8`](crate::NonrigidPlane8).
     #[audit]
     pub residual BlendedPoint8(ξ: [Twist; 8]; turn: Scalar[1], w: [Scalar[1]; 8], v: Vec3, n: Vec3) {
         let B = unit(sum8(ξ, turn, w));

@@ -3,9 +3,9 @@ use energy_dsl::energy;
 energy! {
     fn motion(ξ, turn) { exp(twist(turn * angular(ξ), linear(ξ))) }
 
-    /// E_skeleton with bones as unknowns: ñ·(ṽ − u), in m, with ṽ = Σ η_j T_bj v and ñ = Σ η_j R_bj n, linear blend skinning over the four
-    /// bones that a vertex is most attached to. The blended normal is not brought back to length one. With constant bones this is a
-    /// constant: then it is reported, and moves nothing.
+    /// E_skeleton with bones as unknowns: ñ·(ṽ − u), in m. Linear blend skinning over the four bones with the largest
+    /// weights gives ṽ = Σ η_j T_bj v and ñ = Σ η_j R_bj n. The blended normal is not normalised. With fixed bones the
+    /// residual is constant: it is reported but has no effect.
     #[audit]
     pub residual SkeletonPlane(
         b: [Twist; 4]; turn: Scalar[1], η: [Scalar[1]; 4], v: Vec3[m], n: Vec3[1], u: Vec3[m]

@@ -16,7 +16,7 @@ impl<'a> Checker<'a> {
         let checked: Vec<_> = items.iter().map(|item| self.expression(item)).collect();
         let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
         if let Some((item, _)) = items.iter().zip(&checked).find(|(_, c)| c.shape == Shape::Truth) {
-            return self.error(&item.span, "a comparison is no entry of an array");
+            return self.error(&item.span, "an array entry cannot be a comparison");
         }
         let Ok(length) = u16::try_from(checked.len()) else {
             return self.error(span, "this array is too long");
@@ -55,7 +55,7 @@ impl<'a> Checker<'a> {
                     "`.{}`: only vectors and quaternions have named components, but this is {other}",
                     name.text
                 );
-                self.diagnostics.push(Diagnostic::new(&name.span, message).help("entries of arrays are a[0], a[1], …"));
+                self.diagnostics.push(Diagnostic::new(&name.span, message).help("array entries are a[0], a[1], …"));
                 return None;
             }
         };

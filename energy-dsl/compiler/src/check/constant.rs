@@ -42,7 +42,7 @@ impl<'a> Checker<'a> {
         let value = self.expression(&constant.value)?;
         if value.shape != Shape::Scalar || evaluate(&self.bindings, &value).is_none() {
             let message = format!("the value of the constant `{}` is not a number", constant.name.text);
-            let help = "a constant is made of numbers and other constants; name other values with `let`";
+            let help = "use numbers and other constants only; name other values with `let`";
             self.diagnostics.push(Diagnostic::new(&constant.value.span, message).help(help));
             return None;
         }
@@ -58,7 +58,7 @@ impl<'a> Checker<'a> {
             found => {
                 let found = found.map_or_else(|| "this depends on inputs".into(), |value| format!("this is {value}"));
                 let message = format!("{what} must be a constant whole number, but {found}");
-                let help = "an integer, an index of `sum`, or a `const`";
+                let help = "use an integer, an index of `sum`, or a `const`";
                 self.diagnostics.push(Diagnostic::new(&expression.span, message).help(help));
                 None
             }

@@ -228,7 +228,7 @@ impl<'a> Checker<'a> {
                 let message =
                     format!("`{}` belongs to the rest shape and is known in the `rest` block only", name.text);
                 self.diagnostics.push(
-                    Diagnostic::new(&name.span, message).help("compute what you need of it: rest { let … = …; }"),
+                    Diagnostic::new(&name.span, message).help("compute values from it there: rest { let … = …; }"),
                 );
                 return None;
             }
@@ -337,7 +337,7 @@ impl<'a> Checker<'a> {
         let (of_typed, by_typed) = (self.expression(of), self.expression(by));
         let (of_typed, by_typed) = (of_typed?, by_typed?);
         if of_typed.shape != Shape::Scalar {
-            return self.error(&of.span, format!("`gradient` is of a scalar, but this is {}", of_typed.shape));
+            return self.error(&of.span, format!("`gradient` takes a scalar, but this is {}", of_typed.shape));
         }
         match by_typed.kind {
             TypedKind::Input(Source::Position, first) => {

@@ -52,7 +52,7 @@ pub(super) fn expected(
         )),
         _ => Some((
             format!("a {} must be a scalar or a vector, but this is {found}", kind.keyword()),
-            "split it into vectors: [a, b, …] puts them one after the other",
+            "split it into vectors: [a, b, …] concatenates them",
         )),
     };
     match problem {

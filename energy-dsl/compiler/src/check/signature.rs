@@ -44,9 +44,9 @@ impl Signature {
                 diagnostics.push(
                     Diagnostic::new(
                         &group.type_span,
-                        format!("expected Point: what an {} moves are points", declaration.kind.keyword()),
+                        format!("expected Point: the inputs of this {} before the first `;` are points", declaration.kind.keyword()),
                     )
-                    .help("parameters stand after the first `;`, as in (p0, p1: Point; k: Scalar)"),
+                    .help("put parameters after the first `;`, as in (p0, p1: Point; k: Scalar)"),
                 );
             }
             if group.element == ElementType::Velocity && declaration.kind != Kind::Force {
@@ -65,7 +65,7 @@ impl Signature {
             .into_iter()
             .any(|list| numbers(list) > MOST_NUMBERS)
         {
-            let message = format!("the inputs of {} are more than {MOST_NUMBERS} numbers", declaration.name.text);
+            let message = format!("the inputs of {} have more than {MOST_NUMBERS} numbers", declaration.name.text);
             diagnostics.push(Diagnostic::new(&declaration.name.span, message).help("shorten the arrays"));
         }
         if signature.moving.is_empty() {

@@ -5,29 +5,29 @@ use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op};
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "+", usage: "a + b", docs: "Sum of equal shapes.", shape: same, lower: add, accuracy: "" },
+    Function { name: "+", usage: "a + b", docs: "Sum of two values of the same shape.", shape: same, lower: add, accuracy: "" },
     Function {
         name: "-",
         usage: "a - b",
-        docs: "Difference of equal shapes. `x^2 - y^2` of numbers is (x − y)(x + y).",
+        docs: "Difference of two values of the same shape. `x^2 - y^2` of scalars is computed as (x − y)(x + y).",
         shape: same,
         lower: sub,
         accuracy: "",
     },
-    Function { name: "neg", usage: "-a", docs: "Negative.", shape: one, lower: neg, accuracy: "" },
+    Function { name: "neg", usage: "-a", docs: "Negation.", shape: one, lower: neg, accuracy: "" },
     Function {
         name: "*",
         usage: "a * b",
-        docs: "Product: of numbers, of a number with anything, of matrices, of a matrix with a vector, of quaternions, of dual quaternions.",
+        docs: "Product of scalars, matrices, quaternions or dual quaternions, of a matrix and a vector, or of a scalar and any value.",
         shape: product,
         lower: mul,
         accuracy: "",
     },
-    Function { name: "/", usage: "a / b", docs: "Quotient by a number.", shape: quotient, lower: div, accuracy: "" },
+    Function { name: "/", usage: "a / b", docs: "Division by a scalar.", shape: quotient, lower: div, accuracy: "" },
     Function {
         name: "^",
         usage: "a ^ b",
-        docs: "Power of a number. Integers and halves become products and roots; `norm(d)^α` is one robust primitive; `M^(-1)` is the inverse of a matrix.",
+        docs: "Power of a scalar. Integer and half-integer exponents become products and roots. `norm(d)^α` is a robust primitive. `M^(-1)` is the inverse of a matrix.",
         shape: power,
         lower: pow,
         accuracy: "norm(d)^α: 3 / 3 / 6",

@@ -20,7 +20,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "sqrt",
         "sqrt(x)",
-        "√x, x ≥ 0; of `1 - dot(unit(a), unit(b))` or a multiple, one robust primitive: its derivative at 0 is taken as 0 and flagged.",
+        "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative at 0 is taken as 0 and flagged.",
         one_scalar,
         "1",
         |g, a| g.sqrt(a[0].node())
@@ -28,7 +28,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "exp",
         usage: "exp(x) or exp(ξ)",
-        docs: "eˣ; of a twist ξ = (θ, t), the dual quaternion of the motion that turns by the angle 2‖θ‖ about θ and shifts by t: (q, ½ t q), q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖). Regular at θ = 0.",
+        docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
         shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
         lower: |g, a| match a[0].shape {
             Shape::Twist => super::quaternion::exp(g, &a[0]),
@@ -39,7 +39,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "sin",
         "sin(x)",
-        "Sine of an angle in radians; of a dihedral angle or its half without the angle.",
+        "Sine of an angle in radians. For a dihedral angle or half of one, it is computed without the angle.",
         one_scalar,
         "1",
         |g, a| g.sin(a[0].node())
@@ -47,7 +47,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "cos",
         "cos(x)",
-        "Cosine of an angle in radians; of a dihedral angle or its half without the angle.",
+        "Cosine of an angle in radians. For a dihedral angle or half of one, it is computed without the angle.",
         one_scalar,
         "1",
         |g, a| g.cos(a[0].node())
@@ -68,12 +68,12 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "1",
         |g, a| g.atan2(a[0].node(), a[1].node())
     ),
-    scalar_function!("abs", "abs(x)", "|x|; its derivative at 0 is taken as 0.", one_scalar, "0", |g, a| g
+    scalar_function!("abs", "abs(x)", "Absolute value |x|. The derivative at 0 is taken as 0.", one_scalar, "0", |g, a| g
         .abs(a[0].node())),
     scalar_function!(
         "min",
         "min(a, b, …)",
-        "The smallest; where two are equal, the derivative of the first.",
+        "Smallest argument. If two are equal, the derivative is that of the first.",
         some_scalars,
         "0",
         |g, a| fold(g, a, Graph::min)
@@ -81,7 +81,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "max",
         "max(a, b, …)",
-        "The largest; where two are equal, the derivative of the first.",
+        "Largest argument. If two are equal, the derivative is that of the first.",
         some_scalars,
         "0",
         |g, a| fold(g, a, Graph::max)
@@ -89,7 +89,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "clamp",
         "clamp(x, least, most)",
-        "x, but at least `least` and at most `most`: min(max(x, least), most).",
+        "x limited to the range [least, most]: min(max(x, least), most).",
         three_scalars,
         "0",
         |g, a| {
@@ -97,14 +97,14 @@ pub(super) const FUNCTIONS: &[Function] = &[
             g.min(raised, a[2].node())
         }
     ),
-    scalar_function!("sign", "sign(x)", "−1, 0 or 1; its derivative is taken as 0.", one_scalar, "0", |g, a| sign(
+    scalar_function!("sign", "sign(x)", "−1, 0 or 1. The derivative is taken as 0.", one_scalar, "0", |g, a| sign(
         g,
         a[0].node()
     )),
     scalar_function!(
         "power_of_two",
         "power_of_two(x)",
-        "The power of two s with 1 ≤ s |x| < 2 (1 where x is 0), in the unit of 1/x; its derivative is taken as 0. Multiplying by it is exact: for bringing a rest shape of any size near 1, in formulas whose result does not depend on it.",
+        "The power of two s with 1 ≤ s |x| < 2 (1 if x = 0), in the unit of 1/x. The derivative is taken as 0. Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not depend on s.",
         one_scalar,
         "0",
         |g, a| g.power_of_two_scale(a[0].node())
@@ -112,7 +112,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "one_minus_cos",
         "one_minus_cos(x)",
-        "1 − cos x = 2 sin²(x/2), without cancellation at 0; so is `1 - cos(x)`.",
+        "1 − cos x = 2 sin²(x/2), accurate near 0. `1 - cos(x)` is compiled to it.",
         one_scalar,
         "3 / 2 / 2",
         |g, a| versine(g, a[0].node())
@@ -120,7 +120,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "x_minus_sin",
         "x_minus_sin(x)",
-        "x − sin x, by its series for |x| < 1, without cancellation at 0.",
+        "x − sin x, accurate near 0: by its series for |x| < 1.",
         one_scalar,
         "5 / 2 / 1",
         |g, a| sine_remainder(g, a[0].node())

@@ -9,7 +9,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "log",
         usage: "log(x)",
-        docs: "Natural logarithm, x > 0; `log(1 + x)` is `log1p(x)`.",
+        docs: "Natural logarithm, x > 0. `log(1 + x)` is compiled as `log1p(x)`.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(log(g, a[0].node())),
         accuracy: "1",
@@ -17,7 +17,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "log1p",
         usage: "log1p(x) or log1p(x, u)",
-        docs: "ln(1 + x), x > −1, without cancellation at 0. Where 1 + x has lost digits near −1, u = 1 + x by other means saves them.",
+        docs: "ln(1 + x), x > −1, accurate near 0. Near −1, pass an accurate u = 1 + x as the second argument to avoid cancellation.",
         shape: with_successor,
         lower: |g, a| Lowered::scalar(of_successor(g, a, log1p, log1p_of)),
         accuracy: "4 / 2 / 4",
@@ -25,7 +25,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "log1pmx",
         usage: "log1pmx(x) or log1pmx(x, u)",
-        docs: "ln(1 + x) − x, x > −1, without cancellation at 0, where it is −x²/2. u = 1 + x by other means as for log1p.",
+        docs: "ln(1 + x) − x, x > −1, accurate near 0, where it is −x²/2. The second argument u = 1 + x is that of `log1p`.",
         shape: with_successor,
         lower: |g, a| Lowered::scalar(of_successor(g, a, log1pmx, log1pmx_of)),
         accuracy: "8 / 3 / 4",
@@ -33,7 +33,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "expm1",
         usage: "expm1(x)",
-        docs: "eˣ − 1, without cancellation at 0; so is `exp(x) - 1`.",
+        docs: "eˣ − 1, accurate near 0. `exp(x) - 1` is compiled to it.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(expm1(g, a[0].node())),
         accuracy: "4 / 1 / 1",
@@ -41,7 +41,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "softplus",
         usage: "softplus(x)",
-        docs: "ln(1 + eˣ) = max(x, 0) + log1p(e^(−|x|)), a smooth max(x, 0): no overflow, and no digits lost.",
+        docs: "ln(1 + eˣ) = max(x, 0) + log1p(e^(−|x|)), a smooth max(x, 0), without overflow or cancellation.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(softplus(g, a[0].node())),
         accuracy: "4 / 3 / 5",

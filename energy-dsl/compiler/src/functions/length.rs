@@ -12,7 +12,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "norm",
         usage: "norm(d) or ‖d‖",
-        docs: "Length of a vector or quaternion. At 0 its derivatives are taken as 0 and flagged. `norm(d) - L` is the elongation, one robust primitive, and so is its square.",
+        docs: "Length of a vector or quaternion. At 0 the derivatives are taken as 0 and flagged. `norm(d) - L` and its square are robust primitives.",
         shape: vector_to_scalar,
         lower: norm,
         accuracy: "2 / 2 / 6",
@@ -28,7 +28,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "unit",
         usage: "unit(d) or â",
-        docs: "d/‖d‖ of a vector or quaternion; of a dual quaternion, both parts over the norm of the real one. At 0 it is taken as 0 and flagged.",
+        docs: "d/‖d‖ of a vector or quaternion. For a dual quaternion, both parts are divided by the norm of the real part. At 0 the result is taken as 0 and flagged.",
         shape: unit_shape,
         lower: unit,
         accuracy: "2 / 5 / 8",

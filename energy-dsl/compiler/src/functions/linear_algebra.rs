@@ -11,7 +11,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "dot",
         usage: "dot(a, b) or a·b",
-        docs: "Inner product of two vectors or quaternions; of two numbers, their product. `dot(unit(a), unit(b))` is the cosine between a and b, one robust primitive. Of vectors that one unit quaternion turned, as in `dot(rotate(q, n), transform(q, p) - x)`, p is not turned: a rotation keeps n·p.",
+        docs: "Inner product of two vectors or quaternions; the product of two scalars. `dot(unit(a), unit(b))` is a robust primitive, the cosine between a and b. In `dot(rotate(q, n), transform(q, p) - x)`, p is not rotated, because a rotation preserves n·p.",
         shape: dot_shape,
         lower: dot,
         accuracy: "",
@@ -19,16 +19,16 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "cross",
         usage: "cross(a, b) or a × b",
-        docs: "Cross product of 3-vectors; of two numbers, their product.",
+        docs: "Cross product of two 3-vectors; the product of two scalars.",
         shape: cross_shape,
         lower: cross,
         accuracy: "",
     },
-    Function { name: "outer", usage: "outer(a, b)", docs: "a bᵀ.", shape: outer_shape, lower: outer, accuracy: "" },
+    Function { name: "outer", usage: "outer(a, b)", docs: "Outer product a bᵀ of two vectors.", shape: outer_shape, lower: outer, accuracy: "" },
     Function {
         name: "ddot",
         usage: "ddot(A, B)",
-        docs: "Σᵢⱼ Aᵢⱼ Bᵢⱼ = tr AᵀB.",
+        docs: "Inner product of two matrices, Σᵢⱼ Aᵢⱼ Bᵢⱼ = tr AᵀB.",
         shape: ddot_shape,
         lower: dot,
         accuracy: "",
@@ -36,7 +36,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "transpose",
         usage: "transpose(A) or Aᵀ",
-        docs: "Transpose; of a vector, a row.",
+        docs: "Transpose of a matrix. A vector becomes a row.",
         shape: transpose_shape,
         lower: transpose,
         accuracy: "",
@@ -44,7 +44,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "trace",
         usage: "trace(A)",
-        docs: "Sum of the diagonal.",
+        docs: "Sum of the diagonal of a square matrix.",
         shape: square_to_scalar,
         lower: trace,
         accuracy: "",
@@ -68,7 +68,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "adjugate",
         usage: "adjugate(A)",
-        docs: "det(A) A⁻¹ of a 2×2 or 3×3 matrix, without division: of integers it is exact.",
+        docs: "det(A) A⁻¹ of a 2×2 or 3×3 matrix, without division. It is exact for integers.",
         shape: square_to_square,
         lower: adjugate,
         accuracy: "",
@@ -76,7 +76,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "identity",
         usage: "identity(2) or identity(3)",
-        docs: "Unit matrix.",
+        docs: "Identity matrix.",
         shape: identity_shape,
         lower: identity,
         accuracy: "0",
@@ -84,7 +84,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "columns",
         usage: "columns(a, b, …)",
-        docs: "The matrix of those columns.",
+        docs: "The matrix with the given columns.",
         shape: columns_shape,
         lower: columns,
         accuracy: "0",
@@ -92,7 +92,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "[]",
         usage: "v[i], v.x, q.w",
-        docs: "A component, counted from 0; of an array, an entry.",
+        docs: "A component of a vector or an entry of an array, counted from 0.",
         shape: component_shape,
         lower: component,
         accuracy: "0",
@@ -100,7 +100,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "vector",
         usage: "vector(x, y, …)",
-        docs: "The vector of those numbers.",
+        docs: "The vector with the given components.",
         shape: vector_shape,
         lower: vector,
         accuracy: "0",

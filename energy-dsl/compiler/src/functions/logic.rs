@@ -4,28 +4,28 @@ use super::{Function, Lowered, Shape};
 use crate::graph::Graph;
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "<", usage: "a < b", docs: "Less.", shape: compare, lower: less, accuracy: "" },
+    Function { name: "<", usage: "a < b", docs: "Less than.", shape: compare, lower: less, accuracy: "" },
     Function {
         name: "<=",
         usage: "a <= b",
-        docs: "Less or equal.",
+        docs: "Less than or equal to.",
         shape: compare,
         lower: less_or_equal,
         accuracy: "",
     },
-    Function { name: ">", usage: "a > b", docs: "Greater.", shape: compare, lower: greater, accuracy: "" },
+    Function { name: ">", usage: "a > b", docs: "Greater than.", shape: compare, lower: greater, accuracy: "" },
     Function {
         name: ">=",
         usage: "a >= b",
-        docs: "Greater or equal.",
+        docs: "Greater than or equal to.",
         shape: compare,
         lower: greater_or_equal,
         accuracy: "",
     },
-    Function { name: "==", usage: "a == b", docs: "Equal, exactly.", shape: compare, lower: equal, accuracy: "" },
+    Function { name: "==", usage: "a == b", docs: "Exactly equal.", shape: compare, lower: equal, accuracy: "" },
     Function { name: "!=", usage: "a != b", docs: "Not equal.", shape: compare, lower: not_equal, accuracy: "" },
-    Function { name: "&&", usage: "p && q", docs: "Both.", shape: connect, lower: and, accuracy: "" },
-    Function { name: "||", usage: "p || q", docs: "Either.", shape: connect, lower: or, accuracy: "" },
+    Function { name: "&&", usage: "p && q", docs: "Both conditions hold.", shape: connect, lower: and, accuracy: "" },
+    Function { name: "||", usage: "p || q", docs: "At least one condition holds.", shape: connect, lower: or, accuracy: "" },
 ];
 
 fn compare(shapes: &[Shape]) -> Result<Shape, String> {

@@ -9,7 +9,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "huber",
         usage: "huber(x, δ)",
-        docs: "x²/2 where |x| ≤ δ, else δ (|x| − δ/2), δ > 0. Where |x| = δ its second derivative is that inside, and flagged.",
+        docs: "x²/2 if |x| ≤ δ, else δ (|x| − δ/2), with δ > 0. At |x| = δ the second derivative is the inner one, and flagged.",
         shape: two_scalars,
         lower: |g, a| Lowered::scalar(huber(g, a[0].node(), a[1].node())),
         accuracy: "2 / 0 / 0",
@@ -17,7 +17,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "pseudo_huber",
         usage: "pseudo_huber(x, δ)",
-        docs: "δ² (√(1 + (x/δ)²) − 1), δ > 0, without cancellation at 0.",
+        docs: "δ² (√(1 + (x/δ)²) − 1), δ > 0, accurate near 0.",
         shape: two_scalars,
         lower: |g, a| Lowered::scalar(pseudo_huber(g, a[0].node(), a[1].node())),
         accuracy: "4 / 4 / 8",

@@ -38,7 +38,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "angular",
         usage: "angular(ξ)",
-        docs: "θ of the twist (θ, t).",
+        docs: "The part θ of the twist (θ, t).",
         shape: |s| exactly(s, &[Shape::Twist], Shape::Vector(3), "takes a twist"),
         lower: |_, a| Lowered::vector(&a[0].parts[..3]),
         accuracy: "0",
@@ -46,7 +46,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "linear",
         usage: "linear(ξ)",
-        docs: "t of the twist (θ, t).",
+        docs: "The part t of the twist (θ, t).",
         shape: |s| exactly(s, &[Shape::Twist], Shape::Vector(3), "takes a twist"),
         lower: |_, a| Lowered::vector(&a[0].parts[3..]),
         accuracy: "0",
@@ -54,7 +54,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "real",
         usage: "real(q)",
-        docs: "The real part of a dual quaternion, a quaternion; of a quaternion, w.",
+        docs: "The real part: a quaternion for a dual quaternion, the scalar w for a quaternion.",
         shape: real_shape,
         lower: real,
         accuracy: "0",
@@ -62,7 +62,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "dual",
         usage: "dual(q)",
-        docs: "The dual part of a dual quaternion, a quaternion.",
+        docs: "The dual part of a dual quaternion, as a quaternion.",
         shape: |s| exactly(s, &[Shape::DualQuat], Shape::Quat, "takes a dual quaternion"),
         lower: |_, a| quaternion(&a[0].parts[4..]),
         accuracy: "0",
@@ -78,7 +78,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "conjugate",
         usage: "conjugate(q)",
-        docs: "q*: the vector part negated; of a dual quaternion, in both parts.",
+        docs: "q*, with the vector part negated. For a dual quaternion, this applies to both parts.",
         shape: conjugate_shape,
         lower: conjugate,
         accuracy: "0",
@@ -86,7 +86,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "rotate",
         usage: "rotate(q, v)",
-        docs: "q v q*, the vector v turned by a unit quaternion, or by the unit real part of a dual quaternion.",
+        docs: "q v q*: rotates the vector v by a unit quaternion, or by the unit real part of a dual quaternion.",
         shape: rotate_shape,
         lower: |g, a| Lowered::vector(rotate(g, &a[0].parts[..4], &a[1].parts)),
         accuracy: "",
@@ -94,7 +94,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "transform",
         usage: "transform(q, p)",
-        docs: "The point p moved by a dual quaternion with unit real part: turned by it, and shifted by the vector part of 2 dual(q) real(q)*.",
+        docs: "Moves the point p by a dual quaternion with unit real part: a rotation by real(q), then a translation by the vector part of 2 dual(q) real(q)*.",
         shape: |s| {
             exactly(s, &[Shape::DualQuat, Shape::Vector(3)], Shape::Vector(3), "takes a dual quaternion and a 3-vector")
         },
@@ -104,7 +104,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "rotation",
         usage: "rotation(θ)",
-        docs: "The unit quaternion (cos ‖θ‖, θ sin ‖θ‖/‖θ‖) of half a rotation vector: it turns by the angle 2‖θ‖. Regular at θ = 0.",
+        docs: "The unit quaternion (cos ‖θ‖, θ sin ‖θ‖/‖θ‖) of half a rotation vector θ: it rotates by 2‖θ‖. Regular at θ = 0.",
         shape: |s| exactly(s, &[Shape::Vector(3)], Shape::Quat, "takes a 3-vector"),
         lower: |g, a| quaternion(&rotation(g, &a[0].parts)),
         accuracy: "",
@@ -112,7 +112,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "rotation_matrix",
         usage: "rotation_matrix(q)",
-        docs: "The 3×3 matrix of v ↦ rotate(q, v), of a unit quaternion.",
+        docs: "The 3×3 rotation matrix of a unit quaternion.",
         shape: |s| exactly(s, &[Shape::Quat], Shape::Matrix(3, 3), "takes a quaternion"),
         lower: rotation_matrix,
         accuracy: "",

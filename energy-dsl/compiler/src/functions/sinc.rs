@@ -11,7 +11,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "cos_sqrt",
         usage: "cos_sqrt(y)",
-        docs: "cos √y, y ≥ 0: regular at 0, with derivative −½ sinc_sqrt(y).",
+        docs: "cos √y, y ≥ 0. Regular at 0, with the derivative −½ sinc_sqrt(y).",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(cos_sqrt(g, a[0].node())),
         accuracy: "4 / 3 / 6 for y ≤ 1.5",
@@ -19,7 +19,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "sinc_sqrt",
         usage: "sinc_sqrt(y)",
-        docs: "sin √y / √y, y ≥ 0: 1 at 0, and regular there.",
+        docs: "sin √y / √y, y ≥ 0. Regular at 0, where it is 1.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(sinc_sqrt(g, a[0].node())),
         accuracy: "5 / 6 / 10 for y ≤ 6.5",
@@ -27,7 +27,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "sinc",
         usage: "sinc(x)",
-        docs: "sin x / x: 1 at 0, and regular there.",
+        docs: "sin x / x. Regular at 0, where it is 1.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(sinc(g, a[0].node())),
         accuracy: "2 / 6 / 12 for |x| ≤ 1.5",
@@ -35,7 +35,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "cosc",
         usage: "cosc(x)",
-        docs: "(1 − cos x)/x² = ½ sinc²(x/2): ½ at 0, and regular there.",
+        docs: "(1 − cos x)/x² = ½ sinc²(x/2). Regular at 0, where it is ½.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(cosc(g, a[0].node())),
         accuracy: "5 / 9 / 16 for |x| ≤ 1.5",

@@ -24,6 +24,8 @@ pub enum Ending {
 pub struct Recogniser {
     /// The spelling, for the language reference.
     pub spelling: &'static str,
+    /// Description of the robust form, for the language reference.
+    pub form: &'static str,
     /// The operation that the spelling ends in.
     pub ending: Ending,
     /// Returns the robust form of the operation on these operands; `None` if they do not match the spelling. A unary

@@ -131,7 +131,7 @@ pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
         let here = Span::of(proc_macro2::Span::call_site());
         Diagnostics::from(
             Diagnostic::new(&here, format!("the text does not split into tokens: {error}"))
-                .help("mathematical notation stands in a string: \"‖p − q‖ − L\""),
+                .help("put mathematical notation in a string: \"‖p − q‖ − L\""),
         )
     })?;
     let items = parse(stream, &mut diagnostics);

@@ -64,7 +64,7 @@ impl<'a> Parser<'a> {
         const DEEPEST: usize = 100;
         if self.depth >= DEEPEST {
             let message = format!("the formula is nested more than {DEEPEST} levels deep");
-            return Err(Box::new(Diagnostic::new(&self.span(), message).help("name parts of it with `let`")));
+            return Err(Box::new(Diagnostic::new(&self.span(), message).help("name subexpressions with `let`")));
         }
         self.depth += 1;
         let operand = parse(self);

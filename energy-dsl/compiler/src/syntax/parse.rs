@@ -428,7 +428,7 @@ impl<'a> Parser<'a> {
         if self.is(";") {
             return Err(Box::new(
                 Diagnostic::new(&self.span(), "expected the result to be the last expression, found `;`")
-                    .help("the result stands last and without `;`; name intermediate values with `let name = …;`"),
+                    .help("put the result last, without `;`; name intermediate values with `let name = …;`"),
             ));
         }
         Ok(Body { constants, functions: body.0, lets: body.1, result: Box::new(result) })

@@ -158,7 +158,7 @@ impl<'a> Inference<'a> {
                     let message = match (name, values.len()) {
                         ("if", _) => format!("`if`: one branch is {a}, the other is {b}"),
                         (_, 2) => format!("`{name}`: left is {a}, right is {b}"),
-                        _ => format!("`{name}`: the first is {a}, number {} is {b}", number + 1),
+                        _ => format!("`{name}`: argument 1 is {a}, argument {} is {b}", number + 1),
                     };
                     self.error(span, message, "both need the same unit: check the formula, or the units of the inputs");
                     return Units(first.0.iter().map(|_| self.solver.fresh()).collect());

@@ -1,0 +1,7 @@
+use energy_dsl::energy;
+
+energy! {
+    energy Spring(p, q: Point; L: Scalar) { "‖p − q − L" }
+}
+
+fn main() {}
