@@ -1,5 +1,6 @@
-//! Instructions under Valgrind, of 160 elements: `cargo bench -p energy-bench --bench instructions --features instructions`.
-//! It needs Valgrind and gungraun-runner of gungraun's version. Valgrind has no AVX-512, so AVX2 is the best level it sees.
+//! Instructions under Valgrind, of 160 elements: `cargo bench -p energy-bench --bench instructions --features
+//! instructions`. It needs Valgrind and gungraun-runner of gungraun's version. Valgrind has no AVX-512, so AVX2 is the
+//! best level it sees.
 
 #![allow(missing_docs)]
 
@@ -27,7 +28,10 @@ fn work<K: Subject>(of: Contender) -> Work {
 
 #[library_benchmark]
 #[benches::k1_spring(args = [LIBRARY, HAND, LIBRARY_LANES, HAND_LANES, Contender::Dual], setup = work::<SpringKernel>)]
-#[benches::k2_hair_bend(args = [LIBRARY, HAND, LIBRARY_LANES, HAND_LANES, Contender::Dual], setup = work::<HairBendKernel>)]
+#[benches::k2_hair_bend(
+    args = [LIBRARY, HAND, LIBRARY_LANES, HAND_LANES, Contender::Dual],
+    setup = work::<HairBendKernel>
+)]
 #[benches::k3_hinge(args = [LIBRARY, HAND, LIBRARY_LANES, HAND_LANES, Contender::Dual], setup = work::<HingeKernel>)]
 #[benches::k4_stvk(args = [LIBRARY, HAND, LIBRARY_LANES, HAND_LANES, Contender::Dual], setup = work::<StVKKernel>)]
 #[benches::k5_point_to_plane(

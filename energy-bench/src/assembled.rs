@@ -29,8 +29,8 @@ where
     E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + Sync + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
-    // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as elements, a few more than
-    // in a mesh of triangles. It ends where it began, so that no element's vertices meet.
+    // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as
+    // elements, a few more than in a mesh of triangles. It ends where it began, so that no element's vertices meet.
     let last_point = |sample: &Sample| points::<N>(&sample.unknowns)[N - 1];
     let positions: Vec<Vector3<f64>> = samples.iter().chain(&samples[..N - 1]).map(last_point).collect();
     let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| i + p)).collect();
@@ -70,8 +70,8 @@ where
     })
 }
 
-/// Finished blocks and gradients of a few elements, which stay in the cache, added to a matrix and to forces over and over: what assembly
-/// costs when there is nothing to compute.
+/// Finished blocks and gradients of a few elements, which stay in the cache, added to a matrix and to forces over and
+/// over: what assembly costs when there is nothing to compute.
 struct Sums<const N: usize> {
     stencils: Vec<[usize; N]>,
     /// By element, pair of its points.

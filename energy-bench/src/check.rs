@@ -18,8 +18,8 @@ pub fn expected<K: Subject>(samples: &[Sample]) -> Vec<Vec<f64>> {
     samples.iter().map(|sample| K::library_plain(&K::element(&sample.library), &sample.unknowns).numbers()).collect()
 }
 
-/// The largest difference of any contender's results from the library's, relative to the largest number of the same order of
-/// derivative of the element.
+/// The largest difference of any contender's results from the library's, relative to the largest number of the same
+/// order of derivative of the element.
 ///
 /// # Errors
 /// When it is beyond [`TOLERANCE`], with the contender and the element.

@@ -6,8 +6,8 @@ use crate::check::expected;
 use crate::sample::Sample;
 use crate::subject::Subject;
 
-/// Writes the inputs of the textbook formula of all elements, and the library's results, as little-endian doubles, element by
-/// element: `K1.inputs` and `K1.expected`, and so on.
+/// Writes the inputs of the textbook formula of all elements, and the library's results, as little-endian doubles,
+/// element by element: `K1.inputs` and `K1.expected`, and so on.
 ///
 /// # Errors
 /// When the folder or a file cannot be written.

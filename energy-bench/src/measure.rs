@@ -83,8 +83,8 @@ impl Measured {
     }
 }
 
-/// Runs every contender `repetitions` times, one after the other in turns and each time once more before, to fill the caches; calls
-/// `progress` after every turn. `elements` is how many elements a run computes.
+/// Runs every contender `repetitions` times, one after the other in turns and each time once more before, to fill the
+/// caches; calls `progress` after every turn. `elements` is how many elements a run computes.
 ///
 /// # Panics
 /// When there are no repetitions.

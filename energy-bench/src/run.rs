@@ -85,8 +85,8 @@ pub fn dual<K: Subject>(numbers: &[f64], size: usize) {
     each_block!(numbers, size, 1, |block| K::dual(block));
 }
 
-/// All results, element by element, of hand-derived code or of the library: what is checked, in a kernel so that it is the
-/// code that is measured.
+/// All results, element by element, of hand-derived code or of the library: what is checked, in a kernel so that it is
+/// the code that is measured.
 #[derive(Debug)]
 pub struct Collect<'a, K, W: Width> {
     /// The elements, [`packed`].

@@ -50,8 +50,8 @@ pub trait Subject: Debug + 'static {
     /// [`Self::library_plain`] written to where the result is wanted.
     fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>);
 
-    /// The textbook formula over num-dual's dual numbers: value, gradient and full Hessian (or Jacobian), flattened as the
-    /// library's results are.
+    /// The textbook formula over num-dual's dual numbers: value, gradient and full Hessian (or Jacobian), flattened as
+    /// the library's results are.
     fn dual(textbook: &[f64]) -> Self::HandAnswer<f64>;
 
     /// The same without compensation, where the library's element has it.
@@ -60,7 +60,8 @@ pub trait Subject: Debug + 'static {
         None
     }
 
-    /// The element moved to within [`STRAIN`](crate::accuracy::STRAIN) of its rest, if it has one where differences cancel.
+    /// The element moved to within [`STRAIN`](crate::accuracy::STRAIN) of its rest, if it has one where differences
+    /// cancel.
     #[must_use]
     fn near_rest(_sample: &Sample) -> Option<Sample> {
         None

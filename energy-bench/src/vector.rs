@@ -1,4 +1,5 @@
-//! Vectors and blocks of hand-derived code: loops over fixed indices, so that everything is compiled for the caller's level.
+//! Vectors and blocks of hand-derived code: loops over fixed indices, so that everything is compiled for the caller's
+//! level.
 
 use energy_dsl::{Block, Level, Real, Vector3};
 

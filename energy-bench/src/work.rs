@@ -1,5 +1,5 @@
-//! Loops over all elements: results go to a buffer of a few elements that stays in the cache, so that arithmetic is compared
-//! and not memory.
+//! Loops over all elements: results go to a buffer of a few elements that stays in the cache, so that arithmetic is
+//! compared and not memory.
 
 use std::fmt::Debug;
 use std::hint::black_box;

@@ -6,7 +6,10 @@ energy! {
     /// In this form the damping does not depend on the sign convention of θ. The rate Σ u_j·v_j depends on velocity
     /// differences only.
     #[audit]
-    pub force BridsonForceDamped(x1, x2, x3, x4: Point, v1, v2, v3, v4: Velocity; K: Scalar[J], k_d: Scalar[N s], θ0: Scalar[rad]) {
+    pub force BridsonForceDamped(
+        x1, x2, x3, x4: Point, v1, v2, v3, v4: Velocity;
+        K: Scalar[J], k_d: Scalar[N s], θ0: Scalar[rad]
+    ) {
         let E = x4 - x3;
         let N1 = cross(E, x1 - x3);
         let N2 = cross(x2 - x3, E);

@@ -7,7 +7,11 @@ energy! {
     /// It does not resist rigid motions. With η = β (λ, μ) it is Rayleigh damping of `StVK` at rest. ∂f/∂x is not
     /// symmetric.
     #[audit]
-    pub force StrainRateDamping(x0, x1, x2: Point, v0, v1, v2: Velocity; rest u0, u1, u2: Vec2; η_λ, η_μ: Scalar[N s/m]) {
+    pub force StrainRateDamping(
+        x0, x1, x2: Point, v0, v1, v2: Velocity;
+        rest u0, u1, u2: Vec2;
+        η_λ, η_μ: Scalar[N s/m]
+    ) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
             let B = inverse(D_m);

@@ -46,7 +46,8 @@ proptest! {
             let (name, n) = (entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let moved: Vec<f64> = x[..n].iter().enumerate().map(|(i, c)| c + shift[i % 3]).collect();
-            let (here, there) = (evaluate(name, &parameters, &rest, &x[..n], &v[..n]), evaluate(name, &parameters, &rest, &moved, &v[..n]));
+            let here = evaluate(name, &parameters, &rest, &x[..n], &v[..n]);
+            let there = evaluate(name, &parameters, &rest, &moved, &v[..n]);
             prop_assert_eq!(here.blocks, there.blocks, "{}", name);
         }
     }
@@ -56,7 +57,8 @@ proptest! {
     fn scaling_by_a_power_of_two_is_exact(x in points(4), exponent in -300_i32..300) {
         let factor = 2.0_f64.powi(exponent);
         let scaled: Vec<f64> = x.iter().map(|c| c * factor).collect();
-        for (name, degree) in [("HingeAngle", 0), ("HingeSinHalf", 0), ("HingeCosHalf", 0), ("HingeCos", 0), ("Distance", 1)] {
+        let degrees = [("HingeAngle", 0), ("HingeSinHalf", 0), ("HingeCosHalf", 0), ("HingeCos", 0), ("Distance", 1)];
+        for (name, degree) in degrees {
             let n = 3 * find(name).unwrap().declaration.points.len();
             let (here, there) = (evaluate(name, &[], &[], &x[..n], &[]), evaluate(name, &[], &[], &scaled[..n], &[]));
             for (order, block_name) in ["energy", "grad", "hess"].into_iter().enumerate() {
@@ -94,7 +96,8 @@ proptest! {
             ("BridsonForceDamped", vec![2.0, 7.0, 0.25], vec![2.0, 0.0, 0.25]),
         ] {
             let n = 3 * find(name).unwrap().declaration.points.len();
-            let (damped, undamped) = (evaluate(name, &parameters, &[], &x[..n], &v[..n]), evaluate(name, &still, &[], &x[..n], &v[..n]));
+            let damped = evaluate(name, &parameters, &[], &x[..n], &v[..n]);
+            let undamped = evaluate(name, &still, &[], &x[..n], &v[..n]);
             prop_assert_eq!(block(&damped, "force"), block(&undamped, "force"), "{}", name);
         }
     }

@@ -41,8 +41,8 @@ impl Subject for HairBendKernel {
         element_on(stiffness, &[p0, p1, p2].concat())
     }
 
-    /// With C = −k/2 and s = 1/(‖a‖ ‖b‖): the cosine c = s a·b has c_a = s b − c a/‖a‖², c_ab = s − a/‖a‖² c_bᵀ − s b bᵀ/‖b‖², and
-    /// c_aa = −(a wᵀ + w aᵀ)/‖a‖² − c/‖a‖² with w = s b − 3/2 c a/‖a‖².
+    /// With C = −k/2 and s = 1/(‖a‖ ‖b‖): the cosine c = s a·b has c_a = s b − c a/‖a‖², c_ab = s − a/‖a‖² c_bᵀ − s b
+    /// bᵀ/‖b‖², and c_aa = −(a wᵀ + w aᵀ)/‖a‖² − c/‖a‖² with w = s b − 3/2 c a/‖a‖².
     #[inline(always)]
     fn hand<T: Real, L: Level>(&[k, x0, x1, x2, y0, y1, y2, z0, z1, z2]: &[T; 10]) -> Derivatives<T, 3, 6> {
         let (a, b) = (sub([y0, y1, y2], [x0, x1, x2]), sub([z0, z1, z2], [y0, y1, y2]));

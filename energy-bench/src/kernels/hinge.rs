@@ -46,9 +46,10 @@ impl Subject for HingeKernel {
         element_on([stiffness, rest], &[x1, x2, x3, x4].concat())
     }
 
-    /// By the edge e and the apexes a, b from its start: θ_a = g₁ = −‖e‖ N₁/‖N₁‖², N₁ = e × a, and θ_b = g₂ likewise; with the feet
-    /// t = a·e/‖e‖² of the heights h = a − t e, θ_e = −t₁ g₁ − t₂ g₂. In the plane across e, θ is a difference of polar angles,
-    /// so θ_aa = −(g₁ h₁ᵀ + h₁ g₁ᵀ)/‖h₁‖², θ_ea = −g₁ eᵀ/‖e‖² − t₁ θ_aa; θ_ee follows, where Σ h gᵀ is symmetric.
+    /// By the edge e and the apexes a, b from its start: θ_a = g₁ = −‖e‖ N₁/‖N₁‖², N₁ = e × a, and θ_b = g₂ likewise;
+    /// with the feet t = a·e/‖e‖² of the heights h = a − t e, θ_e = −t₁ g₁ − t₂ g₂. In the plane across e, θ is a
+    /// difference of polar angles, so θ_aa = −(g₁ h₁ᵀ + h₁ g₁ᵀ)/‖h₁‖², θ_ea = −g₁ eᵀ/‖e‖² − t₁ θ_aa; θ_ee follows,
+    /// where Σ h gᵀ is symmetric.
     #[inline(always)]
     fn hand<T: Real, L: Level>(
         &[k, rest, a0, a1, a2, b0, b1, b2, o0, o1, o2, e0, e1, e2]: &[T; 14],

@@ -10,7 +10,8 @@ use crate::sample::{Row, Sample, number_count, residual};
 use crate::subject::Subject;
 use crate::vector::{add, cross, cross_add, dot, scale, scale_add, sub};
 
-/// K5, the distance of a point to a plane, r = n̂·(v̂ − u), the point moved by the blend of four twists; r and its gradient.
+/// K5, the distance of a point to a plane, r = n̂·(v̂ − u), the point moved by the blend of four twists; r and its
+/// gradient.
 #[derive(Clone, Copy, Debug)]
 pub struct PointToPlaneKernel;
 
@@ -109,8 +110,8 @@ impl Subject for PointToPlaneKernel {
     }
 
     /// With the blend's unit real part (w, p) and twice its dual part (W, X): n̂ = n + 2 (w m + p × m), m = p × n, and
-    /// τ = w X − W p + p × X. As rotations keep products, r = n·v + n̂·(τ − u). Its gradient by the eight numbers is freed of
-    /// what changes their length, then carried to each twist.
+    /// τ = w X − W p + p × X. As rotations keep products, r = n·v + n̂·(τ − u). Its gradient by the eight numbers is
+    /// freed of what changes their length, then carried to each twist.
     #[inline(always)]
     fn hand<T: Real, L: Level>(x: &[T; 37]) -> Row<T, 24> {
         let nodes = [

@@ -18,7 +18,8 @@ impl Subject for StVKKernel {
     const DECLARATION: &'static Declaration = <StVK as Element>::DECLARATION;
     const ROUTINE: &'static str = "hessian";
     type Element = StVK;
-    /// λ A, μ A, the metric D_m⁻¹ D_m⁻ᵀ (11, 12, 22), x0 to x2. The textbook formula has λ, μ, A, D_m⁻¹ by rows, x0 to x2.
+    /// λ A, μ A, the metric D_m⁻¹ D_m⁻ᵀ (11, 12, 22), x0 to x2. The textbook formula has λ, μ, A, D_m⁻¹ by rows, x0 to
+    /// x2.
     type Hand<T: Copy> = [T; 14];
     type HandAnswer<T: Real> = Derivatives<T, 3, 6>;
     type LibraryAnswer<T: Real> = Hessian<T, [Vector3<T>; 3], [Block<T>; 6]>;
@@ -49,9 +50,9 @@ impl Subject for StVKKernel {
         Sample::new(&element, &unknowns, hand, textbook)
     }
 
-    /// With the metrics G at rest and K = DᵀD of the moved edges D = (d₁, d₂), Y = G K − 1 has tr E = tr Y/2 and ‖E‖² = tr Y²/4;
-    /// U_D = D M, M = (μ Y + λ tr E) G, and with q = D G, Φ = μ D G Dᵀ:
-    /// U_ij = M_ij + G_ij Φ + μ q_j q_iᵀ + λ q_i q_jᵀ.
+    /// With the metrics G at rest and K = DᵀD of the moved edges D = (d₁, d₂), Y = G K − 1 has tr E = tr Y/2 and ‖E‖² =
+    /// tr Y²/4; U_D = D M, M = (μ Y + λ tr E) G, and with q = D G, Φ = μ D G Dᵀ: U_ij = M_ij + G_ij Φ + μ q_j q_iᵀ + λ
+    /// q_i q_jᵀ.
     #[inline(always)]
     fn hand<T: Real, L: Level>(
         &[lambda, mu, g11, g12, g22, x0, x1, x2, y0, y1, y2, z0, z1, z2]: &[T; 14],

@@ -21,7 +21,8 @@ use crate::syntax;
 /// each declaration is also written there.
 ///
 /// ```
-/// let code = energy_compiler::compile("energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }".parse().unwrap());
+/// let spring = "energy Spring(p, q: Point; k: Scalar) { k * norm_squared(p - q) }";
+/// let code = energy_compiler::compile(spring.parse().unwrap());
 /// assert!(code.to_string().contains("struct Spring"));
 /// ```
 #[must_use]

@@ -80,11 +80,13 @@ fn functions_compute_what_they_say() {
         ("linear(twist(p_k, p_l)).x + angular(twist(p_k, p_l)).y", 5.0),
         // Motions compose: first the one on the right.
         (
-            "{ let A = exp(twist(L * p_k, p_l)); let B = exp(twist(p_l, p_k)); norm(transform(A * B, p_l) - transform(A, transform(B, p_l))) }",
+            "{ let A = exp(twist(L * p_k, p_l)); let B = exp(twist(p_l, p_k)); norm(transform(A * B, p_l) - \
+             transform(A, transform(B, p_l))) }",
             0.0,
         ),
         (
-            "{ let A = exp(twist(L * p_k, p_l)); let q = unit(k * A); norm(real(q) - real(A)) + norm(dual(q) - dual(A)) }",
+            "{ let A = exp(twist(L * p_k, p_l)); let q = unit(k * A); norm(real(q) - real(A)) + norm(dual(q) - \
+             dual(A)) }",
             0.0,
         ),
         ("norm(dual(dual_quat(quat(1, p_k), 2 * quat(0, p_l)))) - 2 * norm(p_l)", 0.0),

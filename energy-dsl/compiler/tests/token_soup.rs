@@ -7,11 +7,15 @@ use energy_compiler::{Listing, compile};
 use proptest::prelude::*;
 
 const SHIPPED: &[&str] = &[
-    "pub energy HairBend(p0, p1, p2: Point; k: Scalar[J]) { let a = p1 - p0; let b = p2 - p1; k / 2 * (1 - dot(unit(a), unit(b))) }",
+    "pub energy HairBend(p0, p1, p2: Point; k: Scalar[J]) { let a = p1 - p0; let b = p2 - p1; k / 2 * (1 - \
+     dot(unit(a), unit(b))) }",
     "constraint Spring(p_k, p_l: Point; L: Scalar[m]) = \"‖p_k − p_ℓ‖ − L\";",
     "force Drag(x: Point, v: Velocity; c: Scalar[N s/m]) { -c * v }",
-    "residual Blend(ξ: [Twist; 2]; w: [Scalar[1]; 2], v: Vec3[m]) { transform(unit(sum(j in 0..2, w[j] * exp(ξ[j]))), v) }",
-    "energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) { rest { let D = columns(u1 - u0, u2 - u0); let B = inverse(D); let A = det(D) / 2; } let F = columns(x1 - x0, x2 - x0) * B; let E = (transpose(F) * F - identity(2)) / 2; A * (μ * ddot(E, E) + λ / 2 * trace(E)^2) }",
+    "residual Blend(ξ: [Twist; 2]; w: [Scalar[1]; 2], v: Vec3[m]) { transform(unit(sum(j in 0..2, w[j] * \
+     exp(ξ[j]))), v) }",
+    "energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) { rest { let D = columns(u1 - u0, u2 - \
+     u0); let B = inverse(D); let A = det(D) / 2; } let F = columns(x1 - x0, x2 - x0) * B; let E = (transpose(F) * F - identity(2)) / 2; \
+     A * (μ * ddot(E, E) + λ / 2 * trace(E)^2) }",
 ];
 
 const WORDS: &[&str] = &[
@@ -106,7 +110,8 @@ proptest! {
         declaration in prop::sample::select(SHIPPED),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>(), 0..4_u8), 1..5),
     ) {
-        let mut pieces: Vec<String> = declaration.split_inclusive([' ', '(', ')', ',', ';', ':']).map(str::to_owned).collect();
+        let pieces = declaration.split_inclusive([' ', '(', ')', ',', ';', ':']);
+        let mut pieces: Vec<String> = pieces.map(str::to_owned).collect();
         for (a, b, edit) in edits {
             let (a, b) = (a.index(pieces.len()), b.index(pieces.len()));
             match edit {

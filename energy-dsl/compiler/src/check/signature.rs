@@ -44,7 +44,11 @@ impl Signature {
                 diagnostics.push(
                     Diagnostic::new(
                         &group.type_span,
-                        format!("expected Point: the inputs of this {} before the first `;` are points", declaration.kind.keyword()),
+                        format!(
+                            "expected Point: the inputs of this {} before the first `;` are \
+                            points",
+                            declaration.kind.keyword()
+                        ),
                     )
                     .help("put parameters after the first `;`, as in (p0, p1: Point; k: Scalar)"),
                 );

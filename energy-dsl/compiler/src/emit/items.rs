@@ -68,7 +68,9 @@ fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
     }
     if program.uncompensated {
         lines.push(
-            "Uncompensated: differences of points, and what cancels, are accurate to the rounding of the points themselves.".into(),
+            "Uncompensated: differences of points, and what cancels, are accurate to the rounding of the points \
+             themselves."
+                .into(),
         );
     }
     lines.extend(["".into(), "| routine | operations | in reduced coordinates |".into(), "|---|---|---|".into()]);
@@ -151,10 +153,15 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         (result, body, quote!(Self::new(#(#values),*)))
     };
     let errors = (!routines.rest.outputs.is_empty()).then(|| {
-        quote!(#[doc = ""] #[doc = "# Errors"] #[doc = "When the rest shape is degenerate: zero length or area, or not finite."])
+        quote! {
+            #[doc = ""]
+            #[doc = "# Errors"]
+            #[doc = "When the rest shape is degenerate: zero length or area, or not finite."]
+        }
     });
     quote! {
-        #[allow(non_snake_case, mixed_script_confusables, confusable_idents, unused_parens, clippy::all, clippy::pedantic)]
+        #[allow(non_snake_case, mixed_script_confusables, confusable_idents, unused_parens)]
+        #[allow(clippy::all, clippy::pedantic)]
         impl<T: ::energy_dsl::Real> #name<T> {
             /// Creates the element from its rest shape (if any) and its parameters, in declared order.
             #errors

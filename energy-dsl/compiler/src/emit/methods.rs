@@ -136,7 +136,11 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                 /// are.
                 #[cold]
                 #[inline(never)]
-                fn #in_general(inputs: &[T; #reads], ordinary: T::Mask, here: ::core::option::Option<#parts>) -> #parts {
+                fn #in_general(
+                    inputs: &[T; #reads],
+                    ordinary: T::Mask,
+                    here: ::core::option::Option<#parts>
+                ) -> #parts {
                     #code
                     let (numbers, flags) =
                         ::energy_dsl::with_care::<WithCare, T, #reads, #returns>(inputs, !ordinary, #summed);

@@ -4,7 +4,10 @@ use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 macro_rules! scalar_function {
-    ($name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal, |$g:ident, $args:ident| $body:expr) => {
+    (
+        $name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal,
+        |$g:ident, $args:ident| $body:expr
+    ) => {
         Function {
             name: $name,
             usage: $usage,
@@ -20,7 +23,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "sqrt",
         "sqrt(x)",
-        "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative at 0 is taken as 0 and flagged.",
+        "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative \
+         at 0 is taken as 0 and flagged.",
         one_scalar,
         "1",
         |g, a| g.sqrt(a[0].node())
@@ -28,7 +32,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "exp",
         usage: "exp(x) or exp(ξ)",
-        docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
+        docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin \
+            ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
         shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
         lower: |g, a| match a[0].shape {
             Shape::Twist => super::quaternion::exp(g, &a[0]),
@@ -68,8 +73,15 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "1",
         |g, a| g.atan2(a[0].node(), a[1].node())
     ),
-    scalar_function!("abs", "abs(x)", "Absolute value |x|. The derivative at 0 is taken as 0.", one_scalar, "0", |g, a| g
-        .abs(a[0].node())),
+    scalar_function!(
+        "abs",
+        "abs(x)",
+        "Absolute value |x|. The derivative at 0 is taken as \
+        0.",
+        one_scalar,
+        "0",
+        |g, a| g.abs(a[0].node())
+    ),
     scalar_function!(
         "min",
         "min(a, b, …)",
@@ -104,7 +116,9 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "power_of_two",
         "power_of_two(x)",
-        "The power of two s with 1 ≤ s |x| < 2 (1 if x = 0), in the unit of 1/x. The derivative is taken as 0. Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not depend on s.",
+        "The power of two s with 1 ≤ s |x| < 2 (1 if x = 0), in the unit of 1/x. The derivative is taken as 0. \
+         Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not \
+         depend on s.",
         one_scalar,
         "0",
         |g, a| g.power_of_two_scale(a[0].node())

@@ -11,7 +11,9 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "dot",
         usage: "dot(a, b) or a·b",
-        docs: "Inner product of two vectors or quaternions; the product of two scalars. `dot(unit(a), unit(b))` is a robust primitive, the cosine between a and b. In `dot(rotate(q, n), transform(q, p) - x)`, p is not rotated, because a rotation preserves n·p.",
+        docs: "Inner product of two vectors or quaternions; the product of two scalars. `dot(unit(a), unit(b))` is a \
+            robust primitive, the cosine between a and b. In `dot(rotate(q, n), transform(q, p) - x)`, p is not \
+            rotated, because a rotation preserves n·p.",
         shape: dot_shape,
         lower: dot,
         accuracy: "",
@@ -24,7 +26,14 @@ pub(super) const FUNCTIONS: &[Function] = &[
         lower: cross,
         accuracy: "",
     },
-    Function { name: "outer", usage: "outer(a, b)", docs: "Outer product a bᵀ of two vectors.", shape: outer_shape, lower: outer, accuracy: "" },
+    Function {
+        name: "outer",
+        usage: "outer(a, b)",
+        docs: "Outer product a bᵀ of two vectors.",
+        shape: outer_shape,
+        lower: outer,
+        accuracy: "",
+    },
     Function {
         name: "ddot",
         usage: "ddot(A, B)",

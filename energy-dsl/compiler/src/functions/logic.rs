@@ -25,7 +25,15 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function { name: "==", usage: "a == b", docs: "Exactly equal.", shape: compare, lower: equal, accuracy: "" },
     Function { name: "!=", usage: "a != b", docs: "Not equal.", shape: compare, lower: not_equal, accuracy: "" },
     Function { name: "&&", usage: "p && q", docs: "Both conditions hold.", shape: connect, lower: and, accuracy: "" },
-    Function { name: "||", usage: "p || q", docs: "At least one condition holds.", shape: connect, lower: or, accuracy: "" },
+    Function {
+        name: "||",
+        usage: "p || q",
+        docs: "At least one condition \
+        holds.",
+        shape: connect,
+        lower: or,
+        accuracy: "",
+    },
 ];
 
 fn compare(shapes: &[Shape]) -> Result<Shape, String> {

@@ -79,32 +79,64 @@ pub fn robust_spellings() -> impl Iterator<Item = (&'static str, &'static str)> 
 /// Naive spellings that compile to robust forms. If several end in the same operation, the first match counts.
 pub const RECOGNISERS: &[Recogniser] = &[
     Recogniser {
-        spelling: "1 - dot(unit(a), unit(b))", form: "2 sin²(φ/2) of the angle φ between a and b",
+        spelling: "1 - dot(unit(a), unit(b))",
+        form: "2 sin²(φ/2) of the angle φ between a and b",
         ending: Ending::Difference,
         recognise: angle::recognise_one_minus_cosine,
     },
-    Recogniser { spelling: "norm(d) - L", form: "the elongation, accurate near rest; so is its square", ending: Ending::Difference, recognise: length::recognise_elongation },
     Recogniser {
-        spelling: "sin(dihedral(a, b, c, d) / 2) - sin(y / 2)", form: "the difference of half-angle sines, accurate near θ = y",
+        spelling: "norm(d) - L",
+        form: "the elongation, accurate near rest; so is its \
+        square",
+        ending: Ending::Difference,
+        recognise: length::recognise_elongation,
+    },
+    Recogniser {
+        spelling: "sin(dihedral(a, b, c, d) / 2) - sin(y / 2)",
+        form: "the difference of half-angle sines, accurate \
+            near θ = y",
         ending: Ending::Difference,
         recognise: dihedral::recognise_sine_difference,
     },
-    Recogniser { spelling: "1 - cos(x)", form: "`one_minus_cos(x)`", ending: Ending::Difference, recognise: elementary::recognise_versine },
-    Recogniser { spelling: "exp(x) - 1", form: "`expm1(x)`", ending: Ending::Difference, recognise: exponential::recognise_expm1 },
     Recogniser {
-        spelling: "sqrt(c * (1 - dot(unit(a), unit(b))))", form: "√(2c) sin(φ/2) of the angle φ between a and b",
+        spelling: "1 - \
+        cos(x)",
+        form: "`one_minus_cos(x)`",
+        ending: Ending::Difference,
+        recognise: elementary::recognise_versine,
+    },
+    Recogniser {
+        spelling: "exp(x) - \
+        1",
+        form: "`expm1(x)`",
+        ending: Ending::Difference,
+        recognise: exponential::recognise_expm1,
+    },
+    Recogniser {
+        spelling: "sqrt(c * (1 - dot(unit(a), unit(b))))",
+        form: "√(2c) sin(φ/2) of the angle φ between a and b",
         ending: Ending::Root,
         recognise: angle::recognise_root,
     },
     Recogniser {
-        spelling: "sin(dihedral(a, b, c, d)), and of half the angle", form: "the sine from the triangles' normals, without the angle",
+        spelling: "sin(dihedral(a, b, c, d)), and of half the angle",
+        form: "the sine from the triangles' normals, \
+            without the angle",
         ending: Ending::Sine,
         recognise: dihedral::recognise_sine,
     },
     Recogniser {
-        spelling: "cos(dihedral(a, b, c, d)), and of half the angle", form: "the cosine from the triangles' normals, without the angle",
+        spelling: "cos(dihedral(a, b, c, d)), and of half the angle",
+        form: "the cosine from the triangles' normals, \
+            without the angle",
         ending: Ending::Cosine,
         recognise: dihedral::recognise_cosine,
     },
-    Recogniser { spelling: "norm(d)^α", form: "a power of the length with its own derivatives at 0", ending: Ending::Power, recognise: length::recognise_norm_power },
+    Recogniser {
+        spelling: "norm(d)^α",
+        form: "a power of the length with its own derivatives at \
+        0",
+        ending: Ending::Power,
+        recognise: length::recognise_norm_power,
+    },
 ];

@@ -17,7 +17,8 @@ use energy_runtime::{
 /// ```
 /// use energy_compiler::{Inputs, Interpreted};
 ///
-/// let pull = Interpreted::from_source("energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }").unwrap().remove(0);
+/// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
+/// let pull = Interpreted::from_source(source).unwrap().remove(0);
 /// let x = [3.0, 0.0, 4.0, 0.0, 0.0, 0.0];
 /// let outputs = pull.evaluate(&Inputs { parameters: &[2.0], rest: &[], positions: &x, velocities: &[] }).unwrap();
 /// assert_eq!(outputs.blocks[0], ("energy", vec![25.0]));
@@ -160,8 +161,10 @@ impl Interpreted {
     /// ```
     /// use energy_compiler::{Inputs, Interpreted};
     ///
-    /// let pull = Interpreted::from_source("energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }").unwrap().remove(0);
-    /// let inputs = Inputs { parameters: &[2.0], rest: &[], positions: &[3.0, 0.0, 4.0, 0.0, 0.0, 0.0], velocities: &[] };
+    /// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
+    /// let pull = Interpreted::from_source(source).unwrap().remove(0);
+    /// let x = [3.0, 0.0, 4.0, 0.0, 0.0, 0.0];
+    /// let inputs = Inputs { parameters: &[2.0], rest: &[], positions: &x, velocities: &[] };
     /// let rest = pull.precomputed(&inputs).unwrap();
     /// assert_eq!(pull.routine("value", &inputs, &rest).unwrap().0, [[25.0]]);
     /// ```

@@ -1,4 +1,5 @@
-//! Lays generated code out for reading, roughly as `rustfmt` does. Only code that the compiler emits needs to look good.
+//! Lays generated code out for reading, roughly as `rustfmt` does. Only code that the compiler emits needs to look
+//! good.
 
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 

@@ -147,7 +147,8 @@ impl Listing {
                 };
                 writeln!(
                     text,
-                    "  {:<42} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} error terms)  {why}",
+                    "  {:<42} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} \
+                     error terms)  {why}",
                     route.name,
                     route.cost,
                     route.count.total(),

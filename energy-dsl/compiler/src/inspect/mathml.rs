@@ -9,7 +9,8 @@ use crate::syntax::{Body, Expression, ExpressionKind, Item, parse};
 /// `None` if the text does not parse.
 ///
 /// ```
-/// let formula = energy_compiler::mathml("energy Spring(p, q: Point; k, L: Scalar) = \"k/2 (‖p − q‖ − L)²\";").unwrap();
+/// let spring = "energy Spring(p, q: Point; k, L: Scalar) = \"k/2 (‖p − q‖ − L)²\";";
+/// let formula = energy_compiler::mathml(spring).unwrap();
 /// assert!(formula.starts_with("<math") && formula.contains("<mfrac><mi>k</mi><mn>2</mn></mfrac>"));
 /// ```
 #[must_use]

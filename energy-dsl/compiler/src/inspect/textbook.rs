@@ -14,8 +14,10 @@ use energy_runtime::{Inputs, Number};
 ///
 /// ```
 /// use energy_compiler::{Inputs, Textbook};
-/// let spring = Textbook::from_source("energy Spring(p, q: Point; k, L: Scalar) { k / 2 * (norm(p - q) - L)^2 }").unwrap();
-/// let inputs = Inputs { parameters: &[8.0, 1.0], rest: &[], positions: &[0.0, 0.0, 0.0, 3.0, 0.0, 4.0], velocities: &[] };
+/// let source = "energy Spring(p, q: Point; k, L: Scalar) { k / 2 * (norm(p - q) - L)^2 }";
+/// let spring = Textbook::from_source(source).unwrap();
+/// let x = [0.0, 0.0, 0.0, 3.0, 0.0, 4.0];
+/// let inputs = Inputs { parameters: &[8.0, 1.0], rest: &[], positions: &x, velocities: &[] };
 /// assert_eq!(spring.evaluate(&inputs), [64.0]);
 /// ```
 #[derive(Clone, Debug)]

@@ -40,7 +40,8 @@ impl Parser<'_> {
             "uncompensated" => attributes.uncompensated = true,
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
-                    "a declaration takes doc comments, #[audit], #[audit(samples = 200)], #[invariant(translation, rotation)], \
+                    "a declaration takes doc comments, #[audit], #[audit(samples = 200)], #[invariant(translation, \
+                     rotation)], \
                      #[rest_state(zero_force)], #[even] and #[uncompensated]",
                 )));
             }

@@ -53,7 +53,11 @@ fn specialised(
     let original = known.iter().find(|d| d.name.text == of.text)?;
     if original.kind != declaration.kind {
         let (kind, found) = (declaration.kind.keyword(), original.kind.keyword());
-        let message = format!("`{}` is declared as {found}, so `{}` cannot be declared as {kind}", of.text, declaration.name.text);
+        let message = format!(
+            "`{}` is declared as {found}, so `{}` cannot be declared as \
+            {kind}",
+            of.text, declaration.name.text
+        );
         diagnostics
             .push(Diagnostic::new(&of.span, message).help(format!("write {found} {} = …", declaration.name.text)));
         return None;

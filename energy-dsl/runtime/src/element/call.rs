@@ -56,11 +56,13 @@ fn numbers<T: Real, A: Array<T>>(numbers: &A) -> A {
 call!(ValueCall: Potential, value_at(1 vectors E::Points) -> Value<T>);
 call!(GradientCall: Potential, gradient_at(1 vectors E::Points) -> Gradient<T, E::Points>);
 call!(HessianCall: Potential, hessian_at(1 vectors E::Points) -> Hessian<T, E::Points, E::Triangle>);
-call!(HessianVectorCall: Potential, hessian_vector_at(1 vectors E::Points, 2 vectors E::Points) -> HessianVector<T, E::Points>);
+call!(HessianVectorCall: Potential,
+    hessian_vector_at(1 vectors E::Points, 2 vectors E::Points) -> HessianVector<T, E::Points>);
 call!(ReducedHessianCall: ReducedPotential,
     reduced_hessian_at(1 vectors E::Points) -> ReducedHessian<T, E::Coordinates, E::Upper>);
 call!(ForceCall: ForceLaw, force_at(1 vectors E::Points, 2 vectors E::Points) -> ForceValue<T, E::Points>);
-call!(JacobiansCall: ForceLaw, jacobians_at(1 vectors E::Points, 2 vectors E::Points) -> ForceJacobians<T, E::Points, E::Square>);
+call!(JacobiansCall: ForceLaw,
+    jacobians_at(1 vectors E::Points, 2 vectors E::Points) -> ForceJacobians<T, E::Points, E::Square>);
 call!(ConstraintJacobianCall: Constraint,
     constraint_jacobian_at(1 vectors Points<E, T>) -> ConstraintJacobian<T, E::Rows, E::Jacobian>);
 call!(ConstraintHessianCall: Constraint,

@@ -1,4 +1,5 @@
-//! Numbers that generated code runs on: floating-point numbers, SIMD lanes of them, and numbers with an extended exponent.
+//! Numbers that generated code runs on: floating-point numbers, SIMD lanes of them, and numbers with an extended
+//! exponent.
 
 mod block_sum;
 mod cpu;

@@ -50,7 +50,10 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
 }
 
 macro_rules! scalar {
-    ($float:ident, $bits:ident, $run_with_care:expr, $mantissa_bits:literal, $bias:literal, $splitter:literal, $moderate:literal, $span:literal, $reach:literal) => {
+    (
+        $float:ident, $bits:ident, $run_with_care:expr, $mantissa_bits:literal, $bias:literal, $splitter:literal,
+        $moderate:literal, $span:literal, $reach:literal
+    ) => {
         impl Scalar for $float {
             const SIGN: Self = -0.0;
             const MAGNITUDE: Self = $float::from_bits($bits::MAX >> 1);

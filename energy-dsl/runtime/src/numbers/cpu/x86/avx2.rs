@@ -92,8 +92,10 @@ impl Register for __m256d {
         fn and(a: Self, b: Self) -> Self = _mm256_and_pd(a, b);
         fn or(a: Self, b: Self) -> Self = _mm256_or_pd(a, b);
         fn xor(a: Self, b: Self) -> Self = _mm256_xor_pd(a, b);
-        fn add_bits(a: Self, b: Self) -> Self = _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)));
-        fn sub_bits(a: Self, b: Self) -> Self = _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)));
+        fn add_bits(a: Self, b: Self) -> Self =
+            _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)));
+        fn sub_bits(a: Self, b: Self) -> Self =
+            _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)));
     }
 }
 
@@ -143,8 +145,10 @@ impl Register for __m256 {
         fn and(a: Self, b: Self) -> Self = _mm256_and_ps(a, b);
         fn or(a: Self, b: Self) -> Self = _mm256_or_ps(a, b);
         fn xor(a: Self, b: Self) -> Self = _mm256_xor_ps(a, b);
-        fn add_bits(a: Self, b: Self) -> Self = _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
-        fn sub_bits(a: Self, b: Self) -> Self = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
+        fn add_bits(a: Self, b: Self) -> Self =
+            _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
+        fn sub_bits(a: Self, b: Self) -> Self =
+            _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
     }
 }
 
@@ -152,7 +156,8 @@ impl DoubleRegister for __m256d {
     intrinsics! {
         fn low_bits_to_exponent(a: Self) -> Self = _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(a)));
         fn exponent_to_low_bits(a: Self) -> Self = _mm256_castsi256_pd(_mm256_srli_epi64::<52>(_mm256_castpd_si256(a)));
-        fn bit_1_to_sign(a: Self) -> Self = _mm256_castsi256_pd(_mm256_slli_epi64::<63>(_mm256_srli_epi64::<1>(_mm256_castpd_si256(a))));
+        fn bit_1_to_sign(a: Self) -> Self =
+            _mm256_castsi256_pd(_mm256_slli_epi64::<63>(_mm256_srli_epi64::<1>(_mm256_castpd_si256(a))));
     }
 }
 
@@ -160,7 +165,9 @@ impl SingleRegister for __m256 {
     type Double = __m256d;
 
     intrinsics! {
-        fn widen(a: Self) -> [__m256d; 2] = [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))];
-        fn narrow(halves: [__m256d; 2]) -> Self = _mm256_set_m128(_mm256_cvtpd_ps(halves[1]), _mm256_cvtpd_ps(halves[0]));
+        fn widen(a: Self) -> [__m256d; 2] =
+            [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))];
+        fn narrow(halves: [__m256d; 2]) -> Self =
+            _mm256_set_m128(_mm256_cvtpd_ps(halves[1]), _mm256_cvtpd_ps(halves[0]));
     }
 }

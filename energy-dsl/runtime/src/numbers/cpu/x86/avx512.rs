@@ -9,9 +9,15 @@ use crate::numbers::elementary::{Binary, Unary, sin_cos};
 use crate::numbers::lane::check_transposed;
 use crate::numbers::level::{Kernel, Level};
 
-mask!(Mask8(__mmask8), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _, and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m);
+mask!(
+    Mask8(__mmask8), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _,
+    and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask8| !m
+);
 
-mask!(Mask16(__mmask16), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _, and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask16| !m);
+mask!(
+    Mask16(__mmask16), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _,
+    and: |a, b| a & b, or: |a, b| a | b, not: |m: __mmask16| !m
+);
 
 impl Register for __m512d {
     type Scalar = f64;
@@ -70,8 +76,10 @@ impl Register for __m512d {
         fn and(a: Self, b: Self) -> Self = _mm512_and_pd(a, b);
         fn or(a: Self, b: Self) -> Self = _mm512_or_pd(a, b);
         fn xor(a: Self, b: Self) -> Self = _mm512_xor_pd(a, b);
-        fn add_bits(a: Self, b: Self) -> Self = _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)));
-        fn sub_bits(a: Self, b: Self) -> Self = _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)));
+        fn add_bits(a: Self, b: Self) -> Self =
+            _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)));
+        fn sub_bits(a: Self, b: Self) -> Self =
+            _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)));
     }
 }
 
@@ -121,8 +129,10 @@ impl Register for __m512 {
         fn and(a: Self, b: Self) -> Self = _mm512_and_ps(a, b);
         fn or(a: Self, b: Self) -> Self = _mm512_or_ps(a, b);
         fn xor(a: Self, b: Self) -> Self = _mm512_xor_ps(a, b);
-        fn add_bits(a: Self, b: Self) -> Self = _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
-        fn sub_bits(a: Self, b: Self) -> Self = _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
+        fn add_bits(a: Self, b: Self) -> Self =
+            _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
+        fn sub_bits(a: Self, b: Self) -> Self =
+            _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
     }
 }
 
@@ -130,7 +140,8 @@ impl DoubleRegister for __m512d {
     intrinsics! {
         fn low_bits_to_exponent(a: Self) -> Self = _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(a)));
         fn exponent_to_low_bits(a: Self) -> Self = _mm512_castsi512_pd(_mm512_srli_epi64::<52>(_mm512_castpd_si512(a)));
-        fn bit_1_to_sign(a: Self) -> Self = _mm512_castsi512_pd(_mm512_slli_epi64::<63>(_mm512_srli_epi64::<1>(_mm512_castpd_si512(a))));
+        fn bit_1_to_sign(a: Self) -> Self =
+            _mm512_castsi512_pd(_mm512_slli_epi64::<63>(_mm512_srli_epi64::<1>(_mm512_castpd_si512(a))));
     }
 }
 
@@ -138,7 +149,9 @@ impl SingleRegister for __m512 {
     type Double = __m512d;
 
     intrinsics! {
-        fn widen(a: Self) -> [__m512d; 2] = [_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a))];
-        fn narrow(halves: [__m512d; 2]) -> Self = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm512_cvtpd_ps(halves[0])), _mm512_cvtpd_ps(halves[1]));
+        fn widen(a: Self) -> [__m512d; 2] =
+            [_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a))];
+        fn narrow(halves: [__m512d; 2]) -> Self =
+            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm512_cvtpd_ps(halves[0])), _mm512_cvtpd_ps(halves[1]));
     }
 }

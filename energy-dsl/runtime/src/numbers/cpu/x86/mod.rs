@@ -123,7 +123,10 @@ macro_rules! intrinsics {
 
 /// Implements a mask that is an integer or a register.
 macro_rules! mask {
-    ($mask:ident($inner:ty), none: $none:expr, bits: |$m:ident| $bits:expr, from_bits: |$b:ident| $from_bits:expr, and: $and:expr, or: $or:expr, not: $not:expr) => {
+    (
+        $mask:ident($inner:ty), none: $none:expr, bits: |$m:ident| $bits:expr, from_bits: |$b:ident| $from_bits:expr,
+        and: $and:expr, or: $or:expr, not: $not:expr
+    ) => {
         #[doc = "The outcome of a comparison of registers."]
         #[derive(Clone, Copy, Debug)]
         pub struct $mask($inner);
