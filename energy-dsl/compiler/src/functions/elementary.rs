@@ -20,7 +20,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "sqrt",
         "sqrt(x)",
-        "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative at 0 is taken as 0 and flagged.",
+        "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative \
+         at 0 is taken as 0 and flagged.",
         one_scalar,
         "1",
         |g, a| g.sqrt(a[0].node())
@@ -28,7 +29,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "exp",
         usage: "exp(x) or exp(ξ)",
-        docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
+        docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin \
+             ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
         shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
         lower: |g, a| match a[0].shape {
             Shape::Twist => super::quaternion::exp(g, &a[0]),
@@ -104,7 +106,9 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "power_of_two",
         "power_of_two(x)",
-        "The power of two s with 1 ≤ s |x| < 2 (1 if x = 0), in the unit of 1/x. The derivative is taken as 0. Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not depend on s.",
+        "The power of two s with 1 ≤ s |x| < 2 (1 if x = 0), in the unit of 1/x. The derivative is taken as 0. \
+         Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not depend \
+         on s.",
         one_scalar,
         "0",
         |g, a| g.power_of_two_scale(a[0].node())
@@ -131,7 +135,7 @@ pub(super) fn one_scalar(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes {
         [Shape::Scalar] => Ok(Shape::Scalar),
         [other] => Err(format!("takes a scalar, but this is {other}")),
-        _ => Err(format!("takes one scalar, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes one scalar, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -139,14 +143,14 @@ pub(super) fn two_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes {
         [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
         [a, b] => Err(format!("takes two scalars, but these are {a} and {b}")),
-        _ => Err(format!("takes two scalars, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two scalars, but got {}", super::arguments(shapes.len()))),
     }
 }
 
 fn some_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.iter().find(|s| **s != Shape::Scalar) {
         None if shapes.len() >= 2 => Ok(Shape::Scalar),
-        None => Err(format!("takes two or more scalars, but there are {} arguments", shapes.len())),
+        None => Err(format!("takes two or more scalars, but got {}", super::arguments(shapes.len()))),
         Some(other) => Err(format!("takes scalars, but one is {other}")),
     }
 }
@@ -154,7 +158,7 @@ fn some_scalars(shapes: &[Shape]) -> Result<Shape, String> {
 fn three_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes {
         [_, _, _] => some_scalars(shapes),
-        _ => Err(format!("takes three scalars, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes three scalars, but got {}", super::arguments(shapes.len()))),
     }
 }
 
