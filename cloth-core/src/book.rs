@@ -12,3 +12,7 @@ mod integrators {}
 mod performance {}
 #[doc = include_str!("../../docs/book/first-hour.md")]
 mod first_hour {}
+#[doc = include_str!("../../docs/book/internals.md")]
+mod internals {}
+#[doc = include_str!("../../docs/book/glossary.md")]
+mod glossary {}

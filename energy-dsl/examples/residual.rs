@@ -9,7 +9,7 @@ energy! {
 
 fn main() {
     let data = [0.0, 1.0, 2.0, 3.0].map(|x| Parabola::new(x, 2.0 * x - 0.5 * x * x));
-    let [mut a, mut b] = [0.0, 0.0];
+    let [mut a, mut b] = [0.0_f64; 2];
     for step in 0..3 {
         // The normal equations JᵀJ d = −Jᵀr of two unknowns.
         let (mut m, mut g) = ([[0.0; 2]; 2], [0.0; 2]);

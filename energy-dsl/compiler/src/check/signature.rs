@@ -56,7 +56,7 @@ impl Signature {
             if group.element == ElementType::Velocity && declaration.kind != Kind::Force {
                 diagnostics.push(Diagnostic::new(
                     &group.type_span,
-                    format!("a {} does not depend on velocities; declare a force", declaration.kind.keyword()),
+                    format!("this {} cannot depend on velocities; declare a force", declaration.kind.keyword()),
                 ));
             }
             let input_type = input_type(group, globals, diagnostics);

@@ -11,7 +11,7 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
     name: "angle",
     usage: "angle(a, b)",
     docs: "Unsigned angle between two 3-vectors, atan2(‖a×b‖, a·b). If they are parallel or one is 0, the \
-        derivatives are taken as 0 and flagged.",
+         derivatives are taken as 0 and flagged.",
     shape: two_vectors,
     lower: angle,
     accuracy: "3 / 4 / 7",
@@ -21,7 +21,7 @@ fn two_vectors(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(3), Shape::Vector(3)] => Ok(Shape::Scalar),
         [a, b] => Err(format!("takes two 3-vectors, but these are {a} and {b}")),
-        _ => Err(format!("takes two 3-vectors, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two 3-vectors, but got {}", super::arguments(shapes.len()))),
     }
 }
 

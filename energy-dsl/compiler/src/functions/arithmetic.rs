@@ -8,8 +8,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "+",
         usage: "a + b",
-        docs: "Sum of two values of the same \
-        shape.",
+        docs: "Sum of two values of the same shape.",
         shape: same,
         lower: add,
         accuracy: "",
@@ -27,7 +26,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "*",
         usage: "a * b",
         docs: "Product of scalars, matrices, quaternions or dual quaternions, of a matrix and a vector, or of a \
-            scalar and any value.",
+             scalar and any value.",
         shape: product,
         lower: mul,
         accuracy: "",
@@ -37,7 +36,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "^",
         usage: "a ^ b",
         docs: "Power of a scalar. Integer and half-integer exponents become products and roots. `norm(d)^α` is a \
-            robust primitive. `M^(-1)` is the inverse of a matrix.",
+             robust primitive. `M^(-1)` is the inverse of a matrix.",
         shape: power,
         lower: pow,
         accuracy: "norm(d)^α: 3 / 3 / 6",

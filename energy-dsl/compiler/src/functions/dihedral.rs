@@ -16,8 +16,9 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
     name: "dihedral",
     usage: "dihedral(x1, x2, x3, x4)",
     docs: "Signed dihedral angle θ in (−π, π] between the triangles x1x3x4 and x2x3x4 with the shared edge E = x3x4. \
-        It is 0 if flat and +π if exactly folded; sin θ = (n₁ × n₂)·Ê with N₁ = E × (x₁ − x₃). \
-         If a triangle has no area, the angle and its derivatives are 0 and flagged. Sine and cosine of θ and of θ/2 are computed without the angle.",
+         It is 0 if flat and +π if exactly folded; sin θ = (n₁ × n₂)·Ê with N₁ = E × (x₁ − x₃). If a triangle has no \
+         area, the angle and its derivatives are 0 and flagged. Sine and cosine of θ and of θ/2 are computed without \
+         the angle.",
     shape: four_points,
     lower: dihedral,
     accuracy: "4 / 5 / 7",

@@ -4,10 +4,7 @@ use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 macro_rules! scalar_function {
-    (
-        $name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal,
-        |$g:ident, $args:ident| $body:expr
-    ) => {
+    ($name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal, |$g:ident, $args:ident| $body:expr) => {
         Function {
             name: $name,
             usage: $usage,
@@ -33,7 +30,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "exp",
         usage: "exp(x) or exp(ξ)",
         docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin \
-            ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
+             ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
         shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
         lower: |g, a| match a[0].shape {
             Shape::Twist => super::quaternion::exp(g, &a[0]),
@@ -76,8 +73,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "abs",
         "abs(x)",
-        "Absolute value |x|. The derivative at 0 is taken as \
-        0.",
+        "Absolute value |x|. The derivative at 0 is taken as 0.",
         one_scalar,
         "0",
         |g, a| g.abs(a[0].node())
@@ -117,8 +113,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "power_of_two",
         "power_of_two(x)",
         "The power of two s with 1 ≤ s |x| < 2 (1 if x = 0), in the unit of 1/x. The derivative is taken as 0. \
-         Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not \
-         depend on s.",
+         Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not depend \
+         on s.",
         one_scalar,
         "0",
         |g, a| g.power_of_two_scale(a[0].node())
@@ -145,7 +141,7 @@ pub(super) fn one_scalar(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes {
         [Shape::Scalar] => Ok(Shape::Scalar),
         [other] => Err(format!("takes a scalar, but this is {other}")),
-        _ => Err(format!("takes one scalar, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes one scalar, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -153,14 +149,14 @@ pub(super) fn two_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes {
         [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
         [a, b] => Err(format!("takes two scalars, but these are {a} and {b}")),
-        _ => Err(format!("takes two scalars, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two scalars, but got {}", super::arguments(shapes.len()))),
     }
 }
 
 fn some_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.iter().find(|s| **s != Shape::Scalar) {
         None if shapes.len() >= 2 => Ok(Shape::Scalar),
-        None => Err(format!("takes two or more scalars, but there are {} arguments", shapes.len())),
+        None => Err(format!("takes two or more scalars, but got {}", super::arguments(shapes.len()))),
         Some(other) => Err(format!("takes scalars, but one is {other}")),
     }
 }
@@ -168,7 +164,7 @@ fn some_scalars(shapes: &[Shape]) -> Result<Shape, String> {
 fn three_scalars(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes {
         [_, _, _] => some_scalars(shapes),
-        _ => Err(format!("takes three scalars, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes three scalars, but got {}", super::arguments(shapes.len()))),
     }
 }
 

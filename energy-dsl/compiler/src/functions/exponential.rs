@@ -18,7 +18,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "log1p",
         usage: "log1p(x) or log1p(x, u)",
         docs: "ln(1 + x), x > −1, accurate near 0. Near −1, pass an accurate u = 1 + x as the second argument to \
-            avoid cancellation.",
+             avoid cancellation.",
         shape: with_successor,
         lower: |g, a| Lowered::scalar(of_successor(g, a, log1p, log1p_of)),
         accuracy: "4 / 2 / 4",
@@ -27,7 +27,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "log1pmx",
         usage: "log1pmx(x) or log1pmx(x, u)",
         docs: "ln(1 + x) − x, x > −1, accurate near 0, where it is −x²/2. The second argument u = 1 + x is that of \
-            `log1p`.",
+             `log1p`.",
         shape: with_successor,
         lower: |g, a| Lowered::scalar(of_successor(g, a, log1pmx, log1pmx_of)),
         accuracy: "8 / 3 / 4",
@@ -92,7 +92,7 @@ fn with_successor(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.len() {
         1 => one_scalar(shapes),
         2 => two_scalars(shapes),
-        count => Err(format!("takes one or two scalars, but there are {count} arguments")),
+        count => Err(format!("takes one or two scalars, but got {}", super::arguments(count))),
     }
 }
 

@@ -13,7 +13,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "norm",
         usage: "norm(d) or ‖d‖",
         docs: "Length of a vector or quaternion. At 0 the derivatives are taken as 0 and flagged. `norm(d) - L` and \
-            its square are robust primitives.",
+             its square are robust primitives.",
         shape: vector_to_scalar,
         lower: norm,
         accuracy: "2 / 2 / 6",
@@ -30,7 +30,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "unit",
         usage: "unit(d) or â",
         docs: "d/‖d‖ of a vector or quaternion. For a dual quaternion, both parts are divided by the norm of the \
-            real part. At 0 the result is taken as 0 and flagged.",
+             real part. At 0 the result is taken as 0 and flagged.",
         shape: unit_shape,
         lower: unit,
         accuracy: "2 / 5 / 8",
@@ -48,7 +48,7 @@ fn unit_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [v @ (Shape::Vector(_) | Shape::Quat | Shape::DualQuat)] => Ok(v),
         [other] => Err(format!("takes a vector, but this is {other}")),
-        _ => Err(format!("takes one vector, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes one vector, but got {}", super::arguments(shapes.len()))),
     }
 }
 

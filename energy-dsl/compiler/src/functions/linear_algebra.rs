@@ -12,8 +12,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "dot",
         usage: "dot(a, b) or a·b",
         docs: "Inner product of two vectors or quaternions; the product of two scalars. `dot(unit(a), unit(b))` is a \
-            robust primitive, the cosine between a and b. In `dot(rotate(q, n), transform(q, p) - x)`, p is not \
-            rotated, because a rotation preserves n·p.",
+             robust primitive, the cosine between a and b. In `dot(rotate(q, n), transform(q, p) - x)`, p is not \
+             rotated, because a rotation preserves n·p.",
         shape: dot_shape,
         lower: dot,
         accuracy: "",
@@ -122,7 +122,7 @@ fn dot_shape(shapes: &[Shape]) -> Result<Shape, String> {
         [Shape::Quat, Shape::Quat] | [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
         [Shape::Scalar, other] | [other, Shape::Scalar] => Ok(other),
         [a, b] => Err(format!("takes two vectors of the same length, but these are {a} and {b}")),
-        _ => Err(format!("takes two vectors, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two vectors, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -132,7 +132,7 @@ fn cross_shape(shapes: &[Shape]) -> Result<Shape, String> {
         [Shape::Scalar, Shape::Scalar] => Ok(Shape::Scalar),
         [Shape::Scalar, other] | [other, Shape::Scalar] => Ok(other),
         [a, b] => Err(format!("takes two 3-vectors, but these are {a} and {b}")),
-        _ => Err(format!("takes two 3-vectors, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two 3-vectors, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -140,7 +140,7 @@ fn outer_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(a), Shape::Vector(b)] => Ok(Shape::Matrix(a, b)),
         [a, b] => Err(format!("takes two vectors, but these are {a} and {b}")),
-        _ => Err(format!("takes two vectors, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two vectors, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -148,7 +148,7 @@ fn ddot_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [a @ Shape::Matrix(..), b] if a == b => Ok(Shape::Scalar),
         [a, b] => Err(format!("takes two matrices of the same shape, but these are {a} and {b}")),
-        _ => Err(format!("takes two matrices, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes two matrices, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -157,7 +157,7 @@ fn transpose_shape(shapes: &[Shape]) -> Result<Shape, String> {
         [Shape::Matrix(r, c)] => Ok(Shape::Matrix(c, r)),
         [Shape::Vector(n)] => Ok(Shape::Matrix(1, n)),
         [other] => Err(format!("takes a matrix or a vector, but this is {other}")),
-        _ => Err(format!("takes one matrix, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes one matrix, but got {}", super::arguments(shapes.len()))),
     }
 }
 
@@ -165,7 +165,7 @@ fn square_to_square(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Matrix(r @ (2 | 3), c)] if r == c => Ok(shapes[0]),
         [other] => Err(format!("takes a 2×2 or 3×3 matrix, but this is {other}")),
-        _ => Err(format!("takes one matrix, but there are {} arguments", shapes.len())),
+        _ => Err(format!("takes one matrix, but got {}", super::arguments(shapes.len()))),
     }
 }
 

@@ -10,7 +10,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "huber",
         usage: "huber(x, δ)",
         docs: "x²/2 if |x| ≤ δ, else δ (|x| − δ/2), with δ > 0. At |x| = δ the second derivative is the inner one, \
-            and flagged.",
+             and flagged.",
         shape: two_scalars,
         lower: |g, a| Lowered::scalar(huber(g, a[0].node(), a[1].node())),
         accuracy: "2 / 0 / 0",

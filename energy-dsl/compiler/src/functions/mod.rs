@@ -28,9 +28,9 @@ pub struct Function {
     pub name: &'static str,
     /// Form of a call, for messages and documentation.
     pub usage: &'static str,
-    /// Description.
+    /// Formula, domain and behaviour at singularities, for the language reference.
     pub docs: &'static str,
-    /// Returns the shape of the result, or a message that says what was expected.
+    /// Returns the shape of the result, or a message that names the expected shapes.
     pub shape: fn(&[Shape]) -> Result<Shape, String>,
     /// Returns the nodes of the result.
     pub lower: fn(&mut Graph, &[Lowered]) -> Lowered,
@@ -69,6 +69,11 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
 #[must_use]
 pub fn find(name: &str) -> Option<&'static Function> {
     all().find(|f| f.name == name)
+}
+
+/// Returns a number of arguments for a message: `1 argument`, `3 arguments`.
+fn arguments(count: usize) -> String {
+    format!("{count} argument{}", if count == 1 { "" } else { "s" })
 }
 
 /// Returns each naive spelling that compiles to a robust form, with a description of that form.

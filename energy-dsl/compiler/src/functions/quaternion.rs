@@ -95,7 +95,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "transform",
         usage: "transform(q, p)",
         docs: "Moves the point p by a dual quaternion with unit real part: a rotation by real(q), then a translation \
-            by the vector part of 2 dual(q) real(q)*.",
+             by the vector part of 2 dual(q) real(q)*.",
         shape: |s| {
             exactly(s, &[Shape::DualQuat, Shape::Vector(3)], Shape::Vector(3), "takes a dual quaternion and a 3-vector")
         },
@@ -106,7 +106,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "rotation",
         usage: "rotation(θ)",
         docs: "The unit quaternion (cos ‖θ‖, θ sin ‖θ‖/‖θ‖) of half a rotation vector θ: it rotates by 2‖θ‖. Regular \
-            at θ = 0.",
+             at θ = 0.",
         shape: |s| exactly(s, &[Shape::Vector(3)], Shape::Quat, "takes a 3-vector"),
         lower: |g, a| quaternion(&rotation(g, &a[0].parts)),
         accuracy: "",

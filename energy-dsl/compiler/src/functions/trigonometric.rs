@@ -18,7 +18,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "asin",
         usage: "asin(x)",
         docs: "The angle in [−π/2, π/2] whose sine is x. If |x| > 1, x is clamped and flagged. If |x| ≥ 1, the \
-            derivatives are taken as 0 and flagged.",
+             derivatives are taken as 0 and flagged.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(arc(g, a[0].node(), Primitive::ArcSine)),
         accuracy: "3 / 3 / 8",
@@ -27,7 +27,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "acos",
         usage: "acos(x)",
         docs: "The angle in [0, π] whose cosine is x, clamped and flagged like `asin`. `acos(dot(unit(a), unit(b)))` \
-            is compiled as `angle(a, b)`.",
+             is compiled as `angle(a, b)`.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(acos(g, a[0].node())),
         accuracy: "3 / 3 / 8",

@@ -145,12 +145,13 @@ impl<'a> Parser<'a> {
             match symbol.as_str() {
                 "{" | "(" | "[" => depth += 1,
                 "}" | ")" | "]" => {
-                    depth -= 1;
-                    if depth <= 0 && symbol == "}" {
+                    // The error can be inside brackets whose start was already read.
+                    depth = (depth - 1).max(0);
+                    if depth == 0 && symbol == "}" {
                         return;
                     }
                 }
-                ";" if depth <= 0 => return,
+                ";" if depth == 0 => return,
                 _ => {}
             }
         }
