@@ -1,5 +1,5 @@
-//! What elementary functions cost beside the standard library's: `cargo bench -p energy-dsl --bench elementary`.
-//! Nanoseconds a call, of a lane as a whole; the arguments are independent, so this is throughput.
+//! Throughput of elementary functions next to the standard library, in nanoseconds per call (of all lanes together):
+//! `cargo bench -p energy-dsl --bench elementary`.
 
 #![allow(missing_docs)]
 
@@ -10,7 +10,7 @@ use energy_dsl::{Kernel, Lane, Level, Number, available, dispatch_at};
 
 const COUNT: usize = 1024;
 
-/// The fastest of several passes over the arguments, in nanoseconds a call.
+/// Returns the time of the fastest of several passes over the arguments, in nanoseconds per call.
 #[inline(always)]
 fn fastest(calls: usize, mut pass: impl FnMut()) -> f64 {
     let time = |_| {
@@ -55,7 +55,7 @@ functions! {
     Pow: |a, b| a.abs().powf::<L>(b), a.abs().powf(b);
 }
 
-/// One pass over the arguments with lanes of type `V`.
+/// Processes all arguments once, with lanes of type `V`.
 struct Pass<'a, S, V, F>(&'a [S], &'a [S], &'a mut [S], std::marker::PhantomData<(V, F)>);
 
 impl<S: Number, V: Lane<S>, F: Function> Kernel for Pass<'_, S, V, F> {
@@ -77,7 +77,7 @@ impl<S: Number, V: Lane<S>, F: Function> Kernel for Pass<'_, S, V, F> {
     }
 }
 
-/// Times of a scalar, of a lane of doubles and of one of single precision.
+/// Measures a scalar, a register of doubles and one of single-precision numbers.
 struct Times<'a, F>(&'a [f64], &'a [f64], std::marker::PhantomData<F>);
 
 impl<F: Function> Kernel for Times<'_, F> {

@@ -1,4 +1,4 @@
-//! What a generated routine costs at each level, scalar and over lanes: `cargo bench -p energy-dsl --bench lanes`.
+//! Times of a generated routine at each level, for scalars and lanes: `cargo bench -p energy-dsl --bench lanes`.
 
 #![allow(missing_docs, mixed_script_confusables)]
 
@@ -16,8 +16,8 @@ energy! {
     }
 }
 
-/// The fastest of several runs of many calls, in nanoseconds a call. The loop is compiled for the level, too: a closure
-/// would not be.
+/// Measures the fastest of several runs of many calls, in nanoseconds per call. The loop is compiled for the level,
+/// too, which a closure would not be.
 struct Time<'a, T: Real, E: Potential<T>>(&'a E, &'a E::Points, std::marker::PhantomData<T>);
 
 impl<T: Real, E: Potential<T>> Kernel for Time<'_, T, E> {
@@ -42,7 +42,7 @@ fn points<T: Real, const N: usize>(number: impl Fn(usize) -> T) -> [[T; 3]; N] {
     std::array::from_fn(|point| std::array::from_fn(|axis| number(point + 20 * axis)))
 }
 
-/// Spring and hinge over lanes of type `V`.
+/// A spring and a hinge over lanes of type `V`.
 struct Elements<V>(std::marker::PhantomData<V>);
 
 struct Measure;

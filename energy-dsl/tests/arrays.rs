@@ -1,4 +1,4 @@
-//! Arrays, matrices and constants as inputs: declared, compiled and run.
+//! Declares, compiles and runs elements with arrays, matrices and constants as inputs.
 #![allow(missing_docs)]
 
 use approx::assert_relative_eq;
@@ -62,7 +62,7 @@ fn flat_parameters_and_the_source_text_mean_the_same() {
     let positions = AT.concat();
     let inputs = Inputs { parameters: &parameters, rest: &[], positions: &positions, velocities: &[] };
     let generated = Centre::<f64>::evaluate(&inputs).unwrap().blocks[0].1[0];
-    // The text brings along the function and the constant that it uses.
+    // The text includes the function and the constant that it uses.
     let source = Centre::<f64>::DECLARATION.source;
     assert!(source.contains("fn blend") && source.contains("const COUNT"), "{source}");
     assert_relative_eq!(generated, Textbook::from_source(source).unwrap().evaluate(&inputs)[0], max_relative = 1e-14);

@@ -1,4 +1,4 @@
-//! Batches of elements give what single elements give, for any number of them.
+//! Batches of any size give the results of single elements.
 
 #![allow(mixed_script_confusables)]
 
@@ -19,7 +19,7 @@ fn positions() -> Vec<[f64; 3]> {
     (0..30).map(|i| [number(3 * i), number(3 * i + 1), number(3 * i + 2)]).collect()
 }
 
-/// The stencils of `count` elements; every seventh has all its points in one place.
+/// Returns the stencils of `count` elements. In every seventh, all points coincide.
 fn stencils<const N: usize>(count: usize) -> Vec<[u32; N]> {
     let point = |element: usize, point: usize| if element % 7 == 6 { 3 } else { (element * 5 + point * 4) as u32 % 30 };
     (0..count).map(|element| std::array::from_fn(|p| point(element, p))).collect()

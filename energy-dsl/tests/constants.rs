@@ -1,4 +1,4 @@
-//! Constants and fixed parameters fold: what they switch off leaves no operations.
+//! Constants and fixed parameters fold: the parts that they switch off leave no operations.
 #![allow(missing_docs)]
 
 use energy_compiler::Textbook;

@@ -1,4 +1,4 @@
-//! Declarations from a file.
+//! `include_energy!` declares the contents of a file.
 #![allow(missing_docs)]
 
 use energy_dsl::include_energy;

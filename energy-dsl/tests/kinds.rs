@@ -1,4 +1,4 @@
-//! The four kinds of declaration, declared, compiled and run.
+//! Declares, compiles and runs the four kinds of declaration.
 #![allow(missing_docs)]
 
 use approx::assert_relative_eq;

@@ -1,4 +1,4 @@
-//! Lanes compute what scalars compute, bit for bit, at every level of the machine.
+//! Lanes are bit-identical to scalars, at every level of the machine.
 
 #![allow(mixed_script_confusables)]
 
@@ -10,10 +10,10 @@ use energy_dsl::{
     available, dispatch, dispatch_at, level,
 };
 
-/// A scalar whose bits can be compared.
+/// A scalar with comparable bits.
 trait Bits: Lane<Self> + Number<Mask = bool> + Into<f64> {
     fn bits(self) -> u64;
-    /// Numbers of every kind there is.
+    /// Returns examples of every kind of number.
     fn examples() -> Vec<Self>;
 }
 
@@ -21,7 +21,7 @@ macro_rules! bits {
     ($float:ident) => {
         impl Bits for $float {
             fn bits(self) -> u64 {
-                // Which NaN comes out of two is the processor's business.
+                // The processor chooses which of two NaNs it returns.
                 if self.is_nan() { u64::MAX } else { u64::from(self.to_bits()) }
             }
             fn examples() -> Vec<Self> {
@@ -52,7 +52,7 @@ macro_rules! bits {
 bits!(f64);
 bits!(f32);
 
-/// A check that is run for the lanes of both precisions at a level.
+/// A check of the lanes of both precisions at a level.
 trait Check {
     fn check<S: Bits, V: Lane<S>, L: Level>();
 }
@@ -77,7 +77,7 @@ fn at_every_level<C: Check>() {
     }
 }
 
-/// Asserts that lanes hold what the scalars `expected(i)` are.
+/// Asserts that lane i equals the scalar `expected(i)`.
 #[track_caller]
 fn assert_lanes<S: Bits, V: Lane<S>>(actual: V, expected: impl Fn(usize) -> S, what: impl Debug) {
     for lane in 0..V::LANES {
@@ -102,7 +102,7 @@ impl Check for Arithmetic {
         let examples = S::examples();
         let count = examples.len();
         for i in 0..count {
-            // Every lane has another number, so that no lane can stand in for its neighbour.
+            // All lanes differ, so that a mix-up of lanes is noticed.
             let a = |lane: usize| examples[(i + lane) % count];
             let va = V::from_fn(a);
             assert_lanes(va.sqrt(), |l| a(l).sqrt(), ("sqrt", va));
@@ -180,7 +180,7 @@ struct ElementaryFunctions;
 
 impl Check for ElementaryFunctions {
     fn check<S: Bits, V: Lane<S>, L: Level>() {
-        // Every kind of number, angles of every size among them, and what lies between.
+        // Every kind of number, angles of every size, and numbers between them.
         let mut numbers = S::examples();
         numbers.extend((-60..60).flat_map(|i| {
             let x = f64::from(i) * 0.37;
@@ -245,7 +245,7 @@ impl Check for SpecialCases {
         let mut numbers = S::examples();
         numbers
             .extend([-3.0, -2.5, 0.5, 2.0, 1e15, 4_503_599_627_370_497.0, -9_007_199_254_740_993.0].map(S::from_f64));
-        // The standard library knows the special cases; `verify` has the errors of all others.
+        // The standard library is right in the special cases; `verify` tests the errors of all others.
         let check = |actual: V, expected: f64, what: &str, a: S, b: S| {
             let (actual, expected): (f64, f64) = (actual.extract(0).into(), S::from_f64(expected).into());
             let same = actual == expected && actual.is_sign_negative() == expected.is_sign_negative();
@@ -284,7 +284,7 @@ energy! {
 
 struct Elements;
 
-/// Points in general position, by element and point; every fifth element is degenerate.
+/// Points in general position, by element and point. Every fifth element is degenerate.
 fn points<S: Bits, const N: usize>(element: usize) -> [[S; 3]; N] {
     let number =
         |point: usize, axis: usize| S::from_f64((1.7 * (3 * point + axis) as f64 + 0.9 * element as f64).sin());
@@ -318,12 +318,12 @@ fn assert_routines<S: Bits, V: Lane<S>, const N: usize, Wide, Narrow>(
     assert_mask(lanes.flags.kink, V::LANES, |l| scalars[l].flags.kink, "kink");
 }
 
-/// A scalar Hessian with its triangle as a vector.
+/// Returns a scalar Hessian with its triangle as a vector.
 fn listed<S: Bits, P, T: Array<Block<S>>>(h: Hessian<S, P, T>) -> Hessian<S, P, Vec<Block<S>>> {
     Hessian { value: h.value, gradient: h.gradient, hessian: h.hessian.as_ref().to_vec(), flags: h.flags }
 }
 
-/// Points of lanes from points of elements.
+/// Gathers the points of elements into lanes.
 fn gathered<S: Bits, V: Lane<S>, const N: usize>(element: impl Fn(usize) -> [[S; 3]; N]) -> [[V; 3]; N] {
     std::array::from_fn(|point| std::array::from_fn(|axis| V::from_fn(|lane| element(lane)[point][axis])))
 }
@@ -359,7 +359,7 @@ impl Check for Rows {
     fn check<S: Bits, V: Lane<S>, L: Level>() {
         let points: Vec<[S; 3]> =
             (0..20).map(|point| [0.0, 0.25, 0.5].map(|axis| S::from_f64(f64::from(point) + axis))).collect();
-        // The last point among them: nothing after it may be read.
+        // Includes the last point, so that a read past the end is noticed.
         let indices: Vec<u32> = (0..V::LANES as u32).map(|lane| (7 * lane + 19) % 20).collect();
         let gathered = V::gather(&points, &indices);
         for axis in 0..3 {
@@ -370,7 +370,7 @@ impl Check for Rows {
             let wide: Vec<V> = (0..numbers).map(|row| V::from_fn(|lane| number(row, lane))).collect();
             for (count, gap) in (0..=V::LANES).flat_map(|count| [(count, 0), (count, 3)]) {
                 let stride = numbers + gap;
-                // No place more than needed.
+                // Exactly as many places as needed.
                 let mut rows = vec![S::from_f64(0.0); (count * stride).saturating_sub(gap)];
                 V::store_transposed(&wide, count, &mut rows, stride);
                 for (place, &stored) in rows.iter().enumerate() {
@@ -446,7 +446,7 @@ fn kernels_run_at_the_level_asked_for() {
     assert!("AVX9".parse::<energy_dsl::LevelName>().is_err());
 }
 
-/// Five blocks of a row, and what they are multiplied with.
+/// Five blocks of a row, and the vectors that they multiply.
 struct Row<'a, S> {
     numbers: &'a [S],
     vectors: &'a [[S; 4]; 5],
@@ -485,7 +485,7 @@ fn sums_of_blocks_have_the_same_bits<S: Bits>(
     at: impl Fn(LevelName, &[S], &[[S; 4]; 5]) -> (bool, [[S; 4]; 2]),
 ) {
     let vectors: [[S; 4]; 5] = std::array::from_fn(|i| std::array::from_fn(|k| numbers[4 * i + k]));
-    // Products by hand, at some distance from the fused ones.
+    // The products in plain arithmetic, which differ a little from the fused ones.
     let entry = |place: usize, row: usize, column: usize| -> f64 { numbers[9 * place + 3 * row + column].into() };
     let product = |place: usize, row: usize| -> f64 {
         (0..3).map(|column| entry(place, row, column) * Into::<f64>::into(vectors[place][column])).sum()

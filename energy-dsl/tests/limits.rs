@@ -1,4 +1,4 @@
-//! Where a function has a limit it is returned, where it has none the documented value and a flag; never a silent NaN.
+//! Functions return their limits where these exist, else a documented value and a flag.
 #![allow(missing_docs)]
 
 use energy_dsl::energy;
@@ -17,7 +17,7 @@ energy! {
     residual Blend(q: DualQuat; p: Vec3) { transform(unit(q), p) }
 }
 
-/// Value, first and second derivative, and whether a flag is up.
+/// Returns value, first and second derivative, and whether a flag is set.
 fn at<E: Potential<f64, Points = [[f64; 3]; 1], Triangle = [[[f64; 3]; 3]; 1]>>(
     e: &E,
     x: f64,

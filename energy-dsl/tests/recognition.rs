@@ -1,12 +1,11 @@
-//! Naive spellings compile to the robust form: they and the robust spelling give the same primitives, the same
-//! operations and the same bits.
+//! Naive and robust spellings compile to the same primitives, the same operations and the same bits.
 #![allow(missing_docs)]
 
 use energy_compiler::compile;
 use energy_dsl::Potential;
 use energy_dsl::energy;
 
-/// The primitives that a formula of vectors and numbers compiles to, and the operations of each routine.
+/// Returns the primitives and the operation counts of a formula of vectors and numbers.
 fn plan(formula: &str) -> String {
     let source = format!(
         "energy Test(p, q, r: Point; k, δ: Scalar) {{
@@ -20,8 +19,8 @@ fn plan(formula: &str) -> String {
     plan_of(&source)
 }
 
-/// The same of a residual of a motion Q by a unit dual quaternion, and of the vectors n, v and u and a quaternion h of
-/// any length.
+/// Returns the same for a residual of a motion Q (a unit dual quaternion), of vectors n, v and u, and of a quaternion h
+/// of any length.
 fn plan_of_motion(formula: &str) -> String {
     plan_of(&format!(
         "residual Test(ξ: [Twist; 2]; w: [Scalar; 2], h: Quat, n, v, u: Vec3) {{
@@ -76,7 +75,7 @@ fn what_a_rotation_keeps_is_not_rotated() {
     ] {
         assert!(plan_of_motion(naive) == plan_of_motion(robust), "{naive} is not {robust}");
     }
-    // A quaternion that may have another length, and one of two.
+    // Quaternions of unknown length, and two different ones.
     for (one, other) in [
         ("dot(rotate(h, n), rotate(h, v))", "dot(n, v)"),
         ("dot(rotate(exp(ξ[0]), n), rotate(exp(ξ[1]), v))", "dot(n, v)"),

@@ -1,4 +1,4 @@
-//! The language reference agrees with the compiler. `UPDATE_GOLDEN=1 cargo test` records the compiler's tables in it.
+//! The tables of the language reference match the compiler. `UPDATE_GOLDEN=1 cargo test` records them.
 
 use std::path::Path;
 

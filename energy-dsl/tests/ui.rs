@@ -1,4 +1,5 @@
-//! Messages of the macro and the places that rustc reports them at. `TRYBUILD=overwrite cargo test` records them.
+//! Error messages of the macro, and the places that rustc reports them at. `TRYBUILD=overwrite cargo test` records
+//! them.
 
 #[test]
 fn mistakes_are_reported_at_their_place() {

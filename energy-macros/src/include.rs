@@ -11,7 +11,7 @@ pub fn expand(input: TokenStream) -> TokenStream {
         Ok((path, text)) => {
             let code = energy_compiler::compile_file(&text, &path, at);
             let path = Literal::string(&format!("/{path}"));
-            // Named in the code, so that a change of the file compiles it anew.
+            // Names the file in the code, so that cargo rebuilds the crate when it changes.
             quote::quote! {
                 const _: &[u8] = ::core::include_bytes!(::core::concat!(::core::env!("CARGO_MANIFEST_DIR"), #path));
                 #code
@@ -21,7 +21,7 @@ pub fn expand(input: TokenStream) -> TokenStream {
     }
 }
 
-/// The path in the literal.
+/// Returns the path in the literal.
 fn path(input: TokenStream) -> Result<String, String> {
     const EXPECTED: &str =
         "expected the path of a file from the root of the crate, as in include_energy!(\"src/springs.energy\")";
@@ -32,7 +32,7 @@ fn path(input: TokenStream) -> Result<String, String> {
     path.map(str::to_owned).ok_or_else(|| EXPECTED.into())
 }
 
-/// The file's text.
+/// Reads the file.
 fn read(path: &str) -> Result<String, String> {
     let root = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_else(|_| ".".into());
     let whole = Path::new(&root).join(path);

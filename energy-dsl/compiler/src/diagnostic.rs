@@ -62,7 +62,7 @@ impl Span {
 /// An error in a text.
 #[derive(Clone, Debug)]
 pub struct Diagnostic {
-    /// What was expected, and what was found.
+    /// Message: expected and found.
     pub message: String,
     /// How to fix it; `None` if unknown.
     pub help: Option<String>,

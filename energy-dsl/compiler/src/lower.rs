@@ -100,7 +100,7 @@ struct Lowering<'a> {
     program: &'a Program,
     graph: Graph,
     done: BTreeMap<usize, Lowered>,
-    /// Where stored bindings start; `None` if they are computed.
+    /// Index of each stored binding; `None` if bindings are computed here.
     slots: Option<BTreeMap<usize, usize>>,
     /// Derivatives that the evaluation of the textbook form must supply.
     gradients: Vec<(NodeId, usize)>,

@@ -1,4 +1,4 @@
-//! Texts of the compiler that users read, against recorded ones. `UPDATE_GOLDEN=1 cargo test` records anew.
+//! Compares texts that users read with recorded ones. `UPDATE_GOLDEN=1 cargo test` records them.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ fn a_broken_declaration_still_declares_its_type() {
     }
 }
 
-/// The messages of a file name file, line and column, and show the line.
+/// Messages about a file name file, line and column, and show the line.
 #[test]
 fn mistakes_in_a_file_are_shown_in_it() {
     let text = include_str!("golden/broken.energy");
@@ -62,7 +62,7 @@ fn mistakes_in_a_file_are_shown_in_it() {
     assert_golden("broken.energy.messages.txt", &messages);
 }
 
-/// Claims that cannot be proved, or that nothing checks, are errors of the code and not of the text.
+/// Claims that cannot be proved, or that nothing checks, are errors.
 #[test]
 fn claims_are_proved_or_refused() {
     for (source, expected) in [

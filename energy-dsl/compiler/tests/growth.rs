@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use energy_compiler::Listing;
 
-/// A small generator of numbers (xorshift).
+/// A small random number generator (xorshift).
 struct Random(u64);
 
 impl Random {
@@ -28,7 +28,7 @@ fn program(size: usize, points: usize, seed: u64) -> String {
         write!(text, "let s{i} = norm_squared(p{} - p{}); ", i % points, i - 1).expect("writing to a string succeeds");
     }
     for i in points + 1..=points + size {
-        // The value before is always used, so that nothing is dead.
+        // Uses the previous value, so that nothing is dead.
         let (a, b) = (i - 1, random.below(i));
         let value = match random.below(7) {
             0 => format!("s{a} * s{b}"),
@@ -45,7 +45,7 @@ fn program(size: usize, points: usize, seed: u64) -> String {
     text
 }
 
-/// Operations of the Hessian, and the time to compile.
+/// Returns the number of operations of the Hessian and the compile time.
 fn compiled(size: usize, points: usize, seed: u64) -> (usize, Duration) {
     let source = program(size, points, seed);
     let start = Instant::now();

@@ -1,12 +1,13 @@
-//! What a text means: both spellings, every function, and derivatives of what they compile to.
+//! The meaning of texts: both spellings, every function, and derivatives of compiled formulas.
 
 use approx::assert_relative_eq;
 use energy_compiler::Textbook;
 use energy_runtime::Inputs;
 
-/// The value of a formula of the points p = (1, 2, 2), q = (3, −1, 4) and the parameters k = 3, L = 0.5, θ₀ = 0.25.
+/// Returns the value of a formula of the points p = (1, 2, 2), q = (3, −1, 4) and the parameters k = 3, L = 0.5, θ₀ =
+/// 0.25.
 fn value(body: &str) -> f64 {
-    // Every input is used, so that a formula need not.
+    // Uses every input, so that the formula need not.
     let source =
         format!("constraint Test(p_k, p_l: Point; k, L, θ0: Scalar) {{ vector({body}, dot(p_k, p_l) * k * L * θ0) }}");
     let program = Textbook::from_source(&source).unwrap_or_else(|e| panic!("{source}\n{e}"));
@@ -78,7 +79,7 @@ fn functions_compute_what_they_say() {
         ("(rotation_matrix(rotation(vector(0, 0, π / 4))) * vector(1, 0, 0)).y", 1.0),
         ("transform(exp(twist(vector(0, 0, π / 4), p_l)), p_k).y", 0.0),
         ("linear(twist(p_k, p_l)).x + angular(twist(p_k, p_l)).y", 5.0),
-        // Motions compose: first the one on the right.
+        // Motions compose from right to left.
         (
             "{ let A = exp(twist(L * p_k, p_l)); let B = exp(twist(p_l, p_k)); norm(transform(A * B, p_l) - \
              transform(A, transform(B, p_l))) }",
@@ -110,7 +111,7 @@ fn functions_compute_what_they_say() {
     }
 }
 
-/// What has right units is accepted, also where some are left to be inferred.
+/// Correct units are accepted, including inferred ones.
 #[test]
 fn right_units_are_accepted() {
     for source in [
@@ -125,7 +126,7 @@ fn right_units_are_accepted() {
         "force A(_p: Point, v: Velocity; c: Scalar[N s/m]) { -c * v }",
         "residual A(ξ: Twist; p: Vec3[m]) { vector(norm(p), angular(ξ).x, dot(linear(ξ), p)) }",
         "constraint A(p, q: Point; L: Scalar[m]) { [norm(p - q) - L, dot(p, q) / L^2] }",
-        // Nothing has a unit: nothing to check.
+        // Without units there is nothing to check.
         "energy A(p, q: Point; α: Scalar[1]) { norm(p - q)^α + sin(norm(p)) }",
     ] {
         Textbook::from_source(source).unwrap_or_else(|e| panic!("{source}\n{e}"));

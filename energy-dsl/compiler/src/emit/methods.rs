@@ -132,8 +132,7 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
                     #ordinary
                 }
 
-                /// The general path, over numbers with an extended exponent. Lanes that do not need it stay as they
-                /// are.
+                /// The general path, over numbers with an extended exponent. Lanes on the ordinary path do not change.
                 #[cold]
                 #[inline(never)]
                 fn #in_general(

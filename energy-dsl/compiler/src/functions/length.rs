@@ -140,7 +140,7 @@ fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
     }
     let at = direction(g, d);
     let value = g.div(at.length, at.scale);
-    // By a and b if d = a × b.
+    // Differentiates by a and b if d = a × b.
     let curvature = g.mul(at.reciprocal, at.scale);
     let (arguments, (first, second)) = match parallelogram::edges(g, d) {
         Some(edges) => (edges.concat(), parallelogram::derivatives(g, &edges, &at.unit, curvature)),

@@ -11,7 +11,7 @@ use super::real::{Mask, Number, Real};
 /// overflow nor underflow. Extraordinary configurations are computed with it: edges of length 1e-160, whose squares
 /// underflow in doubles, keep all their digits.
 ///
-/// Where the plain type neither overflows nor underflows, the bits are the same.
+/// The bits are those of the plain type if that neither overflows nor underflows.
 #[derive(Clone, Copy, Debug)]
 pub struct Unbounded<S> {
     /// Zero, infinite, NaN, or of a magnitude in [1/`S::SPAN`, `S::SPAN`).

@@ -139,7 +139,7 @@ impl fmt::Display for Power {
 /// Parses a unit: names with powers, combined by `·`, `*`, `/` or a space, with parentheses.
 ///
 /// # Errors
-/// What is wrong with it.
+/// A message if the text is not a unit.
 pub(super) fn parse(text: &str) -> Result<Dimension, String> {
     let characters: Vec<char> = text.chars().collect();
     let mut parser = Parser { characters: &characters, at: 0 };
