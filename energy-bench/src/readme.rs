@@ -17,7 +17,7 @@ pub const END: &str = "<!-- benchmark: end -->";
 /// Times in nanoseconds of contenders that this program cannot run, and of generated code in the same run (one core of
 /// an AMD EPYC with AVX-512; 1,024 elements).
 const DATED: [(&str, [&str; 5]); 4] = [
-    ("TinyAD, scalar (last column: gradient only), November 2026", ["185", "1,770", "3,098", "3,118", "854"]),
+    ("TinyAD, scalar (point to plane: gradient only), November 2026", ["185", "1,770", "3,098", "3,118", "854"]),
     ("SymX, AVX2, packed, November 2026", ["8.3", "22", "130", "25", "156"]),
     ("generated, scalar loop, November 2026", ["14", "32", "95", "28", "91"]),
     ("generated, AVX-512 lanes, November 2026", ["4.5", "9.0", "22", "10", "20"]),

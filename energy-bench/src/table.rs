@@ -13,61 +13,90 @@ pub fn table(kernels: &[Measured]) -> Table {
     let title = |kernel: &Measured| format!("{} {}", kernel.key, kernel.title);
     table.set_header(std::iter::once("ns per element".to_owned()).chain(kernels.iter().map(title)));
     let mut rows = Rows { kernels, table: &mut table };
+    times(&mut rows);
+    ratios_to_hand_derived(&mut rows);
+    ratios_to_generated(&mut rows);
+    counts_and_accuracy(&mut rows);
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
 
-    let levels = || LevelName::ALL.into_iter();
+fn levels() -> impl Iterator<Item = LevelName> {
+    LevelName::ALL.into_iter()
+}
+
+/// The best time of generated code in a scalar loop.
+fn generated_scalar(kernel: &Measured) -> Option<f64> {
+    kernel.best(|contender| matches!(contender, Contender::GeneratedScalar(_)))
+}
+
+fn times(rows: &mut Rows<'_>) {
     rows.time(Contender::GeneratedPlain);
     rows.time(Contender::UncompensatedPlain);
     rows.time(Contender::HandPlain);
-    levels().for_each(|level| rows.time(Contender::GeneratedScalar(level)));
-    levels().for_each(|level| rows.time(Contender::GeneratedLanes(level)));
-    levels().for_each(|level| rows.time(Contender::UncompensatedLanes(level)));
-    levels().for_each(|level| rows.time(Contender::GeneratedSingles(level)));
-    levels().for_each(|level| rows.time(Contender::HandScalar(level)));
-    levels().for_each(|level| rows.time(Contender::HandLanes(level)));
-    levels().for_each(|level| rows.time(Contender::HandSingles(level)));
+    let over_levels: [fn(LevelName) -> Contender; 7] = [
+        Contender::GeneratedScalar,
+        Contender::GeneratedLanes,
+        Contender::UncompensatedLanes,
+        Contender::GeneratedSingles,
+        Contender::HandScalar,
+        Contender::HandLanes,
+        Contender::HandSingles,
+    ];
+    for contender in over_levels {
+        levels().for_each(|level| rows.time(contender(level)));
+    }
     for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi] {
         rows.time(contender);
     }
     for contender in [Contender::Batches, Contender::ScatterOnly, Contender::System, Contender::Clamped] {
         rows.time(contender);
     }
+}
 
-    let generated = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::GeneratedScalar(_)));
-    let hand = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::HandScalar(_)));
-    rows.ratio("generated/hand, plain calls", |kernel| {
+fn ratios_to_hand_derived(rows: &mut Rows<'_>) {
+    let hand = |kernel: &Measured| kernel.best(|contender| matches!(contender, Contender::HandScalar(_)));
+    rows.ratio("generated/hand-derived, plain calls", |kernel| {
         Some(kernel.time(Contender::GeneratedPlain)? / kernel.time(Contender::HandPlain)?)
     });
-    rows.ratio("uncompensated/hand, plain calls", |kernel| {
+    rows.ratio("uncompensated/hand-derived, plain calls", |kernel| {
         Some(kernel.time(Contender::UncompensatedPlain)? / kernel.time(Contender::HandPlain)?)
     });
-    rows.ratio("generated/hand, scalar loop", |kernel| Some(generated(kernel)? / hand(kernel)?));
+    rows.ratio("generated/hand-derived, scalar loop", |kernel| Some(generated_scalar(kernel)? / hand(kernel)?));
     for level in levels() {
-        rows.ratio(&format!("generated/hand, f64 lanes, {level}"), |kernel| {
+        rows.ratio(&format!("generated/hand-derived, f64 lanes, {level}"), |kernel| {
             Some(kernel.time(Contender::GeneratedLanes(level))? / kernel.time(Contender::HandLanes(level))?)
         });
     }
     for level in levels() {
-        rows.ratio(&format!("uncompensated/hand, f64 lanes, {level}"), |kernel| {
+        rows.ratio(&format!("uncompensated/hand-derived, f64 lanes, {level}"), |kernel| {
             Some(kernel.time(Contender::UncompensatedLanes(level))? / kernel.time(Contender::HandLanes(level))?)
         });
     }
-    rows.ratio("plain method/in the loop", |kernel| {
-        Some(
-            kernel.time(Contender::GeneratedPlain)?
-                / kernel.best(|c| c == Contender::GeneratedScalar(LevelName::Avx2))?,
-        )
+}
+
+fn ratios_to_generated(rows: &mut Rows<'_>) {
+    rows.ratio("generated, plain method/scalar loop", |kernel| {
+        let scalar_loop = kernel.time(Contender::GeneratedScalar(LevelName::Avx2))?;
+        Some(kernel.time(Contender::GeneratedPlain)? / scalar_loop)
     });
     for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi] {
         rows.ratio(&format!("{contender}/generated, scalar"), |kernel| {
-            Some(kernel.time(contender)? / generated(kernel)?)
+            Some(kernel.time(contender)? / generated_scalar(kernel)?)
         });
     }
-    let lanes = |kernel: &Measured| kernel.best(|c| matches!(c, Contender::GeneratedLanes(_)));
+    let lanes = |kernel: &Measured| kernel.best(|contender| matches!(contender, Contender::GeneratedLanes(_)));
     rows.ratio("batches/generated, lanes", |kernel| Some(kernel.time(Contender::Batches)? / lanes(kernel)?));
     rows.ratio("scatter only/generated, lanes", |kernel| Some(kernel.time(Contender::ScatterOnly)? / lanes(kernel)?));
     rows.ratio("assembled/generated, lanes", |kernel| Some(kernel.time(Contender::System)? / lanes(kernel)?));
-    rows.ratio("assembled/generated, scalar", |kernel| Some(kernel.time(Contender::System)? / generated(kernel)?));
+    rows.ratio("assembled/generated, scalar", |kernel| {
+        Some(kernel.time(Contender::System)? / generated_scalar(kernel)?)
+    });
+}
 
+fn counts_and_accuracy(rows: &mut Rows<'_>) {
     rows.row("operations", |kernel| Some(kernel.operations.to_string()));
     rows.row("instructions (fused as one)", |kernel| Some(kernel.instructions.to_string()));
     rows.row("divisions and roots", |kernel| Some(kernel.divisions_and_roots.to_string()));
@@ -80,10 +109,6 @@ pub fn table(kernels: &[Measured]) -> Table {
     for source in sources {
         rows.coincident(source);
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }
 
 struct Rows<'a> {

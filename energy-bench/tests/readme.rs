@@ -22,7 +22,7 @@ fn split(line: &str) -> Vec<&str> {
 }
 
 #[test]
-fn the_readme_has_the_benchmark_s_rows_and_columns() {
+fn the_comparison_matches_the_benchmark() {
     let readme = include_str!("../../README.md");
     let (_, rest) = readme.split_once(BEGIN).expect("README.md has the line that begins the table");
     let (table, _) = rest.split_once(END).expect("README.md has the line that ends the table");
