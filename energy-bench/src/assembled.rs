@@ -29,8 +29,8 @@ where
     E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + Sync + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.generated, 1)).collect();
-    // A closed strip: consecutive elements share all but one of their vertices. It has as many vertices as elements,
-    // slightly more than a triangle mesh. The first points are appended, so that all points of an element are distinct.
+    // A strip: consecutive elements share all but one of their vertices. It has about as many vertices as elements,
+    // more than a triangle mesh. It ends with the points it began with, and each element's points are distinct.
     let last_point = |sample: &Sample| points::<N>(&sample.unknowns)[N - 1];
     let positions: Vec<Vector3<f64>> = samples.iter().chain(&samples[..N - 1]).map(last_point).collect();
     let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| i + p)).collect();
