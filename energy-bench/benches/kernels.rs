@@ -1,4 +1,4 @@
-//! Criterion's times of one turn over all elements: `cargo bench -p energy-bench --bench kernels`.
+//! Criterion's statistics of one run over all elements: `cargo bench -p energy-bench --bench kernels`.
 
 #![allow(missing_docs)]
 

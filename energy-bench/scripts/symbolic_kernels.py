@@ -1,38 +1,45 @@
 #!/usr/bin/env python3
-"""Times C that SymPy and CasADi generate for the kernels of energy-bench.
+"""Times C that SymPy and CasADi generate for the kernels of energy-bench, and TinyAD in C++.
 
     cargo run --release -p energy-bench -- --inputs DIR
     python3 symbolic_kernels.py DIR [--cc CC] [--repetitions N] [--json] [--keep DIR]
+    python3 symbolic_kernels.py DIR --tinyad TINYAD/include EIGEN [--cxx CXX]
 
-DIR holds, for each kernel, `K1.inputs` and `K1.expected`: little-endian doubles, element by element. Inputs are those of the
-textbook formula; what a rest shape determines is in them already. Expected are the value, the gradient and the triangle of
-3 x 3 blocks of the Hessian (of K5 the residual and its Jacobian), as the library computes them.
+DIR contains little-endian doubles, element by element. Inputs are the constants and unknowns of the textbook formula;
+numbers that depend on the rest shape alone are precomputed.
 
-Each kernel's textbook formula is written once, for both packages. SymPy differentiates it, finds common subexpressions (`cse`)
-and prints C (`ccode`), integer powers as products. CasADi builds the same outputs by `jacobian` and prints C (`CodeGenerator`).
-Both return exactly the expected numbers: neither computes the lower triangle of blocks. All is compiled with
-`cc -O3 -march=native` without fast mathematics, compared with the expected results, and timed in turns; medians are printed.
+- `K1.inputs`: the inputs of kernel K1.
+- `K1.expected`: generated value, gradient and upper triangle of 3 x 3 Hessian blocks (K5: residual and Jacobian).
+- `K1.near_rest`, `K1.coincident`: inputs near rest and at coincident points. Results are returned, not compared.
 
-It needs the packages sympy, casadi and numpy, and a C compiler.
+Each textbook formula is written once for both packages. SymPy differentiates it, eliminates common subexpressions
+(`cse`) and prints C (`ccode`), with integer powers as products. CasADi differentiates it (`hessian`, `gradient`) and
+prints C (`CodeGenerator`). Both return exactly the expected numbers: neither computes the lower triangle of blocks.
+
+TinyAD is header-only and needs Eigen. `--tinyad` takes the include folders of both. `tinyad_kernels.hpp` has the
+formulas.
+
+All code is compiled with `-O3 -march=native` without fast mathematics, and its results are compared with the expected
+ones. Then all tools run in turns, and medians are printed. A package that is not installed is left out with a note.
+
+The script needs numpy and a C compiler.
 """
 
 import argparse
 import ctypes
+import importlib.util
 import json
+import math
 import os
 import statistics
 import subprocess
 import sys
 import tempfile
 
-import casadi
 import numpy
-import sympy
-from sympy.printing.c import C99CodePrinter
-from sympy.printing.precedence import PRECEDENCE
 
 TOLERANCE = 1e-9
-# Results are written over after so many elements, so that they stay in the cache.
+# Number of elements whose results the buffer holds. It stays in the cache.
 TOGETHER = 16
 
 
@@ -111,7 +118,7 @@ def point_to_plane(m, c, x):
     return dot(normal, [point[i] + 2 * shift[i] - u[i] for i in range(3)])
 
 
-# Name, formula, constants, unknowns, whether second derivatives are wanted.
+# Name, formula, number of constants, number of unknowns, whether to compute second derivatives.
 KERNELS = [
     ("K1", spring, 2, 6, True),
     ("K2", hair_bend, 1, 9, True),
@@ -122,29 +129,36 @@ KERNELS = [
 
 
 def triangle(unknowns):
-    """The entries (row, column) of the triangle of blocks, in the library's order."""
+    """Returns the entries (row, column) of the upper triangle of blocks, in the order of generated code."""
     count = unknowns // 3
     blocks = [(i, j) for i in range(count) for j in range(i, count)]
     return [(3 * i + r, 3 * j + c) for i, j in blocks for r in range(3) for c in range(3)]
 
 
-class Powers(C99CodePrinter):
-    """C in which small integer powers are products, as a person would write them: `pow` is slow."""
+def sympy_printer():
+    """Returns a function that prints C. Small integer powers become products, because `pow` is slow."""
+    from sympy.printing.c import C99CodePrinter
+    from sympy.printing.precedence import PRECEDENCE
 
-    def _print_Pow(self, expr):
-        base, exponent = expr.as_base_exp()
-        if exponent.is_Integer and 1 < abs(exponent) <= 8:
-            factor = self.parenthesize(base, PRECEDENCE["Mul"] + 1)
-            powers = "*".join([factor] * abs(exponent))
-            return f"({powers})" if exponent > 0 else f"(1.0/({powers}))"
-        if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) <= 15:
-            half = [f"sqrt({self._print(base)})"]
-            powers = "*".join(half + [f"({self._print(base)})"] * ((abs(exponent.p) - 1) // 2))
-            return f"({powers})" if exponent > 0 else f"(1.0/({powers}))"
-        return super()._print_Pow(expr)
+    class Powers(C99CodePrinter):
+        def _print_Pow(self, expr):
+            base, exponent = expr.as_base_exp()
+            if exponent.is_Integer and 1 < abs(exponent) <= 8:
+                factor = self.parenthesize(base, PRECEDENCE["Mul"] + 1)
+                powers = "*".join([factor] * abs(exponent))
+                return f"({powers})" if exponent > 0 else f"(1.0/({powers}))"
+            if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) <= 15:
+                half = [f"sqrt({self._print(base)})"]
+                powers = "*".join(half + [f"({self._print(base)})"] * ((abs(exponent.p) - 1) // 2))
+                return f"({powers})" if exponent > 0 else f"(1.0/({powers}))"
+            return super()._print_Pow(expr)
+
+    return Powers().doprint
 
 
 def sympy_source(name, formula, constants, unknowns, second):
+    import sympy
+
     c, x = sympy.symbols(f"c:{constants}", real=True), sympy.symbols(f"x:{unknowns}", real=True)
     value = formula(sympy, list(c), list(x))
     gradient = [sympy.diff(value, variable) for variable in x]
@@ -157,23 +171,25 @@ def sympy_source(name, formula, constants, unknowns, second):
                 entries[key] = sympy.diff(gradient[key[0]], x[key[1]])
         outputs += [entries[key] for key in sorted(entries)]
     shared, results = sympy.cse(outputs, symbols=sympy.numbered_symbols("t"), order="none")
-    print_c = Powers().doprint
+    print_c = sympy_printer()
     lines = [f"    double c{i} = in[{i}];" for i in range(constants)]
     lines += [f"    double x{i} = in[{constants + i}];" for i in range(unknowns)]
     lines += [f"    double {symbol} = {print_c(expression)};" for symbol, expression in shared]
     lines += [f"    out[{i}] = {print_c(result)};" for i, result in enumerate(results[: 1 + unknowns])]
     if second:
-        places = {key: results[1 + unknowns + i] for i, key in enumerate(sorted(entries))}
+        entry_of = {key: results[1 + unknowns + i] for i, key in enumerate(sorted(entries))}
         seen = {}
         for i, (row, column) in enumerate(triangle(unknowns)):
             key, place = (min(row, column), max(row, column)), 1 + unknowns + i
-            lines.append(f"    out[{place}] = {f'out[{seen[key]}]' if key in seen else print_c(places[key])};")
+            lines.append(f"    out[{place}] = {f'out[{seen[key]}]' if key in seen else print_c(entry_of[key])};")
             seen.setdefault(key, place)
     body = "\n".join(lines)
     return f"static inline void {name}_sympy(const double *in, double *out) {{\n{body}\n}}\n"
 
 
 def casadi_source(name, formula, constants, unknowns, second, folder):
+    import casadi
+
     c, x = casadi.SX.sym("c", constants), casadi.SX.sym("x", unknowns)
     value = formula(casadi, casadi.vertsplit(c), casadi.vertsplit(x))
     if second:
@@ -185,7 +201,18 @@ def casadi_source(name, formula, constants, unknowns, second, folder):
     function = casadi.Function(f"{name}_casadi", [casadi.vertcat(c, x)], [results], {"cse": True})
     generator = casadi.CodeGenerator(f"{name}_casadi.c", {"with_header": False, "casadi_int": "int"})
     generator.add(function)
-    return open(generator.generate(folder + os.sep), encoding="utf-8").read()
+    with open(generator.generate(folder + os.sep), encoding="utf-8") as file:
+        return file.read()
+
+
+TINYAD_KERNELS = {"K1": "Spring", "K2": "HairBend", "K3": "Hinge", "K4": "StVK", "K5": "PointToPlane"}
+
+
+def tinyad_source(name, second):
+    struct = TINYAD_KERNELS[name]
+    header = os.path.join(os.path.dirname(os.path.abspath(__file__)), "tinyad_kernels.hpp")
+    body = f"kernels::evaluate<kernels::{struct}, {str(second).lower()}>(in, out);"
+    return f'#include "{header}"\nstatic inline void {name}_tinyad(const double *in, double *out) {{ {body} }}\n'
 
 
 LOOP = """
@@ -197,6 +224,9 @@ static double now(void) {{
     clock_gettime(CLOCK_MONOTONIC, &at);
     return at.tv_sec * 1e9 + at.tv_nsec;
 }}
+#ifdef __cplusplus
+extern "C" {{
+#endif
 void all(const double *in, double *out, long elements) {{
     for (long i = 0; i < elements; i++) {{
         const double *element = in + i * {inputs};
@@ -215,16 +245,19 @@ double timed(const double *in, long elements) {{
     }}
     return now() - start;
 }}
+#ifdef __cplusplus
+}}
+#endif
 """
 
 
-def compile_c(folder, name, source, call, inputs, outputs, cc):
-    path = os.path.join(folder, f"{name}.c")
+def compile_loop(folder, name, extension, source, call, inputs, outputs, command):
+    path = os.path.join(folder, name + extension)
     library = os.path.join(folder, f"{name}.so")
     with open(path, "w", encoding="utf-8") as file:
         file.write(LOOP.format(source=source, call=call, inputs=inputs, outputs=outputs, together=TOGETHER))
-    command = [cc, "-O3", "-march=native", "-fno-fast-math", "-fPIC", "-shared", "-o", library, path, "-lm"]
-    subprocess.run(command, check=True)
+    flags = ["-O3", "-march=native", "-fno-fast-math", "-fPIC", "-shared", "-o", library, path, "-lm"]
+    subprocess.run(command + flags, check=True)
     code = ctypes.CDLL(library)
     code.timed.restype = ctypes.c_double
     return code
@@ -235,74 +268,116 @@ def pointer(array):
 
 
 def check(name, unknowns, results, expected):
-    """Compares by order of derivative, relative to the largest number of the element, as the program does."""
+    """Compares value, gradient and Hessian, each relative to the element's largest number, as the benchmark does."""
     for part in (slice(0, 1), slice(1, 1 + unknowns), slice(1 + unknowns, None)):
         found, wanted = results[:, part], expected[:, part]
         if wanted.shape[1] == 0:
             continue
         size = numpy.maximum(numpy.abs(wanted).max(axis=1), sys.float_info.min)
-        apart = (numpy.abs(found - wanted).max(axis=1) / size).max()
-        if not apart <= TOLERANCE:
-            sys.exit(f"{name}: results are off by {apart:.1e}")
+        difference = (numpy.abs(found - wanted).max(axis=1) / size).max()
+        if not difference <= TOLERANCE:
+            sys.exit(f"{name}: expected a relative difference of at most {TOLERANCE:.0e}, got {difference:.1e}")
 
 
-def build(kernel, tool, folder, cc):
+def build(kernel, tool, folder, options):
     name, formula, constants, unknowns, second = kernel
     outputs = 1 + unknowns + (len(triangle(unknowns)) if second else 0)
+    call, extension, command = f"{name}_{tool}(element, result);", ".c", [options.cc]
     if tool == "sympy":
         source = sympy_source(name, formula, constants, unknowns, second)
-        call = f"{name}_sympy(element, result);"
-    else:
+    elif tool == "casadi":
         source = casadi_source(name, formula, constants, unknowns, second, folder)
         call = f"{name}_casadi(&element, &result, 0, 0, 0);"
-    return compile_c(folder, f"{name}_{tool}_loop", source, call, constants + unknowns, outputs, cc)
+    else:
+        source = tinyad_source(name, second)
+        extension = ".cpp"
+        command = [options.cxx, "-std=c++17", "-DNDEBUG"] + [f"-I{include}" for include in options.tinyad]
+    return compile_loop(folder, f"{name}_{tool}_loop", extension, source, call, constants + unknowns, outputs, command)
 
 
-def measure(kernel, folder, inputs_folder, cc, repetitions):
-    name, _, constants, unknowns, second = kernel
-    inputs = numpy.fromfile(os.path.join(inputs_folder, f"{name}.inputs"), dtype="<f8")
-    expected = numpy.fromfile(os.path.join(inputs_folder, f"{name}.expected"), dtype="<f8")
+def run(code, inputs, elements, outputs):
+    results = numpy.empty((elements, outputs))
+    code.all(pointer(inputs), pointer(results), ctypes.c_long(elements))
+    return results
+
+
+def extra_results(code, kernel, which, folder, outputs):
+    """Returns one list of numbers for each element of an extra input file, `None` for NaN and infinity."""
+    path = os.path.join(folder, f"{kernel[0]}.{which}")
+    if not os.path.exists(path):
+        return []
+    inputs = numpy.fromfile(path, dtype="<f8")
+    results = run(code, inputs, len(inputs) // (kernel[2] + kernel[3]), outputs)
+    return [[x if math.isfinite(x) else None for x in row] for row in results.tolist()]
+
+
+def measure(kernel, tools, folder, options):
+    name, _, constants, unknowns, _ = kernel
+    inputs = numpy.fromfile(os.path.join(options.inputs, f"{name}.inputs"), dtype="<f8")
+    expected = numpy.fromfile(os.path.join(options.inputs, f"{name}.expected"), dtype="<f8")
     elements = len(inputs) // (constants + unknowns)
     expected = expected.reshape(elements, -1)
-    codes = {tool: build(kernel, tool, folder, cc) for tool in ("sympy", "casadi")}
+    outputs = expected.shape[1]
+    codes = {tool: build(kernel, tool, folder, options) for tool in tools}
     for tool, code in codes.items():
-        results = numpy.empty_like(expected)
-        code.all(pointer(inputs), pointer(results), ctypes.c_long(elements))
-        check(f"{name} by {tool}", unknowns, results, expected)
+        check(f"{name} by {tool}", unknowns, run(code, inputs, elements, outputs), expected)
     times = {tool: [] for tool in codes}
-    for turn in range(repetitions + 1):
+    for turn in range(options.repetitions + 1):
         for tool, code in codes.items():
             time = code.timed(pointer(inputs), ctypes.c_long(elements)) / elements
+            # The first turn warms up.
             if turn > 0:
                 times[tool].append(time)
-    return [
-        {"kernel": name, "tool": tool, "nanoseconds": statistics.median(of), "least": min(of)}
-        for tool, of in times.items()
-    ]
+    results = []
+    for tool, code in codes.items():
+        coincident = extra_results(code, kernel, "coincident", options.inputs, outputs)
+        results.append(
+            {
+                "kernel": name,
+                "tool": tool,
+                "nanoseconds": statistics.median(times[tool]),
+                "least": min(times[tool]),
+                "near_rest": extra_results(code, kernel, "near_rest", options.inputs, outputs),
+                "coincident": coincident[0] if coincident else [],
+            }
+        )
+    return results
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("inputs", help="the folder that `bench --inputs` wrote")
     parser.add_argument("--cc", default="cc", help="the C compiler")
-    parser.add_argument("--repetitions", type=int, default=31, help="turns, of which the median is taken")
+    parser.add_argument("--cxx", default="g++", help="the C++ compiler")
+    parser.add_argument("--tinyad", nargs="+", metavar="INCLUDE", help="include folders of TinyAD and Eigen")
+    parser.add_argument("--repetitions", type=int, default=31, help="runs of each tool; the median is printed")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--keep", help="keep the generated C in this folder")
-    arguments = parser.parse_args()
-    if arguments.repetitions < 1:
-        parser.error("a median needs repetitions")
-    lines = []
+    parser.add_argument("--keep", help="keep the generated code in this folder")
+    options = parser.parse_args()
+    if options.repetitions < 1:
+        parser.error(f"expected at least one repetition, got {options.repetitions}")
+    tools, notes = [], []
+    for tool, title in (("sympy", "SymPy"), ("casadi", "CasADi")):
+        if importlib.util.find_spec(tool):
+            tools.append(tool)
+        else:
+            notes.append(f"{title} was not measured: {sys.executable} has no package {tool}")
+    if options.tinyad:
+        tools.append("tinyad")
+    results = []
     with tempfile.TemporaryDirectory() as temporary:
-        folder = arguments.keep or temporary
+        folder = options.keep or temporary
         os.makedirs(folder, exist_ok=True)
         for kernel in KERNELS:
-            if os.path.exists(os.path.join(arguments.inputs, f"{kernel[0]}.inputs")):
-                lines += measure(kernel, folder, arguments.inputs, arguments.cc, arguments.repetitions)
-    if arguments.json:
-        json.dump(lines, sys.stdout)
-    else:
-        for line in lines:
-            print(f"{line['kernel']} {line['tool']:8}{line['nanoseconds']:10.1f} ns an element")
+            if os.path.exists(os.path.join(options.inputs, f"{kernel[0]}.inputs")):
+                results += measure(kernel, tools, folder, options)
+    if options.json:
+        json.dump({"results": results, "notes": notes}, sys.stdout)
+        return
+    for result in results:
+        print(f"{result['kernel']} {result['tool']:8}{result['nanoseconds']:10.1f} ns per element")
+    for note in notes:
+        print(f"note: {note}")
 
 
 if __name__ == "__main__":

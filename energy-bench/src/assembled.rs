@@ -1,4 +1,4 @@
-//! Elements between the vertices of a mesh: what evaluating them costs with gathering, unpacking and assembly.
+//! Evaluation of elements on the vertices of a mesh: the cost of gathering, transposing and assembly.
 
 use std::hint::black_box;
 
@@ -11,26 +11,26 @@ use crate::sample::{Sample, points};
 use crate::vector::{add, sub};
 use crate::work::{TOGETHER, Work};
 
-/// The work of all elements by way of vertices.
+/// Work on all elements as part of a mesh.
 pub struct Assembled {
-    /// Batches at the best level: points gathered, results turned to one element after the other.
+    /// Batches at the best level: points gathered, results transposed to one element after the other.
     pub batches: Work,
-    /// Elements and vertices in, matrix of blocks out, by [`System::linearise`].
+    /// [`System::linearise`]: elements and vertices in, block matrix out.
     pub exact: Work,
-    /// The same without evaluating anything: matrix and forces cleared, finished blocks and gradients added.
-    pub sums: Work,
-    /// The same with [`Curvature::Clamped`].
+    /// Assembly alone: clears matrix and forces, then adds precomputed blocks and gradients.
+    pub scatter_only: Work,
+    /// [`System::linearise`] with [`Curvature::Clamped`].
     pub clamped: Work,
 }
 
-/// The elements of `samples` on vertices.
+/// Places the elements of `samples` on a shared set of vertices.
 pub(crate) fn assembled<E, const N: usize>(samples: &[Sample]) -> Assembled
 where
     E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + Sync + 'static,
 {
-    let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
-    // A strip: each element shares all but one of its vertices with the next, and there are as many vertices as
-    // elements, a few more than in a mesh of triangles. It ends where it began, so that no element's vertices meet.
+    let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.generated, 1)).collect();
+    // A strip: consecutive elements share all but one of their vertices. It has about as many vertices as elements,
+    // more than a triangle mesh. It ends with the points it began with, and each element's points are distinct.
     let last_point = |sample: &Sample| points::<N>(&sample.unknowns)[N - 1];
     let positions: Vec<Vector3<f64>> = samples.iter().chain(&samples[..N - 1]).map(last_point).collect();
     let stencils: Vec<[usize; N]> = (0..samples.len()).map(|i| std::array::from_fn(|p| i + p)).collect();
@@ -43,9 +43,9 @@ where
 
     let list = ElementList::new("elements", elements, &stencils).expect("as many stencils as elements");
     let linearise = |curvature| linearise(list.clone(), positions.clone(), curvature);
-    let mut sums = Sums::new(&stencils, system(list.clone(), positions.len()).matrix(), positions.len());
-    let sums = Box::new(move || dispatch(&mut sums));
-    Assembled { batches, sums, exact: linearise(Curvature::Exact), clamped: linearise(Curvature::Clamped) }
+    let mut scatter = Scatter::new(&stencils, system(list.clone(), positions.len()).matrix(), positions.len());
+    let scatter_only = Box::new(move || dispatch(&mut scatter));
+    Assembled { batches, scatter_only, exact: linearise(Curvature::Exact), clamped: linearise(Curvature::Clamped) }
 }
 
 fn system<E>(list: ElementList<E>, vertices: usize) -> System
@@ -70,11 +70,11 @@ where
     })
 }
 
-/// Finished blocks and gradients of a few elements, which stay in the cache, added to a matrix and to forces over and
-/// over: what assembly costs when there is nothing to compute.
-struct Sums<const N: usize> {
+/// Adds precomputed blocks and gradients to a matrix and to forces. The inputs stay in the cache: this measures
+/// assembly without evaluation.
+struct Scatter<const N: usize> {
     stencils: Vec<[usize; N]>,
-    /// By element, pair of its points.
+    /// Indices of matrix blocks, by element and pair of its points.
     places: Vec<usize>,
     matrix: BlockMatrix,
     forces: Vec<Vector3<f64>>,
@@ -82,7 +82,7 @@ struct Sums<const N: usize> {
     triangle: Vec<Block<f64>>,
 }
 
-impl<const N: usize> Sums<N> {
+impl<const N: usize> Scatter<N> {
     fn new(stencils: &[[usize; N]], matrix: BlockMatrix, vertices: usize) -> Self {
         let pairs = stencils.iter().flat_map(|s| (0..N).flat_map(move |i| (i..N).map(move |j| (s[i], s[j]))));
         let places =
@@ -93,7 +93,7 @@ impl<const N: usize> Sums<N> {
     }
 }
 
-impl<const N: usize> Kernel for &mut Sums<N> {
+impl<const N: usize> Kernel for &mut Scatter<N> {
     type Output = ();
 
     #[inline(always)]
@@ -108,7 +108,7 @@ impl<const N: usize> Kernel for &mut Sums<N> {
             for pair in 0..pairs {
                 let block = &mut matrix[places[pair]];
                 let rows = *block;
-                // Rows are read before any is written, so that they are added in registers.
+                // All rows are read before any is written, so that the sums stay in registers.
                 *block = [0, 1, 2].map(|row| add(rows[row], triangle[pair][row]));
             }
             for point in 0..N {
@@ -120,7 +120,7 @@ impl<const N: usize> Kernel for &mut Sums<N> {
     }
 }
 
-/// Results of a few elements, one after the other, soon written over.
+/// Buffer for the results of [`TOGETHER`] elements, overwritten in turn.
 struct Results {
     numbers: Vec<f64>,
 }

@@ -1,19 +1,19 @@
-//! Textbook formulas over num-dual's numbers.
+//! Textbook formulas over the numbers of the crate `num-dual`.
 
 use nalgebra::SVector;
 use num_dual::{Dual2Vec, DualNum, hessian};
 
 use crate::sample::Derivatives;
 
-/// Any of num-dual's numbers over `f64`.
+/// A number type of `num-dual` over `f64`.
 pub trait Dual: DualNum<Primitive = f64> + Copy {}
 
 impl<D: DualNum<Primitive = f64> + Copy> Dual for D {}
 
-/// The numbers that carry a gradient and a Hessian by `N` variables.
+/// Second-order dual numbers: they carry a gradient and a Hessian for `N` variables.
 pub type Second<const N: usize> = Dual2Vec<f64, nalgebra::Const<N>>;
 
-/// Value, gradient and triangle of a function of points, which `N` = 3 `POINTS` coordinates hold.
+/// Returns value, gradient and the upper triangle of Hessian blocks of a function of `POINTS` points. `N` = 3 `POINTS`.
 pub fn derivatives<const N: usize, const POINTS: usize, const BLOCKS: usize>(
     coordinates: &[f64],
     function: impl Fn(&[[Second<N>; 3]; POINTS]) -> Second<N>,

@@ -1,16 +1,18 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-pub mod accuracy;
+pub mod agreement;
 mod assembled;
-pub mod check;
+pub mod coincident;
 mod contender;
 pub mod contenders;
 mod dual;
-mod inputs;
 pub mod kernels;
 pub mod measure;
+pub mod near_rest;
 mod random;
+pub mod readme;
+mod report;
 mod run;
 mod sample;
 mod script;
@@ -21,11 +23,11 @@ mod vector;
 mod work;
 
 pub use assembled::Assembled;
+pub use contender::Source;
 pub use dual::Dual;
-pub use inputs::write_inputs;
 pub use random::Random;
+pub use report::{KEYS, Options, Report, benchmark, write_inputs};
 pub use sample::{Answer, Derivatives, Row, Sample};
-pub use script::run_script;
 pub use subject::{Subject, samples};
 pub use table::table;
 pub use uncompensated::Uncompensated;

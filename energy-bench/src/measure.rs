@@ -1,22 +1,23 @@
-//! Times, taken in turns so that whatever else the machine does meets all contenders alike.
+//! Times of contenders. They run in turns, so that other load on the machine affects all of them equally.
 
 use std::time::Instant;
 
 use energy_dsl::OperationCount;
 use serde::Serialize;
 
-use crate::accuracy::NearRest;
+use crate::coincident::Outcome;
 use crate::contender::Contender;
+use crate::near_rest::GradientError;
 use crate::work::Work;
 
-/// A contender's time.
+/// Time of one contender.
 #[derive(Clone, Copy, Debug)]
 pub struct Time {
-    /// Whose.
+    /// The routine and its loop.
     pub contender: Contender,
-    /// The median, in nanoseconds an element.
+    /// Median, in nanoseconds per element.
     pub nanoseconds: f64,
-    /// The least, in nanoseconds an element.
+    /// Minimum, in nanoseconds per element.
     pub least: f64,
 }
 
@@ -31,29 +32,31 @@ impl Serialize for Time {
     }
 }
 
-/// What was measured of a kernel.
+/// Measurements of one kernel.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
     /// `K1` to `K5`.
     pub key: &'static str,
-    /// What it is.
+    /// Name of the potential.
     pub title: &'static str,
-    /// The operations of the library's routine; a fused multiply-add counts as two.
+    /// Operations of the generated routine; a fused multiply-add counts as two.
     pub operations: usize,
-    /// Its instructions, a fused multiply-add counting as one.
+    /// Instructions of the generated routine; a fused multiply-add counts as one.
     pub instructions: usize,
-    /// Its divisions and roots.
+    /// Divisions and square roots of the generated routine.
     pub divisions_and_roots: usize,
-    /// The largest relative difference of any contender's results from the library's.
+    /// Largest relative difference of any contender's results from the generated ones.
     pub difference: f64,
-    /// Errors near rest, where there is one.
-    pub near_rest: Option<NearRest>,
-    /// All times.
+    /// Gradient errors near rest; empty if the kernel has no rest shape where differences cancel.
+    pub near_rest: Vec<GradientError>,
+    /// Verdicts on the results at coincident points.
+    pub coincident: Vec<Outcome>,
+    /// Times of all contenders.
     pub times: Vec<Time>,
 }
 
 impl Measured {
-    /// The header of a kernel's measurements, without times.
+    /// Creates an entry without times, errors and verdicts.
     #[must_use]
     pub fn new<K: crate::Subject>(difference: f64) -> Self {
         let count: OperationCount = K::operations();
@@ -64,18 +67,19 @@ impl Measured {
             instructions: count.instructions(),
             divisions_and_roots: count.divisions_and_roots,
             difference,
-            near_rest: None,
+            near_rest: Vec::new(),
+            coincident: Vec::new(),
             times: Vec::new(),
         }
     }
 
-    /// The median of a contender, in nanoseconds an element, if it was measured.
+    /// Returns a contender's median in nanoseconds per element; `None` if it was not measured.
     #[must_use]
-    pub fn time(&self, of: Contender) -> Option<f64> {
-        self.times.iter().find(|time| time.contender == of).map(|time| time.nanoseconds)
+    pub fn time(&self, contender: Contender) -> Option<f64> {
+        self.times.iter().find(|time| time.contender == contender).map(|time| time.nanoseconds)
     }
 
-    /// The least median of the contenders that are chosen.
+    /// Returns the smallest median of the chosen contenders.
     #[must_use]
     pub fn best(&self, chosen: impl Fn(Contender) -> bool) -> Option<f64> {
         let times = self.times.iter().filter(|time| chosen(time.contender)).map(|time| time.nanoseconds);
@@ -83,22 +87,22 @@ impl Measured {
     }
 }
 
-/// Runs every contender `repetitions` times, one after the other in turns and each time once more before, to fill the
-/// caches; calls `progress` after every turn. `elements` is how many elements a run computes.
+/// Runs all contenders in turns, `repetitions` times, and calls `progress` after each turn. `elements` is the number of
+/// elements of one run.
 ///
 /// # Panics
-/// When there are no repetitions.
+/// Panics if `repetitions` is 0.
 pub fn measure(
     contenders: &mut [(Contender, Work)],
     elements: usize,
     repetitions: usize,
     mut progress: impl FnMut(),
 ) -> Vec<Time> {
-    assert!(repetitions > 0, "a median needs repetitions");
+    assert!(repetitions > 0, "expected at least one repetition, got 0");
     let mut times = vec![Vec::with_capacity(repetitions); contenders.len()];
     for _ in 0..repetitions {
         for ((_, work), times) in contenders.iter_mut().zip(&mut times) {
-            // Once for the caches, which the others have filled.
+            // Warm up: the other contenders have filled the caches.
             work();
             let start = Instant::now();
             work();

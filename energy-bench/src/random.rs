@@ -1,15 +1,15 @@
-/// Random numbers, the same on every machine: SplitMix64 (Steele, Lea and Flood 2014).
+/// Random numbers that are the same on every machine: SplitMix64 (Steele, Lea and Flood 2014).
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// The sequence of a seed.
+    /// Creates a generator from a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// A number in [`from`, `to`).
+    /// Returns a number in [`from`, `to`).
     pub fn between(&mut self, from: f64, to: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
@@ -19,12 +19,12 @@ impl Random {
         from + (to - from) * ((bits >> 11) as f64 * (0.5f64).powi(53))
     }
 
-    /// A vector whose components are in [−`size`, `size`).
+    /// Returns a vector with components in [−`size`, `size`).
     pub fn vector(&mut self, size: f64) -> [f64; 3] {
         [0.0; 3].map(|_| self.between(-size, size))
     }
 
-    /// A direction, evenly distributed.
+    /// Returns a unit vector, uniformly distributed.
     pub fn direction(&mut self) -> [f64; 3] {
         loop {
             let v = self.vector(1.0);
@@ -35,7 +35,7 @@ impl Random {
         }
     }
 
-    /// A rotation: three orthonormal vectors.
+    /// Returns three random orthonormal vectors.
     pub fn frame(&mut self) -> [[f64; 3]; 3] {
         let x = self.direction();
         loop {

@@ -1,4 +1,4 @@
-//! The loops that are measured: a kernel's code on all elements.
+//! The measured loops: one kernel's routine on all elements.
 
 use std::hint::black_box;
 use std::marker::PhantomData;
@@ -18,7 +18,7 @@ fn hand<K: Subject, S: Real, V: Lane<S>, L: Level>(numbers: &[S]) -> K::HandAnsw
     K::hand::<V, L>(&x)
 }
 
-/// Hand-derived code on all elements, [`packed`] for the lanes of the level.
+/// Runs hand-derived code on all elements, [`packed`] for the lanes of the level.
 #[derive(Debug)]
 pub struct Hand<'a, K, W: Width>(pub &'a [W::Scalar], pub PhantomData<K>);
 
@@ -33,27 +33,28 @@ impl<K: Subject, W: Width> Kernel for Hand<'_, K, W> {
     }
 }
 
-/// The library's routine at the level, on all elements, [`packed`] for its lanes.
+/// Runs generated code at a level on all elements, [`packed`] for its lanes.
 #[derive(Debug)]
-pub struct Library<'a, K, W: Width>(pub &'a [W::Scalar], pub PhantomData<K>);
+pub struct Generated<'a, K, W: Width>(pub &'a [W::Scalar], pub PhantomData<K>);
 
-impl<K: Subject, W: Width> Kernel for Library<'_, K, W> {
+impl<K: Subject, W: Width> Kernel for Generated<'_, K, W> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Level>(self) {
         let lanes = <W::Number<L> as Lane<W::Scalar>>::LANES;
-        let size = K::library_numbers() * lanes;
-        each_block!(self.0, size, lanes, |block| K::library::<W::Scalar, W::Number<L>, L>(block, lanes));
+        let size = K::generated_numbers() * lanes;
+        each_block!(self.0, size, lanes, |block| K::generated::<W::Scalar, W::Number<L>, L>(block, lanes));
     }
 }
 
-/// The library's plain method on all elements, with the unknowns of all one after the other.
-pub fn library_plain<K: Subject>(elements: &[K::Element], unknowns: &[f64]) {
-    call_each(elements, unknowns, K::library_plain, K::library_plain_into);
+/// Calls the generated plain method on each element. `unknowns` holds the unknowns of all elements, one after the
+/// other.
+pub fn generated_plain<K: Subject>(elements: &[K::Element], unknowns: &[f64]) {
+    call_each(elements, unknowns, K::generated_plain, K::generated_plain_into);
 }
 
-/// Hand-derived code on one element, for [`Number::dispatch`]: at the level that the library's plain methods run at.
+/// Hand-derived code on one element, for [`Number::dispatch`], which the generated plain methods also call.
 struct HandCall<'a, K: Subject> {
     numbers: &'a [f64],
     result: &'a mut K::HandAnswer<f64>,
@@ -68,7 +69,7 @@ impl<K: Subject> Kernel for HandCall<'_, K> {
     }
 }
 
-/// Hand-derived code on all elements, a call each.
+/// Calls hand-derived code on each element.
 pub fn hand_plain<K: Subject>(numbers: &[f64]) {
     let size = <K::Hand<f64> as Array<f64>>::LEN;
     let mut results = vec![hand::<K, f64, f64, Baseline>(&numbers[..size]); TOGETHER];
@@ -80,21 +81,20 @@ pub fn hand_plain<K: Subject>(numbers: &[f64]) {
     }
 }
 
-/// Dual numbers on all elements, `size` numbers each.
+/// Evaluates the textbook formula over dual numbers on all elements, `size` numbers each.
 pub fn dual<K: Subject>(numbers: &[f64], size: usize) {
     each_block!(numbers, size, 1, |block| K::dual(block));
 }
 
-/// All results, element by element, of hand-derived code or of the library: what is checked, in a kernel so that it is
-/// the code that is measured.
+/// Collects the results of all elements. It runs in a kernel, so that the checked code is the measured code.
 #[derive(Debug)]
 pub struct Collect<'a, K, W: Width> {
     /// The elements, [`packed`].
     pub numbers: &'a [W::Scalar],
-    /// Hand-derived code or the library.
+    /// Whether to run hand-derived code instead of generated code.
     pub hand: bool,
-    /// Which kernel.
-    pub of: PhantomData<K>,
+    /// The kernel whose code runs.
+    pub kernel: PhantomData<K>,
 }
 
 impl<K: Subject, W: Width> Kernel for Collect<'_, K, W> {
@@ -103,13 +103,13 @@ impl<K: Subject, W: Width> Kernel for Collect<'_, K, W> {
     #[inline(always)]
     fn run<L: Level>(self) -> Self::Output {
         let lanes = <W::Number<L> as Lane<W::Scalar>>::LANES;
-        let size = if self.hand { <K::Hand<f64> as Array<f64>>::LEN } else { K::library_numbers() };
+        let size = if self.hand { <K::Hand<f64> as Array<f64>>::LEN } else { K::generated_numbers() };
         let mut all = Vec::new();
         for block in self.numbers.chunks_exact(size * lanes) {
             let answer = if self.hand {
                 hand::<K, W::Scalar, W::Number<L>, L>(block).numbers()
             } else {
-                K::library::<W::Scalar, W::Number<L>, L>(block, lanes).numbers()
+                K::generated::<W::Scalar, W::Number<L>, L>(block, lanes).numbers()
             };
             for lane in 0..lanes {
                 all.push(answer.iter().map(|number| number.extract(lane)).collect());

@@ -5,43 +5,55 @@ use energy_dsl::{
     ResidualJacobian, Stored, Vector3,
 };
 
-/// One element in the form each contender reads. What a rest shape determines is computed beforehand for all of them.
+/// One element, in the form that each contender reads. Numbers that depend on the rest shape alone are precomputed.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// For the library: the element's own numbers, then its unknowns.
-    pub library: Vec<f64>,
-    /// The unknowns alone.
+    /// Input of generated code: the element's parameters, then its unknowns.
+    pub generated: Vec<f64>,
+    /// Unknowns: coordinates of points, or twists.
     pub unknowns: Vec<f64>,
-    /// For hand-derived code; see [`Subject::Hand`](crate::Subject::Hand).
+    /// Input of hand-derived code; see [`Subject::Hand`](crate::Subject::Hand).
     pub hand: Vec<f64>,
-    /// For the textbook formula, which dual numbers and computer algebra differentiate.
+    /// Input of the textbook formula: constants, then unknowns.
     pub textbook: Vec<f64>,
 }
 
 impl Sample {
-    /// From an element and what it is evaluated on.
+    /// Creates the sample of an element at the given unknowns.
     pub(crate) fn new<E: Stored<f64>>(element: &E, unknowns: &[f64], hand: Vec<f64>, textbook: Vec<f64>) -> Self {
-        let mut library = vec![0.0; E::NUMBERS];
-        element.store(&mut library, 1);
-        library.extend_from_slice(unknowns);
-        Self { library, unknowns: unknowns.to_vec(), hand, textbook }
+        let mut generated = vec![0.0; E::NUMBERS];
+        element.store(&mut generated, 1);
+        generated.extend_from_slice(unknowns);
+        Self { generated, unknowns: unknowns.to_vec(), hand, textbook }
+    }
+
+    /// Returns the same element at other unknowns.
+    pub(crate) fn with_unknowns(&self, unknowns: &[f64]) -> Self {
+        assert_eq!(unknowns.len(), self.unknowns.len(), "the number of unknowns stays");
+        let replace = |numbers: &[f64]| [&numbers[..numbers.len() - unknowns.len()], unknowns].concat();
+        Self {
+            generated: replace(&self.generated),
+            unknowns: unknowns.to_vec(),
+            hand: replace(&self.hand),
+            textbook: replace(&self.textbook),
+        }
     }
 }
 
-/// A result with derivatives.
+/// A value with its derivatives.
 pub trait Answer<T>: Copy {
-    /// Value, gradient and triangle of Hessian blocks (or residual and Jacobian), one after the other.
+    /// Returns value, gradient and upper triangle of Hessian blocks (or residual and Jacobian) as one list.
     fn numbers(&self) -> Vec<T>;
 }
 
-/// The result of hand-derived code: what the library returns, without flags.
+/// Result of hand-derived code for a potential: generated results without flags.
 #[derive(Clone, Copy, Debug)]
 pub struct Derivatives<T, const POINTS: usize, const BLOCKS: usize> {
-    /// U.
+    /// The potential U.
     pub value: T,
-    /// ∂U/∂x.
+    /// ∂U/∂x, by point.
     pub gradient: [Vector3<T>; POINTS],
-    /// The triangle of ∂²U/∂x².
+    /// Upper triangle of the 3×3 blocks of ∂²U/∂x².
     pub hessian: [Block<T>; BLOCKS],
 }
 
@@ -59,10 +71,10 @@ impl<T: Real, Points: Array<Vector3<T>>, Triangle: Array<Block<T>>> Answer<T> fo
     }
 }
 
-/// The result of hand-derived code for a residual.
+/// Result of hand-derived code for a residual.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<T, const UNKNOWNS: usize> {
-    /// r.
+    /// The residual r.
     pub value: T,
     /// ∂r/∂u.
     pub jacobian: [T; UNKNOWNS],
@@ -80,14 +92,14 @@ impl<T: Real, Rows: Array<T>, Jacobian: Array<T>> Answer<T> for ResidualJacobian
     }
 }
 
-/// What a potential over lanes returns.
+/// Result of a generated potential over lanes.
 type WideHessian<E, S, V> = Hessian<
     V,
     <<E as PackedPotential<S>>::Wide<V> as Potential<V>>::Points,
     <<E as PackedPotential<S>>::Wide<V> as Potential<V>>::Triangle,
 >;
 
-/// A potential of the library, read from numbers.
+/// Loads a generated potential and its points from numbers, and evaluates its Hessian.
 #[inline(always)]
 pub(crate) fn potential<S: Real, E: PackedPotential<S>, V: Lane<S>, L: Level>(
     numbers: &[S],
@@ -102,14 +114,14 @@ pub(crate) fn potential<S: Real, E: PackedPotential<S>, V: Lane<S>, L: Level>(
     element.hessian_at::<L>(&points)
 }
 
-/// What a residual over lanes returns.
+/// Result of a generated residual over lanes.
 type WideJacobian<E, S, V> = ResidualJacobian<
     V,
     <<E as PackedResidual<S>>::Wide<V> as Residual<V>>::Rows,
     <<E as PackedResidual<S>>::Wide<V> as Residual<V>>::Jacobian,
 >;
 
-/// A residual of the library, read from numbers.
+/// Loads a generated residual and its unknowns from numbers, and evaluates its Jacobian.
 #[inline(always)]
 pub(crate) fn residual<S: Real, E: PackedResidual<S>, V: Lane<S>, L: Level>(
     numbers: &[S],
@@ -124,12 +136,12 @@ pub(crate) fn residual<S: Real, E: PackedResidual<S>, V: Lane<S>, L: Level>(
     element.jacobian_at::<L>(&unknowns)
 }
 
-/// The numbers of an element and of its unknowns.
+/// Length of [`Sample::generated`]: parameters and unknowns.
 pub(crate) fn number_count<E: Stored<f64>>() -> usize {
     E::NUMBERS + <E as Element>::DECLARATION.points.iter().map(|field| field.size).sum::<usize>()
 }
 
-/// The points that unknowns are the coordinates of, where they are.
+/// Returns unknowns as points.
 pub(crate) fn points<const N: usize>(unknowns: &[f64]) -> &[Vector3<f64>; N] {
     let (points, _) = unknowns.as_chunks();
     points.try_into().expect("three numbers a point")

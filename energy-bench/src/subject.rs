@@ -1,76 +1,82 @@
-//! What a kernel is: inputs, and the ways to compute its derivatives.
+//! The interface of a kernel: random inputs, and its derivatives by each contender.
 
 use std::fmt::Debug;
 
 use energy_dsl::{Array, Declaration, Lane, Level, OperationCount, Real};
 
 use crate::assembled::Assembled;
+use crate::coincident::Coincident;
 use crate::random::Random;
 use crate::sample::{Answer, Sample};
 use crate::uncompensated::Uncompensated;
 
-/// A kernel: one element of the library, and the same derivatives by other means.
+/// A kernel: a declared element, and the same derivatives by other means.
 pub trait Subject: Debug + 'static {
-    /// Its short name, `K1` to `K5`.
+    /// Short name, `K1` to `K5`.
     const KEY: &'static str;
-    /// What it is.
+    /// Name of the potential.
     const TITLE: &'static str;
-    /// The library's declaration.
+    /// Declaration of the element.
     const DECLARATION: &'static Declaration;
-    /// The library's routine that is measured.
+    /// Name of the generated routine that is measured.
     const ROUTINE: &'static str;
 
-    /// The library's element.
+    /// Type of the declared element.
     type Element: 'static;
-    /// What hand-derived code reads: numbers prepared once for an element, then its unknowns.
+    /// Input of hand-derived code: precomputed numbers of the element, then its unknowns.
     type Hand<T: Copy>: Array<T>;
-    /// What hand-derived code returns.
+    /// Result of hand-derived code.
     type HandAnswer<T: Real>: Answer<T>;
-    /// What the library returns.
-    type LibraryAnswer<T: Real>: Answer<T>;
+    /// Result of generated code.
+    type GeneratedAnswer<T: Real>: Answer<T>;
 
-    /// A random, well-conditioned element.
+    /// Returns a random, well-conditioned element.
     fn sample(random: &mut Random) -> Sample;
 
-    /// Hand-derived code.
+    /// Evaluates hand-derived code.
     fn hand<T: Real, L: Level>(x: &Self::Hand<T>) -> Self::HandAnswer<T>;
 
-    /// How many numbers the library reads: the element's own, then its unknowns.
-    fn library_numbers() -> usize;
+    /// Length of [`Sample::generated`]: parameters and unknowns.
+    fn generated_numbers() -> usize;
 
-    /// The library at level `L`, on numbers at 0, `stride`, 2 `stride`, …, as many side by side as `V` has lanes.
-    fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V>;
+    /// Evaluates generated code at level `L` on as many elements as `V` has lanes. Element numbers are `stride` apart
+    /// in `numbers`.
+    fn generated<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::GeneratedAnswer<V>;
 
-    /// The library's element, of its own numbers and possibly more.
+    /// Creates the element from its parameters; further numbers are ignored.
     fn element(numbers: &[f64]) -> Self::Element;
 
-    /// The library by its plain method, which dispatches at every call.
-    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64>;
+    /// Calls the generated plain method, which dispatches at every call.
+    fn generated_plain(element: &Self::Element, unknowns: &[f64]) -> Self::GeneratedAnswer<f64>;
 
-    /// [`Self::library_plain`] written to where the result is wanted.
-    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>);
+    /// Calls the generated plain method that writes its result to `result`.
+    fn generated_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::GeneratedAnswer<f64>);
 
-    /// The textbook formula over num-dual's dual numbers: value, gradient and full Hessian (or Jacobian), flattened as
-    /// the library's results are.
+    /// Evaluates the textbook formula over dual numbers: value, gradient and Hessian (or residual and Jacobian).
     fn dual(textbook: &[f64]) -> Self::HandAnswer<f64>;
 
-    /// The same without compensation, where the library's element has it.
+    /// Returns the results and contenders of the uncompensated element; `None` if compensation does not apply to the
+    /// kernel.
     #[must_use]
     fn uncompensated(_samples: &[Sample]) -> Option<Uncompensated> {
         None
     }
 
-    /// The element moved to within [`STRAIN`](crate::accuracy::STRAIN) of its rest, if it has one where differences
-    /// cancel.
+    /// Returns the element within [`STRAIN`](crate::near_rest::STRAIN) of its rest shape; `None` if nothing cancels
+    /// there.
     #[must_use]
     fn near_rest(_sample: &Sample) -> Option<Sample> {
         None
     }
 
-    /// All elements by way of vertices, where the kernel is a potential of points.
+    /// Returns the element with coincident points (K5: without rotation), and its documented result.
+    #[must_use]
+    fn coincident(sample: &Sample) -> Coincident;
+
+    /// Places all elements on vertices; `None` if the kernel is not a potential of points.
     fn assembled(samples: &[Sample]) -> Option<Assembled>;
 
-    /// The operations of the library's routine.
+    /// Returns the operation count of the generated routine.
     #[must_use]
     fn operations() -> OperationCount {
         let routines = Self::DECLARATION.routines;
@@ -78,7 +84,7 @@ pub trait Subject: Debug + 'static {
     }
 }
 
-/// `count` elements of a kernel, the same in every run.
+/// Returns `count` random elements of a kernel, the same in every run.
 #[must_use]
 pub fn samples<K: Subject>(count: usize) -> Vec<Sample> {
     let mut random = Random::new(20);

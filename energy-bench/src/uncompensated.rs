@@ -1,4 +1,4 @@
-//! The kernels whose library elements correct rounding errors, declared without: what that accuracy costs.
+//! The kernels' elements declared `#[uncompensated]`. They show what compensation costs.
 
 use std::marker::PhantomData;
 
@@ -10,11 +10,11 @@ use crate::sample::{Answer, Sample, points, potential};
 use crate::work::{Doubles, Work, call_each, each_block, lanes, packed};
 
 energy! {
-    /// K1.
+    /// K1 without compensation.
     #[uncompensated]
     pub energy UncompensatedSpring(p, q: Point; K: Scalar[N/m], L: Scalar[m]) = "K/2 (‖p − q‖ − L)²";
 
-    /// K2.
+    /// K2 without compensation.
     #[uncompensated]
     pub energy UncompensatedHairBend(p0, p1, p2: Point; k: Scalar[J]) {
         let a = p1 - p0;
@@ -22,7 +22,7 @@ energy! {
         "k/2 (1 − â·b̂)"
     }
 
-    /// K3.
+    /// K3 without compensation.
     #[uncompensated]
     pub energy UncompensatedHinge(x1, x2, x3, x4: Point; k: Scalar[J], θ0: Scalar[rad]) {
         let θ = dihedral(x1, x2, x3, x4);
@@ -30,11 +30,11 @@ energy! {
     }
 }
 
-/// An element in place of a kernel's own, with the same numbers.
+/// Results and contenders of an uncompensated element.
 pub struct Uncompensated {
-    /// Value, gradient and Hessian of each.
+    /// Value, gradient and Hessian blocks, one list per element.
     pub answers: Vec<Vec<f64>>,
-    /// Its plain method, and lanes at every level.
+    /// The plain method, and lanes at every level.
     pub contenders: Vec<(Contender, Work)>,
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn uncompensated<E, const N: usize>(samples: &[Sample]) -> Uncompensa
 where
     E: PackedPotential<f64, Wide<f64> = E> + Potential<f64, Points = [Vector3<f64>; N]> + 'static,
 {
-    let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.library, 1)).collect();
+    let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.generated, 1)).collect();
     let hessian = |element: &E, unknowns: &[f64]| element.hessian(points(unknowns));
     let answers = elements.iter().zip(samples).map(|(element, s)| hessian(element, &s.unknowns).numbers()).collect();
     let unknowns = packed::<f64>(samples, 1, |sample| &sample.unknowns);
@@ -58,11 +58,11 @@ where
 
 fn over_lanes<E: PackedPotential<f64> + 'static>(samples: &[Sample], level: LevelName) -> Work {
     let width = lanes::<Doubles>(level).expect("the level is available");
-    let numbers = packed::<f64>(samples, width, |sample| &sample.library);
+    let numbers = packed::<f64>(samples, width, |sample| &sample.generated);
     Box::new(move || dispatch_at(level, Lanes::<E>(&numbers, PhantomData)).expect("the level is available"))
 }
 
-/// An element's routine at the level, on all elements, [`packed`] for its lanes.
+/// Kernel that evaluates the element's Hessian at a level, on numbers [`packed`] for its lanes.
 struct Lanes<'a, E>(&'a [f64], PhantomData<E>);
 
 impl<E: PackedPotential<f64>> Kernel for Lanes<'_, E> {

@@ -1,5 +1,5 @@
-//! Vectors and blocks of hand-derived code: loops over fixed indices, so that everything is compiled for the caller's
-//! level.
+//! Vectors and 3×3 blocks for hand-derived code. Loops have fixed bounds and are always inlined, so that they are
+//! compiled for the caller's level.
 
 use energy_dsl::{Block, Level, Real, Vector3};
 
@@ -59,7 +59,7 @@ pub fn cross_add<T: Real, L: Level>(a: Vector3<T>, b: Vector3<T>, c: Vector3<T>)
     ]
 }
 
-/// The block with the entries that `entry` gives, all nine.
+/// Builds a block from all nine entries.
 macro_rules! block {
     (|$i:ident, $j:ident| $entry:expr) => {{
         let mut block = [[energy_dsl::Number::from_f64(0.0); 3]; 3];
@@ -72,7 +72,7 @@ macro_rules! block {
     }};
 }
 
-/// The symmetric block with the entries that `entry` gives for i ≤ j.
+/// Builds a symmetric block from its entries with i ≤ j.
 macro_rules! symmetric {
     (|$i:ident, $j:ident| $entry:expr) => {{
         let mut block = [[energy_dsl::Number::from_f64(0.0); 3]; 3];

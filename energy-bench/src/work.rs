@@ -1,5 +1,5 @@
-//! Loops over all elements: results go to a buffer of a few elements that stays in the cache, so that arithmetic is
-//! compared and not memory.
+//! Loops over all elements. Results go to a small buffer that stays in the cache: the benchmark compares arithmetic,
+//! not memory bandwidth.
 
 use std::fmt::Debug;
 use std::hint::black_box;
@@ -9,17 +9,17 @@ use energy_dsl::{Aligned, Kernel, Lane, Level, Real};
 
 use crate::sample::Sample;
 
-/// How many elements' results the buffer holds.
+/// Number of elements whose results the buffer holds.
 pub const TOGETHER: usize = 16;
 
-/// Work on all elements.
+/// One run over all elements.
 pub type Work = Box<dyn FnMut()>;
 
-/// One element at a time, or as many as there are lanes.
+/// Number of elements that a routine evaluates at once.
 pub trait Width: Debug + 'static {
-    /// A number of which there are several.
+    /// Scalar type: `f64` or `f32`.
     type Scalar: Real;
-    /// What is computed with at a level.
+    /// Number type of the routine at a level.
     type Number<L: Level>: Lane<Self::Scalar>;
 }
 
@@ -37,7 +37,7 @@ macro_rules! width {
 }
 
 width!(
-    /// One double.
+    /// One element in doubles.
     One: f64, f64
 );
 width!(
@@ -49,7 +49,7 @@ width!(
     Singles: f32, L::F32
 );
 
-/// How many lanes there are at the level of the kernel.
+/// Kernel that returns the number of lanes.
 struct Lanes<W>(PhantomData<W>);
 
 impl<W: Width> Kernel for Lanes<W> {
@@ -61,25 +61,26 @@ impl<W: Width> Kernel for Lanes<W> {
     }
 }
 
-/// The lanes of a width at a level; nothing if the machine has no such level.
+/// Returns the number of lanes at a level; `None` if the machine does not have that level.
 #[must_use]
 pub fn lanes<W: Width>(level: energy_dsl::LevelName) -> Option<usize> {
     energy_dsl::dispatch_at(level, Lanes::<W>(PhantomData))
 }
 
-/// Elements side by side: number by number, `width` elements together. With a width of one, an array of structs.
+/// Interleaves the inputs of `width` elements at a time: all first numbers, then all second numbers. A width of 1 gives
+/// an array of structs.
 #[must_use]
-pub fn packed<S: Real>(samples: &[Sample], width: usize, of: impl Fn(&Sample) -> &[f64]) -> Aligned<S> {
-    let mut numbers = Vec::new();
+pub fn packed<S: Real>(samples: &[Sample], width: usize, numbers: impl Fn(&Sample) -> &[f64]) -> Aligned<S> {
+    let mut all = Vec::new();
     for block in samples.chunks_exact(width) {
-        for i in 0..of(&block[0]).len() {
-            numbers.extend(block.iter().map(|sample| S::from_f64(of(sample)[i])));
+        for i in 0..numbers(&block[0]).len() {
+            all.extend(block.iter().map(|sample| S::from_f64(numbers(sample)[i])));
         }
     }
-    Aligned::from(numbers.as_slice())
+    Aligned::from(all.as_slice())
 }
 
-/// The loop over blocks of `size` numbers, each of as many elements as `lanes`.
+/// Evaluates an expression for each block of `size` numbers, which holds `lanes` elements.
 macro_rules! each_block {
     ($numbers:expr, $size:expr, $lanes:expr, |$block:ident| $call:expr) => {{
         let (numbers, size) = ($numbers, $size);
@@ -99,7 +100,7 @@ macro_rules! each_block {
 
 pub(crate) use each_block;
 
-/// A call for each element, after one that makes room for results.
+/// Makes one call per element. `first` fills the buffer before that.
 pub(crate) fn call_each<E, A: Clone>(
     elements: &[E],
     unknowns: &[f64],

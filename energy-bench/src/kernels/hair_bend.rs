@@ -1,20 +1,21 @@
 use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
 use energy_elements::HairBend;
 
-use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
+use crate::coincident::Coincident;
 use crate::dual;
+use crate::near_rest::STRAIN;
 use crate::random::Random;
 use crate::sample::{Derivatives, Sample, number_count, points, potential};
 use crate::subject::Subject;
 use crate::uncompensated::{Uncompensated, UncompensatedHairBend, uncompensated};
 use crate::vector::{add, block, dot, negative, negative_block, scale, scale_add, sub, symmetric};
 
-/// K2, the bending k/2 (1 − â·b̂) of a hair at the middle one of three points.
+/// K2: bending k/2 (1 − â·b̂) of a hair at the middle of three points.
 #[derive(Clone, Copy, Debug)]
 pub struct HairBendKernel;
 
-/// An element, in the form each contender reads.
+/// Returns an element in the form that each contender reads.
 fn element_on(stiffness: f64, unknowns: &[f64]) -> Sample {
     let all = [&[stiffness], unknowns].concat();
     Sample::new(&HairBend { k: stiffness }, unknowns, all.clone(), all)
@@ -29,7 +30,7 @@ impl Subject for HairBendKernel {
     /// k, p0, p1, p2.
     type Hand<T: Copy> = [T; 10];
     type HandAnswer<T: Real> = Derivatives<T, 3, 6>;
-    type LibraryAnswer<T: Real> = Hessian<T, [Vector3<T>; 3], [Block<T>; 6]>;
+    type GeneratedAnswer<T: Real> = Hessian<T, [Vector3<T>; 3], [Block<T>; 6]>;
 
     fn sample(random: &mut Random) -> Sample {
         let stiffness = random.between(0.5, 2.0);
@@ -41,13 +42,18 @@ impl Subject for HairBendKernel {
         element_on(stiffness, &[p0, p1, p2].concat())
     }
 
-    /// With C = −k/2 and s = 1/(‖a‖ ‖b‖): the cosine c = s a·b has c_a = s b − c a/‖a‖², c_ab = s − a/‖a‖² c_bᵀ − s b
-    /// bᵀ/‖b‖², and c_aa = −(a wᵀ + w aᵀ)/‖a‖² − c/‖a‖² with w = s b − 3/2 c a/‖a‖².
+    /// The value is C (c − 1) with C = −k/2 and c = s a·b, the cosine, where s = 1/(‖a‖ ‖b‖).
+    ///
+    /// ```text
+    /// c_a  = s b − c a/‖a‖²
+    /// c_ab = s − a/‖a‖² c_bᵀ − s b bᵀ/‖b‖²
+    /// c_aa = −(a wᵀ + w aᵀ)/‖a‖² − c/‖a‖²    with w = s b − 3/2 c a/‖a‖²
+    /// ```
     #[inline(always)]
     fn hand<T: Real, L: Level>(&[k, x0, x1, x2, y0, y1, y2, z0, z1, z2]: &[T; 10]) -> Derivatives<T, 3, 6> {
         let (a, b) = (sub([y0, y1, y2], [x0, x1, x2]), sub([z0, z1, z2], [y0, y1, y2]));
         let (aa, bb) = (dot::<T, L>(a, a), dot::<T, L>(b, b));
-        // One division and one root for all: 1/‖a‖² = ‖b‖² s².
+        // One division and one square root serve all terms: 1/‖a‖² = ‖b‖² s².
         let s = T::from_f64(1.0) / (aa * bb).sqrt();
         let (per_aa, per_bb) = (bb * s * s, aa * s * s);
         let cosine = dot::<T, L>(a, b) * s;
@@ -80,12 +86,12 @@ impl Subject for HairBendKernel {
         }
     }
 
-    fn library_numbers() -> usize {
+    fn generated_numbers() -> usize {
         number_count::<HairBend>()
     }
 
     #[inline(always)]
-    fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V> {
+    fn generated<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::GeneratedAnswer<V> {
         potential::<S, HairBend<S>, V, L>(numbers, stride)
     }
 
@@ -94,12 +100,12 @@ impl Subject for HairBendKernel {
     }
 
     #[inline]
-    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+    fn generated_plain(element: &Self::Element, unknowns: &[f64]) -> Self::GeneratedAnswer<f64> {
         element.hessian(points(unknowns))
     }
 
     #[inline]
-    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+    fn generated_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::GeneratedAnswer<f64>) {
         element.hessian_into(points(unknowns), result);
     }
 
@@ -120,6 +126,12 @@ impl Subject for HairBendKernel {
         let (a, b) = (sub(*p1, *p0), sub(*p2, *p1));
         let straight = add(*p1, scale_add::<f64, Baseline>(STRAIN, b, a));
         Some(element_on(sample.textbook[0], &[*p0, *p1, straight].concat()))
+    }
+
+    /// The first segment vanishes: value, gradient and Hessian are 0.
+    fn coincident(sample: &Sample) -> Coincident {
+        let [_, p1, p2]: &[_; 3] = points(&sample.unknowns);
+        Coincident::singular(sample.with_unknowns(&[*p1, *p1, *p2].concat()), 0.0)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

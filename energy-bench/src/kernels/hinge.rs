@@ -1,20 +1,21 @@
 use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
 use energy_elements::QuadraticHinge;
 
-use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
+use crate::coincident::Coincident;
 use crate::dual;
+use crate::near_rest::STRAIN;
 use crate::random::Random;
 use crate::sample::{Derivatives, Sample, number_count, points, potential};
 use crate::subject::Subject;
 use crate::uncompensated::{Uncompensated, UncompensatedHinge, uncompensated};
 use crate::vector::{add, block, cross, dot, negative_block, scale, scale_add, sub, symmetric};
 
-/// K3, a hinge k (θ − θ₀)² of two triangles over a shared edge; the weight ‖e‖²/A is in k.
+/// K3: a hinge k (θ − θ₀)² of two triangles that share an edge. The weight ‖e‖²/A is part of k.
 #[derive(Clone, Copy, Debug)]
 pub struct HingeKernel;
 
-/// An element, in the form each contender reads.
+/// Returns an element in the form that each contender reads.
 fn element_on([stiffness, rest]: [f64; 2], unknowns: &[f64]) -> Sample {
     let all = [&[stiffness, rest], unknowns].concat();
     Sample::new(&QuadraticHinge { k: stiffness, θ0: rest }, unknowns, all.clone(), all)
@@ -29,7 +30,7 @@ impl Subject for HingeKernel {
     /// k, θ₀, x1 to x4.
     type Hand<T: Copy> = [T; 14];
     type HandAnswer<T: Real> = Derivatives<T, 4, 10>;
-    type LibraryAnswer<T: Real> = Hessian<T, [Vector3<T>; 4], [Block<T>; 10]>;
+    type GeneratedAnswer<T: Real> = Hessian<T, [Vector3<T>; 4], [Block<T>; 10]>;
 
     fn sample(random: &mut Random) -> Sample {
         let (stiffness, rest) = (random.between(0.5, 2.0), random.between(-1.0, 1.0));
@@ -46,10 +47,17 @@ impl Subject for HingeKernel {
         element_on([stiffness, rest], &[x1, x2, x3, x4].concat())
     }
 
-    /// By the edge e and the apexes a, b from its start: θ_a = g₁ = −‖e‖ N₁/‖N₁‖², N₁ = e × a, and θ_b = g₂ likewise;
-    /// with the feet t = a·e/‖e‖² of the heights h = a − t e, θ_e = −t₁ g₁ − t₂ g₂. In the plane across e, θ is a
-    /// difference of polar angles, so θ_aa = −(g₁ h₁ᵀ + h₁ g₁ᵀ)/‖h₁‖², θ_ea = −g₁ eᵀ/‖e‖² − t₁ θ_aa; θ_ee follows,
-    /// where Σ h gᵀ is symmetric.
+    /// The edge is e. The vectors a and b lead from its start to the apexes.
+    ///
+    /// ```text
+    /// θ_a  = g₁ = −‖e‖ N₁/‖N₁‖²              with N₁ = e × a
+    /// θ_b  = g₂ =  ‖e‖ N₂/‖N₂‖²              with N₂ = e × b
+    /// θ_e  = −t₁ g₁ − t₂ g₂                  with t₁ = a·e/‖e‖², t₂ = b·e/‖e‖²
+    /// θ_aa = −(g₁ h₁ᵀ + h₁ g₁ᵀ)/‖h₁‖²        with the height h₁ = a − t₁ e
+    /// θ_ea = −g₁ eᵀ/‖e‖² − t₁ θ_aa
+    /// ```
+    ///
+    /// In the plane normal to e, θ is a difference of polar angles: this gives θ_aa. The symmetry of Σ h gᵀ gives θ_ee.
     #[inline(always)]
     fn hand<T: Real, L: Level>(
         &[k, rest, a0, a1, a2, b0, b1, b2, o0, o1, o2, e0, e1, e2]: &[T; 14],
@@ -59,7 +67,7 @@ impl Subject for HingeKernel {
         let (n1, n2) = (cross::<T, L>(e, a), cross::<T, L>(e, b));
         let (ee, s1, s2) = (dot::<T, L>(e, e), dot::<T, L>(n1, n1), dot::<T, L>(n2, n2));
         let length = ee.sqrt();
-        // One division for 1/‖e‖, 1/‖N₁‖² and 1/‖N₂‖².
+        // One division serves 1/‖e‖, 1/‖N₁‖² and 1/‖N₂‖².
         let s12 = s1 * s2;
         let per_all = T::from_f64(1.0) / (length * s12);
         let per_length = per_all * s12;
@@ -84,7 +92,7 @@ impl Subject for HingeKernel {
         let h_bb: Block<T> = symmetric!(|i, j| g2[i].mul_add::<L>(y2[j], y2[i] * g2[j]));
         let stiff = scale(k + k, g1);
         let h_ab: Block<T> = block!(|i, j| stiff[i] * g2[j]);
-        // The negatives of U_ae and U_be: the terms of θ_e θ_aᵀ are in U_aa and U_ab.
+        // −U_ae and −U_be. U_aa and U_ab already contain the terms of θ_e θ_aᵀ.
         let along = scale(per_ee, e);
         let m_ae: Block<T> = block!(|i, j| t1.mul_add::<L>(h_aa[i][j], t2.mul_add::<L>(h_ab[i][j], along[i] * f1[j])));
         let m_be: Block<T> = block!(|i, j| t2.mul_add::<L>(h_bb[i][j], t1.mul_add::<L>(h_ab[j][i], along[i] * f2[j])));
@@ -107,12 +115,12 @@ impl Subject for HingeKernel {
         }
     }
 
-    fn library_numbers() -> usize {
+    fn generated_numbers() -> usize {
         number_count::<QuadraticHinge>()
     }
 
     #[inline(always)]
-    fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V> {
+    fn generated<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::GeneratedAnswer<V> {
         potential::<S, QuadraticHinge<S>, V, L>(numbers, stride)
     }
 
@@ -121,12 +129,12 @@ impl Subject for HingeKernel {
     }
 
     #[inline]
-    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+    fn generated_plain(element: &Self::Element, unknowns: &[f64]) -> Self::GeneratedAnswer<f64> {
         element.hessian(points(unknowns))
     }
 
     #[inline]
-    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+    fn generated_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::GeneratedAnswer<f64>) {
         element.hessian_into(points(unknowns), result);
     }
 
@@ -145,7 +153,7 @@ impl Subject for HingeKernel {
         Some(uncompensated::<UncompensatedHinge, 4>(samples))
     }
 
-    /// The first apex is moved across the edge from the second.
+    /// Moves the first apex so that the triangles are almost coplanar: θ is about [`STRAIN`].
     fn near_rest(sample: &Sample) -> Option<Sample> {
         let [x1, x2, x3, x4]: &[_; 4] = points(&sample.unknowns);
         let (e, a, b) = (sub(*x4, *x3), sub(*x1, *x3), sub(*x2, *x3));
@@ -155,6 +163,12 @@ impl Subject for HingeKernel {
         let up = scale(STRAIN / ee.sqrt(), cross::<f64, Baseline>(e, height));
         let flat = add(scale(product(a, e) / ee, e), sub(up, height));
         Some(element_on([sample.textbook[0], 0.0], &[add(*x3, flat), *x2, *x3, *x4].concat()))
+    }
+
+    /// The shared edge vanishes: θ and its derivatives are 0.
+    fn coincident(sample: &Sample) -> Coincident {
+        let (stiffness, rest, [x1, x2, x3, _]) = (sample.textbook[0], sample.textbook[1], points(&sample.unknowns));
+        Coincident::singular(sample.with_unknowns(&[*x1, *x2, *x3, *x3].concat()), stiffness * rest * rest)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

@@ -1,4 +1,4 @@
-//! The kernels. Each file has random inputs, hand-derived code, and the textbook formula for dual numbers.
+//! The five kernels. Each file contains random inputs, hand-derived code and the textbook formula over dual numbers.
 
 mod hair_bend;
 mod hinge;

@@ -1,21 +1,24 @@
-use energy_dsl::{Declaration, Element, Lane, Level, Mask, PackedResidual, Real, Residual, ResidualJacobian, Vector3};
+use energy_dsl::{
+    Baseline, Declaration, Element, Lane, Level, Mask, PackedResidual, Real, Residual, ResidualJacobian, Vector3,
+};
 use energy_elements::PointToPlane;
 use nalgebra::SVector;
 use num_dual::gradient;
 
 use crate::assembled::Assembled;
+use crate::coincident::Coincident;
 use crate::dual::{Dual, cross as dual_cross, dot as dual_dot};
 use crate::random::Random;
 use crate::sample::{Row, Sample, number_count, residual};
 use crate::subject::Subject;
 use crate::vector::{add, cross, cross_add, dot, scale, scale_add, sub};
 
-/// K5, the distance of a point to a plane, r = n̂·(v̂ − u), the point moved by the blend of four twists; r and its
-/// gradient.
+/// K5: signed distance r = n̂·(v̂ − u) of a point to a plane, and its gradient. The hats denote motion by the blend of
+/// four twists.
 #[derive(Clone, Copy, Debug)]
 pub struct PointToPlaneKernel;
 
-/// A node's twist and the parts of its motion.
+/// The twist of a node and terms of its motion.
 #[derive(Clone, Copy)]
 struct Node<T> {
     weight: T,
@@ -23,14 +26,14 @@ struct Node<T> {
     shift: Vector3<T>,
     /// cos ‖θ‖.
     cosine: T,
-    /// sin ‖θ‖/‖θ‖ and its derivative by θ, over θ.
+    /// sin ‖θ‖/‖θ‖. `slope` is its derivative, (cos ‖θ‖ − sin ‖θ‖/‖θ‖)/‖θ‖², as a factor of θ.
     sinc: T,
     slope: T,
     /// θ sin ‖θ‖/‖θ‖.
     axis: Vector3<T>,
 }
 
-/// sin ‖θ‖/‖θ‖, and (cos ‖θ‖ − sin ‖θ‖/‖θ‖)/‖θ‖², from y = ‖θ‖².
+/// Returns sin ‖θ‖/‖θ‖ and (cos ‖θ‖ − sin ‖θ‖/‖θ‖)/‖θ‖², given y = ‖θ‖².
 #[inline(always)]
 fn sinc<T: Real, L: Level>(y: T) -> (T, T) {
     /// (−1)^k/(2 k + 1)!.
@@ -60,7 +63,7 @@ fn sinc<T: Real, L: Level>(y: T) -> (T, T) {
         sinc = sinc.mul_add::<L>(y, T::from_f64(SINC[k]));
         slope = slope.mul_add::<L>(y, T::from_f64(SLOPE[k]));
     }
-    // Turns by at most a right angle, ‖θ‖ ≤ π/4.
+    // The series hold for ‖θ‖ ≤ π/4: a rotation by up to a right angle, as θ is half of its rotation vector.
     let small = y.less_or_equal(T::from_f64(0.62));
     if small.all() { (sinc, slope) } else { large::<T, L>(y, small, sinc, slope) }
 }
@@ -91,7 +94,7 @@ impl Subject for PointToPlaneKernel {
     /// w, v, n, u, then four times θ and t.
     type Hand<T: Copy> = [T; 37];
     type HandAnswer<T: Real> = Row<T, 24>;
-    type LibraryAnswer<T: Real> = ResidualJacobian<T, [T; 1], [T; 24]>;
+    type GeneratedAnswer<T: Real> = ResidualJacobian<T, [T; 1], [T; 24]>;
 
     fn sample(random: &mut Random) -> Sample {
         let w = [0.0; 4].map(|_| random.between(0.2, 1.0));
@@ -109,9 +112,16 @@ impl Subject for PointToPlaneKernel {
         Sample::new(&element, &unknowns, all.clone(), all)
     }
 
-    /// With the blend's unit real part (w, p) and twice its dual part (W, X): n̂ = n + 2 (w m + p × m), m = p × n, and
-    /// τ = w X − W p + p × X. As rotations keep products, r = n·v + n̂·(τ − u). Its gradient by the eight numbers is
-    /// freed of what changes their length, then carried to each twist.
+    /// The unit real part of the blend is (w, p), twice its dual part is (W, X).
+    ///
+    /// ```text
+    /// n̂ = n + 2 (w m + p × m)      with m = p × n
+    /// τ = w X − W p + p × X        the translation
+    /// r = n·v + n̂·(τ − u)          because rotations preserve dot products
+    /// ```
+    ///
+    /// The gradient with respect to these eight numbers loses the part that normalisation removes. Then it is pulled
+    /// back to each twist.
     #[inline(always)]
     fn hand<T: Real, L: Level>(x: &[T; 37]) -> Row<T, 24> {
         let nodes = [
@@ -126,7 +136,7 @@ impl Subject for PointToPlaneKernel {
         for (k, node) in nodes.iter().enumerate() {
             let weighted = scale(node.weight, node.axis);
             let weighted_cosine = node.weight * node.cosine;
-            // (0, t) (cos, axis).
+            // The product (0, t) (cos, axis) of quaternions.
             let inner = -dot::<T, L>(node.shift, weighted);
             let outer = cross_add::<T, L>(node.shift, weighted, scale(weighted_cosine, node.shift));
             (w, p, dual_w, dual_x) = if k == 0 {
@@ -151,7 +161,7 @@ impl Subject for PointToPlaneKernel {
         let by_p = cross_add::<T, L>(two_m, d, cross::<T, L>(two_n, inner));
         let by_p = cross_add::<T, L>(dual_x, normal, scale_add::<T, L>(-dual_w, normal, by_p));
         let by_w = dot::<T, L>(d, two_m) + dot::<T, L>(normal, dual_x);
-        // The gradient along the eight numbers themselves.
+        // Component of the gradient along (w, p) and (W, X), which normalisation removes.
         let radial = moved - dot::<T, L>(n, d) + dot::<T, L>(normal, shift);
         let radial = -(radial + radial);
         let by_p = scale(per_length, scale_add::<T, L>(radial, p, by_p));
@@ -176,12 +186,12 @@ impl Subject for PointToPlaneKernel {
         Row { value, jacobian }
     }
 
-    fn library_numbers() -> usize {
+    fn generated_numbers() -> usize {
         number_count::<PointToPlane>()
     }
 
     #[inline(always)]
-    fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V> {
+    fn generated<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::GeneratedAnswer<V> {
         residual::<S, PointToPlane<S>, V, L>(numbers, stride)
     }
 
@@ -190,12 +200,12 @@ impl Subject for PointToPlaneKernel {
     }
 
     #[inline]
-    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+    fn generated_plain(element: &Self::Element, unknowns: &[f64]) -> Self::GeneratedAnswer<f64> {
         element.jacobian(unknowns.try_into().expect("24 unknowns"))
     }
 
     #[inline]
-    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+    fn generated_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::GeneratedAnswer<f64>) {
         element.jacobian_into(unknowns.try_into().expect("24 unknowns"), result);
     }
 
@@ -205,12 +215,34 @@ impl Subject for PointToPlaneKernel {
         Row { value, jacobian: gradient.into() }
     }
 
+    /// No rotations, a regular point: with the normalised weights c and T = Σ c t, r = n·(v + T − u),
+    /// ∂r/∂θₖ = cₖ n × (tₖ + T − 2 u) and ∂r/∂tₖ = cₖ n.
+    fn coincident(sample: &Sample) -> Coincident {
+        let vector = |numbers: &[f64], i: usize| [numbers[i], numbers[i + 1], numbers[i + 2]];
+        let x = &sample.textbook;
+        let (v, n, u) = (vector(x, 4), vector(x, 7), vector(x, 10));
+        let total: f64 = x[..4].iter().sum();
+        let mut unknowns = sample.unknowns.clone();
+        let mut shift = [0.0; 3];
+        for k in 0..4 {
+            unknowns[6 * k..6 * k + 3].fill(0.0);
+            shift = add(shift, scale(x[k] / total, vector(&unknowns, 6 * k + 3)));
+        }
+        let mut expected = vec![dot::<f64, Baseline>(n, sub(add(v, shift), u))];
+        for k in 0..4 {
+            let (weight, t) = (x[k] / total, vector(&unknowns, 6 * k + 3));
+            expected.extend(scale(weight, cross::<f64, Baseline>(n, sub(add(t, shift), add(u, u)))));
+            expected.extend(scale(weight, n));
+        }
+        Coincident { sample: sample.with_unknowns(&unknowns), expected }
+    }
+
     fn assembled(_samples: &[Sample]) -> Option<Assembled> {
         None
     }
 }
 
-/// (w + p) (v + q) of quaternions.
+/// Product of two quaternions.
 fn product<D: Dual>(a: &[D; 4], b: &[D; 4]) -> [D; 4] {
     let (p, q) = ([a[1], a[2], a[3]], [b[1], b[2], b[3]]);
     let across = dual_cross(&p, &q);

@@ -1,20 +1,21 @@
 use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Potential, Real, Vector3};
 use energy_elements::HookeSpring;
 
-use crate::accuracy::STRAIN;
 use crate::assembled::{Assembled, assembled};
+use crate::coincident::Coincident;
 use crate::dual;
+use crate::near_rest::STRAIN;
 use crate::random::Random;
 use crate::sample::{Derivatives, Sample, number_count, points, potential};
 use crate::subject::Subject;
 use crate::uncompensated::{Uncompensated, UncompensatedSpring, uncompensated};
 use crate::vector::{dot, negative, negative_block, scale, sub, symmetric};
 
-/// K1, a spring ½ k (‖d‖ − L)² between two points.
+/// K1: a spring ½ k (‖d‖ − L)² between two points.
 #[derive(Clone, Copy, Debug)]
 pub struct SpringKernel;
 
-/// An element, in the form each contender reads.
+/// Returns an element in the form that each contender reads.
 fn element_on([stiffness, rest]: [f64; 2], unknowns: &[f64]) -> Sample {
     let all = [&[stiffness, rest], unknowns].concat();
     Sample::new(&HookeSpring { K: stiffness, L: rest }, unknowns, all.clone(), all)
@@ -29,7 +30,7 @@ impl Subject for SpringKernel {
     /// k, L, p, q.
     type Hand<T: Copy> = [T; 8];
     type HandAnswer<T: Real> = Derivatives<T, 2, 3>;
-    type LibraryAnswer<T: Real> = Hessian<T, [Vector3<T>; 2], [Block<T>; 3]>;
+    type GeneratedAnswer<T: Real> = Hessian<T, [Vector3<T>; 2], [Block<T>; 3]>;
 
     fn sample(random: &mut Random) -> Sample {
         let (stiffness, rest) = (random.between(0.5, 2.0), random.between(0.5, 1.5));
@@ -58,12 +59,12 @@ impl Subject for SpringKernel {
         Derivatives { value, gradient: [negative(force), force], hessian: [hessian, negative_block(&hessian), hessian] }
     }
 
-    fn library_numbers() -> usize {
+    fn generated_numbers() -> usize {
         number_count::<HookeSpring>()
     }
 
     #[inline(always)]
-    fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V> {
+    fn generated<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::GeneratedAnswer<V> {
         potential::<S, HookeSpring<S>, V, L>(numbers, stride)
     }
 
@@ -72,12 +73,12 @@ impl Subject for SpringKernel {
     }
 
     #[inline]
-    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+    fn generated_plain(element: &Self::Element, unknowns: &[f64]) -> Self::GeneratedAnswer<f64> {
         element.hessian(points(unknowns))
     }
 
     #[inline]
-    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+    fn generated_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::GeneratedAnswer<f64>) {
         element.hessian_into(points(unknowns), result);
     }
 
@@ -97,6 +98,12 @@ impl Subject for SpringKernel {
         let d = sub(*q, *p);
         let (stiffness, rest) = (sample.textbook[0], dot::<f64, Baseline>(d, d).sqrt() * (1.0 - STRAIN));
         Some(element_on([stiffness, rest], &sample.unknowns))
+    }
+
+    /// Both points meet: the value is k/2 L², gradient and Hessian are 0.
+    fn coincident(sample: &Sample) -> Coincident {
+        let (stiffness, rest, [p, _]) = (sample.textbook[0], sample.textbook[1], points(&sample.unknowns));
+        Coincident::singular(sample.with_unknowns(&[*p, *p].concat()), 0.5 * stiffness * rest * rest)
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {

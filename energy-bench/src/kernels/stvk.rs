@@ -2,13 +2,14 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::StVK;
 
 use crate::assembled::{Assembled, assembled};
+use crate::coincident::Coincident;
 use crate::dual;
 use crate::random::Random;
 use crate::sample::{Derivatives, Sample, number_count, points, potential};
 use crate::subject::Subject;
 use crate::vector::{add, block, dot, negative, scale, scale_add, sub, symmetric};
 
-/// K4, a St. Venant–Kirchhoff membrane A (μ ‖E‖² + λ/2 tr² E) on a triangle.
+/// K4: a St. Venant–Kirchhoff membrane A (μ ‖E‖² + λ/2 tr² E) on a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct StVKKernel;
 
@@ -18,11 +19,11 @@ impl Subject for StVKKernel {
     const DECLARATION: &'static Declaration = <StVK as Element>::DECLARATION;
     const ROUTINE: &'static str = "hessian";
     type Element = StVK;
-    /// λ A, μ A, the metric D_m⁻¹ D_m⁻ᵀ (11, 12, 22), x0 to x2. The textbook formula has λ, μ, A, D_m⁻¹ by rows, x0 to
-    /// x2.
+    /// λ A, μ A, the metric D_m⁻¹ D_m⁻ᵀ (entries 11, 12, 22), x0 to x2. The textbook formula reads λ, μ, A, D_m⁻¹ by
+    /// rows, x0 to x2.
     type Hand<T: Copy> = [T; 14];
     type HandAnswer<T: Real> = Derivatives<T, 3, 6>;
-    type LibraryAnswer<T: Real> = Hessian<T, [Vector3<T>; 3], [Block<T>; 6]>;
+    type GeneratedAnswer<T: Real> = Hessian<T, [Vector3<T>; 3], [Block<T>; 6]>;
 
     fn sample(random: &mut Random) -> Sample {
         let (lambda, mu) = (random.between(0.5, 2.0), random.between(0.5, 2.0));
@@ -50,9 +51,13 @@ impl Subject for StVKKernel {
         Sample::new(&element, &unknowns, hand, textbook)
     }
 
-    /// With the metrics G at rest and K = DᵀD of the moved edges D = (d₁, d₂), Y = G K − 1 has tr E = tr Y/2 and ‖E‖² =
-    /// tr Y²/4; U_D = D M, M = (μ Y + λ tr E) G, and with q = D G, Φ = μ D G Dᵀ: U_ij = M_ij + G_ij Φ + μ q_j q_iᵀ + λ
-    /// q_i q_jᵀ.
+    /// The rest metric is G. The deformed edges are D = (d₁, d₂), and K = DᵀD.
+    ///
+    /// ```text
+    /// tr E = tr Y/2,  ‖E‖² = tr Y²/4                  with Y = G K − 1
+    /// U_D  = D M                                      with M = (μ Y + λ tr E) G
+    /// U_ij = M_ij + G_ij Φ + μ q_j q_iᵀ + λ q_i q_jᵀ  with q = D G, Φ = μ D G Dᵀ
+    /// ```
     #[inline(always)]
     fn hand<T: Real, L: Level>(
         &[lambda, mu, g11, g12, g22, x0, x1, x2, y0, y1, y2, z0, z1, z2]: &[T; 14],
@@ -102,12 +107,12 @@ impl Subject for StVKKernel {
         Derivatives { value, gradient: [negative(add(f1, f2)), f1, f2], hessian: [h00, h01, h02, h11, h12, h22] }
     }
 
-    fn library_numbers() -> usize {
+    fn generated_numbers() -> usize {
         number_count::<StVK>()
     }
 
     #[inline(always)]
-    fn library<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::LibraryAnswer<V> {
+    fn generated<S: Real, V: Lane<S>, L: Level>(numbers: &[S], stride: usize) -> Self::GeneratedAnswer<V> {
         potential::<S, StVK<S>, V, L>(numbers, stride)
     }
 
@@ -116,12 +121,12 @@ impl Subject for StVKKernel {
     }
 
     #[inline]
-    fn library_plain(element: &Self::Element, unknowns: &[f64]) -> Self::LibraryAnswer<f64> {
+    fn generated_plain(element: &Self::Element, unknowns: &[f64]) -> Self::GeneratedAnswer<f64> {
         element.hessian(points(unknowns))
     }
 
     #[inline]
-    fn library_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::LibraryAnswer<f64>) {
+    fn generated_plain_into(element: &Self::Element, unknowns: &[f64], result: &mut Self::GeneratedAnswer<f64>) {
         element.hessian_into(points(unknowns), result);
     }
 
@@ -138,6 +143,24 @@ impl Subject for StVKKernel {
             let norm = e11 * e11 + e12 * e12 * 2.0 + e22 * e22;
             (norm * mu + trace * trace * (0.5 * lambda)) * area
         })
+    }
+
+    /// All points meet. The potential is regular there: E = −1/2, so U = A (μ + λ)/2, ∂U/∂x = 0 and ∂²U/∂xᵢ∂xⱼ = −A (μ
+    /// + λ) Gᵢⱼ.
+    fn coincident(sample: &Sample) -> Coincident {
+        let (lambda, mu) = (sample.hand[0], sample.hand[1]);
+        let (g11, g12, g22) = (sample.hand[2], sample.hand[3], sample.hand[4]);
+        let [x0, _, _]: &[_; 3] = points(&sample.unknowns);
+        // The gradients of the barycentric coordinates add up to 0.
+        let metric = [g11 + 2.0 * g12 + g22, -(g11 + g12), -(g12 + g22), g11, g12, g22];
+        let mut hessian = [[[0.0; 3]; 3]; 6];
+        for (block, g) in hessian.iter_mut().zip(metric) {
+            for i in 0..3 {
+                block[i][i] = -(lambda + mu) * g;
+            }
+        }
+        let expected = [&[0.5 * (lambda + mu)], [0.0; 9].as_slice(), hessian.as_flattened().as_flattened()].concat();
+        Coincident { sample: sample.with_unknowns(&[*x0; 3].concat()), expected }
     }
 
     fn assembled(samples: &[Sample]) -> Option<Assembled> {
