@@ -1,8 +1,8 @@
 //! What the program `verify` measures beyond the audit of [`verify`].
 //!
 //! * [`reference`](mod@reference) compares the elements with recorded multi-precision values.
-//! * [`stress`] sweeps towards every singularity.
-//! * [`bench`] times every way to a Hessian and measures its error.
+//! * [`stress`](mod@stress) sweeps towards every singularity.
+//! * [`bench`](mod@bench) times every way to a Hessian and measures its error.
 //! * [`fuzz_targets`] feeds the compiler with edited inputs.
 #![forbid(unsafe_code)]
 
