@@ -64,7 +64,8 @@ elements! {
     stvk: StVK;
     thread_limit: ThreadLimit;
     tracking: BlendedMotion4, BlendedPoint1, BlendedPoint4, BlendedPoint8, Binding, BoneBinding, FrozenPlane1,
-        FrozenPlane4, FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane, SkeletonPlane,
+        FrozenPlane4, FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane,
+        SkeletonPlane,
         SkeletonPoint, TukeyLoss, TwistMotion;
     viscous_drag: ViscousDrag;
     wind_drag: WindDrag;

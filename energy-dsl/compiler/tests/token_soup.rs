@@ -14,7 +14,8 @@ const SHIPPED: &[&str] = &[
     "residual Blend(ξ: [Twist; 2]; w: [Scalar[1]; 2], v: Vec3[m]) { transform(unit(sum(j in 0..2, w[j] * \
      exp(ξ[j]))), v) }",
     "energy StVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) { rest { let D = columns(u1 - u0, u2 - \
-     u0); let B = inverse(D); let A = det(D) / 2; } let F = columns(x1 - x0, x2 - x0) * B; let E = (transpose(F) * F - identity(2)) / 2; \
+     u0); let B = inverse(D); let A = det(D) / 2; } let F = columns(x1 - x0, x2 - x0) * B; \
+     let E = (transpose(F) * F - identity(2)) / 2; \
      A * (μ * ddot(E, E) + λ / 2 * trace(E)^2) }",
 ];
 

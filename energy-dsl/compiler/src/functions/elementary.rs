@@ -4,7 +4,10 @@ use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 macro_rules! scalar_function {
-    ($name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal, |$g:ident, $args:ident| $body:expr) => {
+    (
+        $name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal,
+        |$g:ident, $args:ident| $body:expr
+    ) => {
         Function {
             name: $name,
             usage: $usage,

@@ -58,7 +58,14 @@ impl Mask for bool {
 /// Operations that depend on the processor take the SIMD [`Level`]: it decides whether products fuse with sums, and so
 /// how elementary functions are evaluated.
 pub trait Number:
-    Clone + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+    Sized
+    + Clone
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
 {
     /// The outcome of a comparison.
     type Mask: Mask;
