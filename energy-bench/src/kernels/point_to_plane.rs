@@ -120,8 +120,8 @@ impl Subject for PointToPlaneKernel {
     /// r = n·v + n̂·(τ − u)          because rotations preserve dot products
     /// ```
     ///
-    /// The gradient with respect to these eight numbers loses the part that normalisation removes. Then it is pulled back to
-    /// each twist.
+    /// The gradient with respect to these eight numbers loses the part that normalisation removes. Then it is pulled
+    /// back to each twist.
     #[inline(always)]
     fn hand<T: Real, L: Level>(x: &[T; 37]) -> Row<T, 24> {
         let nodes = [
