@@ -7,18 +7,9 @@ use serde::Serialize;
 
 use crate::agreement::{TOLERANCE, collect, difference};
 use crate::contender::Source;
-use crate::sample::{Answer, Sample};
+use crate::sample::{Answer, Coincident, Sample};
 use crate::subject::Subject;
 use crate::work::{Doubles, TOGETHER};
-
-/// A degenerate element and its documented result.
-#[derive(Clone, Debug)]
-pub struct Coincident {
-    /// The element, with two or more points at the same position (K5: with no rotation).
-    pub sample: Sample,
-    /// The documented value, gradient and Hessian blocks (or residual and Jacobian), flattened.
-    pub expected: Vec<f64>,
-}
 
 /// Judgement of a result at coincident points, from best to worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,11 +8,11 @@ use energy_dsl::available;
 use serde::Serialize;
 
 use crate::agreement::{agreement, expected};
-use crate::coincident::Coincident;
 use crate::contenders::contenders;
 use crate::for_each_kernel;
 use crate::measure::{Measured, measure};
 use crate::near_rest::NearRest;
+use crate::sample::Coincident;
 use crate::sample::Sample;
 use crate::script::{SCRIPT_TOOLS, run_script};
 use crate::subject::{Subject, samples};

@@ -18,6 +18,15 @@ pub struct Sample {
     pub textbook: Vec<f64>,
 }
 
+/// A degenerate element and its documented result.
+#[derive(Clone, Debug)]
+pub struct Coincident {
+    /// The element, with two or more points at the same position (K5: with no rotation).
+    pub sample: Sample,
+    /// The documented value, gradient and Hessian blocks (or residual and Jacobian), flattened.
+    pub expected: Vec<f64>,
+}
+
 impl Sample {
     /// Creates the sample of an element at the given unknowns.
     pub(crate) fn new<E: Stored<f64>>(element: &E, unknowns: &[f64], hand: Vec<f64>, textbook: Vec<f64>) -> Self {

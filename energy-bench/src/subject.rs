@@ -5,8 +5,8 @@ use std::fmt::Debug;
 use energy_dsl::{Array, Declaration, Lane, Level, OperationCount, Real};
 
 use crate::assembled::Assembled;
-use crate::coincident::Coincident;
 use crate::random::Random;
+use crate::sample::Coincident;
 use crate::sample::{Answer, Sample};
 use crate::uncompensated::Uncompensated;
 

@@ -6,9 +6,9 @@ use nalgebra::SVector;
 use num_dual::gradient;
 
 use crate::assembled::Assembled;
-use crate::coincident::Coincident;
 use crate::dual::{Dual, cross as dual_cross, dot as dual_dot};
 use crate::random::Random;
+use crate::sample::Coincident;
 use crate::sample::{Row, Sample, number_count, residual};
 use crate::subject::Subject;
 use crate::vector::{add, cross, cross_add, dot, scale, scale_add, sub};

@@ -2,10 +2,10 @@ use energy_dsl::{Baseline, Block, Declaration, Element, Hessian, Lane, Level, Po
 use energy_elements::HookeSpring;
 
 use crate::assembled::{Assembled, assembled};
-use crate::coincident::Coincident;
 use crate::dual;
 use crate::near_rest::STRAIN;
 use crate::random::Random;
+use crate::sample::Coincident;
 use crate::sample::{Derivatives, Sample, number_count, points, potential};
 use crate::subject::Subject;
 use crate::uncompensated::{Uncompensated, UncompensatedSpring, uncompensated};

@@ -2,9 +2,9 @@ use energy_dsl::{Block, Declaration, Element, Hessian, Lane, Level, Potential, R
 use energy_elements::StVK;
 
 use crate::assembled::{Assembled, assembled};
-use crate::coincident::Coincident;
 use crate::dual;
 use crate::random::Random;
+use crate::sample::Coincident;
 use crate::sample::{Derivatives, Sample, number_count, points, potential};
 use crate::subject::Subject;
 use crate::vector::{add, block, dot, negative, scale, scale_add, sub, symmetric};
