@@ -15,7 +15,8 @@ use energy_runtime::{
 /// evaluated and audited in this way. Results equal those of the generated code without fused operations.
 ///
 /// ```
-/// use energy_compiler::{Inputs, Interpreted};
+/// use energy_compiler::Interpreted;
+/// use energy_runtime::Inputs;
 ///
 /// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
 /// let pull = Interpreted::from_source(source).unwrap().remove(0);
@@ -159,7 +160,8 @@ impl Interpreted {
     /// numbers by group (a Hessian as its triangle of blocks) and its flags. `None` if the kind has no such routine.
     ///
     /// ```
-    /// use energy_compiler::{Inputs, Interpreted};
+    /// use energy_compiler::Interpreted;
+    /// use energy_runtime::Inputs;
     ///
     /// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
     /// let pull = Interpreted::from_source(source).unwrap().remove(0);

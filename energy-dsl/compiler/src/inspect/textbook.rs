@@ -13,7 +13,8 @@ use energy_runtime::{Inputs, Number};
 /// type; the audit compares generated code with it.
 ///
 /// ```
-/// use energy_compiler::{Inputs, Textbook};
+/// use energy_compiler::Textbook;
+/// use energy_runtime::Inputs;
 /// let source = "energy Spring(p, q: Point; k, L: Scalar) { k / 2 * (norm(p - q) - L)^2 }";
 /// let spring = Textbook::from_source(source).unwrap();
 /// let x = [0.0, 0.0, 0.0, 3.0, 0.0, 4.0];
