@@ -39,6 +39,7 @@ elements! {
     capsule_contact: CapsuleContact;
     distance: Distance;
     distance_squared: DistanceSquared;
+    edge_edge_distance: EdgeEdgeDistance;
     flat_bending: FlatBending;
     gravity: Gravity;
     hair_bend: HairBend;
@@ -52,8 +53,11 @@ elements! {
     ipc_barrier_squared: SquaredDistanceBarrier;
     neo_hookean_log: NeoHookean, StableNeoHookeanLog;
     orthotropic_stvk: OrthotropicStVK;
+    parallel_edges: ParallelEdges;
     plane_contact: PlaneContact;
     plate_bending: PlateBending;
+    point_edge_distance: PointEdgeDistance;
+    point_triangle_distance: PointTriangleDistance;
     power_law: PowerLaw;
     quadratic_hinge: QuadraticHinge;
     sliding_friction: SlidingFriction;
