@@ -24,6 +24,8 @@
 //! [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is deterministic: sums run in the order
 //! of terms and elements, for any number of threads.
 //!
+//! Contact is not a sum of fixed elements: see [`ContactModel`] and [`OverRelaxation::scale_with_contacts`].
+//!
 //! A [`GaussNewton`] solver minimises sums of squared residuals ([`ResidualTerm`]) over blocks of unknowns.
 //!
 //! ```
@@ -44,6 +46,7 @@
 
 #![forbid(unsafe_code)]
 
+mod contact;
 mod least_squares;
 mod linear;
 mod matrix;
@@ -51,6 +54,7 @@ mod system;
 mod terms;
 mod threads;
 
+pub use contact::{Contact, ContactCounts, ContactModel};
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
     Loss, NormalEquations, NormalMatrix, NormalPattern, NormalSolution, NormalSolver, NormalSolverKind, Outcome,

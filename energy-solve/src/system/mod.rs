@@ -13,6 +13,7 @@ use energy_dsl::Vector3;
 use self::constant::ConstantPart;
 pub use self::error::{EvaluationError, SystemError};
 pub use self::linearise::{LinearisationOptions, LinearisedForces};
+use crate::contact::ContactModel;
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
@@ -45,6 +46,7 @@ pub struct System {
     changing: Option<Arc<[Range<u32>]>>,
     /// The constant parts of the matrices in use.
     constants: Vec<ConstantPart>,
+    contact: Option<Box<dyn ContactModel>>,
 }
 
 /// A term and its evaluation counts.
@@ -85,6 +87,7 @@ impl System {
             evaluated_at: Vec::new(),
             changing: None,
             constants: Vec::new(),
+            contact: None,
         };
         system.set_threads(1);
         Ok(system)
@@ -109,6 +112,41 @@ impl System {
     fn divisible(&self, wanted: impl Fn(&dyn PlacedTerm) -> bool) -> Vec<Option<(&dyn Divisible, bool)>> {
         let terms = self.terms.iter().map(|counted| &*counted.term);
         terms.map(|term| term.divisible().map(|divisible| (divisible, wanted(term)))).collect()
+    }
+
+    /// Adds contact. The sums of this system do not include it: an integrator adds it with [`System::contact`], because
+    /// contact also limits the moves that lead from state to state.
+    pub fn set_contact(&mut self, contact: Box<dyn ContactModel>) {
+        self.contact = Some(contact);
+    }
+
+    /// Removes and returns the contact, if there is one.
+    pub fn take_contact(&mut self) -> Option<Box<dyn ContactModel>> {
+        self.contact.take()
+    }
+
+    /// Returns the contact and the map between vertices and rows; `None` if the body does not collide.
+    pub fn contact(&mut self) -> Option<(&mut (dyn ContactModel + 'static), &DofMap)> {
+        Some((&mut **self.contact.as_mut()?, &self.dofs))
+    }
+
+    /// Returns the energy of the contacts of the last step at x, in J; `None` if the body does not collide.
+    #[must_use]
+    pub fn contact_energy(&self, x: &[Vector3<f64>]) -> Option<f64> {
+        self.contact.as_ref().map(|contact| contact.energy(x))
+    }
+
+    /// Adds the forces of the contacts of the last step at x, in N.
+    pub fn add_contact_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
+        if let Some(contact) = &self.contact {
+            contact.add_force(x, force);
+        }
+    }
+
+    /// Whether the body collides.
+    #[must_use]
+    pub fn has_contact(&self) -> bool {
+        self.contact.is_some()
     }
 
     /// Returns the map between vertices and matrix rows.

@@ -4,6 +4,7 @@
 //! on the matrix alone, never on the number of threads, so that results do not either.
 
 mod barrier;
+mod contacts;
 mod couplings;
 mod diagonal;
 mod right_hand_scale;
@@ -17,6 +18,7 @@ use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::Pattern;
 
 pub(crate) use self::barrier::{PerDomain, SpinBarrier};
+pub(crate) use self::contacts::{DomainContacts, contact_diagonals, distribute};
 pub(crate) use self::couplings::Couplings;
 pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
 pub(crate) use self::right_hand_scale::RightHandScale;

@@ -49,7 +49,7 @@ impl<T: Precision> Smoother<T> {
         inverses: &mut [InverseFactor<T>],
     ) -> Result<(), usize> {
         let first = self.triangle.rows.start;
-        invert::<T, M, L>(matrix, self.triangle.rows.clone(), RELAXATION, inverses)?;
+        invert::<T, M, L>(matrix, &[], self.triangle.rows.clone(), RELAXATION, inverses)?;
         let sums = self.couplings.absolute_row_sums(matrix);
         for (place, &local) in self.couplings.border().iter().enumerate() {
             let (mut diagonal, mut more) = (relaxed(&doubled(matrix.diagonal(first + local as usize))), [[0.0; 3]; 3]);

@@ -3,11 +3,13 @@ mod domain;
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-use energy_dsl::{Kernel, Level, Vector3, dispatch};
+use energy_dsl::{Block, Kernel, Level, Vector3, dispatch};
 
 use self::domain::Domain;
+use crate::contact::Contact;
 use crate::linear::domains::{
-    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, SpinBarrier, Wide, create_domains, invert, ranges,
+    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, SpinBarrier, Wide, contact_diagonals, create_domains,
+    distribute, invert, ranges,
 };
 use crate::linear::preconditioner::SingularBlock;
 use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
@@ -36,6 +38,9 @@ const RELAXATION: f64 = 1.6;
 /// between them, Ẽ, enter the operator: p + (ω − 2) t + Ẽ t. The domains depend on the matrix alone, and sums run over
 /// them in order, so the solution is bit-identical for any number of threads.
 ///
+/// Contacts have no place in the pattern. Their diagonal blocks are added to D, and their other blocks to Ẽ; see
+/// [`OverRelaxation::scale_with_contacts`].
+///
 /// [`OverRelaxation::scale`] reuses everything that depends on the pattern alone.
 #[derive(Debug)]
 pub struct OverRelaxation<T> {
@@ -46,6 +51,8 @@ pub struct OverRelaxation<T> {
     domains: Vec<Domain<T>>,
     /// The border rows of t for each domain.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
+    /// The rows of t in contact for each domain; empty without contacts.
+    contact_borders: Vec<RwLock<Vec<Wide<T>>>>,
 }
 
 impl<T: Precision> OverRelaxation<T> {
@@ -70,7 +77,7 @@ impl<T: Precision> OverRelaxation<T> {
         let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.couplings.border().len()]);
         let borders = domains.iter().map(border).collect();
         let inverses = vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()];
-        Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders }
+        Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders, contact_borders: Vec::new() }
     }
 
     /// Reads and scales a matrix of the pattern.
@@ -81,29 +88,63 @@ impl<T: Precision> OverRelaxation<T> {
     /// # Panics
     /// If the matrix has another pattern.
     pub fn scale(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
+        self.scale_with_contacts(matrix, &[])
+    }
+
+    /// Reads and scales the sum of a matrix of the pattern and Σ (c cᵀ) ⊗ B over the contacts.
+    ///
+    /// # Errors
+    /// If a diagonal block of the sum is not positive definite, in which case neither is the sum.
+    ///
+    /// # Panics
+    /// If the matrix has another pattern, or a contact names a row that the matrix does not have.
+    pub fn scale_with_contacts(
+        &mut self,
+        matrix: &BlockMatrix<impl Precision>,
+        contacts: &[Contact],
+    ) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { threads, inverses, domains, .. } = self;
         let rows = || domains.iter().map(|domain| domain.triangle.rows.clone());
         let parts = rows().zip(split_mut(inverses, rows().map(|rows| rows.len()))).collect();
-        let inverted = for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix }));
+        let added = &contact_diagonals(contacts, matrix.pattern().rows())[..];
+        let inverted =
+            for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix, added }));
         inverted.into_iter().collect::<Result<(), usize>>().map_err(|row| SingularBlock { row })?;
         let inverses = &**inverses;
         for_each(*threads, domains.iter_mut().collect(), |Domain { triangle, couplings, .. }| {
             dispatch(Scaling { triangle, couplings, inverses, matrix });
         });
+        self.take_contacts(contacts);
         Ok(())
+    }
+
+    /// Scales contacts with C⁻¹ and hands them to the domains.
+    fn take_contacts(&mut self, contacts: &[Contact]) {
+        let Self { inverses, domains, contact_borders, .. } = self;
+        contact_borders.clear();
+        if contacts.is_empty() {
+            domains.iter_mut().for_each(|domain| domain.contacts = Default::default());
+            return;
+        }
+        let ranges: Vec<_> = domains.iter().map(|domain| domain.triangle.rows.clone()).collect();
+        for (domain, contacts) in domains.iter_mut().zip(distribute(contacts, &ranges, inverses)) {
+            contact_borders.push(contacts.border());
+            domain.contacts = contacts;
+        }
     }
 
     /// Solves A x = b, starting from x = 0. Residuals are measured as √(rᵀ M⁻¹ r) with M = (D/ω + L) (D/ω)⁻¹ (D/ω +
     /// Lᵀ).
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
-        let Self { pattern, threads, inverses, domains, borders } = self;
+        let Self { pattern, threads, inverses, domains, borders, contact_borders } = self;
         let lengths: Vec<usize> = domains.iter().map(|domain| domain.triangle.rows.len()).collect();
         let sum = || PerDomain::new(lengths.len());
         let common = Common {
             pattern,
             options,
             borders,
+            contact_borders,
             barrier: SpinBarrier::new((*threads).clamp(1, lengths.len().max(1))),
             right_hand_scale: RightHandScale::new(lengths.len()),
             first_half: sum(),
@@ -131,6 +172,9 @@ impl<T: Precision> Clone for OverRelaxation<T> {
         let mut copy = Self::with_threads(&self.pattern, self.threads);
         copy.inverses.clone_from(&self.inverses);
         copy.domains.clone_from(&self.domains);
+        if !self.contact_borders.is_empty() {
+            copy.contact_borders = self.domains.iter().map(|domain| domain.contacts.border()).collect();
+        }
         copy
     }
 }
@@ -140,6 +184,8 @@ struct Inversion<'a, T, M> {
     rows: Range<usize>,
     inverses: &'a mut [InverseFactor<T>],
     matrix: &'a BlockMatrix<M>,
+    /// Blocks to add to the diagonal, by row; empty for none.
+    added: &'a [Block<f64>],
 }
 
 impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
@@ -147,7 +193,7 @@ impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> Self::Output {
-        invert::<T, M, L>(self.matrix, self.rows, RELAXATION, self.inverses)
+        invert::<T, M, L>(self.matrix, self.added, self.rows, RELAXATION, self.inverses)
     }
 }
 
@@ -156,6 +202,7 @@ struct Common<'a, T> {
     pattern: &'a Pattern,
     options: &'a SolveOptions,
     borders: &'a [RwLock<Vec<Wide<T>>>],
+    contact_borders: &'a [RwLock<Vec<Wide<T>>>],
     barrier: SpinBarrier,
     right_hand_scale: RightHandScale,
     /// p · t, p · w and r · r. All threads read each number before any of them reaches its next update.
@@ -185,8 +232,8 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
     #[inline(always)]
     fn run<L: Level>(self) -> SolveReport {
         let Self { mut parts, common } = self;
-        let Common { pattern, options, borders, barrier, right_hand_scale, first_half, second_half, square, .. } =
-            common;
+        let Common { pattern, options, borders, contact_borders, barrier, right_hand_scale, .. } = common;
+        let Common { first_half, second_half, square, .. } = common;
         for Part { number, inverses, b, .. } in &parts {
             right_hand_scale.note(*number, inverses, b);
         }
@@ -212,11 +259,12 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
                 break StopReason::IterationLimit;
             }
             for Part { number, domain, .. } in &mut parts {
-                first_half.put(*number, domain.backward::<L>(pattern, conjugate, &borders[*number]));
+                let (border, contact_border) = (&borders[*number], contact_borders.get(*number));
+                first_half.put(*number, domain.backward::<L>(pattern, conjugate, border, contact_border));
             }
             barrier.wait();
             for Part { number, domain, .. } in &mut parts {
-                domain.couple::<L>(borders);
+                domain.couple::<L>(borders, contact_borders);
                 second_half.put(*number, domain.forward::<L>(pattern));
             }
             barrier.wait();

@@ -1,0 +1,12 @@
+//! Contact: forces between features that meet for a while, and then part.
+//!
+//! A [`Term`](crate::Term) has fixed stencils and a fixed matrix pattern. Pairs in contact change from iteration to
+//! iteration, so contact is not a term. A [`ContactModel`] lists the stiffness of the pairs in contact as [`Contact`]s
+//! instead, which solvers apply without a place in the matrix.
+
+mod block;
+mod model;
+
+pub use block::Contact;
+pub(crate) use block::factors;
+pub use model::{ContactCounts, ContactModel};

@@ -1,0 +1,65 @@
+use energy_dsl::{Block, Vector3};
+
+use super::Contact;
+use crate::matrix::dof_map::DofMap;
+
+/// Contact between features of a body, as an integrator that minimises an incremental potential uses it.
+///
+/// The state before the first step has no crossing. The integrator then asks for a certificate of every move of
+/// positions, and evaluates energies only where a certificate allows it to go. By induction no state that it accepts
+/// has a crossing.
+///
+/// 1. [`ContactModel::begin_step`] forgets the pairs of the last step.
+/// 2. [`ContactModel::certify`] shortens each move: the warm start, the motion of pins, each trial of a line search.
+/// 3. [`ContactModel::set_resistance`] tells how stiff the body is, once in a step.
+/// 4. [`ContactModel::meet`] is called at each new iterate. Pairs join there and then stay until the step ends, so that
+///    a line search sees a single function.
+/// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
+pub trait ContactModel: std::fmt::Debug {
+    /// Begins a step: forgets all pairs.
+    fn begin_step(&mut self);
+
+    /// Returns the part of the straight move between two states that certainly has no crossing: 1 for the whole move.
+    /// Pairs that shorten the move join at the next [`ContactModel::meet`].
+    fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64;
+
+    /// Sets the resistance of vertices to displacement: the diagonal blocks of M/h² + ∂²U/∂x² by row, and m/h² by
+    /// vertex, in N/m.
+    fn set_resistance(&mut self, dofs: &DofMap, diagonal: Vec<Block<f64>>, inertia: Vec<f64>);
+
+    /// Adds the pairs that meet at an iterate. Returns the change of the energy there, in J.
+    fn meet(&mut self, x: &[Vector3<f64>]) -> f64;
+
+    /// Returns Σ U, in J; infinite if a pair is within its thickness.
+    fn energy(&self, x: &[Vector3<f64>]) -> f64;
+
+    /// Adds −∇U to the forces on all vertices, in N.
+    fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]);
+
+    /// Returns the stiffness of each pair in contact, in N/m, in an order that does not depend on threads.
+    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact>;
+
+    /// Returns what was counted so far.
+    fn counts(&self) -> ContactCounts;
+}
+
+/// Numbers of pairs and moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactCounts {
+    /// Searches for candidate pairs.
+    pub searches: u64,
+    /// Candidate pairs, summed over the certified moves.
+    pub candidates: u64,
+    /// Pairs whose move needed more than a comparison of distances.
+    pub tested: u64,
+    /// Certified moves.
+    pub moves: u64,
+    /// Moves that were shortened.
+    pub shortened: u64,
+    /// The sum of the parts that were left of them.
+    pub left: f64,
+    /// Pairs in contact, summed over the linear systems.
+    pub active: u64,
+    /// Linear systems.
+    pub systems: u64,
+}
