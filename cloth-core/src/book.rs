@@ -8,6 +8,8 @@ mod potentials {}
 mod audit {}
 #[doc = include_str!("../../docs/book/integrators.md")]
 mod integrators {}
+#[doc = include_str!("../../docs/book/contact.md")]
+mod contact {}
 #[doc = include_str!("../../docs/book/performance.md")]
 mod performance {}
 #[doc = include_str!("../../docs/book/first-hour.md")]

@@ -5,7 +5,9 @@
 //! Modules, from the bottom up; each uses only those above it:
 //!
 //! - [`geometry`], [`mesh`], [`motion`]: vectors, rigid motions, triangle meshes, keyframes
+//! - [`collision`]: pairs of features, certificates of moves, the exact test for crossings
 //! - [`fabric`], [`contact`], [`wind`]: the forces, as terms of declared elements
+//! - [`barrier`]: contact of cloth with itself
 //! - [`integrator`], [`ledger`]: time integration and the energy balance of a body
 //! - [`scene`], [`model`]: the file format, and its assembly into islands
 //! - [`simulation`], [`output`], [`run`]: stepping, output files, runs with checkpoints and reports
@@ -48,7 +50,9 @@ mod book;
 mod bounded;
 mod dissipation_term;
 
+pub mod barrier;
 pub mod bench;
+pub mod collision;
 pub mod contact;
 pub mod demo;
 pub mod fabric;

@@ -6,10 +6,9 @@
 //!
 //! On a mesh, the nearest face, edge or corner acts as a plane, a capsule or a sphere of radius 0.
 //!
-//! Only vertices touch solids, not the triangles between them. Cloth does not collide with cloth.
+//! Only vertices touch solids, not the triangles between them. For cloth on cloth see [`crate::barrier`].
 
 mod friction;
-mod hierarchy;
 mod mesh_solid;
 mod solid;
 mod surface;

@@ -2,8 +2,7 @@ use std::collections::BTreeMap;
 
 use energy_dsl::Vector3;
 
-use super::hierarchy::{Bounds, Hierarchy};
-use crate::geometry::{cross, dot, norm, subtract};
+use crate::geometry::{Bounds, Hierarchy, cross, dot, norm, subtract};
 use crate::mesh::{TriangleMesh, vertex_angles};
 
 /// A mesh that does not bound a solid.

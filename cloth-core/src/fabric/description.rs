@@ -12,6 +12,10 @@ pub struct Fabric {
     /// Mass per area σ, in kg/m².
     #[serde(deserialize_with = "positive")]
     pub density: f64,
+    /// Thickness in contact with cloth, in m. Default `density` over 470 kg/m³, the bulk density of plain cotton.
+    #[serde(default, deserialize_with = "some_positive")]
+    #[schemars(with = "Option<f64>")]
+    pub thickness: Option<f64>,
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
     /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of your own.
     pub material: Material,
@@ -30,8 +34,21 @@ impl Fabric {
     /// Creates a fabric with its warp along the first axis, no strain limit and no damping.
     #[must_use]
     pub fn new(density: f64, material: Material) -> Self {
-        Self { density, material, warp: first_axis(), strain_limit: None, rayleigh: None }
+        Self { density, thickness: None, material, warp: first_axis(), strain_limit: None, rayleigh: None }
     }
+
+    /// Returns the thickness in contact, in m.
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        self.thickness.unwrap_or(self.density / BULK_DENSITY)
+    }
+}
+
+/// Mass per volume of plain cotton, in kg/m³: 0.1503 kg/m² at a thickness of 0.318 mm.
+const BULK_DENSITY: f64 = 470.0;
+
+fn some_positive<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    positive(deserializer).map(Some)
 }
 
 fn first_axis() -> [f64; 3] {

@@ -55,6 +55,13 @@ fn yes() -> bool {
 }
 
 impl Hair {
+    /// Returns the thickness of a strand in contact, in m: the diameter of the round cross-section with these
+    /// stiffnesses, 4 √(bend/stretch), but at least 0.05 mm.
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        (4.0 * (self.bend_stiffness / self.stretch_stiffness).sqrt()).max(5e-5)
+    }
+
     /// Returns the initial vertices, strand by strand from the root, in m.
     #[must_use]
     pub fn vertices(&self) -> Vec<Vector3<f64>> {

@@ -1,44 +1,13 @@
-//! A bounding volume hierarchy for nearest-feature queries.
+//! A bounding volume hierarchy: the nearest item to a point, and all items near a box.
 
 use energy_dsl::Vector3;
 
-/// An axis-aligned box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bounds {
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl Bounds {
-    pub fn of(points: &[Vector3<f64>]) -> Self {
-        let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
-            std::array::from_fn(|axis| points.iter().map(|p| p[axis]).fold(start, pick))
-        };
-        Self { low: bound(f64::min, f64::INFINITY), high: bound(f64::max, f64::NEG_INFINITY) }
-    }
-
-    fn around(self, other: Self) -> Self {
-        Self {
-            low: std::array::from_fn(|axis| self.low[axis].min(other.low[axis])),
-            high: std::array::from_fn(|axis| self.high[axis].max(other.high[axis])),
-        }
-    }
-
-    fn middle(&self, axis: usize) -> f64 {
-        0.5 * (self.low[axis] + self.high[axis])
-    }
-
-    /// Squared distance of a point, in m²; 0 inside.
-    fn distance_squared(&self, x: Vector3<f64>) -> f64 {
-        let beyond = |axis: usize| (self.low[axis] - x[axis]).max(x[axis] - self.high[axis]).max(0.0);
-        (0..3).map(|axis| beyond(axis).powi(2)).sum()
-    }
-}
+use super::Bounds;
 
 /// A binary tree of boxes, split at the median along the longest axis. The children of node n are n + 1 and the index
 /// in [`Kind::Inner`].
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Hierarchy {
+pub(crate) struct Hierarchy {
     nodes: Vec<Node>,
     /// Items, in the order of the leaves.
     items: Vec<usize>,
@@ -48,6 +17,12 @@ pub(super) struct Hierarchy {
 struct Node {
     bounds: Bounds,
     kind: Kind,
+}
+
+impl Node {
+    fn is_leaf(&self) -> bool {
+        matches!(self.kind, Kind::Leaf(..))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +37,7 @@ enum Kind {
 const LEAF: usize = 4;
 
 impl Hierarchy {
-    /// Builds the tree over the boxes of items 0, 1, …; at least one item.
+    /// Builds the tree over the boxes of items 0, 1, ….
     pub fn new(bounds: &[Bounds]) -> Self {
         let mut tree = Self { nodes: Vec::new(), items: (0..bounds.len()).collect() };
         tree.build(bounds, 0, bounds.len());
@@ -71,7 +46,7 @@ impl Hierarchy {
 
     fn build(&mut self, bounds: &[Bounds], from: usize, to: usize) {
         let all = self.items[from..to].iter().map(|&item| bounds[item]);
-        let around = all.reduce(Bounds::around).unwrap_or(Bounds { low: [0.0; 3], high: [0.0; 3] });
+        let around = all.fold(Bounds::EMPTY, Bounds::around);
         let node = self.nodes.len();
         self.nodes.push(Node { bounds: around, kind: Kind::Leaf(from, to) });
         if to - from <= LEAF {
@@ -85,6 +60,95 @@ impl Hierarchy {
         self.build(bounds, from, from + half);
         self.nodes[node].kind = Kind::Inner(self.nodes.len());
         self.build(bounds, from + half, to);
+    }
+
+    /// Adapts the boxes of the tree to new boxes of the items, and keeps its structure. Queries stay exact. They become
+    /// slow if items move far relative to each other.
+    pub fn refit(&mut self, bounds: &[Bounds]) {
+        // Children follow their parents.
+        for number in (0..self.nodes.len()).rev() {
+            self.nodes[number].bounds = match self.nodes[number].kind {
+                Kind::Leaf(from, to) => {
+                    let own = self.items[from..to].iter().map(|&item| bounds[item]);
+                    own.fold(Bounds::EMPTY, Bounds::around)
+                }
+                Kind::Inner(second) => self.nodes[number + 1].bounds.around(self.nodes[second].bounds),
+            };
+        }
+    }
+
+    /// Calls `found` with each item whose leaf overlaps a box, in tree order.
+    pub fn near(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
+        // Halving the items at each level keeps the depth below the number of bits of their count.
+        let (mut waiting, mut end) = ([0; 64], 1);
+        while end > 0 {
+            end -= 1;
+            let number = waiting[end];
+            let node = &self.nodes[number];
+            if !node.bounds.overlaps(bounds) {
+                continue;
+            }
+            match node.kind {
+                Kind::Leaf(from, to) => self.items[from..to].iter().for_each(|&item| found(item)),
+                Kind::Inner(second) => {
+                    [waiting[end], waiting[end + 1]] = [second, number + 1];
+                    end += 2;
+                }
+            }
+        }
+    }
+
+    /// Calls `found` with each pair of items of two trees whose leaves overlap, in an order that depends on both trees.
+    pub fn meeting(&self, other: &Self, mut found: impl FnMut(usize, usize)) {
+        let mut waiting = vec![(0, 0)];
+        while let Some((a, b)) = waiting.pop() {
+            let (first, second) = (&self.nodes[a], &other.nodes[b]);
+            if !first.bounds.overlaps(&second.bounds) {
+                continue;
+            }
+            match (&first.kind, &second.kind) {
+                (&Kind::Leaf(from, to), &Kind::Leaf(other_from, other_to)) => {
+                    for &item in &self.items[from..to] {
+                        other.items[other_from..other_to].iter().for_each(|&with| found(item, with));
+                    }
+                }
+                (&Kind::Inner(right), _) if second.is_leaf() || first.bounds.is_longer_than(&second.bounds) => {
+                    waiting.extend([(a + 1, b), (right, b)]);
+                }
+                (_, &Kind::Inner(right)) => waiting.extend([(a, b + 1), (a, right)]),
+                (&Kind::Inner(right), _) => waiting.extend([(a + 1, b), (right, b)]),
+            }
+        }
+    }
+
+    /// Calls `found` with each pair of different items whose leaves overlap, once and in any order.
+    pub fn meeting_itself(&self, mut found: impl FnMut(usize, usize)) {
+        let mut waiting = vec![(0, 0)];
+        while let Some((a, b)) = waiting.pop() {
+            let (first, second) = (&self.nodes[a], &self.nodes[b]);
+            if !first.bounds.overlaps(&second.bounds) {
+                continue;
+            }
+            match (&first.kind, &second.kind) {
+                (&Kind::Leaf(from, to), _) if a == b => {
+                    let items = &self.items[from..to];
+                    for (place, &item) in items.iter().enumerate() {
+                        items[place + 1..].iter().for_each(|&with| found(item, with));
+                    }
+                }
+                (&Kind::Inner(right), _) if a == b => waiting.extend([(a + 1, a + 1), (a + 1, right), (right, right)]),
+                (&Kind::Leaf(from, to), &Kind::Leaf(other_from, other_to)) => {
+                    for &item in &self.items[from..to] {
+                        self.items[other_from..other_to].iter().for_each(|&with| found(item, with));
+                    }
+                }
+                (&Kind::Inner(right), _) if second.is_leaf() || first.bounds.is_longer_than(&second.bounds) => {
+                    waiting.extend([(a + 1, b), (right, b)]);
+                }
+                (_, &Kind::Inner(right)) => waiting.extend([(a, b + 1), (a, right)]),
+                (&Kind::Inner(right), _) => waiting.extend([(a + 1, b), (right, b)]),
+            }
+        }
     }
 
     /// Returns the distance of a point from the bounding box of all items, in m.

@@ -1,9 +1,13 @@
-//! Vector arithmetic and rigid motions.
+//! Vector arithmetic, rigid motions, boxes and hierarchies of boxes.
 
+mod bounds;
+mod hierarchy;
 mod pose;
 
 use energy_dsl::Vector3;
 
+pub(crate) use bounds::Bounds;
+pub(crate) use hierarchy::Hierarchy;
 pub use pose::Pose;
 
 pub(crate) fn subtract(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> {
@@ -20,4 +24,10 @@ pub(crate) fn dot(a: Vector3<f64>, b: Vector3<f64>) -> f64 {
 
 pub(crate) fn norm(a: Vector3<f64>) -> f64 {
     dot(a, a).sqrt()
+}
+
+/// a + s b.
+#[inline]
+pub(crate) fn add_scaled(a: Vector3<f64>, s: f64, b: Vector3<f64>) -> Vector3<f64> {
+    std::array::from_fn(|axis| a[axis] + s * b[axis])
 }

@@ -33,13 +33,27 @@ pub enum StepError {
     /// The line search of Newton's method failed: no step along the direction lowers the energy.
     #[error(
         "no step along the direction of Newton iteration {iterations} lowers the energy \
-         (its linear system: {stopped}). Try a smaller dt"
+         (its linear system: {stopped}{}). Try a smaller dt",
+        if *.in_contact { "; contact shortened moves" } else { "" }
     )]
     Stuck {
         /// Newton iterations.
         iterations: u64,
         /// Why the linear solver stopped.
         stopped: StopReason,
+        /// Whether contact shortened a move of this step.
+        in_contact: bool,
+    },
+    /// Contact does not let pins reach their places at the end of the step.
+    #[error(
+        "contact stopped the pins after {:.1} % of their way, in {moves} moves; they may press cloth against cloth. \
+         Try a smaller dt, or slower pins", 100.0 * .part
+    )]
+    PinsBlocked {
+        /// Moves of the pins.
+        moves: usize,
+        /// The part of their way that they went.
+        part: f64,
     },
     /// Newton's method did not converge.
     #[error(

@@ -81,7 +81,7 @@ impl ImplicitEuler {
         let unsymmetric = |report| (report, SolvedBy::default());
         let (report, solved_by) = match solver {
             None => unsymmetric(bicgstab(matrix, &BlockJacobi::new(matrix)?, &rhs, &mut delta, options)),
-            Some(solver) => match solver.prepare(matrix, &self.trial) {
+            Some(solver) => match solver.prepare(matrix, &[], &self.trial) {
                 Ok(()) => solver.solve(matrix, &rhs, &mut delta, options, &mut self.trial),
                 // A diagonal block with negative curvature proves that the matrix is indefinite.
                 Err(_) if curvature == Curvature::Exact => unsymmetric(SolveReport::indefinite()),

@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockCholesky, BlockMatrix, IncompleteCholesky, Multigrid, OverRelaxation, Pattern, Precision, SolveOptions,
-    SolveReport, conjugate_gradients,
+    BlockCholesky, BlockMatrix, Contact, IncompleteCholesky, Multigrid, OverRelaxation, Pattern, Precision,
+    SolveOptions, SolveReport, conjugate_gradients,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -102,6 +102,8 @@ impl std::fmt::Display for SolvedBy {
 pub(super) struct LinearSolver<T> {
     choice: LinearSolverChoice,
     threads: usize,
+    /// Whether the prepared sum has contacts, whose solves say nothing about the solver for others.
+    in_contact: bool,
     /// The solver of the last matrix. Solvers of other kinds are set up again when needed, to save memory.
     solver: Option<Solver<T>>,
 }
@@ -140,7 +142,7 @@ impl<T: Precision> Solver<T> {
 /// Clones the settings only: the solver is set up again when needed.
 impl<T: Precision> Clone for LinearSolver<T> {
     fn clone(&self) -> Self {
-        Self { choice: self.choice, threads: self.threads, solver: None }
+        Self { choice: self.choice, threads: self.threads, in_contact: false, solver: None }
     }
 }
 
@@ -153,22 +155,30 @@ impl<T: Precision> LinearSolver<T> {
             LinearSolverChoice::Auto if !matrix.pattern().fills_in() => LinearSolverChoice::IncompleteCholesky,
             choice => choice,
         };
-        Self { choice, threads, solver: None }
+        Self { choice, threads, in_contact: false, solver: None }
     }
 
-    /// Prepares the solver for a matrix.
-    pub(super) fn prepare(&mut self, matrix: &BlockMatrix<impl Precision>, trial: &Trial) -> Result<(), StepError> {
+    /// Prepares the solver for the sum of a matrix and contacts. Only over-relaxation takes contacts, so it replaces
+    /// every other choice while there are some.
+    pub(super) fn prepare(
+        &mut self,
+        matrix: &BlockMatrix<impl Precision>,
+        contacts: &[Contact],
+        trial: &Trial,
+    ) -> Result<(), StepError> {
         let (pattern, threads) = (matrix.pattern(), self.threads);
         let wanted = match self.choice {
+            _ if !contacts.is_empty() => LinearSolverChoice::OverRelaxation,
             LinearSolverChoice::Auto if trial.multigrid() => LinearSolverChoice::Multigrid,
             LinearSolverChoice::Auto => LinearSolverChoice::OverRelaxation,
             choice => choice,
         };
+        self.in_contact = !contacts.is_empty();
         // Drop an unwanted solver before setting up another: memory for both may be lacking.
         let known = self.solver.take().filter(|solver| solver.choice() == wanted);
         let solver = known.map_or_else(|| Solver::set_up(wanted, pattern, threads), Ok)?;
         match self.solver.insert(solver) {
-            Solver::OverRelaxation(solver) => solver.scale(matrix)?,
+            Solver::OverRelaxation(solver) => solver.scale_with_contacts(matrix, contacts)?,
             Solver::Multigrid(solver) => solver.take_over(matrix)?,
             Solver::Cholesky(solver) => solver.factor(matrix)?,
             Solver::IncompleteCholesky(solver) => solver.factor(matrix)?,
@@ -206,7 +216,7 @@ impl<T: Precision> LinearSolver<T> {
                 conjugate_gradients(matrix, &**solver, b, x, options)
             }
         };
-        if self.choice == LinearSolverChoice::Auto && report.converged() {
+        if self.choice == LinearSolverChoice::Auto && !self.in_contact && report.converged() {
             trial.note(report.iterations, options.relative_tolerance);
         }
         (report, solved_by)

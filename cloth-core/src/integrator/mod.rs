@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod bdf2;
+mod contact_work;
 mod error;
 mod explicit_euler;
 mod implicit_euler;
@@ -24,6 +25,7 @@ use energy_solve::EvaluationError;
 
 pub use adaptive::{Adaptive, Rejection};
 pub use bdf2::Bdf2;
+pub use contact_work::ContactWork;
 pub use error::StepError;
 pub use explicit_euler::ExplicitEuler;
 pub use implicit_euler::ImplicitEuler;
@@ -97,6 +99,8 @@ pub struct StepReport {
     pub halvings: u64,
     /// Steps rejected and retried with a smaller size; see [`Adaptive`].
     pub rejected: u64,
+    /// What contact of the cloth with itself did.
+    pub contact: ContactWork,
     /// Wall time by phase; only [`Newton`] measures it.
     pub phases: Phases,
 }
@@ -109,6 +113,7 @@ impl std::ops::AddAssign for StepReport {
         self.projected |= other.projected;
         self.halvings += other.halvings;
         self.rejected += other.rejected;
+        self.contact += other.contact;
         self.phases += other.phases;
     }
 }

@@ -11,9 +11,10 @@ use crate::body::Body;
 pub(crate) struct Account {
     /// ½ Σ m v², in J.
     pub kinetic: f64,
-    /// Potential energies in J, with the ledger column of each term.
+    /// Potential energies in J, with the ledger column of each term. The last is that of contact, if the body collides.
     pub potential: Vec<(usize, f64)>,
-    /// Work of each non-conservative force in J, with its ledger column.
+    /// Work of each non-conservative force in J, with its ledger column. The last is the change of contact's energy by
+    /// new barriers, if the body collides.
     pub work: Vec<(usize, f64)>,
     /// Work of moving pins, in J.
     pub pins: f64,
@@ -35,6 +36,8 @@ pub(crate) struct Opening {
     pins: Vec<(usize, Vector3<f64>, Vector3<f64>)>,
     /// Power of moving obstacles, in W.
     obstacles: f64,
+    /// Positions, if the body collides.
+    x: Option<Vec<Vector3<f64>>>,
 }
 
 impl Account {
@@ -59,7 +62,8 @@ impl Account {
     /// Starts a step, after the terms were told of it. `obstacles` is the power of moving obstacles, in W.
     pub(crate) fn begin(body: &Body, obstacles: f64) -> Opening {
         let pins = pin_forces(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
-        Opening { powers: powers(body), pins, obstacles }
+        let x = body.system.has_contact().then(|| body.x.clone());
+        Opening { powers: powers(body), pins, obstacles, x }
     }
 
     /// Returns the account after the step.
@@ -79,6 +83,12 @@ impl Account {
             after.pins -= (0..3).map(part).sum::<f64>();
         }
         after.obstacles += 0.5 * dt * (opening.obstacles + obstacles);
+        let renewed = opening.x.as_ref().and_then(|x| body.system.contact_energy(x));
+        if let (Some(renewed), Some((_, old)), Some((_, work))) =
+            (renewed, self.potential.last(), after.work.last_mut())
+        {
+            *work += renewed - old;
+        }
         Ok(after)
     }
 
@@ -94,10 +104,11 @@ pub(crate) fn works(term: &dyn PlacedTerm) -> bool {
     !term.has_energy() || term.character().velocity_dependent
 }
 
-/// Returns the energy of each term that has one.
+/// Returns the energy of each term that has one, and of contact, if the body collides.
 fn potentials(body: &Body) -> Result<Vec<f64>, EvaluationError> {
     let energy = |term: &dyn PlacedTerm| term.energy(&body.x).map(|(energy, _)| energy);
-    let all: Vec<f64> = body.system.terms().filter_map(|(term, _)| energy(term)).collect();
+    let terms = body.system.terms().filter_map(|(term, _)| energy(term));
+    let all: Vec<f64> = terms.chain(body.system.contact_energy(&body.x)).collect();
     match all.iter().all(|energy| energy.is_finite()) {
         true => Ok(all),
         false => Err(EvaluationError::NonFiniteSum { what: energy_solve::Quantity::Energy }),
@@ -138,5 +149,6 @@ fn pin_forces(body: &Body) -> Vec<(usize, Vector3<f64>)> {
     for (term, _) in body.system.terms().filter(|(term, _)| term.has_energy()) {
         term.add_force(State { x: &body.x, v: &still }, &mut force);
     }
+    body.system.add_contact_force(&body.x, &mut force);
     moving.into_iter().map(|vertex| (vertex, force[vertex])).collect()
 }

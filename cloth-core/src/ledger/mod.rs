@@ -15,7 +15,8 @@ use account::works;
 ///
 /// The energy is the kinetic energy of the free vertices plus the potential energy of the terms. It changes by the work
 /// of non-conservative forces (drag, damping, friction, wind), of moving pins and of moving obstacles, and by the
-/// kinetic energy removed when an island falls asleep. Work is the time integral of power, by the trapezoidal rule. The
+/// kinetic energy removed when an island falls asleep. Contact of cloth with itself chooses new barriers in each step;
+/// the change of its energy by that choice counts as work. Work is the time integral of power, by the trapezoidal rule. The
 /// remainder, [`Entry::unaccounted`], is the error of the integrator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
@@ -105,13 +106,23 @@ impl Ledger {
             kept.into_iter().map(|kept| if kept { count.next() } else { None }).collect()
         };
         let columns = [columns(|term| term.has_energy()), columns(works)];
-        let [potentials, works] = columns.each_ref().map(|columns| {
+        let [mut potentials, mut works] = columns.each_ref().map(|columns| {
             let named = names.iter().zip(columns).filter(|(_, column)| column.is_some());
-            named.map(|(name, _)| (*name).to_owned()).collect()
+            named.map(|(name, _)| (*name).to_owned()).collect::<Vec<String>>()
         });
+        let in_contact = [potentials.len(), works.len()];
+        if bodies.iter().any(|(body, _)| body.system.has_contact()) {
+            potentials.push("contact".to_owned());
+            works.push("new barriers of contact".to_owned());
+        }
         let account = |(body, labels): &(&Body, &[usize])| {
-            let [potentials, works] =
-                columns.each_ref().map(|columns| labels.iter().filter_map(|&label| columns[label]).collect());
+            let [mut potentials, mut works] = columns
+                .each_ref()
+                .map(|columns| labels.iter().filter_map(|&label| columns[label]).collect::<Vec<usize>>());
+            if body.system.has_contact() {
+                potentials.push(in_contact[0]);
+                works.push(in_contact[1]);
+            }
             Account::open(body, potentials, works)
         };
         let accounts = bodies.iter().map(account).collect::<Result<_, _>>()?;

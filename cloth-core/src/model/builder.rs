@@ -11,7 +11,7 @@ use super::seam::Side;
 use super::{PinError, SeamError, pins, seam};
 use crate::fabric::{self, Hair, Place, Surroundings};
 use crate::mesh::{DisjointSets, SpringNetwork, Topology, TriangleMesh};
-use crate::scene::{Garment, ObstacleError, Pin, Scene, Seam, Shape};
+use crate::scene::{ContactChoice, Garment, ObstacleError, Pin, Scene, Seam, Shape};
 
 /// A model under construction.
 pub(super) struct Builder<'a> {
@@ -95,6 +95,7 @@ impl<'a> Builder<'a> {
         model.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
         model.x.extend(start);
         model.v.extend(velocities);
+        model.thickness.resize(model.x.len(), garment.fabric.thickness());
         self.edge.extend(Topology::boundary(&mesh).iter().map(|vertex| first + vertex));
         self.springs.push(springs);
         self.add_part(part, mesh.vertices().len(), PartKind::Cloth(mesh));
@@ -106,6 +107,7 @@ impl<'a> Builder<'a> {
         let vertices = hair.vertices();
         let count = vertices.len();
         self.model.v.extend(vec![[0.0; 3]; count]);
+        self.model.thickness.extend(vec![hair.thickness(); count]);
         self.model.x.extend(vertices);
         self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
     }
@@ -152,6 +154,11 @@ impl<'a> Builder<'a> {
         }
         let mut groups = DisjointSets::singletons(self.pieces.len());
         seams.iter().flatten().for_each(|&[p, q]| groups.join(piece_of[p], piece_of[q]));
+        if self.scene.contact == ContactChoice::On {
+            // Contact couples everything that may meet.
+            (1..self.pieces.len()).for_each(|piece| groups.join(0, piece));
+        }
+        self.model.sewn = seams.concat();
         self.homes = vec![Home::default(); self.model.x.len()];
         for (piece, island) in self.pieces.iter().zip(groups.numbers()) {
             if island == self.model.islands.len() {
@@ -302,7 +309,8 @@ impl<'a> Builder<'a> {
         let obstacles = obstacles.collect::<Result<Vec<_>, _>>()?;
         let masses = |island: &IslandModel| island.vertices.iter().map(|&vertex| self.model.masses[vertex]).collect();
         let masses: Vec<Vec<f64>> = self.model.islands.iter().map(masses).collect();
-        for obstacle in &obstacles {
+        let colliding: &[_] = if self.scene.contact == ContactChoice::Off { &[] } else { &obstacles };
+        for obstacle in colliding {
             let since = self.model.labels.len();
             for (island, masses) in masses.iter().enumerate() {
                 obstacle.terms(masses).into_iter().for_each(|term| self.add_term(island, since, term));

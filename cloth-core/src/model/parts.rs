@@ -92,6 +92,10 @@ pub struct Model {
     pub labels: Vec<TermLabel>,
     /// Terms that were left out, because their stiffness is zero or they have no elements.
     pub left_out: Vec<String>,
+    /// Pairs of vertices that seams join.
+    pub sewn: Vec<[usize; 2]>,
+    /// Thickness in contact at each vertex, in m.
+    pub thickness: Vec<f64>,
     /// Warnings about the scene.
     pub warnings: Vec<String>,
     /// Obstacles, with their motions.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use comfy_table::{CellAlignment, Table, presets};
 use energy_solve::Tally;
 
-use crate::integrator::SolvedBy;
+use crate::integrator::{ContactWork, SolvedBy};
 use crate::simulation::Summary;
 
 /// Formats a table with one row per term: its elements; the values, gradients and Hessians that were evaluated or
@@ -26,6 +26,14 @@ pub fn tables(summary: &Summary) -> String {
     let mut text = format!("{}\n\n{}\n", terms(summary), summary.sleep());
     if summary.totals.solved_by != SolvedBy::default() {
         writeln!(text, "linear systems solved by {}", summary.totals.solved_by).expect("writing to a string succeeds");
+    }
+    let crossings = match summary.crossings {
+        0 => "no edge crosses a triangle at the end".to_owned(),
+        count => format!("{count} times an edge crosses a triangle at the end"),
+    };
+    writeln!(text, "{crossings}").expect("writing to a string succeeds");
+    if summary.totals.contact != ContactWork::default() {
+        writeln!(text, "contact: {}", summary.totals.contact).expect("writing to a string succeeds");
     }
     if let Some(phases) = phases(summary) {
         write!(text, "\n{phases}\n").expect("writing to a string succeeds");

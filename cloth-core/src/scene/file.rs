@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
-use super::{Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
+use super::{ContactChoice, Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
 use crate::bounded::{finite_triple, non_negative, positive};
 use crate::fabric::Fabric;
 use crate::integrator::{LinearSolverChoice, Scheme, Tolerances};
@@ -55,6 +55,10 @@ pub(super) struct File {
     /// Convergence criteria of Newton's method, for the integrators that use it. Default depends on the integrator.
     #[serde(default)]
     tolerances: Tolerances,
+    /// What collides: `on`, `obstacles` (the default) or `off`. `on` includes contact of cloth and hair with themselves
+    /// and with each other, without friction, and needs the integrator `newton`.
+    #[serde(default)]
+    contact: ContactChoice,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
     /// `multigrid`, `cholesky` or `incomplete-cholesky`.
     #[serde(default)]
@@ -105,6 +109,9 @@ impl TryFrom<File> for Scene {
             let found = file.version;
             return Err(format!("the scene has version {found}, but this program reads version {VERSION}"));
         }
+        if file.contact == ContactChoice::On && file.integrator != Scheme::Newton {
+            return Err("`contact = \"on\"` needs `integrator = \"newton\"`, which certifies its moves".to_owned());
+        }
         let mut garments = file.garment;
         match (file.mesh, file.fabric) {
             (Some(mesh), Some(fabric)) => {
@@ -130,6 +137,7 @@ impl TryFrom<File> for Scene {
             drag: file.drag,
             integrator: file.integrator,
             tolerances: file.tolerances,
+            contact: file.contact,
             linear_solver: file.linear_solver,
             adaptive: file.adaptive,
             sleep: file.sleep,

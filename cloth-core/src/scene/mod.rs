@@ -1,5 +1,6 @@
 //! Scene files in TOML. Each key is a field below, with its unit; unknown keys are errors.
 
+mod contact_choice;
 mod error;
 mod fabric_choice;
 mod file;
@@ -17,6 +18,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 pub use crate::fabric::Hair;
+pub use contact_choice::ContactChoice;
 pub use error::SceneError;
 pub use garment::{Garment, Mesh, MeshSourceError, Placement, Shape, Turn};
 pub use obstacle::{ObstacleDescription, ObstacleError};
@@ -55,6 +57,8 @@ pub struct Scene {
     pub integrator: Scheme,
     /// Convergence criteria of Newton's method.
     pub tolerances: Tolerances,
+    /// What collides.
+    pub contact: ContactChoice,
     /// The linear solver of implicit integrators.
     pub linear_solver: LinearSolverChoice,
     /// Whether a failed step is retried with smaller sizes; see [`Adaptive`].

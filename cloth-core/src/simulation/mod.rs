@@ -1,5 +1,6 @@
 //! Steps a scene through time: cloth and hair, divided into islands that may sleep.
 
+mod collision;
 mod island;
 mod saved;
 mod sleep;
@@ -17,14 +18,17 @@ pub use saved::{RestoreError, SavedCounts, SavedState};
 pub use summary::{Summary, TermSummary};
 pub use totals::Totals;
 
+use crate::barrier::ContactError;
 use crate::body::Body;
+use crate::collision::{CollisionMesh, Crossing, crossings};
 use crate::contact::Obstacle;
 use crate::integrator::{StepError, StepReport};
 use crate::ledger::Ledger;
 use crate::mesh::TriangleMesh;
 use crate::model::{Model, ModelError, MovingPin, Part, PartKind, TermLabel};
 use crate::motion::Motion;
-use crate::scene::Scene;
+use crate::scene::{ContactChoice, Scene};
+use collision::add_contact;
 use sleep::StepContext;
 
 /// A scene that cannot be set up, or a step that failed.
@@ -33,6 +37,9 @@ pub enum SimulationError {
     /// The parts of the scene do not fit together.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// Cloth that collides crosses itself at the start.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
     /// The terms cannot be assembled into a system.
     #[error(transparent)]
     System(#[from] SystemError),
@@ -63,6 +70,8 @@ pub struct Simulation {
     strands: Vec<Range<usize>>,
     obstacles: Vec<Obstacle>,
     motions: Vec<Motion>,
+    /// The features of all parts, for the test for crossings.
+    collision_mesh: CollisionMesh,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
     masses: Vec<f64>,
@@ -92,6 +101,7 @@ impl Simulation {
         let strands = model.strands().collect();
         let islands = create_islands(scene, &mut model)?;
         let summary = Summary::at_start(scene, &model, islands.len());
+        let collision_mesh = collision::mesh_of(&model);
         let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, .. } = model;
         let mut simulation = Self {
             parts,
@@ -99,6 +109,7 @@ impl Simulation {
             strands,
             obstacles,
             motions,
+            collision_mesh,
             x,
             v,
             masses,
@@ -156,6 +167,12 @@ impl Simulation {
     #[must_use]
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
+    }
+
+    /// Returns all edges of cloth and hair that touch or cross a triangle now, by an exact test.
+    #[must_use]
+    pub fn crossings(&self) -> Vec<Crossing> {
+        crossings(&self.collision_mesh, &self.x)
     }
 
     /// The current positions of all vertices, in m.
@@ -343,9 +360,13 @@ impl Simulation {
 }
 
 /// Creates the islands of a model, with their moving pins, on all cores.
-fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, SystemError> {
+fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, SimulationError> {
     let islands = std::mem::take(&mut model.islands).into_iter();
-    let mut islands = islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, _>>()?;
+    let mut islands =
+        islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, SystemError>>()?;
+    if scene.contact == ContactChoice::On {
+        islands.iter_mut().try_for_each(|island| add_contact(island, model))?;
+    }
     distribute_moving_pins(&mut islands, model);
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));

@@ -39,6 +39,9 @@ pub struct Summary {
     pub left_out: Vec<String>,
     /// Warnings about the scene and the run.
     pub warnings: Vec<String>,
+    /// Number of edges of cloth and hair that touch or cross a triangle at the end.
+    #[serde(default)]
+    pub crossings: usize,
     /// ½ Σ m v², in J.
     pub kinetic_energy: f64,
     /// Σ m v, in kg m/s.
@@ -87,13 +90,14 @@ impl Summary {
 
     /// The phases of a step, in order, with the total time of each.
     #[must_use]
-    pub fn named_phases(&self) -> [(&'static str, Duration); 4] {
-        let Phases { assembly, factorisation, solve, line_search } = self.totals.phases;
+    pub fn named_phases(&self) -> [(&'static str, Duration); 5] {
+        let Phases { assembly, factorisation, solve, line_search, collision } = self.totals.phases;
         [
             ("assembly", assembly),
             ("factorisation", factorisation),
             ("linear solves", solve),
             ("line search", line_search),
+            ("collision", collision),
         ]
     }
 
@@ -116,6 +120,7 @@ impl Simulation {
     /// Returns an error if an energy is not finite.
     pub fn summary(&mut self) -> Result<Summary, EvaluationError> {
         let mut summary = self.summary.clone();
+        summary.crossings = self.crossings().len();
         let mut energies: Vec<Option<f64>> = vec![None; self.labels.len()];
         let mut elements = vec![0; self.labels.len()];
         let add = |sum: &mut Vector3<f64>, part: Vector3<f64>| (0..3).for_each(|axis| sum[axis] += part[axis]);

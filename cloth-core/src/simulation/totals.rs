@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::{Phases, SolvedBy, StepReport};
+use crate::integrator::{ContactWork, Phases, SolvedBy, StepReport};
 
 /// Running totals over all steps. Summaries and checkpoints hold these as keys of their own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,9 @@ pub struct Totals {
     /// Steps skipped by sleeping islands, summed over the islands.
     #[serde(default)]
     pub slept: u64,
+    /// The work of contact of the cloth with itself.
+    #[serde(default)]
+    pub contact: ContactWork,
     /// Wall time of all steps.
     pub stepping_time: Duration,
     /// Wall time by phase; zero for integrators that do not report it.
@@ -39,6 +42,7 @@ impl Totals {
         self.projected += u64::from(report.projected);
         self.rejected += report.rejected;
         self.slept += slept;
+        self.contact += report.contact;
         self.stepping_time += elapsed;
         self.phases += report.phases;
     }

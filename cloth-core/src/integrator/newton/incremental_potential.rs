@@ -2,7 +2,9 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Curvature, EvaluationError, LinearisationOptions, Precision, State, System, Weights};
+use energy_solve::{
+    BlockMatrix, ContactCounts, Curvature, EvaluationError, LinearisationOptions, Precision, State, System, Weights,
+};
 
 use super::super::{StepReport, if_finite, moved_by_velocity};
 use crate::body::Body;
@@ -12,6 +14,8 @@ pub(super) struct IncrementalPotential<'a> {
     pub(super) body: &'a mut Body,
     pub(super) dt: f64,
     pub(super) report: StepReport,
+    /// Counts of contact before the step.
+    pub(super) counted: ContactCounts,
 }
 
 /// E at one point.
@@ -32,11 +36,12 @@ pub(super) struct EnergyAndGradient {
 
 impl<'a> IncrementalPotential<'a> {
     pub(super) fn new(body: &'a mut Body, dt: f64) -> Self {
-        Self { body, dt, report: StepReport::default() }
+        let counted = body.system.contact().map_or_else(ContactCounts::default, |(contact, _)| contact.counts());
+        Self { body, dt, report: StepReport::default(), counted }
     }
 
     /// x̂ of a vertex.
-    fn inertial(&self, vertex: usize) -> Vector3<f64> {
+    pub(super) fn inertial(&self, vertex: usize) -> Vector3<f64> {
         moved_by_velocity(&self.body.x[vertex], &self.body.v[vertex], self.dt)
     }
 
@@ -63,11 +68,15 @@ impl<'a> IncrementalPotential<'a> {
             value += self.dt.powi(3) * dissipation;
             magnitude += self.dt.powi(3) * dissipation.abs();
         }
+        let contact = self.contact_energy(x);
+        value += contact;
+        magnitude += contact;
         self.report.phases.line_search += started.elapsed();
         Ok(Energy { value, magnitude })
     }
 
-    /// Assembles the Hessian M − h² ∂f/∂x − h ∂f/∂v and returns −∇E = M (x̂ − x) + h² f of the free vertices.
+    /// Assembles the Hessian M − h² ∂f/∂x − h ∂f/∂v and returns −∇E = M (x̂ − x) + h² f of the free vertices, both
+    /// without contact: pairs may join after this iterate was evaluated ahead.
     pub(super) fn linearise<T: Precision>(
         &mut self,
         x: &[Vector3<f64>],
@@ -85,7 +94,8 @@ impl<'a> IncrementalPotential<'a> {
         Ok(downhill)
     }
 
-    /// Assembles the Hessian and returns E and −∇E; `None` if they are not finite.
+    /// Assembles the Hessian and returns E and −∇E, the latter without contact; `None` if they are not finite. Contact
+    /// begins here: the Hessian tells how stiff its barriers must be.
     pub(super) fn linearise_if_finite(
         &mut self,
         x: &[Vector3<f64>],
@@ -93,11 +103,15 @@ impl<'a> IncrementalPotential<'a> {
         matrix: &mut BlockMatrix<f32>,
     ) -> Result<Option<EnergyAndGradient>, EvaluationError> {
         let Some(downhill) = if_finite(self.linearise(x, curvature, matrix))? else { return Ok(None) };
+        if self.body.system.has_contact() {
+            self.set_resistance(matrix);
+            self.meet(x);
+        }
         let energy = self.energy(x)?;
         Ok(energy.value.is_finite().then_some(EnergyAndGradient { energy, downhill }))
     }
 
-    /// Returns −∇E.
+    /// Returns −∇E without contact.
     pub(super) fn gradient(&mut self, x: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         let started = Instant::now();
         let Body { system, x: start, v: before, .. } = &mut *self.body;

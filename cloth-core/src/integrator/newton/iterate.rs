@@ -1,12 +1,13 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
+use energy_solve::{Contact, Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
 
 use super::super::projection::Projection;
 use super::super::trial::Trial;
 use super::super::{StepError, StepReport};
 use super::forcing::Forcing;
+use super::in_contact::PIN_MOVES;
 use super::incremental_potential::{Energy, EnergyAndGradient, IncrementalPotential};
 use super::line_search::{AcceptedStep, Prefetch};
 use super::{Memory, NewtonOptions, largest};
@@ -31,6 +32,10 @@ pub(super) struct Iterate<'a> {
     /// Whether the last line search took a full step; the next one then probably will.
     took_full_step: bool,
     converged: bool,
+    /// The part of their way that pins have gone; below 1 if contact stopped them.
+    pins: f64,
+    /// Moves of pins that contact had stopped.
+    pin_moves: usize,
 }
 
 /// A search direction.
@@ -57,7 +62,16 @@ impl<'a> Iterate<'a> {
         mut x: Vec<Vector3<f64>>,
     ) -> Result<Self, EvaluationError> {
         let projection = Projection::on_demand();
-        let (energy, linearised) = match potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)? {
+        let in_contact = potential.body.system.has_contact();
+        let mut pins = if in_contact { potential.begin_contact(&mut x) } else { 1.0 };
+        let mut found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
+        if found.is_none() && in_contact {
+            // Pins must not move before the cloth makes way for them.
+            x.clone_from(&potential.body.x);
+            pins = 0.0;
+            found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
+        }
+        let (energy, linearised) = match found {
             Some(EnergyAndGradient { energy, downhill }) => (energy, Some(downhill)),
             None => {
                 let body = &*potential.body;
@@ -79,6 +93,8 @@ impl<'a> Iterate<'a> {
             change: f64::INFINITY,
             took_full_step: true,
             converged: false,
+            pins,
+            pin_moves: 0,
         })
     }
 
@@ -94,10 +110,14 @@ impl<'a> Iterate<'a> {
             }
             let direction = self.direction()?;
             match self.search(&direction)? {
-                Some(step) => self.accept(step, &direction),
+                Some(step) => {
+                    self.accept(step, &direction);
+                    self.move_pins()?;
+                }
                 None if direction.is_projected => {
                     let iterations = self.potential.report.solves;
-                    return Err(StepError::Stuck { iterations, stopped: direction.solved.stopped });
+                    let in_contact = self.potential.report.contact.shortened > 0;
+                    return Err(StepError::Stuck { iterations, stopped: direction.solved.stopped, in_contact });
                 }
                 None => self.projection.demand(),
             }
@@ -114,23 +134,25 @@ impl<'a> Iterate<'a> {
     /// iteration: on a fine mesh vertices are so light that even free fall leaves a small residual impulse.
     fn is_balanced(&mut self) -> Result<bool, EvaluationError> {
         let dt = self.potential.dt;
-        if !self.last.is_some_and(|last| self.options.may_be_balanced(last, dt)) {
+        if self.pins < 1.0 || !self.last.is_some_and(|last| self.options.may_be_balanced(last, dt)) {
             return Ok(false);
         }
-        let downhill = match self.gradient.take() {
+        let mut downhill = match self.gradient.take() {
             Some(downhill) => downhill,
             None => self.potential.gradient(&self.x)?,
         };
+        self.potential.add_contact(&self.x, &mut downhill);
         Ok(self.options.is_balanced(&downhill, dt))
     }
 
     /// Assembles the Hessian, unless it is known, and solves for the search direction.
     fn direction(&mut self) -> Result<Direction, StepError> {
         let (curvature, is_projected) = (self.projection.curvature, !self.projection.is_exact());
-        let downhill = match self.linearised.take().filter(|_| !is_projected) {
+        let mut downhill = match self.linearised.take().filter(|_| !is_projected) {
             Some(downhill) => downhill,
             None => self.potential.linearise(&self.x, curvature, &mut self.memory.matrix)?,
         };
+        self.potential.add_contact(&self.x, &mut downhill);
         let forcing = self.options.forcing(largest(&downhill), self.last);
         self.last = Some(forcing);
         let (vectors, solved) = self.solve(&downhill, curvature, forcing.tolerance)?;
@@ -147,9 +169,10 @@ impl<'a> Iterate<'a> {
         relative_tolerance: f64,
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
         let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
+        let contacts = self.potential.contacts(&self.x);
         let Memory { matrix, solver } = &mut *self.memory;
         let started = Instant::now();
-        let prepared = solver.prepare(matrix, self.trial);
+        let prepared = solver.prepare(matrix, &contacts, self.trial);
         self.potential.report.phases.factorisation += started.elapsed();
 
         let started = Instant::now();
@@ -162,7 +185,7 @@ impl<'a> Iterate<'a> {
             self.potential.report.solved_by += solved_by;
         }
         if curvature != Curvature::Exact && !solved.converged() {
-            solved = self.solve_in_double(downhill, curvature, &options, &mut direction)?;
+            solved = self.solve_in_double(downhill, (curvature, &contacts), &options, &mut direction)?;
         }
         if solved.stopped == StopReason::NonFinite {
             direction.fill([0.0; 3]);
@@ -179,14 +202,14 @@ impl<'a> Iterate<'a> {
     fn solve_in_double(
         &mut self,
         downhill: &[Vector3<f64>],
-        curvature: Curvature,
+        (curvature, contacts): (Curvature, &[Contact]),
         options: &SolveOptions,
         direction: &mut [Vector3<f64>],
     ) -> Result<SolveReport, StepError> {
         let mut matrix = self.potential.body.system.matrix();
         self.potential.linearise(&self.x, curvature, &mut matrix)?;
         let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), self.potential.body.system.threads());
-        solver.scale(&matrix)?;
+        solver.scale_with_contacts(&matrix, contacts)?;
         Ok(solver.solve(downhill, direction, options))
     }
 
@@ -207,15 +230,35 @@ impl<'a> Iterate<'a> {
         self.potential.line_search(&self.x, self.energy, direction, prefetch)
     }
 
+    /// Lets pins that contact has stopped move on, now that the cloth made way.
+    fn move_pins(&mut self) -> Result<(), StepError> {
+        if self.pins == 1.0 {
+            return Ok(());
+        }
+        if self.pin_moves == PIN_MOVES {
+            return Err(StepError::PinsBlocked { moves: PIN_MOVES, part: self.pins });
+        }
+        self.pin_moves += 1;
+        let part = self.potential.move_pins(&mut self.x);
+        self.pins = if part == 1.0 { 1.0 } else { self.pins + (1.0 - self.pins) * part };
+        self.potential.meet(&self.x);
+        self.energy = self.potential.energy(&self.x)?;
+        (self.gradient, self.linearised) = (None, None);
+        Ok(())
+    }
+
     /// Moves to the next iterate, tests for convergence, and decides whether the next Hessian is projected.
     fn accept(&mut self, step: AcceptedStep, direction: &Direction) {
         self.potential.advance(&mut self.x, step.scale, &direction.vectors);
         (self.energy, self.gradient, self.linearised) = (step.energy, step.gradient, step.linearised);
-        self.took_full_step = step.scale >= 1.0;
+        self.energy.value += self.potential.meet(&self.x);
+        self.took_full_step = step.scale >= step.allowed;
         let change = step.scale * direction.length / self.potential.dt;
         let before = std::mem::replace(&mut self.change, change);
         if direction.is_projected || direction.solved.converged() {
-            self.converged = change < self.options.velocity_tolerance;
+            // A step that contact shortens says nothing about the distance to the minimum.
+            let is_whole = step.allowed == 1.0 && self.pins == 1.0;
+            self.converged = is_whole && change < self.options.velocity_tolerance;
             self.projection.proceed(self.took_full_step && change < before);
         } else {
             self.projection.demand();

@@ -27,6 +27,8 @@ pub(super) enum Prefetch<'a> {
 pub(super) struct AcceptedStep {
     /// Length of the step, in units of the search direction.
     pub scale: f64,
+    /// The longest step that was tried: 1, or less if contact allows no more.
+    pub allowed: f64,
     /// E after the step.
     pub energy: Energy,
     /// −∇E after the step, if it was prefetched without the Hessian.
@@ -36,7 +38,17 @@ pub(super) struct AcceptedStep {
 }
 
 impl IncrementalPotential<'_> {
-    /// Returns the first of x + d, x + d/2, … that decreases E sufficiently (Armijo); `None` if none does. Directions
+    /// Returns the longest step of at most `scale` directions that contact allows.
+    fn allowed(&mut self, x: &[Vector3<f64>], scale: f64, direction: &Direction) -> f64 {
+        if !self.body.system.has_contact() {
+            return scale;
+        }
+        let to = self.moved(x, scale, &direction.vectors);
+        scale * self.certified(x, &to)
+    }
+
+    /// Returns the first of x + s d, x + s d/2, … that decreases E sufficiently (Armijo); `None` if none does. s is 1,
+    /// or less if contact allows no more. Directions
     /// of projected Hessians are too short, if anything: a full step along one is doubled while that lowers E.
     pub(super) fn line_search(
         &mut self,
@@ -45,7 +57,11 @@ impl IncrementalPotential<'_> {
         direction: &Direction,
         mut prefetch: Prefetch<'_>,
     ) -> Result<Option<AcceptedStep>, EvaluationError> {
-        let mut scale = 1.0;
+        let mut scale = self.allowed(x, 1.0, direction);
+        let allowed = scale;
+        if allowed == 0.0 {
+            return Ok(None);
+        }
         for _ in 0..=HALVINGS {
             let moved = self.moved(x, scale, &direction.vectors);
             let (mut gradient, mut linearised) = (None, None);
@@ -58,7 +74,7 @@ impl IncrementalPotential<'_> {
             let rounding = ROUNDING * energy.magnitude.min(trial.magnitude);
             if trial.value <= energy.value + DECREASE * scale * direction.slope + rounding {
                 drop(moved);
-                let accepted = AcceptedStep { scale, energy: trial, gradient, linearised };
+                let accepted = AcceptedStep { scale, allowed, energy: trial, gradient, linearised };
                 let may_be_short = direction.is_projected && scale == 1.0;
                 return Ok(Some(if may_be_short { self.lengthen(x, accepted, direction)? } else { accepted }));
             }
@@ -77,12 +93,15 @@ impl IncrementalPotential<'_> {
     ) -> Result<AcceptedStep, EvaluationError> {
         while accepted.scale < LONGEST {
             let scale = 2.0 * accepted.scale;
+            if self.allowed(x, scale, direction) < scale {
+                break;
+            }
             let moved = self.moved(x, scale, &direction.vectors);
             let energy = self.energy(&moved)?;
             if energy.value >= accepted.energy.value {
                 break;
             }
-            accepted = AcceptedStep { scale, energy, gradient: None, linearised: None };
+            accepted = AcceptedStep { scale, energy, gradient: None, linearised: None, ..accepted };
         }
         Ok(accepted)
     }

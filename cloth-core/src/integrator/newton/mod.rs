@@ -1,4 +1,5 @@
 mod forcing;
+mod in_contact;
 mod incremental_potential;
 mod iterate;
 mod line_search;
@@ -30,6 +31,9 @@ use iterate::Iterate;
 ///   Fernández-Fernández, Larionov, Ascher and Bender 2023).
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
+///
+/// If the body collides, every move is certified to have no crossing ([`energy_solve::ContactModel`]): the warm start,
+/// the motion of pins, each trial step and each lengthened step.
 ///
 /// Every force other than drag needs an energy or a dissipation function. [`crate::fabric::Bending::BridsonForce`] has
 /// neither, and springs damped along their length have unsymmetric Jacobians: use [`super::ImplicitEuler`] for both.
@@ -88,6 +92,9 @@ pub struct Phases {
     pub solve: Duration,
     /// Energies along the search directions.
     pub line_search: Duration,
+    /// Search for pairs that may collide, and certificates of moves.
+    #[serde(default)]
+    pub collision: Duration,
 }
 
 impl std::ops::AddAssign for Phases {
@@ -96,6 +103,7 @@ impl std::ops::AddAssign for Phases {
         self.factorisation += other.factorisation;
         self.solve += other.solve;
         self.line_search += other.line_search;
+        self.collision += other.collision;
     }
 }
 

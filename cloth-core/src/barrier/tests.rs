@@ -1,0 +1,164 @@
+use energy_dsl::{Potential, Vector3};
+use energy_elements::{Distance, EdgeEdgeDistance, PointEdgeDistance, PointTriangleDistance};
+use energy_solve::{ContactModel, DofMap};
+
+use super::*;
+use crate::collision::PairKind;
+use crate::geometry::{cross, norm, subtract};
+
+const THICKNESS: f64 = 1e-3;
+const GAP: f64 = 2e-3;
+
+/// Two triangles, the second above the first.
+fn contact(x: &[Vector3<f64>]) -> BarrierContact {
+    let mesh = CollisionMesh::new(6, &[[0, 1, 2], [3, 4, 5]], &[], &[]);
+    let mut contact = BarrierContact::new(mesh, x, vec![true; 6], vec![0.5 * THICKNESS; 6], GAP).unwrap();
+    contact.begin_step();
+    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+    contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
+    contact
+}
+
+/// The second triangle touches the first with a vertex, with an edge across an edge, or beyond a corner.
+fn states() -> Vec<Vec<Vector3<f64>>> {
+    let first = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.003], [0.0, 0.1, -0.002]];
+    let with = |second: [Vector3<f64>; 3]| [first, second].concat();
+    vec![
+        with([[0.03, 0.03, 0.0018], [0.05, 0.02, 0.08], [0.01, 0.05, 0.07]]),
+        with([[0.05, -0.0018, -0.05], [0.052, -0.0018, 0.05], [0.05, -0.09, 0.0]]),
+        with([[-0.0012, -0.0009, 0.0004], [-0.05, -0.03, 0.04], [-0.04, -0.06, -0.02]]),
+        with([[0.05, -0.0015, 0.002], [0.04, -0.05, 0.06], [0.06, -0.06, 0.05]]),
+    ]
+}
+
+#[test]
+fn forces_are_minus_the_gradient_and_neither_push_nor_turn_the_whole() {
+    for x in states() {
+        let mut contact = contact(&x);
+        let joined = contact.meet(&x);
+        let energy = contact.energy(&x);
+        assert!(energy > 0.0 && energy.is_finite() && (energy - joined).abs() < 1e-15 * energy, "{energy} {joined}");
+        let mut force = vec![[0.0; 3]; 6];
+        contact.add_force(&x, &mut force);
+        let largest = force.iter().map(|f| norm(*f)).fold(0.0, f64::max);
+        for vertex in 0..6 {
+            for axis in 0..3 {
+                let at = |offset: f64| {
+                    let mut moved = x.clone();
+                    moved[vertex][axis] += offset;
+                    contact.energy(&moved)
+                };
+                const H: f64 = 1e-6;
+                let slope = (8.0 * (at(H) - at(-H)) - (at(2.0 * H) - at(-2.0 * H))) / (12.0 * H);
+                assert!((slope + force[vertex][axis]).abs() < 1e-6 * largest, "{slope} {:?}", force[vertex]);
+            }
+        }
+        let total = force.iter().fold([0.0; 3], |sum, f| add_scaled(sum, 1.0, *f));
+        let torque = x.iter().zip(&force).fold([0.0; 3], |sum, (x, f)| add_scaled(sum, 1.0, cross(*x, *f)));
+        assert!(norm(total) < 1e-14 * largest && norm(torque) < 1e-14 * largest, "{total:?} {torque:?}");
+    }
+}
+
+#[test]
+fn distances_and_their_gradients_are_those_of_the_declared_elements() {
+    let mut kinds = [0; 4];
+    for x in states() {
+        let mut contact = contact(&x);
+        contact.meet(&x);
+        for (joined, closest, _) in contact.active(&x) {
+            let touched: Vec<usize> = (0..4).filter(|&place| closest.weights[place] != 0.0).collect();
+            let points: Vec<Vector3<f64>> =
+                touched.iter().map(|&place| joined.candidate.pair.corners(&x)[place]).collect();
+            let (kind, distance, gradient) = match (joined.candidate.pair.kind, &points[..]) {
+                (PairKind::PointTriangle, &[p, a]) => {
+                    let found = Distance::<f64>::new().gradient(&[p, a]);
+                    (0, found.value, found.gradient.to_vec())
+                }
+                (PairKind::PointTriangle, &[p, a, b]) => {
+                    let found = PointEdgeDistance::<f64>::new().gradient(&[p, a, b]);
+                    (1, found.value, found.gradient.to_vec())
+                }
+                (PairKind::PointTriangle, &[p, a, b, c]) => {
+                    let found = PointTriangleDistance::<f64>::new().gradient(&[p, a, b, c]);
+                    (2, found.value, found.gradient.to_vec())
+                }
+                (PairKind::EdgeEdge, &[a, b, c, d]) => {
+                    let found = EdgeEdgeDistance::<f64>::new().gradient(&[a, b, c, d]);
+                    (3, found.value, found.gradient.to_vec())
+                }
+                other => panic!("{other:?} should not have joined"),
+            };
+            kinds[kind] += 1;
+            assert!((distance - closest.distance).abs() < 1e-14, "{distance} {}", closest.distance);
+            for (gradient, place) in gradient.iter().zip(touched) {
+                let expected = closest.normal.map(|component| closest.weights[place] * component);
+                assert!(norm(subtract(*gradient, expected)) < 1e-11, "{gradient:?} {expected:?}");
+            }
+        }
+    }
+    assert!(kinds.iter().all(|count| *count > 0), "{kinds:?}");
+}
+
+#[test]
+fn the_stiffness_is_the_curvature_along_the_normal() {
+    for x in states() {
+        let mut contact = contact(&x);
+        contact.meet(&x);
+        let found = contact.contacts(&DofMap::new(&[false; 6]), &x);
+        assert!(!found.is_empty());
+        for ((joined, closest, gap), one) in contact.active(&x).zip(&found) {
+            assert_eq!((one.weights, one.rows), (closest.weights, joined.candidate.pair.vertices));
+            let energy = |gap: f64| contact.energy_of(joined, gap);
+            let h = 1e-3 * gap;
+            let curvature = (energy(gap + h) - 2.0 * energy(gap) + energy(gap - h)) / (h * h);
+            let along = dot(closest.normal, one.block.map(|row| dot(row, closest.normal)));
+            assert!((along / curvature - 1.0).abs() < 1e-4, "{along} {curvature}");
+        }
+    }
+}
+
+/// At half the gap the barrier is as stiff as documented, whatever the resistance.
+#[test]
+fn stiffness_follows_the_resistance() {
+    let x = states()[0].clone();
+    let mut contact = contact(&x);
+    contact.meet(&x);
+    let (joined, _, _) = contact.active(&x).next().unwrap();
+    let half = 0.5 * GAP;
+    let curvature = contact.barrier(joined).hessian(&between(half)).hessian.as_ref()[0][0][0];
+    assert!((curvature / 500.0 - 1.0).abs() < 1e-12, "{curvature}");
+}
+
+#[test]
+fn starts_that_cross_or_are_too_close_are_refused_by_name() {
+    let mesh = || CollisionMesh::new(6, &[[0, 1, 2], [3, 4, 5]], &[], &[]);
+    let new = |x: &[Vector3<f64>]| BarrierContact::new(mesh(), x, vec![true; 6], vec![0.5 * THICKNESS; 6], GAP);
+    let mut x = states()[0].clone();
+    x[3][2] = -0.01;
+    let message = new(&x).unwrap_err().to_string();
+    assert!(message.starts_with("the cloth crosses itself in 2 places at the start: the edge 3–4"), "{message}");
+    let mut x = states()[0].clone();
+    x[3][2] = 0.0008;
+    let message = new(&x).unwrap_err().to_string();
+    assert!(message.starts_with("1 pairs of features are closer than the thickness"), "{message}");
+    assert!(message.contains("vertex 3 and the triangle 0–1–2"), "{message}");
+}
+
+#[test]
+fn moves_are_certified_and_pairs_that_block_join() {
+    let x = states()[0].clone();
+    let mut contact = contact(&x);
+    let mut through = x.clone();
+    through[3..].iter_mut().for_each(|corner| corner[2] -= 0.2);
+    let part = contact.certify(&x, &through);
+    assert!(part > 0.0 && part < 0.01, "{part}");
+    let mut away = x.clone();
+    away[3..].iter_mut().for_each(|corner| corner[2] += 0.2);
+    assert_eq!(contact.certify(&x, &away), 1.0);
+    assert_eq!(contact.certify(&x, &vec![[f64::NAN; 3]; 6]), 0.0);
+    contact.meet(&x);
+    assert!(contact.known.contains(&Pair { kind: PairKind::PointTriangle, vertices: [3, 0, 1, 2] }));
+    let counts = contact.counts();
+    assert_eq!((counts.moves, counts.shortened), (2, 1));
+    assert!((counts.left - part).abs() < 1e-15);
+}

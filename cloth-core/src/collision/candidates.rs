@@ -1,0 +1,192 @@
+use energy_dsl::Vector3;
+use energy_solve::index;
+
+use super::certificate::separation;
+use super::mesh::{CollisionMesh, bounds};
+use super::{Closest, Pair, PairKind};
+use crate::geometry::{Bounds, Hierarchy, add_scaled, norm, subtract};
+
+/// All pairs that can come within reach of each other, sorted by kind and vertices, with the region in which each vertex
+/// may move before the list must be renewed.
+///
+/// Distances do not change if all vertices are translated, so regions are relative to the mean displacement. A sheet in
+/// free fall needs no new list.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidates {
+    points: Hierarchy,
+    triangles: Hierarchy,
+    edges: Hierarchy,
+    /// Whether each pair of features may respond to a contact: some vertex of it is free.
+    is_free: Vec<bool>,
+    /// Distance within which pairs are wanted, in m.
+    reach: f64,
+    /// Positions at the last search; empty before the first.
+    origin: Vec<Vector3<f64>>,
+    /// The region of each vertex.
+    regions: Vec<Bounds>,
+    pairs: Vec<Candidate>,
+}
+
+/// How far regions extend beyond the move of each vertex relative to the mean, so that the next moves need no new list.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slack {
+    /// Added to every region, in m.
+    pub least: f64,
+    /// Added in proportion to the vertex's displacement.
+    pub part: f64,
+    /// The largest extension, in m.
+    pub most: f64,
+}
+
+impl Slack {
+    /// Regions end where the move ends.
+    pub const NONE: Self = Self { least: 0.0, part: 0.0, most: 0.0 };
+}
+
+/// A pair, with its distance and normal at the last search.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub pair: Pair,
+    pub distance: f64,
+    pub normal: Vector3<f64>,
+}
+
+impl Candidate {
+    pub fn new(pair: Pair, x: &[Vector3<f64>]) -> Self {
+        let Closest { distance, normal, .. } = Closest::of(&pair, &pair.corners(x));
+        Self { pair, distance, normal }
+    }
+
+    /// Whether the pair is certainly farther apart than `reach` at x, where the vertices have these excursions.
+    #[inline]
+    pub fn is_beyond(&self, reach: f64, x: &[Vector3<f64>], excursions: &[f64]) -> bool {
+        self.distance - self.approach(excursions) > reach
+            || separation(self.normal, &self.pair.corners(x), self.pair.first()) > reach
+    }
+
+    /// The largest decrease of the distance by these excursions of the vertices.
+    #[inline]
+    pub(super) fn approach(&self, excursions: &[f64]) -> f64 {
+        let [a, b, c, d] = self.pair.of(excursions);
+        match self.pair.kind {
+            PairKind::PointTriangle => a + b.max(c).max(d),
+            PairKind::EdgeEdge => a.max(b) + c.max(d),
+        }
+    }
+}
+
+impl Candidates {
+    /// Creates an empty list. Pairs without a vertex of `is_free` are never listed.
+    pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], is_free: Vec<bool>, reach: f64) -> Self {
+        let boxes_of_triangles: Vec<_> = mesh.triangles().iter().map(|corners| bounds(x, corners)).collect();
+        let boxes_of_edges: Vec<_> = mesh.edges().iter().map(|ends| bounds(x, ends)).collect();
+        let boxes_of_points: Vec<_> = mesh.points().iter().map(|&point| bounds(x, &[point])).collect();
+        let [points, triangles, edges] =
+            [&boxes_of_points, &boxes_of_triangles, &boxes_of_edges].map(|boxes| Hierarchy::new(boxes));
+        Self { points, triangles, edges, is_free, reach, origin: Vec::new(), regions: Vec::new(), pairs: Vec::new() }
+    }
+
+    pub fn pairs(&self) -> &[Candidate] {
+        &self.pairs
+    }
+
+    /// Returns the listed pair; `None` if it is not listed.
+    pub fn find(&self, pair: &Pair) -> Option<Candidate> {
+        self.pairs.binary_search_by_key(pair, |candidate| candidate.pair).ok().map(|place| self.pairs[place])
+    }
+
+    /// Discards the list, so that the next one depends on the state alone.
+    pub fn clear(&mut self) {
+        self.origin.clear();
+        self.pairs.clear();
+    }
+
+    /// Returns the distance of each vertex from its place at the last search, relative to the mean displacement, in m.
+    pub fn excursions(&self, x: &[Vector3<f64>]) -> Vec<f64> {
+        let mean = mean_displacement(&self.origin, x);
+        let excursion = |(x, origin): (&Vector3<f64>, &Vector3<f64>)| norm(subtract(subtract(*x, *origin), mean));
+        x.iter().zip(&self.origin).map(excursion).collect()
+    }
+
+    /// Whether the list holds every pair that comes within reach on a straight way to `x` from a covered state. Regions
+    /// are convex, so the whole way lies within them if both ends do.
+    pub fn cover(&self, x: &[Vector3<f64>]) -> bool {
+        if self.origin.len() != x.len() {
+            return false;
+        }
+        let mean = mean_displacement(&self.origin, x);
+        x.iter().zip(&self.regions).all(|(x, region)| region.contains(subtract(*x, mean)))
+    }
+
+    /// Renews the list for a move from `x` to `to`.
+    pub fn search(&mut self, mesh: &CollisionMesh, x: &[Vector3<f64>], to: &[Vector3<f64>], slack: Slack) {
+        let mean = mean_displacement(x, to);
+        x.clone_into(&mut self.origin);
+        let region = |(&x, &to): (&Vector3<f64>, &Vector3<f64>)| {
+            let to = subtract(to, mean);
+            let slack = (slack.least + slack.part * norm(subtract(to, x))).min(slack.most);
+            Bounds::of(&[x, to]).extended(slack)
+        };
+        self.regions = x.iter().zip(to).map(region).collect();
+        let mut found = Vec::new();
+        self.find_points_near_triangles(mesh, &mut found);
+        self.find_edges_near_edges(mesh, &mut found);
+        found.sort_unstable();
+        self.pairs.clear();
+        self.pairs.extend(found.into_iter().map(|pair| Candidate::new(pair, x)));
+    }
+
+    /// The box around the regions of some vertices, extended by half the reach.
+    fn swept(&self, vertices: &[u32]) -> Bounds {
+        let region = |&vertex: &u32| self.regions[vertex as usize];
+        vertices.iter().map(region).fold(Bounds::EMPTY, Bounds::around).extended(0.5 * self.reach)
+    }
+
+    fn may_respond(&self, a: &[u32], b: &[u32]) -> bool {
+        a.iter().chain(b).any(|vertex| self.is_free[*vertex as usize])
+    }
+
+    fn find_points_near_triangles(&mut self, mesh: &CollisionMesh, found: &mut Vec<Pair>) {
+        let boxes: Vec<_> = mesh.triangles().iter().map(|corners| self.swept(corners)).collect();
+        let around: Vec<_> = mesh.points().iter().map(|&point| self.swept(&[point])).collect();
+        self.triangles.refit(&boxes);
+        self.points.refit(&around);
+        let mut near = Vec::new();
+        self.points.meeting(&self.triangles, |place, triangle| {
+            if around[place].overlaps(&boxes[triangle]) {
+                let (point, corners) = (mesh.points()[place], &mesh.triangles()[triangle]);
+                if !mesh.are_joined(&[point], corners) && self.may_respond(&[point], corners) {
+                    near.push((index(place), index(triangle)));
+                }
+            }
+        });
+        found.extend(near.into_iter().map(|(place, triangle)| {
+            let [a, b, c] = mesh.triangles()[triangle as usize];
+            Pair { kind: PairKind::PointTriangle, vertices: [mesh.points()[place as usize], a, b, c] }
+        }));
+    }
+
+    fn find_edges_near_edges(&mut self, mesh: &CollisionMesh, found: &mut Vec<Pair>) {
+        let boxes: Vec<_> = mesh.edges().iter().map(|ends| self.swept(ends)).collect();
+        self.edges.refit(&boxes);
+        let mut near = Vec::new();
+        self.edges.meeting_itself(|one, other| {
+            if boxes[one].overlaps(&boxes[other]) {
+                let (ends, others) = (&mesh.edges()[one], &mesh.edges()[other]);
+                if !mesh.are_joined(ends, others) && self.may_respond(ends, others) {
+                    near.push((index(one.min(other)), index(one.max(other))));
+                }
+            }
+        });
+        found.extend(near.into_iter().map(|(one, other)| {
+            let ([a, b], [c, d]) = (mesh.edges()[one as usize], mesh.edges()[other as usize]);
+            Pair { kind: PairKind::EdgeEdge, vertices: [a, b, c, d] }
+        }));
+    }
+}
+
+/// Returns the mean of to − from.
+fn mean_displacement(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum = from.iter().zip(to).fold([0.0; 3], |sum, (from, to)| add_scaled(sum, 1.0, subtract(*to, *from)));
+    sum.map(|component| component / from.len().max(1) as f64)
+}

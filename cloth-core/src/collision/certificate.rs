@@ -1,0 +1,149 @@
+//! Proof that a straight move keeps pairs apart.
+//!
+//! A direction n separates two convex features by n·(b − a) ≥ ℓ for all corners a of one and b of the other. Corners
+//! move on straight lines at constant velocity, so n·(b − a) is an affine function of time. If it is at least ℓ at both
+//! ends of a move, it is at least ℓ during the move: the features stay at least ℓ apart. No root is sought, and only
+//! dot products are rounded.
+//!
+//! The level ℓ = ξ + 0.1 (d − ξ) of a pair at distance d keeps a tenth of its gap beyond the thickness ξ. If the normal
+//! of the closest points at the start, or at the end, separates the pair at both ends, the whole move is safe.
+//! Otherwise the pair advances along the move: the normal at one instant allows a certain time, and so on (directional
+//! advance; compare the conservative advancement of Li, Kaufman and Jiang 2021).
+//!
+//! All positions that occur are rounded. The level is raised by 64 ε times the largest coordinate, which exceeds the
+//! sum of all rounding errors: 2 ε for each of the two corners, 1 ε for their difference, 3 ε for the dot product with
+//! a vector of length 1 + 4 ε, each times the largest coordinate and the three components.
+
+use energy_dsl::Vector3;
+
+use super::{Candidate, Closest, Pair};
+use crate::geometry::{add_scaled, dot, subtract};
+
+/// The part of the gap beyond the thickness that a move must leave.
+const KEPT: f64 = 0.1;
+/// Instants at which a pair takes a new normal before the rest of the move is given up.
+const ADVANCES: usize = 64;
+/// The advance is over once it gains less than this part of the way so far.
+const GAIN: f64 = 1e-2;
+/// Bound of all rounding errors, relative to the largest coordinate.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// The distance that a pair keeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clearance {
+    /// The thickness ξ, in m.
+    pub thickness: f64,
+}
+
+/// A straight move of all vertices.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Move<'a> {
+    from: &'a [Vector3<f64>],
+    to: &'a [Vector3<f64>],
+    /// Bound of the rounding errors of a separation, in m.
+    rounding: f64,
+}
+
+impl<'a> Move<'a> {
+    pub fn new(from: &'a [Vector3<f64>], to: &'a [Vector3<f64>]) -> Self {
+        let largest = |x: &[Vector3<f64>]| x.iter().flatten().fold(0.0, |largest: f64, c| largest.max(c.abs()));
+        Self { from, to, rounding: ROUNDING * largest(from).max(largest(to)) }
+    }
+
+    /// Whether a pair certainly stays farther apart than `reach` during the move. `excursions` are those of the
+    /// vertices at both ends of the move: the distance from the place of the last search is largest at an end of a
+    /// straight move, and the separation along a fixed direction is smallest there.
+    #[inline]
+    pub fn stays_beyond(&self, candidate: &Candidate, reach: f64, excursions: &[Vec<f64>; 2]) -> bool {
+        let reach = reach + self.rounding;
+        let [before, after] = excursions;
+        let approach = candidate.approach(before).max(candidate.approach(after));
+        let separates = |x: &[Vector3<f64>]| {
+            separation(candidate.normal, &candidate.pair.corners(x), candidate.pair.first()) > reach
+        };
+        candidate.distance - approach > reach || separates(self.from) && separates(self.to)
+    }
+
+    /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. The
+    /// result is exact enough if it is at least `wanted`; the search then stops early.
+    pub fn safe_part(&self, pair: &Pair, clearance: Clearance, wanted: f64) -> f64 {
+        let (from, to) = (pair.corners(self.from), pair.corners(self.to));
+        let start = Closest::of(pair, &from);
+        let level = self.level(start.distance, clearance);
+        let first = pair.first();
+        let separates =
+            |n: Vector3<f64>| [&from, &to].into_iter().all(|corners| separation(n, corners, first) >= level);
+        if separates(start.normal) || separates(Closest::of(pair, &to).normal) {
+            return 1.0;
+        }
+        self.advance(pair, &from, &to, level, wanted)
+    }
+
+    /// The level ℓ of a pair at a distance, including rounding errors. Pairs within their thickness must not come
+    /// closer by more than a tenth.
+    fn level(&self, distance: f64, Clearance { thickness }: Clearance) -> f64 {
+        let kept =
+            if distance > thickness { thickness + KEPT * (distance - thickness) } else { (1.0 - KEPT) * distance };
+        kept + self.rounding
+    }
+
+    fn advance(&self, pair: &Pair, from: &[Vector3<f64>; 4], to: &[Vector3<f64>; 4], level: f64, wanted: f64) -> f64 {
+        let first = pair.first();
+        let velocities: [Vector3<f64>; 4] = std::array::from_fn(|corner| subtract(to[corner], from[corner]));
+        let mut time = 0.0;
+        for _ in 0..ADVANCES {
+            let here = std::array::from_fn(|corner| add_scaled(from[corner], time, velocities[corner]));
+            let normal = Closest::of(pair, &here).normal;
+            let gained = safe_time(normal, &here, &velocities, first, level);
+            let next = time + gained;
+            if next >= 1.0 {
+                return 1.0;
+            }
+            if next >= wanted || gained <= GAIN * time {
+                return next;
+            }
+            if gained.is_nan() {
+                return time;
+            }
+            time = next;
+        }
+        time
+    }
+}
+
+/// The smallest n·(a − b) over corners a of the first and b of the second feature. For a unit vector n, a lower bound
+/// of their distance, to rounding.
+#[inline]
+pub(super) fn separation(n: Vector3<f64>, corners: &[Vector3<f64>; 4], first: usize) -> f64 {
+    let mut least = f64::INFINITY;
+    for a in 0..first {
+        for b in first..4 {
+            least = least.min(dot(n, subtract(corners[a], corners[b])));
+        }
+    }
+    least
+}
+
+/// How long n keeps the features apart by the level at these velocities. 0 if it does not do so now.
+fn safe_time(
+    n: Vector3<f64>,
+    corners: &[Vector3<f64>; 4],
+    velocities: &[Vector3<f64>; 4],
+    first: usize,
+    level: f64,
+) -> f64 {
+    let mut time = f64::INFINITY;
+    for a in 0..first {
+        for b in first..4 {
+            let beyond = dot(n, subtract(corners[a], corners[b])) - level;
+            let rate = dot(n, subtract(velocities[a], velocities[b]));
+            if !(beyond > 0.0) {
+                return 0.0;
+            }
+            if rate < 0.0 {
+                time = time.min(beyond / -rate);
+            }
+        }
+    }
+    time
+}

@@ -1,0 +1,40 @@
+use energy_dsl::Vector3;
+
+/// The kind of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum PairKind {
+    /// Vertex 0 is the point; the others are the corners of the triangle.
+    PointTriangle,
+    /// Vertices 0 and 1 are the ends of one edge, 2 and 3 those of the other.
+    EdgeEdge,
+}
+
+/// Two features that may touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Pair {
+    pub kind: PairKind,
+    pub vertices: [u32; 4],
+}
+
+impl Pair {
+    /// The number of vertices of the first feature; the second has the others.
+    #[inline]
+    pub fn first(&self) -> usize {
+        match self.kind {
+            PairKind::PointTriangle => 1,
+            PairKind::EdgeEdge => 2,
+        }
+    }
+
+    /// Returns an entry for each vertex.
+    #[inline]
+    pub fn of<T: Copy>(&self, all: &[T]) -> [T; 4] {
+        self.vertices.map(|vertex| all[vertex as usize])
+    }
+
+    /// Returns the positions of its vertices.
+    #[inline]
+    pub fn corners(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 4] {
+        self.of(x)
+    }
+}

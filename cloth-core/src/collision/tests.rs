@@ -1,0 +1,241 @@
+use energy_dsl::Vector3;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+
+use super::*;
+use crate::geometry::{add_scaled, subtract};
+
+/// Two triangles without a common vertex.
+fn two_triangles() -> CollisionMesh {
+    CollisionMesh::new(6, &[[0, 1, 2], [3, 4, 5]], &[], &[])
+}
+
+/// All pairs of the two triangles.
+fn pairs() -> Vec<Pair> {
+    let point = |p: u32, [a, b, c]: [u32; 3]| Pair { kind: PairKind::PointTriangle, vertices: [p, a, b, c] };
+    let points = (0..3).map(|p| point(p, [3, 4, 5])).chain((3..6).map(|p| point(p, [0, 1, 2])));
+    let sides = |first: u32| [[0, 1], [1, 2], [0, 2]].map(|side: [u32; 2]| side.map(|corner| first + corner));
+    let edges = sides(0).into_iter().flat_map(|[a, b]| sides(3).map(|[c, d]| [a, b, c, d]));
+    points.chain(edges.map(|vertices| Pair { kind: PairKind::EdgeEdge, vertices })).collect()
+}
+
+fn distance(x: &[Vector3<f64>]) -> f64 {
+    pairs().iter().map(|pair| Closest::of(pair, &pair.corners(x)).distance).fold(f64::INFINITY, f64::min)
+}
+
+fn at(from: &[Vector3<f64>], to: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>> {
+    from.iter().zip(to).map(|(from, to)| add_scaled(*from, time, subtract(*to, *from))).collect()
+}
+
+/// The part of a move that is safe for all pairs.
+fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 {
+    let step = Move::new(from, to);
+    pairs().iter().fold(1.0, |part, pair| step.safe_part(pair, Clearance { thickness }, part).min(part))
+}
+
+fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
+    prop::array::uniform3(-size..size)
+}
+
+/// A corner on a coarse grid: aligned edges, coplanar triangles and coincident coordinates are common.
+fn on_grid() -> impl Strategy<Value = Vector3<f64>> {
+    prop::array::uniform3((-4_i32..=4).prop_map(|number| 0.01 * f64::from(number)))
+}
+
+/// Positions of the six corners before and after an impact. The triangles fly at each other with up to 100 m/s during
+/// 10 ms, and their corners spread with up to 10 m/s.
+fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
+    let corner = prop_oneof![vector(0.04), on_grid()];
+    let spread = prop_oneof![Just([0.0; 3]), vector(0.1)];
+    let start = prop::collection::vec((corner, spread), 6);
+    (start, vector(1.0), prop_oneof![Just(0.0), Just(1e-3 + 1e-6), 0.0..0.5], 0.0..1.0_f64).prop_map(
+        |(corners, velocity, gap, speed)| {
+            // Start on the way back, so that the triangles meet.
+            let length = subtract(velocity, [0.0; 3]).iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-3);
+            let direction = velocity.map(|component| component / length);
+            let velocity = direction.map(|component| -speed * component);
+            let placed = |(number, &(corner, _)): (usize, &(Vector3<f64>, Vector3<f64>))| {
+                if number < 3 { corner } else { add_scaled(corner, gap, direction) }
+            };
+            let from: Vec<_> = corners.iter().enumerate().map(placed).collect();
+            let moved = |(number, (from, (_, spread))): (usize, (&Vector3<f64>, &(Vector3<f64>, Vector3<f64>)))| {
+                add_scaled(add_scaled(*from, 1.0, *spread), if number < 3 { 0.0 } else { 1.0 }, velocity)
+            };
+            let to = from.iter().zip(&corners).enumerate().map(moved).collect();
+            [from, to]
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 10_000, max_global_rejects: 100_000, ..ProptestConfig::default() })]
+
+    /// No impact passes, judged by the exact test along the accepted move.
+    #[test]
+    fn no_impact_passes([from, to] in impact()) {
+        const THICKNESS: f64 = 1e-3;
+        let mesh = two_triangles();
+        let start = distance(&from);
+        prop_assume!(start > THICKNESS && crossings(&mesh, &from).is_empty());
+        let part = safe_part(&from, &to, THICKNESS);
+        prop_assert!(part > 0.0 && part <= 1.0, "{part}");
+        for sample in 0..=100 {
+            let x = at(&from, &to, part * f64::from(sample) / 100.0);
+            prop_assert!(crossings(&mesh, &x).is_empty(), "sample {sample} of {part}");
+            prop_assert!(distance(&x) > THICKNESS, "sample {sample} of {part}: {}", distance(&x));
+        }
+    }
+}
+
+/// The certificate gives up little: nearly all cut moves end where most of the pair's gap is used up. Others slide past
+/// each other, where normals turn fast.
+#[test]
+fn moves_are_cut_only_near_a_contact() {
+    const THICKNESS: f64 = 1e-3;
+    let mut runner = TestRunner::deterministic();
+    let (mut cut, mut early) = (0, 0);
+    for _ in 0..10_000 {
+        let [from, to] = impact().new_tree(&mut runner).unwrap().current();
+        let step = Move::new(&from, &to);
+        for pair in pairs() {
+            let part = step.safe_part(&pair, Clearance { thickness: THICKNESS }, 1.0);
+            let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
+            if part < 1.0 && gap(0.0) > 0.0 {
+                cut += 1;
+                early += u32::from(gap(part) > 0.2 * gap(0.0));
+            }
+        }
+    }
+    assert!(cut > 10_000 && f64::from(early) < 0.01 * f64::from(cut), "{early} of {cut}");
+}
+
+/// A sheet of cells × cells squares of 1 cm, whose corners are displaced by random vectors.
+fn sheet(cells: usize) -> (CollisionMesh, Vec<Vector3<f64>>) {
+    let corner = |i: usize, j: usize| i * (cells + 1) + j;
+    let squares = (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j)));
+    let halves = |(i, j): (usize, usize)| {
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles: Vec<_> = squares.flat_map(halves).collect();
+    let place = |number: usize| [0.01 * (number / (cells + 1)) as f64, 0.01 * (number % (cells + 1)) as f64, 0.0];
+    let vertices = (cells + 1) * (cells + 1);
+    (CollisionMesh::new(vertices, &triangles, &[], &[]), (0..vertices).map(place).collect())
+}
+
+#[test]
+fn a_flat_sheet_has_no_crossings_and_a_folded_one_has() {
+    let (mesh, flat) = sheet(6);
+    assert_eq!(crossings(&mesh, &flat), []);
+    // The outer column is turned over onto its neighbours, first beside them and then into their plane.
+    let folded = |height: f64| {
+        let turned = |(number, x): (usize, &Vector3<f64>)| {
+            if number / 7 == 6 { [0.043, x[1] + 0.001, height] } else { *x }
+        };
+        flat.iter().enumerate().map(turned).collect::<Vec<_>>()
+    };
+    assert_eq!(crossings(&mesh, &folded(1e-9)), []);
+    assert!(crossings(&mesh, &folded(-1e-9)).is_empty(), "the other side is as good");
+    assert!(!crossings(&mesh, &folded(0.0)).is_empty(), "touching counts");
+    let mut pierced = flat.clone();
+    pierced[0] = [0.035, 0.034, 0.01];
+    pierced[1] = [0.035, 0.033, -0.01];
+    assert!(!crossings(&mesh, &pierced).is_empty());
+}
+
+#[test]
+fn edges_may_start_at_a_corner_but_not_run_into_the_triangle() {
+    let mesh = CollisionMesh::new(4, &[[0, 1, 2]], &[[0, 3]], &[]);
+    let count = |end: Vector3<f64>| crossings(&mesh, &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], end]).len();
+    assert_eq!(count([0.2, 0.2, 1e-200]), 0);
+    assert_eq!(count([0.2, 0.2, 0.0]), 1);
+    assert_eq!(count([2.0, 2.0, 0.0]), 1);
+    assert_eq!(count([0.5, 0.0, 0.0]), 1, "along a side");
+    assert_eq!(count([-0.2, -0.2, 0.0]), 0);
+    assert_eq!(count([-0.2, 0.9, 0.0]), 0);
+}
+
+#[test]
+fn sewn_vertices_count_as_one() {
+    let x = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.1, -1.0], [0.1, 0.1, 1.0]];
+    let with = |sewn: &[[usize; 2]]| crossings(&CollisionMesh::new(5, &[[0, 1, 2]], &[[3, 4]], sewn), &x).len();
+    assert_eq!((with(&[]), with(&[[4, 2]])), (1, 0));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// No pair within reach is missing anywhere on a covered move.
+    #[test]
+    fn candidates_are_complete(
+        offsets in prop::collection::vec((vector(0.012), vector(0.01)), 25),
+        drift in vector(1.0),
+        time in 0.0..1.0_f64,
+    ) {
+        const REACH: f64 = 3e-3;
+        let (mesh, flat) = sheet(4);
+        let from: Vec<_> = flat.iter().zip(&offsets).map(|(x, (offset, _))| add_scaled(*x, 1.0, *offset)).collect();
+        let to: Vec<_> = from.iter().zip(&offsets).map(|(x, (_, move_by))| {
+            add_scaled(add_scaled(*x, 1.0, *move_by), 1.0, drift)
+        }).collect();
+        let mut candidates = Candidates::new(&mesh, &flat, vec![true; 25], REACH);
+        prop_assert!(!candidates.cover(&from));
+        candidates.search(&mesh, &from, &to, Slack { least: 1e-4, part: 0.1, most: 1e-3 });
+        prop_assert!(candidates.cover(&from) && candidates.cover(&to));
+        let x = at(&from, &to, time);
+        prop_assert!(candidates.cover(&x));
+        let listed: std::collections::BTreeSet<Pair> = candidates.pairs().iter().map(|one| one.pair).collect();
+        prop_assert_eq!(listed.len(), candidates.pairs().len());
+        let excursions = candidates.excursions(&x);
+        for pair in all_pairs(&mesh) {
+            let here = Closest::of(&pair, &pair.corners(&x)).distance;
+            prop_assert!(here > REACH || listed.contains(&pair), "{:?} at {}", pair, here);
+        }
+        for one in candidates.pairs() {
+            let here = Closest::of(&one.pair, &one.pair.corners(&x)).distance;
+            prop_assert!(!one.is_beyond(here + 1e-12, &x, &excursions));
+        }
+    }
+
+    /// The closest points are those of a dense search, and the weights reproduce the distance.
+    #[test]
+    fn closest_points_are_closest(corners in prop::array::uniform4(prop_oneof![vector(1.0), on_grid()])) {
+        for kind in [PairKind::PointTriangle, PairKind::EdgeEdge] {
+            let pair = Pair { kind, vertices: [0, 1, 2, 3] };
+            let closest = Closest::of(&pair, &corners);
+            prop_assert!(closest.weights.iter().sum::<f64>().abs() < 1e-14);
+            const STEPS: i32 = 12;
+            for i in 0..=STEPS {
+                for j in 0..=STEPS {
+                    let [s, t] = [i, j].map(|number| f64::from(number) / f64::from(STEPS));
+                    let weights = match kind {
+                        PairKind::EdgeEdge => [1.0 - s, s, t - 1.0, -t],
+                        PairKind::PointTriangle if i + j <= STEPS => [1.0, s + t - 1.0, -s, -t],
+                        PairKind::PointTriangle => continue,
+                    };
+                    let apart = (0..4).fold([0.0; 3], |sum, k| add_scaled(sum, weights[k], corners[k]));
+                    let distance = crate::geometry::norm(apart);
+                    prop_assert!(closest.distance <= distance + 1e-9, "{:?}: {} {}", kind, closest.distance, distance);
+                }
+            }
+        }
+    }
+}
+
+/// All pairs of a mesh that share no vertex.
+fn all_pairs(mesh: &CollisionMesh) -> Vec<Pair> {
+    let mut all = Vec::new();
+    for &p in mesh.points() {
+        for corners in mesh.triangles().iter().filter(|corners| !corners.contains(&p)) {
+            let [a, b, c] = *corners;
+            all.push(Pair { kind: PairKind::PointTriangle, vertices: [p, a, b, c] });
+        }
+    }
+    for (number, &[a, b]) in mesh.edges().iter().enumerate() {
+        for &[c, d] in mesh.edges()[number + 1..].iter().filter(|other| !other.contains(&a) && !other.contains(&b)) {
+            all.push(Pair { kind: PairKind::EdgeEdge, vertices: [a, b, c, d] });
+        }
+    }
+    all
+}

@@ -1,0 +1,68 @@
+use energy_solve::ContactCounts;
+use serde::{Deserialize, Serialize};
+
+/// The work of contact, and how often it shortened moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ContactWork {
+    /// Searches for pairs that may collide.
+    pub searches: u64,
+    /// Certified moves.
+    pub moves: u64,
+    /// Moves that were shortened.
+    pub shortened: u64,
+    /// The sum of the parts of these moves that were left.
+    pub left: f64,
+    /// Candidate pairs, summed over the moves.
+    pub candidates: u64,
+    /// Candidates that were too close to be dismissed by a comparison of distances, summed over the moves.
+    pub tested: u64,
+    /// Pairs in contact, summed over the linear systems.
+    pub active: u64,
+    /// Linear systems, with or without contacts.
+    pub systems: u64,
+}
+
+impl ContactWork {
+    /// Returns the work between two moments.
+    pub(super) fn between(before: &ContactCounts, now: &ContactCounts) -> Self {
+        Self {
+            searches: now.searches - before.searches,
+            moves: now.moves - before.moves,
+            shortened: now.shortened - before.shortened,
+            left: now.left - before.left,
+            candidates: now.candidates - before.candidates,
+            tested: now.tested - before.tested,
+            active: now.active - before.active,
+            systems: now.systems - before.systems,
+        }
+    }
+}
+
+impl std::ops::AddAssign for ContactWork {
+    fn add_assign(&mut self, other: Self) {
+        self.searches += other.searches;
+        self.moves += other.moves;
+        self.shortened += other.shortened;
+        self.left += other.left;
+        self.candidates += other.candidates;
+        self.tested += other.tested;
+        self.active += other.active;
+        self.systems += other.systems;
+    }
+}
+
+/// Such as `12 pairs in contact per linear system; 40 moves, of which 3 were shortened to 0.61 on average; 95 pairs per
+/// move, 20 of them tested; 10 searches`.
+impl std::fmt::Display for ContactWork {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
+        write!(f, "{:.0} pairs in contact per linear system; {} moves", per(self.active, self.systems), self.moves)?;
+        if self.shortened > 0 {
+            let mean = self.left / self.shortened as f64;
+            write!(f, ", of which {} were shortened to {mean:.2} on average", self.shortened)?;
+        }
+        let [candidates, tested] = [self.candidates, self.tested].map(|sum| per(sum, self.moves));
+        write!(f, "; {candidates:.0} pairs per move, {tested:.0} of them tested; {} searches", self.searches)
+    }
+}

@@ -1,0 +1,113 @@
+//! Contact within a step of Newton's method: every move is certified, and energies are evaluated at certified states.
+
+use std::time::Instant;
+
+use energy_dsl::Vector3;
+use energy_solve::{BlockMatrix, Contact};
+
+use super::super::ContactWork;
+use super::incremental_potential::IncrementalPotential;
+
+/// Moves of the pins within a step, after which they count as blocked.
+pub(super) const PIN_MOVES: usize = 40;
+
+impl IncrementalPotential<'_> {
+    /// Forgets the pairs of the last step, and shortens the move to the first iterate x until it is certain to have no
+    /// crossing. Returns the part that is left.
+    pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
+        if let Some((contact, _)) = self.body.system.contact() {
+            contact.begin_step();
+        }
+        let to = std::mem::replace(x, self.body.x.clone());
+        let part = self.certified(x, &to);
+        blend(x, &to, part);
+        part
+    }
+
+    /// Returns the part of the straight move that has no crossing.
+    pub(super) fn certified(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
+        let Some((contact, _)) = self.body.system.contact() else { return 1.0 };
+        let started = Instant::now();
+        let part = contact.certify(from, to);
+        self.report.contact = ContactWork::between(&self.counted, &contact.counts());
+        self.report.phases.collision += started.elapsed();
+        part
+    }
+
+    /// Sets the resistance of the vertices to that of an assembled matrix.
+    pub(super) fn set_resistance(&mut self, matrix: &BlockMatrix<f32>) {
+        let per_square = 1.0 / (self.dt * self.dt);
+        let inertia: Vec<f64> = self.body.masses.iter().map(|mass| per_square * mass).collect();
+        if let Some((contact, dofs)) = self.body.system.contact() {
+            let block = |row: usize| matrix.diagonal(row).map(|row| row.map(|entry| per_square * f64::from(entry)));
+            contact.set_resistance(dofs, (0..dofs.free().len()).map(block).collect(), inertia);
+        }
+    }
+
+    /// Adds the pairs that meet at x. Returns the change of E there.
+    pub(super) fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
+        let square = self.dt * self.dt;
+        let Some((contact, _)) = self.body.system.contact() else { return 0.0 };
+        let started = Instant::now();
+        let change = square * contact.meet(x);
+        self.report.phases.collision += started.elapsed();
+        change
+    }
+
+    /// The contribution of contact to E.
+    pub(super) fn contact_energy(&mut self, x: &[Vector3<f64>]) -> f64 {
+        let square = self.dt * self.dt;
+        self.body.system.contact().map_or(0.0, |(contact, _)| square * contact.energy(x))
+    }
+
+    /// Adds the contribution of contact to −∇E of the free vertices.
+    pub(super) fn add_contact(&mut self, x: &[Vector3<f64>], downhill: &mut [Vector3<f64>]) {
+        let square = self.dt * self.dt;
+        if let Some((contact, dofs)) = self.body.system.contact() {
+            let mut force = vec![[0.0; 3]; x.len()];
+            contact.add_force(x, &mut force);
+            for (downhill, &vertex) in downhill.iter_mut().zip(dofs.free()) {
+                for axis in 0..3 {
+                    downhill[axis] += square * force[vertex][axis];
+                }
+            }
+        }
+    }
+
+    /// Returns the Hessian of contact's contribution to E.
+    pub(super) fn contacts(&mut self, x: &[Vector3<f64>]) -> Vec<Contact> {
+        let square = self.dt * self.dt;
+        let Some((contact, dofs)) = self.body.system.contact() else { return Vec::new() };
+        let mut contacts = contact.contacts(dofs, x);
+        self.report.contact = ContactWork::between(&self.counted, &contact.counts());
+        for contact in &mut contacts {
+            contact.block = contact.block.map(|row| row.map(|entry| square * entry));
+        }
+        contacts
+    }
+
+    /// Moves pins that contact has stopped further towards their places at the end of the step. Returns the part of
+    /// the rest of their way that they went.
+    pub(super) fn move_pins(&mut self, x: &mut [Vector3<f64>]) -> f64 {
+        let mut to = x.to_vec();
+        for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().place(vertex).is_none()) {
+            to[vertex] = self.inertial(vertex);
+        }
+        let part = self.certified(x, &to);
+        blend(x, &to, part);
+        part
+    }
+}
+
+/// x ← x + s (y − x); exactly y for s = 1.
+fn blend(x: &mut [Vector3<f64>], y: &[Vector3<f64>], s: f64) {
+    if s == 1.0 {
+        x.copy_from_slice(y);
+        return;
+    }
+    for (x, y) in x.iter_mut().zip(y) {
+        for axis in 0..3 {
+            x[axis] += s * (y[axis] - x[axis]);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Contact of a scene with itself.
+
+use crate::barrier::{BarrierContact, ContactError};
+use crate::collision::CollisionMesh;
+use crate::model::Model;
+
+use super::Island;
+
+/// The activation gap over the thickness.
+const GAP: f64 = 2.0;
+/// The largest reach of contact over the shortest edge. Features of a flat sheet must not touch their neighbours.
+const LARGEST_REACH: f64 = 0.4;
+
+/// Returns the points, edges and triangles of a model.
+pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
+    let segments: Vec<[usize; 2]> =
+        model.strands().flat_map(|strand| strand.clone().zip(strand.skip(1)).map(|(a, b)| [a, b])).collect();
+    CollisionMesh::new(model.x.len(), &model.triangles, &segments, &model.sewn)
+}
+
+/// Adds contact to an island that holds all vertices of the model.
+pub(super) fn add_contact(island: &mut Island, model: &Model) -> Result<(), ContactError> {
+    let mut local = vec![usize::MAX; model.x.len()];
+    island.vertices().iter().enumerate().for_each(|(place, &vertex)| local[vertex] = place);
+    let renumbered = mesh_of(model).renumbered(&local);
+    let x = &island.body().x;
+    let shortest = renumbered.shortest_edge(x);
+    let all = island.vertices().iter().map(|&vertex| model.thickness[vertex]);
+    let thickest = all.clone().fold(0.0, f64::max);
+    // Coarse fabrics on fine meshes get thinner, with a gap in proportion.
+    let scale = (LARGEST_REACH * shortest / ((1.0 + GAP) * thickest)).min(1.0);
+    let radii = all.map(|thickness| 0.5 * scale * thickness).collect();
+    let is_free = island.vertices().iter().map(|&vertex| !model.pinned[vertex]).collect();
+    let contact = BarrierContact::new(renumbered, x, is_free, radii, GAP * scale * thickest);
+    let contact = contact.map_err(|error| error.on_vertices(island.vertices()))?;
+    island.body_mut().system.set_contact(Box::new(contact));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::rc::Rc;
+
+    use energy_dsl::{Block, Vector3};
+    use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
+
+    use super::*;
+    use crate::collision::crossings;
+    use crate::scene::Scene;
+    use crate::{Island, Simulation};
+
+    /// Contact that judges every state and move by the exact test.
+    #[derive(Debug)]
+    struct Watched {
+        inner: Box<dyn ContactModel>,
+        mesh: CollisionMesh,
+        iterates: Rc<Cell<usize>>,
+    }
+
+    impl Watched {
+        fn check(&self, x: &[Vector3<f64>]) {
+            let found = crossings(&self.mesh, x);
+            assert!(found.is_empty(), "{found:?}");
+            self.iterates.set(self.iterates.get() + 1);
+        }
+    }
+
+    impl ContactModel for Watched {
+        fn begin_step(&mut self) {
+            self.inner.begin_step();
+        }
+
+        fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
+            let part = self.inner.certify(from, to);
+            for sample in 0..=4 {
+                let time = 0.25 * part * f64::from(sample);
+                let at = |(from, to): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
+                    std::array::from_fn(|axis| from[axis] + time * (to[axis] - from[axis]))
+                };
+                self.check(&from.iter().zip(to).map(at).collect::<Vec<_>>());
+            }
+            part
+        }
+
+        fn set_resistance(&mut self, dofs: &DofMap, diagonal: Vec<Block<f64>>, inertia: Vec<f64>) {
+            self.inner.set_resistance(dofs, diagonal, inertia);
+        }
+
+        fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
+            self.check(x);
+            self.inner.meet(x)
+        }
+
+        fn energy(&self, x: &[Vector3<f64>]) -> f64 {
+            self.check(x);
+            let energy = self.inner.energy(x);
+            assert!(energy.is_finite(), "evaluated at a certified state");
+            energy
+        }
+
+        fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
+            self.inner.add_force(x, force);
+        }
+
+        fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
+            self.inner.contacts(dofs, x)
+        }
+
+        fn counts(&self) -> ContactCounts {
+            self.inner.counts()
+        }
+    }
+
+    /// A creased sheet crumples between two pins that meet.
+    const CRUMPLED: &str = r#"
+        dt = 0.01
+        duration = 1.0
+        integrator = "newton"
+        contact = "on"
+        adaptive = true
+        tolerances.velocity = 1e-3
+        drag = 1.0
+        [mesh.sheet]
+        cells = [9, 7]
+        size = [0.3, 0.2]
+        plane = "vertical"
+        [fabric]
+        density = 0.2
+        thickness = 1e-3
+        material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3, bending.flat.stiffness = 1e-6 }
+        [[pins]]
+        nearest = [-0.15, 0.0, 0.1]
+        motion.keys = [{ time = 0.0 }, { time = 0.3, translate = [0.14, 0.01, 0.0] }]
+        [[pins]]
+        nearest = [0.15, 0.0, 0.1]
+        motion.keys = [{ time = 0.0 }, { time = 0.3, translate = [-0.14, -0.01, 0.0] }]
+        [[pins]]
+        nearest = [0.0, 0.0, -0.1]
+        motion.keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.02, 0.19] }]
+        "#;
+
+    #[test]
+    fn no_state_that_is_accepted_or_evaluated_has_a_crossing() {
+        let scene = Scene::parse(CRUMPLED, "crumpled.toml".as_ref()).unwrap();
+        let mut simulation = Simulation::new(&scene).unwrap();
+        let iterates = Rc::new(Cell::new(0));
+        let mesh = simulation.collision_mesh.clone();
+        let [island] = &mut simulation.islands[..] else { panic!("contact joins everything to one island") };
+        watch(island, mesh, &iterates);
+        for _ in 0..40 {
+            simulation.step().unwrap_or_else(|error| panic!("{error}"));
+        }
+        let work = simulation.summary().unwrap().totals.contact;
+        assert!(work.shortened > 0 && work.active > 100, "the sheet meets itself: {work}");
+        assert!(iterates.get() > 500, "{}", iterates.get());
+    }
+
+    fn watch(island: &mut Island, mesh: CollisionMesh, iterates: &Rc<Cell<usize>>) {
+        assert!(island.vertices().iter().enumerate().all(|(place, &vertex)| place == vertex));
+        let system = &mut island.body_mut().system;
+        let inner = system.take_contact().unwrap();
+        system.set_contact(Box::new(Watched { inner, mesh, iterates: Rc::clone(iterates) }));
+    }
+}
