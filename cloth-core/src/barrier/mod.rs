@@ -150,7 +150,7 @@ impl BarrierContact {
     /// Renews the candidates for a move.
     fn search(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) {
         let Slack { least, part, most } = self.slack;
-        let least = least * f64::from(1_u32 << self.searches.min(4));
+        let least = least * f64::from(1_u32 << self.searches.min(3));
         self.candidates.search(&self.mesh, from, to, Slack { least, part, most });
         self.searches += 1;
         self.counts.searches += 1;
@@ -188,11 +188,11 @@ impl ContactModel for BarrierContact {
         let mut part = 1.0;
         let mut tested = 0;
         for candidate in self.candidates.pairs() {
-            if step.stays_beyond(candidate, self.reach, &excursions) {
+            let clearance = Clearance { thickness: self.thickness(&candidate.pair), reach: self.reach };
+            if step.is_plainly_safe(candidate, clearance, &excursions) {
                 continue;
             }
             tested += 1;
-            let clearance = Clearance { thickness: self.thickness(&candidate.pair) };
             let own = step.safe_part(&candidate.pair, clearance, part);
             if own < 1.0 {
                 self.blocking.push(*candidate);

@@ -70,7 +70,7 @@ impl BarrierContact {
             radii,
             gap,
             reach,
-            slack: Slack { least: gap, part: 0.5, most: gap.max(0.4 * mesh.mean_edge(x)) },
+            slack: Slack { least: gap, part: 0.5, most: gap.max(0.15 * mesh.mean_edge(x)) },
             searches: 0,
             candidates,
             joined: Vec::new(),

@@ -152,12 +152,10 @@ impl Candidates {
         self.triangles.refit(&boxes);
         self.points.refit(&around);
         let mut near = Vec::new();
-        self.points.meeting(&self.triangles, |place, triangle| {
-            if around[place].overlaps(&boxes[triangle]) {
-                let (point, corners) = (mesh.points()[place], &mesh.triangles()[triangle]);
-                if !mesh.are_joined(&[point], corners) && self.may_respond(&[point], corners) {
-                    near.push((index(place), index(triangle)));
-                }
+        self.points.meeting(&self.triangles, [&around, &boxes], |place, triangle| {
+            let (point, corners) = (mesh.points()[place], &mesh.triangles()[triangle]);
+            if !mesh.are_joined(&[point], corners) && self.may_respond(&[point], corners) {
+                near.push((index(place), index(triangle)));
             }
         });
         found.extend(near.into_iter().map(|(place, triangle)| {
@@ -170,12 +168,10 @@ impl Candidates {
         let boxes: Vec<_> = mesh.edges().iter().map(|ends| self.swept(ends)).collect();
         self.edges.refit(&boxes);
         let mut near = Vec::new();
-        self.edges.meeting_itself(|one, other| {
-            if boxes[one].overlaps(&boxes[other]) {
-                let (ends, others) = (&mesh.edges()[one], &mesh.edges()[other]);
-                if !mesh.are_joined(ends, others) && self.may_respond(ends, others) {
-                    near.push((index(one.min(other)), index(one.max(other))));
-                }
+        self.edges.meeting_itself(&boxes, |one, other| {
+            let (ends, others) = (&mesh.edges()[one], &mesh.edges()[other]);
+            if !mesh.are_joined(ends, others) && self.may_respond(ends, others) {
+                near.push((index(one.min(other)), index(one.max(other))));
             }
         });
         found.extend(near.into_iter().map(|(one, other)| {

@@ -33,6 +33,8 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 pub(crate) struct Clearance {
     /// The thickness ξ, in m.
     pub thickness: f64,
+    /// Distance beyond which nothing needs to be kept, in m; infinite if a part of every gap is kept.
+    pub reach: f64,
 }
 
 /// A straight move of all vertices.
@@ -50,18 +52,21 @@ impl<'a> Move<'a> {
         Self { from, to, rounding: ROUNDING * largest(from).max(largest(to)) }
     }
 
-    /// Whether a pair certainly stays farther apart than `reach` during the move. `excursions` are those of the
-    /// vertices at both ends of the move: the distance from the place of the last search is largest at an end of a
-    /// straight move, and the separation along a fixed direction is smallest there.
+    /// Whether a comparison of distances, or the normal of the last search, shows that the whole move is safe: the pair
+    /// stays out of reach, or keeps its clearance. `excursions` are those of the vertices at both ends of the move. The
+    /// distance from the place of the last search is largest at an end of a straight move.
     #[inline]
-    pub fn stays_beyond(&self, candidate: &Candidate, reach: f64, excursions: &[Vec<f64>; 2]) -> bool {
-        let reach = reach + self.rounding;
-        let [before, after] = excursions;
-        let approach = candidate.approach(before).max(candidate.approach(after));
-        let separates = |x: &[Vector3<f64>]| {
-            separation(candidate.normal, &candidate.pair.corners(x), candidate.pair.first()) > reach
-        };
-        candidate.distance - approach > reach || separates(self.from) && separates(self.to)
+    pub fn is_plainly_safe(&self, candidate: &Candidate, clearance: Clearance, excursions: &[Vec<f64>; 2]) -> bool {
+        let Clearance { thickness, reach } = clearance;
+        let [before, after] = excursions.each_ref().map(|excursions| candidate.approach(excursions));
+        if candidate.distance - before.max(after) > reach + self.rounding {
+            return true;
+        }
+        // At least the distance at the start of the move, so the level is at least that of the pair.
+        let distance = candidate.distance + before;
+        let level = self.level(distance.max(thickness), clearance).min(reach + self.rounding);
+        let first = candidate.pair.first();
+        [self.from, self.to].iter().all(|x| separation(candidate.normal, &candidate.pair.corners(x), first) >= level)
     }
 
     /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. The
@@ -81,7 +86,7 @@ impl<'a> Move<'a> {
 
     /// The level ℓ of a pair at a distance, including rounding errors. Pairs within their thickness must not come
     /// closer by more than a tenth.
-    fn level(&self, distance: f64, Clearance { thickness }: Clearance) -> f64 {
+    fn level(&self, distance: f64, Clearance { thickness, .. }: Clearance) -> f64 {
         let kept =
             if distance > thickness { thickness + KEPT * (distance - thickness) } else { (1.0 - KEPT) * distance };
         kept + self.rounding

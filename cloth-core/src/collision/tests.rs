@@ -31,7 +31,9 @@ fn at(from: &[Vector3<f64>], to: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>
 /// The part of a move that is safe for all pairs.
 fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 {
     let step = Move::new(from, to);
-    pairs().iter().fold(1.0, |part, pair| step.safe_part(pair, Clearance { thickness }, part).min(part))
+    pairs()
+        .iter()
+        .fold(1.0, |part, pair| step.safe_part(pair, Clearance { thickness, reach: f64::INFINITY }, part).min(part))
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -71,6 +73,30 @@ fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, max_global_rejects: 100_000, ..ProptestConfig::default() })]
 
+    /// Moves that the normal of an earlier search certifies are safe.
+    #[test]
+    fn plainly_safe_moves_keep_their_distance([from, to] in impact(), earlier in prop::collection::vec(vector(2e-3), 6)) {
+        const CLEARANCE: Clearance = Clearance { thickness: 1e-3, reach: 4e-3 };
+        let search: Vec<_> = from.iter().zip(&earlier).map(|(x, offset)| add_scaled(*x, 1.0, *offset)).collect();
+        // A short move, so that normals stay useful.
+        let to = at(&from, &to, 0.01);
+        let excursions = [&from, &to].map(|x| {
+            let excursion = |(x, origin): (&Vector3<f64>, &Vector3<f64>)| crate::geometry::norm(subtract(*x, *origin));
+            x.iter().zip(&search).map(excursion).collect::<Vec<f64>>()
+        });
+        let step = Move::new(&from, &to);
+        for pair in pairs() {
+            let distance = |time: f64| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance;
+            let start = distance(0.0);
+            if start > 1e-3 && step.is_plainly_safe(&Candidate::new(pair, &search), CLEARANCE, &excursions) {
+                let kept = (1e-3 + 0.1 * (start - 1e-3)).min(4e-3);
+                for sample in 0..=10 {
+                    prop_assert!(distance(0.1 * f64::from(sample)) >= kept, "{:?} {}", pair, sample);
+                }
+            }
+        }
+    }
+
     /// No impact passes, judged by the exact test along the accepted move.
     #[test]
     fn no_impact_passes([from, to] in impact()) {
@@ -99,7 +125,7 @@ fn moves_are_cut_only_near_a_contact() {
         let [from, to] = impact().new_tree(&mut runner).unwrap().current();
         let step = Move::new(&from, &to);
         for pair in pairs() {
-            let part = step.safe_part(&pair, Clearance { thickness: THICKNESS }, 1.0);
+            let part = step.safe_part(&pair, Clearance { thickness: THICKNESS, reach: f64::INFINITY }, 1.0);
             let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
             if part < 1.0 && gap(0.0) > 0.0 {
                 cut += 1;

@@ -98,8 +98,9 @@ impl Hierarchy {
         }
     }
 
-    /// Calls `found` with each pair of items of two trees whose leaves overlap, in an order that depends on both trees.
-    pub fn meeting(&self, other: &Self, mut found: impl FnMut(usize, usize)) {
+    /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order. `boxes` are those of the
+    /// items of both trees, as of the last refit.
+    pub fn meeting(&self, other: &Self, boxes: [&[Bounds]; 2], mut found: impl FnMut(usize, usize)) {
         let mut waiting = vec![(0, 0)];
         while let Some((a, b)) = waiting.pop() {
             let (first, second) = (&self.nodes[a], &other.nodes[b]);
@@ -108,9 +109,8 @@ impl Hierarchy {
             }
             match (&first.kind, &second.kind) {
                 (&Kind::Leaf(from, to), &Kind::Leaf(other_from, other_to)) => {
-                    for &item in &self.items[from..to] {
-                        other.items[other_from..other_to].iter().for_each(|&with| found(item, with));
-                    }
+                    let leaves = [&self.items[from..to], &other.items[other_from..other_to]];
+                    between_leaves(leaves, boxes, &second.bounds, &mut found);
                 }
                 (&Kind::Inner(right), _) if second.is_leaf() || first.bounds.is_longer_than(&second.bounds) => {
                     waiting.extend([(a + 1, b), (right, b)]);
@@ -121,8 +121,9 @@ impl Hierarchy {
         }
     }
 
-    /// Calls `found` with each pair of different items whose leaves overlap, once and in any order.
-    pub fn meeting_itself(&self, mut found: impl FnMut(usize, usize)) {
+    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order. `boxes` are those of
+    /// the last refit.
+    pub fn meeting_itself(&self, boxes: &[Bounds], mut found: impl FnMut(usize, usize)) {
         let mut waiting = vec![(0, 0)];
         while let Some((a, b)) = waiting.pop() {
             let (first, second) = (&self.nodes[a], &self.nodes[b]);
@@ -133,14 +134,14 @@ impl Hierarchy {
                 (&Kind::Leaf(from, to), _) if a == b => {
                     let items = &self.items[from..to];
                     for (place, &item) in items.iter().enumerate() {
-                        items[place + 1..].iter().for_each(|&with| found(item, with));
+                        let others = items[place + 1..].iter().filter(|&&with| boxes[item].overlaps(&boxes[with]));
+                        others.for_each(|&with| found(item, with));
                     }
                 }
                 (&Kind::Inner(right), _) if a == b => waiting.extend([(a + 1, a + 1), (a + 1, right), (right, right)]),
                 (&Kind::Leaf(from, to), &Kind::Leaf(other_from, other_to)) => {
-                    for &item in &self.items[from..to] {
-                        self.items[other_from..other_to].iter().for_each(|&with| found(item, with));
-                    }
+                    let leaves = [&self.items[from..to], &self.items[other_from..other_to]];
+                    between_leaves(leaves, [boxes; 2], &second.bounds, &mut found);
                 }
                 (&Kind::Inner(right), _) if second.is_leaf() || first.bounds.is_longer_than(&second.bounds) => {
                     waiting.extend([(a + 1, b), (right, b)]);
@@ -184,5 +185,20 @@ impl Hierarchy {
             }
         }
         best
+    }
+}
+
+/// Calls `found` with each pair of items of two leaves whose boxes overlap; `bounds` are those of the second leaf.
+#[inline]
+fn between_leaves(
+    [items, others]: [&[usize]; 2],
+    boxes: [&[Bounds]; 2],
+    bounds: &Bounds,
+    found: &mut impl FnMut(usize, usize),
+) {
+    // Leaves overlap little: most items of the first miss all of the second.
+    for &item in items.iter().filter(|&&item| boxes[0][item].overlaps(bounds)) {
+        let meeting = others.iter().filter(|&&other| boxes[0][item].overlaps(&boxes[1][other]));
+        meeting.for_each(|&other| found(item, other));
     }
 }
