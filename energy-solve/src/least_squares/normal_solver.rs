@@ -93,18 +93,12 @@ struct Factor(SparseFactor);
 impl Factor {
     fn new<const D: usize>(pattern: &NormalPattern) -> Result<Self, SolverError> {
         let unknowns = pattern.blocks() * D;
-        let (mut columns, mut rows) = (vec![0], Vec::new());
+        let (mut rows, mut columns) = (vec![0], Vec::new());
         for row in 0..pattern.blocks() {
-            for i in 0..D {
-                for &column in pattern.row(row) {
-                    let first = if column as usize == row { i } else { 0 };
-                    rows.extend((first..D).map(|j| column as usize * D + j));
-                }
-                columns.push(rows.len());
-            }
+            columns.extend(pattern.row(row).iter().map(|&column| column as usize));
+            rows.push(columns.len());
         }
-        // The upper triangle by rows is the lower triangle by columns.
-        SparseFactor::new(columns, rows, None).map(Self).map_err(|_| SolverError::OutOfMemory { unknowns })
+        SparseFactor::new(D, &rows, &columns).map(Self).map_err(|_| SolverError::OutOfMemory { unknowns })
     }
 
     fn solve<const D: usize>(
@@ -113,29 +107,10 @@ impl Factor {
         damping: f64,
         x: &mut [[f64; D]],
     ) -> Result<(), SolverError> {
-        self.fill(matrix, damping);
-        self.0.factor().map_err(|_| SolverError::NotPositiveDefinite)?;
+        let entry = |block: usize, i: usize, j: usize| matrix.values[block][i][j];
+        self.0.factor(damping, entry).map_err(|_| SolverError::NotPositiveDefinite)?;
         self.0.solve(x.as_flattened_mut());
         Ok(())
-    }
-
-    /// Copies the values to the factor's structure and adds the damping.
-    fn fill<const D: usize>(&mut self, matrix: &NormalMatrix<D>, damping: f64) {
-        let pattern = matrix.pattern();
-        let mut rest = self.0.values_mut();
-        for row in 0..pattern.blocks() {
-            let blocks = &matrix.values[pattern.row_start(row)..][..pattern.row(row).len()];
-            for i in 0..D {
-                let (diagonal, others) = rest.split_at_mut(D - i);
-                diagonal.copy_from_slice(&blocks[0][i][i..D]);
-                diagonal[0] += damping;
-                let (others, left) = others.split_at_mut(D * (blocks.len() - 1));
-                for (place, block) in others.chunks_exact_mut(D).zip(&blocks[1..]) {
-                    place.copy_from_slice(&block[i][..D]);
-                }
-                rest = left;
-            }
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 
 use crate::linear::preconditioner::Preconditioner;
 use crate::linear::solve::{SolveReport, StopReason};
-use crate::linear::sparse_factor::{Order, SparseFactor};
+use crate::linear::sparse_factor::SparseFactor;
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::matrix::precision::Precision;
@@ -65,23 +65,13 @@ impl BlockCholesky {
     /// If the pattern does not store an upper triangle.
     pub fn new(pattern: &Arc<Pattern>) -> Result<Self, CholeskyError> {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices have Cholesky factors");
-        let failed = |_| CholeskyError::OutOfMemory { rows: pattern.rows() };
-        // The upper triangle by rows is the lower triangle by columns.
-        let (mut groups, mut columns) = (vec![0], vec![0]);
-        let (mut others, mut rows) = (Vec::new(), Vec::new());
+        let (mut rows, mut columns) = (vec![0], Vec::new());
         for row in 0..pattern.rows() {
-            others.extend(pattern.row(row).map(|(_, column)| column));
-            groups.push(others.len());
-            for i in 0..3 {
-                for (_, column) in pattern.row(row) {
-                    let first = if column == row { i } else { 0 };
-                    rows.extend((first..3).map(|j| 3 * column + j));
-                }
-                columns.push(rows.len());
-            }
+            columns.extend(pattern.row(row).map(|(_, column)| column));
+            rows.push(columns.len());
         }
-        let order = Order::by_minimum_degree(3, &groups, &others).map_err(failed)?;
-        let factor = SparseFactor::new(columns, rows, Some(&order)).map_err(failed)?;
+        let factor = SparseFactor::new(3, &rows, &columns);
+        let factor = factor.map_err(|_| CholeskyError::OutOfMemory { rows: pattern.rows() })?;
         Ok(Self { pattern: Arc::clone(pattern), factor })
     }
 
@@ -100,18 +90,8 @@ impl BlockCholesky {
     /// If the matrix has another pattern.
     pub fn factor(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), CholeskyError> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
-        let mut rest = self.factor.values_mut();
-        for row in 0..self.pattern.rows() {
-            for i in 0..3 {
-                for (place, column) in self.pattern.row(row) {
-                    let entries = &matrix.values()[place][i][if column == row { i } else { 0 }..];
-                    let (here, left) = rest.split_at_mut(entries.len());
-                    here.iter_mut().zip(entries).for_each(|(here, &entry)| *here = entry.into());
-                    rest = left;
-                }
-            }
-        }
-        self.factor.factor().map_err(|_| CholeskyError::NotPositiveDefinite)
+        let entry = |block: usize, i: usize, j: usize| matrix.values()[block][i][j].into();
+        self.factor.factor(0.0, entry).map_err(|_| CholeskyError::NotPositiveDefinite)
     }
 
     /// Computes x ← A⁻¹ b for the last factored matrix A. The report tells if the solution is not finite.
@@ -131,6 +111,6 @@ impl Preconditioner for BlockCholesky {
 
     fn apply(&self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
         z.copy_from_slice(r);
-        self.factor.solve_with_new_scratch(z.as_flattened_mut());
+        self.factor.solve(z.as_flattened_mut());
     }
 }

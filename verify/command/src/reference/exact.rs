@@ -1,6 +1,5 @@
-use num_bigint::BigInt;
-use num_rational::BigRational;
-use num_traits::{One, ToPrimitive, Zero};
+use dashu_int::{IBig, UBig};
+use dashu_ratio::RBig;
 
 /// A decimal number in twice the precision of a double: `high` is the nearest double, `low` the remainder.
 ///
@@ -38,23 +37,22 @@ impl std::str::FromStr for Truth {
             return Ok(Self { high, low: 0.0 });
         }
         let exact = decimal(text.trim()).ok_or_else(|| format!("`{text}` is not a decimal number"))?;
-        let rounded =
-            BigRational::from_float(high).ok_or_else(|| format!("`{text}` is out of the range of doubles"))?;
-        Ok(Self { high, low: (exact - rounded).to_f64().unwrap_or(0.0) })
+        let rounded = RBig::try_from(high).map_err(|_| format!("`{text}` is out of the range of doubles"))?;
+        Ok(Self { high, low: (exact - rounded).to_f64().value() })
     }
 }
 
 /// Parses `-1.25e-3` as a fraction.
-fn decimal(text: &str) -> Option<BigRational> {
+fn decimal(text: &str) -> Option<RBig> {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-    let digits: BigInt = format!("{whole}{fraction}").parse().ok()?;
+    let digits: IBig = format!("{whole}{fraction}").parse().ok()?;
     let exponent = exponent.parse::<i32>().ok()? - i32::try_from(fraction.len()).ok()?;
     if digits.is_zero() {
-        return Some(BigRational::zero());
+        return Some(RBig::ZERO);
     }
-    let power = BigInt::from(10).pow(exponent.unsigned_abs());
-    Some(if exponent < 0 { BigRational::new(digits, power) } else { BigRational::new(digits * power, BigInt::one()) })
+    let power = UBig::from(10_u8).pow(exponent.unsigned_abs() as usize);
+    Some(if exponent < 0 { RBig::from_parts(digits, power) } else { (digits * power).into() })
 }
 
 #[cfg(test)]

@@ -1,0 +1,260 @@
+//! Dense panels: the columns of a supernode, column by column.
+
+use std::ops::Range;
+
+use energy_dsl::{Kernel, Level, dispatch};
+use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
+
+use super::supernodes::Supernode;
+
+/// Columns that are factored one by one; wider panels are divided.
+const NARROW: usize = 16;
+
+/// Columns of a product that are computed at a time: only their first square has entries above the diagonal.
+const STRIP: usize = 64;
+
+/// The panel of a factored supernode.
+pub(super) struct Panel<'a> {
+    entries: &'a [f64],
+    size: usize,
+    supernode: &'a Supernode,
+}
+
+/// The panel of a supernode that is being factored.
+pub(super) struct PanelMut<'a> {
+    entries: &'a mut [f64],
+    size: usize,
+    /// Scalar rows and columns.
+    rows: usize,
+    columns: usize,
+}
+
+/// Memory for the product of two parts of a panel.
+#[derive(Default)]
+pub(super) struct Product(Vec<f64>);
+
+impl<'a> Panel<'a> {
+    /// `entries` start with the panel of the supernode, whose groups have `size` unknowns.
+    pub fn new(entries: &'a [f64], size: usize, supernode: &'a Supernode) -> Self {
+        Self { entries: &entries[..size * size * supernode.rows.len() * supernode.columns.len()], size, supernode }
+    }
+
+    /// Returns the scalar rows of the panel.
+    fn rows(&self) -> usize {
+        self.size * self.supernode.rows.len()
+    }
+
+    /// Returns the scalar columns of the panel.
+    fn columns(&self) -> usize {
+        self.size * self.supernode.columns.len()
+    }
+
+    /// x ← L⁻¹ x for the columns of this supernode. `below` is memory for the rows below them.
+    #[inline(always)]
+    pub fn solve_forwards(&self, x: &mut [f64], below: &mut Vec<f64>) {
+        let (rows, columns) = (self.rows(), self.columns());
+        let (own, later) = x[self.size * self.supernode.columns.start..].split_at_mut(columns);
+        below.clear();
+        below.resize(rows - columns, 0.0);
+        for (i, column) in self.entries.chunks_exact(rows).enumerate() {
+            let solved = own[i] / column[i];
+            own[i] = solved;
+            add_multiple(&mut own[i + 1..], -solved, &column[i + 1..columns]);
+            add_multiple(below, -solved, &column[columns..]);
+        }
+        for (group, part) in self.rows_below().zip(below.chunks_exact(self.size)) {
+            add_multiple(&mut later[group], 1.0, part);
+        }
+    }
+
+    /// x ← L⁻ᵀ x for the columns of this supernode. `below` is memory for the rows below them.
+    #[inline(always)]
+    pub fn solve_backwards(&self, x: &mut [f64], below: &mut Vec<f64>) {
+        let (rows, columns) = (self.rows(), self.columns());
+        let (own, later) = x[self.size * self.supernode.columns.start..].split_at_mut(columns);
+        below.clear();
+        self.rows_below().for_each(|group| below.extend_from_slice(&later[group]));
+        for (i, column) in self.entries.chunks_exact(rows).enumerate().rev() {
+            let known = dot(&column[i + 1..columns], &own[i + 1..]) + dot(&column[columns..], below);
+            own[i] = (own[i] - known) / column[i];
+        }
+    }
+
+    /// Returns the unknowns of each row below, counted from the end of the supernode's columns.
+    fn rows_below(&self) -> impl Iterator<Item = Range<usize>> {
+        let Supernode { columns, rows } = self.supernode;
+        let size = self.size;
+        rows[columns.len()..].iter().map(move |row| size * (row - columns.end)..size * (row - columns.end + 1))
+    }
+}
+
+impl<'a> PanelMut<'a> {
+    /// `entries` are the panel of the supernode, whose groups have `size` unknowns.
+    pub fn new(entries: &'a mut [f64], size: usize, supernode: &Supernode) -> Self {
+        Self { entries, size, rows: size * supernode.rows.len(), columns: size * supernode.columns.len() }
+    }
+
+    /// Subtracts the contribution of an earlier panel S: its rows `columns` are columns of this panel, and S_r S_cᵀ is
+    /// subtracted for its rows r from `columns.start` on. `rows` has the positions of these rows, and `row_places` the
+    /// place of each position in this panel.
+    pub fn subtract_product(
+        &mut self,
+        source: &Panel<'_>,
+        columns: Range<usize>,
+        rows: &[usize],
+        row_places: &[usize],
+        product: &mut Product,
+    ) {
+        let size = self.size;
+        let (height, width, depth) = (size * rows.len(), size * columns.len(), source.columns());
+        let (left, stride) = (&source.entries[size * columns.start..], source.rows());
+        let first = row_places[rows[0]];
+        let last = row_places[rows[rows.len() - 1]];
+        if last - first + 1 == rows.len() {
+            let target = &mut self.entries[size * (first + first * self.rows)..];
+            subtract_outer(target, self.rows, left, stride, [height, width, depth]);
+            return;
+        }
+        product.0.clear();
+        product.0.resize(height * width, 0.0);
+        subtract_outer(&mut product.0, height, left, stride, [height, width, depth]);
+        for (at, column) in product.0.chunks_exact(height).enumerate() {
+            let place = size * row_places[rows[at / size]] + at % size;
+            let target = &mut self.entries[place * self.rows..][..self.rows];
+            for (part, row) in column.chunks_exact(size).zip(rows) {
+                add_multiple(&mut target[size * row_places[*row]..], 1.0, part);
+            }
+        }
+    }
+
+    /// Factors the panel in place: its upper square A into L Lᵀ, and the rows B below into B L⁻ᵀ. Returns `None` if a
+    /// pivot is not positive.
+    pub fn factor(&mut self) -> Option<()> {
+        factor(self.entries, self.rows, 0, self.columns)
+    }
+}
+
+/// Factors columns of length `stride`. The diagonal entry of the first one is in row `from`.
+fn factor(entries: &mut [f64], stride: usize, from: usize, columns: usize) -> Option<()> {
+    if columns <= NARROW {
+        return dispatch(NarrowFactor { entries, stride, from, columns });
+    }
+    let half = (columns / 2).next_multiple_of(NARROW);
+    let (left, right) = entries.split_at_mut(half * stride);
+    factor(left, stride, from, half)?;
+    let middle = from + half;
+    subtract_outer(&mut right[middle..], stride, &left[middle..], stride, [stride - middle, columns - half, half]);
+    factor(right, stride, middle, columns - half)
+}
+
+/// Factors few columns, one after the other.
+struct NarrowFactor<'a> {
+    entries: &'a mut [f64],
+    stride: usize,
+    from: usize,
+    columns: usize,
+}
+
+impl Kernel for NarrowFactor<'_> {
+    type Output = Option<()>;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Option<()> {
+        let Self { entries, stride, from, columns } = self;
+        for index in 0..columns {
+            let diagonal = from + index;
+            let (done, column) = entries.split_at_mut(index * stride);
+            let column = &mut column[diagonal..stride];
+            for done in done.chunks_exact(stride) {
+                let multiple = done[diagonal];
+                column.iter_mut().zip(&done[diagonal..]).for_each(|(entry, done)| *entry -= multiple * done);
+            }
+            let pivot = column[0];
+            if pivot.is_nan() || pivot <= 0.0 {
+                return None;
+            }
+            let inverse = 1.0 / pivot.sqrt();
+            column.iter_mut().for_each(|entry| *entry *= inverse);
+        }
+        Some(())
+    }
+}
+
+/// C ← C − A Bᵀ below the diagonal, where A has the given height and depth, and B is the first `width` rows of A.
+fn subtract_outer(
+    target: &mut [f64],
+    target_stride: usize,
+    left: &[f64],
+    stride: usize,
+    [height, width, depth]: [usize; 3],
+) {
+    for first in (0..width).step_by(STRIP) {
+        let left = &left[first..];
+        let (height, width) = (height - first, STRIP.min(width - first));
+        let a = DMatrixView::<f64, Dyn, Dyn>::from_slice_with_strides(left, height, depth, 1, stride);
+        let b = DMatrixView::<f64, Dyn, Dyn>::from_slice_with_strides(left, depth, width, stride, 1);
+        let c = &mut target[first + first * target_stride..];
+        DMatrixViewMut::<f64, Dyn, Dyn>::from_slice_with_strides_mut(c, height, width, 1, target_stride)
+            .gemm(-1.0, &a, &b, 1.0);
+    }
+}
+
+/// y ← y + multiple · x
+#[inline(always)]
+fn add_multiple(y: &mut [f64], multiple: f64, x: &[f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += multiple * x);
+}
+
+/// Returns the dot product, in 16 sums.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a, a_left) = a.as_chunks::<16>();
+    let (b, b_left) = b.as_chunks::<16>();
+    let mut sums = [0.0; 16];
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..16 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    let left: f64 = a_left.iter().zip(b_left).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A panel of `rows` rows whose upper square is positive definite.
+    fn panel(rows: usize, columns: usize) -> Vec<f64> {
+        let entry = |row: usize, column: usize| {
+            if row == column { 50.0 + row as f64 } else { ((7 * row + 3 * column) % 11) as f64 / 11.0 }
+        };
+        (0..columns).flat_map(|column| (0..rows).map(move |row| entry(row.max(column), row.min(column)))).collect()
+    }
+
+    #[test]
+    fn narrow_and_wide_panels_are_products_of_their_factors() {
+        for (rows, columns) in [(1, 1), (5, 3), (40, 16), (41, 17), (130, 75)] {
+            let original = panel(rows, columns);
+            let mut factored = original.clone();
+            factor(&mut factored, rows, 0, columns).unwrap();
+            for column in 0..columns {
+                for row in column..rows {
+                    let product: f64 =
+                        (0..=column).map(|k| factored[k * rows + row] * factored[k * rows + column]).sum();
+                    let error = (product - original[column * rows + row]).abs();
+                    assert!(error < 1e-12, "{rows} × {columns}: entry ({row}, {column}) is off by {error:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_pivot_that_is_not_positive_is_refused() {
+        for bad in [0.0, -1.0, f64::NAN] {
+            let mut entries = panel(40, 20);
+            entries[18 * 40 + 18] = bad;
+            assert_eq!(factor(&mut entries, 40, 0, 20), None, "{bad}");
+        }
+    }
+}
