@@ -44,9 +44,9 @@ fn contacts(rows: u32, count: u32) -> Vec<Contact> {
         let angle = f64::from(number);
         let n = [angle.cos(), angle.sin() * 0.6, angle.sin() * 0.8];
         let t = [-angle.sin(), angle.cos() * 0.6, angle.cos() * 0.8];
-        let tangential = if number % 3 == 0 { 4.0 } else { 0.0 };
+        let tangential = if number.is_multiple_of(3) { 4.0 } else { 0.0 };
         let block = std::array::from_fn(|i| std::array::from_fn(|j| 20.0 * n[i] * n[j] + tangential * t[i] * t[j]));
-        let third = if number % 5 == 0 { Contact::FIXED } else { second + 2 };
+        let third = if number.is_multiple_of(5) { Contact::FIXED } else { second + 2 };
         Contact { rows: [first, second, second + 1, third], weights: [1.0, -0.5, -0.2, -0.3], block }
     };
     (0..count).map(contact).collect()

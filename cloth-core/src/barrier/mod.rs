@@ -236,7 +236,7 @@ impl ContactModel for BarrierContact {
         for candidate in std::mem::take(&mut self.blocking) {
             // A search since then has forgotten the place that its distance refers to.
             let found = self.candidates.find(&candidate.pair);
-            let candidate = found.unwrap_or_else(|| Candidate { distance: 0.0, normal: [0.0; 3], ..candidate });
+            let candidate = found.unwrap_or(Candidate { distance: 0.0, normal: [0.0; 3], ..candidate });
             added.push((candidate, Closest::of(&candidate.pair, &candidate.pair.corners(x))));
         }
         added.iter().map(|(candidate, closest)| self.join(*candidate, closest)).sum()

@@ -155,7 +155,7 @@ fn moves_are_certified_and_pairs_that_block_join() {
     let mut away = x.clone();
     away[3..].iter_mut().for_each(|corner| corner[2] += 0.2);
     assert_eq!(contact.certify(&x, &away), 1.0);
-    assert_eq!(contact.certify(&x, &vec![[f64::NAN; 3]; 6]), 0.0);
+    assert_eq!(contact.certify(&x, &[[f64::NAN; 3]; 6]), 0.0);
     contact.meet(&x);
     assert!(contact.known.contains(&Pair { kind: PairKind::PointTriangle, vertices: [3, 0, 1, 2] }));
     let counts = contact.counts();

@@ -142,7 +142,9 @@ fn safe_time(
         for b in first..4 {
             let beyond = dot(n, subtract(corners[a], corners[b])) - level;
             let rate = dot(n, subtract(velocities[a], velocities[b]));
-            if !(beyond > 0.0) {
+            // False for NaN.
+            let separates = beyond > 0.0;
+            if !separates {
                 return 0.0;
             }
             if rate < 0.0 {

@@ -109,7 +109,9 @@ fn on_segments([a, b, c, d]: [Vector3<f64>; 4]) -> [f64; 2] {
     let area = uu * vv - uv * uv;
     let mut s = if area > 1e-14 * uu * vv { fraction(uv * vr - ur * vv, area) } else { 0.0 };
     let mut t = (uv * s + vr) / vv;
-    if !(t > 0.0) {
+    // NaN if the second edge has no length.
+    let is_after_start = t > 0.0;
+    if !is_after_start {
         (t, s) = (0.0, fraction(-ur, uu));
     } else if t >= 1.0 {
         (t, s) = (1.0, fraction(uv - ur, uu));

@@ -117,7 +117,7 @@ fn enters(v: Vector3<f64>, far: Vector3<f64>, [p, q]: [Vector3<f64>; 2]) -> bool
     let Some((flat, turn)) = projection([v, p, q]) else {
         return projection([v, far, p]).is_none() && projection([v, far, q]).is_none();
     };
-    let turn_of = |b: Vector3<f64>, c: Vector3<f64>| flat(v, b, c);
+    let turn_of = |b: Vector3<f64>, c: Vector3<f64>| flat.turn(v, b, c);
     let within = |sign: Sign| sign == Sign::Zero || sign == turn;
     // The segment is at least as long as a point, so it shares more than v if it starts into the angle at v.
     within(turn_of(p, far)) && within(turn_of(far, q)) && far != v
@@ -132,7 +132,7 @@ fn coplanar_segment_meets_triangle([a, b]: [Vector3<f64>; 2], corners: [Vector3<
     let Some((flat, turn)) = projection(corners) else { return false };
     let is_inside = |x: Vector3<f64>| {
         sides.iter().all(|&[p, q]| {
-            let sign = flat(p, q, x);
+            let sign = flat.turn(p, q, x);
             sign == Sign::Zero || sign == turn
         })
     };
@@ -146,7 +146,7 @@ fn segments_meet([a, b]: [Vector3<f64>; 2], [p, q]: [Vector3<f64>; 2]) -> bool {
     }
     let planes = [[a, b, p], [a, b, q], [p, q, a], [p, q, b]];
     let Some((flat, _)) = planes.into_iter().find_map(projection) else { return overlap([a, b], [p, q]) };
-    opposite(flat(a, b, p), flat(a, b, q)) && opposite(flat(p, q, a), flat(p, q, b))
+    opposite(flat.turn(a, b, p), flat.turn(a, b, q)) && opposite(flat.turn(p, q, a), flat.turn(p, q, b))
 }
 
 /// Whether two points do not lie strictly on the same side.
@@ -162,17 +162,23 @@ fn overlap([a, b]: [Vector3<f64>; 2], [p, q]: [Vector3<f64>; 2]) -> bool {
     })
 }
 
-/// Returns the sign of the turn a → b → c after a projection that keeps the triangle's area, and the turn of the
-/// triangle itself; `None` if the triangle has no area. Dropping a coordinate is exact.
-fn projection(
-    [p, q, r]: [Vector3<f64>; 3],
-) -> Option<(impl Fn(Vector3<f64>, Vector3<f64>, Vector3<f64>) -> Sign, Sign)> {
-    let flat = |dropped: usize| {
-        move |a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>| {
-            let [a, b, c] = [a, b, c].map(|point| Coord { x: point[(dropped + 1) % 3], y: point[(dropped + 2) % 3] });
-            sign(orient2d(a, b, c))
-        }
-    };
-    let turns = (0..3).map(|dropped| (flat(dropped), flat(dropped)(p, q, r)));
-    turns.into_iter().find(|(_, turn)| *turn != Sign::Zero)
+/// A projection onto a plane of two axes. Dropping a coordinate is exact.
+#[derive(Clone, Copy)]
+struct Projection {
+    dropped: usize,
+}
+
+impl Projection {
+    /// The sign of the turn a → b → c.
+    fn turn(self, a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Sign {
+        let axes = [(self.dropped + 1) % 3, (self.dropped + 2) % 3];
+        let [a, b, c] = [a, b, c].map(|point| Coord { x: point[axes[0]], y: point[axes[1]] });
+        sign(orient2d(a, b, c))
+    }
+}
+
+/// Returns a projection that keeps the triangle's area, and the turn of the triangle; `None` if it has no area.
+fn projection([p, q, r]: [Vector3<f64>; 3]) -> Option<(Projection, Sign)> {
+    let turned = |dropped: usize| (Projection { dropped }, Projection { dropped }.turn(p, q, r));
+    (0..3).map(turned).find(|(_, turn)| *turn != Sign::Zero)
 }

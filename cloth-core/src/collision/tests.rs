@@ -45,6 +45,9 @@ fn on_grid() -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3((-4_i32..=4).prop_map(|number| 0.01 * f64::from(number)))
 }
 
+/// The place of a corner, and its displacement relative to the triangle.
+type Corner = (Vector3<f64>, Vector3<f64>);
+
 /// Positions of the six corners before and after an impact. The triangles fly at each other with up to 100 m/s during
 /// 10 ms, and their corners spread with up to 10 m/s.
 fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
@@ -57,11 +60,11 @@ fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
             let length = subtract(velocity, [0.0; 3]).iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-3);
             let direction = velocity.map(|component| component / length);
             let velocity = direction.map(|component| -speed * component);
-            let placed = |(number, &(corner, _)): (usize, &(Vector3<f64>, Vector3<f64>))| {
+            let placed = |(number, &(corner, _)): (usize, &Corner)| {
                 if number < 3 { corner } else { add_scaled(corner, gap, direction) }
             };
             let from: Vec<_> = corners.iter().enumerate().map(placed).collect();
-            let moved = |(number, (from, (_, spread))): (usize, (&Vector3<f64>, &(Vector3<f64>, Vector3<f64>)))| {
+            let moved = |(number, (from, (_, spread))): (usize, (&Vector3<f64>, &Corner))| {
                 add_scaled(add_scaled(*from, 1.0, *spread), if number < 3 { 0.0 } else { 1.0 }, velocity)
             };
             let to = from.iter().zip(&corners).enumerate().map(moved).collect();

@@ -33,8 +33,9 @@ pub(crate) fn factors(contact: &Contact) -> impl Iterator<Item = Vector3<f64>> {
     let largest = (0..3).map(|axis| rest[axis][axis]).fold(0.0, f64::max);
     (0..3).map_while(move |_| {
         let pivot = (0..3).max_by(|&i, &j| rest[i][i].total_cmp(&rest[j][j])).unwrap_or(0);
-        // Not `<=`: no root of NaN.
-        if !(rest[pivot][pivot] > 1e-14 * largest) {
+        // False for NaN, which has no root.
+        let is_positive = rest[pivot][pivot] > 1e-14 * largest;
+        if !is_positive {
             return None;
         }
         let scale = 1.0 / rest[pivot][pivot].sqrt();
