@@ -45,8 +45,8 @@ const FUNCTIONS: &[(&str, &str)] = &[
 
 /// Functions of mathematics whose names must not be taken for misspellings of others.
 const MATHEMATICS: &[&str] = &[
-    "tan", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "sec", "csc", "cot", "erf", "erfc", "gamma",
-    "floor", "ceil", "round", "modulo", "expm1", "log1p", "hypot",
+    "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "sec", "csc", "cot", "erf", "erfc", "gamma", "floor",
+    "ceil", "round", "modulo", "hypot",
 ];
 
 /// Returns what is written here for a function of another language.
