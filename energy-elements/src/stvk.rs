@@ -13,20 +13,20 @@ energy! {
         rest {
             let d1 = u1 - u0;
             let d2 = u2 - u0;
-            let det = det(columns(d1, d2));
+            let double_area = det(columns(d1, d2));
             let n = norm_squared(d1);
             // Scaling by a power of two brings triangles of any size near 1.
             let s = power_of_two(n);
             // p d2 − q d1 is perpendicular to d1; m is its squared length.
             let p = n * s;
             let q = dot(d1, d2) * s;
-            let m = p * (det * s) * det;
+            let m = p * (double_area * s) * double_area;
             let half_n = n / 2;
             let half_m = m / 2;
             let per_n = 1 / n;
             let per_m = 1 / m;
             let per_nm = 1 / (sqrt(2 * n) * sqrt(m));
-            let A = det / 2;
+            let A = double_area / 2;
         }
         // E along and across the first rest edge, where the rest metric is diagonal; only p d2 − q d1 can cancel.
         // Dividing after the subtraction of n and m gives an exact zero at rest for exactly representable edges.
@@ -35,6 +35,6 @@ energy! {
         let along = per_n * (norm_squared(a) / 2 - half_n);
         let across = per_m * (norm_squared(b) / 2 - half_m);
         let shear = per_nm * dot(a, b);
-        (μ * det * (along^2 + across^2 + shear^2) + λ * A * (along + across)^2) / 2
+        (μ * double_area * (along^2 + across^2 + shear^2) + λ * A * (along + across)^2) / 2
     }
 }

@@ -51,6 +51,21 @@ impl Span {
         Self { token: self.token, excerpt }
     }
 
+    /// Returns the line that contains the place, with marks below the place; `None` outside of texts.
+    fn marked(&self) -> Option<String> {
+        let excerpt = self.excerpt.as_ref()?;
+        let (line, _, column) = excerpt.line();
+        let marked = excerpt.text[excerpt.start..excerpt.end.max(excerpt.start)].lines().next().unwrap_or("");
+        let width = marked.chars().count();
+        Some(format!("\n  | {line}\n  | {}{}", " ".repeat(column), "^".repeat(width.max(1))))
+    }
+
+    /// Returns `file:line:column` if the place is in a file, and otherwise `line:column` of the token.
+    fn place(&self) -> String {
+        let start = self.token.start();
+        self.place_in_file().unwrap_or_else(|| format!("{}:{}", start.line, start.column + 1))
+    }
+
     /// Returns `file:line:column` if the place is in a file.
     fn place_in_file(&self) -> Option<String> {
         let excerpt = self.excerpt.as_ref()?;
@@ -68,12 +83,21 @@ pub struct Diagnostic {
     pub help: Option<String>,
     /// Place of the error.
     pub span: Span,
+    /// Another place that the error concerns, and what is there.
+    pub other: Option<(String, Span)>,
 }
 
 impl Diagnostic {
     /// Creates an error at a place.
     pub fn new(span: &Span, message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, span: span.clone() }
+        Self { message: message.into(), help: None, span: span.clone(), other: None }
+    }
+
+    /// Adds another place, and what is there.
+    #[must_use]
+    pub fn see(mut self, other: (String, Span)) -> Self {
+        self.other = Some(other);
+        self
     }
 
     /// Adds how to fix it.
@@ -90,11 +114,9 @@ impl fmt::Display for Diagnostic {
             write!(f, "{place}: ")?;
         }
         f.write_str(&self.message)?;
-        if let Some(excerpt) = &self.span.excerpt {
-            let (line, _, column) = excerpt.line();
-            let marked = excerpt.text[excerpt.start..excerpt.end.max(excerpt.start)].lines().next().unwrap_or("");
-            let width = marked.chars().count();
-            write!(f, "\n  | {line}\n  | {}{}", " ".repeat(column), "^".repeat(width.max(1)))?;
+        f.write_str(&self.span.marked().unwrap_or_default())?;
+        if let Some((what, span)) = &self.other {
+            write!(f, "\nnote: {what} at {}{}", span.place(), span.marked().unwrap_or_default())?;
         }
         if let Some(help) = &self.help {
             write!(f, "\nhelp: {help}")?;
@@ -138,8 +160,7 @@ impl fmt::Display for Diagnostics {
                 write!(f, "{diagnostic}")?;
                 continue;
             }
-            let start = diagnostic.span.token.start();
-            write!(f, "{}:{}: {diagnostic}", start.line, start.column + 1)?;
+            write!(f, "{}: {diagnostic}", diagnostic.span.place())?;
         }
         Ok(())
     }

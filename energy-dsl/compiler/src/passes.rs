@@ -49,7 +49,7 @@ fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> TokenS
     for program in &programs {
         let formulas = lower(program);
         let routines = differentiate(program, formulas);
-        prove(program, &routines, &mut diagnostics);
+        prove(program, &routines, program.audit_samples.is_some(), &mut diagnostics);
         let items = emit(program, &routines);
         if let Some(folder) = &folder
             && let Err(error) = write_code(folder, &program.name, &items)

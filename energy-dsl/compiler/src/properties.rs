@@ -8,8 +8,8 @@ use crate::routines::Routines;
 use crate::syntax::ElementType;
 use energy_runtime::{Kind, Property};
 
-/// Reports claims that are wrong, or that nothing would check.
-pub fn prove(program: &Program, routines: &Routines, diagnostics: &mut Diagnostics) {
+/// Reports claims that are wrong, or that nothing would check: all but translation invariance need an audit.
+pub fn prove(program: &Program, routines: &Routines, audited: bool, diagnostics: &mut Diagnostics) {
     for (property, span) in &program.properties {
         let problem = match property {
             Property::TranslationInvariant => translation(program, routines),
@@ -20,7 +20,7 @@ pub fn prove(program: &Program, routines: &Routines, diagnostics: &mut Diagnosti
             Property::ZeroForceAtRest => rest_state(program),
             Property::RotationInvariant | Property::Even => None,
         };
-        let audited = program.audit_samples.is_some() || *property == Property::TranslationInvariant;
+        let audited = audited || *property == Property::TranslationInvariant;
         let problem = problem.or_else(|| {
             (!audited).then(|| {
                 (format!("nothing checks the claim `{}`", property.attribute()), "the audit does: add #[audit]")

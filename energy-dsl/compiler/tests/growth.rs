@@ -23,25 +23,25 @@ impl Random {
 fn program(size: usize, points: usize, seed: u64) -> String {
     let mut random = Random(seed);
     let names: Vec<String> = (0..points).map(|i| format!("p{i}")).collect();
-    let mut text = format!("energy Growth({}: Point; k: Scalar) {{ let s0 = k; ", names.join(", "));
+    let mut text = format!("energy Growth({}: Point; k: Scalar) {{ let _s0 = k; ", names.join(", "));
     for i in 1..=points {
-        write!(text, "let s{i} = norm_squared(p{} - p{}); ", i % points, i - 1).expect("writing to a string succeeds");
+        write!(text, "let _s{i} = norm_squared(p{} - p{}); ", i % points, i - 1).expect("writing to a string succeeds");
     }
     for i in points + 1..=points + size {
         // Uses the previous value, so that nothing is dead.
         let (a, b) = (i - 1, random.below(i));
         let value = match random.below(7) {
-            0 => format!("s{a} * s{b}"),
-            1 => format!("s{a} + s{b}"),
-            2 => format!("sin(s{a}) * s{b}"),
-            3 => format!("sqrt(1 + s{a}^2)"),
-            4 => format!("s{a} / (1 + s{b}^2)"),
-            5 => format!("s{a} - k * s{b}"),
-            _ => format!("log(2 + s{a}^2) + s{b}"),
+            0 => format!("_s{a} * _s{b}"),
+            1 => format!("_s{a} + _s{b}"),
+            2 => format!("sin(_s{a}) * _s{b}"),
+            3 => format!("sqrt(1 + _s{a}^2)"),
+            4 => format!("_s{a} / (1 + _s{b}^2)"),
+            5 => format!("_s{a} - k * _s{b}"),
+            _ => format!("log(2 + _s{a}^2) + _s{b}"),
         };
-        write!(text, "let s{i} = {value}; ").expect("writing to a string succeeds");
+        write!(text, "let _s{i} = {value}; ").expect("writing to a string succeeds");
     }
-    write!(text, "s{} }}", points + size).expect("writing to a string succeeds");
+    write!(text, "_s{} }}", points + size).expect("writing to a string succeeds");
     text
 }
 

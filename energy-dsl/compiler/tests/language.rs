@@ -151,6 +151,25 @@ fn deep_nesting_is_refused_and_not_a_stack_overflow() {
 }
 
 #[test]
+fn long_sums_and_calls_that_multiply_are_refused_with_a_remedy() {
+    let terms = vec!["norm(p)"; 8000].join(" + ");
+    let message = Textbook::from_source(&format!("energy Long(p: Point) {{ {terms} }}")).unwrap_err().to_string();
+    assert!(message.contains("more than 500 operators") && message.contains("sum over an index"), "{message}");
+    // 300 terms are as long as a formula gets by hand.
+    let terms = vec!["norm(p)"; 300].join(" + ");
+    Textbook::from_source(&format!("energy Sum(p: Point) {{ {terms} }}")).unwrap();
+
+    let mut functions = "fn f0(x) { x } ".to_owned();
+    for level in 1..=40 {
+        functions += &format!("fn f{level}(x) {{ f{0}(x) + f{0}(x) }} ", level - 1);
+    }
+    let message = Textbook::from_source(&format!("{functions} energy Many(p: Point) {{ f40(norm(p)) }}"))
+        .unwrap_err()
+        .to_string();
+    assert_eq!(message.matches("called more than 4096 times").count(), 1, "{message}");
+}
+
+#[test]
 fn hostile_texts_are_refused_without_panic() {
     for source in [
         "",
@@ -187,8 +206,20 @@ fn hostile_texts_are_refused_without_panic() {
 }
 
 #[test]
+fn vectors_that_vanish_identically_compile() {
+    for vector in ["p - p", "0 * p", "(p - q) - (p - q)", "cross(p, p)"] {
+        for formula in ["1 - dot(unit(a), unit(b))", "angle(a, b)", "norm(a) - k", "norm(cross(a, b))"] {
+            let source =
+                format!("energy Test(p, q: Point; k: Scalar) {{ let _a = {vector}; let _b = q - p; k * ({formula}) }}");
+            Textbook::from_source(&source).unwrap_or_else(|e| panic!("{source}: {e}"));
+            energy_compiler::Listing::from_source(&source).unwrap_or_else(|e| panic!("{source}: {e}"));
+        }
+    }
+}
+
+#[test]
 fn constants_that_are_infinite_are_written() {
-    let source = "energy A(p, q: Point) { dot(p - q, p - q) * (1 / (1 - 1)) }";
+    let source = "energy A(p, q: Point) { dot(p - q, p - q) * (1e308 * 10) }";
     let code = energy_compiler::compile(source.parse().unwrap()).to_string().replace(' ', "");
     assert!(code.contains("f64::INFINITY"), "{code}");
 }

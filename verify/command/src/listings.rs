@@ -8,13 +8,12 @@ use energy_compiler::Listing;
 /// # Errors
 /// If there is no such element or file, or the file has errors.
 pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
-    let source = if Path::new(name).extension().is_some_and(|extension| extension == "energy") {
-        std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?
-    } else {
-        let names = || energy_elements::catalogue().iter().map(|e| e.declaration.name).collect::<Vec<_>>().join(", ");
-        let entry = energy_elements::find(name)
-            .with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
-        entry.declaration.source.to_owned()
-    };
-    Listing::from_source(&source).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
+    if Path::new(name).extension().is_some_and(|extension| extension == "energy") {
+        let text = std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?;
+        return Listing::from_file(&text, name).map_err(|errors| anyhow::anyhow!("{errors}"));
+    }
+    let names = || energy_elements::catalogue().iter().map(|e| e.declaration.name).collect::<Vec<_>>().join(", ");
+    let entry =
+        energy_elements::find(name).with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
+    Listing::from_source(entry.declaration.source).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
 }

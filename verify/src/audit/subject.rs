@@ -12,19 +12,20 @@ pub type EvaluateAny = Box<dyn Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, Rest
 
 /// An element to audit: from the catalogue, or from a text read at run time.
 #[derive(Clone, Debug)]
-pub struct Target {
-    /// Source of one declaration and of the functions that it uses.
-    source: String,
-    name: String,
-    entry: Option<&'static AnyElement>,
+pub struct Target(Origin);
+
+#[derive(Clone, Debug)]
+enum Origin {
+    Catalogue(&'static AnyElement),
+    /// With the claims of its text, which its source is without.
+    Text(Box<Interpreted>),
 }
 
 impl Target {
     /// Creates the target of an element of the catalogue.
     #[must_use]
     pub fn of_element(entry: &'static AnyElement) -> Self {
-        let declaration = entry.declaration;
-        Self { source: declaration.source.into(), name: declaration.name.into(), entry: Some(entry) }
+        Self(Origin::Catalogue(entry))
     }
 
     /// Returns every declaration of a text in the format of an `.energy` file; messages call it `name`.
@@ -32,13 +33,8 @@ impl Target {
     /// # Errors
     /// If the text has errors.
     pub fn of_text(text: &str, name: &str) -> Result<Vec<Self>, energy_compiler::Diagnostics> {
-        // A declaration's source includes the functions that it uses, so it compiles on its own.
-        let target = |element: &Interpreted| Self {
-            source: element.declaration().source.into(),
-            name: element.declaration().name.into(),
-            entry: None,
-        };
-        Ok(Interpreted::from_file(text, name)?.iter().map(target).collect())
+        let elements = Interpreted::from_file(text, name)?;
+        Ok(elements.into_iter().map(|element| Self(Origin::Text(Box::new(element)))).collect())
     }
 
     /// Returns every declaration of a file.
@@ -56,7 +52,14 @@ impl Target {
     /// Returns the name of the element.
     #[must_use]
     pub fn name(&self) -> &str {
-        &self.name
+        self.declaration().name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        match &self.0 {
+            Origin::Catalogue(entry) => entry.declaration,
+            Origin::Text(element) => element.declaration(),
+        }
     }
 
     /// Returns the element in the form that audits need.
@@ -64,20 +67,19 @@ impl Target {
     /// # Errors
     /// If the declaration does not compile.
     pub fn subject(&self) -> Result<Subject, String> {
-        let interpreted = self.interpreted()?;
-        match self.entry {
-            Some(entry) => Subject::new(entry.declaration, Box::new(entry.evaluate), Some(interpreted)),
-            None => {
-                let declaration = interpreted.declaration();
-                let runs = interpreted.clone();
+        let declaration = self.declaration();
+        match &self.0 {
+            Origin::Catalogue(entry) => {
+                // A declaration's source includes the functions that it uses, so it compiles on its own.
+                let mut declared = Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string())?;
+                let interpreted = declared.pop();
+                Subject::new(declaration, Box::new(entry.evaluate), interpreted)
+            }
+            Origin::Text(element) => {
+                let (runs, interpreted) = (element.clone(), element.as_ref().clone());
                 Subject::new(declaration, Box::new(move |inputs| runs.evaluate(inputs)), Some(interpreted))
             }
         }
-    }
-
-    fn interpreted(&self) -> Result<Interpreted, String> {
-        let mut declared = Interpreted::from_source(&self.source).map_err(|errors| errors.to_string())?;
-        declared.pop().ok_or_else(|| format!("{}: the source contains no declaration", self.name))
     }
 }
 

@@ -23,10 +23,6 @@ impl Globals {
         let mut globals = Self::default();
         for constant in constants {
             let canonical = constant.name.canonical();
-            if globals.scope.contains_key(&canonical) {
-                let message = format!("the constant `{}` is declared twice", constant.name.text);
-                diagnostics.push(Diagnostic::new(&constant.name.span, message).help("rename one of them"));
-            }
             let mut checker = Checker::new(&signature, &globals, &[], diagnostics);
             let meaning = checker.constant(constant);
             globals.bindings = checker.bindings;
@@ -100,6 +96,29 @@ pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
                 ("max", [a, b]) => a.max(*b),
                 _ => return None,
             })
+        }
+        _ => None,
+    }
+}
+
+/// Largest whole or broken exponent: a larger one overflows at almost every base.
+const LARGEST_EXPONENT: f64 = 1000.0;
+
+/// Describes why a function is undefined for constant arguments; `None` if it is defined or the arguments vary.
+pub(super) fn undefined(function: &str, arguments: &[Option<f64>]) -> Option<String> {
+    match (function, arguments) {
+        ("/", [_, Some(0.0)]) => Some("a division by 0".into()),
+        ("sqrt", [Some(x)]) if *x < 0.0 => Some(format!("the root of {x}, which is negative")),
+        ("log", [Some(x)]) if *x <= 0.0 => Some(format!("the logarithm of {x}, which is not positive")),
+        ("acos" | "asin", [Some(x)]) if x.abs() > 1.0 => {
+            Some(format!("`{function}` of {x}, which is outside of −1 to 1"))
+        }
+        ("^", [_, Some(n)]) if n.abs() > LARGEST_EXPONENT => {
+            Some(format!("the exponent {n} is out of range: exponents are at most {LARGEST_EXPONENT} in size"))
+        }
+        ("^", [Some(0.0), Some(n)]) if *n < 0.0 => Some("a division by 0".into()),
+        ("^", [Some(x), Some(n)]) if *x < 0.0 && n.fract() != 0.0 => {
+            Some(format!("the power {n} of {x}, which is negative"))
         }
         _ => None,
     }

@@ -5,7 +5,11 @@ use super::signature::Signature;
 use super::typed::{Binding, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
 use crate::functions::{self, Shape};
-use crate::syntax::{Body, Expression, ExpressionKind, Name, UserFunction, canonical};
+use crate::syntax::habits;
+use crate::syntax::{Body, Expression, ExpressionKind, Name, UserFunction, canonical, without_hat};
+
+/// Maximum number of calls of the text's functions in a formula. Each is inlined, and nested calls multiply.
+const MOST_CALLS: usize = 4096;
 
 /// The meaning of a name.
 #[derive(Clone)]
@@ -27,6 +31,8 @@ pub(super) struct Checker<'a> {
     /// Scopes: global constants, inputs, then bodies.
     pub(super) scopes: Vec<BTreeMap<String, Option<Meaning>>>,
     calls: Vec<String>,
+    /// Number of calls that were inlined.
+    inlined: usize,
     used: BTreeSet<String>,
     in_rest: bool,
     /// Number of terms that sums were unrolled to.
@@ -53,6 +59,7 @@ impl<'a> Checker<'a> {
             diagnostics,
             scopes: vec![globals.scope.clone(), inputs],
             calls: Vec::new(),
+            inlined: 0,
             used: BTreeSet::new(),
             in_rest: false,
             terms: 0,
@@ -179,7 +186,11 @@ impl<'a> Checker<'a> {
         let known: Vec<String> = self.scopes.iter().flat_map(|s| s.keys().cloned()).collect();
         let mut diagnostic = Diagnostic::new(&name.span, format!("unknown name `{}`", name.text));
         let canonical = name.canonical();
-        diagnostic = if functions::find(&name.text).is_some() {
+        let latin = habits::latin(&name.text).map(|latin| crate::syntax::canonical(&latin));
+        diagnostic = if let Some(latin) = latin.filter(|latin| known.contains(latin)) {
+            let declared = self.as_declared(&latin);
+            diagnostic.help(format!("some of its letters only look Latin; did you mean `{declared}`?"))
+        } else if functions::find(&name.text).is_some() {
             diagnostic.help(format!("`{}` is a function: call it with its arguments in parentheses", name.text))
         } else if let Some(near) = nearest(&canonical, known.iter().map(String::as_str)) {
             diagnostic.help(format!("did you mean `{}`?", self.as_declared(near)))
@@ -244,7 +255,9 @@ impl<'a> Checker<'a> {
             "identity" => return self.identity(name, arguments),
             _ => {}
         }
+        // A function of the text with a name of the language is an error already.
         let user = self.functions.iter().rev().find(|f| f.name.text == name.text).copied();
+        let user = user.filter(|_| functions::find(&name.text).is_none());
         let checked: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
         let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
         if let Some(function) = user {
@@ -267,6 +280,10 @@ impl<'a> Checker<'a> {
             let mut diagnostic = Diagnostic::new(span, format!("unknown function `{name}`"));
             diagnostic = if self.find(name).is_some() {
                 diagnostic.help(format!("`{name}` is a value; for a product write `{name} * (…)`"))
+            } else if let Some(here) = habits::function(name) {
+                diagnostic.help(format!("write {here}"))
+            } else if habits::is_mathematics(name) {
+                diagnostic.help(format!("define it: fn {name}(x) {{ … }}"))
             } else {
                 let names = functions::all().map(|f| f.name).chain(self.functions.iter().map(|f| f.name.text.as_str()));
                 match nearest(name, names) {
@@ -288,11 +305,20 @@ impl<'a> Checker<'a> {
             return None;
         }
         match (function.shape)(&shapes) {
-            Ok(shape) => Some(Typed { kind: TypedKind::Call(function, arguments), shape, span: span.clone() }),
+            Ok(shape) => {
+                let constants: Vec<_> =
+                    arguments.iter().map(|a| super::constant::evaluate(&self.bindings, a)).collect();
+                if let Some(message) = super::constant::undefined(name, &constants) {
+                    return self.error(span, message);
+                }
+                Some(Typed { kind: TypedKind::Call(function, arguments), shape, span: span.clone() })
+            }
             Err(message) => {
-                self.diagnostics.push(
-                    Diagnostic::new(span, format!("`{name}`: {message}")).help(format!("usage: {}", function.usage)),
-                );
+                let help = match (name, shapes.as_slice()) {
+                    ("abs", [Shape::Vector(_)]) => "the length of a vector is ‖v‖ or norm(v)".into(),
+                    _ => format!("usage: {}", function.usage),
+                };
+                self.diagnostics.push(Diagnostic::new(span, format!("`{name}`: {message}")).help(help));
                 None
             }
         }
@@ -307,6 +333,16 @@ impl<'a> Checker<'a> {
         }
         if self.calls.contains(&function.name.text) {
             return self.error(&name.span, format!("`{}` calls itself: a formula cannot be recursive", name.text));
+        }
+        self.inlined += 1;
+        if self.inlined > MOST_CALLS {
+            let message = format!("the functions of this formula are called more than {MOST_CALLS} times in all");
+            let help = "name a repeated value with `let`, so that it is computed once";
+            // One message is enough: further calls would all repeat it.
+            if self.inlined == MOST_CALLS + 1 {
+                self.diagnostics.push(Diagnostic::new(&name.span, message).help(help));
+            }
+            return None;
         }
         self.calls.push(function.name.text.clone());
         let scopes = vec![self.scopes[0].clone(), BTreeMap::new()];
@@ -351,20 +387,4 @@ impl<'a> Checker<'a> {
 
 pub(super) fn constant(value: f64, span: &Span) -> Typed {
     Typed { kind: TypedKind::Constant(value), shape: Shape::Scalar, span: span.clone() }
-}
-
-fn without_hat(name: &str) -> Option<String> {
-    let mut plain = String::new();
-    let mut hat = false;
-    for c in name.chars() {
-        match crate::syntax::unhatted(c) {
-            _ if c == '\u{302}' => hat = true,
-            Some(letter) => {
-                hat = true;
-                plain.push(letter);
-            }
-            None => plain.push(c),
-        }
-    }
-    hat.then_some(plain)
 }

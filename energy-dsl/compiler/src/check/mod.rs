@@ -4,6 +4,7 @@
 mod array;
 mod constant;
 mod expression;
+mod names;
 mod result;
 mod signature;
 mod typed;
@@ -13,51 +14,58 @@ pub use typed::{Input, Program, Source, Typed, TypedKind};
 pub use units::unit_exponents;
 
 use crate::diagnostic::Diagnostics;
-use crate::syntax::{Declaration, Item, UserFunction, canonical};
+use crate::syntax::{Declaration, Item, UserFunction};
 use constant::Globals;
 use expression::Checker;
+use names::{check_names, mentioned};
 use signature::Signature;
 
 /// Checks all declarations. A broken one yields its errors and a stub with the same inputs and value zero, so that code
 /// which uses it causes no further errors.
 pub fn check(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Program> {
+    let unused = check_names(items, diagnostics);
     let functions: Vec<&UserFunction> =
         items.iter().filter_map(|i| if let Item::Function(f) = i { Some(f) } else { None }).collect();
     let constants = items.iter().filter_map(|i| if let Item::Constant(c) = i { Some(c) } else { None });
     let globals = Globals::of(constants, diagnostics);
-    items
-        .iter()
-        .filter_map(|item| if let Item::Declaration(d) = item { Some(d) } else { None })
-        .map(|declaration| {
-            let mut program = check_declaration(declaration, &functions, &globals, diagnostics);
-            program.source = with_what_it_uses(&program.source, items);
-            program
-        })
-        .collect()
+    let mut programs: Vec<Program> = Vec::new();
+    for item in items {
+        let Item::Declaration(declaration) = item else { continue };
+        // A second declaration of the same name would be a second type.
+        if programs.iter().any(|program| program.name == declaration.name.text) {
+            continue;
+        }
+        let mut program = check_declaration(declaration, &functions, &globals, diagnostics);
+        program.source = with_what_it_uses(&program.source, item, items);
+        programs.push(program);
+    }
+    if diagnostics.0.is_empty() {
+        diagnostics.0.extend(unused);
+    }
+    programs
 }
 
 /// Prepends the functions and constants that a declaration uses, so that its text is self-contained.
-fn with_what_it_uses(source: &str, items: &[Item]) -> String {
-    let others: Vec<(String, &str)> = items
+fn with_what_it_uses(source: &str, declaration: &Item, items: &[Item]) -> String {
+    let others: Vec<(&Item, String, &str)> = items
         .iter()
         .filter_map(|item| match item {
-            Item::Function(function) => Some((function.name.canonical(), function.source.as_str())),
-            Item::Constant(constant) => Some((constant.name.canonical(), constant.source.as_str())),
+            Item::Function(function) => Some((item, function.name.text.clone(), function.source.as_str())),
+            Item::Constant(constant) => Some((item, constant.name.canonical(), constant.source.as_str())),
             Item::Declaration(_) | Item::Specialisation(_) => None,
         })
         .collect();
-    let mut named = vec![false; others.len()];
-    let mut texts = vec![source];
-    while let Some(text) = texts.pop() {
-        let text = canonical(text);
-        for (number, (name, other)) in others.iter().enumerate() {
-            if !named[number] && text.contains(name) {
-                named[number] = true;
-                texts.push(other);
+    let mut used = vec![false; others.len()];
+    let mut open = vec![declaration];
+    while let Some(item) = open.pop() {
+        let mentioned = mentioned(item);
+        for (number, (other, name, _)) in others.iter().enumerate() {
+            if mentioned.contains(name) && !std::mem::replace(&mut used[number], true) {
+                open.push(other);
             }
         }
     }
-    let used = others.iter().zip(named).filter(|(_, named)| *named).map(|((_, source), _)| *source);
+    let used = others.iter().zip(used).filter(|(_, used)| *used).map(|((_, _, source), _)| *source);
     used.chain([source]).collect::<Vec<_>>().join(" ")
 }
 

@@ -6,6 +6,7 @@ use crate::inspect::mutation::{Mutation, faults};
 use crate::inspect::tape::Tape;
 use crate::inspect::textbook::{file_programs, programs};
 use crate::lower::lower;
+use crate::properties::prove;
 use crate::routines::{Routines, differentiate};
 use energy_runtime::{
     Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, RestError, Routine, settle, triangle_index,
@@ -60,10 +61,7 @@ impl Interpreted {
     /// # Errors
     /// Whatever is wrong with the text.
     pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
-        Ok(programs(source)?
-            .iter()
-            .map(|program| Self::new(program, &differentiate(program, lower(program))))
-            .collect())
+        Self::compiled(&programs(source)?)
     }
 
     /// Compiles the declarations in the text of a file.
@@ -71,10 +69,19 @@ impl Interpreted {
     /// # Errors
     /// Whatever is wrong with the text, at its places in the file.
     pub fn from_file(text: &str, file: &str) -> Result<Vec<Self>, Diagnostics> {
-        Ok(file_programs(text, file)?
-            .iter()
-            .map(|program| Self::new(program, &differentiate(program, lower(program))))
-            .collect())
+        Self::compiled(&file_programs(text, file)?)
+    }
+
+    /// Compiles programs whose claims an audit may check.
+    fn compiled(programs: &[Program]) -> Result<Vec<Self>, Diagnostics> {
+        let mut diagnostics = Diagnostics::default();
+        let mut compile = |program| {
+            let routines = differentiate(program, lower(program));
+            prove(program, &routines, true, &mut diagnostics);
+            Self::new(program, &routines)
+        };
+        let elements = programs.iter().map(&mut compile).collect();
+        diagnostics.finish(elements)
     }
 
     fn new(program: &Program, routines: &Routines) -> Self {

@@ -2,12 +2,13 @@ use std::fmt::Write as _;
 
 use proc_macro2::TokenStream;
 
+use crate::check::Program;
 use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
 use crate::graph::{NodeId, count};
 use crate::inspect::interpret::{interpret, interpret_mask};
 use crate::inspect::layout::{layout, methods};
-use crate::inspect::textbook::programs;
+use crate::inspect::textbook::{file_programs, programs};
 use crate::lower::lower;
 use crate::routines::{Routines, differentiate};
 use energy_runtime::{Inputs, Mask, Number, OperationCount};
@@ -42,12 +43,23 @@ impl Listing {
     /// # Errors
     /// Whatever is wrong with the text.
     pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
-        let programs = programs(source)?;
+        programs(source).map(Self::of)
+    }
+
+    /// Compiles the declarations in the text of a file.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, at its places in the file.
+    pub fn from_file(text: &str, file: &str) -> Result<Vec<Self>, Diagnostics> {
+        file_programs(text, file).map(Self::of)
+    }
+
+    fn of(programs: Vec<Program>) -> Vec<Self> {
         let listing = |program| {
             let routines = differentiate(program, lower(program));
             Self { name: program.name.clone(), code: emit(program, &routines), routines }
         };
-        Ok(programs.iter().map(listing).collect())
+        programs.iter().map(listing).collect()
     }
 
     /// Returns the name of the declaration.

@@ -1,11 +1,15 @@
 //! Parses expressions by precedence.
 
 use super::ast::{Body, Expression, ExpressionKind, Sum};
+use super::habits;
 use super::name::Name;
 use super::parse::{Parsed, Parser, is_keyword};
 use super::tokens::{Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::functions;
+
+/// Operators of one precedence in a row: a chain is as deep as it is long, and the compiler recurses over it.
+const LONGEST_CHAIN: usize = 500;
 
 impl<'a> Parser<'a> {
     /// Parses an expression of any precedence.
@@ -19,12 +23,21 @@ impl<'a> Parser<'a> {
             &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×", "⊗"]];
         let Some(operators) = LEVELS.get(level) else { return self.unary() };
         let mut left = self.binary(level + 1)?;
-        loop {
+        for length in 0.. {
             let span = self.span();
+            if length == LONGEST_CHAIN {
+                let message = format!("more than {LONGEST_CHAIN} operators follow each other");
+                let help = "name parts with `let`, or sum over an index: sum(j in 0..4, …)";
+                return Err(Box::new(Diagnostic::new(&span, message).help(help)));
+            }
             let operator = operators.iter().find(|o| self.is(o)).copied();
             let operator = match operator {
                 Some(operator) => {
                     self.at += 1;
+                    if operator == "*" && self.is("*") {
+                        let power = Diagnostic::new(&span, "`**` is no operator here");
+                        return Err(Box::new(power.help("a power is written x^2")));
+                    }
                     operator
                 }
                 None if level + 1 == LEVELS.len() && self.starts_factor() => "*",
@@ -39,6 +52,7 @@ impl<'a> Parser<'a> {
             };
             left = call(function, span, vec![left, right]);
         }
+        Ok(left)
     }
 
     /// Returns whether a factor follows without an operator. In notation that is a product.
@@ -95,6 +109,9 @@ impl<'a> Parser<'a> {
                 base = Expression { kind: ExpressionKind::Index(Box::new(base), Box::new(index)), span };
             } else if self.take(".") {
                 let name = self.name("the name of a component, as in v.x")?;
+                if self.is("(") {
+                    return Err(self.method(&name));
+                }
                 base = Expression { kind: ExpressionKind::Component(Box::new(base), name), span };
             } else if self.take("^") {
                 let exponent = self.unary()?;
@@ -103,6 +120,15 @@ impl<'a> Parser<'a> {
                 return Ok(base);
             }
         }
+    }
+
+    /// Describes a call such as `d.norm()`.
+    fn method(&self, name: &Name) -> Box<Diagnostic> {
+        let known = self.is_function(&name.text).then(|| format!("{}(…)", name.text));
+        let written = habits::function(&name.text).map(str::to_owned).or(known);
+        let written = written.unwrap_or_else(|| "norm(p - q)".into());
+        let message = format!("a formula has no methods, found `.{}()`", name.text);
+        Box::new(Diagnostic::new(&name.span, message).help(format!("functions come first: {written}")))
     }
 
     fn primary(&mut self) -> Parsed<Expression> {
@@ -119,6 +145,10 @@ impl<'a> Parser<'a> {
             }
             TokenKind::Name(word) if word == "if" => return self.conditional(),
             TokenKind::Name(word) if is_keyword(word) => return self.fail("a value"),
+            TokenKind::Name(word) if !token.notation && habits::statement(word).is_some() => {
+                let (message, help) = habits::statement(word).unwrap_or_default();
+                return Err(Box::new(Diagnostic::new(&span, message).help(help)));
+            }
             TokenKind::Name(_) => return self.name_or_call(),
             TokenKind::Text(_) => return self.fail("a value"),
             TokenKind::Symbol(symbol) => match symbol.as_str() {
@@ -156,21 +186,31 @@ impl<'a> Parser<'a> {
 
     /// Parses a bracketed expression after its opening bracket.
     fn bracketed(&mut self, open: &str, close: &str) -> Parsed<Expression> {
+        let opened = self.tokens[self.at - 1].span.clone();
         self.bars.push(open.into());
         let inner = self.expression()?;
         self.bars.pop();
-        self.expect(close, &format!("to close `{open}`"))?;
+        self.close(open, close, opened)?;
         Ok(inner)
     }
 
+    /// Expects a closing bracket, and names the place of the opening one if it is missing.
+    fn close(&mut self, open: &str, close: &str, opened: Span) -> Parsed<()> {
+        let closed = self.expect(close, &format!("to close `{open}`"));
+        closed.map_err(|error| Box::new(error.see((format!("`{open}` is opened"), opened))))
+    }
+
     fn list(&mut self, open: &str, close: &str) -> Parsed<Vec<Expression>> {
+        let opened = self.span();
         self.expect(open, "to open the list")?;
         self.bars.push(open.into());
         let mut items = Vec::new();
         while !self.is(close) {
             items.push(self.expression()?);
             if !self.take(",") && !self.is(close) {
-                return self.fail(&format!("`,` or `{close}`"));
+                let error: Parsed<()> = self.fail(&format!("`,` or `{close}`"));
+                let opened = (format!("`{open}` is opened"), opened);
+                return error.map_err(|error| Box::new(error.see(opened))).map(|()| items);
             }
         }
         self.at += 1;

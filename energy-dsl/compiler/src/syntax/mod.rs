@@ -3,6 +3,7 @@
 mod ast;
 mod attribute;
 mod expression;
+pub(crate) mod habits;
 mod name;
 mod notation;
 mod parse;
@@ -15,5 +16,5 @@ pub use ast::{
     Unit, UserFunction,
 };
 pub use name::{Name, canonical};
-pub(crate) use notation::unhatted;
+pub(crate) use notation::without_hat;
 pub use parse::{parse, parse_file};

@@ -231,8 +231,25 @@ impl Lexer<'_> {
     }
 }
 
+/// Returns the name below a hat: `p` of `p̂`. `None` if the name has no hat.
+pub(crate) fn without_hat(name: &str) -> Option<String> {
+    let mut plain = String::new();
+    let mut hat = false;
+    for c in name.chars() {
+        match unhatted(c) {
+            _ if c == '\u{302}' => hat = true,
+            Some(letter) => {
+                hat = true;
+                plain.push(letter);
+            }
+            None => plain.push(c),
+        }
+    }
+    hat.then_some(plain)
+}
+
 /// Returns the letter under a precomposed hat.
-pub(crate) fn unhatted(c: char) -> Option<char> {
+fn unhatted(c: char) -> Option<char> {
     Some(match c {
         'â' => 'a',
         'ê' => 'e',

@@ -7,6 +7,7 @@ use super::ast::{
     UserFunction,
 };
 use super::attribute::Attributes;
+use super::habits;
 use super::name::Name;
 use super::specialise::{Specialisation, specialise};
 use super::text;
@@ -118,7 +119,30 @@ impl<'a> Parser<'a> {
     }
 
     pub(super) fn fail<T>(&self, expected: &str) -> Parsed<T> {
-        Err(Box::new(Diagnostic::new(&self.span(), format!("expected {expected}, found {}", self.found()))))
+        let diagnostic = Diagnostic::new(&self.span(), format!("expected {expected}, found {}", self.found()));
+        Err(Box::new(match self.remedy() {
+            Some(remedy) => diagnostic.help(remedy),
+            None => diagnostic,
+        }))
+    }
+
+    /// Returns the remedy for the next token, where other languages would allow it.
+    fn remedy(&self) -> Option<&'static str> {
+        let token = self.peek()?;
+        let operand = |token: &Token| match &token.kind {
+            TokenKind::Name(word) => !is_keyword(word),
+            TokenKind::Number(_) => true,
+            TokenKind::Symbol(symbol) => symbol == "(",
+            _ => false,
+        };
+        let before = self.at.checked_sub(1).and_then(|at| self.tokens.get(at));
+        if !token.notation && operand(token) && before.is_some_and(|token| operand(token) || token.text == ")") {
+            return Some("write a product with `*`, as in 2 * k * x; only strings such as \"2 k x\" leave it out");
+        }
+        match &token.kind {
+            TokenKind::Symbol(symbol) => habits::symbol(symbol),
+            _ => None,
+        }
     }
 
     pub(super) fn expect(&mut self, symbol: &str, context: &str) -> Parsed<()> {
@@ -187,6 +211,10 @@ impl<'a> Parser<'a> {
         let start = self.at;
         let kind = self.kind()?;
         let name = self.name("a name for the declaration")?;
+        if syn::parse_str::<syn::Ident>(&name.text).is_err() {
+            let message = format!("`{}` cannot name a declaration: it is a word of Rust", name.text);
+            return Err(Box::new(Diagnostic::new(&name.span, message).help("choose another name")));
+        }
         if self.is("=") {
             let declaration = Declaration {
                 docs,
@@ -442,6 +470,10 @@ impl<'a> Parser<'a> {
 
     fn statement(&mut self, rest: bool) -> Parsed<Let> {
         let has_let = self.take_word("let");
+        if has_let && self.is_word("mut") && matches!(self.tokens.get(self.at + 1), Some(t) if t.text != "=") {
+            let mutable = Diagnostic::new(&self.span(), "values never change, found `let mut`");
+            return Err(Box::new(mutable.help("write `let x = …;`, and give a new value a new name")));
+        }
         if !has_let && !self.next_is_definition() {
             return self.fail("`let name = …;`");
         }

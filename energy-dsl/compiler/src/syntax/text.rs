@@ -155,7 +155,8 @@ impl Lexer<'_> {
         let symbol = pair.map_or_else(|| c.to_string(), |pair| (*pair).to_owned());
         self.at += symbol.len();
         if !"#[](){}<>=!&|+-*/^,;:.".contains(c) {
-            let help = "put mathematical notation in a string: \"‖p − q‖ − L\"";
+            let help = super::habits::symbol(&symbol);
+            let help = help.unwrap_or("put mathematical notation in a string: \"‖p − q‖ − L\"");
             self.error(start, format!("the character `{c}` has no meaning here"), help);
             return;
         }
