@@ -13,8 +13,8 @@
 //! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is [`STIFFNESS_RATIO`] times
 //! as stiff as the vertices are against a displacement along the normal. Nothing is left to tune.
 //!
-//! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at certified
-//! states only.
+//! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
+//! certified states only.
 
 mod feasible;
 mod start;

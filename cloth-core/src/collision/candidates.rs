@@ -6,8 +6,8 @@ use super::mesh::{CollisionMesh, bounds};
 use super::{Closest, Pair, PairKind};
 use crate::geometry::{Bounds, Hierarchy, add_scaled, norm, subtract};
 
-/// All pairs that can come within reach of each other, sorted by kind and vertices, with the region in which each vertex
-/// may move before the list must be renewed.
+/// All pairs that can come within reach of each other, sorted by kind and vertices, with the region in which each
+/// vertex may move before the list must be renewed.
 ///
 /// Distances do not change if all vertices are translated, so regions are relative to the mean displacement. A sheet in
 /// free fall needs no new list.

@@ -78,7 +78,10 @@ proptest! {
 
     /// Moves that the normal of an earlier search certifies are safe.
     #[test]
-    fn plainly_safe_moves_keep_their_distance([from, to] in impact(), earlier in prop::collection::vec(vector(2e-3), 6)) {
+    fn plainly_safe_moves_keep_their_distance(
+        [from, to] in impact(),
+        earlier in prop::collection::vec(vector(2e-3), 6),
+    ) {
         const CLEARANCE: Clearance = Clearance { thickness: 1e-3, reach: 4e-3 };
         let search: Vec<_> = from.iter().zip(&earlier).map(|(x, offset)| add_scaled(*x, 1.0, *offset)).collect();
         // A short move, so that normals stay useful.

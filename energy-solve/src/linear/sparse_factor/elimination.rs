@@ -10,8 +10,8 @@ pub(super) struct Elimination {
 
 impl Elimination {
     /// Orders the groups of a symmetric pattern by approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix
-    /// Anal. Appl. 17, 1996), then so that subtrees of the elimination tree are consecutive. The upper triangle is given
-    /// by rows.
+    /// Anal. Appl. 17, 1996), then so that subtrees of the elimination tree are consecutive. The upper triangle is
+    /// given by rows.
     pub fn new(rows: &[usize], columns: &[usize]) -> Self {
         let by_degree = minimum_degree(rows, columns);
         let parents = tree(&neighbours(rows, columns, &by_degree, Side::Before));
@@ -105,8 +105,8 @@ fn postorder(parents: &[Option<usize>]) -> Vec<usize> {
     positions
 }
 
-/// Returns the rows below the diagonal of each column of the factor: the neighbours after it, and the rows of the columns
-/// whose first row it is.
+/// Returns the rows below the diagonal of each column of the factor: the neighbours after it, and the rows of the
+/// columns whose first row it is.
 fn structure(after: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
     let mut structure = after;
     let mut children = vec![Vec::new(); structure.len()];

@@ -91,7 +91,8 @@ impl SparseFactor {
         self.entries.len()
     }
 
-    /// Factors A + μ 1 with the damping μ. Block `b` of A, in the order of the pattern, has the entries `entry(b, i, j)`.
+    /// Factors A + μ 1 with the damping μ. Block `b` of A, in the order of the pattern, has the entries `entry(b, i,
+    /// j)`.
     pub(crate) fn factor(
         &mut self,
         damping: f64,
