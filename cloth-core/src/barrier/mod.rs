@@ -7,10 +7,10 @@
 //! coefficients c of the closest points, so forces and torques of a contact cancel to rounding.
 //!
 //! **Which pairs act.** Two surfaces meet in many pairs. A pair joins at an iterate if its closest points are a local
-//! minimum of the distance of the surfaces ([`feasible`]), and then stays until the step ends. So a line search sees a
+//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a
 //! single function, which a filter in every trial would not be. A pair that shortens a move joins in any case.
 //!
-//! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is [`STIFFNESS_RATIO`] times
+//! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times
 //! as stiff as the vertices are against a displacement along the normal. Nothing is left to tune.
 //!
 //! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at

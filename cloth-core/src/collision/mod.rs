@@ -1,7 +1,7 @@
 //! Geometry of collisions: an exact test for crossings, pairs of features that may meet, and a certificate that a
 //! straight move keeps them apart.
 //!
-//! A surface is a [`CollisionMesh`] of points, edges and triangles. Two kinds of [`Pair`] suffice: a point and a
+//! A surface is a [`CollisionMesh`] of points, edges and triangles. Two kinds of pairs suffice: a point and a
 //! triangle, and two edges. If no such pair touches while all vertices move, no edge ever crosses a triangle: the first
 //! contact of an edge with a triangle is either an end of the edge on the triangle, or the edge on a side of the
 //! triangle. Features that share a vertex, or whose vertices are sewn together, never count as a pair.
