@@ -38,11 +38,14 @@ fn a_broken_declaration_still_declares_its_type() {
         "pub energy Broken(p, q: Point; k: Scalar) { k * norm(p - r) }",
         "pub force Broken(p, q: Point; k: Scalar) { [k * (p - q)] }",
         "pub constraint Broken(p, q: Point; L: Scalar) = \"‖p − q − L\";",
+        "pub energy Broken(p, q: Point; type: Scalar) { type * norm(p - q) }",
+        "pub energy Broken(p, q: Point; rest fn_, where: Scalar) { rest { let r = where * fn_; } r * norm(p - q) }",
     ] {
         let code = compile(source.parse().unwrap()).to_string();
         assert!(code.contains("compile_error"), "{source}: no error");
         assert!(code.contains("pub struct Broken"), "{source}: no stub");
         assert_eq!(code.matches("compile_error").count(), 1, "{source}: one mistake, one error");
+        assert!(syn::parse_str::<syn::File>(&code).is_ok(), "{source}: the stub is no Rust");
     }
 }
 

@@ -139,7 +139,10 @@ impl Signature {
             };
             let first = list.last().map_or(0, |i: &Input| i.first + i.input_type.size());
             let span = unit.span.as_ref().unwrap_or(&name.span).clone();
-            let input = Input { name: name.text.clone(), input_type, unit: unit.text.clone(), span, first };
+            // The stub of a broken declaration must be valid Rust.
+            let suffix = if stored && is_reserved(&name.text) { "_" } else { "" };
+            let input =
+                Input { name: format!("{}{suffix}", name.text), input_type, unit: unit.text.clone(), span, first };
             match length.filter(|_| section == Section::Moving) {
                 // Moving inputs are listed entry by entry.
                 Some(length) => list.extend((0..length).map(|i| entry(&input, i))),
