@@ -7,6 +7,8 @@ mod elementary;
 mod flags;
 mod lane;
 mod level;
+mod limits;
+mod ray;
 mod real;
 mod unbounded;
 
@@ -16,5 +18,7 @@ pub use cpu::{LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
 pub use flags::{Flag, Flags};
 pub use lane::Lane;
 pub use level::{Baseline, Kernel, Level};
+pub use limits::{Roles, settle};
+pub use ray::Ray;
 pub use real::{Mask, Number, Real};
-pub use unbounded::{Precautions, Unbounded, WithCare, settle, with_care};
+pub use unbounded::{Precautions, Unbounded, WithCare, with_care};
