@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::flags::Flags;
+use super::flags::{Flag, Flags};
 use super::ray::{Limit, Ray};
 use super::real::{Mask, Number};
 use super::unbounded::Unbounded;
@@ -74,10 +74,27 @@ struct Rays<'a> {
 /// What the limits of one result along all rays are.
 enum Agreement {
     Number(Unbounded<f64>),
-    Infinite(bool),
+    /// An infinity with the sign of this number.
+    Infinite(f64),
     /// Few different numbers.
     Sides,
     None,
+}
+
+/// A group of results.
+struct Group<'a> {
+    range: Range<usize>,
+    agreements: Vec<Agreement>,
+    /// Results at the input itself.
+    plain: &'a [Unbounded<f64>],
+    /// The largest limit of the routine.
+    scale: Unbounded<f64>,
+}
+
+impl Group<'_> {
+    fn all(&self, is: impl Fn(&Agreement) -> bool) -> bool {
+        self.agreements.iter().all(is)
+    }
 }
 
 fn zero() -> Unbounded<f64> {
@@ -113,43 +130,55 @@ impl<'a> Rays<'a> {
         if (0..plain.len()).any(|i| !matches!(self.agreement(i, scale), Agreement::Number(_))) {
             self.cast(MANY);
         }
-        let (scale, all) = (self.largest(), !T::Mask::none());
+        let scale = self.largest();
         let mut settled = Vec::with_capacity(plain.len());
         for (number, &size) in self.roles.groups.iter().enumerate() {
-            let range = settled.len()..settled.len() + size;
-            let agreements: Vec<Agreement> = range.clone().map(|i| self.agreement(i, scale)).collect();
-            let plain = &plain[range.clone()];
+            let group = Group {
+                range: settled.len()..settled.len() + size,
+                agreements: (settled.len()..settled.len() + size).map(|i| self.agreement(i, scale)).collect(),
+                plain: &plain[settled.len()..settled.len() + size],
+                scale,
+            };
             let is_value = number == 0 && self.roles.values_first;
-            let has = |agreement: fn(&Agreement) -> bool| agreements.iter().any(agreement);
-            let none = has(|a| matches!(a, Agreement::None | Agreement::Infinite(_)));
-            let sides = has(|a| matches!(a, Agreement::Sides));
-            match &agreements[..] {
-                [Agreement::Infinite(negative)] if is_value => {
-                    flags.degenerate = all;
-                    settled.push(Unbounded::from_f64(if *negative { f64::NEG_INFINITY } else { f64::INFINITY }));
-                }
-                _ if none || (sides && is_value) => {
-                    flags.degenerate = all;
-                    // All of the group, so that forces still cancel.
-                    let keep = !self.is_outside && plain.iter().all(|&x| (x - x).equal(zero()));
-                    settled.extend(plain.iter().map(|&x| if keep { x } else { zero() }));
-                }
-                _ => {
-                    if sides {
-                        flags.kink = all;
-                    }
-                    let side = self.side(range.clone(), plain, scale);
-                    let limits =
-                        agreements.iter().zip(range).map(|(agreement, i)| match (agreement, self.limits[side][i]) {
-                            (&Agreement::Number(limit), _) | (_, Limit::Finite(limit)) => limit,
-                            _ => zero(),
-                        });
-                    let nearest = |(limit, &plain)| if is_near(plain, limit, scale) { plain } else { limit };
-                    settled.extend(limits.zip(plain).map(nearest));
-                }
+            let (numbers, flag) = if is_value { self.values(&group) } else { self.derivatives(&group) };
+            settled.extend(numbers);
+            match flag {
+                Some(Flag::Degenerate) => flags.degenerate = !T::Mask::none(),
+                Some(Flag::Kink) => flags.kink = !T::Mask::none(),
+                None => {}
             }
         }
         settled
+    }
+
+    /// Returns values: their limits, infinities, or else the documented values.
+    fn values(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
+        let value = |(agreement, &plain): (&Agreement, &Unbounded<f64>)| match agreement {
+            Agreement::Number(limit) => nearest(plain, *limit, group.scale),
+            Agreement::Infinite(sign) => Unbounded::from_f64(f64::INFINITY.copysign(*sign)),
+            _ if is_finite(plain) && !self.is_outside => plain,
+            _ => zero(),
+        };
+        let flag = (!group.all(|a| matches!(a, Agreement::Number(_)))).then_some(Flag::Degenerate);
+        (group.agreements.iter().zip(group.plain).map(value).collect(), flag)
+    }
+
+    /// Returns derivatives: their limits, or those of one side. If one has neither, all of the group are what the robust
+    /// primitives contribute, or 0, so that forces still cancel.
+    fn derivatives(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
+        if !group.all(|a| matches!(a, Agreement::Number(_) | Agreement::Sides)) {
+            let keep = !self.is_outside && group.plain.iter().copied().all(is_finite);
+            let conventions = group.plain.iter().map(|&x| if keep { x } else { zero() });
+            return (conventions.collect(), Some(Flag::Degenerate));
+        }
+        let side = &self.limits[self.side(group)];
+        let limit = |(agreement, i): (&Agreement, usize)| match (agreement, side[i]) {
+            (&Agreement::Number(limit), _) | (_, Limit::Finite(limit)) => limit,
+            _ => zero(),
+        };
+        let limits = group.agreements.iter().zip(group.range.clone()).map(limit);
+        let numbers = limits.zip(group.plain).map(|(limit, &plain)| nearest(plain, limit, group.scale)).collect();
+        (numbers, group.agreements.iter().any(|a| matches!(a, Agreement::Sides)).then_some(Flag::Kink))
     }
 
     fn numbers(&self, result: usize) -> impl Iterator<Item = Unbounded<f64>> {
@@ -169,10 +198,10 @@ impl<'a> Rays<'a> {
     fn agreement(&self, result: usize, scale: Unbounded<f64>) -> Agreement {
         let numbers: Vec<_> = self.numbers(result).collect();
         let infinite = self.limits.iter().filter_map(|ray| match ray[result] {
-            Limit::Infinite(negative) => Some(negative),
+            Limit::Infinite(sign) => Some(sign),
             _ => None,
         });
-        let infinite: Vec<bool> = infinite.collect();
+        let infinite: Vec<f64> = infinite.collect();
         match (&numbers[..], &infinite[..]) {
             ([], []) => Agreement::None,
             ([], [first, rest @ ..]) if rest.iter().all(|other| other == first) => Agreement::Infinite(*first),
@@ -191,13 +220,22 @@ impl<'a> Rays<'a> {
     }
 
     /// Returns the ray whose limits are the most like the plain results: the side on which the formula itself is.
-    fn side(&self, results: Range<usize>, plain: &[Unbounded<f64>], scale: Unbounded<f64>) -> usize {
+    fn side(&self, group: &Group<'_>) -> usize {
         let alike = |ray: usize| {
-            let same = |(limit, plain): (&Limit, &Unbounded<f64>)| matches!(limit, Limit::Finite(number) if is_near(*number, *plain, scale));
-            self.limits[ray][results.clone()].iter().zip(plain).filter(|pair| same(*pair)).count()
+            let same = |(limit, plain): (&Limit, &Unbounded<f64>)| matches!(limit, Limit::Finite(number) if is_near(*number, *plain, group.scale));
+            self.limits[ray][group.range.clone()].iter().zip(group.plain).filter(|pair| same(*pair)).count()
         };
         (0..self.limits.len()).rev().max_by_key(|&ray| alike(ray)).unwrap_or(0)
     }
+}
+
+fn is_finite(x: Unbounded<f64>) -> bool {
+    (x - x).equal(zero())
+}
+
+/// Returns the plain result if it is the limit, because it is more accurate.
+fn nearest(plain: Unbounded<f64>, limit: Unbounded<f64>, scale: Unbounded<f64>) -> Unbounded<f64> {
+    if is_near(plain, limit, scale) { plain } else { limit }
 }
 
 fn is_near(a: Unbounded<f64>, b: Unbounded<f64>, scale: Unbounded<f64>) -> bool {

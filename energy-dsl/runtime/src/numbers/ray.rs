@@ -307,7 +307,7 @@ impl Series {
             return if Order::ONE.is_larger_than(self.unknown) { Limit::Finite(factor(0.0)) } else { Limit::Unknown };
         };
         match first.order.compare(Order::ONE) {
-            Ordering::Less => Limit::Infinite(is_negative(first.factor)),
+            Ordering::Less => Limit::Infinite(self.sign()),
             Ordering::Equal => Limit::Finite(first.factor),
             Ordering::Greater => Limit::Finite(factor(0.0)),
         }
@@ -323,8 +323,8 @@ fn factorial(k: usize) -> f64 {
 pub(super) enum Limit {
     /// A finite number.
     Finite(Unbounded<f64>),
-    /// +∞, or −∞ if true.
-    Infinite(bool),
+    /// An infinity with the sign of this number.
+    Infinite(f64),
     /// The number is not defined along the ray.
     Unknown,
 }
@@ -497,13 +497,7 @@ mod tests {
     fn limit(of: Ray) -> f64 {
         match of.limit() {
             Limit::Finite(value) => value.to_scalar(),
-            Limit::Infinite(negative) => {
-                if negative {
-                    f64::NEG_INFINITY
-                } else {
-                    f64::INFINITY
-                }
-            }
+            Limit::Infinite(sign) => sign * f64::INFINITY,
             Limit::Unknown => f64::NAN,
         }
     }
