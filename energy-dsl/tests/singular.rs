@@ -19,6 +19,12 @@ energy! {
     energy Sum(p: Point) { norm(p) * norm(p) + unit(p).x * norm(p) }
     energy Quadratic(p, q: Point; k: Scalar) { k * norm_squared(p - q) }
     energy Deep(p: Point) { (1 - cos(norm(p))) / norm_squared(p) }
+    energy Opposite(a, b: Point) { 1 + dot(unit(a), unit(b)) }
+    energy Stretched(x0, x1, x2: Point; rest u0, u1, u2: Vec2) {
+        rest { let B = inverse(columns(u1 - u0, u2 - u0)); }
+        let F = columns(x1 - x0, x2 - x0) * B;
+        trace(transpose(F) * F)
+    }
     force Pull(p, q: Point; k: Scalar) { [k * unit(p - q) * norm(p - q), k * (q - p)] }
 }
 
@@ -113,4 +119,22 @@ fn forces_have_limits_too() {
     let pull = Pull::new(3.0).jacobians(&[ORIGIN; 2], &[ORIGIN; 2]);
     assert_eq!((pull.force, pull.flags.any()), ([ORIGIN; 2], false));
     assert!((pull.by_position[0][0][0] - 3.0).abs() < 1e-14 && pull.by_position[0][0][1] == 0.0);
+}
+
+#[test]
+fn one_plus_the_cosine_of_opposite_vectors_keeps_its_digits() {
+    let tilt = 1e-9;
+    let at = Opposite::<f64>::new().gradient(&[[1.0, 0.0, 0.0], [-1.0, tilt, 0.0]]);
+    let expected = tilt * tilt / 2.0;
+    assert!((at.value / expected - 1.0).abs() < 1e-14, "{}", at.value);
+    assert!((at.gradient[1][1] / tilt - 1.0).abs() < 1e-14);
+}
+
+#[test]
+fn an_inverted_rest_shape_is_refused() {
+    assert!(Stretched::new([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]).is_ok());
+    for flipped in [[0.0, -1.0], [2.0, 0.0]] {
+        let error = Stretched::new([0.0, 0.0], [1.0, 0.0], flipped).unwrap_err();
+        assert!(error.to_string().contains("inverted"), "{error}");
+    }
 }

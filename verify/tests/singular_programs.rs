@@ -34,7 +34,7 @@ fn scalar(depth: u32) -> BoxedStrategy<String> {
         1 => less().prop_map(|a| format!("log({a})")),
         1 => less().prop_map(|a| format!("sin({a})")),
         1 => less().prop_map(|a| format!("(1 - cos({a}))")),
-        1 => (less(), less()).prop_map(|(a, b)| format!("atan2({a}, {b})")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("atan2({a}, ({b})^2)")),
         2 => less().prop_map(|a| format!("abs({a})")),
         1 => (less(), less()).prop_map(|(a, b)| format!("max({a}, {b})")),
         1 => (less(), less(), less()).prop_map(|(a, b, c)| format!("(if {a} < {b} {{ {c} }} else {{ ({c})^2 }})")),

@@ -102,7 +102,7 @@ impl Interpreted {
                 values_first: routine.has_values(),
             }),
         });
-        let degenerate: Vec<NodeId> = routines.rest_flags[0].into_iter().collect();
+        let degenerate: Vec<NodeId> = routines.refused.into_iter().collect();
         Self {
             declaration: Box::leak(Box::new(describe(program, routines))),
             rest: Tape::new(&routines.rest.graph, std::slice::from_ref(&routines.rest.outputs), &degenerate),

@@ -135,8 +135,8 @@ impl Whole {
 pub struct Routines {
     /// The part that the rest shape determines.
     pub rest: RestFormula,
-    /// Masks under which the rest shape is degenerate.
-    pub rest_flags: [Option<NodeId>; 2],
+    /// Mask under which the rest shape is degenerate or inverted.
+    pub refused: Option<NodeId>,
     /// Graph of the moving part.
     pub graph: Graph,
     /// Routines in the order of the trait methods.
@@ -195,7 +195,7 @@ pub fn differentiate(
     program: &Program,
     (mut rest, Formula { mut graph, outputs }): (RestFormula, Formula),
 ) -> Routines {
-    let rest_flags = [degenerate(&mut rest.graph, &rest.outputs), None];
+    let refused = refused(&mut rest.graph, &rest.outputs);
     let g = &mut graph;
     let coordinates = match program.kind {
         Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
@@ -222,7 +222,7 @@ pub fn differentiate(
     let list = list.into_iter().map(|whole| whole.split(g)).collect();
     Routines {
         rest,
-        rest_flags,
+        refused,
         list,
         coordinates: coordinates.len(),
         vectors: if program.kind == Kind::Residual { Vec::new() } else { coordinates.vectors.clone() },
@@ -306,12 +306,17 @@ fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut 
     ]
 }
 
-/// Returns the mask under which a robust primitive of `outputs` is a convention.
-fn degenerate(g: &mut Graph, outputs: &[NodeId]) -> Option<NodeId> {
+/// Returns the mask of rest shapes for which a robust primitive is a convention, or a determinant is not positive.
+fn refused(g: &mut Graph, outputs: &[NodeId]) -> Option<NodeId> {
     let rules = operations(g, outputs).into_iter().filter_map(|node| g.rule(node));
-    let flags =
-        rules.flat_map(|rule| rule.flags.clone()).filter(|flag| flag.order == 0 && flag.flag == Flag::Degenerate);
-    flags.map(|flag| flag.mask).collect::<Vec<_>>().into_iter().reduce(|a, b| g.or(a, b))
+    let flags = rules.flat_map(|rule| rule.flags.clone());
+    let conventions = flags.filter(|flag| flag.order == 0 && flag.flag == Flag::Degenerate).map(|flag| flag.mask);
+    let mut masks: Vec<NodeId> = conventions.collect();
+    let zero = g.constant(0.0);
+    for determinant in g.determinants().to_vec() {
+        masks.push(g.less_or_equal(determinant, zero));
+    }
+    masks.into_iter().reduce(|a, b| g.or(a, b))
 }
 
 /// Lists the primitives for the documentation of the generated type.
