@@ -25,10 +25,10 @@ pub struct Roles<'a> {
 /// Evaluates a routine along a ray; `None` if the formula itself is degenerate there.
 type Along<'a> = &'a dyn Fn(&[Ray]) -> Option<Vec<Ray>>;
 
-/// Rays that are tried first: two opposite pairs.
-const FEW: usize = 4;
+/// Rays that are tried first: four opposite pairs.
+const FEW: usize = 8;
 /// Rays that tell a kink, where derivatives have some values, from a singularity, where each ray has its own.
-const MANY: usize = 16;
+const MANY: usize = 24;
 
 /// Replaces results by their limits, or by the documented values where there is none, and sets the flags.
 ///
@@ -111,16 +111,14 @@ impl<'a> Rays<'a> {
         let Roles { moves, groups, values_first } = self.roles;
         for ray in self.limits.len()..rays {
             let slope = |(i, &moves): (usize, &bool)| if moves { slope(ray, i) } else { 0.0 };
-            let slopes = moves.iter().enumerate().map(slope);
-            let inputs: Vec<Ray> = self.inputs.iter().zip(slopes).map(|(&x, slope)| Ray::from(x, slope)).collect();
-            let found = (self.along)(&inputs).map(|found| found.into_iter().map(Ray::limit).collect::<Vec<_>>());
+            let slopes: Vec<f64> = moves.iter().enumerate().map(slope).collect();
+            let found = Ray::limits(&self.inputs, &slopes, self.along);
             let values = if values_first { groups[0] } else { 0 };
             let is_inside = |found: &Vec<Limit>| !found[..values].iter().any(|value| matches!(value, Limit::Unknown));
             self.is_outside &= found.as_ref().is_some_and(|found| !is_inside(found));
             // Where the value is undefined, so are its derivatives.
             let found = found.filter(is_inside);
             self.limits.push(found.unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]));
-            Ray::forget();
         }
     }
 

@@ -4,7 +4,7 @@
 //! what it tends to as ε → 0. The series are those of a Hahn field: real powers of ε and of ln(1/ε), with the order
 //! and the arithmetic of real numbers.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -14,8 +14,6 @@ use super::unbounded::Unbounded;
 
 type Factor = Unbounded<f64>;
 
-/// Terms that a series keeps.
-const TERMS: usize = 10;
 /// A sum this small against its operands is rounding: they cancel.
 const CANCELLED: f64 = 1e-12;
 /// Powers that differ by less are equal.
@@ -95,11 +93,16 @@ impl Series {
     }
 
     /// Sorts terms, adds those of one order, and drops what is zero or unknown.
-    fn of(mut terms: Vec<Term>, mut unknown: Order) -> Self {
+    fn of(mut terms: Vec<Term>, unknown: Order) -> Self {
+        terms.sort_by(|a, b| a.order.compare(b.order));
+        Self::sorted(terms, unknown)
+    }
+
+    /// Adds terms of one order, and drops what is zero or unknown.
+    fn sorted(terms: Vec<Term>, mut unknown: Order) -> Self {
         if terms.iter().any(|term| !(term.factor - term.factor).equal(factor(0.0))) {
             return Self::undefined();
         }
-        terms.sort_by(|a, b| a.order.compare(b.order));
         let mut kept: Vec<Term> = Vec::with_capacity(terms.len());
         let mut first = 0;
         while first < terms.len() {
@@ -113,9 +116,10 @@ impl Series {
                 kept.push(Term { order, factor: sum });
             }
         }
-        if let Some(dropped) = kept.get(TERMS) {
+        let length = LENGTH.get();
+        if let Some(dropped) = kept.get(length) {
             unknown = unknown.larger(dropped.order);
-            kept.truncate(TERMS);
+            kept.truncate(length);
         }
         Self { terms: kept, unknown }
     }
@@ -139,8 +143,14 @@ impl Series {
     }
 
     fn plus(&self, other: &Self) -> Self {
-        let terms = self.terms.iter().chain(&other.terms).copied().collect();
-        Self::of(terms, self.unknown.larger(other.unknown))
+        let mut terms = Vec::with_capacity(self.terms.len() + other.terms.len());
+        let (mut a, mut b) = (self.terms.iter().peekable(), other.terms.iter().peekable());
+        while let (Some(x), Some(y)) = (a.peek(), b.peek()) {
+            let first = if y.order.is_larger_than(x.order) { &mut b } else { &mut a };
+            terms.extend(first.next());
+        }
+        terms.extend(a.chain(b));
+        Self::sorted(terms, self.unknown.larger(other.unknown))
     }
 
     fn times(&self, other: &Self) -> Self {
@@ -156,7 +166,11 @@ impl Series {
     }
 
     fn scaled(&self, by: f64) -> Self {
-        self.times(&Self::number(by))
+        if by == 0.0 && self.is_defined() {
+            return Self::number(0.0);
+        }
+        let terms = self.terms.iter().map(|term| Term { factor: term.factor * factor(by), ..*term }).collect();
+        Self { terms, ..*self }
     }
 
     fn minus(&self, other: &Self) -> Self {
@@ -168,7 +182,7 @@ impl Series {
         let order = by.order.raised(-1.0);
         let terms = self.terms.iter();
         let terms = terms.map(|t| Term { order: t.order.times(order), factor: t.factor / by.factor }).collect();
-        Self::of(terms, self.unknown.times(order))
+        Self::sorted(terms, self.unknown.times(order))
     }
 
     /// Splits t (1 + r) into t and the infinitesimal r; `None` if no term is known.
@@ -194,16 +208,16 @@ impl Series {
     /// Returns Σ coefficient(k) rᵏ for an infinitesimal r.
     fn composed(&self, coefficient: impl Fn(usize) -> f64) -> Self {
         let mut sum = Self::number(coefficient(0));
-        let mut power = Self::number(1.0);
-        for k in 1..=TERMS {
+        if self.is_zero() {
+            return sum;
+        }
+        let (mut power, length) = (Self::number(1.0), LENGTH.get());
+        for k in 1..=length {
             power = power.times(self);
             sum = sum.plus(&power.scaled(coefficient(k)));
         }
-        if !self.is_zero() {
-            let rest = self.leading().raised(TERMS as f64 + 1.0);
-            sum = Self::of(sum.terms, sum.unknown.larger(rest));
-        }
-        sum
+        let rest = self.leading().raised(length as f64 + 1.0);
+        Self::sorted(sum.terms, sum.unknown.larger(rest))
     }
 
     fn reciprocal(&self) -> Self {
@@ -329,8 +343,13 @@ pub(super) enum Limit {
     Unknown,
 }
 
+/// Terms that a series keeps at first, and if these do not determine a limit.
+const LENGTHS: [usize; 2] = [4, 10];
+
 thread_local! {
-    /// The series of all rays that this thread has computed since [`Ray::forget`].
+    /// Terms that a series keeps.
+    static LENGTH: Cell<usize> = const { Cell::new(LENGTHS[1]) };
+    /// The series of all rays that this thread is computing.
     static SERIES: RefCell<Vec<Series>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -339,13 +358,27 @@ thread_local! {
 pub struct Ray(u32);
 
 impl Ray {
-    /// Frees the series of this thread. Its rays become invalid.
-    pub(super) fn forget() {
-        SERIES.with_borrow_mut(Vec::clear);
+    /// Returns the limits of what a routine computes at x + slope · ε; `None` if it has no result.
+    pub(super) fn limits(
+        x: &[Unbounded<f64>],
+        slopes: &[f64],
+        along: &dyn Fn(&[Self]) -> Option<Vec<Self>>,
+    ) -> Option<Vec<Limit>> {
+        let at = |length: usize| {
+            LENGTH.set(length);
+            let rays: Vec<Self> = x.iter().zip(slopes).map(|(&x, &slope)| Self::from(x, slope)).collect();
+            let limits = along(&rays).map(|found| found.into_iter().map(Self::limit).collect::<Vec<_>>());
+            SERIES.with_borrow_mut(Vec::clear);
+            LENGTH.set(LENGTHS[1]);
+            limits
+        };
+        let short = at(LENGTHS[0])?;
+        let is_known = !short.iter().any(|limit| matches!(limit, Limit::Unknown));
+        if is_known { Some(short) } else { at(LENGTHS[1]) }
     }
 
     /// Creates x + slope · ε. An infinite x becomes |slope|/ε with its sign.
-    pub(super) fn from(x: Unbounded<f64>, slope: f64) -> Self {
+    fn from(x: Unbounded<f64>, slope: f64) -> Self {
         let term = |power: f64, factor| Term { order: Order { power, logs: 0.0 }, factor };
         let plain = x.to_scalar();
         if plain.is_infinite() && !(x - x).equal(factor(0.0)) {
@@ -355,7 +388,7 @@ impl Ray {
         Self::new(Series::of(vec![term(0.0, x), term(1.0, factor(slope))], Order::NEVER))
     }
 
-    pub(super) fn limit(self) -> Limit {
+    fn limit(self) -> Limit {
         self.read(Series::limit)
     }
 
