@@ -5,7 +5,9 @@ mod angle;
 mod arithmetic;
 mod dihedral;
 mod elementary;
+mod error_function;
 mod exponential;
+mod hyperbolic;
 mod inner_product;
 mod length;
 mod linear_algebra;
@@ -52,6 +54,8 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
         elementary::FUNCTIONS,
         exponential::FUNCTIONS,
         trigonometric::FUNCTIONS,
+        hyperbolic::FUNCTIONS,
+        error_function::FUNCTIONS,
         sinc::FUNCTIONS,
         loss::FUNCTIONS,
         linear_algebra::FUNCTIONS,
