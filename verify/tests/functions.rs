@@ -155,6 +155,15 @@ energy! {
     }
 
     #[audit(samples = 50)]
+    energy Polar(p, q: Point; M: Mat2x2) {
+        let F = columns(vector(p.x, p.y), vector(q.x, q.y)) + M;
+        let D = F - rotation_of(F);
+        let G = columns(p, q);
+        let E = stretch_of(G) - identity(2);
+        ddot(D, D) + trace(E)^2 + ddot(E, E) + dot(vector(p.x, q.z), rotation_of(G)[0]) * det(stretch_of(F))
+    }
+
+    #[audit(samples = 50)]
     energy Bounds(p, q: Point; a, b: Scalar) {
         let x = dot(p, q);
         clamp(x, -a, b)^2 + min(x, p.y, q.z, a) * max(x, p.z, b) + sign(x) * norm(p - q)

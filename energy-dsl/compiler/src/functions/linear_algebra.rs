@@ -222,7 +222,7 @@ fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
     }
 }
 
-fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
+pub(super) fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (x, y) = (&a[0], &a[1]);
     match (x.shape, y.shape) {
         (Shape::Scalar, _) => scaled(g, x.node(), y),

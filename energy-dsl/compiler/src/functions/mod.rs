@@ -14,6 +14,7 @@ mod linear_algebra;
 mod logic;
 mod loss;
 mod parallelogram;
+mod polar;
 mod quaternion;
 mod rotated;
 mod shape;
@@ -59,6 +60,7 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
         sinc::FUNCTIONS,
         loss::FUNCTIONS,
         linear_algebra::FUNCTIONS,
+        polar::FUNCTIONS,
         length::FUNCTIONS,
         angle::FUNCTIONS,
         dihedral::FUNCTIONS,
