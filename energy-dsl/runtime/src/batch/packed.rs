@@ -143,7 +143,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
             return Err(BatchError::Missing { needed: self.reach, given });
         }
         let within = range.start <= range.end && range.end <= self.elements;
-        if within && range.start % BLOCK == 0 {
+        if within && range.start.is_multiple_of(BLOCK) {
             Ok(())
         } else {
             Err(BatchError::Range { range: range.clone(), elements: self.elements })
