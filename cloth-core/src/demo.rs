@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use verify::audit::{Check, Options, Report, audit_all, describe_failure, targets_in};
 
+use crate::materials::ELEMENTS;
 use crate::scene::{Scene, SceneError};
 use crate::simulation::Simulation;
 
@@ -32,7 +33,7 @@ pub fn audit_materials(simulation: &Simulation) -> Result<String, AuditError> {
     elements.sort_unstable();
     elements.dedup();
     let options = Options::default();
-    let targets = targets_in(energy_elements::catalogue(), &elements).map_err(AuditError)?;
+    let targets = targets_in(ELEMENTS, &elements).map_err(AuditError)?;
     let report = audit_all(&targets, None, options);
     if !report.passed() {
         return Err(AuditError(failures(&report)));

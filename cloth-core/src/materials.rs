@@ -1,20 +1,64 @@
-//! Text descriptions of the declared elements.
+//! The elements that simulations are made of, and text descriptions of all declared elements.
 
 use std::fmt::Write as _;
 
-use energy_dsl::{Declaration, Field, OperationCount};
+use energy_dsl::{AnyElement, Declaration, Field, OperationCount};
+
+macro_rules! entries {
+    ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<energy_elements::$name<f64>>()),*] };
+}
+
+/// The elements of the library that terms of a simulation evaluate, in alphabetical order. Audits of simulations read
+/// this table; the whole catalogue would compile elements that no simulation has.
+pub const ELEMENTS: &[AnyElement] = entries![
+    ArcAngle,
+    AsRigidAsPossible,
+    BaraffWitkinShear,
+    BaraffWitkinStretch,
+    BoxContact,
+    BridsonBending,
+    BridsonForce,
+    BridsonForceDamped,
+    CapsuleContact,
+    DistanceBarrier,
+    FlatBending,
+    Gravity,
+    HairBend,
+    HingeDamping,
+    HookeSpring,
+    NeoHookean,
+    OrthotropicStVK,
+    PlaneContact,
+    SlidingFriction,
+    SphereContact,
+    Spring,
+    StVK,
+    StableNeoHookean,
+    StableNeoHookeanLog,
+    StrainRateDamping,
+    ThreadLimit,
+    ViscousDrag,
+    WindDrag,
+    ZeroLengthSpring,
+];
+
+/// Returns the element of [`ELEMENTS`] with this name.
+#[must_use]
+pub fn element(name: &str) -> Option<&'static AnyElement> {
+    ELEMENTS.iter().find(|entry| entry.declaration.name == name)
+}
 
 /// Describes every declared element: name, kind, formula, inputs with units, and operations per routine.
 #[must_use]
 pub fn listing() -> String {
-    let entries: Vec<String> = energy_elements::catalogue().iter().map(|entry| describe(entry.declaration)).collect();
+    let entries: Vec<String> = energy_elements::DECLARATIONS.iter().map(|declaration| describe(declaration)).collect();
     entries.join("\n")
 }
 
 /// Describes one declared element.
 ///
 /// ```
-/// let spring = energy_elements::find("HookeSpring").unwrap();
+/// let spring = cloth_core::materials::element("HookeSpring").unwrap();
 /// let text = cloth_core::materials::describe(spring.declaration);
 /// assert!(text.starts_with("HookeSpring (energy)") && text.contains("K [N/m]"));
 /// ```

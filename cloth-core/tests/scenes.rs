@@ -1,6 +1,7 @@
 //! Scenes with several parts: contact, friction, wind, moving pins, seams, hair, and the energy ledger.
 
 use cloth_core::Simulation;
+use cloth_core::materials::element;
 use cloth_core::scene::Scene;
 
 const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\
@@ -287,6 +288,10 @@ fn the_scenes_of_the_gallery_are_valid() {
             let scene = Scene::read(&path).unwrap_or_else(|error| panic!("{error}"));
             let simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             assert!(simulation.warnings().is_empty(), "{}: {:?}", path.display(), simulation.warnings());
+            for term in simulation.terms() {
+                let name = term.declaration().name;
+                assert!(element(name).is_some(), "{}: `{name}` is not in `materials::ELEMENTS`", path.display());
+            }
             count += 1;
         }
     }

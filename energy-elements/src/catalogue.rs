@@ -1,4 +1,4 @@
-use energy_dsl::AnyElement;
+use energy_dsl::{Declaration, Element};
 
 /// Calls a macro with the names of all elements of this crate, in alphabetical order.
 ///
@@ -6,7 +6,7 @@ use energy_dsl::AnyElement;
 /// macro_rules! count {
 ///     ($($name:ident),* $(,)?) => { [$(stringify!($name)),*].len() };
 /// }
-/// assert_eq!(energy_elements::for_each_element!(count), energy_elements::catalogue().len());
+/// assert_eq!(energy_elements::for_each_element!(count), energy_elements::DECLARATIONS.len());
 /// ```
 #[macro_export]
 macro_rules! for_each_element {
@@ -80,26 +80,15 @@ macro_rules! for_each_element {
     };
 }
 
-macro_rules! entries {
-    ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<crate::$name<f64>>()),*] };
+macro_rules! declarations {
+    ($($name:ident),* $(,)?) => { &[$(<crate::$name<f64> as Element>::DECLARATION),*] };
 }
 
-/// Returns all elements of this crate, in alphabetical order.
-// `#[inline(never)]`: a crate that inlines this function compiles every element again.
-#[inline(never)]
-#[must_use]
-pub fn catalogue() -> &'static [AnyElement] {
-    const CATALOGUE: &[AnyElement] = for_each_element!(entries);
-    CATALOGUE
-}
-
-/// Returns the element of this name; `None` if the crate has no such element.
+/// The declarations of all elements of this crate, in alphabetical order. A crate that only reads them compiles no
+/// routine of the elements; `energy_catalogue::catalogue` has these, too.
 ///
 /// ```
-/// let spring = energy_elements::find("Spring").unwrap();
-/// assert!(spring.declaration.translation_invariant);
+/// let spring = energy_elements::DECLARATIONS.iter().find(|declaration| declaration.name == "Spring").unwrap();
+/// assert!(spring.translation_invariant);
 /// ```
-#[must_use]
-pub fn find(name: &str) -> Option<&'static AnyElement> {
-    catalogue().iter().find(|entry| entry.declaration.name == name)
-}
+pub const DECLARATIONS: &[&Declaration] = for_each_element!(declarations);

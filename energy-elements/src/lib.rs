@@ -18,8 +18,7 @@
 
 mod catalogue;
 
-pub use catalogue::{catalogue, find};
-pub use energy_dsl::AnyElement as CatalogueEntry;
+pub use catalogue::DECLARATIONS;
 
 macro_rules! elements {
     ($($file:ident: $($name:ident),+;)*) => {

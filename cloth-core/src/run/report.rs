@@ -10,6 +10,7 @@ use verify::audit::{Check, Options, Report, Target, audit_all, describe_failure}
 
 use super::record::{Record, RecordError};
 use crate::fabric::Material;
+use crate::materials;
 use crate::output::{OutputError, OutputFolder};
 use crate::scene::Scene;
 use crate::simulation::Summary;
@@ -66,7 +67,7 @@ fn audited(record: &Record) -> Vec<Verdict> {
     let own = own_targets(record);
     let target = |name: &str| {
         let declared = own.iter().find(|target| target.name() == name).cloned();
-        declared.or_else(|| energy_elements::find(name).map(Target::of_element))
+        declared.or_else(|| materials::element(name).map(Target::of_element))
     };
     let verdict = |name: &str| match target(name) {
         Some(target) => verdict_on(name, &audit_all(&[target], None, Options::default())),

@@ -246,15 +246,15 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     }
 
     /// Calls `each` with an element's index, its energy, and the square root of its weight. Elements that met a
-    /// singularity have zero weight.
+    /// singularity have zero weight, unless their residual is infinite.
     fn weigh(&self, first: usize, count: usize, chunk: &Chunk, mut each: impl FnMut(usize, f64, f64)) {
         let rows = Self::rows();
         for at in 0..count {
-            if chunk.degenerate.contains(&at) {
+            let square: f64 = chunk.residuals[at * rows..][..rows].iter().map(|r| r * r).sum();
+            if square.is_finite() && chunk.degenerate.contains(&at) {
                 each(at, 0.0, 0.0);
                 continue;
             }
-            let square = chunk.residuals[at * rows..][..rows].iter().map(|r| r * r).sum();
             let (loss, slope) = self.loss.of(square);
             let weight = self.lambda * self.weights[first + at];
             each(at, weight * loss, (weight * slope).sqrt());

@@ -20,10 +20,6 @@ pub struct Demo {
     frames: usize,
 }
 
-/// The declared residuals of the demonstration's energy.
-#[cfg(feature = "audit")]
-const TERMS: [&str; 6] = ["NonrigidPlane4", "GraphEdge", "Binding", "BoneBinding", "SkeletonPlane", "BlendedPoint4"];
-
 impl Demo {
     pub fn run(&self) -> Result<()> {
         audit()?;
@@ -58,10 +54,21 @@ impl Demo {
 /// Compares the derivatives of every term with dual numbers and finite differences.
 #[cfg(feature = "audit")]
 fn audit() -> Result<()> {
-    use verify::audit::{Options, audit_all, describe_failure, targets_in};
+    use energy_dsl::AnyElement;
+    use energy_elements::{Binding, BlendedPoint4, BoneBinding, GraphEdge, NonrigidPlane4, SkeletonPlane};
+    use verify::audit::{Options, Target, audit_all, describe_failure};
 
+    // The declared residuals of the demonstration's energy.
+    const TERMS: &[AnyElement] = &[
+        AnyElement::of::<NonrigidPlane4<f64>>(),
+        AnyElement::of::<GraphEdge<f64>>(),
+        AnyElement::of::<Binding<f64>>(),
+        AnyElement::of::<BoneBinding<f64>>(),
+        AnyElement::of::<SkeletonPlane<f64>>(),
+        AnyElement::of::<BlendedPoint4<f64>>(),
+    ];
     let options = Options { samples: 50, ..Options::default() };
-    let targets = targets_in(energy_elements::catalogue(), &TERMS).map_err(anyhow::Error::msg)?;
+    let targets: Vec<Target> = TERMS.iter().map(Target::of_element).collect();
     let report = audit_all(&targets, None, options);
     if !report.passed() {
         let failures: Vec<String> = report.failures().map(describe_failure).collect();

@@ -12,8 +12,8 @@ pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
         let text = std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?;
         return Listing::from_file(&text, name).map_err(|errors| anyhow::anyhow!("{errors}"));
     }
-    let names = || energy_elements::catalogue().iter().map(|e| e.declaration.name).collect::<Vec<_>>().join(", ");
+    let names = || energy_catalogue::catalogue().iter().map(|e| e.declaration.name).collect::<Vec<_>>().join(", ");
     let entry =
-        energy_elements::find(name).with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
+        energy_catalogue::find(name).with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
     Listing::from_source(entry.declaration.source).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
 }

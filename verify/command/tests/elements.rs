@@ -2,14 +2,15 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use energy_elements::{CatalogueEntry, catalogue};
+use energy_catalogue::catalogue;
+use energy_dsl::AnyElement;
 use verify::audit::{Options, audit, describe_failure};
 
 /// The comparisons that `assert_derivatives!` makes for an element.
 const OPTIONS: Options = Options { samples: 200, truths: 5, mutations: 0, trials: 40, seed: 1 };
 
 /// Returns a description of each failed check of an element's generated code.
-fn problems(entry: &CatalogueEntry) -> Vec<String> {
+fn problems(entry: &AnyElement) -> Vec<String> {
     let report = audit(entry.declaration, entry.evaluate, OPTIONS);
     let refused = report.refused.iter().map(|(name, why)| format!("{name} cannot be audited: {why}"));
     let problems: Vec<String> = refused.chain(report.failures().map(describe_failure)).collect();

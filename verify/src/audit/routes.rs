@@ -55,7 +55,11 @@ impl Auditor<'_> {
             routes.push(Route { name: "multi-precision".into(), numbers: digits, uncertainty: 0.0 });
         }
         let dual = Check::DualNumbers.tolerance();
-        routes.push(Route { name: "dual numbers".into(), numbers: &case.dual(block.name).numbers, uncertainty: dual });
+        // Where the formula as written is 0/0, dual numbers have no value to compare a limit with.
+        let numbers = &case.dual(block.name).numbers;
+        if !numbers.iter().any(|number| number.is_nan()) {
+            routes.push(Route { name: "dual numbers".into(), numbers, uncertainty: dual });
+        }
         if let Some((lower, sweep)) = differences {
             routes.push(Route {
                 name: format!("differences of `{lower}` (step {:.1e})", sweep.step),

@@ -72,9 +72,8 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
         }
         Op::Abs(a) => {
             let minus = g.neg(one);
-            let (negative, at_zero) = (g.less(a, zero), g.equal(a, zero));
+            let negative = g.less(a, zero);
             let sign = g.select(negative, minus, one);
-            let sign = g.select(at_zero, zero, sign);
             Local::linear(vec![a], vec![sign])
         }
         Op::Min(a, b) => {

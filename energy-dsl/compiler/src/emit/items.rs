@@ -119,7 +119,7 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         let read = |input: Input| read_input(&program.rest, &program.parameters, input);
         let mut schedule = Schedule::new(&routines.rest.graph, &read);
         let precomputed = schedule.array(&routines.rest.outputs);
-        let degenerate = schedule.mask(routines.rest_flags[0]);
+        let degenerate = schedule.mask(routines.refused);
         let statements = schedule.statements();
         let inputs = || program.rest.iter().chain(&program.parameters);
         let names: Vec<_> = inputs().map(|input| format_ident!("{}", input.name)).collect();

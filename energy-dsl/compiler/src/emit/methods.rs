@@ -12,7 +12,7 @@ use quote::{format_ident, quote};
 use super::schedule::Schedule;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Graph, Input, NodeId};
-use crate::routines::{General, Routines};
+use crate::routines::{General, Routine, Routines};
 use energy_runtime::Kind;
 
 /// Converts a group of outputs to an expression.
@@ -100,7 +100,7 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
             // replaced afterwards. A scalar branches first. Values are passed by copy: a reference would force them
             // into memory on both paths.
             let WithCare { inputs, outputs, reads, returns, summed, code } =
-                with_care(method, name, program, routines, general);
+                with_care(method, name, program, routines, routine, general);
             let select = quote! {
                 let ordinary = self.#is_ordinary::<L>(#(#names),*);
                 if T::WIDE {
@@ -183,11 +183,18 @@ struct WithCare {
     code: TokenStream,
 }
 
-fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routines, general: &General) -> WithCare {
+fn with_care(
+    method: &Method,
+    name: &Ident,
+    program: &Program,
+    routines: &Routines,
+    routine: &Routine,
+    general: &General,
+) -> WithCare {
     let inputs = RefCell::new(Vec::new());
     let read = |input: Input| {
         let mut inputs = inputs.borrow_mut();
-        inputs.push(read_input(program, input));
+        inputs.push(input);
         let number = inputs.len() - 1;
         quote!(inputs[#number])
     };
@@ -215,6 +222,10 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
     });
     let outputs = outputs.collect();
     let inputs = inputs.into_inner();
+    let moves = inputs.iter().map(|input| matches!(input, Input::Position(_) | Input::Velocity(_)));
+    let moves: Vec<bool> = moves.collect();
+    let (sizes, values_first) = (routine.sizes(), routine.has_values());
+    let inputs: Vec<TokenStream> = inputs.into_iter().map(|input| read_input(program, input)).collect();
     let (reads, returns) = (inputs.len(), all.len());
     let what = format!("`{}` of [`{name}`].", method.routine);
     let code = quote! {
@@ -222,6 +233,9 @@ fn with_care(method: &Method, name: &Ident, program: &Program, routines: &Routin
         struct WithCare;
 
         impl ::energy_dsl::WithCare<#reads, #returns> for WithCare {
+            const ROLES: ::energy_dsl::Roles<'static> =
+                ::energy_dsl::Roles { moves: &[#(#moves),*], groups: &[#(#sizes),*], values_first: #values_first };
+
             fn compiled() -> &'static ::energy_dsl::Precautions<#reads, #returns> {
                 static COMPILED: ::energy_dsl::Precautions<#reads, #returns> =
                     ::energy_dsl::Precautions::of::<WithCare>();

@@ -10,8 +10,8 @@ use energy_runtime::Flag;
 pub(super) const FUNCTIONS: &[Function] = &[Function {
     name: "angle",
     usage: "angle(a, b)",
-    docs: "Unsigned angle between two 3-vectors, atan2(‖a×b‖, a·b). If they are parallel or one is 0, the \
-         derivatives are taken as 0 and flagged.",
+    docs: "Unsigned angle between two 3-vectors, atan2(‖a×b‖, a·b). If they are parallel or one is 0, it \
+         contributes no derivatives, and they are flagged.",
     shape: two_vectors,
     lower: angle,
     accuracy: "3 / 4 / 7",
@@ -144,10 +144,27 @@ pub(super) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
         return None;
     }
     let arguments = g.rule(cosine).filter(|r| r.primitive == Primitive::Cosine)?.arguments.clone();
+    Some(one_minus_cosine(g, arguments))
+}
+
+/// Creates 1 − â·b̂ of the vectors that the arguments list.
+fn one_minus_cosine(g: &mut Graph, arguments: Vec<NodeId>) -> NodeId {
     let at = aligned(g, &arguments[..3], &arguments[3..]);
     let (first, second) = cosine_derivatives(g, &at, true);
     let rule = Rule::factored(Primitive::OneMinusCosine, arguments, at.one_minus, first, second);
-    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
+    g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[])
+}
+
+/// Recognises 1 + â·b̂, which is 1 − cos of the angle between a and −b.
+pub(super) fn recognise_one_plus_cosine(g: &mut Graph, x: NodeId, y: NodeId) -> Option<NodeId> {
+    let (one, cosine) = if g.is(x, 1.0) { (x, y) } else { (y, x) };
+    if !g.is(one, 1.0) {
+        return None;
+    }
+    let arguments = g.rule(cosine).filter(|r| r.primitive == Primitive::Cosine)?.arguments.clone();
+    let opposite: Vec<NodeId> = arguments[3..].iter().map(|&b| g.neg(b)).collect();
+    let opposite = [&arguments[..3], &opposite].concat();
+    Some(one_minus_cosine(g, opposite))
 }
 
 /// Parts of the derivatives with respect to a, one of the two vectors.

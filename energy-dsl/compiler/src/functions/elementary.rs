@@ -24,7 +24,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "sqrt",
         "sqrt(x)",
         "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative \
-         at 0 is taken as 0 and flagged.",
+         at 0 is that of one side, and flagged as a kink.",
         one_scalar,
         "1",
         |g, a| g.sqrt(a[0].node())
@@ -68,7 +68,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "atan2",
         "atan2(y, x)",
-        "The angle of the point (x, y), in (−π, π].",
+        "The angle of the point (x, y), in (−π, π]. At the origin it is 0 and flagged.",
         two_scalars,
         "1",
         |g, a| g.atan2(a[0].node(), a[1].node())
@@ -76,7 +76,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "abs",
         "abs(x)",
-        "Absolute value |x|. The derivative at 0 is taken as 0.",
+        "Absolute value |x|. At 0, a kink, the derivative is 1.",
         one_scalar,
         "0",
         |g, a| g.abs(a[0].node())
@@ -84,7 +84,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "min",
         "min(a, b, …)",
-        "Smallest argument. If two are equal, the derivative is that of the first.",
+        "Smallest argument. If two are equal, a kink, the derivative is that of the first.",
         some_scalars,
         "0",
         |g, a| fold(g, a, Graph::min)
@@ -92,7 +92,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     scalar_function!(
         "max",
         "max(a, b, …)",
-        "Largest argument. If two are equal, the derivative is that of the first.",
+        "Largest argument. If two are equal, a kink, the derivative is that of the first.",
         some_scalars,
         "0",
         |g, a| fold(g, a, Graph::max)
@@ -108,10 +108,9 @@ pub(super) const FUNCTIONS: &[Function] = &[
             g.min(raised, a[2].node())
         }
     ),
-    scalar_function!("sign", "sign(x)", "−1, 0 or 1. The derivative is taken as 0.", one_scalar, "0", |g, a| sign(
-        g,
-        a[0].node()
-    )),
+    scalar_function!("sign", "sign(x)", "−1, 0 or 1; 0 is flagged. The derivative is 0.", one_scalar, "0", |g, a| {
+        sign(g, a[0].node())
+    }),
     scalar_function!(
         "power_of_two",
         "power_of_two(x)",

@@ -308,15 +308,21 @@ fn cofactors_by_pairs(g: &mut Graph, m: &Lowered) -> Vec<NodeId> {
 }
 
 fn det(g: &mut Graph, a: &[Lowered]) -> Lowered {
-    let n = a[0].dimensions().0;
     let cofactors = cofactors(g, &a[0]);
-    Lowered::scalar(g.dot(&a[0].parts[..n], &cofactors[..n]))
+    Lowered::scalar(determinant(g, &a[0], &cofactors))
+}
+
+fn determinant(g: &mut Graph, a: &Lowered, cofactors: &[NodeId]) -> NodeId {
+    let n = a.dimensions().0;
+    let value = g.dot(&a.parts[..n], &cofactors[..n]);
+    g.note_determinant(value);
+    value
 }
 
 fn inverse(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let n = a[0].dimensions().0;
     let cofactors = cofactors(g, &a[0]);
-    let determinant = g.dot(&a[0].parts[..n], &cofactors[..n]);
+    let determinant = determinant(g, &a[0], &cofactors);
     let parts = (0..n * n).map(|e| g.div(cofactors[(e % n) * n + e / n], determinant)).collect();
     Lowered::matrix(n, n, parts)
 }

@@ -96,6 +96,12 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: angle::recognise_one_minus_cosine,
     },
     Recogniser {
+        spelling: "1 + dot(unit(a), unit(b))",
+        form: "2 cos²(φ/2) of the angle φ between a and b",
+        ending: Ending::Sum,
+        recognise: angle::recognise_one_plus_cosine,
+    },
+    Recogniser {
         spelling: "norm(d) - L",
         form: "the elongation, accurate near rest; so is its \
         square",

@@ -109,6 +109,9 @@ impl Graph {
             let two = self.constant(2.0);
             return self.mul(two, a);
         }
+        if let Some(recognised) = self.recognised(Ending::Sum, a, b) {
+            return recognised;
+        }
         match (self.magnitude(a), self.magnitude(b)) {
             ((x, true), (y, true)) => {
                 let sum = self.add(x, y);

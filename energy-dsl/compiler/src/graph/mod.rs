@@ -49,6 +49,8 @@ pub struct Graph {
     assumptions: Vec<Assumption>,
     /// Origins of vectors, by their components; see `origin.rs`.
     origins: HashMap<Vec<NodeId>, Origin>,
+    /// Determinants of square matrices. That of a rest shape must be positive.
+    determinants: Vec<NodeId>,
     /// Nodes that are rounded before every use; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
     /// Differences of products that absorb a weight; see `sums.rs`.
@@ -86,6 +88,7 @@ impl Graph {
             rule_index: HashMap::new(),
             assumptions: Vec::new(),
             origins: HashMap::new(),
+            determinants: Vec::new(),
             rounded: BTreeSet::new(),
             weighable: BTreeMap::new(),
             outward: false,

@@ -29,4 +29,16 @@ impl Graph {
     pub(crate) fn origin(&self, components: &[NodeId]) -> Option<&Origin> {
         self.origins.get(components)
     }
+
+    /// Records that a node is the determinant of a square matrix.
+    pub(crate) fn note_determinant(&mut self, determinant: NodeId) {
+        if !self.determinants.contains(&determinant) {
+            self.determinants.push(determinant);
+        }
+    }
+
+    /// Returns all determinants.
+    pub(crate) fn determinants(&self) -> &[NodeId] {
+        &self.determinants
+    }
 }

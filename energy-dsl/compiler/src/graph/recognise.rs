@@ -7,6 +7,8 @@ use super::{Graph, NodeId};
 /// The operation that a spelling ends in. The constructor of that operation looks the spelling up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
+    /// a + b.
+    Sum,
     /// a − b.
     Difference,
     /// √a.

@@ -9,7 +9,8 @@ use crate::lower::lower;
 use crate::properties::prove;
 use crate::routines::{Routines, differentiate};
 use energy_runtime::{
-    Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, RestError, Routine, settle, triangle_index,
+    Declaration, Field, Flags, Inputs, Kind, Mask, Number, Outputs, Ray, RestError, Roles, Routine, settle,
+    triangle_index,
 };
 
 /// An element whose compiled routines are interpreted instead of emitted as Rust. Declarations read at run time are
@@ -51,6 +52,8 @@ struct GeneralPath {
     guard: Tape,
     tape: Tape,
     flags: [bool; 2],
+    /// Whether the first group is of values, not of derivatives.
+    values_first: bool,
 }
 
 impl Interpreted {
@@ -96,9 +99,10 @@ impl Interpreted {
                 guard: Tape::new(graph, &[], &[general.ordinary]),
                 tape: Tape::new(graph, &general.groups, &masks(general.flags)),
                 flags: present(general.flags),
+                values_first: routine.has_values(),
             }),
         });
-        let degenerate: Vec<NodeId> = routines.rest_flags[0].into_iter().collect();
+        let degenerate: Vec<NodeId> = routines.refused.into_iter().collect();
         Self {
             declaration: Box::leak(Box::new(describe(program, routines))),
             rest: Tape::new(&routines.rest.graph, std::slice::from_ref(&routines.rest.outputs), &degenerate),
@@ -283,6 +287,13 @@ impl InterpretedRoutine {
 }
 
 impl GeneralPath {
+    fn with_flags<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> (Vec<Vec<T>>, Flags<T>) {
+        let (groups, masks) = self.tape.run(inputs, rest);
+        let mut masks = masks.into_iter();
+        let mut mask = |is_there| if is_there { masks.next() } else { None }.unwrap_or_else(Mask::none);
+        (groups, Flags { degenerate: mask(self.flags[0]), kink: mask(self.flags[1]) })
+    }
+
     /// Runs the general path over numbers with an extended exponent.
     fn run<T: Number>(&self, inputs: &Inputs<'_, T>, rest: &[T]) -> Results<T> {
         let unbounded = |numbers: &[T]| numbers.iter().map(|x| x.unbounded(0)).collect::<Vec<_>>();
@@ -293,17 +304,30 @@ impl GeneralPath {
             velocities: &unbounded(inputs.velocities),
         };
         let rest = unbounded(rest);
-        let (mut groups, masks) = self.tape.run(&inputs, &rest);
+        let (groups, mut flags) = self.with_flags(&inputs, &rest);
         let number = |value: T::Unbounded| {
             let mut number = T::from_f64(0.0);
             number.set_lane(0, value);
             number
         };
-        let mut masks = masks.into_iter();
-        let mut mask = |is_there| if is_there { masks.next() } else { None }.unwrap_or_else(Mask::none);
-        let mut flags = Flags { degenerate: mask(self.flags[0]), kink: mask(self.flags[1]) };
-        let read = [inputs.parameters, inputs.rest, inputs.positions, inputs.velocities, &rest].concat();
-        groups.iter_mut().for_each(|group| settle(&read, group, &mut flags));
+        let Inputs { parameters, rest: shape, positions, velocities } = inputs;
+        let read = [parameters, shape, &rest, positions, velocities].concat();
+        let fixed = parameters.len() + shape.len() + rest.len();
+        let moves: Vec<bool> = (0..read.len()).map(|i| i >= fixed).collect();
+        let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
+        let mut results = groups.concat();
+        let along = |rays: &[Ray]| {
+            let mut rays = rays;
+            let mut take = |count: usize| rays.split_off(..count).expect("as many rays as inputs");
+            let (parameters, shape, rest) = (take(parameters.len()), take(shape.len()), take(rest.len()));
+            let (positions, velocities) = (take(positions.len()), take(velocities.len()));
+            let (groups, flags) = self.with_flags(&Inputs { parameters, rest: shape, positions, velocities }, rest);
+            (!flags.degenerate).then(|| groups.concat())
+        };
+        let roles = Roles { moves: &moves, groups: &sizes, values_first: self.values_first };
+        settle(&read, roles, &mut results, &mut flags, &along);
+        let mut results = results.into_iter();
+        let groups: Vec<Vec<T::Unbounded>> = sizes.iter().map(|&size| results.by_ref().take(size).collect()).collect();
         let groups = groups.into_iter().map(|group| group.into_iter().map(number).collect()).collect();
         let mask = |mask: <T::Unbounded as Number>::Mask| T::Mask::from_bits(u32::from(mask.any()));
         let flags = Flags { degenerate: mask(flags.degenerate), kink: mask(flags.kink) };

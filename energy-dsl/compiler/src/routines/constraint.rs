@@ -1,6 +1,6 @@
 //! The routines of a constraint: those of its energy U = ½ k_s CᵀC, C with J and ∂²C, and its force f = −∇U − k_d Jᵀ Ċ.
 
-use super::{Routine, flags, potential};
+use super::{Hazards, Whole, hazards, potential};
 use crate::check::Program;
 use crate::diff::{Coordinates, Plan, SecondOrder, first_order, second_order};
 use crate::graph::{Graph, Input, NodeId, symmetric_index};
@@ -27,7 +27,7 @@ pub(super) fn routines(
     c: &[NodeId],
     coordinates: &Coordinates,
     plans: &mut Vec<Plan>,
-) -> (Vec<Routine>, SecondOrder) {
+) -> (Vec<Whole>, SecondOrder) {
     let parameter = |g: &mut Graph, from_end: usize| {
         let number = program.parameters_size() - from_end;
         g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
@@ -68,34 +68,34 @@ pub(super) fn routines(
 }
 
 impl Compliant<'_> {
-    /// Returns the flags of U's derivatives of one order and of C's of another.
-    fn flags(&self, g: &mut Graph, energy_order: u8, row_order: u8) -> [Option<NodeId>; 2] {
+    /// Returns the hazards of U's derivatives of one order and of C's of another.
+    fn hazards(&self, g: &mut Graph, energy_order: u8, row_order: u8) -> Hazards {
         let mut roots = vec![(self.energy.value, energy_order)];
         roots.extend(self.c.iter().map(|&row| (row, row_order)));
-        flags(g, &roots)
+        hazards(g, &roots)
     }
 
     /// Creates the routines of C with J, and with ∂²C too.
-    fn geometry(&self, g: &mut Graph) -> [Routine; 2] {
+    fn geometry(&self, g: &mut Graph) -> [Whole; 2] {
         let rows = |order: u8| self.c.iter().map(|&row| (row, order)).collect::<Vec<_>>();
-        let (first_flags, second_flags) = (flags(g, &rows(1)), flags(g, &rows(2)));
+        let (first, second) = (hazards(g, &rows(1)), hazards(g, &rows(2)));
         let (c, jacobian, hessians) = (self.c.to_vec(), self.jacobian.concat(), self.hessians.concat());
         let full_jacobian: Vec<NodeId> =
             self.jacobian.iter().flat_map(|row| self.coordinates.expand_all(g, row, self.points)).collect();
         let full_hessians: Vec<NodeId> =
             self.hessians.iter().flat_map(|row| self.coordinates.expand_triangle(g, row, self.points)).collect();
         [
-            Routine::new(
+            Whole::new(
                 "constraint_jacobian",
                 [&c[..], &jacobian].concat(),
                 vec![c.clone(), full_jacobian.clone()],
-                first_flags,
+                first,
             ),
-            Routine::new(
+            Whole::new(
                 "constraint_hessian",
                 [&c[..], &jacobian, &hessians].concat(),
                 vec![c, full_jacobian, full_hessians],
-                second_flags,
+                second,
             ),
         ]
     }
@@ -108,26 +108,25 @@ impl Compliant<'_> {
     }
 
     /// Creates the routine of U, ∇U and k_s JᵀJ.
-    fn gauss_newton(&self, g: &mut Graph) -> Routine {
+    fn gauss_newton(&self, g: &mut Graph) -> Whole {
         let n = self.coordinates.len();
         let upper = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
         let curvature: Vec<NodeId> = upper.map(|(i, j)| self.outer(g, self.stiffness, i, j)).collect();
         let value = self.energy.value;
-        Routine::new(
+        let full_gradient = self.coordinates.expand_all(g, &self.gradient, self.points);
+        let full_curvature = self.coordinates.expand_triangle(g, &curvature, self.points);
+        let hazards = self.hazards(g, 1, 1);
+        Whole::new(
             "gauss_newton",
             [&[value], &self.gradient[..], &curvature].concat(),
-            vec![
-                vec![value],
-                self.coordinates.expand_all(g, &self.gradient, self.points),
-                self.coordinates.expand_triangle(g, &curvature, self.points),
-            ],
-            self.flags(g, 1, 1),
+            vec![vec![value], full_gradient, full_curvature],
+            hazards,
         )
     }
 
     /// Creates the routines of the force f = −∇U − k_d Jᵀ Ċ with Ċ = J q̇, where q̇ are the differences of velocities,
     /// and of its Jacobians ∂f/∂x = −∇²U − k_d Σ (Ċ ∂²C + ∇C (∂²C q̇)ᵀ) and ∂f/∂v = −k_d JᵀJ.
-    fn force(&self, g: &mut Graph) -> [Routine; 2] {
+    fn force(&self, g: &mut Graph) -> [Whole; 2] {
         let n = self.coordinates.len();
         let speeds = self.coordinates.rates(g);
         let rates: Vec<NodeId> = self.jacobian.iter().map(|row| g.dot(row, &speeds)).collect();
@@ -170,13 +169,14 @@ impl Compliant<'_> {
         let full_force = self.coordinates.expand_all(g, &force, self.points);
         let full_position = self.coordinates.expand_square(g, &by_position, self.points);
         let full_velocity = self.coordinates.expand_square(g, &by_velocity, self.points);
+        let hazards = [(1, 1), (2, 2)].map(|(energy, rows)| self.hazards(g, energy, rows));
         [
-            Routine::new("force", force.clone(), vec![full_force.clone()], self.flags(g, 1, 1)),
-            Routine::new(
+            Whole::new("force", force.clone(), vec![full_force.clone()], hazards[0]),
+            Whole::new(
                 "jacobians",
                 [force, by_position, by_velocity].concat(),
                 vec![full_force, full_position, full_velocity],
-                self.flags(g, 2, 2),
+                hazards[1],
             ),
         ]
     }

@@ -1,14 +1,14 @@
 //! The routines of each kind of declaration, as nodes of one graph.
 
 mod constraint;
-
-use std::collections::BTreeSet;
+mod hazards;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, second_order};
-use crate::graph::{Graph, Input, NodeId, Op, Primitive, general, ordinary, with_signs_inside};
+use crate::graph::{Graph, Input, NodeId, Op, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, RestFormula};
 use energy_runtime::{Flag, Kind};
+use hazards::{Hazards, hazards, operations};
 
 /// A routine to be generated.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub struct Routine {
     pub reduced: Vec<NodeId>,
     /// Returned results by group: value, gradient, ….
     pub groups: Vec<Vec<NodeId>>,
-    /// Masks of the flags: degenerate, kink.
+    /// Masks of the flags of the ordinary path: degenerate, kink.
     pub flags: [Option<NodeId>; 2],
     /// The general path; `None` if there are no precautions.
     pub general: Option<General>,
@@ -32,37 +32,21 @@ pub struct General {
     pub ordinary: NodeId,
     /// Results on the general path.
     pub groups: Vec<Vec<NodeId>>,
-    /// Masks of the flags on the general path.
+    /// Masks of inputs at which a result may be a convention: degenerate, kink. Rays through the input decide.
     pub flags: [Option<NodeId>; 2],
 }
 
 impl Routine {
-    fn new(name: &'static str, reduced: Vec<NodeId>, groups: Vec<Vec<NodeId>>, flags: [Option<NodeId>; 2]) -> Self {
-        Self { name, reduced, groups, flags, general: None }
+    /// Returns the number of results in each group.
+    #[must_use]
+    pub fn sizes(&self) -> Vec<usize> {
+        self.groups.iter().map(Vec::len).collect()
     }
 
-    /// Splits the routine into its ordinary and its general path.
-    fn split(self, g: &mut Graph) -> Self {
-        let all: Vec<NodeId> = self.reduced.iter().copied().chain(self.outputs()).collect();
-        let cautious = general(g, &all);
-        let Some((nodes, ordinary)) = ordinary(g, &all) else {
-            let nodes = with_signs_inside(g, &cautious);
-            return self.with(g, &nodes);
-        };
-        let cautious = self.with(g, &cautious);
-        let general = General { ordinary, groups: cautious.groups, flags: cautious.flags };
-        let nodes = with_signs_inside(g, &nodes);
-        Self { general: Some(general), ..self.with(g, &nodes) }
-    }
-
-    /// Replaces the nodes of the routine: reduced, groups, flags.
-    fn with(&self, g: &Graph, nodes: &[NodeId]) -> Self {
-        let mut nodes = nodes.iter().copied();
-        let mut take = |n: usize| nodes.by_ref().take(n).collect::<Vec<_>>();
-        let reduced = take(self.reduced.len());
-        let groups = self.groups.iter().map(|group| take(group.len())).collect();
-        let flags = self.flags.map(|flag| flag.map(|_| take(1)[0]).filter(|&mask| g.op(mask) != Op::Truth(false)));
-        Self { name: self.name, reduced, groups, flags, general: None }
+    /// Returns whether the first group is of values, not of derivatives.
+    #[must_use]
+    pub fn has_values(&self) -> bool {
+        self.name != "hessian_vector"
     }
 
     /// Returns all outputs.
@@ -80,13 +64,79 @@ impl Routine {
     }
 }
 
+/// A routine before it is split into its ordinary and its general path.
+struct Whole {
+    name: &'static str,
+    reduced: Vec<NodeId>,
+    groups: Vec<Vec<NodeId>>,
+    hazards: Hazards,
+}
+
+impl Whole {
+    fn new(name: &'static str, reduced: Vec<NodeId>, groups: Vec<Vec<NodeId>>, hazards: Hazards) -> Self {
+        Self { name, reduced, groups, hazards }
+    }
+
+    fn nodes(&self) -> Vec<NodeId> {
+        let Hazards { flags, sound } = self.hazards;
+        let masks = flags.into_iter().flatten().chain(sound);
+        self.reduced.iter().copied().chain(self.groups.iter().flatten().copied()).chain(masks).collect()
+    }
+
+    /// Replaces the nodes of the routine.
+    fn with(&self, g: &Graph, nodes: &[NodeId]) -> Self {
+        let mut nodes = nodes.iter().copied();
+        let mut take = |n: usize| nodes.by_ref().take(n).collect::<Vec<_>>();
+        let reduced = take(self.reduced.len());
+        let groups = self.groups.iter().map(|group| take(group.len())).collect();
+        let mut mask = |mask: Option<NodeId>| mask.map(|_| take(1)[0]);
+        let flags = self.hazards.flags.map(|flag| mask(flag).filter(|&flag| g.op(flag) != Op::Truth(false)));
+        let sound = mask(self.hazards.sound).filter(|&sound| g.op(sound) != Op::Truth(true));
+        Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound } }
+    }
+
+    /// Returns the mask where the sum of the values is finite.
+    fn is_finite(&self, g: &mut Graph) -> NodeId {
+        // The results before they are expanded to points are fewer.
+        let values = if self.reduced.len() < self.groups[0].len() { &self.reduced } else { &self.groups[0] };
+        let (sum, infinity) = (g.sum(values.clone()), g.constant(f64::INFINITY));
+        let size = g.abs(sum);
+        g.less(size, infinity)
+    }
+
+    fn split(self, g: &mut Graph) -> Routine {
+        let all = self.nodes();
+        let cautious = general(g, &all);
+        let (nodes, moderate) = match ordinary(g, &all) {
+            Some((nodes, moderate)) => (nodes, Some(moderate)),
+            None => (cautious.clone(), None),
+        };
+        let nodes = with_signs_inside(g, &nodes);
+        let ordinary = self.with(g, &nodes);
+        let finite = ordinary.is_finite(g);
+        let Hazards { flags, sound } = ordinary.hazards;
+        let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
+        let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).collect();
+        let Self { name, reduced, groups, .. } = ordinary;
+        if guards.is_empty() {
+            // A polynomial: it overflows where its own terms do.
+            let degenerate = Some(g.not(finite)).filter(|&mask| g.op(mask) != Op::Truth(false));
+            return Routine { name, reduced, groups, flags: [degenerate, None], general: None };
+        }
+        let ordinary = guards.into_iter().fold(finite, |all, guard| g.and(all, guard));
+        let Self { groups: with_care, hazards, .. } = self.with(g, &cautious);
+        let general = General { ordinary, groups: with_care, flags: hazards.flags };
+        Routine { name, reduced, groups, flags: [None, None], general: Some(general) }
+    }
+}
+
 /// The routines of a declaration.
 #[derive(Clone, Debug)]
 pub struct Routines {
     /// The part that the rest shape determines.
     pub rest: RestFormula,
-    /// Masks under which the rest shape is degenerate.
-    pub rest_flags: [Option<NodeId>; 2],
+    /// Mask under which the rest shape is degenerate or inverted.
+    pub refused: Option<NodeId>,
     /// Graph of the moving part.
     pub graph: Graph,
     /// Routines in the order of the trait methods.
@@ -145,7 +195,7 @@ pub fn differentiate(
     program: &Program,
     (mut rest, Formula { mut graph, outputs }): (RestFormula, Formula),
 ) -> Routines {
-    let rest_flags = flags(&mut rest.graph, &rest.outputs.iter().map(|&o| (o, 0)).collect::<Vec<_>>());
+    let refused = refused(&mut rest.graph, &rest.outputs);
     let g = &mut graph;
     let coordinates = match program.kind {
         Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
@@ -153,7 +203,7 @@ pub fn differentiate(
     };
     let mut plans = Vec::new();
     let mut expansion = None;
-    let list: Vec<Routine> = match program.kind {
+    let list: Vec<Whole> = match program.kind {
         Kind::Energy => {
             let (energy, plan) = second_order(g, "hessian", outputs[0], &coordinates);
             plans.push(plan);
@@ -169,10 +219,10 @@ pub fn differentiate(
         Kind::Residual => residual(g, &outputs, &coordinates, &mut plans),
     };
     let primitives = primitives(g, &outputs, &list);
-    let list: Vec<Routine> = list.into_iter().map(|routine| routine.split(g)).collect();
+    let list = list.into_iter().map(|whole| whole.split(g)).collect();
     Routines {
         rest,
-        rest_flags,
+        refused,
         list,
         coordinates: coordinates.len(),
         vectors: if program.kind == Kind::Residual { Vec::new() } else { coordinates.vectors.clone() },
@@ -191,7 +241,7 @@ fn potential(
     coordinates: &Coordinates,
     points: usize,
     plans: &mut Vec<Plan>,
-) -> Vec<Routine> {
+) -> Vec<Whole> {
     let value = energy.value;
     let known = Some(energy.gradient.clone());
     let (mut gradient, plan) = first_order(g, "gradient", &[value], coordinates, known);
@@ -200,22 +250,22 @@ fn potential(
     let (product, plan) = hessian_vector(g, "hessian_vector", energy, coordinates);
     plans.push(plan);
     let full_product = coordinates.expand_all(g, &product, points);
-    let flags = [0, 1, 2].map(|order| flags(g, &[(value, order)]));
+    let hazards = [0, 1, 2].map(|order| hazards(g, &[(value, order)]));
     let full_gradient = coordinates.expand_all(g, &gradient, points);
     let hessian_gradient = coordinates.expand_all(g, &energy.gradient, points);
     let triangle = coordinates.expand_triangle(g, &energy.hessian, points);
     let reduced = [&[value], &energy.gradient[..], &energy.hessian[..]].concat();
     let reduced_groups = vec![vec![value], energy.gradient.clone(), energy.hessian.clone()];
     vec![
-        Routine::new("value", vec![value], vec![vec![value]], flags[0]),
-        Routine::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], flags[1]),
-        Routine::new("hessian", reduced.clone(), vec![vec![value], hessian_gradient, triangle], flags[2]),
-        Routine::new("reduced_hessian", reduced, reduced_groups, flags[2]),
-        Routine::new("hessian_vector", product, vec![full_product], flags[2]),
+        Whole::new("value", vec![value], vec![vec![value]], hazards[0]),
+        Whole::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], hazards[1]),
+        Whole::new("hessian", reduced.clone(), vec![vec![value], hessian_gradient, triangle], hazards[2]),
+        Whole::new("reduced_hessian", reduced, reduced_groups, hazards[2]),
+        Whole::new("hessian_vector", product, vec![full_product], hazards[2]),
     ]
 }
 
-fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize, plans: &mut Vec<Plan>) -> Vec<Routine> {
+fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize, plans: &mut Vec<Plan>) -> Vec<Whole> {
     let (by_position, plan) = first_order(g, "jacobians", f, coordinates, None);
     plans.push(plan);
     let velocities = Coordinates::of_points(g, f, Moving::Velocities);
@@ -237,68 +287,45 @@ fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize, 
     let full_position = square(g, &by_position, coordinates);
     let full_velocity = square(g, &by_velocity, &velocities);
     let order = |order: u8| f.iter().map(|&node| (node, order)).collect::<Vec<_>>();
+    let hazards = [0, 1].map(|i| hazards(g, &order(i)));
     vec![
-        Routine::new("force", f.to_vec(), vec![f.to_vec()], flags(g, &order(0))),
-        Routine::new("jacobians", reduced, vec![f.to_vec(), full_position, full_velocity], flags(g, &order(1))),
+        Whole::new("force", f.to_vec(), vec![f.to_vec()], hazards[0]),
+        Whole::new("jacobians", reduced, vec![f.to_vec(), full_position, full_velocity], hazards[1]),
     ]
 }
 
-fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut Vec<Plan>) -> Vec<Routine> {
+fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut Vec<Plan>) -> Vec<Whole> {
     let (jacobian, plan) = first_order(g, "jacobian", r, coordinates, None);
     plans.push(plan);
     let jacobian = jacobian.concat();
     let order = |order: u8| r.iter().map(|&node| (node, order)).collect::<Vec<_>>();
+    let hazards = [0, 1].map(|i| hazards(g, &order(i)));
     vec![
-        Routine::new("residual", r.to_vec(), vec![r.to_vec()], flags(g, &order(0))),
-        Routine::new(
-            "jacobian",
-            r.iter().chain(&jacobian).copied().collect(),
-            vec![r.to_vec(), jacobian],
-            flags(g, &order(1)),
-        ),
+        Whole::new("residual", r.to_vec(), vec![r.to_vec()], hazards[0]),
+        Whole::new("jacobian", r.iter().chain(&jacobian).copied().collect(), vec![r.to_vec(), jacobian], hazards[1]),
     ]
 }
 
-/// Returns the rules that `roots` depend on.
-fn rules(g: &Graph, roots: &[NodeId]) -> BTreeSet<NodeId> {
-    let mut seen = BTreeSet::new();
-    let mut stack = roots.to_vec();
-    while let Some(node) = stack.pop() {
-        if seen.insert(node) {
-            match g.rule(node) {
-                Some(rule) => stack.extend(&rule.arguments),
-                None => stack.extend(g.op(node).operands()),
-            }
-        }
+/// Returns the mask of rest shapes for which a robust primitive is a convention, or a determinant is not positive.
+fn refused(g: &mut Graph, outputs: &[NodeId]) -> Option<NodeId> {
+    let rules = operations(g, outputs).into_iter().filter_map(|node| g.rule(node));
+    let flags = rules.flat_map(|rule| rule.flags.clone());
+    let conventions = flags.filter(|flag| flag.order == 0 && flag.flag == Flag::Degenerate).map(|flag| flag.mask);
+    let mut masks: Vec<NodeId> = conventions.collect();
+    let zero = g.constant(0.0);
+    for determinant in g.determinants().to_vec() {
+        masks.push(g.less_or_equal(determinant, zero));
     }
-    seen.retain(|&node| matches!(g.op(node), Op::Rule(_)));
-    seen
-}
-
-/// Returns the masks (degenerate, kink) under which derivatives of `roots` up to the given orders are conventions.
-fn flags(g: &mut Graph, roots: &[(NodeId, u8)]) -> [Option<NodeId>; 2] {
-    let mut masks = [None, None];
-    for &(root, order) in roots {
-        for node in rules(g, &[root]) {
-            for flag in g.rule(node).expect("a rule").flags.clone() {
-                if flag.order <= order {
-                    let mask = &mut masks[usize::from(flag.flag == Flag::Kink)];
-                    *mask = Some(mask.map_or(flag.mask, |other| g.or(other, flag.mask)));
-                }
-            }
-        }
-    }
-    masks
+    masks.into_iter().reduce(|a, b| g.or(a, b))
 }
 
 /// Lists the primitives for the documentation of the generated type.
-fn primitives(g: &Graph, outputs: &[NodeId], list: &[Routine]) -> Vec<&'static str> {
+fn primitives(g: &Graph, outputs: &[NodeId], list: &[Whole]) -> Vec<&'static str> {
     let values: Vec<NodeId> =
         outputs.iter().chain(list.first().into_iter().flat_map(|r| r.groups.iter().flatten())).copied().collect();
     let mut labels: Vec<&'static str> = Vec::new();
-    for node in rules(g, &values) {
-        let primitive: Primitive = g.rule(node).expect("a rule").primitive;
-        if let Some(label) = primitive.label().filter(|l| !labels.contains(l)) {
+    for rule in operations(g, &values).into_iter().filter_map(|node| g.rule(node)) {
+        if let Some(label) = rule.primitive.label().filter(|l| !labels.contains(l)) {
             labels.push(label);
         }
     }

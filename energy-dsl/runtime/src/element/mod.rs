@@ -48,7 +48,7 @@ pub struct RestError {
 
 impl std::fmt::Display for RestError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: the rest shape is degenerate (zero length or area, or not finite)", self.element)
+        write!(f, "{}: the rest shape is degenerate (zero length or area, inverted, or not finite)", self.element)
     }
 }
 

@@ -8,6 +8,8 @@ mod flags;
 mod float;
 mod lane;
 mod level;
+mod limits;
+mod ray;
 mod real;
 mod unbounded;
 
@@ -18,5 +20,7 @@ pub use flags::{Flag, Flags};
 pub use float::Float;
 pub use lane::Lane;
 pub use level::{Baseline, Kernel, Level};
+pub use limits::{Roles, settle};
+pub use ray::Ray;
 pub use real::{Mask, Number, Real};
-pub use unbounded::{Precautions, Unbounded, WithCare, settle, with_care};
+pub use unbounded::{Precautions, Unbounded, WithCare, with_care};

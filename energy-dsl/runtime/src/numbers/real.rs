@@ -160,6 +160,23 @@ pub trait Number:
     fn saturated(self) -> Self {
         self
     }
+    /// Returns the number in double precision with an extended exponent; `None` if the type has more digits than that
+    /// or is no plain number.
+    #[doc(hidden)]
+    fn extended(&self) -> Option<Unbounded<f64>> {
+        None
+    }
+    /// Returns the number nearest to one with an extended exponent. Only types that are [`Number::extended`] need it.
+    #[doc(hidden)]
+    #[must_use]
+    fn of_extended(value: Unbounded<f64>) -> Self {
+        Self::from_f64(value.to_scalar())
+    }
+    /// Returns whether the bounded type has a finite number for it.
+    #[doc(hidden)]
+    fn is_representable(&self) -> bool {
+        (self.clone() - self.clone()).equal(Self::from_f64(0.0)).all()
+    }
     /// Runs the general path of a routine over this type.
     #[doc(hidden)]
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(

@@ -5,6 +5,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::cpu::{Fused, Scalar};
 use super::flags::Flags;
 use super::level::Level;
+use super::limits::{Roles, settle};
+use super::ray::Ray;
 use super::real::{Mask, Number, Real};
 
 /// The number significand · 2^exponent. It rounds as the floating-point type does, but intermediate results neither
@@ -306,6 +308,17 @@ impl<S: Scalar> Number for Unbounded<S> {
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
+    fn extended(&self) -> Option<Unbounded<f64>> {
+        let (significand, exponent) = self.to_double();
+        Some(Unbounded::new(significand, exponent))
+    }
+    fn of_extended(value: Unbounded<f64>) -> Self {
+        let (significand, exponent) = value.split();
+        Self::by_double(significand, exponent)
+    }
+    fn is_representable(&self) -> bool {
+        self.to_scalar().abs() < S::INFINITY
+    }
     fn saturated(self) -> Self {
         if !self.is_plain() || self.to_scalar().abs() < S::INFINITY {
             return self;
@@ -325,6 +338,9 @@ impl<S: Scalar> Number for Unbounded<S> {
 /// It always uses fused operations. It is so rare that their cost does not matter, and all levels give the same bits.
 #[doc(hidden)]
 pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
+    /// What inputs and outputs are.
+    const ROLES: Roles<'static>;
+
     /// Runs the path at a SIMD level.
     fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
 
@@ -337,22 +353,22 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
     }
 }
 
-/// The general path of a routine in double precision. As a `static` it is compiled once, in the crate that declares the
-/// element. Crates that use single precision compile that path themselves.
+/// The general path of a routine in double precision and along rays. As a `static` it is compiled once, in the crate
+/// that declares the element. Crates that use single precision compile that path themselves.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
-    pub(crate) double: Routine<INPUTS, OUTPUTS>,
+    pub(crate) double: Routine<Unbounded<f64>, INPUTS, OUTPUTS>,
+    ray: Routine<Ray, INPUTS, OUTPUTS>,
 }
 
-type Routine<const INPUTS: usize, const OUTPUTS: usize> =
-    fn(&[Unbounded<f64>; INPUTS]) -> ([Unbounded<f64>; OUTPUTS], Flags<Unbounded<f64>>);
+type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
 
 impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
     /// Creates the table of a routine.
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
-        Self { double: W::run::<Unbounded<f64>> }
+        Self { double: W::run::<Unbounded<f64>>, ray: W::run::<Ray> }
     }
 }
 
@@ -376,7 +392,11 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
         }
         let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
         let (mut results, mut flags) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(&own);
-        settle(&own, &mut results, &mut flags);
+        let along = |rays: &[Ray]| {
+            let (results, flags) = (W::compiled().ray)(rays.try_into().expect("as many rays as inputs"));
+            (!flags.degenerate).then(|| results.to_vec())
+        };
+        settle(&own, W::ROLES, &mut results, &mut flags, &along);
         for (number, (output, result)) in outputs.iter_mut().zip(results).enumerate() {
             output.set_lane(lane, if number < summed { result } else { result.saturated() });
         }
@@ -385,18 +405,6 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
     }
     let mask = <T::Mask as Mask>::from_bits;
     (outputs, Flags { degenerate: mask(degenerate), kink: mask(kink) })
-}
-
-/// Replaces NaN results by 0 and flags them as degenerate, unless an input was NaN.
-pub fn settle<T: Number>(inputs: &[T], results: &mut [T], flags: &mut Flags<T>) {
-    let is_number = |x: &T| x.clone().equal(x.clone()).all();
-    if !inputs.iter().all(is_number) {
-        return;
-    }
-    for result in results.iter_mut().filter(|x| !is_number(x)) {
-        *result = T::from_f64(0.0);
-        flags.degenerate = !T::Mask::none();
-    }
 }
 
 #[cfg(test)]
@@ -465,17 +473,6 @@ mod tests {
         let tiny = of(-1000.0).exp::<Baseline>();
         assert_eq!(tiny.to_scalar(), 0.0);
         assert!(((tiny * of(500.0).exp::<Baseline>()).to_scalar() / (-500.0_f64).exp() - 1.0).abs() < 1e-13);
-    }
-
-    #[test]
-    fn what_is_no_number_is_0_and_flagged_unless_it_was_read() {
-        let (nan, one) = (of(f64::NAN), of(1.0));
-        let mut results = [one, one / of(0.0) - one / of(0.0)];
-        let mut flags = Flags::clear();
-        settle(&[one, nan], &mut results, &mut flags);
-        assert!(!flags.any() && f64::is_nan(results[1].to_scalar()));
-        settle(&[one, one], &mut results, &mut flags);
-        assert!(flags.degenerate && results.map(Unbounded::to_scalar) == [1.0, 0.0]);
     }
 
     #[test]

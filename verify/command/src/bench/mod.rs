@@ -35,7 +35,7 @@ pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
         if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
             continue;
         }
-        let entry = energy_elements::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
+        let entry = energy_catalogue::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
         let subject = Target::of_element(entry).subject()?;
         let mut sampler = Sampler::new(subject.declaration, 3);
         let samples: Vec<Sample> = (0..INPUTS).map(|_| in_single_precision(sampler.sample())).collect();

@@ -1,4 +1,5 @@
-use energy_elements::{CatalogueEntry, find};
+use energy_catalogue::find;
+use energy_dsl::AnyElement;
 
 /// The element that computes a reference potential, and the source of its parameters.
 #[derive(Clone, Copy, Debug)]
@@ -6,7 +7,7 @@ pub struct Mapping {
     /// Name of the reference potential.
     pub potential: &'static str,
     /// Element of the catalogue.
-    pub entry: &'static CatalogueEntry,
+    pub entry: &'static AnyElement,
     /// The record's names of the element's parameters, in order; an empty name means 0.
     pub parameters: &'static [&'static str],
     /// The record's name of the rest shape.

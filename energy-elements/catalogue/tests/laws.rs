@@ -1,10 +1,11 @@
 //! Laws that hold exactly, and values known in closed form.
 #![allow(missing_docs)]
 
+use energy_catalogue::{catalogue, find};
 use energy_dsl::{ForceLaw, Inputs, Kind, Outputs, Potential};
 use energy_elements::{
     BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
-    StVK, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring, catalogue, find,
+    StVK, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring,
 };
 use proptest::prelude::*;
 

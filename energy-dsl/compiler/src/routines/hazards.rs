@@ -1,0 +1,133 @@
+//! Where a formula may be singular: the operations that the user wrote, seen from outside of robust primitives.
+
+use std::collections::BTreeSet;
+
+use crate::graph::{Graph, NodeId, Op};
+use energy_runtime::Flag;
+
+/// Masks of the places where a routine needs more than its ordinary path.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Hazards {
+    /// Where a result may be a convention: degenerate, kink. The general path looks closer.
+    pub(super) flags: [Option<NodeId>; 2],
+    /// Where all operands are of moderate size and away from singularities; `None` if they always are.
+    pub(super) sound: Option<NodeId>,
+}
+
+/// Operands up to 2²⁴⁰ (2³⁶ in single precision): their cubes, and those of their reciprocals, are numbers.
+const DEGREE: u8 = 3;
+/// e⁸⁰ is a number in single precision, too.
+const LARGEST_EXPONENT: f64 = 80.0;
+
+impl Hazards {
+    fn flag(&mut self, g: &mut Graph, flag: Flag, mask: NodeId) {
+        let flags = &mut self.flags[usize::from(flag == Flag::Kink)];
+        *flags = Some(flags.map_or(mask, |other| g.or(other, mask)));
+    }
+
+    fn require(&mut self, g: &mut Graph, mask: NodeId) {
+        self.sound = Some(self.sound.map_or(mask, |other| g.and(other, mask)));
+    }
+
+    /// Requires a > 0 of moderate size.
+    fn require_moderate(&mut self, g: &mut Graph, a: NodeId) {
+        if g.as_constant(a).is_none() {
+            let moderate = g.is_moderate(a, DEGREE);
+            self.require(g, moderate);
+        }
+    }
+
+    /// Marks a = b, where derivatives may have two sides.
+    fn tie(&mut self, g: &mut Graph, a: NodeId, b: NodeId) {
+        let equal = g.equal(a, b);
+        self.flag(g, Flag::Kink, equal);
+        let apart = g.not(equal);
+        self.require(g, apart);
+    }
+
+    /// Marks the boundary of a condition.
+    fn boundary(&mut self, g: &mut Graph, mask: NodeId) {
+        match g.op(mask) {
+            Op::And(a, b) | Op::Or(a, b) => [a, b].into_iter().for_each(|mask| self.boundary(g, mask)),
+            Op::Not(a) => self.boundary(g, a),
+            Op::Less(a, b) | Op::LessOrEqual(a, b) | Op::Equal(a, b) if g.varies(a) || g.varies(b) => self.tie(g, a, b),
+            _ => {}
+        }
+    }
+
+    fn operation(&mut self, g: &mut Graph, node: NodeId, order: u8) {
+        let zero = g.constant(0.0);
+        match g.op(node) {
+            Op::Div(_, b) if g.as_constant(b).is_none() => {
+                let size = g.abs(b);
+                self.require_moderate(g, size);
+                let by_zero = g.equal(b, zero);
+                self.flag(g, Flag::Kink, by_zero);
+            }
+            Op::Sqrt(a) => {
+                self.require_moderate(g, a);
+                if order >= 1 {
+                    let at_zero = g.equal(a, zero);
+                    self.flag(g, Flag::Kink, at_zero);
+                }
+            }
+            Op::Ln(a) => self.require_moderate(g, a),
+            Op::Pow(a, _) => {
+                self.require_moderate(g, a);
+                self.require_moderate(g, node);
+                if order >= 1 {
+                    let at_zero = g.equal(a, zero);
+                    self.flag(g, Flag::Kink, at_zero);
+                }
+            }
+            Op::Exp(a) if g.as_constant(a).is_none() => {
+                let most = g.constant(LARGEST_EXPONENT);
+                let below = g.less(a, most);
+                self.require(g, below);
+            }
+            Op::Atan2(y, x) => {
+                let square = g.dot(&[x, y], &[x, y]);
+                self.require_moderate(g, square);
+                let at_zero = g.equal(square, zero);
+                self.flag(g, Flag::Kink, at_zero);
+            }
+            Op::Abs(a) if order >= 1 => self.tie(g, a, zero),
+            Op::Min(a, b) | Op::Max(a, b) if order >= 1 => self.tie(g, a, b),
+            Op::Select(mask, ..) => self.boundary(g, mask),
+            _ => {}
+        }
+    }
+}
+
+/// Returns the hazards of derivatives of `roots` up to the given orders.
+pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
+    let mut found = Hazards::default();
+    for &(root, order) in roots {
+        for node in operations(g, &[root]) {
+            match g.rule(node) {
+                Some(rule) => {
+                    for flag in rule.flags.clone().into_iter().filter(|flag| flag.order <= order) {
+                        found.flag(g, flag.flag, flag.mask);
+                    }
+                }
+                None => found.operation(g, node, order),
+            }
+        }
+    }
+    found
+}
+
+/// Returns the operations that `roots` depend on. A robust primitive counts as one.
+pub(super) fn operations(g: &Graph, roots: &[NodeId]) -> BTreeSet<NodeId> {
+    let mut seen = BTreeSet::new();
+    let mut stack = roots.to_vec();
+    while let Some(node) = stack.pop() {
+        if seen.insert(node) {
+            match g.rule(node) {
+                Some(rule) => stack.extend(&rule.arguments),
+                None => stack.extend(g.op(node).operands()),
+            }
+        }
+    }
+    seen
+}

@@ -1,0 +1,325 @@
+//! Results at singular inputs.
+//!
+//! A result that is not finite, or that a flag marks, is evaluated along rays through the input. If all rays agree, the
+//! result has that limit.
+
+use std::ops::Range;
+
+use super::flags::{Flag, Flags};
+use super::ray::{Limit, Ray};
+use super::real::{Mask, Number};
+use super::unbounded::Unbounded;
+
+/// What the inputs and outputs of a routine are.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Roles<'a> {
+    /// Inputs that derivatives are taken with respect to.
+    pub moves: &'a [bool],
+    /// Sizes of the groups of results: values, first derivatives, second derivatives.
+    pub groups: &'a [usize],
+    /// Whether the first group is of values, not of derivatives.
+    pub values_first: bool,
+}
+
+/// Evaluates a routine along a ray; `None` if the formula itself is degenerate there.
+type Along<'a> = &'a dyn Fn(&[Ray]) -> Option<Vec<Ray>>;
+
+/// Rays that are tried first: two opposite pairs.
+const FEW: usize = 4;
+/// Rays that tell a kink, where derivatives have some values, from a singularity, where each ray has its own.
+const MANY: usize = 16;
+
+/// Replaces results by their limits, or by the documented values where there is none, and sets the flags.
+///
+/// - `degenerate` is set if a result is not finite or replaces a limit that does not exist.
+/// - `kink` is set if a derivative has different limits on different sides. The result is one of them.
+///
+/// `along` evaluates the results along a ray.
+#[doc(hidden)]
+pub fn settle<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flags: &mut Flags<T>, along: Along<'_>) {
+    let is_finite = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
+    if (flags.degenerate | flags.kink).any() || !results.iter().all(is_finite) {
+        *flags = Flags::clear();
+        let is_number = |x: &T| x.clone().equal(x.clone()).all();
+        let extended = |numbers: &[T]| numbers.iter().map(Number::extended).collect::<Option<Vec<_>>>();
+        match (extended(inputs), extended(results)) {
+            _ if !inputs.iter().all(is_number) => {}
+            (Some(inputs), Some(plain)) => {
+                let settled = Rays::through(inputs, roles, along).settle(&plain, flags);
+                results.iter_mut().zip(settled).for_each(|(result, number)| *result = T::of_extended(number));
+            }
+            // A type without rays, such as multi-precision numbers.
+            _ => results.iter_mut().filter(|x| !is_number(x)).for_each(|result| {
+                *result = T::from_f64(0.0);
+                flags.degenerate = !T::Mask::none();
+            }),
+        }
+    }
+    if !results.iter().all(Number::is_representable) {
+        flags.degenerate = !T::Mask::none();
+    }
+}
+
+/// The limits of all results along each ray.
+struct Rays<'a> {
+    inputs: Vec<Unbounded<f64>>,
+    roles: Roles<'a>,
+    along: Along<'a>,
+    limits: Vec<Vec<Limit>>,
+    /// Whether all values are undefined along all rays, as those of √(−1).
+    is_outside: bool,
+}
+
+/// What the limits of one result along all rays are.
+enum Agreement {
+    Number(Unbounded<f64>),
+    /// An infinity with the sign of this number.
+    Infinite(f64),
+    /// Few different numbers.
+    Sides,
+    None,
+}
+
+/// A group of results.
+struct Group<'a> {
+    range: Range<usize>,
+    agreements: Vec<Agreement>,
+    /// Results at the input itself.
+    plain: &'a [Unbounded<f64>],
+    /// The largest limit of the routine.
+    scale: Unbounded<f64>,
+}
+
+impl Group<'_> {
+    fn all(&self, is: impl Fn(&Agreement) -> bool) -> bool {
+        self.agreements.iter().all(is)
+    }
+}
+
+fn zero() -> Unbounded<f64> {
+    Unbounded::from_f64(0.0)
+}
+
+impl<'a> Rays<'a> {
+    fn through(inputs: Vec<Unbounded<f64>>, roles: Roles<'a>, along: Along<'a>) -> Self {
+        Self { inputs, roles, along, limits: Vec::new(), is_outside: true }
+    }
+
+    /// Evaluates more rays, up to this number.
+    fn cast(&mut self, rays: usize) {
+        let Roles { moves, groups, values_first } = self.roles;
+        for ray in self.limits.len()..rays {
+            let slope = |(i, &moves): (usize, &bool)| if moves { slope(ray, i) } else { 0.0 };
+            let slopes = moves.iter().enumerate().map(slope);
+            let inputs: Vec<Ray> = self.inputs.iter().zip(slopes).map(|(&x, slope)| Ray::from(x, slope)).collect();
+            let found = (self.along)(&inputs).map(|found| found.into_iter().map(Ray::limit).collect::<Vec<_>>());
+            let values = if values_first { groups[0] } else { 0 };
+            let is_inside = |found: &Vec<Limit>| !found[..values].iter().any(|value| matches!(value, Limit::Unknown));
+            self.is_outside &= found.as_ref().is_some_and(|found| !is_inside(found));
+            // Where the value is undefined, so are its derivatives.
+            let found = found.filter(is_inside);
+            self.limits.push(found.unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]));
+            Ray::forget();
+        }
+    }
+
+    fn settle<T: Number>(mut self, plain: &[Unbounded<f64>], flags: &mut Flags<T>) -> Vec<Unbounded<f64>> {
+        self.cast(FEW);
+        let scale = self.largest();
+        if (0..plain.len()).any(|i| !matches!(self.agreement(i, scale), Agreement::Number(_))) {
+            self.cast(MANY);
+        }
+        let scale = self.largest();
+        let mut settled = Vec::with_capacity(plain.len());
+        for (number, &size) in self.roles.groups.iter().enumerate() {
+            let group = Group {
+                range: settled.len()..settled.len() + size,
+                agreements: (settled.len()..settled.len() + size).map(|i| self.agreement(i, scale)).collect(),
+                plain: &plain[settled.len()..settled.len() + size],
+                scale,
+            };
+            let is_value = number == 0 && self.roles.values_first;
+            let (numbers, flag) = if is_value { self.values(&group) } else { self.derivatives(&group) };
+            settled.extend(numbers);
+            match flag {
+                Some(Flag::Degenerate) => flags.degenerate = !T::Mask::none(),
+                Some(Flag::Kink) => flags.kink = !T::Mask::none(),
+                None => {}
+            }
+        }
+        settled
+    }
+
+    /// Returns values: their limits, infinities, or else the documented values.
+    fn values(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
+        let value = |(agreement, &plain): (&Agreement, &Unbounded<f64>)| match agreement {
+            Agreement::Number(limit) => nearest(plain, *limit, group.scale),
+            Agreement::Infinite(sign) => Unbounded::from_f64(f64::INFINITY.copysign(*sign)),
+            _ if is_finite(plain) && !self.is_outside => plain,
+            _ => zero(),
+        };
+        let flag = (!group.all(|a| matches!(a, Agreement::Number(_)))).then_some(Flag::Degenerate);
+        (group.agreements.iter().zip(group.plain).map(value).collect(), flag)
+    }
+
+    /// Returns derivatives: their limits, or those of one side. If one has neither, all of the group are what the robust
+    /// primitives contribute, or 0, so that forces still cancel.
+    fn derivatives(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
+        if !group.all(|a| matches!(a, Agreement::Number(_) | Agreement::Sides)) {
+            let keep = !self.is_outside && group.plain.iter().copied().all(is_finite);
+            let conventions = group.plain.iter().map(|&x| if keep { x } else { zero() });
+            return (conventions.collect(), Some(Flag::Degenerate));
+        }
+        let side = &self.limits[self.side(group)];
+        let limit = |(agreement, i): (&Agreement, usize)| match (agreement, side[i]) {
+            (&Agreement::Number(limit), _) | (_, Limit::Finite(limit)) => limit,
+            _ => zero(),
+        };
+        let limits = group.agreements.iter().zip(group.range.clone()).map(limit);
+        let numbers = limits.zip(group.plain).map(|(limit, &plain)| nearest(plain, limit, group.scale)).collect();
+        (numbers, group.agreements.iter().any(|a| matches!(a, Agreement::Sides)).then_some(Flag::Kink))
+    }
+
+    fn numbers(&self, result: usize) -> impl Iterator<Item = Unbounded<f64>> {
+        self.limits.iter().filter_map(move |ray| match ray[result] {
+            Limit::Finite(number) => Some(number),
+            _ => None,
+        })
+    }
+
+    /// Returns the largest finite limit.
+    fn largest(&self) -> Unbounded<f64> {
+        let results = self.limits.first().map_or(0, Vec::len);
+        (0..results).flat_map(|i| self.numbers(i)).fold(zero(), |largest, x| largest.max(x.abs()))
+    }
+
+    /// Rays on which a result is not defined do not count: they leave its domain.
+    fn agreement(&self, result: usize, scale: Unbounded<f64>) -> Agreement {
+        let numbers: Vec<_> = self.numbers(result).collect();
+        let infinite = self.limits.iter().filter_map(|ray| match ray[result] {
+            Limit::Infinite(sign) => Some(sign),
+            _ => None,
+        });
+        let infinite: Vec<f64> = infinite.collect();
+        match (&numbers[..], &infinite[..]) {
+            ([], []) => Agreement::None,
+            ([], [first, rest @ ..]) if rest.iter().all(|other| other == first) => Agreement::Infinite(*first),
+            ([first, rest @ ..], []) if rest.iter().all(|x| is_near(*x, *first, scale)) => Agreement::Number(*first),
+            (numbers, []) => {
+                let mut sides: Vec<Unbounded<f64>> = Vec::new();
+                for &number in numbers {
+                    if !sides.iter().any(|side| is_near(*side, number, scale)) {
+                        sides.push(number);
+                    }
+                }
+                if 2 * sides.len() <= numbers.len() { Agreement::Sides } else { Agreement::None }
+            }
+            _ => Agreement::None,
+        }
+    }
+
+    /// Returns the ray whose limits are the most like the plain results: the side on which the formula itself is.
+    fn side(&self, group: &Group<'_>) -> usize {
+        let alike = |ray: usize| {
+            let same = |(limit, plain): (&Limit, &Unbounded<f64>)| matches!(limit, Limit::Finite(number) if is_near(*number, *plain, group.scale));
+            self.limits[ray][group.range.clone()].iter().zip(group.plain).filter(|pair| same(*pair)).count()
+        };
+        (0..self.limits.len()).rev().max_by_key(|&ray| alike(ray)).unwrap_or(0)
+    }
+}
+
+fn is_finite(x: Unbounded<f64>) -> bool {
+    (x - x).equal(zero())
+}
+
+/// Returns the plain result if it is the limit, because it is more accurate.
+fn nearest(plain: Unbounded<f64>, limit: Unbounded<f64>, scale: Unbounded<f64>) -> Unbounded<f64> {
+    if is_near(plain, limit, scale) { plain } else { limit }
+}
+
+fn is_near(a: Unbounded<f64>, b: Unbounded<f64>, scale: Unbounded<f64>) -> bool {
+    let allowed = Unbounded::from_f64(1e-8) * a.abs().max(b.abs()) + Unbounded::from_f64(1e-13) * scale;
+    (a - b).abs().less_or_equal(allowed)
+}
+
+/// Returns the slope of an input along a ray: a fixed number of size ¼ to 1. Only the first rays are opposite: an even
+/// function would have one limit along both, as if these were sides of a kink.
+fn slope(ray: usize, input: usize) -> f64 {
+    let (pair, sign) = if ray < FEW { (ray / 2, if ray % 2 == 0 { 1.0 } else { -1.0 }) } else { (ray, 1.0) };
+    // The finaliser of SplitMix64, with the bits of a counter.
+    let mut bits = (pair as u64 * 4099 + input as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    bits ^= bits >> 31;
+    let size = 0.25 + 0.75 * (bits >> 12) as f64 / (1_u64 << 52) as f64;
+    if bits & 1 == 0 { sign * size } else { -sign * size }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::level::Baseline;
+
+    type Formula = fn(&[Ray]) -> Vec<Ray>;
+
+    /// Returns the settled results and the flags (degenerate, kink) at x = y = 0, of which no plain result is known.
+    fn at_zero(values: usize, formula: Formula) -> (Vec<f64>, (bool, bool)) {
+        let inputs = [Unbounded::<f64>::of(0.0); 2];
+        let results = formula(&[0, 1].map(|_| Ray::from_f64(0.0))).len();
+        let mut results = vec![Unbounded::of(f64::NAN); results];
+        let mut flags = Flags::clear();
+        let roles = Roles { moves: &[true, true], groups: &[values, results.len() - values], values_first: true };
+        settle(&inputs, roles, &mut results, &mut flags, &|rays| Some(formula(rays)));
+        (results.into_iter().map(Unbounded::to_scalar).collect(), (flags.degenerate, flags.kink))
+    }
+
+    fn length(x: &[Ray]) -> Ray {
+        (x[0] * x[0] + x[1] * x[1]).sqrt()
+    }
+
+    #[test]
+    fn limits_kinks_and_singularities_are_told_apart() {
+        assert_eq!(at_zero(1, |x| vec![x[0] / x[0], x[0] * x[1] / x[0]]), (vec![1.0, 0.0], (false, false)));
+        let (kink, flags) = at_zero(1, |x| vec![x[0].abs(), x[0] / x[0].abs(), x[1] / x[1].abs()]);
+        assert!(kink[0] == 0.0 && kink[1].abs() == 1.0 && kink[2].abs() == 1.0 && flags == (false, true));
+        assert_eq!(
+            at_zero(1, |x| {
+                let r = length(x);
+                vec![r, x[0] / r]
+            }),
+            (vec![0.0, 0.0], (true, false))
+        );
+        let (barrier, flags) = at_zero(1, |x| {
+            let r = length(x);
+            vec![-r.ln::<Baseline>(), x[0] / (r * r)]
+        });
+        assert!(barrier == [f64::INFINITY, 0.0] && flags == (true, false));
+        assert_eq!(at_zero(1, |x| vec![x[0].sqrt(), x[0].sqrt() * x[0]]), (vec![0.0, 0.0], (false, false)));
+        assert_eq!(at_zero(1, |x| vec![(x[0] - Ray::from_f64(1.0)).sqrt()]), (vec![0.0], (true, false)));
+        assert_eq!(at_zero(1, |x| vec![Ray::from_f64(1.0) / x[0]]), (vec![0.0], (true, false)));
+    }
+
+    #[test]
+    fn unread_flags_of_untaken_branches_vanish() {
+        let mut flags = Flags::<Unbounded<f64>> { degenerate: true, kink: true };
+        let mut results = [Unbounded::of(3.0), Unbounded::of(0.0)];
+        let roles = Roles { moves: &[true], groups: &[1, results.len() - 1], values_first: true };
+        let along = |x: &[Ray]| Some(vec![Ray::from_f64(3.0), x[0] * Ray::from_f64(2.0)]);
+        settle(&[Unbounded::of(0.0)], roles, &mut results, &mut flags, &along);
+        assert!(!flags.any() && results.map(Unbounded::to_scalar) == [3.0, 0.0]);
+    }
+
+    #[test]
+    fn numbers_that_were_read_as_nan_stay_and_are_flagged() {
+        let mut flags = Flags::<Unbounded<f64>>::clear();
+        let mut results = [Unbounded::of(f64::NAN)];
+        let roles = Roles { moves: &[true], groups: &[1, results.len() - 1], values_first: true };
+        settle(&[Unbounded::of(f64::NAN)], roles, &mut results, &mut flags, &|_| None);
+        assert!(flags.degenerate && results[0].to_scalar().is_nan());
+        let roles = Roles { groups: &[1], ..roles };
+        let (mut large, mut flags) = ([Unbounded::of(1e200) * Unbounded::of(1e200)], Flags::clear());
+        settle(&[Unbounded::of(1e200)], roles, &mut large, &mut flags, &|_| None);
+        assert!(flags.degenerate && large[0].to_scalar() == f64::INFINITY);
+    }
+}

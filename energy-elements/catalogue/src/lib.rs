@@ -1,0 +1,31 @@
+//! All elements of [`energy_elements`] behind function pointers, for tools that take an element by name.
+//!
+//! They are a crate of their own because this table compiles every routine of every element. A simulator uses some of
+//! the elements and compiles those.
+#![forbid(unsafe_code)]
+
+use energy_dsl::AnyElement;
+
+macro_rules! entries {
+    ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<energy_elements::$name<f64>>()),*] };
+}
+
+/// Returns all elements of the library, in alphabetical order.
+// `#[inline(never)]`: a crate that inlines this function compiles every element again.
+#[inline(never)]
+#[must_use]
+pub fn catalogue() -> &'static [AnyElement] {
+    const CATALOGUE: &[AnyElement] = energy_elements::for_each_element!(entries);
+    CATALOGUE
+}
+
+/// Returns the element of this name; `None` if the library has no such element.
+///
+/// ```
+/// let spring = energy_catalogue::find("Spring").unwrap();
+/// assert!(spring.declaration.translation_invariant);
+/// ```
+#[must_use]
+pub fn find(name: &str) -> Option<&'static AnyElement> {
+    catalogue().iter().find(|entry| entry.declaration.name == name)
+}

@@ -1,0 +1,239 @@
+//! Random programs at random singular inputs: coincident, collinear, flat, folded and infinite points. Results are
+//! finite or flagged, and equal the limit wherever multi-precision finds one.
+//!
+//! `PROPTEST_CASES=10000 cargo test --release -p verify --test singular_programs` is the long run.
+
+use energy_compiler::{Interpreted, Textbook};
+use energy_dsl::Inputs;
+use proptest::prelude::*;
+use verify::Sample;
+use verify::multiprecision::{self, Big};
+
+/// Generates a scalar expression with singularities.
+fn scalar(depth: u32) -> BoxedStrategy<String> {
+    let leaf = prop_oneof![
+        2 => Just("p.x".to_owned()),
+        1 => Just("(q.y - p.y)".to_owned()),
+        1 => Just("k".to_owned()),
+        2 => vector(0).prop_map(|v| format!("norm({v})")),
+        1 => vector(0).prop_map(|v| format!("norm_squared({v})")),
+        1 => (vector(0), vector(0)).prop_map(|(a, b)| format!("dot({a}, {b})")),
+    ];
+    if depth == 0 {
+        return leaf.boxed();
+    }
+    let less = || scalar(depth - 1);
+    let vectors = || vector(depth - 1);
+    prop_oneof![
+        1 => leaf,
+        2 => (less(), less()).prop_map(|(a, b)| format!("({a} + {b})")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("({a} - {b})")),
+        3 => (less(), less()).prop_map(|(a, b)| format!("({a} * {b})")),
+        3 => (less(), less()).prop_map(|(a, b)| format!("({a} / {b})")),
+        2 => less().prop_map(|a| format!("sqrt({a})")),
+        1 => less().prop_map(|a| format!("log({a})")),
+        1 => less().prop_map(|a| format!("sin({a})")),
+        1 => less().prop_map(|a| format!("(1 - cos({a}))")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("atan2({a}, ({b})^2)")),
+        2 => less().prop_map(|a| format!("abs({a})")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("max({a}, {b})")),
+        1 => (less(), less(), less()).prop_map(|(a, b, c)| format!("(if {a} < {b} {{ {c} }} else {{ ({c})^2 }})")),
+        2 => (less(), 2..4_u8).prop_map(|(a, n)| format!("({a})^{n}")),
+        1 => less().prop_map(|a| format!("({a})^1.5")),
+        2 => (vectors(), vectors()).prop_map(|(a, b)| format!("dot(unit({a}), {b})")),
+        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("(1 - dot(unit({a}), unit({b})))")),
+        1 => (vectors(), vectors()).prop_map(|(a, b)| format!("(1 + dot(unit({a}), unit({b})))")),
+        2 => (vectors(), vectors()).prop_map(|(a, b)| format!("angle({a}, {b})")),
+        1 => vectors().prop_map(|v| format!("(norm({v}) - k)^2")),
+        1 => (vectors(), vectors(), vectors()).prop_map(|(a, b, c)| format!("det(columns({a}, {b}, {c}))")),
+    ]
+    .boxed()
+}
+
+fn vector(depth: u32) -> BoxedStrategy<String> {
+    let leaf = prop_oneof![
+        3 => Just("(q - p)".to_owned()),
+        3 => Just("(r - q)".to_owned()),
+        1 => Just("p".to_owned()),
+    ];
+    if depth == 0 {
+        return leaf.boxed();
+    }
+    let less = || vector(depth - 1);
+    prop_oneof![
+        3 => leaf,
+        1 => (less(), less()).prop_map(|(a, b)| format!("({a} + {b})")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("cross({a}, {b})")),
+        1 => (scalar(depth - 1), less()).prop_map(|(s, a)| format!("({s} * {a})")),
+        1 => less().prop_map(|a| format!("unit({a})")),
+    ]
+    .boxed()
+}
+
+/// Few coordinates, so that points coincide, align, lie in a plane and fold.
+fn coordinate() -> impl Strategy<Value = f64> {
+    prop_oneof![5 => Just(0.0), 2 => Just(1.0), 1 => Just(-1.0), 1 => Just(0.5)]
+}
+
+const SIGNATURE: &str = "p, q, r: Point; k: Scalar";
+/// The same formula at points moved by ε along a direction.
+const MOVED: &str = "a, b, c: Point; k, e: Scalar, da, db, dc: Vec3";
+const MOVES: &str = "let p = a + e * da; let q = b + e * db; let r = c + e * dc;";
+/// A formula must use all inputs.
+const USES: &str = "0 * (k + norm_squared(p) + norm_squared(q) + norm_squared(r))";
+
+/// Directions whose components are dyadic, so that doubles hold them.
+const DIRECTIONS: [[f64; 9]; 10] = [
+    [-0.5625, -0.65625, 0.40625, -0.34375, -0.65625, 0.3125, -0.78125, 0.53125, -0.375],
+    [0.5625, 0.65625, -0.40625, 0.34375, 0.65625, -0.3125, 0.78125, -0.53125, 0.375],
+    [0.46875, -0.90625, 0.53125, -0.4375, 0.5625, 0.34375, 0.9375, 0.78125, -0.4375],
+    [-0.46875, 0.90625, -0.53125, 0.4375, -0.5625, -0.34375, -0.9375, -0.78125, 0.4375],
+    [-0.75, 0.34375, 0.28125, 0.84375, 0.78125, -0.6875, 0.875, 0.6875, 0.4375],
+    [0.75, -0.34375, -0.28125, -0.84375, -0.78125, 0.6875, -0.875, -0.6875, -0.4375],
+    [-0.5625, 0.3125, -0.3125, 0.90625, 0.78125, 0.96875, 0.40625, -0.34375, 0.46875],
+    [0.5625, -0.3125, 0.3125, -0.90625, -0.78125, -0.96875, -0.40625, 0.34375, -0.46875],
+    [0.53125, -0.625, 0.84375, 0.90625, -0.59375, -0.3125, -0.53125, -0.375, 0.4375],
+    [0.71875, -0.3125, 0.96875, -0.5625, 0.28125, 0.5625, 0.40625, 0.875, -0.5625],
+];
+
+/// Value, gradient and Hessian.
+type Blocks = [Vec<f64>; 3];
+
+/// Computes the blocks at x + ε d; `None` if the formula has no value there.
+fn beside(source: &str, textbook: &Textbook, k: f64, x: &[f64], direction: &[f64; 9]) -> Option<Blocks> {
+    let parameters = [&[k, 2.0_f64.powi(-100)], &direction[..]].concat();
+    let sample = Sample { parameters, rest: vec![], positions: x.into(), velocities: vec![] };
+    let declaration = Interpreted::from_source(source).ok()?.first()?.declaration();
+    let blocks = multiprecision::truth(declaration, textbook, &sample, 70);
+    let numbers = |k: usize| blocks[k].block.numbers.iter().map(Big::to_f64).collect::<Vec<f64>>();
+    blocks.iter().all(|block| block.is_defined).then(|| [numbers(0), numbers(1), numbers(2)])
+}
+
+/// What a block tends to along all directions.
+#[derive(Debug)]
+enum Limit {
+    Numbers(Vec<f64>),
+    /// Directions differ.
+    None,
+    /// It converges too slowly to tell.
+    Unknown,
+}
+
+fn limit(block: usize, found: &[Blocks]) -> Limit {
+    let largest = found.iter().flat_map(|blocks| &blocks[block]).fold(0.0_f64, |largest, x| largest.max(x.abs()));
+    if largest > 1e25 {
+        return Limit::None;
+    }
+    let spread = |entry: usize| {
+        let values = found.iter().map(|blocks| blocks[block][entry]);
+        values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
+    };
+    let spread = (0..found[0][block].len()).map(spread).fold(0.0, f64::max);
+    if spread <= 1e-12 * largest.max(1e-3) {
+        Limit::Numbers(found[0][block].clone())
+    } else if spread > 1e-2 * largest && largest > 1e-3 && largest < 1e6 {
+        Limit::None
+    } else {
+        Limit::Unknown
+    }
+}
+
+fn check(formula: &str, k: f64, x: &[f64]) -> Result<(), TestCaseError> {
+    let source = format!("energy Random({SIGNATURE}) {{ {formula} + {USES} }}");
+    let moved = format!("energy Moved({MOVED}) {{ {MOVES} {formula} + {USES} }}");
+    // A formula may be refused: `log(0)` of what folds to a constant.
+    let Ok(mut elements) = Interpreted::from_source(&source) else { return Err(TestCaseError::reject("refused")) };
+    let element = elements.remove(0);
+    let inputs = Inputs { parameters: &[k], rest: &[], positions: x, velocities: &[] };
+    let rest = element.precomputed(&inputs).expect("no rest shape");
+    let results =
+        ["value", "gradient", "hessian"].map(|name| element.routine(name, &inputs, &rest).expect("an energy"));
+    for (groups, flags) in &results {
+        let is_finite = groups.iter().flatten().all(|number| number.is_finite());
+        prop_assert!(is_finite || flags.degenerate, "{source}\nat {x:?}: {groups:?} {flags:?}");
+    }
+    if x.iter().any(|x| !x.is_finite()) {
+        return Ok(());
+    }
+    let Ok(textbook) = Textbook::from_source(&moved) else { return Err(TestCaseError::reject("refused")) };
+    let found: Vec<Option<Blocks>> =
+        DIRECTIONS.iter().map(|direction| beside(&moved, &textbook, k, x, direction)).collect();
+    // Only inputs with a neighbourhood in the domain.
+    let Some(found) = found.into_iter().collect::<Option<Vec<Blocks>>>() else { return Ok(()) };
+    for (order, (groups, flags)) in results.iter().enumerate() {
+        let limits: Vec<Limit> = (0..=order).map(|block| limit(block, &found)).collect();
+        if limits.iter().any(|limit| matches!(limit, Limit::Unknown)) {
+            continue;
+        }
+        let exists = limits.iter().all(|limit| matches!(limit, Limit::Numbers(_)));
+        let flagged = flags.degenerate || flags.kink;
+        // `angle(a, a)` is a convention everywhere.
+        if exists && flagged && is_flagged_nearby(&element, ["value", "gradient", "hessian"][order], k, x) {
+            continue;
+        }
+        prop_assert_eq!(
+            exists,
+            !flagged,
+            "{}\nat {:?}, order {}: {:?}\n{:?}\n{:?}",
+            source,
+            x,
+            order,
+            flags,
+            groups,
+            limits
+        );
+        for (block, limit) in limits.iter().enumerate() {
+            let Limit::Numbers(truth) = limit else { continue };
+            if !exists && block > 0 {
+                continue;
+            }
+            let found = if block == 2 { full(&groups[2]) } else { groups[block].clone() };
+            let scale = truth.iter().fold(1e-3_f64, |scale, x| scale.max(x.abs()));
+            for (a, b) in found.iter().zip(truth) {
+                prop_assert!((a - b).abs() <= 1e-8 * scale, "{source}\nat {x:?}, block {block}: {a:e}, truly {b:e}");
+            }
+        }
+    }
+    Ok(())
+}
+
+fn is_flagged_nearby(element: &Interpreted, routine: &str, k: f64, x: &[f64]) -> bool {
+    DIRECTIONS.iter().all(|direction| {
+        let x: Vec<f64> = x.iter().zip(direction).map(|(x, d)| x + 1e-3 * d).collect();
+        let inputs = Inputs { parameters: &[k], rest: &[], positions: &x, velocities: &[] };
+        element.routine(routine, &inputs, &[]).is_some_and(|(_, flags)| flags.degenerate || flags.kink)
+    })
+}
+
+/// Expands the triangle of blocks of three points to a matrix.
+fn full(triangle: &[f64]) -> Vec<f64> {
+    let entry = |row: usize, column: usize| {
+        let (row, column) = if row / 3 <= column / 3 { (row, column) } else { (column, row) };
+        let block = [[0, 1, 2], [1, 3, 4], [2, 4, 5]][row / 3][column / 3];
+        triangle[9 * block + 3 * (row % 3) + column % 3]
+    };
+    (0..81).map(|i| entry(i / 9, i % 9)).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(256),
+        failure_persistence: None,
+        max_global_rejects: 100_000,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn results_are_finite_or_flagged_and_equal_the_limit_where_there_is_one(
+        formula in (1..3_u32).prop_flat_map(scalar),
+        k in prop_oneof![Just(1.0), Just(0.5), Just(2.0)],
+        x in prop::collection::vec(coordinate(), 9),
+        infinite in prop_oneof![15 => Just(None), 1 => (0..9_usize).prop_map(Some)],
+    ) {
+        let mut x = x;
+        if let Some(i) = infinite {
+            x[i] = f64::INFINITY;
+        }
+        check(&formula, k, &x)?;
+    }
+}
