@@ -152,7 +152,8 @@ fn positions_in<S: Real>() -> Vec<[S; 3]> {
 /// Returns ranges that begin at whole blocks and cover `count` elements: one, one block each, uneven ones.
 fn partitions(count: usize) -> [Vec<std::ops::Range<usize>>; 3] {
     let blocks = (0..count).step_by(BLOCK).map(|start| start..(start + BLOCK).min(count)).collect();
-    [vec![0..count], blocks, vec![0..2 * BLOCK, 2 * BLOCK..2 * BLOCK, 2 * BLOCK..count]]
+    let whole = std::iter::once(0..count).collect();
+    [whole, blocks, vec![0..2 * BLOCK, 2 * BLOCK..2 * BLOCK, 2 * BLOCK..count]]
 }
 
 /// Parts of outputs that belong to a range alone receive the results of single elements, in `S`.
@@ -278,7 +279,8 @@ fn misfits_are_errors_with_their_numbers() {
     let range = |range: std::ops::Range<usize>| BatchError::Range { range, elements: 40 };
     assert_eq!(packed.values(8..40, &x, &mut out[8..]).unwrap_err(), range(8..40));
     assert_eq!(packed.values(0..41, &x, &mut out).unwrap_err(), range(0..41));
-    assert_eq!(packed.values(32..16, &x, &mut []).unwrap_err(), range(32..16));
+    let backwards = std::ops::Range { start: 32, end: 16 };
+    assert_eq!(packed.values(backwards.clone(), &x, &mut []).unwrap_err(), range(backwards));
     let missing = packed.values(0..40, &x[..7], &mut out).unwrap_err();
     assert!(matches!(missing, BatchError::Missing { given: 7, .. }), "{missing}");
     let short = packed.values(16..40, &x, &mut out[..20]).unwrap_err();

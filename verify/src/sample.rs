@@ -223,7 +223,8 @@ impl Sampler {
         points.chunks(3).flat_map(|p| rotate(&turn, p)).enumerate().map(|(i, x)| scale * x + offset[i % 3]).collect()
     }
 
-    /// Draws a rest shape: points in the plane or in space (a triangle or tetrahedron has positive size), or plain numbers.
+    /// Draws a rest shape: points in the plane or in space (a triangle or tetrahedron has positive size), or plain
+    /// numbers.
     fn rest(&mut self) -> Vec<f64> {
         let fields = self.declaration.rest;
         let count = fields.iter().map(|field| field.size).sum();

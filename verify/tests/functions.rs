@@ -74,7 +74,8 @@ energy! {
         let e = norm(p - q) - L;
         let U = k / 2 * e^2 + log(1 + k^2) * angle(q - p, r - q) + exp(dot(a, p) / 8) + det(M) * M[0][1] * e;
         let G = gradient(U, M);
-        gradient(U, k)^2 + gradient(U, L) * dot(gradient(U, a), q) + ddot(G, G) + norm_squared(gradient(gradient(U, L), p))
+        gradient(U, k)^2 + gradient(U, L) * dot(gradient(U, a), q) + ddot(G, G)
+            + norm_squared(gradient(gradient(U, L), p))
     }
 
     #[audit(samples = 50)]

@@ -1,8 +1,8 @@
 //! Conversions from and to types of nalgebra (feature `nalgebra`).
 //!
 //! Elements take and return plain arrays: `[T; 3]` for a point, `[[T; 3]; N]` for the points of an element. nalgebra
-//! converts single vectors: `Vector3::from([x, y, z])` and `<[f64; 3]>::from(vector)`. This module converts what elements
-//! take and return.
+//! converts single vectors: `Vector3::from([x, y, z])` and `<[f64; 3]>::from(vector)`. This module converts what
+//! elements take and return.
 //!
 //! ```
 //! use energy_runtime::interop::{points_from, points_to};

@@ -15,9 +15,10 @@ use super::vector::transposed;
 /// |---|---|
 /// | nalgebra-sparse | `CsrMatrix::try_from_csr_data(n, n, csr.offsets, csr.columns, csr.values)` |
 /// | sprs | `CsMatView::new((n, n), &csr.offsets, &csr.columns, &csr.values)` |
-/// | faer | `SparseRowMatRef::new(SymbolicSparseRowMatRef::new_checked(n, n, &csr.offsets, None, &csr.columns), &csr.values)` |
+/// | faer | `SparseRowMatRef::new(pattern, &csr.values)` |
 ///
-/// with `n = csr.rows()`. Matrices of one [`Pattern`](crate::Pattern) have the same `offsets` and `columns`, so a
+/// with `n = csr.rows()`, and for faer `pattern = SymbolicSparseRowMatRef::new_checked(n, n, &csr.offsets, None,
+/// &csr.columns)`. Matrices of one [`Pattern`](crate::Pattern) have the same `offsets` and `columns`, so a
 /// symbolic factorisation stays valid from step to step. Compressed rows of a symmetric matrix are its compressed
 /// columns, too.
 #[derive(Clone, Debug, PartialEq)]

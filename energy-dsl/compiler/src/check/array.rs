@@ -24,7 +24,8 @@ impl<'a> Checker<'a> {
         Some(Typed { kind: TypedKind::Array(checked), shape: Shape::Array(length), span: span.clone() })
     }
 
-    /// Checks `a[i]`: an entry of an array, a component of a vector, or a row of a matrix, so that `M[i][j]` is an entry.
+    /// Checks `a[i]`: an entry of an array, a component of a vector, or a row of a matrix, so that `M[i][j]` is an
+    /// entry.
     pub(super) fn index(&mut self, of: &'a Expression, index: &'a Expression) -> Option<Typed> {
         let value = self.expression(of)?;
         let number = self.whole_number(index, "an index")?;

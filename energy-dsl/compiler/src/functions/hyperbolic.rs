@@ -10,7 +10,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "sinh",
         usage: "sinh(x)",
-        docs: "Hyperbolic sine (eˣ − e⁻ˣ)/2, accurate near 0: by its series for |x| < 1. It overflows where e^|x| does.",
+        docs: "Hyperbolic sine (eˣ − e⁻ˣ)/2, accurate near 0: by its series for |x| < 1. It overflows where \
+             e^|x| does.",
         shape: one_scalar,
         lower: |g, a| Lowered::scalar(sinh(g, a[0].node())),
         accuracy: "2 / 2 / 2",

@@ -42,8 +42,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
 ];
 
-/// Creates atan x. The first derivative is 1/(1 + x²), the second −2x/(1 + x²)². Beyond ±1 they are computed from 1/x, so
-/// that no square overflows.
+/// Creates atan x. The first derivative is 1/(1 + x²), the second −2x/(1 + x²)². Beyond ±1 they are computed from 1/x,
+/// so that no square overflows.
 fn atan(g: &mut Graph, x: NodeId) -> NodeId {
     let one = g.constant(1.0);
     let value = g.atan2(x, one);

@@ -50,7 +50,8 @@ impl fmt::Display for BatchError {
         match self {
             Self::Range { range, elements } => write!(
                 f,
-                "{range:?} of {elements} elements: a range starts at a multiple of {BLOCK} and ends at most at {elements}"
+                "{range:?} of {elements} elements: a range starts at a multiple of {BLOCK} and ends at {elements} or \
+                 before"
             ),
             Self::Stencil { needed, given } => {
                 write!(
