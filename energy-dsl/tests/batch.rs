@@ -3,7 +3,10 @@
 #![allow(mixed_script_confusables)]
 
 use energy_dsl::energy;
-use energy_dsl::{Batches, Hessians, Packed, PackedPotential, Potential, available, dispatch_at};
+use energy_dsl::{
+    BLOCK, BatchError, Batches, Float, ForceLaw, Hessians, Packed, PackedPotential, Potential, Real, Residual,
+    available, dispatch_at,
+};
 
 energy! {
     energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) { k / 2 * (norm(p - q) - L)^2 }
@@ -11,6 +14,12 @@ energy! {
         let θ = dihedral(x1, x2, x3, x4);
         k * (θ - θ0)^2
     }
+    force Drag(p, q: Point, v, w: Velocity; b: Scalar[kg/s]) {
+        let d = p - q;
+        let f = b * dot(v - w, d) / norm_squared(d) * d;
+        [-f, f]
+    }
+    residual Circle(x: Scalar, y: Scalar, r: Scalar) { vector(sqrt(x^2 + y^2) - r, x * y) }
     energy Angle(x1, x2, x3, x4: Point) { dihedral(x1, x2, x3, x4) }
 }
 
@@ -133,4 +142,151 @@ fn replaced_elements_are_those_computed_with() {
         energies
     };
     assert_eq!(energies(&packed), energies(&Packed::new(&changed, &stencils::<2>(19))));
+}
+
+/// The positions in another precision.
+fn positions_in<S: Real>() -> Vec<[S; 3]> {
+    positions().into_iter().map(|point| point.map(S::from_f64)).collect()
+}
+
+/// Returns ranges that begin at whole blocks and cover `count` elements: one, one block each, uneven ones.
+fn partitions(count: usize) -> [Vec<std::ops::Range<usize>>; 3] {
+    let blocks = (0..count).step_by(BLOCK).map(|start| start..(start + BLOCK).min(count)).collect();
+    let whole = std::iter::once(0..count).collect();
+    [whole, blocks, vec![0..2 * BLOCK, 2 * BLOCK..2 * BLOCK, 2 * BLOCK..count]]
+}
+
+/// Parts of outputs that belong to a range alone receive the results of single elements, in `S`.
+fn check_potential<S: Float + PartialEq + Default>(spring: impl Fn(usize) -> Spring<S>) {
+    let (count, x, stencils) = (43, positions_in::<S>(), stencils::<2>(43));
+    let elements: Vec<Spring<S>> = (0..count).map(&spring).collect();
+    let packed = Packed::new(&elements, &stencils);
+    for ranges in partitions(count) {
+        for range in ranges {
+            let (mut energies, mut gradients) = (vec![S::default(); range.len()], vec![S::default(); 6 * range.len()]);
+            let (mut triangles, mut values) = (vec![S::default(); 27 * range.len()], energies.clone());
+            let flagged =
+                packed.hessians(range.clone(), &x, &mut energies, &mut gradients, &mut triangles).expect("they fit");
+            let expected: Vec<usize> = range.clone().filter(|element| element % 7 == 6).collect();
+            assert_eq!(flagged.iter().map(|(element, _)| *element).collect::<Vec<_>>(), expected);
+            packed.values(range.clone(), &x, &mut values).expect("they fit");
+            // At a singular input each routine looks for its own limits, with its own rounding.
+            let ordinary = |element: usize| element % 7 != 6;
+            let same = |a: &[S], b: &[S], each: usize| {
+                range
+                    .clone()
+                    .enumerate()
+                    .filter(|(_, element)| ordinary(*element))
+                    .all(|(place, _)| a[each * place..][..each] == b[each * place..][..each])
+            };
+            assert!(same(&values, &energies, 1));
+            let mut forces = vec![S::default(); gradients.len()];
+            let flagged = packed.gradients(range.clone(), &x, &mut values, &mut forces).expect("they fit");
+            assert!(same(&values, &energies, 1) && same(&forces, &gradients, 6));
+            assert_eq!(flagged.len(), expected.len());
+            for (place, element) in range.enumerate() {
+                let points = stencils[element].map(|point| x[point as usize]);
+                let single = elements[element].hessian(&points);
+                assert!(single.value == energies[place]);
+                assert!(single.gradient.as_flattened() == &gradients[6 * place..][..6]);
+                assert!(single.hessian.as_flattened().as_flattened() == &triangles[27 * place..][..27]);
+            }
+        }
+    }
+}
+
+#[test]
+fn ranges_are_relative_to_their_outputs_in_both_precisions() {
+    check_potential::<f64>(|i| Spring { k: 1.0 + i as f64, L: 0.1 * i as f64 });
+    check_potential::<f32>(|i| Spring { k: 1.0 + i as f32, L: 0.1 * i as f32 });
+}
+
+#[test]
+fn work_in_a_later_range_writes_from_its_first_place_on() {
+    let packed = Packed::new(&[Spring { k: 1.0, L: 1.0 }; 40], &stencils::<2>(40));
+    let (mut energies, mut gradients, mut triangles) = ([0.0; 16], [0.0; 96], [0.0; 432]);
+    let mut work =
+        Hessians { energies: &mut energies, gradients: &mut gradients, triangles: &mut triangles, flagged: Vec::new() };
+    energy_dsl::for_each_batch_in(&packed, 16..32, &positions(), &mut work);
+    let flagged: Vec<usize> = work.flagged.iter().map(|(element, _)| *element).collect();
+    assert_eq!(flagged, [20, 27]);
+    let mut expected = [0.0; 40];
+    packed.values(0..40, &positions(), &mut expected).expect("they fit");
+    assert_eq!(energies, expected[16..32]);
+}
+
+/// Forces and Jacobians in `S`.
+fn check_force<S: Float + PartialEq + Default>(drag: impl Fn(usize) -> Drag<S>) {
+    let (count, x, stencils) = (43, positions_in::<S>(), stencils::<2>(43));
+    let v: Vec<[S; 3]> = x.iter().map(|&[a, b, c]| [c, a, b]).collect();
+    let elements: Vec<Drag<S>> = (0..count).map(&drag).collect();
+    let packed = Packed::new(&elements, &stencils);
+    for range in partitions(count).concat() {
+        let numbers = |each: usize| vec![S::default(); each * range.len()];
+        let (mut alone, mut forces, mut by_position, mut by_velocity) =
+            (numbers(6), numbers(6), numbers(36), numbers(36));
+        packed
+            .force_jacobians(range.clone(), &x, &v, &mut forces, &mut by_position, &mut by_velocity)
+            .expect("they fit");
+        packed.forces(range.clone(), &x, &v, &mut alone).expect("they fit");
+        for (place, element) in range.enumerate().filter(|(_, element)| element % 7 != 6) {
+            let [x, v] = [&x, &v].map(|all| stencils[element].map(|point| all[point as usize]));
+            let single = elements[element].jacobians(&x, &v);
+            assert!(single.force.as_flattened() == &forces[6 * place..][..6]);
+            assert!(single.force.as_flattened() == &alone[6 * place..][..6]);
+            assert!(single.by_position.as_flattened().as_flattened() == &by_position[36 * place..][..36]);
+            assert!(single.by_velocity.as_flattened().as_flattened() == &by_velocity[36 * place..][..36]);
+        }
+    }
+}
+
+#[test]
+fn batches_of_forces_are_forces_in_both_precisions() {
+    check_force::<f64>(|i| Drag { b: 1.0 + i as f64 });
+    check_force::<f32>(|i| Drag { b: 1.0 + i as f32 });
+}
+
+/// Residuals and Jacobians in `S`.
+fn check_residual<S: Float + PartialEq + Default>(circle: impl Fn() -> Circle<S>) {
+    let (count, unknowns) = (43, positions_in::<S>().concat());
+    let stencils: Vec<[u32; 3]> = (0..count).map(|i| [i + 1, 2 * i % 89 + 1, 5 * i % 89 + 1]).collect();
+    let elements: Vec<Circle<S>> = stencils.iter().map(|_| circle()).collect();
+    let packed = Packed::new(&elements, &stencils);
+    for range in partitions(count as usize).concat() {
+        let numbers = |each: usize| vec![S::default(); each * range.len()];
+        let (mut alone, mut residuals, mut jacobians) = (numbers(2), numbers(2), numbers(6));
+        packed.jacobians(range.clone(), &unknowns, &mut residuals, &mut jacobians).expect("they fit");
+        packed.residuals(range.clone(), &unknowns, &mut alone).expect("they fit");
+        assert!(alone == residuals);
+        for (place, element) in range.enumerate() {
+            let single = elements[element].jacobian(&stencils[element].map(|unknown| unknowns[unknown as usize]));
+            assert!(single.value == residuals[2 * place..][..2]);
+            assert!(single.jacobian == jacobians[6 * place..][..6]);
+        }
+    }
+}
+
+#[test]
+fn batches_of_residuals_are_residuals_in_both_precisions() {
+    check_residual::<f64>(Circle::new);
+    check_residual::<f32>(Circle::new);
+}
+
+#[test]
+fn misfits_are_errors_with_their_numbers() {
+    let packed = Packed::new(&[Spring { k: 1.0, L: 1.0 }; 40], &stencils::<2>(40));
+    let (x, mut out) = (positions(), [0.0; 40]);
+    let range = |range: std::ops::Range<usize>| BatchError::Range { range, elements: 40 };
+    assert_eq!(packed.values(8..40, &x, &mut out[8..]).unwrap_err(), range(8..40));
+    assert_eq!(packed.values(0..41, &x, &mut out).unwrap_err(), range(0..41));
+    let backwards = std::ops::Range { start: 32, end: 16 };
+    assert_eq!(packed.values(backwards.clone(), &x, &mut []).unwrap_err(), range(backwards));
+    let missing = packed.values(0..40, &x[..7], &mut out).unwrap_err();
+    assert!(matches!(missing, BatchError::Missing { given: 7, .. }), "{missing}");
+    let short = packed.values(16..40, &x, &mut out[..20]).unwrap_err();
+    assert_eq!(short, BatchError::Output { of: "energies", needed: 24, given: 20 });
+    assert_eq!(out, [0.0; 40]);
+    let wrong = Packed::new(&[Spring { k: 1.0, L: 1.0 }], &[[0, 1, 2]]);
+    assert_eq!(wrong.values(0..1, &x, &mut out[..1]).unwrap_err(), BatchError::Stencil { needed: 2, given: 3 });
+    assert_eq!((packed.chunk_len(1), packed.chunk_len(2), packed.chunk_len(100)), (48, 32, 16));
 }

@@ -12,6 +12,11 @@ energy! {
     energy Sinc(p: Point) { sinc(p.x) }
     energy Cosc(p: Point) { cosc(p.x) }
     energy SincSqrt(p: Point) { sinc_sqrt(p.x) }
+    energy Sinh(p: Point) { sinh(p.x) }
+    energy Cosh(p: Point) { cosh(p.x) }
+    energy Tanh(p: Point) { tanh(p.x) }
+    energy Atan(p: Point) { atan(p.x) }
+    energy Erf(p: Point) { erf(p.x) }
     energy Arcs(p: Point) { asin(p.x) + acos(p.y) }
     energy Huber(p: Point) { huber(p.x, 0.5) }
     residual Blend(q: DualQuat; p: Vec3) { transform(unit(q), p) }
@@ -56,6 +61,55 @@ fn large_arguments_neither_overflow_nor_vanish() {
     assert_eq!(at(&Softplus::new(), 1e300), (1e300, 1.0, 0.0, false));
     assert_eq!(at(&Softplus::new(), -800.0), (0.0, 0.0, 0.0, false));
     assert_eq!(at(&Softplus::new(), 0.0), (2.0_f64.ln(), 0.5, 0.25, false));
+}
+
+#[test]
+fn sigmoids_reach_their_limits() {
+    for x in [40.0, 1e200, f64::INFINITY] {
+        for sign in [1.0, -1.0] {
+            assert_eq!(at(&Erf::new(), sign * x), (sign, 0.0, 0.0, false));
+            let (value, first, second, flag) = at(&Atan::new(), sign * x);
+            assert_eq!((value, flag), ((sign * x).atan(), false));
+            assert!(first.is_finite() && second.is_finite() && second * sign <= 0.0, "{x}: {first}, {second}");
+            let (value, first, second, flag) = at(&Tanh::new(), sign * x);
+            assert_eq!((value, flag), (sign, false));
+            assert!(first < 1e-30 && second * sign <= 0.0 && second.abs() < 1e-30);
+        }
+    }
+    assert_eq!(at(&Erf::new(), 0.0), (0.0, std::f64::consts::FRAC_2_SQRT_PI, 0.0, false));
+    for element in [at(&Tanh::new(), 0.0), at(&Atan::new(), 0.0), at(&Sinh::new(), 0.0)] {
+        assert_eq!(element, (0.0, 1.0, 0.0, false));
+    }
+    assert_eq!(at(&Cosh::new(), 0.0), (1.0, 0.0, 1.0, false));
+    let (value, first, second, _) = at(&Cosh::new(), 709.0);
+    assert!(value.is_finite() && value == first && value == second && value == at(&Sinh::new(), 709.0).0);
+    assert_eq!(at(&Sinh::new(), -711.0).0, f64::NEG_INFINITY);
+    assert_eq!(at(&Tanh::new(), -1e-300).0, -1e-300);
+}
+
+/// The same functions in single precision, against those in double precision.
+#[test]
+fn sigmoids_in_single_precision() {
+    macro_rules! compare {
+        ($($name:ident),*) => {$(
+            for i in -40..=40 {
+                let x = i as f32 / 4.0 + 0.01;
+                let (single, double) = ($name::<f32>::new(), $name::<f64>::new());
+                let (single, double) = (single.hessian(&[[x, 0.0, 0.0]]), double.hessian(&[[f64::from(x), 0.0, 0.0]]));
+                let pairs = [
+                    (single.value, double.value),
+                    (single.gradient[0][0], double.gradient[0][0]),
+                    (single.hessian[0][0][0], double.hessian[0][0][0]),
+                ];
+                for (single, double) in pairs {
+                    let error = (f64::from(single) - double).abs();
+                    let smallest = f64::from(f32::MIN_POSITIVE);
+                    assert!(error <= 16.0 * 2.0_f64.powi(-24) * double.abs() + smallest, "{x}: {single} {double}");
+                }
+            }
+        )*};
+    }
+    compare!(Sinh, Cosh, Tanh, Atan, Erf);
 }
 
 #[test]

@@ -68,6 +68,8 @@ macro_rules! for_each_element {
             StableNeoHookean,
             StableNeoHookeanLog,
             StrainRateDamping,
+            TetStVK,
+            TetStableNeoHookean,
             ThreadLimit,
             TukeyLoss,
             TwistMotion,

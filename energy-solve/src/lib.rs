@@ -24,6 +24,9 @@
 //! [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is deterministic: sums run in the order
 //! of terms and elements, for any number of threads.
 //!
+//! To use another library's solver, [`BlockMatrix::to_csr`], [`BlockMatrix::to_bsr`] and [`BlockMatrix::to_triplets`]
+//! export the matrix; [`Csr`] shows the calls for nalgebra-sparse, sprs and faer.
+//!
 //! Contact is not a sum of fixed elements: see [`ContactModel`] and [`OverRelaxation::scale_with_contacts`].
 //!
 //! A [`GaussNewton`] solver minimises sums of squared residuals ([`ResidualTerm`]) over blocks of unknowns.
@@ -64,7 +67,7 @@ pub use linear::{
     BlockCholesky, BlockJacobi, CholeskyError, IncompleteCholesky, Multigrid, OverRelaxation, Preconditioner,
     SingularBlock, SolveOptions, SolveReport, StopReason, bicgstab, conjugate_gradients,
 };
-pub use matrix::{BlockMatrix, Blocks, DofMap, Pattern, Precision, Storage, dot, index};
+pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
     Character, Counts, Curvature, Divisible, ElementList, ForceTerm, Linearisation, ListError, PlacedTerm,

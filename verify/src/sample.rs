@@ -216,14 +216,15 @@ impl Sampler {
 
     /// Draws well-shaped points, scaled and translated at random.
     fn points(&mut self, count: usize) -> Vec<f64> {
-        let points = self.shape(count, 3);
+        let points = self.shape(count, 3, |_, _| true);
         let scale = self.uniform(-1.0, 2.0).exp2();
         let turn = self.rotation();
         let offset = self.uniforms(3, -2.0, 2.0);
         points.chunks(3).flat_map(|p| rotate(&turn, p)).enumerate().map(|(i, x)| scale * x + offset[i % 3]).collect()
     }
 
-    /// Draws a rest shape: points in the plane (a triangle has positive area) or in space, or plain numbers.
+    /// Draws a rest shape: points in the plane or in space (a triangle or tetrahedron has positive size), or plain
+    /// numbers.
     fn rest(&mut self) -> Vec<f64> {
         let fields = self.declaration.rest;
         let count = fields.iter().map(|field| field.size).sum();
@@ -231,17 +232,17 @@ impl Sampler {
         if !(2..=3).contains(&dimension) || fields.iter().any(|field| field.size != dimension) {
             return fields.iter().flat_map(|field| self.parameter(field)).collect();
         }
-        self.shape(count, dimension)
+        self.shape(count, dimension, is_oriented)
     }
 
-    /// Draws points in the box (−1, 1) that are well separated, with a demand that falls with each attempt. A plane
-    /// triangle has positive area.
-    fn shape(&mut self, count: usize, dimension: usize) -> Vec<f64> {
+    /// Draws points in the box (−1, 1) that are well separated, with a demand that falls with each attempt, until
+    /// `accepts` holds.
+    fn shape(&mut self, count: usize, dimension: usize, accepts: fn(&[f64], usize) -> bool) -> Vec<f64> {
         let mut demand = 1.0;
         loop {
             for _ in 0..1000 {
                 let points = self.uniforms(count, -1.0, 1.0);
-                if is_well_shaped(&points, dimension, demand) && has_positive_area(&points, dimension) {
+                if is_well_shaped(&points, dimension, demand) && accepts(&points, dimension) {
                     return points;
                 }
             }
@@ -271,10 +272,20 @@ impl Sampler {
     }
 }
 
-/// Whether a plane triangle is counter-clockwise; `true` for all other shapes.
-fn has_positive_area(points: &[f64], dimension: usize) -> bool {
-    let corners: Vec<&[f64]> = points.chunks(2).collect();
-    let (2, [a, b, c]) = (dimension, corners.as_slice()) else { return true };
-    let (u, v) = (difference(b, a), difference(c, a));
-    u[0] * v[1] - u[1] * v[0] > 0.0
+/// Whether a plane triangle is counter-clockwise, or four points in space are a tetrahedron of positive volume; `true`
+/// for all other shapes.
+fn is_oriented(points: &[f64], dimension: usize) -> bool {
+    let corners: Vec<&[f64]> = points.chunks(dimension.max(1)).collect();
+    match (dimension, corners.as_slice()) {
+        (2, [a, b, c]) => {
+            let (u, v) = (difference(b, a), difference(c, a));
+            u[0] * v[1] - u[1] * v[0] > 0.0
+        }
+        (3, [a, b, c, d]) => {
+            let [u, v, w] = [b, c, d].map(|corner| difference(corner, a));
+            let minor = |i: usize, j: usize| v[i] * w[j] - v[j] * w[i];
+            u[0] * minor(1, 2) + u[1] * minor(2, 0) + u[2] * minor(0, 1) > 0.0
+        }
+        _ => true,
+    }
 }

@@ -21,6 +21,11 @@ energy! {
     energy Tan(p: Point) { tan(p.x) }
     energy Asin(p: Point) { asin(p.x) }
     energy PseudoHuber(p: Point) { pseudo_huber(p.x, 0.75) }
+    energy Atan(p: Point) { atan(p.x) }
+    energy Sinh(p: Point) { sinh(p.x) }
+    energy Cosh(p: Point) { cosh(p.x) }
+    energy Tanh(p: Point) { tanh(p.x) }
+    energy Erf(p: Point) { erf(p.x) }
     energy Versine(p: Point) { one_minus_cos(p.x) }
 }
 
@@ -236,6 +241,79 @@ fn trigonometric_functions() {
         }
         let first = one() / other.clone();
         [angle, first.clone(), x * first.clone() * first.clone() * first]
+    });
+}
+
+#[test]
+fn inverse_tangent() {
+    let check_on = |arguments: &[f64]| {
+        check(&Atan::new(), arguments, [1.0, 4.0, 6.0], |x| {
+            // Newton's method for tan from the rounded angle.
+            let mut angle = Fixed::of((x.0.to_f64().unwrap() / 2.0_f64.powi(BITS as i32)).atan());
+            for _ in 0..5 {
+                let (sine, cosine) = sine_and_cosine(&angle);
+                angle = angle + (x.clone() * cosine.clone() - sine.clone()) / (cosine + x.clone() * sine);
+            }
+            let first = one() / (one() + x.clone() * x.clone());
+            [angle, first.clone(), -(Fixed::of(2.0) * x * first.clone() * first)]
+        });
+    };
+    check_on(&arguments(1.5, true));
+    check_on(&arguments(1e6, true));
+}
+
+/// Returns sinh x and cosh x.
+fn hyperbolic(x: &Fixed) -> (Fixed, Fixed) {
+    let two = Fixed::of(2.0);
+    let (grown, fallen) = (x.expm1(), (-x.clone()).expm1());
+    ((grown.clone() - fallen.clone()) / two.clone(), one() + (grown + fallen) / two)
+}
+
+#[test]
+fn hyperbolic_functions() {
+    check(&Sinh::new(), &arguments(30.0, true), [2.0, 2.0, 2.0], |x| {
+        let (sine, cosine) = hyperbolic(&x);
+        [sine.clone(), cosine, sine]
+    });
+    check(&Cosh::new(), &arguments(30.0, true), [2.0, 2.0, 2.0], |x| {
+        let (sine, cosine) = hyperbolic(&x);
+        [cosine.clone(), sine, cosine]
+    });
+    check(&Tanh::new(), &arguments(30.0, true), [4.0, 5.0, 7.0], |x| {
+        let (sine, cosine) = hyperbolic(&x);
+        let (tangent, inverse) = (sine / cosine.clone(), one() / cosine);
+        let first = inverse.clone() * inverse;
+        [tangent.clone(), first.clone(), -(Fixed::of(2.0) * tangent * first)]
+    });
+}
+
+/// Returns π by Machin's formula.
+fn pi() -> Fixed {
+    let arctangent_of_inverse = |n: f64| {
+        let square = Fixed::of(n * n);
+        Fixed::series(one() / Fixed::of(n), |k| {
+            -(Fixed::of(f64::from(2 * k + 1)) / (square.clone() * Fixed::of(f64::from(2 * k + 3))))
+        })
+    };
+    Fixed::of(16.0) * arctangent_of_inverse(5.0) - Fixed::of(4.0) * arctangent_of_inverse(239.0)
+}
+
+#[test]
+fn error_function() {
+    assert!(error(std::f64::consts::PI, &pi()) <= 1.0);
+    let factor = Fixed::of(2.0) / pi().sqrt();
+    let mut all = arguments(8.0, true);
+    all.extend(arguments(1.5, true));
+    check(&Erf::new(), &all, [2.0, 3.0, 4.0], |x| {
+        let square = x.clone() * x.clone();
+        let gaussian = factor.clone() * (-square.clone()).exp();
+        // The alternating series, which cancels: exp(64) takes 93 of 600 bits.
+        let ratio = |k: i32| {
+            let odd = Fixed::of(f64::from(2 * k + 1)) / Fixed::of(f64::from((k + 1) * (2 * k + 3)));
+            -(square.clone() * odd)
+        };
+        let value = Fixed::series(factor.clone() * x.clone(), ratio);
+        [value, gaussian.clone(), -(Fixed::of(2.0) * x * gaussian)]
     });
 }
 

@@ -70,6 +70,21 @@ energy! {
     }
 
     #[audit(samples = 50)]
+    energy Sensitivity(p, q, r: Point; k, L: Scalar, a: Vec3, M: Mat2x2) {
+        let e = norm(p - q) - L;
+        let U = k / 2 * e^2 + log(1 + k^2) * angle(q - p, r - q) + exp(dot(a, p) / 8) + det(M) * M[0][1] * e;
+        let G = gradient(U, M);
+        gradient(U, k)^2 + gradient(U, L) * dot(gradient(U, a), q) + ddot(G, G)
+            + norm_squared(gradient(gradient(U, L), p))
+    }
+
+    #[audit(samples = 50)]
+    residual Calibration(s, t: Scalar; k: Scalar, x: Scalar) {
+        let model = s * exp(-k * x) + t * tanh(k);
+        vector(model, gradient(model, k), gradient(gradient(model, k), x))
+    }
+
+    #[audit(samples = 50)]
     constraint Angles(p, q, r: Point; φ: Scalar) { vector(angle(q - p, r - q) - φ, norm(p - r)^3) }
 
     #[audit(samples = 50)]
@@ -116,6 +131,37 @@ energy! {
     energy Arcs(p, q: Point; s: Scalar) {
         let x = dot(p, q) / (s + norm(p) * norm(q));
         asin(x) * acos(x / 2) + tan(x / s) + acos(dot(unit(p), unit(q)))
+    }
+
+    #[audit(samples = 50)]
+    energy Sigmoids(p, q: Point; s: Scalar) {
+        let x = dot(p, q) / s;
+        tanh(x) * atan(s * x) + erf(x / 2) * norm(p) + sinh(x / 8) + cosh(norm(q) / 4) * erf(s)
+    }
+
+    #[audit(samples = 50)]
+    force SigmoidGradients(p, q: Point; s: Scalar) {
+        let U = tanh(norm(p - q)) + atan(s * p.x) + erf(p.y) + sinh(q.z / 4) * cosh(q.y / 4);
+        [-gradient(U, p), -gradient(U, q)]
+    }
+
+    #[audit(samples = 50)]
+    energy LargeMatrices(p, q, r: Point; M: Mat4x4, N: Mat2x3) {
+        let A = columns(
+            vector(p.x, p.y, p.z, 1), vector(q.x, q.y, q.z, 1), vector(r.x, r.y, r.z, 1), vector(1, p.x, q.y, r.z)
+        ) + M + 8 * identity(4);
+        let B = inverse(A);
+        det(A) / 512 + ddot(B, transpose(M)) + trace(adjugate(A)) / 64 + A[1][2] * B[0][3] + dot(A[3], B[2])
+            + norm(N * p) + N[1][2] * dot(N[0], q)
+    }
+
+    #[audit(samples = 50)]
+    energy Polar(p, q: Point; M: Mat2x2) {
+        let F = columns(vector(p.x, p.y), vector(q.x, q.y)) + M;
+        let D = F - rotation_of(F);
+        let G = columns(p, q);
+        let E = stretch_of(G) - identity(2);
+        ddot(D, D) + trace(E)^2 + ddot(E, E) + dot(vector(p.x, q.z), rotation_of(G)[0]) * det(stretch_of(F))
     }
 
     #[audit(samples = 50)]

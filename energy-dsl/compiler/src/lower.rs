@@ -1,6 +1,7 @@
 //! Lowers typed programs to scalar graphs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use crate::check::{Program, Source, Typed, TypedKind};
 use crate::diff::{Coordinates, Moving, Order, first_derivatives};
@@ -62,10 +63,10 @@ impl Formula {
 /// A program in its textbook form, without derivatives.
 #[derive(Clone, Debug)]
 pub struct TextbookFormula {
-    /// The formula. The derivatives that it uses are [`Input::Precomputed`], three numbers each.
+    /// The formula. The derivatives that it uses are [`Input::Precomputed`].
     pub formula: Formula,
-    /// Derivatives that the formula uses: node and point. Later ones may use earlier ones.
-    pub gradients: Vec<(NodeId, usize)>,
+    /// Derivatives that the formula uses: node, section and index of the input number. Later ones may use earlier ones.
+    pub gradients: Vec<(NodeId, Source, usize)>,
 }
 
 /// Lowers the whole program to its textbook form.
@@ -87,7 +88,7 @@ fn stored_bindings(program: &Program) -> Vec<usize> {
             }
             TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().for_each(|e| visit(program, e, seen)),
             TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|e| visit(program, e, seen)),
-            TypedKind::Gradient(of, _) => visit(program, of, seen),
+            TypedKind::Gradient(of, ..) => visit(program, of, seen),
             TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
         }
     }
@@ -103,7 +104,7 @@ struct Lowering<'a> {
     /// Index of each stored binding; `None` if bindings are computed here.
     slots: Option<BTreeMap<usize, usize>>,
     /// Derivatives that the evaluation of the textbook form must supply.
-    gradients: Vec<(NodeId, usize)>,
+    gradients: Vec<(NodeId, Source, usize)>,
 }
 
 impl<'a> Lowering<'a> {
@@ -113,6 +114,7 @@ impl<'a> Lowering<'a> {
             Form::Textbook => Graph::textbook(),
         };
         graph.compensate(!program.uncompensated);
+        differentiated_parameters(program).into_iter().for_each(|number| graph.vary(Input::Parameter(number)));
         Self { program, graph, done: BTreeMap::new(), slots, gradients: Vec::new() }
     }
 
@@ -139,15 +141,7 @@ impl<'a> Lowering<'a> {
         match &expression.kind {
             TypedKind::Constant(value) => Lowered::scalar(self.graph.constant(*value)),
             TypedKind::Pi => Lowered::scalar(self.graph.pi()),
-            TypedKind::Input(source, first) => {
-                let input = match source {
-                    Source::Position => Input::Position,
-                    Source::Velocity => Input::Velocity,
-                    Source::Rest => Input::Rest,
-                    Source::Parameter => Input::Parameter,
-                };
-                self.inputs(expression.shape, *first, input)
-            }
+            TypedKind::Input(source, first) => self.inputs(expression.shape, *first, input_of(*source)),
             TypedKind::Binding(number) => self.binding(*number),
             TypedKind::Call(function, arguments) => {
                 let arguments: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
@@ -163,25 +157,72 @@ impl<'a> Lowering<'a> {
                 let parts = list.iter().flat_map(|f| self.expression(f).parts).collect();
                 Lowered { shape: expression.shape, parts }
             }
-            TypedKind::Gradient(of, point) => {
-                let of = self.expression(of).node();
-                Lowered::vector(self.gradient(of, *point))
+            TypedKind::Gradient(of, source, first) => {
+                let (of, shape) = (self.expression(of).node(), expression.shape);
+                let parts = match (self.graph.form(), source) {
+                    (Form::Textbook, _) => self.textbook_gradient(of, *source, *first..*first + shape.size()),
+                    (Form::Robust, Source::Position) => self.gradient_by_point(of, first / 3),
+                    (Form::Robust, _) => self.gradient_by_parameter(of, *first, shape),
+                };
+                Lowered { shape, parts }
             }
         }
     }
 
-    fn gradient(&mut self, of: NodeId, point: usize) -> Vec<NodeId> {
-        if self.graph.form() == Form::Textbook {
-            let known = self.gradients.iter().position(|&known| known == (of, point));
+    /// Returns inputs for the derivatives, which the evaluation of the textbook form supplies.
+    fn textbook_gradient(&mut self, of: NodeId, source: Source, numbers: Range<usize>) -> Vec<NodeId> {
+        let derivative = |by: usize| {
+            let known = self.gradients.iter().position(|&known| known == (of, source, by));
             let number = known.unwrap_or_else(|| {
-                self.gradients.push((of, point));
+                self.gradients.push((of, source, by));
                 self.gradients.len() - 1
             });
-            return self.inputs(Shape::Vector(3), 3 * number, Input::Precomputed).parts;
-        }
+            self.graph.input(Input::Precomputed(u16::try_from(number).expect("fewer than 65536 inputs")))
+        };
+        numbers.map(derivative).collect()
+    }
+
+    fn gradient_by_point(&mut self, of: NodeId, point: usize) -> Vec<NodeId> {
         let g = &mut self.graph;
         let coordinates = Coordinates::of_points(g, &[of], Moving::Positions);
         let reduced = first_derivatives(g, &[of], &coordinates, Order::FirstToDifferentiate).remove(0);
         coordinates.expand(g, &reduced, point)
     }
+
+    fn gradient_by_parameter(&mut self, of: NodeId, first: usize, shape: Shape) -> Vec<NodeId> {
+        let parameters = self.inputs(shape, first, Input::Parameter).parts;
+        let coordinates = Coordinates::of_nodes(&mut self.graph, &parameters);
+        first_derivatives(&mut self.graph, &[of], &coordinates, Order::FirstToDifferentiate).remove(0)
+    }
+}
+
+/// Returns the constructor of inputs of a section.
+fn input_of(source: Source) -> fn(u16) -> Input {
+    match source {
+        Source::Position => Input::Position,
+        Source::Velocity => Input::Velocity,
+        Source::Rest => Input::Rest,
+        Source::Parameter => Input::Parameter,
+    }
+}
+
+/// Returns the parameter numbers that a program differentiates by.
+fn differentiated_parameters(program: &Program) -> BTreeSet<u16> {
+    fn visit(typed: &Typed, found: &mut BTreeSet<u16>) {
+        match &typed.kind {
+            TypedKind::Gradient(of, source, first) => {
+                if *source == Source::Parameter {
+                    let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
+                    found.extend((0..typed.shape.size()).map(number));
+                }
+                visit(of, found);
+            }
+            TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().for_each(|part| visit(part, found)),
+            TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|part| visit(part, found)),
+            TypedKind::Binding(_) | TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
+        }
+    }
+    let mut found = BTreeSet::new();
+    program.bindings.iter().map(|binding| &binding.value).chain([&program.result]).for_each(|t| visit(t, &mut found));
+    found
 }

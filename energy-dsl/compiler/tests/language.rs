@@ -41,6 +41,8 @@ fn both_spellings_mean_the_same() {
         ("\\left(k + L\\right) \\lVert p_k \\rVert \\cos \\theta_0", "(k + L) * norm(p_k) * cos(θ0)"),
         ("M = columns(p_k, p_l, p_k × p_l); (M⁻¹ p_l)·vector(1, 10, 100)", "10"),
         ("sin² θ₀ + cos² θ₀ + |−L|", "1.5"),
+        ("M = columns(p_k, p_l); M[1][0] k + M[2]·vector(1, 2)", "2 * k + 10"),
+        ("tanh k + erf(L) - atan(k/2)", "tanh(k) + erf(L) - atan2(k, 2)"),
         ("w = [k, L]; sum(j in 0..2, w[j] j) + p_k.y", "L + 2"),
     ] {
         let printed_value = value(&format!("\"{}\"", printed.replace('\\', "\\\\")));
@@ -58,6 +60,13 @@ fn functions_compute_what_they_say() {
         ("trace(outer(p_k, p_l))", dot),
         ("det(columns(p_k, p_l, cross(p_k, p_l)))", 9.0 * 26.0 - dot * dot),
         ("ddot(identity(3), outer(p_k, p_l))", dot),
+        ("tanh(L) + sinh(L) * cosh(L)", 0.5_f64.tanh() + 1.0_f64.sinh() / 2.0),
+        ("erf(L)", 0.520_499_877_813_046_5),
+        ("erf(-k)", -0.999_977_909_503_001_4),
+        ("atan(-k)", -(3.0_f64.atan())),
+        ("gradient(k^2 * L, k)", 3.0),
+        ("gradient(log(k) * L, k) * gradient(norm(L * p_k), L)", 0.5),
+        ("det(identity(4) + identity(4))", 16.0),
         ("dot(inverse(columns(p_k, p_l, cross(p_k, p_l))) * p_l, vector(1, 10, 100))", 10.0),
         ("norm(transpose(outer(p_k, p_l)) * p_k)", 9.0 * 26.0_f64.sqrt()),
         ("min(k, L) + 10 * max(k, L)", 30.5),

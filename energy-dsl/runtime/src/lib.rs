@@ -8,14 +8,16 @@ mod choose;
 mod declaration;
 mod element;
 mod evaluate;
+#[cfg(feature = "nalgebra")]
+pub mod interop;
 mod numbers;
 mod results;
 
 pub use aligned::Aligned;
 pub use array::Array;
 pub use batch::{
-    BLOCK, Batch, BatchWork, Batches, Hessians, Packed, PackedForce, PackedPotential, PackedResidual, Stored,
-    WidePoints, for_each_batch, for_each_batch_in,
+    BLOCK, Batch, BatchError, BatchWork, Batches, Flagged, Hessians, Packed, PackedForce, PackedPotential,
+    PackedResidual, Stored, WidePoints, for_each_batch, for_each_batch_in,
 };
 #[doc(hidden)]
 pub use choose::Choose;
@@ -31,8 +33,8 @@ pub use element::{
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use numbers::{
-    BLOCK_NUMBERS, Baseline, BlockSum, Flag, Flags, Kernel, Lane, Level, LevelName, Mask, Number, Real, Unbounded,
-    UnknownLevel, available, dispatch, dispatch_at, level,
+    BLOCK_NUMBERS, Baseline, BlockSum, Flag, Flags, Float, Kernel, Lane, Level, LevelName, Mask, Number, Real,
+    Unbounded, UnknownLevel, available, dispatch, dispatch_at, level,
 };
 #[doc(hidden)]
 pub use numbers::{Precautions, Ray, Roles, WithCare, settle, with_care};

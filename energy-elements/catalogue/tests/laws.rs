@@ -5,7 +5,7 @@ use energy_catalogue::{catalogue, find};
 use energy_dsl::{ForceLaw, Inputs, Kind, Outputs, Potential};
 use energy_elements::{
     BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
-    StVK, ViscousDrag, ZeroLengthSpring,
+    StVK, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring,
 };
 use proptest::prelude::*;
 
@@ -30,6 +30,7 @@ fn ordinary(name: &str) -> (Vec<f64>, Vec<f64>) {
     let rest = match declaration.rest.iter().map(|field| field.size).sum::<usize>() {
         0 => vec![],
         6 => vec![0.1, 0.0, 1.0, 0.25, 0.0, 0.75],
+        12 if name.starts_with("Tet") => vec![0.0, 0.0, 0.0, 1.0, 0.25, 0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.75],
         12 => vec![0.5, -1.0, 0.0, 0.25, 0.75, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         18 => vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.25, 1.0, 0.0, 1.0, 1.0, 0.0, -0.75, 0.75, 0.0, 0.5, -1.0, 0.0],
         other => panic!("{name}: no rest shape of {other} numbers here"),
@@ -189,6 +190,56 @@ fn membranes_stretch_and_refuse_a_flat_rest_shape() {
     let sheet = StVK::new([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], lambda, mu).unwrap();
     let turned = sheet.gradient(&[ORIGIN, [3.0, 4.0, 0.0], [-4.0, 3.0, 0.0]]);
     assert_eq!((turned.value, turned.gradient), (0.0, [ORIGIN; 3]));
+}
+
+/// The energies of a tetrahedron of volume 1/6 with the gradient F of its deformation.
+fn solids(f: [[f64; 3]; 3], lambda: f64, mu: f64) -> [energy_dsl::Gradient<f64, [[f64; 3]; 4]>; 2] {
+    let corners = [ORIGIN, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let [a, b, c, d] = corners;
+    let moved = corners.map(|p| [0, 1, 2].map(|i| 0.5 + f[i][0] * p[0] + f[i][1] * p[1] + f[i][2] * p[2]));
+    [
+        TetStVK::new(a, b, c, d, lambda, mu).unwrap().gradient(&moved),
+        TetStableNeoHookean::new(a, b, c, d, lambda, mu).unwrap().gradient(&moved),
+    ]
+}
+
+#[test]
+fn solids_have_the_energy_of_their_deformation() {
+    let (lambda, mu) = (5.0, 3.0);
+    let alpha = 1.0 + 0.75 * mu / lambda;
+    let diagonal = |x: f64, y: f64, z: f64| [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]];
+    let shear = [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    // F, ‖E‖², tr E, I and J.
+    for (f, square, trace, i, j) in [
+        (diagonal(2.0, 1.0, 1.0), 2.25, 1.5, 6.0, 2.0),
+        (diagonal(0.5, 1.0, 1.0), 0.140_625, -0.375, 2.25, 0.5),
+        (shear, 0.140_625, 0.125, 3.25, 1.0),
+        // Flat, and inverted.
+        (diagonal(0.0, 1.0, 1.0), 0.25, -0.5, 2.0, 0.0),
+        (diagonal(-1.0, 1.0, 1.0), 0.0, 0.0, 3.0, -1.0),
+        (diagonal(-2.0, 1.0, 1.0), 2.25, 1.5, 6.0, -2.0),
+    ] {
+        let [stvk, stable] = solids(f, lambda, mu);
+        let expected = (mu * square + lambda / 2.0 * trace * trace) / 6.0;
+        assert!((stvk.value - expected).abs() < 1e-14, "{f:?}: {} is not {expected}", stvk.value);
+        let volumetric = lambda / 2.0 * ((j - alpha).powi(2) - (1.0 - alpha).powi(2));
+        let expected: f64 = (mu / 2.0 * (i - 3.0) - mu / 2.0 * f64::ln((i + 1.0) / 4.0) + volumetric) / 6.0;
+        assert!((stable.value - expected).abs() < 1e-14, "{f:?}: {} is not {expected}", stable.value);
+        assert!(!stvk.flags.any() && !stable.flags.any());
+        // Uniaxial stress P = ∂Ψ/∂F₁₁ pulls the second corner.
+        if f == diagonal(2.0, 1.0, 1.0) {
+            let [stvk, stable] = [stvk.gradient[1][0], stable.gradient[1][0]].map(|force| 6.0 * force);
+            assert!((stvk - 2.0 * (2.0 * mu * 1.5 + lambda * 1.5)).abs() < 1e-13);
+            assert!((stable - (mu * 2.0 * (1.0 - 1.0 / 7.0) + lambda * (2.0 - alpha))).abs() < 1e-13);
+        }
+    }
+    for at in solids([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], lambda, mu) {
+        assert_eq!((at.value, at.gradient), (0.0, [ORIGIN; 4]), "turned by a right angle, at rest");
+    }
+    // An inverted and a flat rest shape.
+    let [a, b, c, d] = [ORIGIN, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    assert!(TetStVK::new(a, c, b, d, lambda, mu).is_err() && TetStVK::new(a, b, c, c, lambda, mu).is_err());
+    assert!(TetStableNeoHookean::new(a, c, b, d, lambda, mu).is_err());
 }
 
 #[test]

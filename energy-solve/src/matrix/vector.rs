@@ -41,7 +41,7 @@ pub(crate) fn block_times(block: &Block<f64>, v: &Vector3<f64>) -> Vector3<f64> 
 }
 
 /// Returns Bᵀ.
-pub(crate) fn transposed(block: &Block<f64>) -> Block<f64> {
+pub(crate) fn transposed<T: Copy>(block: &Block<T>) -> Block<T> {
     std::array::from_fn(|row| std::array::from_fn(|column| block[column][row]))
 }
 

@@ -24,14 +24,19 @@ impl<'a> Checker<'a> {
         Some(Typed { kind: TypedKind::Array(checked), shape: Shape::Array(length), span: span.clone() })
     }
 
-    /// Checks `a[i]`: an entry of an array, or a component of a vector.
+    /// Checks `a[i]`: an entry of an array, a component of a vector, or a row of a matrix, so that `M[i][j]` is an
+    /// entry.
     pub(super) fn index(&mut self, of: &'a Expression, index: &'a Expression) -> Option<Typed> {
         let value = self.expression(of)?;
         let number = self.whole_number(index, "an index")?;
         let length = match value.shape {
             Shape::Vector(_) | Shape::Quat | Shape::DualQuat | Shape::Twist => value.shape.size(),
             Shape::Array(n) => n.into(),
-            other => return self.error(&of.span, format!("only arrays and vectors have entries, but this is {other}")),
+            Shape::Matrix(rows, _) => rows.into(),
+            other => {
+                return self
+                    .error(&of.span, format!("only arrays, vectors and matrices have entries, but this is {other}"));
+            }
         };
         if number >= length {
             let message =
@@ -71,8 +76,12 @@ impl<'a> Checker<'a> {
 
     fn component_of(&mut self, value: Typed, number: usize, span: &Span) -> Option<Typed> {
         let function = functions::find("[]").expect("compiler bug: no function `[]`");
+        let shape = match value.shape {
+            Shape::Matrix(_, columns @ 2..) => Shape::Vector(columns),
+            _ => Shape::Scalar,
+        };
         let arguments = vec![value, constant(number as f64, span)];
-        Some(Typed { kind: TypedKind::Call(function, arguments), shape: Shape::Scalar, span: span.clone() })
+        Some(Typed { kind: TypedKind::Call(function, arguments), shape, span: span.clone() })
     }
 
     /// Checks and unrolls `sum(j in first..end, term)`.

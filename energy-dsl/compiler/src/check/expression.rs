@@ -358,17 +358,17 @@ impl<'a> Checker<'a> {
 
     fn identity(&mut self, name: &Name, arguments: &[Expression]) -> Option<Typed> {
         match arguments {
-            [Expression { kind: ExpressionKind::Number(n), .. }] if *n == 2.0 || *n == 3.0 => {
+            [Expression { kind: ExpressionKind::Number(n), .. }] if [2.0, 3.0, 4.0].contains(n) => {
                 self.apply("identity", &name.span, vec![constant(0.0, &name.span); *n as usize])
             }
-            _ => self.error(&name.span, "`identity` takes the number 2 or 3, as in identity(3)"),
+            _ => self.error(&name.span, "`identity` takes the number 2, 3 or 4, as in identity(3)"),
         }
     }
 
-    /// Checks `gradient(U, p)`, the derivative of a scalar with respect to a point.
+    /// Checks `gradient(U, p)`, the derivative of a scalar with respect to a point or a parameter.
     fn gradient(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
         let [of, by] = arguments else {
-            return self.error(&name.span, "`gradient` takes a scalar and a point, as in gradient(θ, x1)");
+            return self.error(&name.span, "`gradient` takes a scalar and a point or parameter, as in gradient(θ, x1)");
         };
         let (of_typed, by_typed) = (self.expression(of), self.expression(by));
         let (of_typed, by_typed) = (of_typed?, by_typed?);
@@ -376,11 +376,52 @@ impl<'a> Checker<'a> {
             return self.error(&of.span, format!("`gradient` takes a scalar, but this is {}", of_typed.shape));
         }
         match by_typed.kind {
-            TypedKind::Input(Source::Position, first) => {
-                let kind = TypedKind::Gradient(Box::new(of_typed), first / 3);
-                Some(Typed { kind, shape: Shape::Vector(3), span: name.span.clone() })
+            TypedKind::Input(source @ (Source::Position | Source::Parameter), first) => {
+                let shape = by_typed.shape;
+                if source == Source::Position && shape != Shape::Vector(3) {
+                    return self.error(&by.span, "`gradient` is by a point or a parameter, not by this unknown");
+                }
+                if !matches!(shape, Shape::Scalar | Shape::Vector(_) | Shape::Matrix(..)) {
+                    return self
+                        .error(&by.span, format!("`gradient` is by a scalar, vector or matrix, not by {shape}"));
+                }
+                if self.rest_reads(&of_typed, (source, first), false, &mut BTreeSet::new()) {
+                    let message = "the `rest` block uses this parameter, and its values are constants here";
+                    self.diagnostics.push(
+                        Diagnostic::new(&by.span, message)
+                            .help("compute what depends on it outside of the `rest` block"),
+                    );
+                    return None;
+                }
+                let kind = TypedKind::Gradient(Box::new(of_typed), source, first);
+                Some(Typed { kind, shape, span: name.span.clone() })
             }
-            _ => self.error(&by.span, "`gradient` is by a declared point"),
+            _ => self.error(&by.span, "`gradient` is by a declared point or parameter"),
+        }
+    }
+
+    /// Returns whether an expression depends on an input through the `rest` block. `within` says whether the expression
+    /// belongs to that block; `seen` holds the bindings of either kind that were searched.
+    fn rest_reads(
+        &self,
+        typed: &Typed,
+        input: (Source, usize),
+        within: bool,
+        seen: &mut BTreeSet<(usize, bool)>,
+    ) -> bool {
+        match &typed.kind {
+            TypedKind::Input(source, first) => within && (*source, *first) == input,
+            TypedKind::Binding(number) => {
+                let binding = &self.bindings[*number];
+                let within = within || binding.rest;
+                seen.insert((*number, within)) && self.rest_reads(&binding.value, input, within, seen)
+            }
+            TypedKind::Call(_, list) | TypedKind::Array(list) => {
+                list.iter().any(|part| self.rest_reads(part, input, within, seen))
+            }
+            TypedKind::Select(a, b, c) => [a, b, c].into_iter().any(|part| self.rest_reads(part, input, within, seen)),
+            TypedKind::Gradient(of, ..) => self.rest_reads(of, input, within, seen),
+            TypedKind::Constant(_) | TypedKind::Pi => false,
         }
     }
 }

@@ -139,6 +139,7 @@ pub enum TypedKind {
     Select(Box<Typed>, Box<Typed>, Box<Typed>),
     /// Concatenated entries of an array, or rows.
     Array(Vec<Typed>),
-    /// The derivative of a scalar with respect to a point.
-    Gradient(Box<Typed>, usize),
+    /// The derivative of a scalar with respect to a point or a parameter, by the section and the index of its first
+    /// component. It has the shape of that input.
+    Gradient(Box<Typed>, Source, usize),
 }

@@ -49,7 +49,7 @@ impl Coordinates {
     }
 
     /// Creates one coordinate for each node.
-    pub(super) fn of_nodes(g: &mut Graph, nodes: &[NodeId]) -> Self {
+    pub fn of_nodes(g: &mut Graph, nodes: &[NodeId]) -> Self {
         let one = g.constant(1.0);
         let seeds = nodes.iter().enumerate().map(|(number, &node)| (node, vec![(number, one)])).collect();
         let vectors = (0..nodes.len()).map(|number| vec![(number, true)]).collect();

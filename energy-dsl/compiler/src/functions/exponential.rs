@@ -179,7 +179,7 @@ fn log1pmx_near_0(g: &mut Graph, x: NodeId) -> NodeId {
 }
 
 /// Creates eˣ − 1. For |x| < 1 it is (u − 1) x/ln u with u = eˣ rounded: the errors cancel.
-fn expm1(g: &mut Graph, x: NodeId) -> NodeId {
+pub(super) fn expm1(g: &mut Graph, x: NodeId) -> NodeId {
     let u = g.exp(x);
     // Plain addition: `sub` would be recognised as this function again.
     let minus_one = g.constant(-1.0);

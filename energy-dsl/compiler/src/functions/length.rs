@@ -159,7 +159,7 @@ fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
     Lowered::scalar(inner_product(g, &args[0].parts, &args[0].parts))
 }
 
-fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
+pub(super) fn unit(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let (q, shape) = (&args[0], args[0].shape);
     if shape == Shape::DualQuat {
         return super::quaternion::unit_dual(g, q);

@@ -61,7 +61,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "det",
         usage: "det(A)",
-        docs: "Determinant of a 2×2 or 3×3 matrix.",
+        docs: "Determinant of a 2×2, 3×3 or 4×4 matrix.",
         shape: square_to_scalar,
         lower: det,
         accuracy: "",
@@ -69,7 +69,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "inverse",
         usage: "inverse(A)",
-        docs: "Inverse of a 2×2 or 3×3 matrix.",
+        docs: "Inverse of a 2×2, 3×3 or 4×4 matrix.",
         shape: square_to_square,
         lower: inverse,
         accuracy: "",
@@ -77,7 +77,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "adjugate",
         usage: "adjugate(A)",
-        docs: "det(A) A⁻¹ of a 2×2 or 3×3 matrix, without division. It is exact for integers.",
+        docs: "det(A) A⁻¹ of a 2×2, 3×3 or 4×4 matrix, without division. It is exact for integers.",
         shape: square_to_square,
         lower: adjugate,
         accuracy: "",
@@ -100,8 +100,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
     Function {
         name: "[]",
-        usage: "v[i], v.x, q.w",
-        docs: "A component of a vector or an entry of an array, counted from 0.",
+        usage: "v[i], v.x, q.w, M[i][j]",
+        docs: "A component of a vector, a row of a matrix or an entry of an array, counted from 0.",
         shape: component_shape,
         lower: component,
         accuracy: "0",
@@ -163,8 +163,8 @@ fn transpose_shape(shapes: &[Shape]) -> Result<Shape, String> {
 
 fn square_to_square(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
-        [Shape::Matrix(r @ (2 | 3), c)] if r == c => Ok(shapes[0]),
-        [other] => Err(format!("takes a 2×2 or 3×3 matrix, but this is {other}")),
+        [Shape::Matrix(r @ 2..=4, c)] if r == c => Ok(shapes[0]),
+        [other] => Err(format!("takes a 2×2, 3×3 or 4×4 matrix, but this is {other}")),
         _ => Err(format!("takes one matrix, but got {}", super::arguments(shapes.len()))),
     }
 }
@@ -176,19 +176,19 @@ fn square_to_scalar(shapes: &[Shape]) -> Result<Shape, String> {
 /// The checker has expanded `identity(n)` to n numbers; the shape follows from their count.
 fn identity_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match shapes.len() {
-        n @ (2 | 3) => Ok(Shape::Matrix(n as u8, n as u8)),
-        _ => Err("takes the number 2 or 3".into()),
+        n @ 2..=4 => Ok(Shape::Matrix(n as u8, n as u8)),
+        _ => Err("takes the number 2, 3 or 4".into()),
     }
 }
 
 fn columns_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(n), ref rest @ ..]
-            if rest.iter().all(|s| *s == Shape::Vector(n)) && (1..=2).contains(&rest.len()) =>
+            if rest.iter().all(|s| *s == Shape::Vector(n)) && (1..=3).contains(&rest.len()) =>
         {
             Ok(Shape::Matrix(n, rest.len() as u8 + 1))
         }
-        _ => Err("takes two or three vectors of the same length".into()),
+        _ => Err("takes two to four vectors of the same length".into()),
     }
 }
 
@@ -203,6 +203,8 @@ fn vector_shape(shapes: &[Shape]) -> Result<Shape, String> {
 fn component_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
         [Shape::Vector(_) | Shape::Quat | Shape::DualQuat | Shape::Twist, Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Matrix(_, 1), Shape::Scalar] => Ok(Shape::Scalar),
+        [Shape::Matrix(_, columns), Shape::Scalar] => Ok(Shape::Vector(columns)),
         _ => Err("is written v[0] or v.x".into()),
     }
 }
@@ -220,7 +222,7 @@ fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
     }
 }
 
-fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
+pub(super) fn cross(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let (x, y) = (&a[0], &a[1]);
     match (x.shape, y.shape) {
         (Shape::Scalar, _) => scaled(g, x.node(), y),
@@ -260,14 +262,49 @@ fn minor(g: &mut Graph, m: &Lowered, (i, j): (usize, usize), (k, l): (usize, usi
     g.sub(plus, minus)
 }
 
-/// Returns the cofactors of a 2×2 or 3×3 matrix, row by row.
+/// Returns the cofactors of a 2×2, 3×3 or 4×4 matrix, row by row.
 fn cofactors(g: &mut Graph, m: &Lowered) -> Vec<NodeId> {
-    if m.dimensions().0 == 2 {
-        let (b, c) = (g.neg(m.at(0, 1)), g.neg(m.at(1, 0)));
-        return vec![m.at(1, 1), c, b, m.at(0, 0)];
+    match m.dimensions().0 {
+        2 => {
+            let (b, c) = (g.neg(m.at(0, 1)), g.neg(m.at(1, 0)));
+            return vec![m.at(1, 1), c, b, m.at(0, 0)];
+        }
+        4 => return cofactors_by_pairs(g, m),
+        _ => {}
     }
     let others = |i: usize| ((i + 1) % 3, (i + 2) % 3);
     (0..9).map(|e| minor(g, m, others(e / 3), others(e % 3))).collect()
+}
+
+/// The pairs of the numbers 0 to 3.
+const PAIRS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+
+/// Returns the cofactors of a 4×4 matrix from the twelve 2×2 minors of its upper and lower rows (Laplace).
+fn cofactors_by_pairs(g: &mut Graph, m: &Lowered) -> Vec<NodeId> {
+    let minors = [(0, 1), (2, 3)].map(|rows| PAIRS.map(|columns| minor(g, m, rows, columns)));
+    let mut cofactors = Vec::with_capacity(16);
+    for row in 0..4 {
+        // Expands the minor without this row along the other row of the same half.
+        let (partner, opposite) = (row ^ 1, &minors[1 - row / 2]);
+        for column in 0..4 {
+            let [a, b, c] = [0, 1, 2, 3].into_iter().filter(|&k| k != column).collect::<Vec<_>>()[..] else {
+                unreachable!("compiler bug: three of four columns")
+            };
+            let pair = |i: usize, j: usize| {
+                let place = PAIRS.iter().position(|&pair| pair == (i, j));
+                opposite[place.expect("compiler bug: a pair of columns")]
+            };
+            let (first, second, third) = (
+                g.mul(m.at(partner, a), pair(b, c)),
+                g.mul(m.at(partner, b), pair(a, c)),
+                g.mul(m.at(partner, c), pair(a, b)),
+            );
+            let outer = g.add(first, third);
+            let minor = g.sub(outer, second);
+            cofactors.push(if (row + column) % 2 == 0 { minor } else { g.neg(minor) });
+        }
+    }
+    cofactors
 }
 
 fn det(g: &mut Graph, a: &[Lowered]) -> Lowered {
@@ -314,5 +351,12 @@ fn vector(_: &mut Graph, a: &[Lowered]) -> Lowered {
 
 fn component(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let number = g.as_constant(a[1].node()).expect("compiler bug: indices are constants");
-    Lowered::scalar(a[0].parts[number as usize])
+    let number = number as usize;
+    match a[0].shape {
+        Shape::Matrix(_, columns @ 2..) => {
+            let columns = usize::from(columns);
+            Lowered::vector(&a[0].parts[number * columns..][..columns])
+        }
+        _ => Lowered::scalar(a[0].parts[number]),
+    }
 }

@@ -5,13 +5,16 @@ mod angle;
 mod arithmetic;
 mod dihedral;
 mod elementary;
+mod error_function;
 mod exponential;
+mod hyperbolic;
 mod inner_product;
 mod length;
 mod linear_algebra;
 mod logic;
 mod loss;
 mod parallelogram;
+mod polar;
 mod quaternion;
 mod rotated;
 mod shape;
@@ -52,9 +55,12 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
         elementary::FUNCTIONS,
         exponential::FUNCTIONS,
         trigonometric::FUNCTIONS,
+        hyperbolic::FUNCTIONS,
+        error_function::FUNCTIONS,
         sinc::FUNCTIONS,
         loss::FUNCTIONS,
         linear_algebra::FUNCTIONS,
+        polar::FUNCTIONS,
         length::FUNCTIONS,
         angle::FUNCTIONS,
         dihedral::FUNCTIONS,

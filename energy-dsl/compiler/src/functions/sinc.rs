@@ -132,7 +132,7 @@ pub(super) fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -
 /// degree is replaced by lower ones, using y² times the Chebyshev polynomial with the same leading coefficient, while
 /// this changes the sum by at most 2⁻⁵⁶ of its first term. The first two terms stay: rounding them again would cost
 /// more.
-fn economised(coefficient: impl Fn(i32) -> f64, below: f64) -> Vec<f64> {
+pub(super) fn economised(coefficient: impl Fn(i32) -> f64, below: f64) -> Vec<f64> {
     let budget = coefficient(0).abs() * 2.0_f64.powi(-56);
     let negligible = |k: i32| coefficient(k).abs() * below.powi(k) < budget * 2.0_f64.powi(-10);
     let last = (0..).find(|&k| negligible(k)).expect("a series converges");

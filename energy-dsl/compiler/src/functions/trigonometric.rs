@@ -1,4 +1,4 @@
-//! The tangent, and the inverse sine and cosine.
+//! The tangent, and the inverse sine, cosine and tangent.
 
 use super::elementary::one_scalar;
 use super::{Function, Lowered};
@@ -32,7 +32,36 @@ pub(super) const FUNCTIONS: &[Function] = &[
         lower: |g, a| Lowered::scalar(acos(g, a[0].node())),
         accuracy: "3 / 3 / 8",
     },
+    Function {
+        name: "atan",
+        usage: "atan(x)",
+        docs: "The angle in (−π/2, π/2) whose tangent is x. For a quotient y/x, use `atan2(y, x)`.",
+        shape: one_scalar,
+        lower: |g, a| Lowered::scalar(atan(g, a[0].node())),
+        accuracy: "1 / 4 / 6",
+    },
 ];
+
+/// Creates atan x. The first derivative is 1/(1 + x²), the second −2x/(1 + x²)². Beyond ±1 they are computed from 1/x,
+/// so that no square overflows.
+fn atan(g: &mut Graph, x: NodeId) -> NodeId {
+    let one = g.constant(1.0);
+    let value = g.atan2(x, one);
+    if g.form() == Form::Textbook {
+        return value;
+    }
+    let (minus_two, magnitude, reciprocal) = (g.constant(-2.0), g.abs(x), g.div(one, x));
+    let far = g.less(one, magnitude);
+    let inner = g.select(far, reciprocal, x);
+    let square = g.mul(inner, inner);
+    let sum = g.add(one, square);
+    let near = g.div(one, sum);
+    let across = g.mul(square, near);
+    let first = g.select(far, across, near);
+    // x/(1 + x²) = r/(1 + r²) with r = 1/x.
+    let second = g.product(None, &[minus_two, inner, near, first]);
+    g.add_rule(Rule::smooth(Primitive::ArcTangent, vec![x], value, vec![first], vec![second]), &[])
+}
 
 /// Creates sin x / cos x. The first derivative is 1/cos² x, the second 2 tan x / cos² x.
 fn tan(g: &mut Graph, x: NodeId) -> NodeId {

@@ -25,6 +25,7 @@ impl Graph {
         }
         let varies = match op {
             Op::Input(Input::Position(_) | Input::Velocity(_)) => true,
+            Op::Input(input) => self.varied.contains(&input),
             _ => op.operands().any(|o| self.varies(o)),
         };
         let id = self.push(op, varies);

@@ -59,6 +59,8 @@ pub struct Graph {
     outward: bool,
     /// Whether rounding errors are computed and compensated.
     compensated: bool,
+    /// Parameters that the formula differentiates by.
+    varied: BTreeSet<Input>,
 }
 
 impl Graph {
@@ -91,7 +93,13 @@ impl Graph {
             weighable: BTreeMap::new(),
             outward: false,
             compensated: true,
+            varied: BTreeSet::new(),
         }
+    }
+
+    /// Makes an input vary, so that nodes can be differentiated by it. Call it before the input is used.
+    pub fn vary(&mut self, input: Input) {
+        self.varied.insert(input);
     }
 
     /// Sets whether rounding errors are computed. Otherwise they are 0, and whatever uses them folds.

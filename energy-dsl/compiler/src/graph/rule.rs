@@ -69,6 +69,16 @@ pub enum Primitive {
     ArcSine,
     /// acos x.
     ArcCosine,
+    /// atan x.
+    ArcTangent,
+    /// sinh x.
+    HyperbolicSine,
+    /// cosh x.
+    HyperbolicCosine,
+    /// tanh x.
+    HyperbolicTangent,
+    /// erf x.
+    ErrorFunction,
     /// A first partial derivative of another rule.
     Partial {
         /// Node that is differentiated.
@@ -113,6 +123,11 @@ impl Primitive {
             Self::Tangent => "tan x",
             Self::ArcSine => "asin x",
             Self::ArcCosine => "acos x",
+            Self::ArcTangent => "atan x",
+            Self::HyperbolicSine => "sinh x",
+            Self::HyperbolicCosine => "cosh x",
+            Self::HyperbolicTangent => "tanh x",
+            Self::ErrorFunction => "erf x",
             Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }

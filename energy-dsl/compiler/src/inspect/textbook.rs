@@ -1,6 +1,6 @@
 use proc_macro2::TokenStream;
 
-use crate::check::{Program, check};
+use crate::check::{Program, Source, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::graph::{Input, NodeId, Op, reachable};
 use crate::inspect::interpret::interpret_with;
@@ -66,16 +66,16 @@ impl Textbook {
         rows.into_iter().map(Tower::into_plain).collect()
     }
 
-    /// Returns the derivatives that `outputs` use, three numbers each (0 for unused ones). Each is differentiated with
+    /// Returns the derivatives that `outputs` use (0 for unused ones). Each is differentiated with
     /// an ε of its own depth.
     fn gradients<T: Number>(&self, outputs: &[NodeId], inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
         let graph = &self.formula.formula.graph;
-        let mut numbers = vec![Tower::from_f64(0.0); 3 * self.formula.gradients.len()];
+        let mut numbers = vec![Tower::from_f64(0.0); self.formula.gradients.len()];
         for node in reachable(graph, outputs) {
             let Op::Input(Input::Precomputed(number)) = graph.op(node) else { continue };
             let number = usize::from(number);
-            let (of, point) = self.formula.gradients[number / 3];
-            let moved = inputs.raised(3 * point + number % 3, depth);
+            let (of, source, by) = self.formula.gradients[number];
+            let moved = inputs.raised(source, by, depth);
             let within = self.gradients(&[of], &moved, depth + 1);
             numbers[number] = interpret_with(graph, &[of], &moved.borrow(), &within).remove(0).slope(depth);
         }
@@ -84,6 +84,7 @@ impl Textbook {
 }
 
 /// Inputs as nested dual numbers.
+#[derive(Clone)]
 struct TowerInputs<T> {
     parameters: Vec<Tower<T>>,
     rest: Vec<Tower<T>>,
@@ -102,16 +103,17 @@ impl<T: Number> TowerInputs<T> {
         }
     }
 
-    /// Adds the ε of this depth to one coordinate.
-    fn raised(&self, coordinate: usize, depth: usize) -> Self {
-        let mut positions = self.positions.clone();
-        positions[coordinate] = positions[coordinate].clone().raised(depth);
-        Self {
-            parameters: self.parameters.clone(),
-            rest: self.rest.clone(),
-            positions,
-            velocities: self.velocities.clone(),
-        }
+    /// Adds the ε of this depth to one number of a section.
+    fn raised(&self, source: Source, number: usize, depth: usize) -> Self {
+        let mut inputs = self.clone();
+        let section = match source {
+            Source::Position => &mut inputs.positions,
+            Source::Velocity => &mut inputs.velocities,
+            Source::Rest => &mut inputs.rest,
+            Source::Parameter => &mut inputs.parameters,
+        };
+        section[number] = section[number].clone().raised(depth);
+        inputs
     }
 
     fn borrow(&self) -> Inputs<'_, Tower<T>> {

@@ -28,6 +28,7 @@ const FUNCTIONS: &[(&str, &str)] = &[
     ("fabs", "abs(x)"),
     ("arccos", "acos(x)"),
     ("arcsin", "asin(x)"),
+    ("arctan", "atan(x)"),
     ("arctan2", "atan2(y, x)"),
     ("determinant", "det(M)"),
     ("inv", "inverse(M)"),
@@ -44,10 +45,8 @@ const FUNCTIONS: &[(&str, &str)] = &[
 ];
 
 /// Functions of mathematics whose names must not be taken for misspellings of others.
-const MATHEMATICS: &[&str] = &[
-    "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "sec", "csc", "cot", "erf", "erfc", "gamma", "floor",
-    "ceil", "round", "modulo", "hypot",
-];
+const MATHEMATICS: &[&str] =
+    &["asinh", "acosh", "atanh", "sec", "csc", "cot", "erfc", "gamma", "floor", "ceil", "round", "modulo", "hypot"];
 
 /// Returns what is written here for a function of another language.
 pub(crate) fn function(name: &str) -> Option<&'static str> {

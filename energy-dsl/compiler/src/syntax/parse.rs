@@ -74,6 +74,7 @@ const TYPES: &[(&str, ElementType)] = &[
     ("Vec3", ElementType::Vector(3)),
     ("Vec4", ElementType::Vector(4)),
     ("Mat2x2", ElementType::Matrix(2, 2)),
+    ("Mat2x3", ElementType::Matrix(2, 3)),
     ("Mat3x2", ElementType::Matrix(3, 2)),
     ("Mat3x3", ElementType::Matrix(3, 3)),
     ("Mat4x4", ElementType::Matrix(4, 4)),

@@ -105,9 +105,9 @@ impl<'a> Inference<'a> {
                 entries.iter().for_each(|entry| drop(self.expression(entry)));
                 Units::one(Dimension::default())
             }
-            TypedKind::Gradient(of, point) => {
+            TypedKind::Gradient(of, source, first) => {
                 let of = self.expression(of).main();
-                let by = self.input(Source::Position, 3 * point, Shape::Vector(3)).main();
+                let by = self.input(*source, *first, typed.shape).main();
                 Units::one(of.over(&by))
             }
         }

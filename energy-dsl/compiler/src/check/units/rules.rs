@@ -41,7 +41,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
             inference.same(call.name, &all, call.span);
             number()
         }
-        "neg" | "abs" | "transpose" | "trace" | "conjugate" => call.units[0].clone(),
+        "neg" | "abs" | "transpose" | "trace" | "conjugate" | "stretch_of" => call.units[0].clone(),
         "*" => product(inference, call),
         "dot" | "cross" | "outer" | "ddot" => scaled(call),
         "/" => call.units[0].map(|d| d.over(&call.main(1))),
@@ -60,7 +60,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
             inference.same(call.name, &all, call.span);
             number()
         }
-        "unit" | "angle" | "sign" | "identity" => number(),
+        "unit" | "angle" | "sign" | "identity" | "rotation_of" => number(),
         "[]" => component(call),
         "exp" if call.is(0, Shape::Twist) => {
             inference.number("exp", &call.main(0), call.span);

@@ -1,0 +1,81 @@
+//! The polar decomposition F = R S, without singular values: its derivatives stay finite where these meet.
+
+use super::length::unit;
+use super::linear_algebra::cross;
+use super::{Function, Lowered, Shape};
+use crate::graph::{Graph, NodeId};
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
+        name: "rotation_of",
+        usage: "rotation_of(F)",
+        docs: "Rotation R of the polar decomposition F = R S, S symmetric. For a 2×2 matrix, det R = 1, and the \
+             singular values have the sign of det F on the smallest. Where their sum is 0, the result is taken as 0 \
+             and flagged. For a 3×2 matrix, R has orthonormal columns and S ≥ 0; the result is flagged where the \
+             columns are parallel.",
+        shape: |shapes| deformation(shapes).map(|()| shapes[0]),
+        lower: |g, a| rotation(g, &a[0]),
+        accuracy: "",
+    },
+    Function {
+        name: "stretch_of",
+        usage: "stretch_of(F)",
+        docs: "Symmetric 2×2 factor S = RᵀF of the polar decomposition, flagged like `rotation_of`. Its eigenvalues \
+             are the signed singular values of F: their sum is trace(S), their product det(S).",
+        shape: |shapes| deformation(shapes).map(|()| Shape::Matrix(2, 2)),
+        lower: |g, a| stretch(g, &a[0]),
+        accuracy: "",
+    },
+];
+
+fn deformation(shapes: &[Shape]) -> Result<(), String> {
+    match *shapes {
+        [Shape::Matrix(2 | 3, 2)] => Ok(()),
+        [other] => Err(format!("takes a 2×2 or 3×2 matrix, but this is {other}")),
+        _ => Err(format!("takes one matrix, but got {}", super::arguments(shapes.len()))),
+    }
+}
+
+fn rotation(g: &mut Graph, f: &Lowered) -> Lowered {
+    let columns = orthonormal_columns(g, f);
+    let rows = f.dimensions().0;
+    let parts = (0..rows).flat_map(|i| columns.iter().map(move |column| column.parts[i])).collect();
+    Lowered::matrix(rows, 2, parts)
+}
+
+/// Returns the columns of R.
+fn orthonormal_columns(g: &mut Graph, f: &Lowered) -> [Lowered; 2] {
+    if f.dimensions().0 == 2 { planar_columns(g, f) } else { spatial_columns(g, f) }
+}
+
+/// F + cof F = (σ₁ + σ₂) R for 2×2 matrices: its first column is (F₀₀ + F₁₁, F₁₀ − F₀₁).
+fn planar_columns(g: &mut Graph, f: &Lowered) -> [Lowered; 2] {
+    let (sum, difference) = (g.add(f.at(0, 0), f.at(1, 1)), g.sub(f.at(1, 0), f.at(0, 1)));
+    let first = unit(g, &[Lowered::vector([sum, difference])]);
+    let (cosine, sine) = (first.parts[0], first.parts[1]);
+    let opposite = g.neg(sine);
+    [first, Lowered::vector([opposite, cosine])]
+}
+
+/// The same in the plane of both columns, with their normal n: cof F has the columns f₂ × n and n × f₁.
+fn spatial_columns(g: &mut Graph, f: &Lowered) -> [Lowered; 2] {
+    let [first, second] = columns(f);
+    let normal = cross(g, &[first.clone(), second.clone()]);
+    let normal = unit(g, &[normal]);
+    let cofactors = [cross(g, &[second.clone(), normal.clone()]), cross(g, &[normal, first.clone()])];
+    [(first, 0), (second, 1)].map(|(column, number)| {
+        let pairs = column.parts.iter().zip(&cofactors[number].parts);
+        let sum: Vec<NodeId> = pairs.map(|(&a, &b)| g.add(a, b)).collect();
+        unit(g, &[Lowered::vector(sum)])
+    })
+}
+
+fn columns(f: &Lowered) -> [Lowered; 2] {
+    [0, 1].map(|j| Lowered::vector((0..f.dimensions().0).map(|i| f.at(i, j)).collect::<Vec<_>>()))
+}
+
+fn stretch(g: &mut Graph, f: &Lowered) -> Lowered {
+    let ([a, b], [r, s]) = (columns(f), orthonormal_columns(g, f));
+    let (first, mixed, last) = (g.dot(&r.parts, &a.parts), g.dot(&r.parts, &b.parts), g.dot(&s.parts, &b.parts));
+    Lowered::matrix(2, 2, vec![first, mixed, mixed, last])
+}

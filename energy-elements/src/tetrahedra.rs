@@ -1,0 +1,61 @@
+use energy_dsl::energy;
+
+energy! {
+    // Both are written with A = FᵀF − 1 for F = D D_m⁻¹: its invariants vanish at rest, where I − 3 and J − 1 would
+    // cancel.
+
+    /// St. Venant–Kirchhoff solid on a tetrahedron: V (μ ‖E‖² + λ/2 tr² E) with the Green strain E = (FᵀF − 1)/2 and
+    /// Lamé's parameters λ and μ.
+    ///
+    /// A polynomial, regular everywhere; it does not resist inversion. The rest shape must have a positive volume:
+    /// (X1 − X0) · ((X2 − X0) × (X3 − X0)) > 0.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy TetStVK(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; λ, μ: Scalar[Pa]) {
+        rest {
+            let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
+            let B = inverse(D_m);
+            // The root refuses an inverted rest shape.
+            let V = sqrt(det(D_m))^2 / 6;
+        }
+        let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
+        let A = transpose(F) * F - identity(3);
+        V / 8 * (2 * μ * ddot(A, A) + λ * trace(A)^2)
+    }
+
+    /// Stable neo-Hookean solid on a tetrahedron (Smith, de Goes & Kim 2018, *Stable Neo-Hookean Flesh Simulation*,
+    /// equation 14): V (μ/2 (I − 3) − μ/2 ln((I + 1)/4) + λ/2 ((J − α)² − (1 − α)²)) with I = tr FᵀF, J = det F and
+    /// α = 1 + 3μ/(4λ). It is 0 at rest and resists inversion with a finite energy.
+    ///
+    /// λ and μ are those of the formula; the paper gives them in terms of Lamé's parameters: μ = 4/3 μ_Lamé and λ =
+    /// λ_Lamé + 5/6 μ_Lamé. The rest shape must have a positive volume: (X1 − X0) · ((X2 − X0) × (X3 − X0)) > 0.
+    ///
+    /// Terms that are linear in the strain cancel and are not computed.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy TetStableNeoHookean(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; λ, μ: Scalar[Pa]) {
+        rest {
+            let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
+            let B = inverse(D_m);
+            let d = det(D_m);
+            let per_d = 1 / d;
+            let V = sqrt(d)^2 / 6;
+        }
+        let D = columns(x1 - x0, x2 - x0, x3 - x0);
+        let F = D * B;
+        let A = transpose(F) * F - identity(3);
+        // I − 3, and J² − 1 = i + r.
+        let i = trace(A);
+        let size = ddot(A, A);
+        let r = (i^2 - size) / 2 + det(A);
+        let J = det(D) * per_d;
+        // J − 1, and I − 3 − 2 (J − 1), which is quadratic in the strain. Far from rest they are computed as printed.
+        let j = if size < 1/4 && J > 0 { (i + r) / (J + 1) } else { J - 1 };
+        let distortion = if size < 1/4 && J > 0 { (i * j - 2 * r) / (J + 1) } else { i - 2 * j };
+        // I − 3 − ln((I + 1)/4) − 3/2 (J − 1)
+        let deviation = 3/4 * distortion - log1pmx(i / 4, (i + 4) / 4);
+        V / 2 * (μ * deviation + λ * j^2)
+    }
+}
