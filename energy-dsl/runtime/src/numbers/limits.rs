@@ -154,7 +154,7 @@ impl<'a> Rays<'a> {
         let value = |(agreement, &plain): (&Agreement, &Unbounded<f64>)| match agreement {
             Agreement::Number(limit) => nearest(plain, *limit, group.scale),
             Agreement::Infinite(sign) => Unbounded::from_f64(f64::INFINITY.copysign(*sign)),
-            _ if is_finite(plain) && !self.is_outside => plain,
+            _ if plain.is_finite() && !self.is_outside => plain,
             _ => zero(),
         };
         let flag = (!group.all(|a| matches!(a, Agreement::Number(_)))).then_some(Flag::Degenerate);
@@ -165,7 +165,7 @@ impl<'a> Rays<'a> {
     /// primitives contribute, or 0, so that forces still cancel.
     fn derivatives(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
         if !group.all(|a| matches!(a, Agreement::Number(_) | Agreement::Sides)) {
-            let keep = !self.is_outside && group.plain.iter().copied().all(is_finite);
+            let keep = !self.is_outside && group.plain.iter().copied().all(Unbounded::is_finite);
             let conventions = group.plain.iter().map(|&x| if keep { x } else { zero() });
             return (conventions.collect(), Some(Flag::Degenerate));
         }
@@ -227,10 +227,6 @@ impl<'a> Rays<'a> {
     }
 }
 
-fn is_finite(x: Unbounded<f64>) -> bool {
-    (x - x).equal(zero())
-}
-
 /// Returns the plain result if it is the limit, because it is more accurate.
 fn nearest(plain: Unbounded<f64>, limit: Unbounded<f64>, scale: Unbounded<f64>) -> Unbounded<f64> {
     if is_near(plain, limit, scale) { plain } else { limit }
@@ -244,7 +240,7 @@ fn is_near(a: Unbounded<f64>, b: Unbounded<f64>, scale: Unbounded<f64>) -> bool 
 /// Returns the slope of an input along a ray: a fixed number of size ¼ to 1. Only the first rays are opposite: an even
 /// function would have one limit along both, as if these were sides of a kink.
 fn slope(ray: usize, input: usize) -> f64 {
-    let (pair, sign) = if ray < FEW { (ray / 2, if ray % 2 == 0 { 1.0 } else { -1.0 }) } else { (ray, 1.0) };
+    let (pair, sign) = if ray < FEW { (ray / 2, if ray.is_multiple_of(2) { 1.0 } else { -1.0 }) } else { (ray, 1.0) };
     // The finaliser of SplitMix64, with the bits of a counter.
     let mut bits = (pair as u64 * 4099 + input as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

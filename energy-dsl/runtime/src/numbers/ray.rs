@@ -100,7 +100,7 @@ impl Series {
 
     /// Adds terms of one order, and drops what is zero or unknown.
     fn sorted(terms: Vec<Term>, mut unknown: Order) -> Self {
-        if terms.iter().any(|term| !(term.factor - term.factor).equal(factor(0.0))) {
+        if !terms.iter().all(|term| term.factor.is_finite()) {
             return Self::undefined();
         }
         let mut kept: Vec<Term> = Vec::with_capacity(terms.len());
@@ -222,7 +222,7 @@ impl Series {
 
     fn reciprocal(&self) -> Self {
         let Some((first, rest)) = self.split() else { return Self::undefined() };
-        rest.composed(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).over(first)
+        rest.composed(|k| if k.is_multiple_of(2) { 1.0 } else { -1.0 }).over(first)
     }
 
     /// Returns the power with a constant exponent.
@@ -272,14 +272,15 @@ impl Series {
         }
         let log = Term { order: Order { power: 0.0, logs: 1.0 }, factor: factor(-first.order.power) };
         let constant = Term { order: Order::ONE, factor: first.factor.ln::<Baseline>() };
-        let series = rest.composed(|k| if k == 0 { 0.0 } else { (if k % 2 == 0 { -1.0 } else { 1.0 }) / k as f64 });
+        let series =
+            rest.composed(|k| if k == 0 { 0.0 } else { (if k.is_multiple_of(2) { -1.0 } else { 1.0 }) / k as f64 });
         Self::of(vec![log, constant], Order::NEVER).plus(&series)
     }
 
     /// Returns sine and cosine.
     fn sin_cos(&self) -> (Self, Self) {
         let Some((constant, rest)) = self.finite() else { return (Self::undefined(), Self::undefined()) };
-        let alternating = |k: usize| (if k / 2 % 2 == 0 { 1.0 } else { -1.0 }) / factorial(k);
+        let alternating = |k: usize| (if (k / 2).is_multiple_of(2) { 1.0 } else { -1.0 }) / factorial(k);
         let sine = rest.composed(|k| if k % 2 == 1 { alternating(k) } else { 0.0 });
         let cosine = rest.composed(|k| if k % 2 == 0 { alternating(k) } else { 0.0 });
         let (s, c) = constant.sin_cos();
@@ -292,7 +293,7 @@ impl Series {
         // atan(c + r) = atan c + atan(r / (1 + c² + c r)).
         let below = Self::number(1.0 + constant * constant).plus(&rest.scaled(constant));
         let slight = rest.times(&below.reciprocal());
-        let odd = |k: usize| if k % 2 == 0 { 0.0 } else { (if k % 4 == 1 { 1.0 } else { -1.0 }) / k as f64 };
+        let odd = |k: usize| if k.is_multiple_of(2) { 0.0 } else { (if k % 4 == 1 { 1.0 } else { -1.0 }) / k as f64 };
         Self::number(constant.atan()).plus(&slight.composed(odd))
     }
 
@@ -381,7 +382,7 @@ impl Ray {
     fn from(x: Unbounded<f64>, slope: f64) -> Self {
         let term = |power: f64, factor| Term { order: Order { power, logs: 0.0 }, factor };
         let plain = x.to_scalar();
-        if plain.is_infinite() && !(x - x).equal(factor(0.0)) {
+        if !x.is_finite() {
             let size = if slope == 0.0 { 1.0 } else { slope.abs() };
             return Self::new(Series::of(vec![term(-1.0, factor(size.copysign(plain)))], Order::NEVER));
         }

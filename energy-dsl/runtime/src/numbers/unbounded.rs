@@ -64,6 +64,11 @@ impl<S: Scalar> Unbounded<S> {
         (significand, exponent)
     }
 
+    /// Returns whether the number is neither infinite nor NaN. It may be too large for the type.
+    pub(crate) fn is_finite(self) -> bool {
+        self.significand.abs() < S::INFINITY
+    }
+
     fn is_plain(self) -> bool {
         let magnitude = self.significand.abs();
         S::default() < magnitude && magnitude < S::INFINITY
