@@ -46,7 +46,7 @@ pub fn settle<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flag
         match (extended(inputs), extended(results)) {
             _ if !inputs.iter().all(is_number) => {}
             (Some(inputs), Some(plain)) => {
-                let settled = Rays::through(inputs, roles, along).settle(&plain, flags);
+                let settled = Rays::through(inputs, roles, Rounding::of::<T>(), along).settle(&plain, flags);
                 results.iter_mut().zip(settled).for_each(|(result, number)| *result = T::of_extended(number));
             }
             // A type without rays, such as multi-precision numbers.
@@ -65,6 +65,7 @@ pub fn settle<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flag
 struct Rays<'a> {
     inputs: Vec<Unbounded<f64>>,
     roles: Roles<'a>,
+    rounding: Rounding,
     along: Along<'a>,
     limits: Vec<Vec<Limit>>,
     /// Whether all values are undefined along all rays, as those of √(−1).
@@ -102,8 +103,8 @@ fn zero() -> Unbounded<f64> {
 }
 
 impl<'a> Rays<'a> {
-    fn through(inputs: Vec<Unbounded<f64>>, roles: Roles<'a>, along: Along<'a>) -> Self {
-        Self { inputs, roles, along, limits: Vec::new(), is_outside: true }
+    fn through(inputs: Vec<Unbounded<f64>>, roles: Roles<'a>, rounding: Rounding, along: Along<'a>) -> Self {
+        Self { inputs, roles, rounding, along, limits: Vec::new(), is_outside: true }
     }
 
     /// Evaluates more rays, up to this number.
@@ -149,25 +150,35 @@ impl<'a> Rays<'a> {
         settled
     }
 
-    /// Returns values: their limits, infinities, or else the documented values.
+    /// Returns values: their limits, infinities, or else the documented values. Several values, such as the components
+    /// of forces, are infinite at infinite inputs only; elsewhere they are conventions, like derivatives.
     fn values(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
         let value = |(agreement, &plain): (&Agreement, &Unbounded<f64>)| match agreement {
-            Agreement::Number(limit) => nearest(plain, *limit, group.scale),
+            Agreement::Number(limit) => self.rounding.nearest(plain, *limit, group.scale),
             Agreement::Infinite(sign) => Unbounded::from_f64(f64::INFINITY.copysign(*sign)),
             _ if plain.is_finite() && !self.is_outside => plain,
             _ => zero(),
         };
-        let flag = (!group.all(|a| matches!(a, Agreement::Number(_)))).then_some(Flag::Degenerate);
+        let has_limits = group.all(|a| matches!(a, Agreement::Number(_)));
+        let is_single = group.plain.len() == 1 || !self.inputs.iter().all(|input| input.is_finite());
+        if !has_limits && !is_single {
+            return self.conventions(group);
+        }
+        let flag = (!has_limits).then_some(Flag::Degenerate);
         (group.agreements.iter().zip(group.plain).map(value).collect(), flag)
     }
 
-    /// Returns derivatives: their limits, or those of one side. If one has neither, all of the group are what the robust
-    /// primitives contribute, or 0, so that forces still cancel.
+    /// Returns what the robust primitives contribute, or 0: all of a group, so that forces still cancel.
+    fn conventions(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
+        let keep = !self.is_outside && group.plain.iter().copied().all(Unbounded::is_finite);
+        let numbers = group.plain.iter().map(|&x| if keep { x } else { zero() });
+        (numbers.collect(), Some(Flag::Degenerate))
+    }
+
+    /// Returns derivatives: their limits, or those of one side.
     fn derivatives(&self, group: &Group<'_>) -> (Vec<Unbounded<f64>>, Option<Flag>) {
         if !group.all(|a| matches!(a, Agreement::Number(_) | Agreement::Sides)) {
-            let keep = !self.is_outside && group.plain.iter().copied().all(Unbounded::is_finite);
-            let conventions = group.plain.iter().map(|&x| if keep { x } else { zero() });
-            return (conventions.collect(), Some(Flag::Degenerate));
+            return self.conventions(group);
         }
         let side = &self.limits[self.side(group)];
         let limit = |(agreement, i): (&Agreement, usize)| match (agreement, side[i]) {
@@ -175,7 +186,8 @@ impl<'a> Rays<'a> {
             _ => zero(),
         };
         let limits = group.agreements.iter().zip(group.range.clone()).map(limit);
-        let numbers = limits.zip(group.plain).map(|(limit, &plain)| nearest(plain, limit, group.scale)).collect();
+        let numbers =
+            limits.zip(group.plain).map(|(limit, &plain)| self.rounding.nearest(plain, limit, group.scale)).collect();
         (numbers, group.agreements.iter().any(|a| matches!(a, Agreement::Sides)).then_some(Flag::Kink))
     }
 
@@ -227,9 +239,21 @@ impl<'a> Rays<'a> {
     }
 }
 
-/// Returns the plain result if it is the limit, because it is more accurate.
-fn nearest(plain: Unbounded<f64>, limit: Unbounded<f64>, scale: Unbounded<f64>) -> Unbounded<f64> {
-    if is_near(plain, limit, scale) { plain } else { limit }
+/// The rounding errors of a plain result that is the limit, relative to the result and to the largest of all.
+#[derive(Clone, Copy, Debug)]
+struct Rounding(f64, f64);
+
+impl Rounding {
+    fn of<T: Number>() -> Self {
+        let is_single = T::from_f64(1.0 + 1e-10).equal(T::from_f64(1.0)).all();
+        if is_single { Self(1e-3, 1e-5) } else { Self(1e-8, 1e-13) }
+    }
+
+    /// Returns the plain result if it is the limit: other routines return the same bits.
+    fn nearest(self, plain: Unbounded<f64>, limit: Unbounded<f64>, scale: Unbounded<f64>) -> Unbounded<f64> {
+        let allowed = Unbounded::from_f64(self.0) * plain.abs().max(limit.abs()) + Unbounded::from_f64(self.1) * scale;
+        if (plain - limit).abs().less_or_equal(allowed) { plain } else { limit }
+    }
 }
 
 fn is_near(a: Unbounded<f64>, b: Unbounded<f64>, scale: Unbounded<f64>) -> bool {
