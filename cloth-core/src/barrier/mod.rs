@@ -27,7 +27,7 @@ use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
 pub use start::ContactError;
 
-use crate::collision::{Candidate, Candidates, Clearance, Closest, CollisionMesh, Move, Pair, Slack};
+use crate::collision::{Candidate, Candidates, Clearance, Closest, CollisionMesh, Move, Pair, Shortlist, Slack};
 use crate::geometry::{add_scaled, dot};
 use feasible::may_join;
 
@@ -56,6 +56,8 @@ pub struct BarrierContact {
     /// Searches in this step.
     searches: u32,
     candidates: Candidates,
+    /// The candidates that matter near the current iterate.
+    shortlist: Shortlist,
     joined: Vec<Joined>,
     /// The pairs of `joined`.
     known: BTreeSet<Pair>,
@@ -152,6 +154,7 @@ impl BarrierContact {
         let Slack { least, part, most } = self.slack;
         let least = least * f64::from(1_u32 << self.searches.min(3));
         self.candidates.search(&self.mesh, from, to, Slack { least, part, most });
+        self.shortlist.clear();
         self.searches += 1;
         self.counts.searches += 1;
         for joined in &mut self.joined {
@@ -172,6 +175,7 @@ impl ContactModel for BarrierContact {
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
         self.candidates.clear();
+        self.shortlist.clear();
         self.searches = 0;
     }
 
@@ -183,11 +187,18 @@ impl ContactModel for BarrierContact {
         if !(self.candidates.cover(from) && self.candidates.cover(to)) {
             self.search(from, to);
         }
-        let excursions = [from, to].map(|x| self.candidates.excursions(x));
         let step = Move::new(from, to);
+        self.shortlist.prepare(&self.candidates, from, to, step.rounding());
+        let excursions = [from, to].map(|x| self.candidates.excursions(x));
+        let from_centre = self.shortlist.excursions(from, to);
+        let out_of_reach = self.reach + step.rounding();
         let mut part = 1.0;
         let mut tested = 0;
-        for candidate in self.candidates.pairs() {
+        for listed in self.shortlist.pairs() {
+            if listed.is_beyond(out_of_reach, &from_centre) {
+                continue;
+            }
+            let candidate = &listed.candidate;
             let clearance = Clearance { thickness: self.thickness(&candidate.pair), reach: self.reach };
             if step.is_plainly_safe(candidate, clearance, &excursions) {
                 continue;
@@ -200,7 +211,7 @@ impl ContactModel for BarrierContact {
             part = own.min(part);
         }
         self.counts.moves += 1;
-        self.counts.candidates += self.candidates.pairs().len() as u64;
+        self.counts.candidates += self.shortlist.pairs().len() as u64;
         self.counts.tested += tested;
         if part < 1.0 {
             self.counts.shortened += 1;
@@ -221,11 +232,20 @@ impl ContactModel for BarrierContact {
         if !self.candidates.cover(x) {
             self.search(x, x);
         }
+        // A list that was made for a move covers its end. A shorter one would not cover the next move.
+        if !self.shortlist.covers(x, x) {
+            self.shortlist.prepare(&self.candidates, x, x, Move::new(x, x).rounding());
+        }
         let excursions = self.candidates.excursions(x);
+        let from_centre = self.shortlist.excursions(x, x);
+        let near = JOINING * self.reach;
         let mut added = Vec::new();
-        for candidate in self.candidates.pairs() {
-            let near = JOINING * self.reach;
-            if candidate.is_beyond(near, x, &excursions) || self.known.contains(&candidate.pair) {
+        for listed in self.shortlist.pairs() {
+            let candidate = &listed.candidate;
+            if listed.is_beyond(near, &from_centre)
+                || candidate.is_beyond(near, x, &excursions)
+                || self.known.contains(&candidate.pair)
+            {
                 continue;
             }
             let closest = Closest::of(&candidate.pair, &candidate.pair.corners(x));

@@ -2,8 +2,8 @@
 
 use energy_dsl::Vector3;
 
-use super::{BarrierContact, Resistance};
-use crate::collision::{Candidates, Closest, CollisionMesh, Crossing, Pair, PairKind, Slack, crossings};
+use super::{BarrierContact, JOINING, Resistance};
+use crate::collision::{Candidates, Closest, CollisionMesh, Crossing, Pair, PairKind, Shortlist, Slack, crossings};
 use energy_solve::ContactCounts;
 
 /// A start that contact cannot keep free of crossings, because it is not.
@@ -73,6 +73,7 @@ impl BarrierContact {
             slack: Slack { least: gap, part: 0.5, most: gap.max(0.15 * mesh.mean_edge(x)) },
             searches: 0,
             candidates,
+            shortlist: Shortlist::new(0.25 * reach, JOINING * reach),
             joined: Vec::new(),
             known: Default::default(),
             blocking: Vec::new(),

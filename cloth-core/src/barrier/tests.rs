@@ -1,6 +1,7 @@
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{Distance, EdgeEdgeDistance, PointEdgeDistance, PointTriangleDistance};
 use energy_solve::{ContactModel, DofMap};
+use proptest::prelude::*;
 
 use super::*;
 use crate::collision::PairKind;
@@ -161,4 +162,63 @@ fn moves_are_certified_and_pairs_that_block_join() {
     let counts = contact.counts();
     assert_eq!((counts.moves, counts.shortened), (2, 1));
     assert!((counts.left - part).abs() < 1e-15);
+}
+
+/// Two layers of 4 × 4 squares of 1 cm, above each other.
+fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
+    let corner = |layer: usize, i: usize, j: usize| 25 * layer + 5 * i + j;
+    let squares = (0..32).map(|number| (number / 16, number / 4 % 4, number % 4));
+    let halves = |(layer, i, j)| {
+        let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(di, dj)| corner(layer, i + di, j + dj));
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles: Vec<_> = squares.flat_map(halves).collect();
+    let place = |number: usize| {
+        let (layer, i, j) = (number / 25, number % 25 / 5, number % 5);
+        [0.01 * i as f64 + 0.002 * layer as f64, 0.01 * j as f64, 0.002 * layer as f64]
+    };
+    (CollisionMesh::new(50, &triangles, &[], &[]), (0..50).map(place).collect())
+}
+
+/// The contact of the layers; `margin` is that of the short list.
+fn contact_of_layers(margin: Option<f64>) -> BarrierContact {
+    let (mesh, x) = layers();
+    let mut contact = BarrierContact::new(mesh, &x, vec![true; 50], vec![0.5 * THICKNESS; 50], GAP).unwrap();
+    if let Some(margin) = margin {
+        contact.shortlist = Shortlist::new(margin, JOINING * contact.reach);
+    }
+    contact.begin_step();
+    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+    contact.set_resistance(&DofMap::new(&[false; 50]), vec![block; 50], vec![1.0; 50]);
+    contact
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Moves, pairs and forces are bit-identical to those of a walk over all candidates.
+    #[test]
+    fn the_short_list_changes_no_result(
+        moves in prop::collection::vec((prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 50), 0..4_i32), 8),
+    ) {
+        let [mut short, mut whole] = [None, Some(f64::INFINITY)].map(contact_of_layers);
+        let mut x = layers().1;
+        for (directions, decade) in moves {
+            let size = 0.005 * 10.0_f64.powi(-decade);
+            let moved = |part: f64| -> Vec<Vector3<f64>> {
+                x.iter().zip(&directions).map(|(x, direction)| add_scaled(*x, part * size, *direction)).collect()
+            };
+            let part = short.certify(&x, &moved(1.0));
+            prop_assert_eq!(part.to_bits(), whole.certify(&x, &moved(1.0)).to_bits());
+            // The line search halves.
+            x = moved(0.5 * part);
+            prop_assert_eq!(short.meet(&x).to_bits(), whole.meet(&x).to_bits());
+            let joined = |contact: &BarrierContact| -> Vec<_> {
+                contact.joined.iter().map(|one| (one.candidate.pair, one.stiffness.to_bits())).collect()
+            };
+            prop_assert_eq!(joined(&short), joined(&whole));
+        }
+        prop_assert!(short.counts().candidates < whole.counts().candidates);
+        prop_assert!(!short.joined.is_empty());
+    }
 }

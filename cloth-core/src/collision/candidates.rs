@@ -27,6 +27,10 @@ pub(crate) struct Candidates {
     pairs: Vec<Candidate>,
 }
 
+/// Pairs are listed if they can come within this many times the reach, because contacts join before they have an
+/// energy. The guarantee needs 1, and rounding errors are far smaller than the rest.
+const KEPT: f64 = 2.0;
+
 /// How far regions extend beyond the move of each vertex relative to the mean, so that the next moves need no new list.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slack {
@@ -60,18 +64,8 @@ impl Candidate {
     /// Whether the pair is certainly farther apart than `reach` at x, where the vertices have these excursions.
     #[inline]
     pub fn is_beyond(&self, reach: f64, x: &[Vector3<f64>], excursions: &[f64]) -> bool {
-        self.distance - self.approach(excursions) > reach
+        self.distance - self.pair.approach(excursions) > reach
             || separation(self.normal, &self.pair.corners(x), self.pair.first()) > reach
-    }
-
-    /// The largest decrease of the distance by these excursions of the vertices.
-    #[inline]
-    pub(super) fn approach(&self, excursions: &[f64]) -> f64 {
-        let [a, b, c, d] = self.pair.of(excursions);
-        match self.pair.kind {
-            PairKind::PointTriangle => a + b.max(c).max(d),
-            PairKind::EdgeEdge => a.max(b) + c.max(d),
-        }
     }
 }
 
@@ -103,9 +97,7 @@ impl Candidates {
 
     /// Returns the distance of each vertex from its place at the last search, relative to the mean displacement, in m.
     pub fn excursions(&self, x: &[Vector3<f64>]) -> Vec<f64> {
-        let mean = mean_displacement(&self.origin, x);
-        let excursion = |(x, origin): (&Vector3<f64>, &Vector3<f64>)| norm(subtract(subtract(*x, *origin), mean));
-        x.iter().zip(&self.origin).map(excursion).collect()
+        excursions(&self.origin, x)
     }
 
     /// Whether the list holds every pair that comes within reach on a straight way to `x` from a covered state. Regions
@@ -133,7 +125,10 @@ impl Candidates {
         self.find_edges_near_edges(mesh, &mut found);
         found.sort_unstable();
         self.pairs.clear();
-        self.pairs.extend(found.into_iter().map(|pair| Candidate::new(pair, x)));
+        let radii: Vec<f64> = self.regions.iter().zip(x).map(|(region, x)| region.farthest(*x)).collect();
+        // Boxes of tilted features meet long before the features do.
+        let may_meet = |one: &Candidate| one.distance - one.pair.approach(&radii) <= KEPT * self.reach;
+        self.pairs.extend(found.into_iter().map(|pair| Candidate::new(pair, x)).filter(may_meet));
     }
 
     /// The box around the regions of some vertices, extended by half the reach.
@@ -179,6 +174,13 @@ impl Candidates {
             Pair { kind: PairKind::EdgeEdge, vertices: [a, b, c, d] }
         }));
     }
+}
+
+/// Returns the length of each displacement relative to their mean, in m.
+pub(super) fn excursions(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Vec<f64> {
+    let mean = mean_displacement(from, to);
+    let excursion = |(from, to): (&Vector3<f64>, &Vector3<f64>)| norm(subtract(subtract(*to, *from), mean));
+    from.iter().zip(to).map(excursion).collect()
 }
 
 /// Returns the mean of to − from.

@@ -52,13 +52,18 @@ impl<'a> Move<'a> {
         Self { from, to, rounding: ROUNDING * largest(from).max(largest(to)) }
     }
 
+    /// Bound of the rounding errors of a distance, in m.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
+    }
+
     /// Whether a comparison of distances, or the normal of the last search, shows that the whole move is safe: the pair
     /// stays out of reach, or keeps its clearance. `excursions` are those of the vertices at both ends of the move. The
     /// distance from the place of the last search is largest at an end of a straight move.
     #[inline]
     pub fn is_plainly_safe(&self, candidate: &Candidate, clearance: Clearance, excursions: &[Vec<f64>; 2]) -> bool {
         let Clearance { thickness, reach } = clearance;
-        let [before, after] = excursions.each_ref().map(|excursions| candidate.approach(excursions));
+        let [before, after] = excursions.each_ref().map(|excursions| candidate.pair.approach(excursions));
         if candidate.distance - before.max(after) > reach + self.rounding {
             return true;
         }
@@ -74,7 +79,8 @@ impl<'a> Move<'a> {
     pub fn safe_part(&self, pair: &Pair, clearance: Clearance, wanted: f64) -> f64 {
         let (from, to) = (pair.corners(self.from), pair.corners(self.to));
         let start = Closest::of(pair, &from);
-        let level = self.level(start.distance, clearance);
+        // Out of reach, nothing needs to be kept.
+        let level = self.level(start.distance, clearance).min(clearance.reach + self.rounding);
         let first = pair.first();
         let separates =
             |n: Vector3<f64>| [&from, &to].into_iter().all(|corners| separation(n, corners, first) >= level);

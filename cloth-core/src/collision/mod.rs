@@ -12,6 +12,7 @@ mod closest;
 mod crossing;
 mod mesh;
 mod pair;
+mod shortlist;
 
 pub(crate) use candidates::{Candidate, Candidates, Slack};
 pub(crate) use certificate::{Clearance, Move};
@@ -19,6 +20,7 @@ pub(crate) use closest::Closest;
 pub use crossing::{Crossing, crossings};
 pub use mesh::CollisionMesh;
 pub(crate) use pair::{Pair, PairKind};
+pub(crate) use shortlist::Shortlist;
 
 #[cfg(test)]
 mod tests;

@@ -32,6 +32,16 @@ impl Pair {
         self.vertices.map(|vertex| all[vertex as usize])
     }
 
+    /// The largest decrease of the distance by these excursions of the vertices.
+    #[inline]
+    pub fn approach(&self, excursions: &[f64]) -> f64 {
+        let [a, b, c, d] = self.of(excursions);
+        match self.kind {
+            PairKind::PointTriangle => a + b.max(c).max(d),
+            PairKind::EdgeEdge => a.max(b) + c.max(d),
+        }
+    }
+
     /// Returns the positions of its vertices.
     #[inline]
     pub fn corners(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 4] {

@@ -219,6 +219,25 @@ proptest! {
         prop_assert!(candidates.cover(&x));
         let listed: std::collections::BTreeSet<Pair> = candidates.pairs().iter().map(|one| one.pair).collect();
         prop_assert_eq!(listed.len(), candidates.pairs().len());
+        // A list for the whole move, then one for the rest of it.
+        let mut shortlist = Shortlist::new(1e-4, REACH);
+        for start in [from.clone(), at(&from, &to, 0.8 * time), x.clone()] {
+            shortlist.prepare(&candidates, &start, &x, 1e-15);
+            let short: std::collections::BTreeSet<Pair> =
+                shortlist.pairs().iter().map(|one| one.candidate.pair).collect();
+            let excursions = shortlist.excursions(&start, &x);
+            for here in [&start, &x] {
+                for pair in &listed {
+                    let distance = Closest::of(pair, &pair.corners(here)).distance;
+                    prop_assert!(distance > REACH || short.contains(pair), "{:?} at {}", pair, distance);
+                }
+                for one in shortlist.pairs() {
+                    let pair = one.candidate.pair;
+                    let distance = Closest::of(&pair, &pair.corners(here)).distance;
+                    prop_assert!(!one.is_beyond(distance + 1e-12, &excursions));
+                }
+            }
+        }
         let excursions = candidates.excursions(&x);
         for pair in all_pairs(&mesh) {
             let here = Closest::of(&pair, &pair.corners(&x)).distance;

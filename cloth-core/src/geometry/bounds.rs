@@ -56,6 +56,12 @@ impl Bounds {
         (0..3).all(|axis| self.low[axis] <= x[axis] && x[axis] <= self.high[axis])
     }
 
+    /// Returns the largest distance of a point from a place in the box, in m.
+    pub fn farthest(&self, x: Vector3<f64>) -> f64 {
+        let along = |axis: usize| (x[axis] - self.low[axis]).max(self.high[axis] - x[axis]);
+        (0..3).map(|axis| along(axis).powi(2)).sum::<f64>().sqrt()
+    }
+
     pub fn middle(&self, axis: usize) -> f64 {
         0.5 * (self.low[axis] + self.high[axis])
     }
