@@ -2,8 +2,8 @@
 
 use energy_dsl::Vector3;
 
-use super::{BarrierContact, JOINING, Resistance};
-use crate::collision::{Candidates, Closest, CollisionMesh, Crossing, Pair, PairKind, Shortlist, Slack, crossings};
+use super::{BarrierContact, JOINING, Joined, Resistance};
+use crate::collision::{Candidates, Closest, CollisionMesh, Crossing, PairKind, Shortlist, Slack, crossings};
 use energy_solve::ContactCounts;
 
 /// A start that contact cannot keep free of crossings, because it is not.
@@ -74,8 +74,7 @@ impl BarrierContact {
             searches: 0,
             candidates,
             shortlist: Shortlist::new(0.25 * reach, JOINING * reach),
-            joined: Vec::new(),
-            known: Default::default(),
+            joined: Joined::default(),
             blocking: Vec::new(),
             resistance: Resistance::default(),
             counts: ContactCounts::default(),
@@ -86,8 +85,8 @@ impl BarrierContact {
     }
 
     fn check_distances(&self, x: &[Vector3<f64>]) -> Result<(), ContactError> {
-        let measured = |pair: Pair| (Closest::of(&pair, &pair.corners(x)).distance, self.thickness(&pair), pair);
-        let all = self.candidates.pairs().iter().map(|candidate| measured(candidate.pair));
+        let all = self.candidates.pairs().iter();
+        let all = all.map(|pair| (Closest::of(pair, &pair.corners(x)).distance, self.thickness(pair), pair));
         let close: Vec<_> = all.filter(|(distance, thickness, _)| distance <= thickness).collect();
         let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         closest.map_or(Ok(()), |&(distance, thickness, pair)| {

@@ -20,6 +20,13 @@ fn contact(x: &[Vector3<f64>]) -> BarrierContact {
     contact
 }
 
+/// The pairs with an energy at x.
+fn active(contact: &BarrierContact, x: &[Vector3<f64>]) -> Vec<(Pair, Law, Closest, f64)> {
+    let mut all = Vec::new();
+    contact.for_each_active(x, |pair, law, closest, apart| all.push((*pair, law, closest, apart)));
+    all
+}
+
 /// The second triangle touches the first with a vertex, with an edge across an edge, or beyond a corner.
 fn states() -> Vec<Vec<Vector3<f64>>> {
     let first = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.003], [0.0, 0.1, -0.002]];
@@ -66,11 +73,10 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
     for x in states() {
         let mut contact = contact(&x);
         contact.meet(&x);
-        for (joined, closest, _) in contact.active(&x) {
+        for (pair, _, closest, _) in active(&contact, &x) {
             let touched: Vec<usize> = (0..4).filter(|&place| closest.weights[place] != 0.0).collect();
-            let points: Vec<Vector3<f64>> =
-                touched.iter().map(|&place| joined.candidate.pair.corners(&x)[place]).collect();
-            let (kind, distance, gradient) = match (joined.candidate.pair.kind, &points[..]) {
+            let points: Vec<Vector3<f64>> = touched.iter().map(|&place| pair.corners(&x)[place]).collect();
+            let (kind, distance, gradient) = match (pair.kind, &points[..]) {
                 (PairKind::PointTriangle, &[p, a]) => {
                     let found = Distance::<f64>::new().gradient(&[p, a]);
                     (0, found.value, found.gradient.to_vec())
@@ -107,9 +113,9 @@ fn the_stiffness_is_the_curvature_along_the_normal() {
         contact.meet(&x);
         let found = contact.contacts(&DofMap::new(&[false; 6]), &x);
         assert!(!found.is_empty());
-        for ((joined, closest, gap), one) in contact.active(&x).zip(&found) {
-            assert_eq!((one.weights, one.rows), (closest.weights, joined.candidate.pair.vertices));
-            let energy = |gap: f64| contact.energy_of(joined, gap);
+        for ((pair, law, closest, gap), one) in active(&contact, &x).into_iter().zip(&found) {
+            assert_eq!((one.weights, one.rows), (closest.weights, pair.vertices));
+            let energy = |gap: f64| law.energy(gap, GAP);
             let h = 1e-3 * gap;
             let curvature = (energy(gap + h) - 2.0 * energy(gap) + energy(gap - h)) / (h * h);
             let along = dot(closest.normal, one.block.map(|row| dot(row, closest.normal)));
@@ -124,9 +130,9 @@ fn stiffness_follows_the_resistance() {
     let x = states()[0].clone();
     let mut contact = contact(&x);
     contact.meet(&x);
-    let (joined, _, _) = contact.active(&x).next().unwrap();
+    let (_, law, _, _) = active(&contact, &x)[0];
     let half = 0.5 * GAP;
-    let curvature = contact.barrier(joined).hessian(&between(half)).hessian.as_ref()[0][0][0];
+    let curvature = law.barrier(GAP).hessian(&between(half)).hessian.as_ref()[0][0][0];
     assert!((curvature / 500.0 - 1.0).abs() < 1e-12, "{curvature}");
 }
 
@@ -158,7 +164,8 @@ fn moves_are_certified_and_pairs_that_block_join() {
     assert_eq!(contact.certify(&x, &away), 1.0);
     assert_eq!(contact.certify(&x, &[[f64::NAN; 3]; 6]), 0.0);
     contact.meet(&x);
-    assert!(contact.known.contains(&Pair { kind: PairKind::PointTriangle, vertices: [3, 0, 1, 2] }));
+    let blocked = Pair { kind: PairKind::PointTriangle, features: [3, 0], vertices: [3, 0, 1, 2] };
+    assert!(contact.joined.contains(&blocked));
     let counts = contact.counts();
     assert_eq!((counts.moves, counts.shortened), (2, 1));
     assert!((counts.left - part).abs() < 1e-15);
@@ -214,11 +221,12 @@ proptest! {
             x = moved(0.5 * part);
             prop_assert_eq!(short.meet(&x).to_bits(), whole.meet(&x).to_bits());
             let joined = |contact: &BarrierContact| -> Vec<_> {
-                contact.joined.iter().map(|one| (one.candidate.pair, one.stiffness.to_bits())).collect()
+                let Joined { pairs, laws, .. } = &contact.joined;
+                pairs.iter().zip(laws).map(|(pair, law)| (*pair, law.stiffness.to_bits())).collect()
             };
             prop_assert_eq!(joined(&short), joined(&whole));
         }
         prop_assert!(short.counts().candidates < whole.counts().candidates);
-        prop_assert!(!short.joined.is_empty());
+        prop_assert!(!short.joined.pairs.is_empty());
     }
 }

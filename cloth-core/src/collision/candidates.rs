@@ -1,9 +1,8 @@
 use energy_dsl::Vector3;
 use energy_solve::index;
 
-use super::certificate::separation;
 use super::mesh::{CollisionMesh, bounds};
-use super::{Closest, Pair, PairKind};
+use super::{Measured, Pair, PairKind};
 use crate::geometry::{Bounds, Hierarchy, add_scaled, norm, subtract};
 
 /// All pairs that can come within reach of each other, sorted by kind and vertices, with the region in which each
@@ -24,7 +23,9 @@ pub(crate) struct Candidates {
     origin: Vec<Vector3<f64>>,
     /// The region of each vertex.
     regions: Vec<Bounds>,
-    pairs: Vec<Candidate>,
+    pairs: Vec<Pair>,
+    /// The pairs at the last search.
+    measured: Measured,
 }
 
 /// Pairs are listed if they can come within this many times the reach, because contacts join before they have an
@@ -47,28 +48,6 @@ impl Slack {
     pub const NONE: Self = Self { least: 0.0, part: 0.0, most: 0.0 };
 }
 
-/// A pair, with its distance and normal at the last search.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidate {
-    pub pair: Pair,
-    pub distance: f64,
-    pub normal: Vector3<f64>,
-}
-
-impl Candidate {
-    pub fn new(pair: Pair, x: &[Vector3<f64>]) -> Self {
-        let Closest { distance, normal, .. } = Closest::of(&pair, &pair.corners(x));
-        Self { pair, distance, normal }
-    }
-
-    /// Whether the pair is certainly farther apart than `reach` at x, where the vertices have these excursions.
-    #[inline]
-    pub fn is_beyond(&self, reach: f64, x: &[Vector3<f64>], excursions: &[f64]) -> bool {
-        self.distance - self.pair.approach(excursions) > reach
-            || separation(self.normal, &self.pair.corners(x), self.pair.first()) > reach
-    }
-}
-
 impl Candidates {
     /// Creates an empty list. Pairs without a vertex of `is_free` are never listed.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], is_free: Vec<bool>, reach: f64) -> Self {
@@ -77,22 +56,24 @@ impl Candidates {
         let boxes_of_points: Vec<_> = mesh.points().iter().map(|&point| bounds(x, &[point])).collect();
         let [points, triangles, edges] =
             [&boxes_of_points, &boxes_of_triangles, &boxes_of_edges].map(|boxes| Hierarchy::new(boxes));
-        Self { points, triangles, edges, is_free, reach, origin: Vec::new(), regions: Vec::new(), pairs: Vec::new() }
+        let (origin, regions, pairs, measured) = Default::default();
+        Self { points, triangles, edges, is_free, reach, origin, regions, pairs, measured }
     }
 
-    pub fn pairs(&self) -> &[Candidate] {
+    pub fn pairs(&self) -> &[Pair] {
         &self.pairs
     }
 
-    /// Returns the listed pair; `None` if it is not listed.
-    pub fn find(&self, pair: &Pair) -> Option<Candidate> {
-        self.pairs.binary_search_by_key(pair, |candidate| candidate.pair).ok().map(|place| self.pairs[place])
+    /// The pairs at the last search.
+    pub fn measured(&self) -> &Measured {
+        &self.measured
     }
 
     /// Discards the list, so that the next one depends on the state alone.
     pub fn clear(&mut self) {
         self.origin.clear();
         self.pairs.clear();
+        self.measured.clear();
     }
 
     /// Returns the distance of each vertex from its place at the last search, relative to the mean displacement, in m.
@@ -120,15 +101,18 @@ impl Candidates {
             Bounds::of(&[x, to]).extended(slack)
         };
         self.regions = x.iter().zip(to).map(region).collect();
-        let mut found = Vec::new();
-        self.find_points_near_triangles(mesh, &mut found);
-        self.find_edges_near_edges(mesh, &mut found);
-        found.sort_unstable();
         self.pairs.clear();
+        self.find_points_near_triangles(mesh);
+        self.find_edges_near_edges(mesh);
+        self.measured.clear();
+        self.measured.measure(&self.pairs, x);
         let radii: Vec<f64> = self.regions.iter().zip(x).map(|(region, x)| region.farthest(*x)).collect();
         // Boxes of tilted features meet long before the features do.
-        let may_meet = |one: &Candidate| one.distance - one.pair.approach(&radii) <= KEPT * self.reach;
-        self.pairs.extend(found.into_iter().map(|pair| Candidate::new(pair, x)).filter(may_meet));
+        let may_meet = |(pair, separation): (&Pair, &f64)| separation - pair.approach(&radii) <= KEPT * self.reach;
+        let is_kept: Vec<bool> = self.pairs.iter().zip(self.measured.separations()).map(may_meet).collect();
+        self.measured.retain(&is_kept);
+        let mut kept = is_kept.into_iter();
+        self.pairs.retain(|_| kept.next().expect("one for each pair"));
     }
 
     /// The box around the regions of some vertices, extended by half the reach.
@@ -141,7 +125,7 @@ impl Candidates {
         a.iter().chain(b).any(|vertex| self.is_free[*vertex as usize])
     }
 
-    fn find_points_near_triangles(&mut self, mesh: &CollisionMesh, found: &mut Vec<Pair>) {
+    fn find_points_near_triangles(&mut self, mesh: &CollisionMesh) {
         let boxes: Vec<_> = mesh.triangles().iter().map(|corners| self.swept(corners)).collect();
         let around: Vec<_> = mesh.points().iter().map(|&point| self.swept(&[point])).collect();
         self.triangles.refit(&boxes);
@@ -150,28 +134,30 @@ impl Candidates {
         self.points.meeting(&self.triangles, [&around, &boxes], |place, triangle| {
             let (point, corners) = (mesh.points()[place], &mesh.triangles()[triangle]);
             if !mesh.are_joined(&[point], corners) && self.may_respond(&[point], corners) {
-                near.push((index(place), index(triangle)));
+                near.push([index(place), index(triangle)]);
             }
         });
-        found.extend(near.into_iter().map(|(place, triangle)| {
-            let [a, b, c] = mesh.triangles()[triangle as usize];
-            Pair { kind: PairKind::PointTriangle, vertices: [mesh.points()[place as usize], a, b, c] }
+        near.sort_unstable();
+        self.pairs.extend(near.into_iter().map(|features| {
+            let (point, [a, b, c]) = (mesh.points()[features[0] as usize], mesh.triangles()[features[1] as usize]);
+            Pair { kind: PairKind::PointTriangle, features, vertices: [point, a, b, c] }
         }));
     }
 
-    fn find_edges_near_edges(&mut self, mesh: &CollisionMesh, found: &mut Vec<Pair>) {
+    fn find_edges_near_edges(&mut self, mesh: &CollisionMesh) {
         let boxes: Vec<_> = mesh.edges().iter().map(|ends| self.swept(ends)).collect();
         self.edges.refit(&boxes);
         let mut near = Vec::new();
         self.edges.meeting_itself(&boxes, |one, other| {
             let (ends, others) = (&mesh.edges()[one], &mesh.edges()[other]);
             if !mesh.are_joined(ends, others) && self.may_respond(ends, others) {
-                near.push((index(one.min(other)), index(one.max(other))));
+                near.push([index(one.min(other)), index(one.max(other))]);
             }
         });
-        found.extend(near.into_iter().map(|(one, other)| {
-            let ([a, b], [c, d]) = (mesh.edges()[one as usize], mesh.edges()[other as usize]);
-            Pair { kind: PairKind::EdgeEdge, vertices: [a, b, c, d] }
+        near.sort_unstable();
+        self.pairs.extend(near.into_iter().map(|features| {
+            let [[a, b], [c, d]] = features.map(|edge| mesh.edges()[edge as usize]);
+            Pair { kind: PairKind::EdgeEdge, features, vertices: [a, b, c, d] }
         }));
     }
 }

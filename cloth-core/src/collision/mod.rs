@@ -10,14 +10,16 @@ mod candidates;
 mod certificate;
 mod closest;
 mod crossing;
+mod measured;
 mod mesh;
 mod pair;
 mod shortlist;
 
-pub(crate) use candidates::{Candidate, Candidates, Slack};
+pub(crate) use candidates::{Candidates, Slack};
 pub(crate) use certificate::{Clearance, Move};
 pub(crate) use closest::Closest;
 pub use crossing::{Crossing, crossings};
+pub(crate) use measured::Measured;
 pub use mesh::CollisionMesh;
 pub(crate) use pair::{Pair, PairKind};
 pub(crate) use shortlist::Shortlist;

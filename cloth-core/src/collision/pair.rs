@@ -9,10 +9,23 @@ pub(crate) enum PairKind {
     EdgeEdge,
 }
 
-/// Two features that may touch.
+impl PairKind {
+    /// The number of vertices of the first feature; the second has the others.
+    #[inline]
+    pub const fn first(self) -> usize {
+        match self {
+            Self::PointTriangle => 1,
+            Self::EdgeEdge => 2,
+        }
+    }
+}
+
+/// Two features that may touch. Pairs are ordered by kind, then by features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Pair {
     pub kind: PairKind,
+    /// The places of the two features in the mesh's lists of points, triangles and edges.
+    pub features: [u32; 2],
     pub vertices: [u32; 4],
 }
 
@@ -20,10 +33,7 @@ impl Pair {
     /// The number of vertices of the first feature; the second has the others.
     #[inline]
     pub fn first(&self) -> usize {
-        match self.kind {
-            PairKind::PointTriangle => 1,
-            PairKind::EdgeEdge => 2,
-        }
+        self.kind.first()
     }
 
     /// Returns an entry for each vertex.

@@ -13,11 +13,7 @@ fn two_triangles() -> CollisionMesh {
 
 /// All pairs of the two triangles.
 fn pairs() -> Vec<Pair> {
-    let point = |p: u32, [a, b, c]: [u32; 3]| Pair { kind: PairKind::PointTriangle, vertices: [p, a, b, c] };
-    let points = (0..3).map(|p| point(p, [3, 4, 5])).chain((3..6).map(|p| point(p, [0, 1, 2])));
-    let sides = |first: u32| [[0, 1], [1, 2], [0, 2]].map(|side: [u32; 2]| side.map(|corner| first + corner));
-    let edges = sides(0).into_iter().flat_map(|[a, b]| sides(3).map(|[c, d]| [a, b, c, d]));
-    points.chain(edges.map(|vertices| Pair { kind: PairKind::EdgeEdge, vertices })).collect()
+    all_pairs(&two_triangles())
 }
 
 fn distance(x: &[Vector3<f64>]) -> f64 {
@@ -33,7 +29,12 @@ fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 
     let step = Move::new(from, to);
     pairs()
         .iter()
-        .fold(1.0, |part, pair| step.safe_part(pair, Clearance { thickness, reach: f64::INFINITY }, part).min(part))
+        .fold(1.0, |part, pair| safe_part_of(&step, pair, &pair.corners(from), thickness, part).min(part))
+}
+
+/// The part of a move that is safe for a pair; `from` holds its corners at the start.
+fn safe_part_of(step: &Move<'_>, pair: &Pair, from: &[Vector3<f64>; 4], thickness: f64, wanted: f64) -> f64 {
+    step.safe_part(pair, &Closest::of(pair, from), Clearance { thickness, reach: f64::INFINITY }, wanted)
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -76,30 +77,27 @@ fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, max_global_rejects: 100_000, ..ProptestConfig::default() })]
 
-    /// Moves that the normal of an earlier search certifies are safe.
+    /// Pairs that stay beyond a distance do so.
     #[test]
-    fn plainly_safe_moves_keep_their_distance(
-        [from, to] in impact(),
-        earlier in prop::collection::vec(vector(2e-3), 6),
-    ) {
-        const CLEARANCE: Clearance = Clearance { thickness: 1e-3, reach: 4e-3 };
-        let search: Vec<_> = from.iter().zip(&earlier).map(|(x, offset)| add_scaled(*x, 1.0, *offset)).collect();
-        // A short move, so that normals stay useful.
-        let to = at(&from, &to, 0.01);
-        let excursions = [&from, &to].map(|x| {
-            let excursion = |(x, origin): (&Vector3<f64>, &Vector3<f64>)| crate::geometry::norm(subtract(*x, *origin));
-            x.iter().zip(&search).map(excursion).collect::<Vec<f64>>()
-        });
+    fn pairs_beyond_reach_stay_there([from, to] in impact(), reach in 0.0..0.05) {
         let step = Move::new(&from, &to);
         for pair in pairs() {
             let distance = |time: f64| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance;
-            let start = distance(0.0);
-            if start > 1e-3 && step.is_plainly_safe(&Candidate::new(pair, &search), CLEARANCE, &excursions) {
-                let kept = (1e-3 + 0.1 * (start - 1e-3)).min(4e-3);
+            if step.stays_beyond(reach, &pair, Closest::of(&pair, &pair.corners(&from)).separation) {
                 for sample in 0..=10 {
-                    prop_assert!(distance(0.1 * f64::from(sample)) >= kept, "{:?} {}", pair, sample);
+                    prop_assert!(distance(0.1 * f64::from(sample)) > reach, "{:?} {}", pair, sample);
                 }
             }
+        }
+    }
+
+    /// Lanes give the bits of single pairs.
+    #[test]
+    fn lanes_measure_what_single_pairs_are([x, _] in impact()) {
+        let mut measured = Measured::default();
+        measured.measure(&pairs(), &x);
+        for (number, pair) in pairs().iter().enumerate() {
+            prop_assert_eq!(measured.closest(number), Closest::of(pair, &pair.corners(&x)));
         }
     }
 
@@ -131,7 +129,7 @@ fn moves_are_cut_only_near_a_contact() {
         let [from, to] = impact().new_tree(&mut runner).unwrap().current();
         let step = Move::new(&from, &to);
         for pair in pairs() {
-            let part = step.safe_part(&pair, Clearance { thickness: THICKNESS, reach: f64::INFINITY }, 1.0);
+            let part = safe_part_of(&step, &pair, &pair.corners(&from), THICKNESS, 1.0);
             let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
             if part < 1.0 && gap(0.0) > 0.0 {
                 cut += 1;
@@ -217,35 +215,23 @@ proptest! {
         prop_assert!(candidates.cover(&from) && candidates.cover(&to));
         let x = at(&from, &to, time);
         prop_assert!(candidates.cover(&x));
-        let listed: std::collections::BTreeSet<Pair> = candidates.pairs().iter().map(|one| one.pair).collect();
+        let listed: std::collections::BTreeSet<Pair> = candidates.pairs().iter().copied().collect();
         prop_assert_eq!(listed.len(), candidates.pairs().len());
         // A list for the whole move, then one for the rest of it.
         let mut shortlist = Shortlist::new(1e-4, REACH);
         for start in [from.clone(), at(&from, &to, 0.8 * time), x.clone()] {
             shortlist.prepare(&candidates, &start, &x, 1e-15);
-            let short: std::collections::BTreeSet<Pair> =
-                shortlist.pairs().iter().map(|one| one.candidate.pair).collect();
-            let excursions = shortlist.excursions(&start, &x);
+            let short: std::collections::BTreeSet<Pair> = shortlist.pairs().iter().copied().collect();
             for here in [&start, &x] {
                 for pair in &listed {
                     let distance = Closest::of(pair, &pair.corners(here)).distance;
                     prop_assert!(distance > REACH || short.contains(pair), "{:?} at {}", pair, distance);
                 }
-                for one in shortlist.pairs() {
-                    let pair = one.candidate.pair;
-                    let distance = Closest::of(&pair, &pair.corners(here)).distance;
-                    prop_assert!(!one.is_beyond(distance + 1e-12, &excursions));
-                }
             }
         }
-        let excursions = candidates.excursions(&x);
         for pair in all_pairs(&mesh) {
             let here = Closest::of(&pair, &pair.corners(&x)).distance;
             prop_assert!(here > REACH || listed.contains(&pair), "{:?} at {}", pair, here);
-        }
-        for one in candidates.pairs() {
-            let here = Closest::of(&one.pair, &one.pair.corners(&x)).distance;
-            prop_assert!(!one.is_beyond(here + 1e-12, &x, &excursions));
         }
     }
 
@@ -253,9 +239,10 @@ proptest! {
     #[test]
     fn closest_points_are_closest(corners in prop::array::uniform4(prop_oneof![vector(1.0), on_grid()])) {
         for kind in [PairKind::PointTriangle, PairKind::EdgeEdge] {
-            let pair = Pair { kind, vertices: [0, 1, 2, 3] };
+            let pair = Pair { kind, features: [0, 1], vertices: [0, 1, 2, 3] };
             let closest = Closest::of(&pair, &corners);
             prop_assert!(closest.weights.iter().sum::<f64>().abs() < 1e-14);
+            prop_assert!((closest.separation - closest.distance).abs() < 1e-7, "{:?}", closest);
             const STEPS: i32 = 12;
             for i in 0..=STEPS {
                 for j in 0..=STEPS {
@@ -277,15 +264,18 @@ proptest! {
 /// All pairs of a mesh that share no vertex.
 fn all_pairs(mesh: &CollisionMesh) -> Vec<Pair> {
     let mut all = Vec::new();
-    for &p in mesh.points() {
-        for corners in mesh.triangles().iter().filter(|corners| !corners.contains(&p)) {
-            let [a, b, c] = *corners;
-            all.push(Pair { kind: PairKind::PointTriangle, vertices: [p, a, b, c] });
+    for (place, &p) in mesh.points().iter().enumerate() {
+        for (number, corners) in mesh.triangles().iter().enumerate().filter(|(_, corners)| !corners.contains(&p)) {
+            let ([a, b, c], features) = (*corners, [place, number].map(energy_solve::index));
+            all.push(Pair { kind: PairKind::PointTriangle, features, vertices: [p, a, b, c] });
         }
     }
     for (number, &[a, b]) in mesh.edges().iter().enumerate() {
-        for &[c, d] in mesh.edges()[number + 1..].iter().filter(|other| !other.contains(&a) && !other.contains(&b)) {
-            all.push(Pair { kind: PairKind::EdgeEdge, vertices: [a, b, c, d] });
+        for (other, &[c, d]) in mesh.edges().iter().enumerate().skip(number + 1) {
+            if ![c, d].iter().any(|end| [a, b].contains(end)) {
+                let features = [number, other].map(energy_solve::index);
+                all.push(Pair { kind: PairKind::EdgeEdge, features, vertices: [a, b, c, d] });
+            }
         }
     }
     all
