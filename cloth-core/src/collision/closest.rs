@@ -1,7 +1,8 @@
 //! Closest points of a point and a triangle, and of two edges (Ericson, "Real-Time Collision Detection", 2005, §5.1).
 //!
 //! The formulas have no branches, so that SIMD lanes evaluate many pairs at a time. They use plain sums and products:
-//! results have the same bits in any number of lanes.
+//! results have the same bits in any number of lanes. Vectors are written out by components: closures that build arrays
+//! would stay calls, which SIMD levels cannot compile for themselves.
 
 use energy_dsl::{Real, Vector3};
 
@@ -47,13 +48,13 @@ impl<V: Real> Closest<V> {
         let origin = &corners[kind.first()];
         let zero = V::from_f64(0.0);
         let mut apart = [zero; 3];
-        for (weight, corner) in weights.iter().zip(corners) {
-            let from_origin = subtract(corner, origin);
-            apart = std::array::from_fn(|axis| apart[axis] + *weight * from_origin[axis]);
+        for corner in 0..4 {
+            apart = add_scaled(&apart, weights[corner], &subtract(&corners[corner], origin));
         }
         let distance = dot(&apart, &apart).sqrt();
         let is_apart = zero.less(distance);
-        let normal = apart.map(|component| V::select(is_apart, component / distance, zero));
+        let [x, y, z] = apart;
+        let normal = select(is_apart, &[x / distance, y / distance, z / distance], &[zero; 3]);
         Self { weights, distance, normal, separation: separation(&normal, corners, kind.first()) }
     }
 }
@@ -87,20 +88,20 @@ fn on_triangle<V: Real>(corners: &[[V; 3]; 4]) -> [V; 3] {
     let is_positive = |x: V| zero.less_or_equal(x);
 
     // The coordinates of b and c are quotients, with the numerators and the denominator of the point's region.
-    let on_bc = is_negative(va) & d3.less_or_equal(d4) & d6.less_or_equal(d5);
-    let regions = [
-        (on_bc, [zero, d4 - d3, (d4 - d3) + (d5 - d6)]),
-        (is_negative(vb) & is_positive(d2) & is_negative(d6), [zero, d2, d2 - d6]),
-        (is_positive(d6) & d5.less_or_equal(d6), [zero, one, one]),
-        (is_negative(vc) & is_positive(d1) & is_negative(d3), [d1, zero, d1 - d3]),
-        (is_positive(d3) & d4.less_or_equal(d3), [one, zero, one]),
-        (is_negative(d1) & is_negative(d2), [zero, zero, one]),
-    ];
-    let mut region = [vb, vc, va + vb + vc];
-    for (holds, other) in regions {
-        region = std::array::from_fn(|i| V::select(holds, other[i], region[i]));
-    }
-    let is_beyond_bc = regions[1..].iter().fold(on_bc, |mask, (holds, _)| mask & !*holds);
+    let is_on_bc = is_negative(va) & d3.less_or_equal(d4) & d6.less_or_equal(d5);
+    let is_on_ac = is_negative(vb) & is_positive(d2) & is_negative(d6);
+    let is_at_c = is_positive(d6) & d5.less_or_equal(d6);
+    let is_on_ab = is_negative(vc) & is_positive(d1) & is_negative(d3);
+    let is_at_b = is_positive(d3) & d4.less_or_equal(d3);
+    let is_at_a = is_negative(d1) & is_negative(d2);
+    let region = [vb, vc, va + vb + vc];
+    let region = select(is_on_bc, &[zero, d4 - d3, (d4 - d3) + (d5 - d6)], &region);
+    let region = select(is_on_ac, &[zero, d2, d2 - d6], &region);
+    let region = select(is_at_c, &[zero, one, one], &region);
+    let region = select(is_on_ab, &[d1, zero, d1 - d3], &region);
+    let region = select(is_at_b, &[one, zero, one], &region);
+    let region = select(is_at_a, &[zero, zero, one], &region);
+    let is_beyond_bc = is_on_bc & !(is_on_ac | is_at_c | is_on_ab | is_at_b | is_at_a);
     let [v, w, sum] = region;
     let w = fraction(w, sum);
     let v = V::select(is_beyond_bc, one - w, fraction(v, sum));
@@ -112,8 +113,7 @@ fn on_triangle<V: Real>(corners: &[[V; 3]; 4]) -> [V; 3] {
     if !energy_dsl::Mask::any(is_flat) {
         return [u, v, w];
     }
-    let on_sides = on_sides(p, [a, b, c]);
-    std::array::from_fn(|i| V::select(is_flat, on_sides[i], [u, v, w][i]))
+    select(is_flat, &on_sides(p, [a, b, c]), &[u, v, w])
 }
 
 /// Barycentric coordinates of the closest point of a triangle without area: that of the nearest side.
@@ -125,13 +125,13 @@ fn on_sides<V: Real>(p: &[V; 3], corners: [&[V; 3]; 3]) -> [V; 3] {
         let end = (start + 1) % 3;
         let (along, to) = (subtract(corners[end], corners[start]), subtract(p, corners[start]));
         let t = fraction(dot(&to, &along), dot(&along, &along));
-        let rest: [V; 3] = std::array::from_fn(|axis| to[axis] - t * along[axis]);
+        let rest = add_scaled(&to, -t, &along);
         let square = dot(&rest, &rest);
         let is_nearer = square.less(least);
         let mut coordinates = [V::from_f64(0.0); 3];
         (coordinates[start], coordinates[end]) = (one - t, t);
         least = V::select(is_nearer, square, least);
-        nearest = std::array::from_fn(|i| V::select(is_nearer, coordinates[i], nearest[i]));
+        nearest = select(is_nearer, &coordinates, &nearest);
     }
     nearest
 }
@@ -165,7 +165,19 @@ fn fraction<V: Real>(a: V, b: V) -> V {
 
 #[inline(always)]
 fn subtract<V: Real>(a: &[V; 3], b: &[V; 3]) -> [V; 3] {
-    std::array::from_fn(|axis| a[axis] - b[axis])
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// a + s b.
+#[inline(always)]
+fn add_scaled<V: Real>(a: &[V; 3], s: V, b: &[V; 3]) -> [V; 3] {
+    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
+}
+
+/// a where the mask holds, b elsewhere.
+#[inline(always)]
+fn select<V: Real>(mask: V::Mask, a: &[V; 3], b: &[V; 3]) -> [V; 3] {
+    [V::select(mask, a[0], b[0]), V::select(mask, a[1], b[1]), V::select(mask, a[2], b[2])]
 }
 
 #[inline(always)]

@@ -88,9 +88,15 @@ fn measure<L: Level>(
     let lanes = L::F64::LANES;
     for (start, pairs) in pairs.chunks(lanes).enumerate().map(|(chunk, pairs)| (chunk * lanes, pairs)) {
         // Lanes beyond the end repeat the last pair.
-        let vertices: [[u32; 16]; 4] =
-            std::array::from_fn(|corner| std::array::from_fn(|lane| pairs[lane.min(pairs.len() - 1)].vertices[corner]));
-        let corners: [[L::F64; 3]; 4] = std::array::from_fn(|corner| L::F64::gather(x, &vertices[corner]));
+        let mut vertices = [[0; 16]; 4];
+        for lane in 0..lanes {
+            let pair = &pairs[lane.min(pairs.len() - 1)];
+            for corner in 0..4 {
+                vertices[corner][lane] = pair.vertices[corner];
+            }
+        }
+        let [p, q, r, s] = &vertices;
+        let corners = [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)];
         let Closest { weights: [a, b, c, d], normal: [nx, ny, nz], distance, separation } =
             Closest::between(kind, &corners);
         let rows = numbers[start..][..pairs.len()].as_flattened_mut();
