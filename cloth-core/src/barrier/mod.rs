@@ -27,7 +27,9 @@ use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
 pub use start::ContactError;
 
-use crate::collision::{Candidates, Clearance, Closest, CollisionMesh, Measured, Move, Pair, Shortlist, Slack};
+use crate::collision::{
+    Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept,
+};
 use crate::geometry::{add_scaled, dot};
 use feasible::Meeting;
 
@@ -38,7 +40,9 @@ const STIFFNESS_RATIO: f64 = 10.0;
 const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
-const JOINING: f64 = 2.0;
+const JOINING: f64 = 1.25;
+/// Part of the displacement of the last long move that an iterate may stray before the next search.
+const STRAYING: f64 = 0.5;
 
 /// Contact of a body with itself.
 #[derive(Debug)]
@@ -50,14 +54,13 @@ pub struct BarrierContact {
     gap: f64,
     /// Largest distance at which a pair has an energy, in m.
     reach: f64,
-    /// The slack of the first search of a step. The least slack doubles with further searches, because the iterates
-    /// stray.
-    slack: Slack,
-    /// Searches in this step.
-    searches: u32,
-    candidates: Candidates,
-    /// The candidates that matter near the current iterate.
-    shortlist: Shortlist,
+    /// The least and the largest distance that vertices may move before the next search, in m.
+    slack: [f64; 2],
+    search: Search,
+    /// The pairs near the current iterate.
+    neighbourhood: Neighbourhood,
+    /// The displacement of each vertex in the last move that left the neighbourhood, in m.
+    strides: Vec<f64>,
     joined: Joined,
     /// Pairs that shortened a move since the last iterate.
     blocking: Vec<Pair>,
@@ -160,15 +163,51 @@ impl BarrierContact {
         Law { thickness: self.thickness(pair), stiffness }
     }
 
-    /// Renews the candidates for a move.
-    fn search(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) {
-        let Slack { least, part, most } = self.slack;
-        let least = least * f64::from(1_u32 << self.searches.min(3));
-        self.candidates.search(&self.mesh, from, to, Slack { least, part, most });
-        self.shortlist.clear();
-        self.searches += 1;
-        self.counts.searches += 1;
+    /// Makes all pairs near an iterate known, and measures them there.
+    fn visit(&mut self, x: &[Vector3<f64>]) {
+        if !self.covers(x) {
+            let [least, most] = self.slack;
+            let radii = self.strides.iter().map(|stride| (least + STRAYING * stride).min(most)).collect();
+            self.neighbourhood.renew(&mut self.search, &self.mesh, x, radii);
+            self.counts.searches += 1;
+        }
+        self.neighbourhood.visit(x);
     }
+
+    /// Whether the neighbourhood covers x. It grows to do so if it lacks few vertices.
+    fn covers(&mut self, x: &[Vector3<f64>]) -> bool {
+        let (is_covered, searches) = self.neighbourhood.cover(&mut self.search, &self.mesh, x);
+        self.counts.searches += searches;
+        is_covered
+    }
+
+    /// Judges a move by some pairs, measured at its start.
+    fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
+        let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
+        for (number, (pair, separation)) in pairs.iter().zip(measured.separations()).enumerate() {
+            if step.stays_beyond(self.reach, pair, *separation) {
+                continue;
+            }
+            judgement.tested += 1;
+            let clearance = Clearance { thickness: self.thickness(pair), reach: self.reach };
+            let own = step.safe_part(pair, &measured.closest(number), clearance, judgement.part);
+            if own < 1.0 {
+                judgement.blocking.push(*pair);
+            }
+            judgement.part = own.min(judgement.part);
+        }
+        judgement
+    }
+}
+
+/// What pairs say of a move.
+struct Judgement {
+    /// The part of the move during which all pairs certainly keep their clearance.
+    part: f64,
+    /// Pairs that were too close to be dismissed by a comparison of distances.
+    tested: u64,
+    /// The pairs that shorten the move.
+    blocking: Vec<Pair>,
 }
 
 impl Law {
@@ -199,9 +238,8 @@ impl ContactModel for BarrierContact {
         self.joined.clear();
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
-        self.candidates.clear();
-        self.shortlist.clear();
-        self.searches = 0;
+        self.neighbourhood.clear();
+        self.strides.fill(0.0);
     }
 
     fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
@@ -209,28 +247,23 @@ impl ContactModel for BarrierContact {
         if !to.iter().flatten().all(|coordinate| coordinate.is_finite()) {
             return 0.0;
         }
-        if !(self.candidates.cover(from) && self.candidates.cover(to)) {
-            self.search(from, to);
-        }
         let step = Move::new(from, to);
-        self.shortlist.prepare(&self.candidates, from, to, step.rounding());
-        let measured = self.shortlist.measured();
-        let mut part = 1.0;
-        let mut tested = 0;
-        for (number, (pair, separation)) in self.shortlist.pairs().iter().zip(measured.separations()).enumerate() {
-            if step.stays_beyond(self.reach, pair, *separation) {
-                continue;
-            }
-            tested += 1;
-            let clearance = Clearance { thickness: self.thickness(pair), reach: self.reach };
-            let own = step.safe_part(pair, &measured.closest(number), clearance, part);
-            if own < 1.0 {
-                self.blocking.push(*pair);
-            }
-            part = own.min(part);
-        }
+        let (count, judgement) = if self.covers(from) && self.covers(to) {
+            self.neighbourhood.visit(from);
+            let pairs = self.neighbourhood.pairs();
+            (pairs.len(), self.judge(&step, pairs, self.neighbourhood.measured()))
+        } else {
+            self.strides.copy_from_slice(step.excursions());
+            self.counts.searches += 1;
+            let pairs = self.search.pairs(&self.mesh, swept(from, to), JOINING * self.reach);
+            let mut measured = Measured::default();
+            measured.measure(&pairs, from);
+            (pairs.len(), self.judge(&step, &pairs, &measured))
+        };
+        let Judgement { part, tested, blocking } = judgement;
+        self.blocking.extend(blocking);
         self.counts.moves += 1;
-        self.counts.candidates += self.shortlist.pairs().len() as u64;
+        self.counts.candidates += count as u64;
         self.counts.tested += tested;
         if part < 1.0 {
             self.counts.shortened += 1;
@@ -248,15 +281,12 @@ impl ContactModel for BarrierContact {
     }
 
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
-        if !self.candidates.cover(x) {
-            self.search(x, x);
-        }
-        self.shortlist.visit(&self.candidates, x, Move::new(x, x).rounding());
-        let measured = self.shortlist.measured();
+        self.visit(x);
+        let measured = self.neighbourhood.measured();
         let mut known = self.joined.pairs.iter().peekable();
         let mut meeting = Meeting::new(&self.mesh, x);
         let mut added = Vec::new();
-        for (number, (pair, separation)) in self.shortlist.pairs().iter().zip(measured.separations()).enumerate() {
+        for (number, (pair, separation)) in self.neighbourhood.pairs().iter().zip(measured.separations()).enumerate() {
             if *separation > JOINING * self.reach {
                 continue;
             }

@@ -16,8 +16,8 @@
 
 use energy_dsl::Vector3;
 
-use super::candidates::excursions;
 use super::closest::separation;
+use super::displacement::excursions;
 use super::{Closest, Pair};
 use crate::geometry::{add_scaled, dot, subtract};
 
@@ -56,9 +56,9 @@ impl<'a> Move<'a> {
         Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * largest(from).max(largest(to)) }
     }
 
-    /// Bound of the rounding errors of a distance, in m.
-    pub fn rounding(&self) -> f64 {
-        self.rounding
+    /// The length of the displacement of each vertex relative to the mean, in m.
+    pub fn excursions(&self) -> &[f64] {
+        &self.excursions
     }
 
     /// Whether a pair with this separation at the start certainly stays out of reach.
