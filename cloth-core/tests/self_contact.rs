@@ -54,6 +54,39 @@ fn a_falling_sheet_rests_on_another() {
     assert!(cloth.clone().filter(above).count() == cloth.len(), "the net carries the cloth");
 }
 
+/// A sheet lies on a pinned one, which is tilted by an angle: gravity has the slope tan α. Returns its way in m after
+/// half a second, and that without friction.
+fn slide(friction: f64, slope: f64) -> [f64; 2] {
+    let angle = slope.atan();
+    let gravity = format!("gravity = [{:?}, 0.0, {:?}]\n", 9.81 * angle.sin(), -9.81 * angle.cos());
+    let ground = sheet("ground", 8, 0.8, [0.0; 3], "");
+    // At rest, the barriers carry the sheet at this height.
+    let cloth = sheet("cloth", 5, 0.2, [-0.213, 0.02, 0.0027], "");
+    let head = gravity + &head("on", "tolerances.velocity = 1e-5");
+    let fabric = format!("fabric = {{ friction = {friction:?}, ");
+    let text = (head + &ground + &cloth).replace("fabric = { ", &fabric);
+    let mut simulation = simulation(&format!("{text}[[pins]]\nof = \"ground\"\nall = true\n"));
+    let middle = |simulation: &Simulation| {
+        let cloth = simulation.parts()[1].vertices.clone();
+        simulation.positions()[cloth].iter().map(|x| x[0]).sum::<f64>() / 36.0
+    };
+    let start = middle(&simulation);
+    assert_eq!(crossings(&mut simulation, 50), 0);
+    let free = 0.5 * 9.81 * angle.sin() * 0.5 * 0.5;
+    [middle(&simulation) - start, free]
+}
+
+#[test]
+fn a_sheet_on_an_incline_sticks_or_slides_by_coulombs_law() {
+    let [way, free] = slide(0.5, 0.3);
+    assert!(way < 2e-3 && way < 0.01 * free, "sticks: {way} of {free}");
+    for (friction, slope) in [(0.0, 0.3), (0.15, 0.3), (0.3, 0.5)] {
+        let [way, free] = slide(friction, slope);
+        let expected = free * (1.0 - friction / slope);
+        assert!((way / expected - 1.0).abs() < 0.08, "μ {friction}, tan α {slope}: {way} instead of {expected}");
+    }
+}
+
 /// At 30 m/s a sheet moves by 0.3 m in a step, three hundred times the thickness.
 #[test]
 fn a_fast_sheet_does_not_pass_through_a_thin_one() {

@@ -17,6 +17,7 @@
 //! certified states only.
 
 mod feasible;
+mod friction;
 mod start;
 
 use std::cell::RefCell;
@@ -27,11 +28,10 @@ use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
 pub use start::ContactError;
 
-use crate::collision::{
-    Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept,
-};
+use crate::collision::{Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
 use crate::geometry::{add_scaled, dot};
 use feasible::Meeting;
+use friction::Friction;
 
 /// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
 /// same number of iterations.
@@ -62,6 +62,7 @@ pub struct BarrierContact {
     /// The displacement of each vertex in the last move that left the neighbourhood, in m.
     strides: Vec<f64>,
     joined: Joined,
+    friction: Friction,
     /// Pairs that shortened a move since the last iterate.
     blocking: Vec<Pair>,
     resistance: Resistance,
@@ -157,6 +158,35 @@ impl BarrierContact {
         }
     }
 
+    /// Sets the coefficient of friction μ at each vertex. That of a pair is the mean of its two features.
+    #[must_use]
+    pub fn with_friction(mut self, coefficients: Vec<f64>) -> Self {
+        let is_rough = coefficients.iter().any(|coefficient| *coefficient > 0.0);
+        self.friction.coefficients = if is_rough { coefficients } else { Vec::new() };
+        self
+    }
+
+    /// Finds the pairs in contact at the start of the step, on which friction acts.
+    fn begin_friction(&mut self) {
+        if self.friction.coefficients.is_empty() {
+            return;
+        }
+        let start = std::mem::take(&mut self.friction.start);
+        self.visit(&start);
+        let measured = self.neighbourhood.measured();
+        let mut meeting = Meeting::new(&self.mesh, &start);
+        let mut touching = Vec::new();
+        for (number, pair) in self.neighbourhood.pairs().iter().enumerate() {
+            let closest = measured.closest(number);
+            let apart = closest.distance - self.thickness(pair);
+            if apart < self.gap && meeting.may_join(pair, &closest) {
+                touching.push((*pair, self.law(pair, &closest), closest, apart));
+            }
+        }
+        self.friction.start = start;
+        self.friction.take(touching.into_iter(), self.gap);
+    }
+
     /// The law of a pair that joins with these closest points.
     fn law(&self, pair: &Pair, closest: &Closest) -> Law {
         let stiffness = STIFFNESS_RATIO / CURVATURE_AT_HALF * self.resistance.of(pair, closest);
@@ -216,6 +246,11 @@ impl Law {
         DistanceBarrier::new(self.stiffness, gap)
     }
 
+    /// The normal force at a distance of the surfaces, in N, with this activation gap.
+    fn force(self, apart: f64, gap: f64) -> f64 {
+        if apart < gap { -self.barrier(gap).gradient(&between(apart)).gradient[0][0] } else { 0.0 }
+    }
+
     /// The energy at a distance of the surfaces, in J, with this activation gap.
     fn energy(self, apart: f64, gap: f64) -> f64 {
         if apart >= gap {
@@ -234,7 +269,8 @@ fn between(gap: f64) -> [Vector3<f64>; 2] {
 }
 
 impl ContactModel for BarrierContact {
-    fn begin_step(&mut self) {
+    fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
+        self.friction.begin_step(x, dt);
         self.joined.clear();
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
@@ -278,6 +314,7 @@ impl ContactModel for BarrierContact {
             blocks[vertex] = Some(block);
         }
         self.resistance = Resistance { blocks, inertia };
+        self.begin_friction();
     }
 
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
@@ -301,9 +338,8 @@ impl ContactModel for BarrierContact {
         blocking.retain(|pair| !self.joined.contains(pair) && added.binary_search_by_key(pair, |one| one.0).is_err());
         added.extend(blocking.into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)))));
         let laws: Vec<Law> = added.iter().map(|(pair, closest)| self.law(pair, closest)).collect();
-        let energy = |((_, closest), law): (&(Pair, Closest), &Law)| {
-            law.energy(closest.distance - law.thickness, self.gap)
-        };
+        let energy =
+            |((_, closest), law): (&(Pair, Closest), &Law)| law.energy(closest.distance - law.thickness, self.gap);
         let change = added.iter().zip(&laws).map(energy).sum();
         if !added.is_empty() {
             self.joined.extend(added.into_iter().map(|(pair, _)| pair).zip(laws));
@@ -312,19 +348,20 @@ impl ContactModel for BarrierContact {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-        let mut sum = 0.0;
+        let mut sum = self.friction.energy(x);
         self.for_each_active(x, |_, law, _, apart| sum += law.energy(apart, self.gap));
         sum
     }
 
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
         self.for_each_active(x, |pair, law, closest, apart| {
-            let slope = law.barrier(self.gap).gradient(&between(apart)).gradient[0][0];
+            let push = law.force(apart, self.gap);
             for (&vertex, weight) in pair.vertices.iter().zip(closest.weights) {
                 let pull = &mut force[vertex as usize];
-                *pull = add_scaled(*pull, -slope * weight, closest.normal);
+                *pull = add_scaled(*pull, push * weight, closest.normal);
             }
         });
+        self.friction.add_force(x, force);
     }
 
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
@@ -340,6 +377,7 @@ impl ContactModel for BarrierContact {
             });
         });
         self.counts.active += contacts.len() as u64;
+        self.friction.add_contacts(x, row, &mut contacts);
         self.counts.systems += 1;
         contacts
     }

@@ -2,7 +2,7 @@
 
 use energy_dsl::Vector3;
 
-use super::{BarrierContact, JOINING, Joined, Resistance};
+use super::{BarrierContact, Friction, JOINING, Joined, Resistance};
 use crate::collision::{Closest, CollisionMesh, Crossing, Neighbourhood, PairKind, Search, crossings};
 use energy_solve::ContactCounts;
 
@@ -73,6 +73,7 @@ impl BarrierContact {
             neighbourhood: Neighbourhood::new(JOINING * reach),
             strides: vec![0.0; x.len()],
             joined: Joined::default(),
+            friction: Friction::default(),
             blocking: Vec::new(),
             resistance: Resistance::default(),
             counts: ContactCounts::default(),

@@ -14,7 +14,7 @@ const GAP: f64 = 2e-3;
 fn contact(x: &[Vector3<f64>]) -> BarrierContact {
     let mesh = CollisionMesh::new(6, &[[0, 1, 2], [3, 4, 5]], &[], &[]);
     let mut contact = BarrierContact::new(mesh, x, vec![true; 6], vec![0.5 * THICKNESS; 6], GAP).unwrap();
-    contact.begin_step();
+    contact.begin_step(x, 0.01);
     let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
     contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
     contact
@@ -64,6 +64,55 @@ fn forces_are_minus_the_gradient_and_neither_push_nor_turn_the_whole() {
         let total = force.iter().fold([0.0; 3], |sum, f| add_scaled(sum, 1.0, *f));
         let torque = x.iter().zip(&force).fold([0.0; 3], |sum, (x, f)| add_scaled(sum, 1.0, cross(*x, *f)));
         assert!(norm(total) < 1e-14 * largest && norm(torque) < 1e-14 * largest, "{total:?} {torque:?}");
+    }
+}
+
+/// Friction opposes the sliding since the start of the step, with at most μ times the normal force.
+#[test]
+fn friction_opposes_sliding() {
+    const FRICTION: f64 = 0.4;
+    for x in states() {
+        let force_at = |coefficient: f64, to: &[Vector3<f64>]| {
+            let mut contact = contact(&x).with_friction(vec![coefficient; 6]);
+            contact.begin_step(&x, 0.01);
+            let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+            contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
+            contact.meet(&x);
+            let mut force = vec![[0.0; 3]; 6];
+            contact.add_force(to, &mut force);
+            (force, contact)
+        };
+        let (normal, _) = force_at(0.0, &x);
+        let (still, contact) = force_at(FRICTION, &x);
+        assert_eq!(normal, still, "nothing slides yet");
+        // The upper triangle moves by ten times the sliding of a sticking pair.
+        let mut moved = x.clone();
+        moved[3..].iter_mut().for_each(|corner| *corner = add_scaled(*corner, 1e-4, [0.6, 0.8, 0.0]));
+        let ((without, _), (with, _)) = (force_at(0.0, &moved), force_at(FRICTION, &moved));
+        let friction: Vec<_> = with.iter().zip(&without).map(|(a, b)| subtract(*a, *b)).collect();
+        let sum = |of: &[Vector3<f64>]| of.iter().fold([0.0; 3], |sum, f| add_scaled(sum, 1.0, *f));
+        let (drag, push) = (sum(&friction[3..]), sum(&normal[3..]));
+        assert!(norm(sum(&friction)) < 1e-14 * norm(push));
+        assert!(dot(drag, [0.6, 0.8, 0.0]) < 0.0, "{drag:?}");
+        let largest: f64 =
+            active(&contact, &x).iter().map(|(_, law, _, apart)| FRICTION * law.force(*apart, GAP)).sum();
+        assert!(norm(drag) <= largest && norm(drag) > 0.5 * largest, "{} {largest}", norm(drag));
+        // The force is minus the gradient of the energy, and the stiffness its derivative.
+        let stiffness = {
+            let (_, mut contact) = force_at(FRICTION, &moved);
+            contact.contacts(&DofMap::new(&[false; 6]), &moved)
+        };
+        for (vertex, axis) in (3..6).flat_map(|vertex| (0..3).map(move |axis| (vertex, axis))) {
+            let at = |offset: f64| {
+                let mut moved = moved.clone();
+                moved[vertex][axis] += offset;
+                contact.friction.energy(&moved)
+            };
+            const H: f64 = 1e-7;
+            let slope = (8.0 * (at(H) - at(-H)) - (at(2.0 * H) - at(-2.0 * H))) / (12.0 * H);
+            assert!((slope + friction[vertex][axis]).abs() < 1e-5 * largest, "{slope} {:?}", friction[vertex]);
+        }
+        assert!(stiffness.len() > active(&contact, &moved).len(), "friction has a stiffness");
     }
 }
 
@@ -191,7 +240,7 @@ fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
 fn contact_of_layers() -> BarrierContact {
     let (mesh, x) = layers();
     let mut contact = BarrierContact::new(mesh, &x, vec![true; 50], vec![0.5 * THICKNESS; 50], GAP).unwrap();
-    contact.begin_step();
+    contact.begin_step(&x, 0.01);
     let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
     contact.set_resistance(&DofMap::new(&[false; 50]), vec![block; 50], vec![1.0; 50]);
     contact

@@ -25,9 +25,8 @@ struct Boxes {
 impl Boxes {
     fn new(mesh: &CollisionMesh, mut regions: Vec<Bounds>, reach: f64) -> Self {
         regions.iter_mut().for_each(|region| *region = region.extended(0.5 * reach));
-        let around = |vertices: &[u32]| {
-            vertices.iter().fold(Bounds::EMPTY, |all, &vertex| all.around(regions[vertex as usize]))
-        };
+        let around =
+            |vertices: &[u32]| vertices.iter().fold(Bounds::EMPTY, |all, &vertex| all.around(regions[vertex as usize]));
         Self {
             points: mesh.points().iter().map(|&point| regions[point as usize]).collect(),
             triangles: mesh.triangles().iter().map(|corners| around(corners)).collect(),

@@ -27,9 +27,7 @@ fn at(from: &[Vector3<f64>], to: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>
 /// The part of a move that is safe for all pairs.
 fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 {
     let step = Move::new(from, to);
-    pairs()
-        .iter()
-        .fold(1.0, |part, pair| safe_part_of(&step, pair, &pair.corners(from), thickness, part).min(part))
+    pairs().iter().fold(1.0, |part, pair| safe_part_of(&step, pair, &pair.corners(from), thickness, part).min(part))
 }
 
 /// The part of a move that is safe for a pair; `from` holds its corners at the start.

@@ -16,6 +16,9 @@ pub struct Fabric {
     #[serde(default, deserialize_with = "some_positive")]
     #[schemars(with = "Option<f64>")]
     pub thickness: Option<f64>,
+    /// Coefficient of friction with cloth; between two fabrics, the mean of theirs. Default 0.
+    #[serde(default, deserialize_with = "non_negative")]
+    pub friction: f64,
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
     /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of your own.
     pub material: Material,
@@ -34,7 +37,15 @@ impl Fabric {
     /// Creates a fabric with its warp along the first axis, no strain limit and no damping.
     #[must_use]
     pub fn new(density: f64, material: Material) -> Self {
-        Self { density, thickness: None, material, warp: first_axis(), strain_limit: None, rayleigh: None }
+        Self {
+            density,
+            thickness: None,
+            friction: 0.0,
+            material,
+            warp: first_axis(),
+            strain_limit: None,
+            rayleigh: None,
+        }
     }
 
     /// Returns the thickness in contact, in m.

@@ -113,7 +113,7 @@ impl Ledger {
         let in_contact = [potentials.len(), works.len()];
         if bodies.iter().any(|(body, _)| body.system.has_contact()) {
             potentials.push("contact".to_owned());
-            works.push("new barriers of contact".to_owned());
+            works.push("friction and new barriers of contact".to_owned());
         }
         let account = |(body, labels): &(&Body, &[usize])| {
             let [mut potentials, mut works] = columns

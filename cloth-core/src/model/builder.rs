@@ -96,6 +96,7 @@ impl<'a> Builder<'a> {
         model.x.extend(start);
         model.v.extend(velocities);
         model.thickness.resize(model.x.len(), garment.fabric.thickness());
+        model.friction.resize(model.x.len(), garment.fabric.friction);
         self.edge.extend(Topology::boundary(&mesh).iter().map(|vertex| first + vertex));
         self.springs.push(springs);
         self.add_part(part, mesh.vertices().len(), PartKind::Cloth(mesh));
@@ -108,6 +109,7 @@ impl<'a> Builder<'a> {
         let count = vertices.len();
         self.model.v.extend(vec![[0.0; 3]; count]);
         self.model.thickness.extend(vec![hair.thickness(); count]);
+        self.model.friction.extend(vec![0.0; count]);
         self.model.x.extend(vertices);
         self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
     }

@@ -96,6 +96,8 @@ pub struct Model {
     pub sewn: Vec<[usize; 2]>,
     /// Thickness in contact at each vertex, in m.
     pub thickness: Vec<f64>,
+    /// Coefficient of friction with cloth at each vertex.
+    pub friction: Vec<f64>,
     /// Warnings about the scene.
     pub warnings: Vec<String>,
     /// Obstacles, with their motions.

@@ -56,8 +56,8 @@ pub(super) struct File {
     #[serde(default)]
     tolerances: Tolerances,
     /// What collides: `on`, `obstacles` or `off`. `on` includes contact of cloth and hair with themselves and with each
-    /// other, without friction, and needs the integrator `newton`. Default: `on` for cloth with `newton` and without
-    /// `sleep`, otherwise `obstacles`.
+    /// other, and needs the integrator `newton`. Default: `on` for cloth with `newton` and without `sleep`, otherwise
+    /// `obstacles`.
     contact: Option<ContactChoice>,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
     /// `multigrid`, `cholesky` or `incomplete-cholesky`.

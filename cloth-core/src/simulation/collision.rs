@@ -33,6 +33,7 @@ pub(super) fn add_contact(island: &mut Island, model: &Model) -> Result<(), Cont
     let is_free = island.vertices().iter().map(|&vertex| !model.pinned[vertex]).collect();
     let contact = BarrierContact::new(renumbered, x, is_free, radii, GAP * scale * thickest);
     let contact = contact.map_err(|error| error.on_vertices(island.vertices()))?;
+    let contact = contact.with_friction(island.vertices().iter().map(|&vertex| model.friction[vertex]).collect());
     island.body_mut().system.set_contact(Box::new(contact));
     Ok(())
 }
@@ -67,8 +68,8 @@ mod tests {
     }
 
     impl ContactModel for Watched {
-        fn begin_step(&mut self) {
-            self.inner.begin_step();
+        fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
+            self.inner.begin_step(x, dt);
         }
 
         fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {

@@ -16,8 +16,8 @@ use crate::matrix::dof_map::DofMap;
 ///    a line search sees a single function.
 /// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
 pub trait ContactModel: std::fmt::Debug {
-    /// Begins a step: forgets all pairs.
-    fn begin_step(&mut self);
+    /// Begins a step of size `dt`, in s, at x: forgets all pairs.
+    fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64);
 
     /// Returns the part of the straight move between two states that certainly has no crossing: 1 for the whole move.
     /// Pairs that shorten the move join at the next [`ContactModel::meet`].
@@ -30,13 +30,14 @@ pub trait ContactModel: std::fmt::Debug {
     /// Adds the pairs that meet at an iterate. Returns the change of the energy there, in J.
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64;
 
-    /// Returns Σ U, in J; infinite if a pair is within its thickness.
+    /// Returns Σ U, in J; infinite if a pair is within its thickness. With friction, U includes its potential since the
+    /// start of the step.
     fn energy(&self, x: &[Vector3<f64>]) -> f64;
 
     /// Adds −∇U to the forces on all vertices, in N.
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]);
 
-    /// Returns the stiffness of each pair in contact, in N/m, in an order that does not depend on threads.
+    /// Returns the stiffness of each pair in contact, and of friction, in N/m, in an order that does not depend on threads.
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact>;
 
     /// Returns what was counted so far.

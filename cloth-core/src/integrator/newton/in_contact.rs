@@ -7,6 +7,7 @@ use energy_solve::{BlockMatrix, Contact};
 
 use super::super::ContactWork;
 use super::incremental_potential::IncrementalPotential;
+use crate::body::Body;
 
 /// Moves of the pins within a step, after which they count as blocked.
 pub(super) const PIN_MOVES: usize = 40;
@@ -15,8 +16,9 @@ impl IncrementalPotential<'_> {
     /// Forgets the pairs of the last step, and shortens the move to the first iterate x until it is certain to have no
     /// crossing. Returns the part that is left.
     pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
-        if let Some((contact, _)) = self.body.system.contact() {
-            contact.begin_step();
+        let Body { system, x: start, .. } = &mut *self.body;
+        if let Some((contact, _)) = system.contact() {
+            contact.begin_step(start, self.dt);
         }
         let to = std::mem::replace(x, self.body.x.clone());
         let part = self.certified(x, &to);

@@ -83,7 +83,8 @@ pub(crate) fn distribute<T: Precision>(
             for (number, Vertex { home: Home { domain, .. }, .. }) in vertices.iter().enumerate() {
                 let is_first = vertices[..number].iter().all(|before| before.home.domain != *domain);
                 if is_first {
-                    let target = |vertex: &Vertex| if vertex.home.domain == *domain { vertex.home.row } else { ELSEWHERE };
+                    let target =
+                        |vertex: &Vertex| if vertex.home.domain == *domain { vertex.home.row } else { ELSEWHERE };
                     vertices.iter().zip(&mut scaled_factor.targets).for_each(|(vertex, t)| *t = target(vertex));
                     all[*domain as usize].factors.push(scaled_factor.clone());
                 }
