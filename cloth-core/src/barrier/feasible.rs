@@ -16,30 +16,65 @@ const RIDGE: f64 = 0.1;
 /// ends and the triangles suffice.
 const PARALLEL: f64 = 0.01;
 
-/// Whether a pair with these closest points becomes a contact at x.
-pub(super) fn may_join(mesh: &CollisionMesh, pair: &Pair, closest: &Closest, x: &[Vector3<f64>]) -> bool {
-    match pair.kind {
-        PairKind::PointTriangle => {
-            let [point, corners @ ..] = pair.vertices;
-            let touched: Vec<u32> =
-                corners.into_iter().zip(&closest.weights[1..]).filter(|(_, c)| **c != 0.0).map(|(v, _)| v).collect();
-            match touched[..] {
-                [_, _, _] => true,
-                [a, b] => on_edge(mesh, x, [a, b], corners, closest.normal),
-                [a] => on_vertex(mesh, x, point, a, corners),
-                _ => false,
-            }
+/// Decides which pairs become contacts at x.
+pub(super) struct Meeting<'a> {
+    mesh: &'a CollisionMesh,
+    x: &'a [Vector3<f64>],
+    /// The edge that was last looked at, and whether it is a ridge in some direction.
+    last: Option<(u32, bool)>,
+}
+
+impl<'a> Meeting<'a> {
+    pub fn new(mesh: &'a CollisionMesh, x: &'a [Vector3<f64>]) -> Self {
+        Self { mesh, x, last: None }
+    }
+
+    /// Whether a pair with these closest points becomes a contact. Fastest if pairs come in order.
+    pub fn may_join(&mut self, pair: &Pair, closest: &Closest) -> bool {
+        match pair.kind {
+            PairKind::PointTriangle => self.is_feasible_on_triangle(pair, closest),
+            PairKind::EdgeEdge => self.may_be_ridge(pair.features[0]) && self.are_ridges(pair, closest),
         }
-        PairKind::EdgeEdge => {
-            let [a, b, c, d] = pair.vertices;
-            let inside = closest.weights.iter().all(|weight| *weight != 0.0);
-            let towards = closest.normal;
-            let away = towards.map(|component| -component);
-            inside
-                && !are_parallel(x, [a, b], [c, d])
-                && is_ridge(mesh, x, [a, b], away)
-                && is_ridge(mesh, x, [c, d], towards)
+    }
+
+    fn is_feasible_on_triangle(&self, pair: &Pair, closest: &Closest) -> bool {
+        let [point, corners @ ..] = pair.vertices;
+        let is_touched = |corner: &usize| closest.weights[1 + corner] != 0.0;
+        let mut touched = (0..3).filter(is_touched).map(|corner| corners[corner]);
+        match (touched.next(), touched.next(), touched.next()) {
+            (Some(_), Some(_), Some(_)) => true,
+            (Some(a), Some(b), None) => on_edge(self.mesh, self.x, [a, b], corners, closest.normal),
+            (Some(a), None, None) => on_vertex(self.mesh, self.x, point, a, corners),
+            _ => false,
         }
+    }
+
+    fn are_ridges(&self, pair: &Pair, closest: &Closest) -> bool {
+        let Self { mesh, x, .. } = *self;
+        let [a, b, c, d] = pair.vertices;
+        let [first, second] = pair.features;
+        let towards = closest.normal;
+        let away = towards.map(|component| -component);
+        closest.weights.iter().all(|weight| *weight != 0.0)
+            && is_ridge(mesh, x, first, away)
+            && is_ridge(mesh, x, second, towards)
+            && !are_parallel(x, [a, b], [c, d])
+    }
+
+    /// Whether an edge is a ridge in some direction. Most edges of smooth cloth are not.
+    fn may_be_ridge(&mut self, edge: u32) -> bool {
+        if let Some((last, may_be)) = self.last
+            && last == edge
+        {
+            return may_be;
+        }
+        let ends = self.mesh.edges()[edge as usize];
+        let heights = self.mesh.apexes(edge as usize).iter().map(|&apex| across(self.x, ends, apex));
+        // In the direction −s/‖s‖ of the sum s of n unit vectors, some vector has a component of at least −‖s‖/n.
+        let (sum, count) = heights.fold(([0.0; 3], 0.0), |(sum, n), height| (add_scaled(sum, 1.0, height), n + 1.0));
+        let may_be = norm(sum) >= RIDGE * count;
+        self.last = Some((edge, may_be));
+        may_be
     }
 }
 
@@ -50,8 +85,9 @@ fn are_parallel(x: &[Vector3<f64>], first: [u32; 2], second: [u32; 2]) -> bool {
 }
 
 /// Whether the triangles of an edge all fall away from a direction.
-fn is_ridge(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: [u32; 2], direction: Vector3<f64>) -> bool {
-    apexes(mesh, edge).iter().all(|&apex| dot(across(x, edge, apex), direction) <= -RIDGE)
+fn is_ridge(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: u32, direction: Vector3<f64>) -> bool {
+    let ends = mesh.edges()[edge as usize];
+    mesh.apexes(edge as usize).iter().all(|&apex| dot(across(x, ends, apex), direction) <= -RIDGE)
 }
 
 /// Whether a point nearest to the inside of an edge, in this direction, is nearest to it among the edge's triangles.

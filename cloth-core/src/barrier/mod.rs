@@ -19,7 +19,7 @@
 mod feasible;
 mod start;
 
-use std::collections::BTreeSet;
+use std::cell::RefCell;
 
 use energy_dsl::{Block, Potential, Vector3};
 use energy_elements::DistanceBarrier;
@@ -27,9 +27,11 @@ use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
 pub use start::ContactError;
 
-use crate::collision::{Candidate, Candidates, Clearance, Closest, CollisionMesh, Move, Pair, Slack};
+use crate::collision::{
+    Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept,
+};
 use crate::geometry::{add_scaled, dot};
-use feasible::may_join;
+use feasible::Meeting;
 
 /// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
 /// same number of iterations.
@@ -38,7 +40,9 @@ const STIFFNESS_RATIO: f64 = 10.0;
 const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
-const JOINING: f64 = 2.0;
+const JOINING: f64 = 1.25;
+/// Part of the displacement of the last long move that an iterate may stray before the next search.
+const STRAYING: f64 = 0.5;
 
 /// Contact of a body with itself.
 #[derive(Debug)]
@@ -50,28 +54,58 @@ pub struct BarrierContact {
     gap: f64,
     /// Largest distance at which a pair has an energy, in m.
     reach: f64,
-    /// The slack of the first search of a step. The least slack doubles with further searches, because the iterates
-    /// stray.
-    slack: Slack,
-    /// Searches in this step.
-    searches: u32,
-    candidates: Candidates,
-    joined: Vec<Joined>,
-    /// The pairs of `joined`.
-    known: BTreeSet<Pair>,
+    /// The least and the largest distance that vertices may move before the next search, in m.
+    slack: [f64; 2],
+    search: Search,
+    /// The pairs near the current iterate.
+    neighbourhood: Neighbourhood,
+    /// The displacement of each vertex in the last move that left the neighbourhood, in m.
+    strides: Vec<f64>,
+    joined: Joined,
     /// Pairs that shortened a move since the last iterate.
-    blocking: Vec<Candidate>,
+    blocking: Vec<Pair>,
     resistance: Resistance,
     counts: ContactCounts,
 }
 
-/// A pair in contact, or close to it.
-#[derive(Clone, Copy, Debug)]
+/// The pairs in contact, or close to it, in order.
+#[derive(Debug, Default)]
 struct Joined {
-    candidate: Candidate,
+    pairs: Vec<Pair>,
+    laws: Vec<Law>,
+    /// The pairs where they were last evaluated.
+    measured: RefCell<Measured>,
+}
+
+/// The barrier of a pair.
+#[derive(Clone, Copy, Debug)]
+struct Law {
+    /// ξ, in m.
     thickness: f64,
     /// K/g², in N/m.
     stiffness: f64,
+}
+
+impl Joined {
+    fn clear(&mut self) {
+        self.pairs.clear();
+        self.laws.clear();
+        self.measured.get_mut().clear();
+    }
+
+    /// Adds pairs that are not yet here.
+    fn extend(&mut self, added: impl Iterator<Item = (Pair, Law)>) {
+        let known = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.laws));
+        let mut all: Vec<(Pair, Law)> = known.chain(added).collect();
+        // Two runs in order are merged in linear time.
+        all.sort_by_key(|(pair, _)| *pair);
+        (self.pairs, self.laws) = all.into_iter().unzip();
+        self.measured.get_mut().clear();
+    }
+
+    fn contains(&self, pair: &Pair) -> bool {
+        self.pairs.binary_search(pair).is_ok()
+    }
 }
 
 /// The resistance of vertices to displacement, in N/m.
@@ -108,54 +142,88 @@ impl BarrierContact {
         self.radii[pair.vertices[0] as usize] + self.radii[pair.vertices[pair.first()] as usize]
     }
 
-    /// Iterates over the joined pairs with an energy at x. `excursions` are those of the candidates.
-    fn active<'a>(&'a self, x: &'a [Vector3<f64>]) -> impl Iterator<Item = (&'a Joined, Closest, f64)> + 'a {
-        let excursions = self.candidates.excursions(x);
-        self.joined.iter().filter_map(move |joined| {
-            let within = joined.thickness + self.gap;
-            if joined.candidate.is_beyond(within, x, &excursions) {
-                return None;
+    /// Calls `evaluate` with each joined pair that has an energy at x, its closest points and the distance of its
+    /// surfaces.
+    fn for_each_active(&self, x: &[Vector3<f64>], mut evaluate: impl FnMut(&Pair, Law, Closest, f64)) {
+        let Joined { pairs, laws, measured } = &self.joined;
+        let mut measured = measured.borrow_mut();
+        measured.measure(pairs, x);
+        for (number, (pair, law)) in pairs.iter().zip(laws).enumerate() {
+            let closest = measured.closest(number);
+            let apart = closest.distance - law.thickness;
+            if apart < self.gap {
+                evaluate(pair, *law, closest, apart);
             }
-            let pair = &joined.candidate.pair;
-            let closest = Closest::of(pair, &pair.corners(x));
-            (closest.distance < within).then_some((joined, closest, closest.distance - joined.thickness))
-        })
-    }
-
-    /// The barrier of a pair as a function of the vector between the surfaces of its features.
-    fn barrier(&self, joined: &Joined) -> DistanceBarrier {
-        DistanceBarrier::new(joined.stiffness, self.gap)
-    }
-
-    /// The energy of a pair at a gap, in J.
-    fn energy_of(&self, joined: &Joined, gap: f64) -> f64 {
-        if gap > 0.0 { self.barrier(joined).value(&between(gap)).value } else { f64::INFINITY }
-    }
-
-    /// Adds a pair, unless it is known. Returns its energy.
-    fn join(&mut self, candidate: Candidate, closest: &Closest) -> f64 {
-        if !self.known.insert(candidate.pair) {
-            return 0.0;
         }
-        let stiffness = STIFFNESS_RATIO / CURVATURE_AT_HALF * self.resistance.of(&candidate.pair, closest);
-        let joined = Joined { candidate, thickness: self.thickness(&candidate.pair), stiffness };
-        self.joined.push(joined);
-        if closest.distance < joined.thickness + self.gap {
-            self.energy_of(&joined, closest.distance - joined.thickness)
-        } else {
+    }
+
+    /// The law of a pair that joins with these closest points.
+    fn law(&self, pair: &Pair, closest: &Closest) -> Law {
+        let stiffness = STIFFNESS_RATIO / CURVATURE_AT_HALF * self.resistance.of(pair, closest);
+        Law { thickness: self.thickness(pair), stiffness }
+    }
+
+    /// Makes all pairs near an iterate known, and measures them there.
+    fn visit(&mut self, x: &[Vector3<f64>]) {
+        if !self.covers(x) {
+            let [least, most] = self.slack;
+            let radii = self.strides.iter().map(|stride| (least + STRAYING * stride).min(most)).collect();
+            self.neighbourhood.renew(&mut self.search, &self.mesh, x, radii);
+            self.counts.searches += 1;
+        }
+        self.neighbourhood.visit(x);
+    }
+
+    /// Whether the neighbourhood covers x. It grows to do so if it lacks few vertices.
+    fn covers(&mut self, x: &[Vector3<f64>]) -> bool {
+        let (is_covered, searches) = self.neighbourhood.cover(&mut self.search, &self.mesh, x);
+        self.counts.searches += searches;
+        is_covered
+    }
+
+    /// Judges a move by some pairs, measured at its start.
+    fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
+        let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
+        for (number, (pair, separation)) in pairs.iter().zip(measured.separations()).enumerate() {
+            if step.stays_beyond(self.reach, pair, *separation) {
+                continue;
+            }
+            judgement.tested += 1;
+            let clearance = Clearance { thickness: self.thickness(pair), reach: self.reach };
+            let own = step.safe_part(pair, &measured.closest(number), clearance, judgement.part);
+            if own < 1.0 {
+                judgement.blocking.push(*pair);
+            }
+            judgement.part = own.min(judgement.part);
+        }
+        judgement
+    }
+}
+
+/// What pairs say of a move.
+struct Judgement {
+    /// The part of the move during which all pairs certainly keep their clearance.
+    part: f64,
+    /// Pairs that were too close to be dismissed by a comparison of distances.
+    tested: u64,
+    /// The pairs that shorten the move.
+    blocking: Vec<Pair>,
+}
+
+impl Law {
+    /// The barrier as a function of the vector between the surfaces of the features.
+    fn barrier(self, gap: f64) -> DistanceBarrier {
+        DistanceBarrier::new(self.stiffness, gap)
+    }
+
+    /// The energy at a distance of the surfaces, in J, with this activation gap.
+    fn energy(self, apart: f64, gap: f64) -> f64 {
+        if apart >= gap {
             0.0
-        }
-    }
-
-    /// Renews the candidates for a move.
-    fn search(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) {
-        let Slack { least, part, most } = self.slack;
-        let least = least * f64::from(1_u32 << self.searches.min(3));
-        self.candidates.search(&self.mesh, from, to, Slack { least, part, most });
-        self.searches += 1;
-        self.counts.searches += 1;
-        for joined in &mut self.joined {
-            joined.candidate = Candidate::new(joined.candidate.pair, from);
+        } else if apart > 0.0 {
+            self.barrier(gap).value(&between(apart)).value
+        } else {
+            f64::INFINITY
         }
     }
 }
@@ -168,11 +236,10 @@ fn between(gap: f64) -> [Vector3<f64>; 2] {
 impl ContactModel for BarrierContact {
     fn begin_step(&mut self) {
         self.joined.clear();
-        self.known.clear();
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
-        self.candidates.clear();
-        self.searches = 0;
+        self.neighbourhood.clear();
+        self.strides.fill(0.0);
     }
 
     fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
@@ -180,27 +247,23 @@ impl ContactModel for BarrierContact {
         if !to.iter().flatten().all(|coordinate| coordinate.is_finite()) {
             return 0.0;
         }
-        if !(self.candidates.cover(from) && self.candidates.cover(to)) {
-            self.search(from, to);
-        }
-        let excursions = [from, to].map(|x| self.candidates.excursions(x));
         let step = Move::new(from, to);
-        let mut part = 1.0;
-        let mut tested = 0;
-        for candidate in self.candidates.pairs() {
-            let clearance = Clearance { thickness: self.thickness(&candidate.pair), reach: self.reach };
-            if step.is_plainly_safe(candidate, clearance, &excursions) {
-                continue;
-            }
-            tested += 1;
-            let own = step.safe_part(&candidate.pair, clearance, part);
-            if own < 1.0 {
-                self.blocking.push(*candidate);
-            }
-            part = own.min(part);
-        }
+        let (count, judgement) = if self.covers(from) && self.covers(to) {
+            self.neighbourhood.visit(from);
+            let pairs = self.neighbourhood.pairs();
+            (pairs.len(), self.judge(&step, pairs, self.neighbourhood.measured()))
+        } else {
+            self.strides.copy_from_slice(step.excursions());
+            self.counts.searches += 1;
+            let pairs = self.search.pairs(&self.mesh, swept(from, to), JOINING * self.reach);
+            let mut measured = Measured::default();
+            measured.measure(&pairs, from);
+            (pairs.len(), self.judge(&step, &pairs, &measured))
+        };
+        let Judgement { part, tested, blocking } = judgement;
+        self.blocking.extend(blocking);
         self.counts.moves += 1;
-        self.counts.candidates += self.candidates.pairs().len() as u64;
+        self.counts.candidates += count as u64;
         self.counts.tested += tested;
         if part < 1.0 {
             self.counts.shortened += 1;
@@ -218,56 +281,64 @@ impl ContactModel for BarrierContact {
     }
 
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
-        if !self.candidates.cover(x) {
-            self.search(x, x);
-        }
-        let excursions = self.candidates.excursions(x);
+        self.visit(x);
+        let measured = self.neighbourhood.measured();
+        let mut known = self.joined.pairs.iter().peekable();
+        let mut meeting = Meeting::new(&self.mesh, x);
         let mut added = Vec::new();
-        for candidate in self.candidates.pairs() {
-            let near = JOINING * self.reach;
-            if candidate.is_beyond(near, x, &excursions) || self.known.contains(&candidate.pair) {
+        for (number, (pair, separation)) in self.neighbourhood.pairs().iter().zip(measured.separations()).enumerate() {
+            if *separation > JOINING * self.reach {
                 continue;
             }
-            let closest = Closest::of(&candidate.pair, &candidate.pair.corners(x));
-            if closest.distance <= near && may_join(&self.mesh, &candidate.pair, &closest, x) {
-                added.push((*candidate, closest));
+            while known.next_if(|other| *other < pair).is_some() {}
+            if known.peek() != Some(&pair) && meeting.may_join(pair, &measured.closest(number)) {
+                added.push((*pair, measured.closest(number)));
             }
         }
-        for candidate in std::mem::take(&mut self.blocking) {
-            // A search since then has forgotten the place that its distance refers to.
-            let found = self.candidates.find(&candidate.pair);
-            let candidate = found.unwrap_or(Candidate { distance: 0.0, normal: [0.0; 3], ..candidate });
-            added.push((candidate, Closest::of(&candidate.pair, &candidate.pair.corners(x))));
+        let mut blocking = std::mem::take(&mut self.blocking);
+        blocking.sort_unstable();
+        blocking.dedup();
+        blocking.retain(|pair| !self.joined.contains(pair) && added.binary_search_by_key(pair, |one| one.0).is_err());
+        added.extend(blocking.into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)))));
+        let laws: Vec<Law> = added.iter().map(|(pair, closest)| self.law(pair, closest)).collect();
+        let energy = |((_, closest), law): (&(Pair, Closest), &Law)| {
+            law.energy(closest.distance - law.thickness, self.gap)
+        };
+        let change = added.iter().zip(&laws).map(energy).sum();
+        if !added.is_empty() {
+            self.joined.extend(added.into_iter().map(|(pair, _)| pair).zip(laws));
         }
-        added.iter().map(|(candidate, closest)| self.join(*candidate, closest)).sum()
+        change
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-        self.active(x).map(|(joined, _, gap)| self.energy_of(joined, gap)).sum()
+        let mut sum = 0.0;
+        self.for_each_active(x, |_, law, _, apart| sum += law.energy(apart, self.gap));
+        sum
     }
 
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        for (joined, closest, gap) in self.active(x) {
-            let slope = self.barrier(joined).gradient(&between(gap)).gradient[0][0];
-            for (&vertex, weight) in joined.candidate.pair.vertices.iter().zip(closest.weights) {
+        self.for_each_active(x, |pair, law, closest, apart| {
+            let slope = law.barrier(self.gap).gradient(&between(apart)).gradient[0][0];
+            for (&vertex, weight) in pair.vertices.iter().zip(closest.weights) {
                 let pull = &mut force[vertex as usize];
                 *pull = add_scaled(*pull, -slope * weight, closest.normal);
             }
-        }
+        });
     }
 
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
         let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
-        let contact = |(joined, closest, gap): (&Joined, Closest, f64)| {
-            let curvature = self.barrier(joined).hessian(&between(gap)).hessian.as_ref()[0][0][0];
+        let mut contacts = Vec::new();
+        self.for_each_active(x, |pair, law, closest, apart| {
+            let curvature = law.barrier(self.gap).hessian(&between(apart)).hessian.as_ref()[0][0][0];
             let n = closest.normal;
-            Contact {
-                rows: joined.candidate.pair.vertices.each_ref().map(row),
+            contacts.push(Contact {
+                rows: pair.vertices.each_ref().map(row),
                 weights: closest.weights,
                 block: std::array::from_fn(|i| std::array::from_fn(|j| curvature * n[i] * n[j])),
-            }
-        };
-        let contacts: Vec<Contact> = self.active(x).map(contact).collect();
+            });
+        });
         self.counts.active += contacts.len() as u64;
         self.counts.systems += 1;
         contacts

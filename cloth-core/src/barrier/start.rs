@@ -2,8 +2,8 @@
 
 use energy_dsl::Vector3;
 
-use super::{BarrierContact, Resistance};
-use crate::collision::{Candidates, Closest, CollisionMesh, Crossing, Pair, PairKind, Slack, crossings};
+use super::{BarrierContact, JOINING, Joined, Resistance};
+use crate::collision::{Closest, CollisionMesh, Crossing, Neighbourhood, PairKind, Search, crossings};
 use energy_solve::ContactCounts;
 
 /// A start that contact cannot keep free of crossings, because it is not.
@@ -64,17 +64,15 @@ impl BarrierContact {
             return Err(ContactError::Crosses { count: crossings.len(), first, at });
         }
         let reach = gap + 2.0 * radii.iter().copied().fold(0.0, f64::max);
-        let mut candidates = Candidates::new(&mesh, x, is_free, reach);
-        candidates.search(&mesh, x, x, Slack::NONE);
-        let contact = Self {
+        let mut contact = Self {
             radii,
             gap,
             reach,
-            slack: Slack { least: gap, part: 0.5, most: gap.max(0.15 * mesh.mean_edge(x)) },
-            searches: 0,
-            candidates,
-            joined: Vec::new(),
-            known: Default::default(),
+            slack: [0.5 * gap, gap.max(0.15 * mesh.mean_edge(x))],
+            search: Search::new(&mesh, x, is_free),
+            neighbourhood: Neighbourhood::new(JOINING * reach),
+            strides: vec![0.0; x.len()],
+            joined: Joined::default(),
             blocking: Vec::new(),
             resistance: Resistance::default(),
             counts: ContactCounts::default(),
@@ -84,9 +82,10 @@ impl BarrierContact {
         Ok(contact)
     }
 
-    fn check_distances(&self, x: &[Vector3<f64>]) -> Result<(), ContactError> {
-        let measured = |pair: Pair| (Closest::of(&pair, &pair.corners(x)).distance, self.thickness(&pair), pair);
-        let all = self.candidates.pairs().iter().map(|candidate| measured(candidate.pair));
+    fn check_distances(&mut self, x: &[Vector3<f64>]) -> Result<(), ContactError> {
+        self.visit(x);
+        let all = self.neighbourhood.pairs().iter();
+        let all = all.map(|pair| (Closest::of(pair, &pair.corners(x)).distance, self.thickness(pair), pair));
         let close: Vec<_> = all.filter(|(distance, thickness, _)| distance <= thickness).collect();
         let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         closest.map_or(Ok(()), |&(distance, thickness, pair)| {

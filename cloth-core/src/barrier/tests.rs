@@ -1,6 +1,7 @@
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{Distance, EdgeEdgeDistance, PointEdgeDistance, PointTriangleDistance};
 use energy_solve::{ContactModel, DofMap};
+use proptest::prelude::*;
 
 use super::*;
 use crate::collision::PairKind;
@@ -17,6 +18,13 @@ fn contact(x: &[Vector3<f64>]) -> BarrierContact {
     let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
     contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
     contact
+}
+
+/// The pairs with an energy at x.
+fn active(contact: &BarrierContact, x: &[Vector3<f64>]) -> Vec<(Pair, Law, Closest, f64)> {
+    let mut all = Vec::new();
+    contact.for_each_active(x, |pair, law, closest, apart| all.push((*pair, law, closest, apart)));
+    all
 }
 
 /// The second triangle touches the first with a vertex, with an edge across an edge, or beyond a corner.
@@ -65,11 +73,10 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
     for x in states() {
         let mut contact = contact(&x);
         contact.meet(&x);
-        for (joined, closest, _) in contact.active(&x) {
+        for (pair, _, closest, _) in active(&contact, &x) {
             let touched: Vec<usize> = (0..4).filter(|&place| closest.weights[place] != 0.0).collect();
-            let points: Vec<Vector3<f64>> =
-                touched.iter().map(|&place| joined.candidate.pair.corners(&x)[place]).collect();
-            let (kind, distance, gradient) = match (joined.candidate.pair.kind, &points[..]) {
+            let points: Vec<Vector3<f64>> = touched.iter().map(|&place| pair.corners(&x)[place]).collect();
+            let (kind, distance, gradient) = match (pair.kind, &points[..]) {
                 (PairKind::PointTriangle, &[p, a]) => {
                     let found = Distance::<f64>::new().gradient(&[p, a]);
                     (0, found.value, found.gradient.to_vec())
@@ -106,9 +113,9 @@ fn the_stiffness_is_the_curvature_along_the_normal() {
         contact.meet(&x);
         let found = contact.contacts(&DofMap::new(&[false; 6]), &x);
         assert!(!found.is_empty());
-        for ((joined, closest, gap), one) in contact.active(&x).zip(&found) {
-            assert_eq!((one.weights, one.rows), (closest.weights, joined.candidate.pair.vertices));
-            let energy = |gap: f64| contact.energy_of(joined, gap);
+        for ((pair, law, closest, gap), one) in active(&contact, &x).into_iter().zip(&found) {
+            assert_eq!((one.weights, one.rows), (closest.weights, pair.vertices));
+            let energy = |gap: f64| law.energy(gap, GAP);
             let h = 1e-3 * gap;
             let curvature = (energy(gap + h) - 2.0 * energy(gap) + energy(gap - h)) / (h * h);
             let along = dot(closest.normal, one.block.map(|row| dot(row, closest.normal)));
@@ -123,9 +130,9 @@ fn stiffness_follows_the_resistance() {
     let x = states()[0].clone();
     let mut contact = contact(&x);
     contact.meet(&x);
-    let (joined, _, _) = contact.active(&x).next().unwrap();
+    let (_, law, _, _) = active(&contact, &x)[0];
     let half = 0.5 * GAP;
-    let curvature = contact.barrier(joined).hessian(&between(half)).hessian.as_ref()[0][0][0];
+    let curvature = law.barrier(GAP).hessian(&between(half)).hessian.as_ref()[0][0][0];
     assert!((curvature / 500.0 - 1.0).abs() < 1e-12, "{curvature}");
 }
 
@@ -157,8 +164,69 @@ fn moves_are_certified_and_pairs_that_block_join() {
     assert_eq!(contact.certify(&x, &away), 1.0);
     assert_eq!(contact.certify(&x, &[[f64::NAN; 3]; 6]), 0.0);
     contact.meet(&x);
-    assert!(contact.known.contains(&Pair { kind: PairKind::PointTriangle, vertices: [3, 0, 1, 2] }));
+    let blocked = Pair { kind: PairKind::PointTriangle, features: [3, 0], vertices: [3, 0, 1, 2] };
+    assert!(contact.joined.contains(&blocked));
     let counts = contact.counts();
     assert_eq!((counts.moves, counts.shortened), (2, 1));
     assert!((counts.left - part).abs() < 1e-15);
+}
+
+/// Two layers of 4 × 4 squares of 1 cm, above each other.
+fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
+    let corner = |layer: usize, i: usize, j: usize| 25 * layer + 5 * i + j;
+    let squares = (0..32).map(|number| (number / 16, number / 4 % 4, number % 4));
+    let halves = |(layer, i, j)| {
+        let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(di, dj)| corner(layer, i + di, j + dj));
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles: Vec<_> = squares.flat_map(halves).collect();
+    let place = |number: usize| {
+        let (layer, i, j) = (number / 25, number % 25 / 5, number % 5);
+        [0.01 * i as f64 + 0.002 * layer as f64, 0.01 * j as f64, 0.002 * layer as f64]
+    };
+    (CollisionMesh::new(50, &triangles, &[], &[]), (0..50).map(place).collect())
+}
+
+/// The contact of the layers.
+fn contact_of_layers() -> BarrierContact {
+    let (mesh, x) = layers();
+    let mut contact = BarrierContact::new(mesh, &x, vec![true; 50], vec![0.5 * THICKNESS; 50], GAP).unwrap();
+    contact.begin_step();
+    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+    contact.set_resistance(&DofMap::new(&[false; 50]), vec![block; 50], vec![1.0; 50]);
+    contact
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Moves, pairs and stiffnesses do not depend on the neighbourhood: they are bit-identical if it is forgotten before
+    /// each of them.
+    #[test]
+    fn the_neighbourhood_changes_no_result(
+        moves in prop::collection::vec((prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 50), 0..4_i32), 8),
+    ) {
+        let [mut known, mut forgetful] = [contact_of_layers(), contact_of_layers()];
+        let mut x = layers().1;
+        for (directions, decade) in moves {
+            let size = 0.005 * 10.0_f64.powi(-decade);
+            let moved = |part: f64| -> Vec<Vector3<f64>> {
+                x.iter().zip(&directions).map(|(x, direction)| add_scaled(*x, part * size, *direction)).collect()
+            };
+            forgetful.neighbourhood.clear();
+            let part = known.certify(&x, &moved(1.0));
+            prop_assert_eq!(part.to_bits(), forgetful.certify(&x, &moved(1.0)).to_bits());
+            // The line search halves.
+            x = moved(0.5 * part);
+            forgetful.neighbourhood.clear();
+            prop_assert_eq!(known.meet(&x).to_bits(), forgetful.meet(&x).to_bits());
+            let joined = |contact: &BarrierContact| -> Vec<_> {
+                let Joined { pairs, laws, .. } = &contact.joined;
+                pairs.iter().zip(laws).map(|(pair, law)| (*pair, law.stiffness.to_bits())).collect()
+            };
+            prop_assert_eq!(joined(&known), joined(&forgetful));
+        }
+        prop_assert!(known.counts().searches < forgetful.counts().searches);
+        prop_assert!(!known.joined.pairs.is_empty());
+    }
 }

@@ -70,7 +70,9 @@ pub enum SleepBenchError {
     },
 }
 
-const HEAD: &str = "dt = 0.01\nduration = 1000.0\nintegrator = \"newton\"\ntolerances.velocity = 1e-3\n";
+/// Contact of cloth with itself would couple all cloths.
+const HEAD: &str = "dt = 0.01\nduration = 1000.0\nintegrator = \"newton\"\ncontact = \"obstacles\"\n\
+                    tolerances.velocity = 1e-3\n";
 /// Steps within which islands must fall asleep.
 const PATIENCE: u64 = 20_000;
 

@@ -16,7 +16,9 @@
 
 use energy_dsl::Vector3;
 
-use super::{Candidate, Closest, Pair};
+use super::closest::separation;
+use super::displacement::excursions;
+use super::{Closest, Pair};
 use crate::geometry::{add_scaled, dot, subtract};
 
 /// The part of the gap beyond the thickness that a move must leave.
@@ -38,10 +40,12 @@ pub(crate) struct Clearance {
 }
 
 /// A straight move of all vertices.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Move<'a> {
     from: &'a [Vector3<f64>],
     to: &'a [Vector3<f64>],
+    /// The displacement of each vertex relative to the mean, in m.
+    excursions: Vec<f64>,
     /// Bound of the rounding errors of a separation, in m.
     rounding: f64,
 }
@@ -49,36 +53,33 @@ pub(crate) struct Move<'a> {
 impl<'a> Move<'a> {
     pub fn new(from: &'a [Vector3<f64>], to: &'a [Vector3<f64>]) -> Self {
         let largest = |x: &[Vector3<f64>]| x.iter().flatten().fold(0.0, |largest: f64, c| largest.max(c.abs()));
-        Self { from, to, rounding: ROUNDING * largest(from).max(largest(to)) }
+        Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * largest(from).max(largest(to)) }
     }
 
-    /// Whether a comparison of distances, or the normal of the last search, shows that the whole move is safe: the pair
-    /// stays out of reach, or keeps its clearance. `excursions` are those of the vertices at both ends of the move. The
-    /// distance from the place of the last search is largest at an end of a straight move.
+    /// The length of the displacement of each vertex relative to the mean, in m.
+    pub fn excursions(&self) -> &[f64] {
+        &self.excursions
+    }
+
+    /// Whether a pair with this separation at the start certainly stays out of reach.
     #[inline]
-    pub fn is_plainly_safe(&self, candidate: &Candidate, clearance: Clearance, excursions: &[Vec<f64>; 2]) -> bool {
-        let Clearance { thickness, reach } = clearance;
-        let [before, after] = excursions.each_ref().map(|excursions| candidate.approach(excursions));
-        if candidate.distance - before.max(after) > reach + self.rounding {
-            return true;
-        }
-        // At least the distance at the start of the move, so the level is at least that of the pair.
-        let distance = candidate.distance + before;
-        let level = self.level(distance.max(thickness), clearance).min(reach + self.rounding);
-        let first = candidate.pair.first();
-        [self.from, self.to].iter().all(|x| separation(candidate.normal, &candidate.pair.corners(x), first) >= level)
+    pub fn stays_beyond(&self, reach: f64, pair: &Pair, separation: f64) -> bool {
+        separation - pair.approach(&self.excursions) > reach + self.rounding
     }
 
-    /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. The
-    /// result is exact enough if it is at least `wanted`; the search then stops early.
-    pub fn safe_part(&self, pair: &Pair, clearance: Clearance, wanted: f64) -> f64 {
-        let (from, to) = (pair.corners(self.from), pair.corners(self.to));
-        let start = Closest::of(pair, &from);
-        let level = self.level(start.distance, clearance);
-        let first = pair.first();
-        let separates =
-            |n: Vector3<f64>| [&from, &to].into_iter().all(|corners| separation(n, corners, first) >= level);
-        if separates(start.normal) || separates(Closest::of(pair, &to).normal) {
+    /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. `start`
+    /// has the closest points at the start. The result is exact enough if it is at least `wanted`; the search then stops
+    /// early.
+    pub fn safe_part(&self, pair: &Pair, start: &Closest, clearance: Clearance, wanted: f64) -> f64 {
+        let to = pair.corners(self.to);
+        // Out of reach, nothing needs to be kept.
+        let level = self.level(start.distance, clearance).min(clearance.reach + self.rounding);
+        if start.separation >= level && separation(&start.normal, &to, pair.first()) >= level {
+            return 1.0;
+        }
+        let from = pair.corners(self.from);
+        let end = Closest::of(pair, &to);
+        if end.separation >= level && separation(&end.normal, &from, pair.first()) >= level {
             return 1.0;
         }
         self.advance(pair, &from, &to, level, wanted)
@@ -114,19 +115,6 @@ impl<'a> Move<'a> {
         }
         time
     }
-}
-
-/// The smallest n·(a − b) over corners a of the first and b of the second feature. For a unit vector n, a lower bound
-/// of their distance, to rounding.
-#[inline]
-pub(super) fn separation(n: Vector3<f64>, corners: &[Vector3<f64>; 4], first: usize) -> f64 {
-    let mut least = f64::INFINITY;
-    for a in 0..first {
-        for b in first..4 {
-            least = least.min(dot(n, subtract(corners[a], corners[b])));
-        }
-    }
-    least
 }
 
 /// How long n keeps the features apart by the level at these velocities. 0 if it does not do so now.

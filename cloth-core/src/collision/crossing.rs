@@ -40,7 +40,7 @@ pub fn crossings(mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Crossing> {
     for edge in mesh.edges() {
         let (around, mut crossed) = (bounds(x, edge), Vec::new());
         tree.near(&around, |triangle| {
-            if boxes[triangle].overlaps(&around) && crosses(mesh, x, edge, &mesh.triangles()[triangle]) {
+            if crosses(mesh, x, edge, &mesh.triangles()[triangle]) {
                 crossed.push(triangle);
             }
         });

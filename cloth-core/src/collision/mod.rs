@@ -6,19 +6,24 @@
 //! contact of an edge with a triangle is either an end of the edge on the triangle, or the edge on a side of the
 //! triangle. Features that share a vertex, or whose vertices are sewn together, never count as a pair.
 
-mod candidates;
 mod certificate;
 mod closest;
 mod crossing;
+mod displacement;
+mod measured;
 mod mesh;
+mod neighbourhood;
 mod pair;
+mod search;
 
-pub(crate) use candidates::{Candidate, Candidates, Slack};
 pub(crate) use certificate::{Clearance, Move};
 pub(crate) use closest::Closest;
 pub use crossing::{Crossing, crossings};
+pub(crate) use measured::Measured;
 pub use mesh::CollisionMesh;
+pub(crate) use neighbourhood::{Neighbourhood, swept};
 pub(crate) use pair::{Pair, PairKind};
+pub(crate) use search::Search;
 
 #[cfg(test)]
 mod tests;

@@ -9,10 +9,23 @@ pub(crate) enum PairKind {
     EdgeEdge,
 }
 
-/// Two features that may touch.
+impl PairKind {
+    /// The number of vertices of the first feature; the second has the others.
+    #[inline]
+    pub const fn first(self) -> usize {
+        match self {
+            Self::PointTriangle => 1,
+            Self::EdgeEdge => 2,
+        }
+    }
+}
+
+/// Two features that may touch. Pairs are ordered by kind, then by features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Pair {
     pub kind: PairKind,
+    /// The places of the two features in the mesh's lists of points, triangles and edges.
+    pub features: [u32; 2],
     pub vertices: [u32; 4],
 }
 
@@ -20,16 +33,23 @@ impl Pair {
     /// The number of vertices of the first feature; the second has the others.
     #[inline]
     pub fn first(&self) -> usize {
-        match self.kind {
-            PairKind::PointTriangle => 1,
-            PairKind::EdgeEdge => 2,
-        }
+        self.kind.first()
     }
 
     /// Returns an entry for each vertex.
     #[inline]
     pub fn of<T: Copy>(&self, all: &[T]) -> [T; 4] {
         self.vertices.map(|vertex| all[vertex as usize])
+    }
+
+    /// The largest decrease of the distance by these excursions of the vertices.
+    #[inline]
+    pub fn approach(&self, excursions: &[f64]) -> f64 {
+        let [a, b, c, d] = self.of(excursions);
+        match self.kind {
+            PairKind::PointTriangle => a + b.max(c).max(d),
+            PairKind::EdgeEdge => a.max(b) + c.max(d),
+        }
     }
 
     /// Returns the positions of its vertices.

@@ -13,11 +13,7 @@ fn two_triangles() -> CollisionMesh {
 
 /// All pairs of the two triangles.
 fn pairs() -> Vec<Pair> {
-    let point = |p: u32, [a, b, c]: [u32; 3]| Pair { kind: PairKind::PointTriangle, vertices: [p, a, b, c] };
-    let points = (0..3).map(|p| point(p, [3, 4, 5])).chain((3..6).map(|p| point(p, [0, 1, 2])));
-    let sides = |first: u32| [[0, 1], [1, 2], [0, 2]].map(|side: [u32; 2]| side.map(|corner| first + corner));
-    let edges = sides(0).into_iter().flat_map(|[a, b]| sides(3).map(|[c, d]| [a, b, c, d]));
-    points.chain(edges.map(|vertices| Pair { kind: PairKind::EdgeEdge, vertices })).collect()
+    all_pairs(&two_triangles())
 }
 
 fn distance(x: &[Vector3<f64>]) -> f64 {
@@ -33,7 +29,12 @@ fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 
     let step = Move::new(from, to);
     pairs()
         .iter()
-        .fold(1.0, |part, pair| step.safe_part(pair, Clearance { thickness, reach: f64::INFINITY }, part).min(part))
+        .fold(1.0, |part, pair| safe_part_of(&step, pair, &pair.corners(from), thickness, part).min(part))
+}
+
+/// The part of a move that is safe for a pair; `from` holds its corners at the start.
+fn safe_part_of(step: &Move<'_>, pair: &Pair, from: &[Vector3<f64>; 4], thickness: f64, wanted: f64) -> f64 {
+    step.safe_part(pair, &Closest::of(pair, from), Clearance { thickness, reach: f64::INFINITY }, wanted)
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -76,30 +77,27 @@ fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, max_global_rejects: 100_000, ..ProptestConfig::default() })]
 
-    /// Moves that the normal of an earlier search certifies are safe.
+    /// Pairs that stay beyond a distance do so.
     #[test]
-    fn plainly_safe_moves_keep_their_distance(
-        [from, to] in impact(),
-        earlier in prop::collection::vec(vector(2e-3), 6),
-    ) {
-        const CLEARANCE: Clearance = Clearance { thickness: 1e-3, reach: 4e-3 };
-        let search: Vec<_> = from.iter().zip(&earlier).map(|(x, offset)| add_scaled(*x, 1.0, *offset)).collect();
-        // A short move, so that normals stay useful.
-        let to = at(&from, &to, 0.01);
-        let excursions = [&from, &to].map(|x| {
-            let excursion = |(x, origin): (&Vector3<f64>, &Vector3<f64>)| crate::geometry::norm(subtract(*x, *origin));
-            x.iter().zip(&search).map(excursion).collect::<Vec<f64>>()
-        });
+    fn pairs_beyond_reach_stay_there([from, to] in impact(), reach in 0.0..0.05) {
         let step = Move::new(&from, &to);
         for pair in pairs() {
             let distance = |time: f64| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance;
-            let start = distance(0.0);
-            if start > 1e-3 && step.is_plainly_safe(&Candidate::new(pair, &search), CLEARANCE, &excursions) {
-                let kept = (1e-3 + 0.1 * (start - 1e-3)).min(4e-3);
+            if step.stays_beyond(reach, &pair, Closest::of(&pair, &pair.corners(&from)).separation) {
                 for sample in 0..=10 {
-                    prop_assert!(distance(0.1 * f64::from(sample)) >= kept, "{:?} {}", pair, sample);
+                    prop_assert!(distance(0.1 * f64::from(sample)) > reach, "{:?} {}", pair, sample);
                 }
             }
+        }
+    }
+
+    /// Lanes give the bits of single pairs.
+    #[test]
+    fn lanes_measure_what_single_pairs_are([x, _] in impact()) {
+        let mut measured = Measured::default();
+        measured.measure(&pairs(), &x);
+        for (number, pair) in pairs().iter().enumerate() {
+            prop_assert_eq!(measured.closest(number), Closest::of(pair, &pair.corners(&x)));
         }
     }
 
@@ -131,7 +129,7 @@ fn moves_are_cut_only_near_a_contact() {
         let [from, to] = impact().new_tree(&mut runner).unwrap().current();
         let step = Move::new(&from, &to);
         for pair in pairs() {
-            let part = step.safe_part(&pair, Clearance { thickness: THICKNESS, reach: f64::INFINITY }, 1.0);
+            let part = safe_part_of(&step, &pair, &pair.corners(&from), THICKNESS, 1.0);
             let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
             if part < 1.0 && gap(0.0) > 0.0 {
                 cut += 1;
@@ -198,7 +196,7 @@ fn sewn_vertices_count_as_one() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// No pair within reach is missing anywhere on a covered move.
+    /// No pair within reach is missing on a swept move, or in a neighbourhood.
     #[test]
     fn candidates_are_complete(
         offsets in prop::collection::vec((vector(0.012), vector(0.01)), 25),
@@ -211,22 +209,47 @@ proptest! {
         let to: Vec<_> = from.iter().zip(&offsets).map(|(x, (_, move_by))| {
             add_scaled(add_scaled(*x, 1.0, *move_by), 1.0, drift)
         }).collect();
-        let mut candidates = Candidates::new(&mesh, &flat, vec![true; 25], REACH);
-        prop_assert!(!candidates.cover(&from));
-        candidates.search(&mesh, &from, &to, Slack { least: 1e-4, part: 0.1, most: 1e-3 });
-        prop_assert!(candidates.cover(&from) && candidates.cover(&to));
         let x = at(&from, &to, time);
-        prop_assert!(candidates.cover(&x));
-        let listed: std::collections::BTreeSet<Pair> = candidates.pairs().iter().map(|one| one.pair).collect();
-        prop_assert_eq!(listed.len(), candidates.pairs().len());
-        let excursions = candidates.excursions(&x);
+        let within = |pair: &Pair, x: &[Vector3<f64>]| Closest::of(pair, &pair.corners(x)).distance <= REACH;
+        let mut search = Search::new(&mesh, &flat, vec![true; 25]);
+        let swept = search.pairs(&mesh, swept(&from, &to), REACH);
+        prop_assert!(swept.is_sorted() && swept.windows(2).all(|two| two[0] != two[1]));
+        let mut neighbourhood = Neighbourhood::new(REACH);
+        prop_assert!(!neighbourhood.cover(&mut search, &mesh, &from).0);
+        neighbourhood.renew(&mut search, &mesh, &from, vec![1e-3; 25]);
+        let grown = neighbourhood.cover(&mut search, &mesh, &from).0 && neighbourhood.cover(&mut search, &mesh, &x).0;
+        let near = neighbourhood.pairs();
+        prop_assert!(near.is_sorted() && near.windows(2).all(|two| two[0] != two[1]));
         for pair in all_pairs(&mesh) {
-            let here = Closest::of(&pair, &pair.corners(&x)).distance;
-            prop_assert!(here > REACH || listed.contains(&pair), "{:?} at {}", pair, here);
+            prop_assert!(!within(&pair, &x) || swept.contains(&pair), "{:?} is not on the way", pair);
+            prop_assert!(!within(&pair, &from) || near.contains(&pair), "{:?} is not near", pair);
+            prop_assert!(!grown || !within(&pair, &x) || near.contains(&pair), "{:?} is not near the end", pair);
         }
-        for one in candidates.pairs() {
-            let here = Closest::of(&one.pair, &one.pair.corners(&x)).distance;
-            prop_assert!(!one.is_beyond(here + 1e-12, &x, &excursions));
+    }
+
+    /// Balls that grow around a few vertices find the pairs that a new search finds.
+    #[test]
+    fn a_grown_neighbourhood_is_complete(
+        offsets in prop::collection::vec(vector(0.012), 25),
+        strays in prop::collection::vec((0..25_usize, vector(0.02)), 1..4),
+    ) {
+        const REACH: f64 = 3e-3;
+        let (mesh, flat) = sheet(4);
+        let start: Vec<_> = flat.iter().zip(&offsets).map(|(x, offset)| add_scaled(*x, 1.0, *offset)).collect();
+        let mut x = start.clone();
+        for &(vertex, stray) in &strays {
+            x[vertex] = add_scaled(start[vertex], 1.0, stray);
+        }
+        let mut search = Search::new(&mesh, &flat, vec![true; 25]);
+        let mut neighbourhood = Neighbourhood::new(REACH);
+        neighbourhood.renew(&mut search, &mesh, &start, vec![5e-3; 25]);
+        let (is_covered, _) = neighbourhood.cover(&mut search, &mesh, &x);
+        prop_assert!(is_covered);
+        for pair in all_pairs(&mesh) {
+            for here in [&start, &x] {
+                let distance = Closest::of(&pair, &pair.corners(here)).distance;
+                prop_assert!(distance > REACH || neighbourhood.pairs().contains(&pair), "{:?} at {}", pair, distance);
+            }
         }
     }
 
@@ -234,9 +257,11 @@ proptest! {
     #[test]
     fn closest_points_are_closest(corners in prop::array::uniform4(prop_oneof![vector(1.0), on_grid()])) {
         for kind in [PairKind::PointTriangle, PairKind::EdgeEdge] {
-            let pair = Pair { kind, vertices: [0, 1, 2, 3] };
+            let pair = Pair { kind, features: [0, 1], vertices: [0, 1, 2, 3] };
             let closest = Closest::of(&pair, &corners);
             prop_assert!(closest.weights.iter().sum::<f64>().abs() < 1e-14);
+            let below = closest.distance - closest.separation;
+            prop_assert!(below > -1e-12 && (below < 1e-7 || closest.distance < 1e-6), "{:?}", closest);
             const STEPS: i32 = 12;
             for i in 0..=STEPS {
                 for j in 0..=STEPS {
@@ -258,15 +283,18 @@ proptest! {
 /// All pairs of a mesh that share no vertex.
 fn all_pairs(mesh: &CollisionMesh) -> Vec<Pair> {
     let mut all = Vec::new();
-    for &p in mesh.points() {
-        for corners in mesh.triangles().iter().filter(|corners| !corners.contains(&p)) {
-            let [a, b, c] = *corners;
-            all.push(Pair { kind: PairKind::PointTriangle, vertices: [p, a, b, c] });
+    for (place, &p) in mesh.points().iter().enumerate() {
+        for (number, corners) in mesh.triangles().iter().enumerate().filter(|(_, corners)| !corners.contains(&p)) {
+            let ([a, b, c], features) = (*corners, [place, number].map(energy_solve::index));
+            all.push(Pair { kind: PairKind::PointTriangle, features, vertices: [p, a, b, c] });
         }
     }
     for (number, &[a, b]) in mesh.edges().iter().enumerate() {
-        for &[c, d] in mesh.edges()[number + 1..].iter().filter(|other| !other.contains(&a) && !other.contains(&b)) {
-            all.push(Pair { kind: PairKind::EdgeEdge, vertices: [a, b, c, d] });
+        for (other, &[c, d]) in mesh.edges().iter().enumerate().skip(number + 1) {
+            if ![c, d].iter().any(|end| [a, b].contains(end)) {
+                let features = [number, other].map(energy_solve::index);
+                all.push(Pair { kind: PairKind::EdgeEdge, features, vertices: [a, b, c, d] });
+            }
         }
     }
     all

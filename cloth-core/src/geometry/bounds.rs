@@ -37,10 +37,11 @@ impl Bounds {
         }
     }
 
-    /// Whether the boxes share a point.
+    /// Whether the boxes share a point. All comparisons are made: a branch after each of them would be hard to predict.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        (0..3).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
+        let along = |axis: usize| (self.low[axis] <= other.high[axis]) & (other.low[axis] <= self.high[axis]);
+        along(0) & along(1) & along(2)
     }
 
     /// Whether the sum of the edge lengths exceeds that of another box.
@@ -48,12 +49,6 @@ impl Bounds {
     pub fn is_longer_than(&self, other: &Self) -> bool {
         let length = |bounds: &Self| (0..3).map(|axis| bounds.high[axis] - bounds.low[axis]).sum::<f64>();
         length(self) > length(other)
-    }
-
-    /// Whether a point lies in the box.
-    #[inline]
-    pub fn contains(&self, x: Vector3<f64>) -> bool {
-        (0..3).all(|axis| self.low[axis] <= x[axis] && x[axis] <= self.high[axis])
     }
 
     pub fn middle(&self, axis: usize) -> f64 {

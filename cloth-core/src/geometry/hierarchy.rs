@@ -11,6 +11,8 @@ pub(crate) struct Hierarchy {
     nodes: Vec<Node>,
     /// Items, in the order of the leaves.
     items: Vec<usize>,
+    /// The boxes of `items`, in the same order: leaves find theirs side by side.
+    boxes: Vec<Bounds>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -39,8 +41,9 @@ const LEAF: usize = 4;
 impl Hierarchy {
     /// Builds the tree over the boxes of items 0, 1, ….
     pub fn new(bounds: &[Bounds]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), items: (0..bounds.len()).collect() };
+        let mut tree = Self { nodes: Vec::new(), items: (0..bounds.len()).collect(), boxes: Vec::new() };
         tree.build(bounds, 0, bounds.len());
+        tree.boxes = tree.items.iter().map(|&item| bounds[item]).collect();
         tree
     }
 
@@ -65,19 +68,19 @@ impl Hierarchy {
     /// Adapts the boxes of the tree to new boxes of the items, and keeps its structure. Queries stay exact. They become
     /// slow if items move far relative to each other.
     pub fn refit(&mut self, bounds: &[Bounds]) {
+        for (own, &item) in self.boxes.iter_mut().zip(&self.items) {
+            *own = bounds[item];
+        }
         // Children follow their parents.
         for number in (0..self.nodes.len()).rev() {
             self.nodes[number].bounds = match self.nodes[number].kind {
-                Kind::Leaf(from, to) => {
-                    let own = self.items[from..to].iter().map(|&item| bounds[item]);
-                    own.fold(Bounds::EMPTY, Bounds::around)
-                }
+                Kind::Leaf(from, to) => self.boxes[from..to].iter().copied().fold(Bounds::EMPTY, Bounds::around),
                 Kind::Inner(second) => self.nodes[number + 1].bounds.around(self.nodes[second].bounds),
             };
         }
     }
 
-    /// Calls `found` with each item whose leaf overlaps a box, in tree order.
+    /// Calls `found` with each item whose box overlaps a box, in tree order.
     pub fn near(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
         // Halving the items at each level keeps the depth below the number of bits of their count.
         let (mut waiting, mut end) = ([0; 64], 1);
@@ -89,7 +92,7 @@ impl Hierarchy {
                 continue;
             }
             match node.kind {
-                Kind::Leaf(from, to) => self.items[from..to].iter().for_each(|&item| found(item)),
+                Kind::Leaf(from, to) => self.leaf(from, to).meeting(bounds).for_each(&mut found),
                 Kind::Inner(second) => {
                     [waiting[end], waiting[end + 1]] = [second, number + 1];
                     end += 2;
@@ -98,9 +101,8 @@ impl Hierarchy {
         }
     }
 
-    /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order. `boxes` are those of the
-    /// items of both trees, as of the last refit.
-    pub fn meeting(&self, other: &Self, boxes: [&[Bounds]; 2], mut found: impl FnMut(usize, usize)) {
+    /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order.
+    pub fn meeting(&self, other: &Self, mut found: impl FnMut(usize, usize)) {
         let mut waiting = vec![(0, 0)];
         while let Some((a, b)) = waiting.pop() {
             let (first, second) = (&self.nodes[a], &other.nodes[b]);
@@ -109,8 +111,8 @@ impl Hierarchy {
             }
             match (&first.kind, &second.kind) {
                 (&Kind::Leaf(from, to), &Kind::Leaf(other_from, other_to)) => {
-                    let leaves = [&self.items[from..to], &other.items[other_from..other_to]];
-                    between_leaves(leaves, boxes, &second.bounds, &mut found);
+                    let leaves = [self.leaf(from, to), other.leaf(other_from, other_to)];
+                    between_leaves(leaves, &second.bounds, &mut found);
                 }
                 (&Kind::Inner(right), _) if second.is_leaf() || first.bounds.is_longer_than(&second.bounds) => {
                     waiting.extend([(a + 1, b), (right, b)]);
@@ -121,9 +123,8 @@ impl Hierarchy {
         }
     }
 
-    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order. `boxes` are those of
-    /// the last refit.
-    pub fn meeting_itself(&self, boxes: &[Bounds], mut found: impl FnMut(usize, usize)) {
+    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order.
+    pub fn meeting_itself(&self, mut found: impl FnMut(usize, usize)) {
         let mut waiting = vec![(0, 0)];
         while let Some((a, b)) = waiting.pop() {
             let (first, second) = (&self.nodes[a], &self.nodes[b]);
@@ -132,16 +133,16 @@ impl Hierarchy {
             }
             match (&first.kind, &second.kind) {
                 (&Kind::Leaf(from, to), _) if a == b => {
-                    let items = &self.items[from..to];
-                    for (place, &item) in items.iter().enumerate() {
-                        let others = items[place + 1..].iter().filter(|&&with| boxes[item].overlaps(&boxes[with]));
-                        others.for_each(|&with| found(item, with));
+                    for place in from..to {
+                        self.leaf(place + 1, to).meeting(&self.boxes[place]).for_each(|with| {
+                            found(self.items[place], with);
+                        });
                     }
                 }
                 (&Kind::Inner(right), _) if a == b => waiting.extend([(a + 1, a + 1), (a + 1, right), (right, right)]),
                 (&Kind::Leaf(from, to), &Kind::Leaf(other_from, other_to)) => {
-                    let leaves = [&self.items[from..to], &self.items[other_from..other_to]];
-                    between_leaves(leaves, [boxes; 2], &second.bounds, &mut found);
+                    let leaves = [self.leaf(from, to), self.leaf(other_from, other_to)];
+                    between_leaves(leaves, &second.bounds, &mut found);
                 }
                 (&Kind::Inner(right), _) if second.is_leaf() || first.bounds.is_longer_than(&second.bounds) => {
                     waiting.extend([(a + 1, b), (right, b)]);
@@ -150,6 +151,10 @@ impl Hierarchy {
                 (&Kind::Inner(right), _) => waiting.extend([(a + 1, b), (right, b)]),
             }
         }
+    }
+
+    fn leaf(&self, from: usize, to: usize) -> Leaf<'_> {
+        Leaf { items: &self.items[from..to], boxes: &self.boxes[from..to] }
     }
 
     /// Returns the distance of a point from the bounding box of all items, in m.
@@ -188,17 +193,26 @@ impl Hierarchy {
     }
 }
 
+/// The items of a leaf, and their boxes.
+#[derive(Clone, Copy)]
+struct Leaf<'a> {
+    items: &'a [usize],
+    boxes: &'a [Bounds],
+}
+
+impl<'a> Leaf<'a> {
+    /// The items whose boxes overlap a box.
+    #[inline]
+    fn meeting(self, bounds: &Bounds) -> impl Iterator<Item = usize> + use<'a, '_> {
+        self.items.iter().zip(self.boxes).filter(|(_, own)| own.overlaps(bounds)).map(|(item, _)| *item)
+    }
+}
+
 /// Calls `found` with each pair of items of two leaves whose boxes overlap; `bounds` are those of the second leaf.
 #[inline]
-fn between_leaves(
-    [items, others]: [&[usize]; 2],
-    boxes: [&[Bounds]; 2],
-    bounds: &Bounds,
-    found: &mut impl FnMut(usize, usize),
-) {
+fn between_leaves([first, second]: [Leaf<'_>; 2], bounds: &Bounds, found: &mut impl FnMut(usize, usize)) {
     // Leaves overlap little: most items of the first miss all of the second.
-    for &item in items.iter().filter(|&&item| boxes[0][item].overlaps(bounds)) {
-        let meeting = others.iter().filter(|&&other| boxes[0][item].overlaps(&boxes[1][other]));
-        meeting.for_each(|&other| found(item, other));
+    for (&item, own) in first.items.iter().zip(first.boxes).filter(|(_, own)| own.overlaps(bounds)) {
+        second.meeting(own).for_each(|other| found(item, other));
     }
 }

@@ -13,7 +13,7 @@ pub struct ContactWork {
     pub shortened: u64,
     /// The sum of the parts of these moves that were left.
     pub left: f64,
-    /// Candidate pairs, summed over the moves.
+    /// Candidate pairs that could come within reach near the iterate, summed over the moves.
     pub candidates: u64,
     /// Candidates that were too close to be dismissed by a comparison of distances, summed over the moves.
     pub tested: u64,

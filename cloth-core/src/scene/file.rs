@@ -55,10 +55,10 @@ pub(super) struct File {
     /// Convergence criteria of Newton's method, for the integrators that use it. Default depends on the integrator.
     #[serde(default)]
     tolerances: Tolerances,
-    /// What collides: `on`, `obstacles` (the default) or `off`. `on` includes contact of cloth and hair with themselves
-    /// and with each other, without friction, and needs the integrator `newton`.
-    #[serde(default)]
-    contact: ContactChoice,
+    /// What collides: `on`, `obstacles` or `off`. `on` includes contact of cloth and hair with themselves and with each
+    /// other, without friction, and needs the integrator `newton`. Default: `on` for cloth with `newton` and without
+    /// `sleep`, otherwise `obstacles`.
+    contact: Option<ContactChoice>,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
     /// `multigrid`, `cholesky` or `incomplete-cholesky`.
     #[serde(default)]
@@ -109,7 +109,7 @@ impl TryFrom<File> for Scene {
             let found = file.version;
             return Err(format!("the scene has version {found}, but this program reads version {VERSION}"));
         }
-        if file.contact == ContactChoice::On && file.integrator != Scheme::Newton {
+        if file.contact == Some(ContactChoice::On) && file.integrator != Scheme::Newton {
             return Err("`contact = \"on\"` needs `integrator = \"newton\"`, which certifies its moves".to_owned());
         }
         let mut garments = file.garment;
@@ -126,6 +126,7 @@ impl TryFrom<File> for Scene {
         if garments.is_empty() && file.hair.is_empty() {
             return Err("nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned());
         }
+        let usual = ContactChoice::usual(file.integrator, file.sleep.is_some(), !garments.is_empty());
         Ok(Self {
             garments,
             hair: file.hair,
@@ -137,7 +138,7 @@ impl TryFrom<File> for Scene {
             drag: file.drag,
             integrator: file.integrator,
             tolerances: file.tolerances,
-            contact: file.contact,
+            contact: file.contact.unwrap_or(usual),
             linear_solver: file.linear_solver,
             adaptive: file.adaptive,
             sleep: file.sleep,

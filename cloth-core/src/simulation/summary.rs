@@ -146,6 +146,13 @@ impl Simulation {
             TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
         };
         summary.terms = self.counts().into_iter().enumerate().map(term).collect();
+        if summary.crossings > 0 {
+            summary.warnings.push(format!(
+                "the cloth passes through itself: at the end, edges cross triangles in {} places. \
+                 `integrator = \"newton\"` with `contact = \"on\"` prevents this",
+                summary.crossings
+            ));
+        }
         summary.warnings.extend(self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator)));
         Ok(summary)
     }

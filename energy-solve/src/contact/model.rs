@@ -48,7 +48,7 @@ pub trait ContactModel: std::fmt::Debug {
 pub struct ContactCounts {
     /// Searches for candidate pairs.
     pub searches: u64,
-    /// Candidate pairs, summed over the certified moves.
+    /// Candidate pairs that could come within reach near the iterate, summed over the certified moves.
     pub candidates: u64,
     /// Pairs whose move needed more than a comparison of distances.
     pub tested: u64,

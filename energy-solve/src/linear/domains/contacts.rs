@@ -58,50 +58,75 @@ pub(crate) fn distribute<T: Precision>(
     ranges: &[Range<usize>],
     inverses: &[InverseFactor<T>],
 ) -> Vec<DomainContacts<T>> {
-    let mut all: Vec<_> = ranges.iter().map(|_| DomainContacts::default()).collect();
-    let local = |row: usize| {
-        let domain = ranges.partition_point(|range| range.end <= row);
-        (domain, index(row - ranges[domain].start))
-    };
-    for (row, _) in contacts.iter().flat_map(Contact::free) {
-        let (domain, row) = local(row);
-        all[domain].rows.push(row);
-    }
-    for domain in &mut all {
-        domain.rows.sort_unstable();
-        domain.rows.dedup();
-    }
+    let (mut all, homes) = published(contacts, ranges);
     for contact in contacts {
-        let homes: Vec<_> = contact.free().map(|(row, weight)| (row, weight, local(row))).collect();
-        let place = |(domain, row): (usize, u32)| {
-            let place = all[domain].rows.binary_search(&row).expect("the rows of all contacts were collected");
-            [index(domain), index(place)]
-        };
-        let sources: Vec<_> = homes.iter().map(|&(_, _, home)| place(home)).collect();
-        let mut domains: Vec<usize> = homes.iter().map(|(_, _, (domain, _))| *domain).collect();
-        domains.sort_unstable();
-        domains.dedup();
+        let mut vertices = [Vertex::default(); 4];
+        let mut count = 0;
+        for (row, weight) in contact.free() {
+            vertices[count] = Vertex { row, weight, home: homes[row] };
+            count += 1;
+        }
+        let vertices = &vertices[..count];
+        let Some(first) = vertices.first() else { continue };
         for root in factors(contact) {
-            for &own in &domains {
-                let mut scaled_factor = ScaledFactor {
-                    vectors: [[T::from_f64(0.0); 4]; 4],
-                    sources: [sources[0]; 4],
-                    targets: [ELSEWHERE; 4],
-                };
-                for (vertex, &(row, weight, (domain, local))) in homes.iter().enumerate() {
-                    let root: Vector3<f64> = root.map(|component| weight * component);
-                    let [u, v, w] = scaled(&inverses[row], &root).map(T::from_f64);
-                    scaled_factor.vectors[vertex] = [u, v, w, T::from_f64(0.0)];
-                    scaled_factor.sources[vertex] = sources[vertex];
-                    if domain == own {
-                        scaled_factor.targets[vertex] = local;
-                    }
+            let mut scaled_factor = ScaledFactor {
+                vectors: [[T::from_f64(0.0); 4]; 4],
+                sources: [[first.home.domain, first.home.place]; 4],
+                targets: [ELSEWHERE; 4],
+            };
+            for (number, &Vertex { row, weight, home }) in vertices.iter().enumerate() {
+                let root: Vector3<f64> = root.map(|component| weight * component);
+                let [u, v, w] = scaled(&inverses[row], &root).map(T::from_f64);
+                scaled_factor.vectors[number] = [u, v, w, T::from_f64(0.0)];
+                scaled_factor.sources[number] = [home.domain, home.place];
+            }
+            for (number, Vertex { home: Home { domain, .. }, .. }) in vertices.iter().enumerate() {
+                let is_first = vertices[..number].iter().all(|before| before.home.domain != *domain);
+                if is_first {
+                    let target = |vertex: &Vertex| if vertex.home.domain == *domain { vertex.home.row } else { ELSEWHERE };
+                    vertices.iter().zip(&mut scaled_factor.targets).for_each(|(vertex, t)| *t = target(vertex));
+                    all[*domain as usize].factors.push(scaled_factor.clone());
                 }
-                all[own].factors.push(scaled_factor);
             }
         }
     }
     all
+}
+
+/// A free vertex of a contact.
+#[derive(Clone, Copy, Default)]
+struct Vertex {
+    row: usize,
+    weight: f64,
+    home: Home,
+}
+
+/// Where a row lives.
+#[derive(Clone, Copy, Default)]
+struct Home {
+    domain: u32,
+    /// Its number within the domain.
+    row: u32,
+    /// Its place among the rows that the domain publishes.
+    place: u32,
+}
+
+/// Returns the rows of each domain that contacts act on, and the home of each such row.
+fn published<T>(contacts: &[Contact], ranges: &[Range<usize>]) -> (Vec<DomainContacts<T>>, Vec<Home>) {
+    let mut is_touched = vec![false; ranges.last().map_or(0, |range| range.end)];
+    contacts.iter().flat_map(Contact::free).for_each(|(row, _)| is_touched[row] = true);
+    let mut homes = vec![Home::default(); is_touched.len()];
+    let mut all = Vec::new();
+    for (domain, range) in ranges.iter().enumerate() {
+        let mut rows = Vec::new();
+        for row in range.clone().filter(|&row| is_touched[row]) {
+            let own = index(row - range.start);
+            homes[row] = Home { domain: index(domain), row: own, place: index(rows.len()) };
+            rows.push(own);
+        }
+        all.push(DomainContacts { rows, factors: Vec::new() });
+    }
+    (all, homes)
 }
 
 impl<T: Precision> DomainContacts<T> {

@@ -1,0 +1,24 @@
+//! Displacements relative to their mean. Distances do not change if all vertices are translated.
+
+use energy_dsl::Vector3;
+
+use crate::geometry::{add_scaled, norm, subtract};
+
+/// Returns the length of each displacement relative to their mean, in m.
+pub(crate) fn excursions(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Vec<f64> {
+    let mean = mean_displacement(from, to);
+    let excursion = |(from, to): (&Vector3<f64>, &Vector3<f64>)| norm(subtract(subtract(*to, *from), mean));
+    from.iter().zip(to).map(excursion).collect()
+}
+
+/// Returns the mean of to − from.
+pub(super) fn mean_displacement(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum = from.iter().zip(to).fold([0.0; 3], |sum, (from, to)| add_scaled(sum, 1.0, subtract(*to, *from)));
+    sum.map(|component| component / from.len().max(1) as f64)
+}
+
+/// Returns the mean of some positions.
+pub(super) fn mean(x: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum = x.iter().fold([0.0; 3], |sum, x| add_scaled(sum, 1.0, *x));
+    sum.map(|component| component / x.len().max(1) as f64)
+}

@@ -1,0 +1,106 @@
+use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
+
+use super::{Closest, Pair, PairKind};
+
+/// The closest points of many pairs at one place.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Measured {
+    /// The place; empty if nothing has been measured.
+    place: Vec<Vector3<f64>>,
+    /// Weights, normal and distance of each pair.
+    numbers: Vec<[f64; 8]>,
+    separations: Vec<f64>,
+}
+
+impl Measured {
+    /// Measures pairs at x, unless they have been measured there. Pairs are in order, so those of one kind are
+    /// consecutive.
+    pub fn measure(&mut self, pairs: &[Pair], x: &[Vector3<f64>]) {
+        if self.numbers.len() == pairs.len() && self.place == x {
+            return;
+        }
+        x.clone_into(&mut self.place);
+        self.numbers.resize(pairs.len(), [0.0; 8]);
+        self.separations.resize(pairs.len(), 0.0);
+        let Self { numbers, separations, .. } = self;
+        dispatch(Measure { pairs, x, numbers, separations });
+    }
+
+    /// Discards everything. Required if pairs change.
+    pub fn clear(&mut self) {
+        self.place.clear();
+        self.numbers.clear();
+        self.separations.clear();
+    }
+
+    /// A lower bound of the distance of each pair; see [`Closest::separation`].
+    pub fn separations(&self) -> &[f64] {
+        &self.separations
+    }
+
+    /// The closest points of a pair.
+    #[inline]
+    pub fn closest(&self, number: usize) -> Closest {
+        let [c0, c1, c2, c3, nx, ny, nz, distance] = self.numbers[number];
+        let separation = self.separations[number];
+        Closest { weights: [c0, c1, c2, c3], normal: [nx, ny, nz], distance, separation }
+    }
+
+    /// Keeps some of the pairs.
+    pub fn retain(&mut self, is_kept: &[bool]) {
+        let mut kept = is_kept.iter();
+        self.numbers.retain(|_| *kept.next().expect("one for each pair"));
+        let mut kept = is_kept.iter();
+        self.separations.retain(|_| *kept.next().expect("one for each pair"));
+    }
+}
+
+struct Measure<'a> {
+    pairs: &'a [Pair],
+    x: &'a [Vector3<f64>],
+    numbers: &'a mut [[f64; 8]],
+    separations: &'a mut [f64],
+}
+
+impl Kernel for Measure<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { pairs, x, numbers, separations } = self;
+        let points = pairs.partition_point(|pair| pair.kind == PairKind::PointTriangle);
+        let (of_points, of_edges) = numbers.split_at_mut(points);
+        let (apart_of_points, apart_of_edges) = separations.split_at_mut(points);
+        measure::<L>(PairKind::PointTriangle, &pairs[..points], x, of_points, apart_of_points);
+        measure::<L>(PairKind::EdgeEdge, &pairs[points..], x, of_edges, apart_of_edges);
+    }
+}
+
+/// Measures pairs of one kind.
+#[inline(always)]
+fn measure<L: Level>(
+    kind: PairKind,
+    pairs: &[Pair],
+    x: &[Vector3<f64>],
+    numbers: &mut [[f64; 8]],
+    separations: &mut [f64],
+) {
+    let lanes = L::F64::LANES;
+    for (start, pairs) in pairs.chunks(lanes).enumerate().map(|(chunk, pairs)| (chunk * lanes, pairs)) {
+        // Lanes beyond the end repeat the last pair.
+        let mut vertices = [[0; 16]; 4];
+        for lane in 0..lanes {
+            let pair = &pairs[lane.min(pairs.len() - 1)];
+            for corner in 0..4 {
+                vertices[corner][lane] = pair.vertices[corner];
+            }
+        }
+        let [p, q, r, s] = &vertices;
+        let corners = [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)];
+        let Closest { weights: [a, b, c, d], normal: [nx, ny, nz], distance, separation } =
+            Closest::between(kind, &corners);
+        let rows = numbers[start..][..pairs.len()].as_flattened_mut();
+        L::F64::store_transposed(&[a, b, c, d, nx, ny, nz, distance], pairs.len(), rows, 8);
+        separation.store_ragged(&mut separations[start..][..pairs.len()]);
+    }
+}
