@@ -1,7 +1,8 @@
 //! Central differences with one extrapolation, over a sweep of steps.
 //!
 //! The error falls with the step until rounding takes over. The smallest error and the observed order tell a right
-//! derivative from a wrong one.
+//! derivative from a wrong one. A difference across a kink or the boundary of two regions is the derivative of neither
+//! side, so only steps whose inputs all lie on one side count.
 
 use energy_dsl::Kind;
 
@@ -42,31 +43,37 @@ pub(crate) struct Sweep {
     pub(crate) curve: Vec<(f64, f64, f64)>,
 }
 
-/// Compares differences of `lower`, a function of the stepped inputs, with `block`.
+/// Compares differences of `lower`, a function of the stepped inputs, with `block`. `None` if hardly any step keeps all
+/// its inputs on the side of the sample, by `is_on_this_side`.
 pub(crate) fn sweep(
     sample: &Sample,
     stepped: Stepped,
     length: f64,
     block: &[f64],
     lower: impl Fn(&Sample) -> Result<Vec<f64>, NoAnswer>,
-) -> Result<Sweep, NoAnswer> {
+    is_on_this_side: impl Fn(&Sample) -> bool,
+) -> Result<Option<Sweep>, NoAnswer> {
     const STEPS: [i32; 5] = [-6, -8, -10, -12, -14];
-    // If the function jumps nearby (a sign is chosen), only steps that stay on one side are useful.
+    // If the function has a kink or jumps nearby (a sign is chosen), only steps that stay on one side are useful.
     const FINER: [i32; 3] = [-17, -20, -23];
     const SUSPICIOUS: f64 = 1e-7;
     let inputs = match stepped {
         Stepped::Positions => sample.positions.len(),
         Stepped::Velocities => sample.velocities.len(),
     };
+    let moved = |input: usize, offset: f64| {
+        let mut moved = sample.clone();
+        let list = if stepped == Stepped::Positions { &mut moved.positions } else { &mut moved.velocities };
+        list[input] += offset;
+        (list[input], moved)
+    };
+    let stays = |step: f64| (0..inputs).all(|i| [step, -step].iter().all(|&s| is_on_this_side(&moved(i, s).1)));
     let central = |step: f64| -> Result<Vec<f64>, NoAnswer> {
         let rows = block.len() / inputs.max(1);
         let mut differences = vec![0.0; block.len()];
         for input in 0..inputs {
             let at = |offset: f64| {
-                let mut moved = sample.clone();
-                let list = if stepped == Stepped::Positions { &mut moved.positions } else { &mut moved.velocities };
-                list[input] += offset;
-                let there = list[input];
+                let (there, moved) = moved(input, offset);
                 lower(&moved).map(|values| (there, values))
             };
             let ((high, plus), (low, minus)) = (at(step)?, at(-step)?);
@@ -86,11 +93,17 @@ pub(crate) fn sweep(
             break;
         }
         let step = length * f64::from(exponent).exp2();
+        if !(stays(step) && stays(step / 2.0)) {
+            continue;
+        }
         let (whole, half) = (central(step)?, central(step / 2.0)?);
         plain.push((deviation(&whole), deviation(&half)));
         let extrapolated: Vec<f64> = whole.iter().zip(&half).map(|(w, h)| (4.0 * h - w) / 3.0).collect();
         curve.push((step / length, deviation(&whole), deviation(&extrapolated)));
         extrapolations.push((step, extrapolated));
+    }
+    if extrapolations.len() < 2 {
+        return Ok(None);
     }
     // The step is chosen without the block: errors are smallest where consecutive steps agree best.
     let disagreement = |k: usize| largest_difference(&extrapolations[k].1, &extrapolations[k + 1].1);
@@ -102,7 +115,7 @@ pub(crate) fn sweep(
         .first()
         .filter(|(whole, half)| *half > 1e3 * error && *half > 1e-10 * largest(block) && *whole > *half)
         .map(|(w, h)| (w / h).log2());
-    Ok(Sweep { best, step, order, curve })
+    Ok(Some(Sweep { best, step, order, curve }))
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use energy_compiler::AuditScope;
 use energy_dsl::{Declaration, Field, Inputs, Kind};
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
@@ -120,21 +121,33 @@ pub fn has_points(declaration: &Declaration) -> bool {
     !declaration.points.is_empty() && declaration.points.iter().all(|point| point.size == 3)
 }
 
+/// Whether the rest shape consists of points in the plane or in space.
+fn has_rest_points(declaration: &Declaration) -> bool {
+    let first = declaration.rest.first().map_or(0, |field| field.size);
+    (2..=3).contains(&first) && declaration.rest.iter().all(|field| field.size == first)
+}
+
 /// Draws samples for one declaration.
 pub struct Sampler {
     declaration: &'static Declaration,
+    scope: AuditScope,
     random: Rng,
 }
 
 impl Sampler {
     /// Creates a sampler whose samples depend on the seed and the declaration's name only.
     pub fn new(declaration: &'static Declaration, seed: u64) -> Self {
+        Self::within(&AuditScope::default(), declaration, seed)
+    }
+
+    /// Creates a sampler of the domain that a declaration states.
+    pub fn within(scope: &AuditScope, declaration: &'static Declaration, seed: u64) -> Self {
         // FNV-1a.
         let name = declaration
             .name
             .bytes()
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
-        Self { declaration, random: Rng::with_seed(seed ^ name) }
+        Self { declaration, scope: scope.clone(), random: Rng::with_seed(seed ^ name) }
     }
 
     /// Returns a uniform number in [low, high).
@@ -146,18 +159,30 @@ impl Sampler {
         (0..count).map(|_| self.uniform(low, high)).collect()
     }
 
-    /// Draws an input: points at distances of about one to eight, within a few units of the origin.
+    /// Draws an input: points at distances of about one to eight, within a few units of the origin, or as the
+    /// declaration states.
     pub fn sample(&mut self) -> Sample {
         let declaration = self.declaration;
         let count: usize = declaration.points.iter().map(|point| point.size).sum();
-        let positions = if has_points(declaration) { self.points(count) } else { self.unknowns(count) };
-        let rest = self.rest();
+        let size = self.range("scale").map(|(low, high)| self.uniform(low.log2(), high.log2()).exp2());
+        let positions = match has_points(declaration) {
+            true => self.points(count, size),
+            false if self.is_limited() => declaration.points.iter().flat_map(|field| self.unknown(field)).collect(),
+            false => self.unknowns(count),
+        };
+        let mut rest = self.rest();
+        if let Some(size) = size.filter(|_| has_rest_points(declaration)) {
+            rest.iter_mut().for_each(|x| *x *= size);
+        }
+        let stretches = self.range("strain");
+        let positions = stretches.map_or(positions, |stretches| self.deformed(&rest, stretches));
         let mut parameters = Vec::new();
         // Lengths are about the size of the configuration, so that springs are compressed and stretched, and barriers
         // near and far.
         let length = if has_points(declaration) { shortest_distance(&positions).unwrap_or(1.0) } else { 1.0 };
         for parameter in declaration.parameters {
-            let scale = if parameter.unit == "m" { length } else { 1.0 };
+            let is_stated = self.scope.range(parameter.name).is_some();
+            let scale = if parameter.unit == "m" && !is_stated { length } else { 1.0 };
             parameters.extend(self.parameter(parameter).into_iter().map(|x| scale * x));
         }
         let mut velocities = Vec::new();
@@ -180,7 +205,7 @@ impl Sampler {
     pub fn lattice_sample(&mut self) -> Sample {
         let sample = self.sample();
         // A function of the coordinates themselves may have a kink at any integer.
-        if !has_points(self.declaration) || !self.declaration.translation_invariant {
+        if !has_points(self.declaration) || !self.declaration.translation_invariant || self.is_limited() {
             return sample;
         }
         let mut demand = 1.0;
@@ -199,6 +224,9 @@ impl Sampler {
     /// different sizes.
     pub fn odd_sample(&mut self) -> Sample {
         let mut sample = self.sample();
+        if self.is_limited() {
+            return sample;
+        }
         let shrink = |numbers: &mut [f64], random: &mut Rng| {
             let all = random.bool().then(|| random.i32(-20..1));
             for x in numbers.iter_mut() {
@@ -214,10 +242,57 @@ impl Sampler {
         sample
     }
 
-    /// Draws well-shaped points, scaled and translated at random.
-    fn points(&mut self, count: usize) -> Vec<f64> {
+    /// Returns the stated range of a name.
+    fn range(&self, name: &str) -> Option<(f64, f64)> {
+        // An input of that name has the range for itself.
+        let Declaration { points, rest, parameters, .. } = self.declaration;
+        let is_input = [points, rest, parameters].into_iter().any(|list| list.iter().any(|field| field.name == name));
+        if is_input { None } else { self.scope.range(name) }
+    }
+
+    /// Whether the declaration states where it is used.
+    fn is_limited(&self) -> bool {
+        !self.scope.ranges.is_empty()
+    }
+
+    /// Draws a deformation of the rest shape by principal stretches in a range, turned and moved at random.
+    fn deformed(&mut self, rest: &[f64], (low, high): (f64, f64)) -> Vec<f64> {
+        let dimension = self.declaration.rest[0].size;
+        let mut axes = self.rotation();
+        if dimension == 2 {
+            // A turn in the plane.
+            let half = self.uniform(0.0, std::f64::consts::PI);
+            axes = Rotation::from_unit_quaternion([half.cos(), 0.0, 0.0, half.sin()]);
+        }
+        let stretches = [(); 3].map(|()| self.uniform(low, high));
+        let turn = self.rotation();
+        let offset = self.uniforms(3, -2.0, 2.0);
+        rest.chunks(dimension)
+            .flat_map(|point| {
+                let point: Vec<f64> = (0..3).map(|axis| point.get(axis).copied().unwrap_or(0.0)).collect();
+                let mut principal = rotate(&axes, &point);
+                (0..3).for_each(|axis| principal[axis] *= stretches[axis]);
+                rotate(&turn, &principal)
+            })
+            .enumerate()
+            .map(|(i, x)| x + offset[i % 3])
+            .collect()
+    }
+
+    fn unknown(&mut self, unknown: &Field) -> Vec<f64> {
+        match self.scope.range(unknown.name) {
+            Some((low, high)) => self.uniforms(unknown.size, low, high),
+            None => self.unknowns(unknown.size),
+        }
+    }
+
+    /// Draws well-shaped points, of a size or one from ½ to 4, and translated at random.
+    fn points(&mut self, count: usize, size: Option<f64>) -> Vec<f64> {
         let points = self.shape(count, 3, |_, _| true);
-        let scale = self.uniform(-1.0, 2.0).exp2();
+        let scale = match size {
+            Some(size) => size,
+            None => self.uniform(-1.0, 2.0).exp2(),
+        };
         let turn = self.rotation();
         let offset = self.uniforms(3, -2.0, 2.0);
         points.chunks(3).flat_map(|p| rotate(&turn, p)).enumerate().map(|(i, x)| scale * x + offset[i % 3]).collect()
@@ -252,6 +327,9 @@ impl Sampler {
 
     /// Draws angles in (−2, 2), other scalars in [0.5, 2), and vectors of either sign.
     fn parameter(&mut self, field: &Field) -> Vec<f64> {
+        if let Some((low, high)) = self.scope.range(field.name) {
+            return self.uniforms(field.size, low, high);
+        }
         match (field.unit, field.size) {
             ("rad", size) => self.uniforms(size, -2.0, 2.0),
             (_, 1) => self.uniforms(1, 0.5, 2.0),

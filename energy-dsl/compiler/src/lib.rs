@@ -27,4 +27,4 @@ pub use diagnostic::{Diagnostic, Diagnostics};
 pub use functions::{Function, all as functions, robust_spellings};
 pub use inspect::{Fault, Interpreted, Listing, Mutation, Path, Textbook, mathml};
 pub use passes::{compile, compile_file};
-pub use syntax::canonical as canonical_name;
+pub use syntax::{AuditRange, AuditScope, canonical as canonical_name};

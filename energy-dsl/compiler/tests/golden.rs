@@ -77,12 +77,26 @@ fn claims_are_proved_or_refused() {
             "where each point rests",
         ),
         ("#[audit] #[invariant(scale)] energy A(p: Point) { norm(p) }", "unknown property `scale`"),
+        ("#[audit(sample = 3)] energy A(p: Point) { norm(p) }", "unknown option `sample`"),
+        ("#[audit(domain(j = 1..2))] energy A(p: Point; k: Scalar) { k * norm(p) }", "`j` is not an input"),
+        ("#[audit(domain(k = 2..1))] energy A(p: Point; k: Scalar) { k * norm(p) }", "the range of `k` is empty"),
+        ("#[audit(domain(k = 1..2, k = 1..3))] energy A(p: Point; k: Scalar) { k * norm(p) }", "`k` has two ranges"),
+        ("#[audit(domain(p = 1..2))] energy A(p: Point) { norm(p) }", "`p` has no range"),
+        ("#[audit(domain(strain = 1..2))] energy A(p: Point) { norm(p) }", "strain needs a rest shape"),
+        ("#[audit(domain(scale = 0..2))] energy A(p: Point) { norm(p) }", "a scale is greater than 0"),
+        ("#[audit(domain(k = 1, 2))] energy A(p: Point; k: Scalar) { k * norm(p) }", "between the ends of the range"),
+        ("#[audit(tolerance = 0.5)] energy A(p: Point) { norm(p) }", "a relative error from 0 to 1e-3"),
         ("#[odd] energy A(p: Point) { norm(p) }", "unknown attribute `odd`"),
         ("#[uncompensated] fn f(a) { a } energy A(p: Point) { f(norm(p)) }", "a declaration after its attributes"),
     ] {
         let code = compile(source.parse().unwrap()).to_string();
         assert!(code.contains("compile_error") && code.contains(expected), "{source}: {code}");
     }
+    let scoped = "#[audit(samples = 3, domain(k = -1..2, scale = 0.1..1), tolerance = 1e-6)]
+                  energy A(p, q: Point; k: Scalar) { k * norm(p - q) }";
+    let code = compile(scoped.parse().unwrap()).to_string();
+    assert!(!code.contains("compile_error"), "{code}");
+    assert!(code.contains("#[audit(domain(k = -1.0..2.0, scale = 0.1..1.0), tolerance = 1e-6)]"), "{code}");
     let right = "#[invariant(translation)] force A(p, q: Point; k: Scalar) { [k * (p - q), -k * (p - q)] }";
     assert!(!compile(right.parse().unwrap()).to_string().contains("compile_error"));
 }

@@ -11,7 +11,7 @@ use crate::finite_difference::{Stepped, antiderivative};
 use crate::formula::expected_blocks;
 use crate::geometry::{Rotation, rotate_all};
 use crate::multiprecision::{TrueBlock, truth_of_ordinary};
-use crate::sample::{Sample, Sampler};
+use crate::sample::Sample;
 
 /// An input with the expected results, which do not depend on the code under audit.
 pub(super) struct Case {
@@ -44,7 +44,7 @@ const LATTICE: usize = 5;
 
 /// Draws inputs from a seed; the first `with_truth` get multi-precision blocks.
 pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: u64) -> Vec<Case> {
-    let mut sampler = Sampler::new(subject.declaration, seed);
+    let mut sampler = subject.sampler(seed);
     (0..samples)
         .map(|number| {
             let is_lattice = number % LATTICE == LATTICE - 1;
@@ -79,6 +79,8 @@ pub(super) struct Auditor<'a> {
     pub(super) declaration: &'static Declaration,
     pub(super) lines: Vec<Line>,
     places: BTreeMap<(Check, BlockName), usize>,
+    /// For each derivative, the number of inputs, and of those where differences stayed on one side of every kink.
+    differences: BTreeMap<BlockName, (usize, usize)>,
 }
 
 /// The result of one comparison.
@@ -92,7 +94,43 @@ pub(super) struct Finding<'a> {
 
 impl<'a> Auditor<'a> {
     pub(super) fn new(subject: &'a Subject) -> Self {
-        Self { subject, declaration: subject.declaration, lines: Vec::new(), places: BTreeMap::new() }
+        Self {
+            subject,
+            declaration: subject.declaration,
+            lines: Vec::new(),
+            places: BTreeMap::new(),
+            differences: BTreeMap::new(),
+        }
+    }
+
+    /// Counts an input at which the differences of a derivative were taken, or could not be.
+    pub(super) fn count_differences(&mut self, block: BlockName, taken: bool) {
+        if antiderivative(block, self.declaration.kind).is_some() {
+            let (inputs, compared) = self.differences.entry(block).or_default();
+            *inputs += 1;
+            *compared += usize::from(taken);
+        }
+    }
+
+    /// Returns the largest number of inputs at which no differences of a derivative were taken. Fails the audit if these
+    /// are too many to trust the others.
+    pub(super) fn rejected_differences(&mut self, sample: &Sample) -> usize {
+        let mut most = 0;
+        for (block, (inputs, compared)) in self.differences.clone() {
+            let rejected = inputs - compared;
+            if rejected > 0 {
+                most = most.max(rejected);
+                let error = rejected as f64 / inputs as f64;
+                let finding = Finding { check: Check::OneSide, block, error, order: None, sample };
+                self.record(&finding, || {
+                    format!(
+                        "  at {rejected} of {inputs} inputs, a kink or the boundary of two regions is too near for \
+                         differences of any step"
+                    )
+                });
+            }
+        }
+        most
     }
 
     pub(super) fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
@@ -102,15 +140,15 @@ impl<'a> Auditor<'a> {
     /// Records a finding. `detail` is evaluated only if it is the worst of its check and block.
     pub(super) fn record(&mut self, finding: &Finding<'_>, detail: impl FnOnce() -> String) {
         let &Finding { check, block, error, order, sample } = finding;
-        let element = self.declaration.name;
+        let (element, tolerance) = (self.declaration.name, self.subject.tolerance(check));
         let lines = &mut self.lines;
         let at = *self.places.entry((check, block)).or_insert_with(|| {
-            lines.push(Line::new(element, block, check));
+            lines.push(Line::new(element, block, check, tolerance));
             lines.len() - 1
         });
         let line = &mut self.lines[at];
         line.inputs += 1;
-        line.passed &= error <= check.tolerance();
+        line.passed &= error <= tolerance;
         if let Some(order) = order {
             line.order = Some(line.order.map_or(order, |least: f64| least.min(order)));
         }

@@ -13,6 +13,10 @@ use crate::eigenvalues::eigenvalues;
 use crate::formula::rows;
 use crate::sample::{Sample, has_points};
 
+/// The remedy for a formula that overflows at inputs where nobody uses it.
+const OUT_OF_DOMAIN: &str =
+    "\n  if the formula is not used there, state where it is, as in #[audit(domain(strain = 0.5..2.0))]";
+
 impl Auditor<'_> {
     /// Checks every law at one input.
     pub(super) fn laws(&mut self, case: &Case, answer: &Answer) -> Result<(), NoAnswer> {
@@ -39,12 +43,14 @@ impl Auditor<'_> {
             let flagged = answer.flags[block.name.order(declaration.kind)].any();
             let error = if bad.is_some() || flagged { f64::INFINITY } else { 0.0 };
             self.note(Check::Finite, block.name, error, sample, || match bad {
-                Some(entry) => format!(
-                    "  entry {} is {}, at{}",
-                    entry_name(declaration, block, entry),
-                    block.numbers[entry],
-                    sample.describe(declaration)
-                ),
+                Some(entry) => {
+                    format!(
+                        "  entry {} is {}, at{}",
+                        entry_name(declaration, block, entry),
+                        block.numbers[entry],
+                        sample.describe(declaration)
+                    ) + OUT_OF_DOMAIN
+                }
                 None => format!("  flagged as degenerate or a kink, at{}", sample.describe(declaration)),
             });
         }

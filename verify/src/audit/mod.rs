@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod auditor;
+mod continuity;
 mod entry;
 mod html;
 mod input;
@@ -21,6 +22,7 @@ use energy_dsl::{AnyElement, Declaration, Element};
 
 pub use self::accuracy::amplification;
 use self::auditor::{Auditor, Case, case, cases};
+use self::continuity::typical_value;
 pub use self::html::html;
 pub use self::input::read_inputs;
 pub use self::junit::junit;
@@ -146,11 +148,16 @@ fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<
     let cases = cases(subject, options.samples, options.truths, options.seed);
     let mut auditor = Auditor::new(subject);
     let mut section = section(subject, cases.len());
-    for case in &cases {
+    let typical = typical_value(&cases);
+    for (number, case) in cases.iter().enumerate() {
         audit_case(&mut auditor, &mut section, case).map_err(|error| error.to_string())?;
+        auditor.continuity(case, &cases[(number + 1) % cases.len()].sample, typical);
         if let Some(energy) = energy {
             against_energy(&mut auditor, energy, case)?;
         }
+    }
+    if let Some(last) = cases.last() {
+        section.without_differences = auditor.rejected_differences(&last.sample);
     }
     let lines = auditor.lines;
     // Faults in a faulty element tell nothing.
@@ -170,6 +177,7 @@ fn section(subject: &Subject, inputs: usize) -> Section {
         docs: declaration.docs,
         source: declaration.source,
         inputs,
+        without_differences: 0,
         accuracy: Vec::new(),
         curves: Vec::new(),
         spots: Vec::new(),

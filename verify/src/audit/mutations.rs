@@ -12,7 +12,7 @@ use super::report::{Check, Mutant, MutationScore};
 use super::subject::Subject;
 use crate::blocks::{BlockName, NoAnswer};
 use crate::multiprecision::{Big, worse};
-use crate::sample::{Sample, Sampler};
+use crate::sample::Sample;
 
 /// Plants up to `wanted` faults, spread over kinds and routines, and tries each at `trials` inputs. Faults that
 /// provably change nothing are counted separately.
@@ -61,8 +61,7 @@ pub(super) fn score(
 }
 
 fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
-    let runs = interpreted.clone();
-    Subject::new(interpreted.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), None)
+    Subject::of_routines(interpreted, None)
 }
 
 /// Returns by how much an unnoticed fault changes results without rounding: the largest difference at any input,
@@ -125,7 +124,7 @@ fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial
         seen.extend(branches(&trial.case.sample).into_iter().flatten().enumerate());
     }
     let comparisons = seen.iter().map(|(number, _)| number + 1).max().unwrap_or(0);
-    let mut sampler = Sampler::new(subject.declaration, seed ^ 0x6272_616e_6368);
+    let mut sampler = subject.sampler(seed ^ 0x6272_616e_6368);
     let mut found = Vec::new();
     for _ in 0..CANDIDATES {
         if seen.len() == 2 * comparisons {

@@ -13,6 +13,8 @@ struct Route<'a> {
     numbers: &'a [f64],
     /// Relative error of the route at an ordinary input.
     uncertainty: f64,
+    /// The check that compares the route with the code; `None` if another does.
+    check: Option<Check>,
 }
 
 impl Auditor<'_> {
@@ -26,6 +28,7 @@ impl Auditor<'_> {
         let mut curves = Vec::new();
         for block in &answer.blocks {
             let differences = self.differences(case, block)?;
+            self.count_differences(block.name, differences.is_some());
             if let Some((lower, sweep)) = &differences {
                 let (block, of) = (block.name, *lower);
                 curves.push(StepCurve { block, of, errors: relative(&sweep.curve, answer.block(block).largest()) });
@@ -36,13 +39,21 @@ impl Auditor<'_> {
         Ok(curves)
     }
 
+    /// Returns the differences whose inputs are all on the side of the sample; `None` if no step is small enough for
+    /// that, or if the block is not a derivative.
     fn differences(&self, case: &Case, block: &Block) -> Result<Option<(BlockName, Sweep)>, NoAnswer> {
         let Some((lower, stepped)) = antiderivative(block.name, self.declaration.kind) else { return Ok(None) };
         let length = self.length(&case.sample, stepped);
-        let found = sweep(&case.sample, stepped, length, &block.numbers, |moved| {
-            self.answer(moved).map(|answer| answer.block(lower).numbers.clone())
-        })?;
-        Ok(Some((lower, found)))
+        let here = self.subject.branches(&case.sample);
+        let found = sweep(
+            &case.sample,
+            stepped,
+            length,
+            &block.numbers,
+            |moved| self.subject.lower_block(lower, moved),
+            |moved| here.is_empty() || self.subject.branches(moved) == here,
+        )?;
+        Ok(found.map(|found| (lower, found)))
     }
 
     fn compare_all(&mut self, case: &Case, answer: &Answer, block: &Block, differences: Option<&(BlockName, Sweep)>) {
@@ -50,32 +61,35 @@ impl Auditor<'_> {
             .truth(block.name)
             .filter(|t| t.is_defined)
             .map(|t| t.block.numbers.iter().map(|x| x.to_f64()).collect());
-        let mut routes = vec![Route { name: "generated code".into(), numbers: &block.numbers, uncertainty: 0.0 }];
+        let mut routes =
+            vec![Route { name: "generated code".into(), numbers: &block.numbers, uncertainty: 0.0, check: None }];
         if let Some(digits) = &digits {
-            routes.push(Route { name: "multi-precision".into(), numbers: digits, uncertainty: 0.0 });
+            routes.push(Route { name: "multi-precision".into(), numbers: digits, uncertainty: 0.0, check: None });
         }
-        let dual = Check::DualNumbers.tolerance();
+        let dual = self.subject.tolerance(Check::DualNumbers);
         // Where the formula as written is 0/0, dual numbers have no value to compare a limit with.
         let numbers = &case.dual(block.name).numbers;
         if !numbers.iter().any(|number| number.is_nan()) {
-            routes.push(Route { name: "dual numbers".into(), numbers, uncertainty: dual });
+            routes.push(Route {
+                name: "dual numbers".into(),
+                numbers,
+                uncertainty: dual,
+                check: Some(Check::DualNumbers),
+            });
         }
         if let Some((lower, sweep)) = differences {
             routes.push(Route {
                 name: format!("differences of `{lower}` (step {:.1e})", sweep.step),
                 numbers: &sweep.best,
-                uncertainty: Check::FiniteDifferences.tolerance(),
+                uncertainty: self.subject.tolerance(Check::FiniteDifferences),
+                check: Some(Check::FiniteDifferences),
             });
         }
         let scale = routes.iter().map(|route| largest(route.numbers)).fold(0.0, f64::max);
         let scale = scale.max(self.natural_size(&case.sample, answer, block.name));
         let order = differences.and_then(|(_, sweep)| sweep.order);
         for route in &routes[1..] {
-            let check = match route.uncertainty {
-                0.0 => continue,
-                u if u == dual => Check::DualNumbers,
-                _ => Check::FiniteDifferences,
-            };
+            let Some(check) = route.check else { continue };
             let (entry, error) = distance(&block.numbers, route.numbers);
             let declaration = self.declaration;
             let order = if check == Check::FiniteDifferences { order } else { None };
@@ -191,7 +205,7 @@ mod tests {
     use super::*;
 
     fn route(name: &str, numbers: &'static [f64], uncertainty: f64) -> Route<'static> {
-        Route { name: name.into(), numbers, uncertainty }
+        Route { name: name.into(), numbers, uncertainty, check: None }
     }
 
     #[test]

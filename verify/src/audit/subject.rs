@@ -4,8 +4,9 @@ use anyhow::Context;
 use energy_compiler::{Interpreted, Textbook};
 use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs, RestError};
 
-use crate::blocks::{Answer, NoAnswer, evaluate};
-use crate::sample::Sample;
+use super::report::Check;
+use crate::blocks::{Answer, BlockName, NoAnswer, evaluate};
+use crate::sample::{Sample, Sampler};
 
 /// A function or closure that evaluates an element.
 pub type EvaluateAny = Box<dyn Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>>;
@@ -75,10 +76,7 @@ impl Target {
                 let interpreted = declared.pop();
                 Subject::new(declaration, Box::new(entry.evaluate), interpreted)
             }
-            Origin::Text(element) => {
-                let (runs, interpreted) = (element.clone(), element.as_ref().clone());
-                Subject::new(declaration, Box::new(move |inputs| runs.evaluate(inputs)), Some(interpreted))
-            }
+            Origin::Text(element) => Subject::of_routines(element, Some(element.as_ref().clone())),
         }
     }
 }
@@ -93,6 +91,8 @@ pub struct Subject {
     pub formula: Textbook,
     /// The compiled routines, in which faults are planted; `None` if the source is not available.
     pub interpreted: Option<Interpreted>,
+    /// The routines that `evaluate` interprets, to run one of them alone; `None` if it runs generated code.
+    routines: Option<Interpreted>,
 }
 
 impl Subject {
@@ -106,7 +106,40 @@ impl Subject {
         interpreted: Option<Interpreted>,
     ) -> Result<Self, String> {
         let formula = Textbook::from_source(declaration.source).map_err(|errors| errors.to_string())?;
-        Ok(Self { declaration, evaluate, formula, interpreted })
+        Ok(Self { declaration, evaluate, formula, interpreted, routines: None })
+    }
+
+    /// Creates the subject of an audit of interpreted routines.
+    ///
+    /// # Errors
+    /// If the source of the declaration does not compile.
+    pub fn of_routines(routines: &Interpreted, interpreted: Option<Interpreted>) -> Result<Self, String> {
+        let runs = routines.clone();
+        let subject = Self::new(routines.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), interpreted)?;
+        Ok(Self { routines: Some(routines.clone()), ..subject })
+    }
+
+    /// Evaluates the block whose differences are taken. Interprets one routine instead of all, because differences need
+    /// hundreds of values.
+    ///
+    /// # Errors
+    /// If the rest shape is degenerate or a block has the wrong size.
+    pub(super) fn lower_block(&self, block: BlockName, sample: &Sample) -> Result<Vec<f64>, NoAnswer> {
+        let routine = match block {
+            BlockName::Energy => Some(("value", 0)),
+            BlockName::Gradient => Some(("gradient", 1)),
+            BlockName::Force => Some(("force", 0)),
+            BlockName::Residual => Some(("residual", 0)),
+            _ => None,
+        };
+        if let (Some(routines), Some((name, group))) = (&self.routines, routine) {
+            let inputs = sample.inputs();
+            let precomputed = routines.precomputed(&inputs).map_err(NoAnswer::Rest)?;
+            if let Some((mut groups, _)) = routines.routine(name, &inputs, &precomputed) {
+                return Ok(groups.swap_remove(group));
+            }
+        }
+        self.answer(sample).map(|answer| answer.block(block).numbers.clone())
     }
 
     /// Evaluates all blocks at an input.
@@ -115,6 +148,26 @@ impl Subject {
     /// If the rest shape is degenerate or a block has the wrong size.
     pub fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
         evaluate(self.declaration, &self.evaluate, &sample.inputs())
+    }
+
+    /// Returns a sampler of the domain that the declaration states.
+    #[must_use]
+    pub fn sampler(&self, seed: u64) -> Sampler {
+        Sampler::within(&self.formula.program().audit_scope, self.declaration, seed)
+    }
+
+    /// Returns the largest error that a check allows, or that the declaration states.
+    pub(super) fn tolerance(&self, check: Check) -> f64 {
+        let stated = self.formula.program().audit_scope.tolerance;
+        let loses_digits = matches!(check, Check::FiniteDifferences | Check::DualNumbers);
+        stated.filter(|_| loses_digits).unwrap_or_else(|| check.tolerance())
+    }
+
+    /// Returns the branches of the formula that an input takes. The formula may have a kink or a jump between inputs
+    /// that take different ones.
+    #[must_use]
+    pub fn branches(&self, sample: &Sample) -> Vec<bool> {
+        self.formula.branches(&sample.inputs())
     }
 
     /// Returns whether the element depends on velocities.

@@ -3,6 +3,7 @@
 
 mod array;
 mod constant;
+mod domain;
 mod expression;
 mod names;
 mod result;
@@ -76,6 +77,7 @@ fn check_declaration(
     diagnostics: &mut Diagnostics,
 ) -> Program {
     let signature = Signature::of(declaration, globals, diagnostics);
+    domain::check(declaration, &signature, diagnostics);
     let mut own = Diagnostics::default();
     let checked = declaration.body.as_ref().and_then(|body| {
         let mut checker = Checker::new(&signature, globals, functions, &mut own);
@@ -100,6 +102,7 @@ fn check_declaration(
         docs: declaration.docs.clone(),
         visibility: declaration.visibility.clone(),
         audit_samples: declaration.audit_samples,
+        audit_scope: declaration.audit_scope.clone(),
         properties: declaration.properties.clone(),
         uncompensated: declaration.uncompensated,
         kind: declaration.kind,

@@ -1,6 +1,6 @@
 use crate::diagnostic::Span;
 use crate::functions::{Function, Shape};
-use crate::syntax::{InputType, Unit};
+use crate::syntax::{AuditScope, InputType, Unit};
 use energy_runtime::{Kind, Property};
 
 /// A checked declaration.
@@ -16,6 +16,8 @@ pub struct Program {
     pub visibility: String,
     /// Samples of the generated audit test; `None` without `#[audit]`.
     pub audit_samples: Option<usize>,
+    /// Domain and tolerance of audits.
+    pub audit_scope: AuditScope,
     /// Claimed properties, and where they are claimed.
     pub properties: Vec<(Property, Span)>,
     /// Whether rounding errors are not compensated.

@@ -31,6 +31,29 @@ pub fn interpret_with<T: Number>(
     outputs.iter().map(|&o| number(graph, &values, o)).collect()
 }
 
+/// Returns the branch that every comparison, minimum, maximum and absolute value takes on the way to `outputs`.
+pub fn branches_with<T: Number>(
+    graph: &Graph,
+    outputs: &[NodeId],
+    inputs: &Inputs<'_, T>,
+    precomputed: &[T],
+) -> Vec<T::Mask> {
+    let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
+    let mut branches = Vec::new();
+    for node in reachable(graph, outputs) {
+        let value = compute(graph, node, inputs, precomputed, &values);
+        let n = |node| number(graph, &values, node);
+        match (graph.fused(node), &value) {
+            (Op::Min(a, b) | Op::Max(a, b), _) => branches.push(n(a).less(n(b))),
+            (Op::Abs(a), _) => branches.push(n(a).less(T::from_f64(0.0))),
+            (_, Computed::Mask(mask)) => branches.push(*mask),
+            (_, Computed::Number(_)) => {}
+        }
+        values[node.0 as usize] = Some(value);
+    }
+    branches
+}
+
 /// Returns the value of a mask.
 pub fn interpret_mask<T: Number>(graph: &Graph, output: NodeId, inputs: &Inputs<'_, T>) -> T::Mask {
     let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];

@@ -3,7 +3,7 @@ use proc_macro2::TokenStream;
 use crate::check::{Program, Source, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::graph::{Input, NodeId, Op, reachable};
-use crate::inspect::interpret::interpret_with;
+use crate::inspect::interpret::{branches_with, interpret_with};
 use crate::inspect::tower::Tower;
 use crate::lower::{TextbookFormula, lower_textbook};
 use crate::syntax::{parse, parse_file};
@@ -64,6 +64,25 @@ impl Textbook {
         let gradients = self.gradients(&formula.outputs, &inputs, 1);
         let rows = interpret_with(&formula.graph, &formula.outputs, &inputs.borrow(), &gradients);
         rows.into_iter().map(Tower::into_plain).collect()
+    }
+
+    /// Returns the branches that the formula takes at an input: the outcome of each comparison, the smaller operand of
+    /// each minimum and maximum, the sign in each absolute value. Between two inputs with the same branches, the formula
+    /// may be smooth; between others it may have a kink or a jump.
+    ///
+    /// # Panics
+    /// When an input slice is shorter than declared.
+    #[must_use]
+    pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Vec<bool> {
+        let formula = &self.formula.formula;
+        if self.formula.gradients.is_empty() {
+            return branches_with(&formula.graph, &formula.outputs, inputs, &[]);
+        }
+        let inputs = TowerInputs::of(inputs);
+        let inner = self.formula.gradients.iter().map(|(of, ..)| *of);
+        let outputs: Vec<NodeId> = formula.outputs.iter().copied().chain(inner).collect();
+        let gradients = self.gradients(&outputs, &inputs, 1);
+        branches_with(&formula.graph, &outputs, &inputs.borrow(), &gradients)
     }
 
     /// Returns the derivatives that `outputs` use (0 for unused ones). Each is differentiated with

@@ -16,6 +16,48 @@ pub enum Item {
     Specialisation(Box<Specialisation>),
 }
 
+/// Where and how strictly `#[audit(domain(…), tolerance = …)]` wants a declaration audited.
+#[derive(Clone, Debug, Default)]
+pub struct AuditScope {
+    /// Ranges to draw inputs from.
+    pub ranges: Vec<AuditRange>,
+    /// Largest relative error of finite differences and dual numbers; `None` for the audit's own.
+    pub tolerance: Option<f64>,
+}
+
+/// A range of an audit's domain.
+#[derive(Clone, Debug)]
+pub struct AuditRange {
+    /// An input, `scale` or `strain`.
+    pub name: Name,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end, above the lower.
+    pub high: f64,
+}
+
+impl AuditScope {
+    /// Returns the range of a name, if it has one.
+    #[must_use]
+    pub fn range(&self, name: &str) -> Option<(f64, f64)> {
+        self.ranges.iter().find(|range| range.name.text == name).map(|range| (range.low, range.high))
+    }
+
+    /// Returns the attribute that states this scope, followed by a space; empty if nothing is stated.
+    #[must_use]
+    pub fn attribute(&self) -> String {
+        let ranges: Vec<String> = self
+            .ranges
+            .iter()
+            .map(|AuditRange { name, low, high }| format!("{} = {low:?}..{high:?}", name.text))
+            .collect();
+        let domain = (!ranges.is_empty()).then(|| format!("domain({})", ranges.join(", ")));
+        let tolerance = self.tolerance.map(|tolerance| format!("tolerance = {tolerance:?}"));
+        let parts: Vec<String> = domain.into_iter().chain(tolerance).collect();
+        if parts.is_empty() { String::new() } else { format!("#[audit({})] ", parts.join(", ")) }
+    }
+}
+
 /// A declared energy, constraint, force or residual.
 #[derive(Clone, Debug)]
 pub struct Declaration {
@@ -25,6 +67,8 @@ pub struct Declaration {
     pub visibility: String,
     /// Samples of the generated audit test; `None` without `#[audit]`.
     pub audit_samples: Option<usize>,
+    /// Domain and tolerance of audits.
+    pub audit_scope: AuditScope,
     /// Claimed properties, and where they are claimed.
     pub properties: Vec<(Property, Span)>,
     /// Whether the declaration has the attribute `#[uncompensated]`.

@@ -1,5 +1,6 @@
 //! Attributes of declarations: documentation, audit, claimed properties and accuracy.
 
+use super::ast::{AuditRange, AuditScope};
 use super::parse::{Parsed, Parser};
 use super::tokens::{Kind as TokenKind, Token};
 use crate::diagnostic::{Diagnostic, Span};
@@ -10,12 +11,13 @@ use energy_runtime::Property;
 pub(super) struct Attributes {
     pub(super) docs: Vec<String>,
     pub(super) audit_samples: Option<usize>,
+    pub(super) audit_scope: AuditScope,
     pub(super) properties: Vec<(Property, Span)>,
     pub(super) uncompensated: bool,
 }
 
 impl Parser<'_> {
-    /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n)]`, `[invariant(translation,
+    /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n, …)]`, `[invariant(translation,
     /// rotation)]`, `[rest_state(zero_force)]`, `[even]` or `[uncompensated]`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
         self.expect("[", "to open the attribute")?;
@@ -29,7 +31,7 @@ impl Parser<'_> {
                 }
                 self.at += 1;
             }
-            "audit" => attributes.audit_samples = Some(self.samples()?),
+            "audit" => self.audit(attributes)?,
             "invariant" => {
                 let known =
                     [("translation", Property::TranslationInvariant), ("rotation", Property::RotationInvariant)];
@@ -40,8 +42,8 @@ impl Parser<'_> {
             "uncompensated" => attributes.uncompensated = true,
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
-                    "a declaration takes doc comments, #[audit], #[audit(samples = 200)], #[invariant(translation, \
-                     rotation)], \
+                    "a declaration takes doc comments, #[audit], #[audit(samples = 200)], #[audit(domain(k = 1..10), tolerance = 1e-6)], \
+                     #[invariant(translation, rotation)], \
                      #[rest_state(zero_force)], #[even] and #[uncompensated]",
                 )));
             }
@@ -49,22 +51,92 @@ impl Parser<'_> {
         self.expect("]", "to close the attribute")
     }
 
-    /// Parses `(samples = n)`; returns the default count if there are no parentheses.
-    fn samples(&mut self) -> Parsed<usize> {
+    /// Parses `(samples = n, domain(name = a..b, …), tolerance = x)`, in any order, or nothing.
+    fn audit(&mut self, attributes: &mut Attributes) -> Parsed<()> {
+        attributes.audit_samples.get_or_insert(200);
         if !self.take("(") {
-            return Ok(200);
+            return Ok(());
         }
-        if !self.take_word("samples") {
-            return self.fail("`samples = …`");
+        while !self.take(")") {
+            let option = self.name("`samples`, `domain` or `tolerance`")?;
+            match option.text.as_str() {
+                "samples" => attributes.audit_samples = Some(self.samples()?),
+                "tolerance" => attributes.audit_scope.tolerance = Some(self.tolerance()?),
+                "domain" => self.domain(&mut attributes.audit_scope.ranges)?,
+                other => {
+                    let message = format!("unknown option `{other}`; expected `samples = …`");
+                    return Err(Box::new(Diagnostic::new(&option.span, message).help(
+                        "an audit takes samples = 200, domain(k = 1..10, scale = 0.1..1, strain = 0.5..2) and \
+                         tolerance = 1e-6",
+                    )));
+                }
+            }
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after an option of the audit");
+            }
         }
+        Ok(())
+    }
+
+    /// Parses `= n`.
+    fn samples(&mut self) -> Parsed<usize> {
         self.expect("=", "after samples")?;
         let samples = match self.peek() {
             Some(Token { kind: TokenKind::Number(n), .. }) if *n >= 1.0 && n.fract() == 0.0 => *n as usize,
             _ => return self.fail("the number of samples"),
         };
         self.at += 1;
-        self.expect(")", "after the number of samples")?;
         Ok(samples)
+    }
+
+    /// Parses `= x`. Errors above 1e-3 would pass any derivative.
+    fn tolerance(&mut self) -> Parsed<f64> {
+        self.expect("=", "after tolerance")?;
+        match self.peek() {
+            Some(Token { kind: TokenKind::Number(x), .. }) if *x > 0.0 && *x <= 1e-3 => {
+                let tolerance = *x;
+                self.at += 1;
+                Ok(tolerance)
+            }
+            _ => self.fail("a relative error from 0 to 1e-3"),
+        }
+    }
+
+    /// Parses `(name = a..b, …)`.
+    fn domain(&mut self, ranges: &mut Vec<AuditRange>) -> Parsed<()> {
+        self.expect("(", "before the ranges of the domain")?;
+        while !self.take(")") {
+            let name = self.name("an input, `scale` or `strain`")?;
+            self.expect("=", "between a name and its range")?;
+            let low = self.signed_number()?;
+            self.expect("..", "between the ends of the range, as in strain = 0.5..2.0")?;
+            let high = self.signed_number()?;
+            if low >= high {
+                let message = format!("the range of `{}` is empty: {low} is not below {high}", name.text);
+                return Err(Box::new(Diagnostic::new(&name.span, message).help("write the lower end first")));
+            }
+            if ranges.iter().any(|range| range.name.text == name.text) {
+                let message = format!("`{}` has two ranges", name.text);
+                return Err(Box::new(Diagnostic::new(&name.span, message).help("remove one of them")));
+            }
+            ranges.push(AuditRange { name, low, high });
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after a range");
+            }
+        }
+        Ok(())
+    }
+
+    fn signed_number(&mut self) -> Parsed<f64> {
+        let sign = if self.take("-") { -1.0 } else { 1.0 };
+        match self.peek() {
+            Some(Token { kind: TokenKind::Number(x), .. }) if x.is_finite() => {
+                let number = sign * x;
+                self.at += 1;
+                Ok(number)
+            }
+            _ => self.fail("a number"),
+        }
     }
 
     /// Parses `(name, name)` with known names.

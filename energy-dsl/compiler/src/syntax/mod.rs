@@ -12,8 +12,8 @@ mod text;
 mod tokens;
 
 pub use ast::{
-    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, InputType, Item, Section, Sum,
-    Unit, UserFunction,
+    AuditRange, AuditScope, Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup,
+    InputType, Item, Section, Sum, Unit, UserFunction,
 };
 pub use name::{Name, canonical};
 pub(crate) use notation::without_hat;

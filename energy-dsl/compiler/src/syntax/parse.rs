@@ -187,8 +187,9 @@ impl<'a> Parser<'a> {
         while self.take("#") {
             self.attribute(&mut attributes)?;
         }
-        let Attributes { docs, audit_samples, properties, uncompensated } = attributes;
-        let prefix = if uncompensated { "#[uncompensated] " } else { "" };
+        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated } = attributes;
+        let uncompensated_prefix = if uncompensated { "#[uncompensated] " } else { "" };
+        let prefix = &format!("{}{uncompensated_prefix}", audit_scope.attribute());
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -221,6 +222,7 @@ impl<'a> Parser<'a> {
                 docs,
                 visibility,
                 audit_samples,
+                audit_scope,
                 properties,
                 uncompensated,
                 kind,
@@ -251,6 +253,7 @@ impl<'a> Parser<'a> {
             docs,
             visibility,
             audit_samples,
+            audit_scope,
             properties,
             uncompensated,
             kind,

@@ -11,7 +11,7 @@ use energy_cli::plot::{Curve, logarithmic};
 pub use self::methods::Measured;
 use self::methods::Methods;
 use verify::audit::Target;
-use verify::sample::{Sample, Sampler};
+use verify::sample::Sample;
 
 /// Inputs per element.
 const INPUTS: usize = 8;
@@ -37,7 +37,7 @@ pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
         }
         let entry = energy_catalogue::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
         let subject = Target::of_element(entry).subject()?;
-        let mut sampler = Sampler::new(subject.declaration, 3);
+        let mut sampler = subject.sampler(3);
         let samples: Vec<Sample> = (0..INPUTS).map(|_| in_single_precision(sampler.sample())).collect();
         list.extend(run(&Methods::new(&subject, &samples)));
     }

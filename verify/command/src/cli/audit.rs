@@ -113,11 +113,24 @@ fn print(report: &Report) {
         println!("\n{element}: no check noticed a planted fault: {}", mutant.fault);
     }
     print_mutation_scores(report);
+    print_blind_spots(report);
     println!(
         "\n{} elements, {} checks, {} failed",
         report.elements(),
         report.lines.len(),
         report.failures().count() + report.refused.len() + report.missed().count()
+    );
+}
+
+/// Says where the audit did not look.
+fn print_blind_spots(report: &Report) {
+    for section in report.sections.iter().filter(|section| section.without_differences > 0) {
+        let (none, inputs) = (section.without_differences, section.inputs);
+        println!("{}: no differences at {none} of {inputs} inputs, too near to a kink or a boundary", section.element);
+    }
+    println!(
+        "\nNot looked at: inputs outside of the sampled range (points ½ to 8 apart, parameters ½ to 2, or the domain \
+         that a declaration states), and those near rest or a singularity, where `verify stress` looks"
     );
 }
 

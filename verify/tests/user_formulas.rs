@@ -1,0 +1,66 @@
+//! A file of formulas as users write them: the audit raises no false alarm, and a false formula fails by its check.
+
+use verify::audit::{Check, Line, Options, Report, Target, audit_all, describe_failure};
+
+const FORMULAS: &str = include_str!("../data/user_formulas.energy");
+
+fn report(text: &str, options: Options) -> Report {
+    let targets = Target::of_text(text, "user_formulas.energy").unwrap_or_else(|errors| panic!("{errors}"));
+    audit_all(&targets, None, options)
+}
+
+fn failures(report: &Report) -> Vec<String> {
+    let refused = report.refused.iter().map(|(name, why)| format!("{name}: {why}"));
+    refused.chain(report.failures().map(describe_failure)).collect()
+}
+
+#[test]
+fn formulas_by_regions_exponentials_and_angles_pass_with_five_seeds() {
+    for seed in 1..=5 {
+        let report = report(FORMULAS, Options { samples: 30, truths: 3, mutations: 0, seed, ..Options::default() });
+        assert!(report.elements() > 8);
+        // κ counts rounding of the edges only. Where 1 + cos(3 θ − n₀) nearly vanishes, rounding 3 θ costs more.
+        let is_known = |line: &Line| line.element == "Torsion" && line.check == Check::Accuracy && line.worst < 16.0;
+        let others: Vec<String> = report.failures().filter(|line| !is_known(line)).map(describe_failure).collect();
+        assert_eq!(others, [""; 0], "seed {seed}");
+        assert!(report.refused.is_empty(), "{:?}", report.refused);
+    }
+}
+
+/// Without its domain, an exponential overflows where nobody uses it, and the message says how to state one.
+#[test]
+fn an_exponential_without_its_domain_is_told_to_state_it() {
+    let start = FORMULAS.find("energy Fung").unwrap();
+    let fung = &FORMULAS[start..start + FORMULAS[start..].find("\n}\n").unwrap() + 2];
+    let report = report(&format!("#[audit] {fung}"), Options { samples: 60, mutations: 0, ..Options::default() });
+    let messages = failures(&report).join("\n");
+    assert!(messages.contains("finite") && messages.contains("#[audit(domain("), "{messages}");
+}
+
+#[test]
+fn a_jump_fails_and_a_kink_passes() {
+    let options = Options { samples: 40, truths: 2, mutations: 0, ..Options::default() };
+    for (jump, size) in [("0.1", true), ("1e-6", true), ("0", false)] {
+        let text = format!(
+            "#[audit] energy Step(p, q: Point; k, L: Scalar) {{
+                 let r = norm(p - q);
+                 if r < L {{ k * r + {jump} }} else {{ k * (2 * r - L) }}
+             }}"
+        );
+        let report = report(&text, options);
+        let failed: Vec<Check> = report.failures().map(|line| line.check).collect();
+        assert_eq!(failed, vec![Check::Continuity; usize::from(size)], "{jump}: {:?}", failures(&report));
+    }
+}
+
+/// A value that is drawn from everywhere near a kink leaves no side to take differences on.
+#[test]
+fn inputs_without_differences_are_counted_and_too_many_fail() {
+    let few = report(FORMULAS, Options { samples: 30, truths: 0, mutations: 0, ..Options::default() });
+    assert!(few.sections.iter().all(|section| section.without_differences <= section.inputs / 3));
+    let many = "#[audit(domain(x = 0..1e-9))] residual Edge(x: Scalar; k: Scalar) { k * abs(x) }";
+    let many = report(many, Options { samples: 30, truths: 0, mutations: 0, ..Options::default() });
+    let failed: Vec<Check> = many.failures().map(|line| line.check).collect();
+    assert!(failed.contains(&Check::OneSide), "{:?}", failures(&many));
+    assert!(many.sections[0].without_differences > 10);
+}
