@@ -46,7 +46,7 @@ energy! {
     energy Choices(p, q: Point; k: Scalar) {
         let s = norm_squared(p);
         let t = norm_squared(q);
-        abs(s - t) + min(s, t)^2 + max(s, k * t) + if s < t && t > k { s * s } else { t * s }
+        abs(s - t) + min(s, t)^2 + max(s, k * t) + t * s + if s < t && t > k { (s - t) * (t - k) } else { 0 }
     }
 
     #[audit(samples = 50)]

@@ -1,9 +1,10 @@
 //! Friction of cloth with itself.
 //!
 //! A step of a pair in contact has the potential μ λ (√(‖t‖² + ε²) − ε) ([`SlidingFriction`]). The sliding t is the
-//! tangential part of the displacement of the closest points relative to each other, since the start of the step. Closest
-//! points, normal and normal force λ are lagged: taken at the start of the step, so that friction has a potential (Li et
-//! al. 2020, "Incremental potential contact", §5.5). Sliding slower than ε per step sticks, but creeps.
+//! tangential part of the displacement of the closest points relative to each other, since the start of the step.
+//! Closest points, normal and normal force λ are lagged: taken at the start of the step, so that friction has a
+//! potential (Li et al. 2020, "Incremental potential contact", §5.5). Sliding slower than ε per step sticks, but
+//! creeps.
 
 use energy_dsl::{Potential, Vector3};
 use energy_elements::SlidingFriction;

@@ -249,8 +249,8 @@ fn contact_of_layers() -> BarrierContact {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Moves, pairs and stiffnesses do not depend on the neighbourhood: they are bit-identical if it is forgotten before
-    /// each of them.
+    /// Moves, pairs and stiffnesses do not depend on the neighbourhood: they are bit-identical if it is forgotten
+    /// before each of them.
     #[test]
     fn the_neighbourhood_changes_no_result(
         moves in prop::collection::vec((prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 50), 0..4_i32), 8),

@@ -68,8 +68,8 @@ impl<'a> Move<'a> {
     }
 
     /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. `start`
-    /// has the closest points at the start. The result is exact enough if it is at least `wanted`; the search then stops
-    /// early.
+    /// has the closest points at the start. The result is exact enough if it is at least `wanted`; the search then
+    /// stops early.
     pub fn safe_part(&self, pair: &Pair, start: &Closest, clearance: Clearance, wanted: f64) -> f64 {
         let to = pair.corners(self.to);
         // Out of reach, nothing needs to be kept.

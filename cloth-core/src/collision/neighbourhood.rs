@@ -7,8 +7,8 @@ use crate::geometry::{Bounds, norm, subtract};
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current
 /// iterate.
 ///
-/// Distances do not change if all vertices are translated, so balls move with the mean of all vertices. Late iterates of
-/// a step move little and need no search. Where a few vertices leave their balls, these grow, and only the pairs of
+/// Distances do not change if all vertices are translated, so balls move with the mean of all vertices. Late iterates
+/// of a step move little and need no search. Where a few vertices leave their balls, these grow, and only the pairs of
 /// these vertices are searched for.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbourhood {
@@ -105,8 +105,8 @@ impl Neighbourhood {
         self.centres.iter().zip(&self.radii).map(ball).collect()
     }
 
-    /// Measures the pairs at x, and drops those that cannot come within reach: boxes of tilted features meet long before
-    /// the features do.
+    /// Measures the pairs at x, and drops those that cannot come within reach: boxes of tilted features meet long
+    /// before the features do.
     fn keep_near(&mut self, x: &[Vector3<f64>]) {
         self.measured.clear();
         self.measured.measure(&self.pairs, x);

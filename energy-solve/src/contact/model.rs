@@ -37,7 +37,8 @@ pub trait ContactModel: std::fmt::Debug {
     /// Adds −∇U to the forces on all vertices, in N.
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]);
 
-    /// Returns the stiffness of each pair in contact, and of friction, in N/m, in an order that does not depend on threads.
+    /// Returns the stiffness of each pair in contact, and of friction, in N/m, in an order that does not depend on
+    /// threads.
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact>;
 
     /// Returns what was counted so far.

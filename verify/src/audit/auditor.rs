@@ -112,8 +112,8 @@ impl<'a> Auditor<'a> {
         }
     }
 
-    /// Returns the largest number of inputs at which no differences of a derivative were taken. Fails the audit if these
-    /// are too many to trust the others.
+    /// Returns the largest number of inputs at which no differences of a derivative were taken. Fails the audit if
+    /// these are too many to trust the others.
     pub(super) fn rejected_differences(&mut self, sample: &Sample) -> usize {
         let mut most = 0;
         for (block, (inputs, compared)) in self.differences.clone() {

@@ -12,8 +12,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "norm",
         usage: "norm(d) or ‖d‖",
-        docs: "Length of a vector or quaternion. At 0 it contributes no derivatives, and they are flagged. `norm(d) - L` and \
-             its square are robust primitives.",
+        docs: "Length of a vector or quaternion. At 0 it contributes no derivatives, and they are flagged. \
+               `norm(d) - L` and its square are robust primitives.",
         shape: vector_to_scalar,
         lower: norm,
         accuracy: "2 / 2 / 6",

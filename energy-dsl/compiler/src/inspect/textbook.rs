@@ -67,8 +67,8 @@ impl Textbook {
     }
 
     /// Returns the branches that the formula takes at an input: the outcome of each comparison, the smaller operand of
-    /// each minimum and maximum, the sign in each absolute value. Between two inputs with the same branches, the formula
-    /// may be smooth; between others it may have a kink or a jump.
+    /// each minimum and maximum, the sign in each absolute value. Between two inputs with the same branches, the
+    /// formula may be smooth; between others it may have a kink or a jump.
     ///
     /// # Panics
     /// When an input slice is shorter than declared.

@@ -42,8 +42,8 @@ impl Parser<'_> {
             "uncompensated" => attributes.uncompensated = true,
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
-                    "a declaration takes doc comments, #[audit], #[audit(samples = 200)], #[audit(domain(k = 1..10), tolerance = 1e-6)], \
-                     #[invariant(translation, rotation)], \
+                    "a declaration takes doc comments, #[audit], #[audit(samples = 200)], \
+                     #[audit(domain(k = 1..10), tolerance = 1e-6)], #[invariant(translation, rotation)], \
                      #[rest_state(zero_force)], #[even] and #[uncompensated]",
                 )));
             }

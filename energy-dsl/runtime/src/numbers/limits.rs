@@ -232,7 +232,10 @@ impl<'a> Rays<'a> {
     /// Returns the ray whose limits are the most like the plain results: the side on which the formula itself is.
     fn side(&self, group: &Group<'_>) -> usize {
         let alike = |ray: usize| {
-            let same = |(limit, plain): (&Limit, &Unbounded<f64>)| matches!(limit, Limit::Finite(number) if is_near(*number, *plain, group.scale));
+            let same = |(limit, plain): (&Limit, &Unbounded<f64>)| match limit {
+                Limit::Finite(number) => is_near(*number, *plain, group.scale),
+                _ => false,
+            };
             self.limits[ray][group.range.clone()].iter().zip(group.plain).filter(|pair| same(*pair)).count()
         };
         (0..self.limits.len()).rev().max_by_key(|&ray| alike(ray)).unwrap_or(0)

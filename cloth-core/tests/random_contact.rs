@@ -1,0 +1,116 @@
+//! Random drops, pulls and folds of small sheets: no state has a crossing or a NaN, and no step stalls without saying so.
+//! `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test random_contact` runs a hundred thousand steps.
+#![allow(missing_docs)]
+
+use cloth_core::Simulation;
+use cloth_core::scene::Scene;
+use proptest::prelude::*;
+
+const STEPS: usize = 25;
+/// Scenes in CI: a thousand steps.
+const SCENES: u32 = 40;
+
+/// A fabric, from soft and thick to stiff and thin.
+fn fabric() -> impl Strategy<Value = String> {
+    let material = prop::sample::select(vec!["stvk", "neo-hookean", "stable-neo-hookean"]);
+    (material, 0.7..2.5_f64, 0.1..0.4_f64, -3.5..-2.7_f64, 0.0..0.8_f64, -7.0..-4.0_f64).prop_map(
+        |(material, stiffness, density, thickness, friction, bending)| {
+            format!(
+                "fabric = {{ density = {density:?}, thickness = {:?}, friction = {friction:?}, material.{material} = \
+                 {{ stretch_stiffness = {:?}, poisson_ratio = 0.3, bending.flat.stiffness = {:?} }} }}\n",
+                10_f64.powf(thickness),
+                10_f64.powf(stiffness),
+                10_f64.powf(bending)
+            )
+        },
+    )
+}
+
+fn sheet(name: &str, cells: usize, at: [f64; 3], rest: &str, fabric: &str) -> String {
+    let size = 0.025 * cells as f64;
+    format!(
+        "[[garment]]\nname = \"{name}\"\nplacement.translate = {at:?}\n\
+         mesh.sheet = {{ cells = [{cells}, {cells}], size = [{size:?}, {size:?}] }}\n{rest}{fabric}"
+    )
+}
+
+/// A spinning sheet flies onto another, which is held at its edge.
+fn drop() -> impl Strategy<Value = String> {
+    let vector = |size: f64| prop::array::uniform3(-size..size);
+    (fabric(), fabric(), vector(0.02), vector(1.0), vector(20.0), 0.0..10.0_f64).prop_map(
+        |(net, cloth, offset, drift, spin, speed)| {
+            let velocity = [drift[0], drift[1], -speed];
+            let motion = format!("velocity = {velocity:?}\nspin = {spin:?}\n");
+            let at = [offset[0], offset[1], 0.08];
+            let held = "[[pins]]\nof = \"net\"\nboundary = true\n";
+            sheet("net", 8, [0.0; 3], "", &net) + &sheet("cloth", 4, at, &motion, &cloth) + held
+        },
+    )
+}
+
+/// The corners of a sheet are pulled to random places.
+fn pull() -> impl Strategy<Value = String> {
+    let corner = prop::option::weighted(0.7, prop::array::uniform3(-0.1..0.1_f64));
+    (fabric(), prop::array::uniform4(corner), 0.05..0.5_f64).prop_map(|(fabric, corners, time)| {
+        let ends = [[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]];
+        let pins = ends.iter().zip(corners).filter_map(|(end, to)| {
+            let to: [f64; 3] = std::array::from_fn(|axis| to.map_or(f64::NAN, |to| 0.8 * (to[axis] - end[axis])));
+            let keys = format!("[{{ time = 0.0 }}, {{ time = {time:?}, translate = {to:?} }}]");
+            to[0].is_finite().then(|| format!("[[pins]]\nnearest = {end:?}\nmotion.keys = {keys}\n"))
+        });
+        sheet("cloth", 8, [0.0; 3], "", &fabric) + &pins.collect::<String>()
+    })
+}
+
+/// One edge of a sheet is laid over the opposite one, and beyond.
+fn fold() -> impl Strategy<Value = String> {
+    (fabric(), 0.1..0.3_f64, 0.01..0.05_f64, 0.1..0.5_f64).prop_map(|(fabric, way, height, time)| {
+        let edge = |low: f64, high: f64| format!("box = {{ min = [{low:?}, -1.0, -1.0], max = [{high:?}, 1.0, 1.0] }}");
+        let keys = format!(
+            "[{{ time = 0.0 }}, {{ time = {:?}, translate = [{:?}, 0.0, {height:?}] }}, \
+             {{ time = {time:?}, translate = [{way:?}, 0.0, {:?}] }}]",
+            0.5 * time,
+            0.5 * way,
+            0.2 * height
+        );
+        let (fixed, moving) = (edge(0.099, 0.101), edge(-0.101, -0.099));
+        sheet("cloth", 8, [0.0; 3], "", &fabric)
+            + &format!("[[pins]]\n{fixed}\n[[pins]]\n{moving}\nmotion.keys = {keys}\n")
+    })
+}
+
+/// A scene, and whether its pins move. Moving pins may demand the impossible.
+fn scene() -> impl Strategy<Value = (String, bool)> {
+    let still = drop().prop_map(|text| (text, false));
+    let moving = prop_oneof![pull(), fold()].prop_map(|text| (text, true));
+    (0.001..0.033_f64, prop_oneof![still, moving]).prop_map(|(dt, (rest, moves))| {
+        let text = format!(
+            "dt = {dt:?}\nduration = 10.0\nintegrator = \"newton\"\ncontact = \"on\"\nadaptive = true\n\
+             tolerances.velocity = 1e-3\ndrag = 0.5\n{rest}"
+        );
+        (text, moves)
+    })
+}
+
+fn scenes() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(SCENES)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: scenes(), ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_random_scene_has_a_crossing_or_a_nan((text, pins_move) in scene()) {
+        let parsed = Scene::parse(&text, "random.toml".as_ref()).unwrap_or_else(|error| panic!("{error}"));
+        let mut simulation = Simulation::new(&parsed).unwrap_or_else(|error| panic!("{error}"));
+        for step in 0..STEPS {
+            if let Err(error) = simulation.step() {
+                println!("step {step}: {error}");
+                prop_assert!(pins_move, "step {}: {}", step, error);
+                break;
+            }
+            prop_assert_eq!(simulation.crossings(), []);
+            prop_assert!(simulation.positions().as_flattened().iter().all(|coordinate| coordinate.is_finite()));
+        }
+    }
+}
