@@ -10,7 +10,7 @@ use energy_dsl::{Potential, Vector3};
 use energy_elements::SlidingFriction;
 use energy_solve::Contact;
 
-use super::Law;
+use super::joined::Law;
 use crate::collision::{Closest, Pair};
 use crate::geometry::add_scaled;
 
@@ -48,18 +48,18 @@ impl Friction {
         }
     }
 
-    /// Takes the pairs in contact at the start, with their laws, closest points and the distance of their surfaces.
-    pub fn take(&mut self, touching: impl Iterator<Item = (Pair, Law, Closest, f64)>, gap: f64) {
+    /// Takes the pairs in contact at the start, with their laws and closest points.
+    pub fn take(&mut self, touching: Vec<(Pair, Law, Closest)>) {
         let Self { coefficients, start, dt, sliding } = self;
-        let of = |(pair, law, closest, apart): (Pair, Law, Closest, f64)| {
+        let of = |(pair, law, closest): (Pair, Law, Closest)| {
             let [first, second] = [pair.vertices[0], pair.vertices[pair.first()]];
             let coefficient = 0.5 * (coefficients[first as usize] + coefficients[second as usize]);
-            let limit = coefficient * law.force(apart, gap);
+            let limit = coefficient * law.force(law.apart(&closest));
             let between = combine(&closest.weights, &pair.corners(start));
             let element = SlidingFriction::new(closest.normal, between, limit, STICKING * *dt);
             (limit > 0.0).then_some(Sliding { pair, weights: closest.weights, element })
         };
-        *sliding = touching.filter_map(of).collect();
+        *sliding = touching.into_iter().filter_map(of).collect();
     }
 
     /// Returns Σ μ λ (√(‖t‖² + ε²) − ε), in J.

@@ -2,42 +2,39 @@
 //! move.
 //!
 //! **Energy.** A pair at distance d, with thickness ξ and activation gap g, has the energy K β(s), β(s) =
-//! −(1 − s)² ln s, s = (d − ξ)/g, below s = 1, and none above ([`DistanceBarrier`] of the gap). d is the distance of
+//! −(1 − s)² ln s, s = (d − ξ)/g, below s = 1, and none above ([`DistanceBarrier`](energy_elements::DistanceBarrier) of the gap). d is the distance of
 //! two closed features: a point and a triangle, or two edges. Its gradient is c ⊗ n for the unit normal n and the
-//! coefficients c of the closest points, so forces and torques of a contact cancel to rounding.
+//! coefficients c of the closest points, so forces and torques of a contact cancel to rounding. Friction is in
+//! `friction.rs`.
 //!
 //! **Which pairs act.** Two surfaces meet in many pairs. A pair joins at an iterate if its closest points are a local
-//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a
-//! single function, which a filter in every trial would not be. A pair that shortens a move joins in any case.
+//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a single function,
+//! which a filter in every trial would not be. A pair that shortens a move joins in any case.
 //!
-//! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times
-//! as stiff as the vertices are against a displacement along the normal. Nothing is left to tune.
+//! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
+//! vertices are against a displacement along the normal. Nothing is left to tune.
 //!
 //! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
 //! certified states only.
 
 mod feasible;
 mod friction;
+mod joined;
+mod resistance;
 mod start;
 
-use std::cell::RefCell;
-
-use energy_dsl::{Block, Potential, Vector3};
-use energy_elements::DistanceBarrier;
+use energy_dsl::{Block, Vector3};
 use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
 pub use start::ContactError;
 
 use crate::collision::{Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
-use crate::geometry::{add_scaled, dot};
+use crate::geometry::add_scaled;
 use feasible::Meeting;
 use friction::Friction;
+use joined::{Joined, Law};
+use resistance::Resistance;
 
-/// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
-/// same number of iterations.
-const STIFFNESS_RATIO: f64 = 10.0;
-/// β″(½).
-const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
 const JOINING: f64 = 1.25;
@@ -69,93 +66,10 @@ pub struct BarrierContact {
     counts: ContactCounts,
 }
 
-/// The pairs in contact, or close to it, in order.
-#[derive(Debug, Default)]
-struct Joined {
-    pairs: Vec<Pair>,
-    laws: Vec<Law>,
-    /// The pairs where they were last evaluated.
-    measured: RefCell<Measured>,
-}
-
-/// The barrier of a pair.
-#[derive(Clone, Copy, Debug)]
-struct Law {
-    /// ξ, in m.
-    thickness: f64,
-    /// K/g², in N/m.
-    stiffness: f64,
-}
-
-impl Joined {
-    fn clear(&mut self) {
-        self.pairs.clear();
-        self.laws.clear();
-        self.measured.get_mut().clear();
-    }
-
-    /// Adds pairs that are not yet here.
-    fn extend(&mut self, added: impl Iterator<Item = (Pair, Law)>) {
-        let known = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.laws));
-        let mut all: Vec<(Pair, Law)> = known.chain(added).collect();
-        // Two runs in order are merged in linear time.
-        all.sort_by_key(|(pair, _)| *pair);
-        (self.pairs, self.laws) = all.into_iter().unzip();
-        self.measured.get_mut().clear();
-    }
-
-    fn contains(&self, pair: &Pair) -> bool {
-        self.pairs.binary_search(pair).is_ok()
-    }
-}
-
-/// The resistance of vertices to displacement, in N/m.
-#[derive(Debug, Default)]
-struct Resistance {
-    /// Diagonal blocks of M/h² + ∂²U/∂x² by vertex; `None` for a pinned one.
-    blocks: Vec<Option<Block<f64>>>,
-    /// m/h² by vertex, the least resistance.
-    inertia: Vec<f64>,
-}
-
-impl Resistance {
-    /// The resistance of a pair to a displacement along its normal: the mean over free vertices by the squares of c.
-    /// The small constant keeps the mean defined while the closest points depend on pinned vertices only.
-    fn of(&self, pair: &Pair, closest: &Closest) -> f64 {
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for (vertex, c) in pair.vertices.iter().zip(closest.weights) {
-            let vertex = *vertex as usize;
-            if let Some(block) = &self.blocks[vertex] {
-                let n = closest.normal;
-                let along = dot(n, block.map(|row| dot(row, n))).max(self.inertia[vertex]);
-                let weight = c * c + 1e-3;
-                sum += weight * along;
-                weights += weight;
-            }
-        }
-        if weights > 0.0 { sum / weights } else { 0.0 }
-    }
-}
-
 impl BarrierContact {
     /// The distance at which a pair touches, in m.
     fn thickness(&self, pair: &Pair) -> f64 {
         self.radii[pair.vertices[0] as usize] + self.radii[pair.vertices[pair.first()] as usize]
-    }
-
-    /// Calls `evaluate` with each joined pair that has an energy at x, its closest points and the distance of its
-    /// surfaces.
-    fn for_each_active(&self, x: &[Vector3<f64>], mut evaluate: impl FnMut(&Pair, Law, Closest, f64)) {
-        let Joined { pairs, laws, measured } = &self.joined;
-        let mut measured = measured.borrow_mut();
-        measured.measure(pairs, x);
-        for (number, (pair, law)) in pairs.iter().zip(laws).enumerate() {
-            let closest = measured.closest(number);
-            let apart = closest.distance - law.thickness;
-            if apart < self.gap {
-                evaluate(pair, *law, closest, apart);
-            }
-        }
     }
 
     /// Sets the coefficient of friction μ at each vertex. That of a pair is the mean of its two features.
@@ -178,19 +92,18 @@ impl BarrierContact {
         let mut touching = Vec::new();
         for (number, pair) in self.neighbourhood.pairs().iter().enumerate() {
             let closest = measured.closest(number);
-            let apart = closest.distance - self.thickness(pair);
-            if apart < self.gap && meeting.may_join(pair, &closest) {
-                touching.push((*pair, self.law(pair, &closest), closest, apart));
+            let is_active = closest.distance - self.thickness(pair) < self.gap;
+            if is_active && meeting.may_join(pair, &closest) {
+                touching.push((*pair, self.law(pair, &closest), closest));
             }
         }
         self.friction.start = start;
-        self.friction.take(touching.into_iter(), self.gap);
+        self.friction.take(touching);
     }
 
     /// The law of a pair that joins with these closest points.
     fn law(&self, pair: &Pair, closest: &Closest) -> Law {
-        let stiffness = STIFFNESS_RATIO / CURVATURE_AT_HALF * self.resistance.of(pair, closest);
-        Law { thickness: self.thickness(pair), stiffness }
+        Law::new(self.thickness(pair), self.gap, self.resistance.of(pair, closest))
     }
 
     /// Makes all pairs near an iterate known, and measures them there.
@@ -238,34 +151,6 @@ struct Judgement {
     tested: u64,
     /// The pairs that shorten the move.
     blocking: Vec<Pair>,
-}
-
-impl Law {
-    /// The barrier as a function of the vector between the surfaces of the features.
-    fn barrier(self, gap: f64) -> DistanceBarrier {
-        DistanceBarrier::new(self.stiffness, gap)
-    }
-
-    /// The normal force at a distance of the surfaces, in N, with this activation gap.
-    fn force(self, apart: f64, gap: f64) -> f64 {
-        if apart < gap { -self.barrier(gap).gradient(&between(apart)).gradient[0][0] } else { 0.0 }
-    }
-
-    /// The energy at a distance of the surfaces, in J, with this activation gap.
-    fn energy(self, apart: f64, gap: f64) -> f64 {
-        if apart >= gap {
-            0.0
-        } else if apart > 0.0 {
-            self.barrier(gap).value(&between(apart)).value
-        } else {
-            f64::INFINITY
-        }
-    }
-}
-
-/// Two points at this distance.
-fn between(gap: f64) -> [Vector3<f64>; 2] {
-    [[gap, 0.0, 0.0], [0.0; 3]]
 }
 
 impl ContactModel for BarrierContact {
@@ -338,8 +223,7 @@ impl ContactModel for BarrierContact {
         blocking.retain(|pair| !self.joined.contains(pair) && added.binary_search_by_key(pair, |one| one.0).is_err());
         added.extend(blocking.into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)))));
         let laws: Vec<Law> = added.iter().map(|(pair, closest)| self.law(pair, closest)).collect();
-        let energy =
-            |((_, closest), law): (&(Pair, Closest), &Law)| law.energy(closest.distance - law.thickness, self.gap);
+        let energy = |((_, closest), law): (&(Pair, Closest), &Law)| law.energy(law.apart(closest));
         let change = added.iter().zip(&laws).map(energy).sum();
         if !added.is_empty() {
             self.joined.extend(added.into_iter().map(|(pair, _)| pair).zip(laws));
@@ -349,13 +233,13 @@ impl ContactModel for BarrierContact {
 
     fn energy(&self, x: &[Vector3<f64>]) -> f64 {
         let mut sum = self.friction.energy(x);
-        self.for_each_active(x, |_, law, _, apart| sum += law.energy(apart, self.gap));
+        self.joined.for_each_active(x, |_, law, closest| sum += law.energy(law.apart(closest)));
         sum
     }
 
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        self.for_each_active(x, |pair, law, closest, apart| {
-            let push = law.force(apart, self.gap);
+        self.joined.for_each_active(x, |pair, law, closest| {
+            let push = law.force(law.apart(closest));
             for (&vertex, weight) in pair.vertices.iter().zip(closest.weights) {
                 let pull = &mut force[vertex as usize];
                 *pull = add_scaled(*pull, push * weight, closest.normal);
@@ -367,9 +251,8 @@ impl ContactModel for BarrierContact {
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
         let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
         let mut contacts = Vec::new();
-        self.for_each_active(x, |pair, law, closest, apart| {
-            let curvature = law.barrier(self.gap).hessian(&between(apart)).hessian.as_ref()[0][0][0];
-            let n = closest.normal;
+        self.joined.for_each_active(x, |pair, law, closest| {
+            let (curvature, n) = (law.curvature(law.apart(closest)), closest.normal);
             contacts.push(Contact {
                 rows: pair.vertices.each_ref().map(row),
                 weights: closest.weights,
@@ -377,8 +260,8 @@ impl ContactModel for BarrierContact {
             });
         });
         self.counts.active += contacts.len() as u64;
-        self.friction.add_contacts(x, row, &mut contacts);
         self.counts.systems += 1;
+        self.friction.add_contacts(x, row, &mut contacts);
         contacts
     }
 
