@@ -2,14 +2,14 @@
 //! move.
 //!
 //! **Energy.** A pair at distance d, with thickness ξ and activation gap g, has the energy K β(s), β(s) =
-//! −(1 − s)² ln s, s = (d − ξ)/g, below s = 1, and none above ([`DistanceBarrier`](energy_elements::DistanceBarrier) of the gap). d is the distance of
-//! two closed features: a point and a triangle, or two edges. Its gradient is c ⊗ n for the unit normal n and the
-//! coefficients c of the closest points, so forces and torques of a contact cancel to rounding. Friction is in
-//! `friction.rs`.
+//! −(1 − s)² ln s, s = (d − ξ)/g, below s = 1, and none above. It is the element
+//! [`DistanceBarrier`](energy_elements::DistanceBarrier) of the gap. d is the distance of two closed features: a point
+//! and a triangle, or two edges. Its gradient is c ⊗ n for the unit normal n and the coefficients c of the closest
+//! points, so forces and torques of a contact cancel to rounding. Friction is in `friction.rs`.
 //!
 //! **Which pairs act.** Two surfaces meet in many pairs. A pair joins at an iterate if its closest points are a local
-//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a single function,
-//! which a filter in every trial would not be. A pair that shortens a move joins in any case.
+//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a single
+//! function, which a filter in every trial would not be. A pair that shortens a move joins in any case.
 //!
 //! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
 //! vertices are against a displacement along the normal. Nothing is left to tune.
