@@ -70,7 +70,7 @@ impl<'a> Meeting<'a> {
         }
         let ends = self.mesh.edges()[edge as usize];
         let heights = self.mesh.apexes(edge as usize).iter().map(|&apex| across(self.x, ends, apex));
-        // In the direction −s/‖s‖ of the sum s of n unit vectors, some vector has a component of at least −‖s‖/n.
+        // If n unit vectors all fall away from a direction by the sine, the length of their sum is at least n times it.
         let (sum, count) = heights.fold(([0.0; 3], 0.0), |(sum, n), height| (add_scaled(sum, 1.0, height), n + 1.0));
         let may_be = norm(sum) >= RIDGE * count;
         self.last = Some((edge, may_be));

@@ -12,7 +12,7 @@ use energy_solve::Contact;
 
 use super::joined::Law;
 use crate::collision::{Closest, Pair};
-use crate::geometry::add_scaled;
+use crate::geometry::{add_scaled, subtract};
 
 /// The sliding velocity at which friction is μ/√2 times the normal force, in m/s.
 const STICKING: f64 = 1e-3;
@@ -25,7 +25,7 @@ pub(super) struct Friction {
     /// Positions at the start of the step.
     pub start: Vec<Vector3<f64>>,
     /// The size of the step, in s.
-    pub dt: f64,
+    dt: f64,
     /// The pairs in contact at the start.
     sliding: Vec<Sliding>,
 }
@@ -71,10 +71,7 @@ impl Friction {
     pub fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
         for one in &self.sliding {
             let [slope] = one.element.gradient(&[one.between(x)]).gradient;
-            for (&vertex, weight) in one.pair.vertices.iter().zip(one.weights) {
-                let pull = &mut force[vertex as usize];
-                *pull = add_scaled(*pull, -weight, slope);
-            }
+            one.pair.add(one.weights, slope.map(|component| -component), force);
         }
     }
 
@@ -97,6 +94,6 @@ impl Sliding {
 
 /// Σ cᵢ xᵢ for coefficients with the sum 0. Differences to one corner lose fewer digits.
 fn combine(weights: &[f64; 4], corners: &[Vector3<f64>; 4]) -> Vector3<f64> {
-    let from_first = |corner: &Vector3<f64>| crate::geometry::subtract(*corner, corners[0]);
+    let from_first = |corner: &Vector3<f64>| subtract(*corner, corners[0]);
     weights.iter().zip(corners).fold([0.0; 3], |sum, (weight, corner)| add_scaled(sum, *weight, from_first(corner)))
 }

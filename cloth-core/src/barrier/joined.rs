@@ -10,6 +10,7 @@ use crate::collision::{Closest, Measured, Pair};
 const STIFFNESS_RATIO: f64 = 10.0;
 /// β″(½).
 const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
+
 /// The pairs in contact, or close to it, in order.
 #[derive(Debug, Default)]
 pub(super) struct Joined {

@@ -29,7 +29,6 @@ use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 pub use start::ContactError;
 
 use crate::collision::{Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
-use crate::geometry::add_scaled;
 use feasible::Meeting;
 use friction::Friction;
 use joined::{Joined, Law};
@@ -240,10 +239,7 @@ impl ContactModel for BarrierContact {
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
         self.joined.for_each_active(x, |pair, law, closest| {
             let push = law.force(law.apart(closest));
-            for (&vertex, weight) in pair.vertices.iter().zip(closest.weights) {
-                let pull = &mut force[vertex as usize];
-                *pull = add_scaled(*pull, push * weight, closest.normal);
-            }
+            pair.add(closest.weights, closest.normal.map(|component| push * component), force);
         });
         self.friction.add_force(x, force);
     }

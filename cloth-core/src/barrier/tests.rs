@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::collision::PairKind;
-use crate::geometry::{cross, dot, norm, subtract};
+use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 
 const THICKNESS: f64 = 1e-3;
 const GAP: f64 = 2e-3;

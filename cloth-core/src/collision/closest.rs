@@ -1,12 +1,12 @@
 //! Closest points of a point and a triangle, and of two edges (Ericson, "Real-Time Collision Detection", 2005, §5.1).
 //!
 //! The formulas have no branches, so that SIMD lanes evaluate many pairs at a time. They use plain sums and products:
-//! results have the same bits in any number of lanes. Vectors are written out by components: closures that build arrays
-//! would stay calls, which SIMD levels cannot compile for themselves.
+//! results have the same bits in any number of lanes.
 
 use energy_dsl::{Real, Vector3};
 
 use super::{Pair, PairKind};
+use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 
 /// The closest points p and q of a pair. `V` is a number, or several of them in lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,13 +45,13 @@ impl<V: Real> Closest<V> {
             }
         };
         // Differences to one corner lose fewer digits than a sum of positions.
-        let origin = &corners[kind.first()];
+        let origin = corners[kind.first()];
         let zero = V::from_f64(0.0);
         let mut apart = [zero; 3];
         for corner in 0..4 {
-            apart = add_scaled(&apart, weights[corner], &subtract(&corners[corner], origin));
+            apart = add_scaled(apart, weights[corner], subtract(corners[corner], origin));
         }
-        let distance = dot(&apart, &apart).sqrt();
+        let distance = norm(apart);
         let is_apart = zero.less(distance);
         let [x, y, z] = apart;
         let normal = select(is_apart, &[x / distance, y / distance, z / distance], &[zero; 3]);
@@ -66,7 +66,7 @@ pub(super) fn separation<V: Real>(n: &[V; 3], corners: &[[V; 3]; 4], first: usiz
     let mut least = V::from_f64(f64::INFINITY);
     for a in 0..first {
         for b in first..4 {
-            least = least.min(dot(n, &subtract(&corners[a], &corners[b])));
+            least = least.min(dot(*n, subtract(corners[a], corners[b])));
         }
     }
     least
@@ -76,13 +76,13 @@ pub(super) fn separation<V: Real>(n: &[V; 3], corners: &[[V; 3]; 4], first: usiz
 /// point avoids.
 #[inline(always)]
 fn on_triangle<V: Real>(corners: &[[V; 3]; 4]) -> [V; 3] {
-    let [p, a, b, c] = corners;
+    let [p, a, b, c] = *corners;
     let (zero, one) = (V::from_f64(0.0), V::from_f64(1.0));
     let (ab, ac) = (subtract(b, a), subtract(c, a));
     let (ap, bp, cp) = (subtract(p, a), subtract(p, b), subtract(p, c));
-    let (d1, d2) = (dot(&ab, &ap), dot(&ac, &ap));
-    let (d3, d4) = (dot(&ab, &bp), dot(&ac, &bp));
-    let (d5, d6) = (dot(&ab, &cp), dot(&ac, &cp));
+    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
+    let (d3, d4) = (dot(ab, bp), dot(ac, bp));
+    let (d5, d6) = (dot(ab, cp), dot(ac, cp));
     let (va, vb, vc) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
     let is_negative = |x: V| x.less_or_equal(zero);
     let is_positive = |x: V| zero.less_or_equal(x);
@@ -107,9 +107,9 @@ fn on_triangle<V: Real>(corners: &[[V; 3]; 4]) -> [V; 3] {
     let v = V::select(is_beyond_bc, one - w, fraction(v, sum));
     let u = V::select(is_beyond_bc, zero, (one - v - w).max(zero));
 
-    let normal = cross(&ab, &ac);
-    let least = V::from_f64(1e-20) * dot(&ab, &ab) * dot(&ac, &ac);
-    let is_flat = dot(&normal, &normal).less_or_equal(least);
+    let normal = cross(ab, ac);
+    let least = V::from_f64(1e-20) * dot(ab, ab) * dot(ac, ac);
+    let is_flat = dot(normal, normal).less_or_equal(least);
     if !energy_dsl::Mask::any(is_flat) {
         return [u, v, w];
     }
@@ -118,15 +118,15 @@ fn on_triangle<V: Real>(corners: &[[V; 3]; 4]) -> [V; 3] {
 
 /// Barycentric coordinates of the closest point of a triangle without area: that of the nearest side.
 #[inline(always)]
-fn on_sides<V: Real>(p: &[V; 3], corners: [&[V; 3]; 3]) -> [V; 3] {
+fn on_sides<V: Real>(p: [V; 3], corners: [[V; 3]; 3]) -> [V; 3] {
     let one = V::from_f64(1.0);
     let (mut least, mut nearest) = (V::from_f64(f64::INFINITY), [V::from_f64(0.0); 3]);
     for start in 0..3 {
         let end = (start + 1) % 3;
         let (along, to) = (subtract(corners[end], corners[start]), subtract(p, corners[start]));
-        let t = fraction(dot(&to, &along), dot(&along, &along));
-        let rest = add_scaled(&to, -t, &along);
-        let square = dot(&rest, &rest);
+        let t = fraction(dot(to, along), dot(along, along));
+        let rest = add_scaled(to, -t, along);
+        let square = dot(rest, rest);
         let is_nearer = square.less(least);
         let mut coordinates = [V::from_f64(0.0); 3];
         (coordinates[start], coordinates[end]) = (one - t, t);
@@ -138,11 +138,11 @@ fn on_sides<V: Real>(p: &[V; 3], corners: [&[V; 3]; 3]) -> [V; 3] {
 
 /// Parameters of the closest points on the segments from x₀ to x₁ and from x₂ to x₃.
 #[inline(always)]
-fn on_segments<V: Real>([a, b, c, d]: &[[V; 3]; 4]) -> [V; 2] {
+fn on_segments<V: Real>(&[a, b, c, d]: &[[V; 3]; 4]) -> [V; 2] {
     let (zero, one) = (V::from_f64(0.0), V::from_f64(1.0));
     let (u, v, r) = (subtract(b, a), subtract(d, c), subtract(a, c));
-    let (uu, vv, uv) = (dot(&u, &u), dot(&v, &v), dot(&u, &v));
-    let (ur, vr) = (dot(&u, &r), dot(&v, &r));
+    let (uu, vv, uv) = (dot(u, u), dot(v, v), dot(u, v));
+    let (ur, vr) = (dot(u, r), dot(v, r));
     let area = uu * vv - uv * uv;
     let is_skew = (V::from_f64(1e-14) * uu * vv).less(area);
     let s = V::select(is_skew, fraction(uv * vr - ur * vv, area), zero);
@@ -163,29 +163,8 @@ fn fraction<V: Real>(a: V, b: V) -> V {
     V::select(zero.less(a) & zero.less(b), (a / b).min(V::from_f64(1.0)), zero)
 }
 
-#[inline(always)]
-fn subtract<V: Real>(a: &[V; 3], b: &[V; 3]) -> [V; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// a + s b.
-#[inline(always)]
-fn add_scaled<V: Real>(a: &[V; 3], s: V, b: &[V; 3]) -> [V; 3] {
-    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
-}
-
 /// a where the mask holds, b elsewhere.
 #[inline(always)]
 fn select<V: Real>(mask: V::Mask, a: &[V; 3], b: &[V; 3]) -> [V; 3] {
     [V::select(mask, a[0], b[0]), V::select(mask, a[1], b[1]), V::select(mask, a[2], b[2])]
-}
-
-#[inline(always)]
-fn dot<V: Real>(a: &[V; 3], b: &[V; 3]) -> V {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross<V: Real>(a: &[V; 3], b: &[V; 3]) -> [V; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -11,10 +11,9 @@ pub(crate) fn excursions(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Vec<f64>
     from.iter().zip(to).map(excursion).collect()
 }
 
-/// Returns the mean of to − from.
+/// Returns the mean of to − from. Its rounding error moves all vertices alike, so it changes no distance.
 pub(super) fn mean_displacement(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Vector3<f64> {
-    let sum = from.iter().zip(to).fold([0.0; 3], |sum, (from, to)| add_scaled(sum, 1.0, subtract(*to, *from)));
-    sum.map(|component| component / from.len().max(1) as f64)
+    subtract(mean(to), mean(from))
 }
 
 /// Returns the mean of some positions.

@@ -1,5 +1,7 @@
 use energy_dsl::Vector3;
 
+use crate::geometry::add_scaled;
+
 /// The kind of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum PairKind {
@@ -56,5 +58,14 @@ impl Pair {
     #[inline]
     pub fn corners(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 4] {
         self.of(x)
+    }
+
+    /// Adds a vector to those of its vertices, times their coefficients.
+    #[inline]
+    pub fn add(&self, weights: [f64; 4], vector: Vector3<f64>, all: &mut [Vector3<f64>]) {
+        for (&vertex, weight) in self.vertices.iter().zip(weights) {
+            let own = &mut all[vertex as usize];
+            *own = add_scaled(*own, weight, vector);
+        }
     }
 }

@@ -4,30 +4,37 @@ mod bounds;
 mod hierarchy;
 mod pose;
 
-use energy_dsl::Vector3;
+use energy_dsl::Real;
 
 pub(crate) use bounds::Bounds;
 pub(crate) use hierarchy::Hierarchy;
 pub use pose::Pose;
 
-pub(crate) fn subtract(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> {
-    std::array::from_fn(|axis| a[axis] - b[axis])
+// Vectors of numbers, or of SIMD lanes of numbers. They are written out by components: closures that build arrays would
+// stay calls, which SIMD levels cannot compile for themselves.
+
+#[inline(always)]
+pub(crate) fn subtract<V: Real>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-pub(crate) fn cross(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> {
+#[inline(always)]
+pub(crate) fn cross<V: Real>(a: [V; 3], b: [V; 3]) -> [V; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-pub(crate) fn dot(a: Vector3<f64>, b: Vector3<f64>) -> f64 {
+#[inline(always)]
+pub(crate) fn dot<V: Real>(a: [V; 3], b: [V; 3]) -> V {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn norm(a: Vector3<f64>) -> f64 {
+#[inline(always)]
+pub(crate) fn norm<V: Real>(a: [V; 3]) -> V {
     dot(a, a).sqrt()
 }
 
 /// a + s b.
-#[inline]
-pub(crate) fn add_scaled(a: Vector3<f64>, s: f64, b: Vector3<f64>) -> Vector3<f64> {
-    std::array::from_fn(|axis| a[axis] + s * b[axis])
+#[inline(always)]
+pub(crate) fn add_scaled<V: Real>(a: [V; 3], s: V, b: [V; 3]) -> [V; 3] {
+    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
 }
