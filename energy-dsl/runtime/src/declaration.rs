@@ -97,6 +97,18 @@ impl OperationCount {
     pub const fn instructions(&self) -> usize {
         self.basic + self.fused + self.divisions_and_roots + self.transcendental + self.error_terms
     }
+
+    /// Returns the count of as many runs.
+    #[must_use]
+    pub const fn times(self, runs: usize) -> Self {
+        Self {
+            basic: self.basic * runs,
+            fused: self.fused * runs,
+            divisions_and_roots: self.divisions_and_roots * runs,
+            transcendental: self.transcendental * runs,
+            error_terms: self.error_terms * runs,
+        }
+    }
 }
 
 /// One generated routine.

@@ -1,6 +1,7 @@
 //! Code that generated elements call, and code that calls them: number types, SIMD lanes and levels, element traits,
 //! batches, and the self-description of every generated element.
 
+mod accumulate;
 mod aligned;
 mod array;
 mod batch;
@@ -13,6 +14,8 @@ pub mod interop;
 mod numbers;
 mod results;
 
+#[doc(hidden)]
+pub use accumulate::Accumulate;
 pub use aligned::Aligned;
 pub use array::Array;
 pub use batch::{

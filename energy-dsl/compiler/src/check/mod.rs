@@ -11,7 +11,7 @@ mod signature;
 mod typed;
 mod units;
 
-pub use typed::{Input, Program, Source, Typed, TypedKind};
+pub use typed::{Binding, Input, Program, Source, Typed, TypedKind};
 pub use units::unit_exponents;
 
 use crate::diagnostic::Diagnostics;

@@ -2,7 +2,7 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 use crate::check::{Input, Program};
-use crate::graph::{Graph, NodeId, count};
+use crate::graph::NodeId;
 use crate::routines::{Routine, Routines};
 use energy_runtime::{Kind, OperationCount};
 
@@ -30,7 +30,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     });
     let primitives = &routines.primitives;
     let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
-    let list = routines.list.iter().map(|r| routine(&routines.graph, r));
+    let list = routines.list.iter().map(|r| routine(routines, r));
     quote! {
         ::energy_dsl::Declaration {
             name: #name,
@@ -98,14 +98,15 @@ fn fields(inputs: &[Input]) -> TokenStream {
         .collect()
 }
 
-fn routine(graph: &Graph, routine: &Routine) -> TokenStream {
+fn routine(routines: &Routines, routine: &Routine) -> TokenStream {
     let name = routine.name;
-    let (reduced, full) = (tokens(graph, &routine.reduced_outputs()), tokens(graph, &routine.outputs()));
+    let [reduced, full] =
+        [routine.reduced_outputs(), routine.outputs()].map(|outputs| tokens(routines.count(&outputs)));
     quote!(::energy_dsl::Routine { name: #name, reduced: #reduced, full: #full })
 }
 
-fn tokens(graph: &Graph, outputs: &[NodeId]) -> TokenStream {
-    let OperationCount { basic, fused, divisions_and_roots, transcendental, error_terms } = count(graph, outputs);
+fn tokens(count: OperationCount) -> TokenStream {
+    let OperationCount { basic, fused, divisions_and_roots, transcendental, error_terms } = count;
     quote! {
         ::energy_dsl::OperationCount {
             basic: #basic,

@@ -3,10 +3,11 @@ use quote::{format_ident, quote};
 
 use super::declaration::declaration;
 use super::methods::component;
+use super::repeated;
 use super::schedule::Schedule;
 use super::traits::traits;
 use crate::check::{Input as DeclaredInput, Program};
-use crate::graph::{Input, count};
+use crate::graph::Input;
 use crate::routines::Routines;
 use energy_runtime::Kind;
 
@@ -17,10 +18,11 @@ pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
     let structure = structure(&name, program, routines);
     let constructor = constructor(&name, program, routines);
     let element = element(&name, program, routines);
+    let term = repeated::term(&name, program, routines);
     let traits = traits(&name, program, routines);
     let packed = packed(&name, program, routines);
     let test = audit_test(&name, program);
-    quote!(#structure #constructor #element #traits #packed #test)
+    quote!(#structure #constructor #element #term #traits #packed #test)
 }
 
 fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
@@ -75,16 +77,14 @@ fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
     }
     lines.extend(["".into(), "| routine | operations | in reduced coordinates |".into(), "|---|---|---|".into()]);
     for routine in &routines.list {
-        let (full, reduced) = (
-            count(&routines.graph, &routine.outputs()).total(),
-            count(&routines.graph, &routine.reduced_outputs()).total(),
-        );
+        let (full, reduced) =
+            (routines.count(&routine.outputs()).total(), routines.count(&routine.reduced_outputs()).total());
         lines.push(format!("| `{}` | {full} | {reduced} |", routine.name));
     }
     lines
 }
 
-fn input_type(input: &DeclaredInput) -> TokenStream {
+pub(super) fn input_type(input: &DeclaredInput) -> TokenStream {
     input.input_type.dimensions().into_iter().rev().fold(quote!(T), |entry, length| quote!([#entry; #length]))
 }
 

@@ -3,12 +3,15 @@
 //! A routine `f` becomes `f_at::<L>`, which is inlined into a caller at SIMD level L, and `f`, which runs it at the
 //! best level of the machine. If precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general`
 //! by `f_is_ordinary`.
+//!
+//! For a sum of like terms, these are the routines of one term, and `f_at` is the loop over all.
 
 use std::cell::RefCell;
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
+use super::repeated::{self, term_of};
 use super::schedule::Schedule;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Graph, Input, NodeId};
@@ -47,11 +50,19 @@ pub(super) fn implementation(
     routines: &Routines,
 ) -> TokenStream {
     let of = format_ident!("{of}");
-    let (levelled, general): (Vec<_>, Vec<_>) = methods.iter().map(|m| method(m, name, program, routines)).unzip();
+    let term = term_of(name, routines);
+    let owner = term.as_ref().unwrap_or(name);
+    let emitted = methods.iter().map(|method| self::method(method, owner, program, routines));
+    let (levelled, general): (Vec<_>, Vec<_>) = emitted
+        .map(|Emitted { plain, levelled, general }| match &term {
+            None => (quote!(#plain #levelled), general),
+            Some(_) => (plain, quote!(#levelled #general)),
+        })
+        .unzip();
     let general = general.iter().any(|g| !g.is_empty()).then(|| {
         quote! {
             #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
-            impl<T: ::energy_dsl::Real> #name<T> {
+            impl<T: ::energy_dsl::Real> #owner<T> {
                 #(#general)*
             }
         }
@@ -67,8 +78,18 @@ pub(super) fn implementation(
     }
 }
 
-/// Emits a method with its levelled form, and its general path if there is one.
-fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines) -> (TokenStream, TokenStream) {
+/// A method of a trait.
+struct Emitted {
+    /// The method, and for a sum of like terms the loop over the terms.
+    plain: TokenStream,
+    /// The routine at a SIMD level.
+    levelled: TokenStream,
+    /// Its general path, if there is one.
+    general: TokenStream,
+}
+
+/// Emits a method. Its routine is one of `owner`: the element, or one term of it.
+fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines) -> Emitted {
     let routine = routines
         .list
         .iter()
@@ -100,7 +121,7 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
             // replaced afterwards. A scalar branches first. Values are passed by copy: a reference would force them
             // into memory on both paths.
             let WithCare { inputs, outputs, reads, returns, summed, code } =
-                with_care(method, name, program, routines, routine, general);
+                with_care(method, owner, program, routines, routine, general);
             let select = quote! {
                 let ordinary = self.#is_ordinary::<L>(#(#names),*);
                 if T::WIDE {
@@ -154,18 +175,30 @@ fn method(method: &Method, name: &Ident, program: &Program, routines: &Routines)
             (select, general)
         }
     };
-    let methods = quote! {
+    let sum = routines.repetition.as_ref().map(|_| {
+        let sum = repeated::sum(owner, &levelled, &names);
+        quote! {
+            #[inline(always)]
+            fn #levelled<L: ::energy_dsl::Level>(#arguments) -> #result_type {
+                #sum
+            }
+        }
+    });
+    let plain = quote! {
         #[inline]
         fn #plain(#arguments) -> #result_type {
             T::dispatch(::energy_dsl::#call(self, #(#names),*))
         }
 
+        #sum
+    };
+    let levelled = quote! {
         #[inline(always)]
         fn #levelled<L: ::energy_dsl::Level>(#arguments) -> #result_type {
             #body
         }
     };
-    (methods, general)
+    Emitted { plain, levelled, general }
 }
 
 /// The general path of a routine: inputs, outputs and code.

@@ -3,6 +3,7 @@
 mod declaration;
 mod items;
 mod methods;
+mod repeated;
 mod schedule;
 mod traits;
 

@@ -1,11 +1,11 @@
 use crate::check::{Input, Program};
 use crate::diagnostic::Diagnostics;
 use crate::emit::{Character, character};
-use crate::graph::{self, NodeId, Op, count};
+use crate::graph::{self, NodeId, Op};
 use crate::inspect::mutation::{Mutation, faults};
 use crate::inspect::tape::Tape;
 use crate::inspect::textbook::{file_programs, programs};
-use crate::lower::lower;
+use crate::lower::{Repetition, lower};
 use crate::properties::prove;
 use crate::routines::{Routines, differentiate};
 use energy_runtime::{
@@ -32,6 +32,8 @@ pub struct Interpreted {
     declaration: &'static Declaration,
     rest: Tape,
     routines: Vec<InterpretedRoutine>,
+    /// The numbers of each term, if the routines compute one term of a sum.
+    repetition: Option<Repetition>,
 }
 
 /// Routines that blocks are taken from.
@@ -107,6 +109,7 @@ impl Interpreted {
             declaration: Box::leak(Box::new(describe(program, routines))),
             rest: Tape::new(&routines.rest.graph, std::slice::from_ref(&routines.rest.outputs), &degenerate),
             routines: list.collect(),
+            repetition: routines.repetition.clone(),
         }
     }
 
@@ -127,7 +130,7 @@ impl Interpreted {
         let rest = self.precomputed(inputs)?;
         let run = |name: &str| {
             let routine = self.routines.iter().find(|r| r.name == name);
-            routine.expect("compiler bug: the kind decides the routines").run(inputs, &rest)
+            self.run(routine.expect("compiler bug: the kind decides the routines"), inputs, &rest)
         };
         let points = self.declaration.points.len();
         let (mut blocks, mut repeats) = (Vec::new(), Vec::new());
@@ -189,7 +192,7 @@ impl Interpreted {
         precomputed: &[T],
     ) -> Option<(Vec<Vec<T>>, Flags<T>)> {
         let routine = self.routines.iter().find(|routine| routine.name == name)?;
-        let Results { groups, flags } = routine.run(inputs, precomputed);
+        let Results { groups, flags } = self.run(routine, inputs, precomputed);
         Some((groups, flags))
     }
 
@@ -215,7 +218,24 @@ impl Interpreted {
     pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Result<Vec<bool>, RestError> {
         let rest = self.precomputed(inputs)?;
         let routines = self.routines.iter().filter(|r| EVALUATED.contains(&r.name));
-        Ok(routines.flat_map(|routine| routine.ordinary.comparisons(inputs, &rest)).collect())
+        let terms = self.terms(&rest);
+        let outcomes = |tape: &Tape| terms.iter().flat_map(|term| tape.comparisons(inputs, term)).collect::<Vec<_>>();
+        Ok(routines.flat_map(|routine| outcomes(&routine.ordinary)).collect())
+    }
+
+    /// Returns the stored numbers that each term reads; all of them if the formula is no sum of like terms.
+    fn terms<T: Number>(&self, precomputed: &[T]) -> Vec<Vec<T>> {
+        match &self.repetition {
+            None => vec![precomputed.to_vec()],
+            Some(all) => (0..all.terms()).map(|term| all.numbers(term, precomputed, T::from_f64)).collect(),
+        }
+    }
+
+    /// Runs a routine for all terms, and adds the results.
+    fn run<T: Number>(&self, routine: &InterpretedRoutine, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Results<T> {
+        let mut results = self.terms(precomputed).into_iter().map(|term| routine.run(inputs, &term));
+        let first = results.next().expect("compiler bug: a sum has terms");
+        results.fold(first, Results::plus)
     }
 
     /// Returns every fault that can be planted in the numbers of the ordinary path. Operations that only choose between
@@ -269,6 +289,16 @@ struct Results<T: Number> {
 impl<T: Number> Results<T> {
     fn group(&self, number: usize) -> Vec<T> {
         self.groups[number].clone()
+    }
+
+    fn plus(self, term: Self) -> Self {
+        let add = |(sum, term): (Vec<T>, Vec<T>)| sum.into_iter().zip(term).map(|(a, b)| a + b).collect::<Vec<_>>();
+        let groups: Vec<Vec<T>> = self.groups.into_iter().zip(term.groups).map(add).collect();
+        let sum = groups.iter().flatten().cloned().fold(T::from_f64(0.0), |sum, number| sum + number);
+        let finite = (sum.clone() - sum).equal(T::from_f64(0.0));
+        let mut flags = self.flags.union(term.flags);
+        flags.degenerate = flags.degenerate | !finite;
+        Self { groups, flags }
     }
 }
 
@@ -365,8 +395,8 @@ fn describe(program: &Program, routines: &Routines) -> Declaration {
     let vectors = routines.vectors.iter().map(|vector| &*vector.clone().leak()).collect::<Vec<_>>();
     let list = routines.list.iter().map(|routine| Routine {
         name: routine.name,
-        reduced: count(&routines.graph, &routine.reduced_outputs()),
-        full: count(&routines.graph, &routine.outputs()),
+        reduced: routines.count(&routine.reduced_outputs()),
+        full: routines.count(&routine.outputs()),
     });
     Declaration {
         name: program.name.clone().leak(),

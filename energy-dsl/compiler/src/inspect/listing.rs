@@ -5,7 +5,7 @@ use proc_macro2::TokenStream;
 use crate::check::Program;
 use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
-use crate::graph::{NodeId, count};
+use crate::graph::NodeId;
 use crate::inspect::interpret::{interpret, interpret_mask};
 use crate::inspect::layout::{layout, methods};
 use crate::inspect::textbook::{file_programs, programs};
@@ -124,9 +124,8 @@ impl Listing {
             writeln!(text, "  {name:<32} {:>10}  {:>12}", count.total(), count.instructions())
                 .expect("writing to a string succeeds");
         };
-        let graph = &self.routines.graph;
         for routine in &self.routines.list {
-            row(routine.name, count(graph, &routine.outputs()));
+            row(routine.name, self.routines.count(&routine.outputs()));
         }
         let hessian = self.routines.list.iter().find(|routine| routine.name == "hessian");
         let Some([value, gradient, triangle]) = hessian.map(|routine| &routine.groups[..]) else { return text };
@@ -138,7 +137,7 @@ impl Listing {
             for (_, block) in pairs.zip(triangle.chunks(9)).filter(|((i, j), _)| *i != pinned && *j != pinned) {
                 outputs.extend(block);
             }
-            row(&format!("hessian, point {pinned} pinned"), count(graph, &outputs));
+            row(&format!("hessian, point {pinned} pinned"), self.routines.count(&outputs));
         }
         text
     }

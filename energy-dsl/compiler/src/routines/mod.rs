@@ -5,9 +5,9 @@ mod hazards;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, second_order};
-use crate::graph::{Graph, Input, NodeId, Op, general, ordinary, with_signs_inside};
-use crate::lower::{Formula, RestFormula};
-use energy_runtime::{Flag, Kind};
+use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
+use crate::lower::{Formula, Repetition, RestFormula};
+use energy_runtime::{Flag, Kind, OperationCount};
 use hazards::{Hazards, hazards, operations};
 
 /// A routine to be generated.
@@ -137,8 +137,10 @@ pub struct Routines {
     pub rest: RestFormula,
     /// Mask under which the rest shape is degenerate or inverted.
     pub refused: Option<NodeId>,
-    /// Graph of the moving part.
+    /// Graph of the moving part, or of one term of it.
     pub graph: Graph,
+    /// The numbers of each term, if the routines compute one term of a sum.
+    pub repetition: Option<Repetition>,
     /// Routines in the order of the trait methods.
     pub list: Vec<Routine>,
     /// Number of reduced coordinates.
@@ -153,6 +155,14 @@ pub struct Routines {
     pub primitives: Vec<&'static str>,
     /// Routes to the derivatives of each routine.
     pub plans: Vec<Plan>,
+}
+
+impl Routines {
+    /// Counts the operations that compute some outputs, in all terms of a sum.
+    #[must_use]
+    pub fn count(&self, outputs: &[NodeId]) -> OperationCount {
+        count(&self.graph, outputs).times(self.repetition.as_ref().map_or(1, Repetition::terms))
+    }
 }
 
 /// Derivatives with respect to points, as functions of the numbers of a reduced routine: [`Input::Precomputed`] 0 to n
@@ -193,9 +203,9 @@ impl Expansion {
 #[must_use]
 pub fn differentiate(
     program: &Program,
-    (mut rest, Formula { mut graph, outputs }): (RestFormula, Formula),
+    (mut rest, Formula { mut graph, outputs, repetition }): (RestFormula, Formula),
 ) -> Routines {
-    let refused = refused(&mut rest.graph, &rest.outputs);
+    let refused = refused(&mut rest);
     let g = &mut graph;
     let coordinates = match program.kind {
         Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
@@ -231,6 +241,7 @@ pub fn differentiate(
         primitives,
         plans,
         graph,
+        repetition,
     }
 }
 
@@ -307,15 +318,14 @@ fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut 
 }
 
 /// Returns the mask of rest shapes for which a robust primitive is a convention, or a determinant is not positive.
-fn refused(g: &mut Graph, outputs: &[NodeId]) -> Option<NodeId> {
-    let rules = operations(g, outputs).into_iter().filter_map(|node| g.rule(node));
+fn refused(rest: &mut RestFormula) -> Option<NodeId> {
+    let g = &mut rest.graph;
+    let rules = operations(g, &rest.outputs).into_iter().filter_map(|node| g.rule(node));
     let flags = rules.flat_map(|rule| rule.flags.clone());
     let conventions = flags.filter(|flag| flag.order == 0 && flag.flag == Flag::Degenerate).map(|flag| flag.mask);
     let mut masks: Vec<NodeId> = conventions.collect();
     let zero = g.constant(0.0);
-    for determinant in g.determinants().to_vec() {
-        masks.push(g.less_or_equal(determinant, zero));
-    }
+    masks.extend(rest.determinants.iter().map(|&determinant| g.less_or_equal(determinant, zero)));
     masks.into_iter().reduce(|a, b| g.or(a, b))
 }
 

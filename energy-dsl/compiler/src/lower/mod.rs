@@ -1,5 +1,10 @@
 //! Lowers typed programs to scalar graphs.
 
+mod repeated;
+mod rest;
+
+pub use repeated::Repetition;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -7,6 +12,7 @@ use crate::check::{Program, Source, Typed, TypedKind};
 use crate::diff::{Coordinates, Moving, Order, first_derivatives};
 use crate::functions::{Lowered, RECOGNISERS, Shape};
 use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
+use repeated::{LikeTerms, like_terms};
 
 /// A program as a graph.
 #[derive(Clone, Debug)]
@@ -15,6 +21,8 @@ pub struct Formula {
     pub graph: Graph,
     /// Result, row by row.
     pub outputs: Vec<NodeId>,
+    /// The numbers of each term, if the formula is one term of a sum.
+    pub repetition: Option<Repetition>,
 }
 
 /// The `rest` block of a program as a graph, evaluated once for each element.
@@ -24,39 +32,83 @@ pub struct RestFormula {
     pub graph: Graph,
     /// Numbers to store, in the order of [`Input::Precomputed`].
     pub outputs: Vec<NodeId>,
+    /// Determinants that the block names. They must be positive.
+    pub determinants: Vec<NodeId>,
 }
+
+/// Sums of like terms become loops from this cost on. Below, unrolled terms share what they have in common.
+const LEAST_COST_OF_LOOPS: usize = 1000;
 
 /// Lowers to the robust form, split into the part that the rest shape determines and the part that moves.
 #[must_use]
 pub fn lower(program: &Program) -> (RestFormula, Formula) {
+    let declared = stored_bindings(program);
+    let program = &rest::with_constant_parts_stored(program);
     let mut rest = Lowering::new(program, Form::Robust, None);
-    let stored = stored_bindings(program);
+    declared.into_iter().for_each(|binding| drop(rest.binding(binding)));
+    let determinants = rest.graph.determinants().to_vec();
+    let (outputs, formula) = like_terms(program)
+        .map(|terms| repeated(&terms, &mut rest))
+        .filter(|(_, formula)| formula.cost() >= LEAST_COST_OF_LOOPS)
+        .unwrap_or_else(|| unrolled(program, &mut rest));
+    (RestFormula { graph: rest.graph, outputs, determinants }, formula)
+}
+
+/// Returns the numbers to store, and the formula.
+fn unrolled(program: &Program, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) {
     let mut outputs = Vec::new();
     let mut slots = BTreeMap::new();
-    for &binding in &stored {
+    for binding in stored_bindings(program) {
         slots.insert(binding, outputs.len());
         outputs.extend(rest.binding(binding).parts);
     }
-    let rest = RestFormula { graph: rest.graph, outputs };
+    (outputs, moving(program, &slots))
+}
+
+/// Returns the numbers to store for all terms of a sum, and the formula of one term.
+fn repeated(sum: &LikeTerms, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) {
+    let LikeTerms { term, terms, stored, constants } = sum;
+    let own: BTreeSet<usize> = stored.iter().map(|(b, _)| b).chain(constants.iter().map(|(b, _)| b)).copied().collect();
+    let mut outputs = Vec::new();
+    let mut slots = BTreeMap::new();
+    for binding in stored_bindings(term).into_iter().filter(|binding| !own.contains(binding)) {
+        slots.insert(binding, outputs.len());
+        outputs.extend(rest.binding(binding).parts);
+    }
+    let shared = outputs.len();
+    let mut next = shared;
+    for binding in stored.iter().map(|(b, _)| b).chain(constants.iter().map(|(b, _)| b)) {
+        slots.insert(*binding, next);
+        next += term.bindings[*binding].value.shape.size();
+    }
+    let stride = stored.iter().map(|(binding, _)| term.bindings[*binding].value.shape.size()).sum();
+    for number in 0..*terms {
+        outputs.extend(stored.iter().flat_map(|(_, of)| rest.binding(of[number]).parts));
+    }
+    let row = |number: usize| constants.iter().flat_map(|(_, rows)| rows[number].clone()).collect();
+    let table = (0..*terms).map(row).collect();
+    (outputs, Formula { repetition: Some(Repetition { shared, stride, table }), ..moving(term, &slots) })
+}
+
+/// Lowers what moves. Powers of two that move outwards may meet and cancel, but may also be multiplied more often.
+fn moving(program: &Program, slots: &BTreeMap<usize, usize>) -> Formula {
     let formula = |outward: bool| {
         let mut moving = Lowering::new(program, Form::Robust, Some(slots.clone()));
         moving.graph.move_outward(outward);
         let outputs = moving.expression(&program.result).parts;
         moving.graph.move_outward(false);
-        Formula { graph: moving.graph, outputs }
+        Formula { graph: moving.graph, outputs, repetition: None }
     };
-    // Moved outwards, powers of two may meet and cancel, but may also have to be multiplied more often.
     let [inward, outward] = [false, true].map(formula);
-    let formula = if outward.cost() < inward.cost() { outward } else { inward };
-    (rest, formula)
+    if outward.cost() < inward.cost() { outward } else { inward }
 }
 
 impl Formula {
-    /// Returns the cost of the result on the ordinary path.
+    /// Returns the cost of the result on the ordinary path, that of all terms.
     fn cost(&self) -> usize {
         let mut graph = self.graph.clone();
         let outputs = ordinary(&mut graph, &self.outputs).map_or_else(|| self.outputs.clone(), |(outputs, _)| outputs);
-        count(&graph, &outputs).cost()
+        count(&graph, &outputs).cost() * self.repetition.as_ref().map_or(1, Repetition::terms)
     }
 }
 
@@ -74,7 +126,10 @@ pub struct TextbookFormula {
 pub fn lower_textbook(program: &Program) -> TextbookFormula {
     let mut lowering = Lowering::new(program, Form::Textbook, None);
     let outputs = lowering.expression(&program.result).parts;
-    TextbookFormula { formula: Formula { graph: lowering.graph, outputs }, gradients: lowering.gradients }
+    TextbookFormula {
+        formula: Formula { graph: lowering.graph, outputs, repetition: None },
+        gradients: lowering.gradients,
+    }
 }
 
 /// Returns the bindings of the `rest` block that the moving part reads, in order.

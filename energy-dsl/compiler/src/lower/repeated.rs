@@ -1,0 +1,264 @@
+//! Recognises energies that are sums of like terms, such as sums over quadrature points. The terms differ in stored
+//! numbers and constants only, so that one body in a loop computes all of them.
+
+use std::collections::BTreeMap;
+
+use super::Lowering;
+use crate::check::{Binding, Program, Source, Typed, TypedKind};
+use crate::functions::Shape;
+use crate::graph::Form;
+use energy_runtime::Kind;
+
+/// The numbers of each term of a sum. Term q reads the stored numbers 0 to `shared` − 1, then its own `stride` numbers,
+/// from `shared` + q · `stride`, then row q of the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repetition {
+    /// Stored numbers that all terms read.
+    pub shared: usize,
+    /// Stored numbers that one term reads.
+    pub stride: usize,
+    /// Constants of each term.
+    pub table: Vec<Vec<f64>>,
+}
+
+impl Repetition {
+    /// Returns the number of terms.
+    #[must_use]
+    pub fn terms(&self) -> usize {
+        self.table.len()
+    }
+
+    /// Returns the numbers that a term reads.
+    #[must_use]
+    pub fn numbers<T: Clone>(&self, term: usize, stored: &[T], constant: impl Fn(f64) -> T) -> Vec<T> {
+        let own = self.shared + term * self.stride;
+        let constants = self.table[term].iter().map(|&number| constant(number));
+        stored[..self.shared].iter().chain(&stored[own..own + self.stride]).cloned().chain(constants).collect()
+    }
+}
+
+/// A sum of like terms.
+pub(super) struct LikeTerms {
+    /// The program of one term. It reads what differs from bindings of its own.
+    pub(super) term: Program,
+    /// Number of terms.
+    pub(super) terms: usize,
+    /// Bindings of the term, each with the stored binding that it stands for in each term.
+    pub(super) stored: Vec<(usize, Vec<usize>)>,
+    /// Bindings of the term, each with its constant numbers in each term.
+    pub(super) constants: Vec<(usize, Vec<Vec<f64>>)>,
+}
+
+/// Returns the terms of an energy that is a sum of like terms, times or divided by factors that do not move.
+pub(super) fn like_terms(program: &Program) -> Option<LikeTerms> {
+    if program.kind != Kind::Energy || !program.bindings.iter().any(|binding| binding.rest) {
+        return None;
+    }
+    let mut unifier = Unifier::new(program);
+    let result = unifier.sum(&program.result)?;
+    let Unifier { bindings, stored, constants, terms, .. } = unifier;
+    let mut term = program.clone();
+    term.bindings = bindings;
+    term.result = result;
+    Some(LikeTerms { term, terms, stored, constants })
+}
+
+/// Finds one expression for like terms.
+struct Unifier<'a> {
+    program: &'a Program,
+    /// Bindings of the program, then those of the term.
+    bindings: Vec<Binding>,
+    /// Number of terms.
+    terms: usize,
+    stored: Vec<(usize, Vec<usize>)>,
+    constants: Vec<(usize, Vec<Vec<f64>>)>,
+    /// The binding of the term that stands for these, one for each term.
+    known: BTreeMap<Vec<usize>, usize>,
+}
+
+impl<'a> Unifier<'a> {
+    fn new(program: &'a Program) -> Self {
+        let bindings = program.bindings.clone();
+        Self { program, bindings, terms: 0, stored: Vec::new(), constants: Vec::new(), known: BTreeMap::new() }
+    }
+
+    /// Returns the term of a sum, with the factors of the sum.
+    fn sum(&mut self, typed: &'a Typed) -> Option<Typed> {
+        let within = |list: Vec<Typed>| match &typed.kind {
+            TypedKind::Call(function, _) => Typed { kind: TypedKind::Call(function, list), ..typed.clone() },
+            _ => unreachable!("compiler bug: a call"),
+        };
+        match &typed.kind {
+            TypedKind::Binding(number) => self.sum(&self.program.bindings[*number].value),
+            TypedKind::Call(function, list) => match (function.name, &list[..]) {
+                ("+", _) => self.term(typed),
+                ("*" | "/", [sum, factor]) if self.is_fixed(factor) => {
+                    self.sum(sum).map(|term| within(vec![term, factor.clone()]))
+                }
+                ("*", [factor, sum]) if self.is_fixed(factor) => {
+                    self.sum(sum).map(|term| within(vec![factor.clone(), term]))
+                }
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Returns whether an expression is a scalar that does not depend on positions.
+    fn is_fixed(&self, typed: &Typed) -> bool {
+        typed.shape == Shape::Scalar
+            && match &typed.kind {
+                TypedKind::Constant(_) | TypedKind::Pi => true,
+                TypedKind::Input(source, _) => *source == Source::Parameter,
+                TypedKind::Binding(number) => {
+                    let binding = &self.program.bindings[*number];
+                    binding.rest || self.is_fixed(&binding.value)
+                }
+                TypedKind::Call(_, list) => list.iter().all(|part| self.is_fixed(part)),
+                _ => false,
+            }
+    }
+
+    /// Returns the term that ((t₀ + t₁) + t₂) + … repeats.
+    fn term(&mut self, mut typed: &'a Typed) -> Option<Typed> {
+        let mut terms = Vec::new();
+        while let TypedKind::Call(function, list) = &typed.kind
+            && let ("+", [sum, last]) = (function.name, &list[..])
+        {
+            terms.insert(0, last);
+            // The first term may be a sum of its own.
+            let (bindings, stored, constants) = (self.bindings.len(), self.stored.len(), self.constants.len());
+            let all: Vec<&Typed> = std::iter::once(sum).chain(terms.iter().copied()).collect();
+            if let Some(term) = self.unified(&all) {
+                self.terms = all.len();
+                return Some(term);
+            }
+            self.bindings.truncate(bindings);
+            self.stored.truncate(stored);
+            self.constants.truncate(constants);
+            self.known.clear();
+            typed = sum;
+        }
+        None
+    }
+
+    /// Returns one expression for expressions that differ in stored and constant numbers only.
+    fn unified(&mut self, terms: &[&Typed]) -> Option<Typed> {
+        let first = terms[0];
+        if terms.iter().any(|term| term.shape != first.shape) {
+            return None;
+        }
+        if let Some(numbers) = terms.iter().map(|term| self.literal(term)).collect::<Option<Vec<_>>>() {
+            return Some(self.constant(first, numbers));
+        }
+        let part = |number: usize| -> Vec<&Typed> { terms.iter().map(|term| parts(term)[number]).collect() };
+        if terms.iter().any(|term| parts(term).len() != parts(first).len()) {
+            return None;
+        }
+        let same = |known: fn(&TypedKind, &TypedKind) -> bool| terms.iter().all(|term| known(&first.kind, &term.kind));
+        let alike = match &first.kind {
+            TypedKind::Binding(_) => return self.binding(terms),
+            TypedKind::Constant(_) | TypedKind::Pi => false,
+            TypedKind::Input(..) => same(|a, b| match (a, b) {
+                (TypedKind::Input(a, i), TypedKind::Input(b, j)) => (a, i) == (b, j),
+                _ => false,
+            }),
+            TypedKind::Call(..) => same(|a, b| match (a, b) {
+                (TypedKind::Call(a, _), TypedKind::Call(b, _)) => a.name == b.name,
+                _ => false,
+            }),
+            TypedKind::Gradient(..) => same(|a, b| match (a, b) {
+                (TypedKind::Gradient(_, a, i), TypedKind::Gradient(_, b, j)) => (a, i) == (b, j),
+                _ => false,
+            }),
+            TypedKind::Select(..) => same(|_, b| matches!(b, TypedKind::Select(..))),
+            TypedKind::Array(..) => same(|_, b| matches!(b, TypedKind::Array(..))),
+        };
+        if !alike {
+            return None;
+        }
+        let count = parts(first).len();
+        let unified: Vec<Typed> = (0..count).map(|number| self.unified(&part(number))).collect::<Option<_>>()?;
+        let mut unified = unified.into_iter();
+        Some(super::rest::map_parts(first, |_| unified.next().expect("compiler bug: as many parts")))
+    }
+
+    /// Returns the numbers of an expression without inputs.
+    fn literal(&self, typed: &Typed) -> Option<Vec<f64>> {
+        let mut stack = vec![typed];
+        while let Some(part) = stack.pop() {
+            match &part.kind {
+                TypedKind::Input(..) | TypedKind::Gradient(..) => return None,
+                TypedKind::Binding(number) => {
+                    let binding = &self.program.bindings[*number];
+                    if binding.rest {
+                        return None;
+                    }
+                    stack.push(&binding.value);
+                }
+                _ => stack.extend(parts(part)),
+            }
+        }
+        let mut lowering = Lowering::new(self.program, Form::Robust, None);
+        let nodes = lowering.expression(typed).parts;
+        nodes.into_iter().map(|node| lowering.graph.as_constant(node)).collect()
+    }
+
+    /// Returns a constant of all terms, or a binding that stands for those of each term.
+    fn constant(&mut self, first: &Typed, numbers: Vec<Vec<f64>>) -> Typed {
+        if numbers.iter().all(|row| *row == numbers[0]) {
+            return first.clone();
+        }
+        let known = self.constants.iter().find(|(_, rows)| *rows == numbers).map(|(number, _)| *number);
+        let number = known.unwrap_or_else(|| {
+            let number = self.add(first.clone(), true);
+            self.constants.push((number, numbers));
+            number
+        });
+        Typed { kind: TypedKind::Binding(number), ..first.clone() }
+    }
+
+    fn binding(&mut self, terms: &[&Typed]) -> Option<Typed> {
+        let number = |term: &Typed| if let TypedKind::Binding(number) = term.kind { Some(number) } else { None };
+        let numbers: Vec<usize> = terms.iter().map(|term| number(term)).collect::<Option<_>>()?;
+        let first = numbers[0];
+        if numbers.iter().all(|&number| number == first) {
+            return Some(terms[0].clone());
+        }
+        let stands = match self.known.get(&numbers) {
+            Some(&known) => known,
+            None => {
+                let program = self.program;
+                let bindings: Vec<&Binding> = numbers.iter().map(|&number| &program.bindings[number]).collect();
+                let number = if bindings.iter().all(|binding| binding.rest) {
+                    let number = self.add(bindings[0].value.clone(), true);
+                    self.stored.push((number, numbers.clone()));
+                    number
+                } else if bindings.iter().all(|binding| !binding.rest) {
+                    let value = self.unified(&bindings.iter().map(|binding| &binding.value).collect::<Vec<_>>())?;
+                    self.add(value, false)
+                } else {
+                    return None;
+                };
+                self.known.insert(numbers, number);
+                number
+            }
+        };
+        Some(Typed { kind: TypedKind::Binding(stands), ..terms[0].clone() })
+    }
+
+    fn add(&mut self, value: Typed, rest: bool) -> usize {
+        self.bindings.push(Binding { value, rest, unit: None });
+        self.bindings.len() - 1
+    }
+}
+
+/// Returns the parts of an expression.
+fn parts(typed: &Typed) -> Vec<&Typed> {
+    match &typed.kind {
+        TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().collect(),
+        TypedKind::Select(a, b, c) => vec![&**a, &**b, &**c],
+        TypedKind::Gradient(of, ..) => vec![&**of],
+        TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) | TypedKind::Binding(_) => Vec::new(),
+    }
+}
