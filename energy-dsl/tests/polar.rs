@@ -1,4 +1,4 @@
-//! The polar decomposition F = R S of 2×2 and 3×2 matrices.
+//! The polar decomposition F = R S of 2×2, 3×2 and 3×3 matrices.
 
 use energy_dsl::{Residual, energy};
 
@@ -17,6 +17,14 @@ energy! {
         let P = R * S - F;
         [I[0], I[1], P[0], P[1], P[2], S[0][1] - S[1][0], trace(S), det(S)]
     }
+    residual Solid(F: Mat3x3) {
+        let R = rotation_of(F);
+        let S = stretch_of(F);
+        let I = transpose(R) * R - identity(3);
+        let P = R * S - F;
+        [I[0], I[1], I[2], det(R) - 1, P[0], P[1], P[2], trace(S) - ddot(R, F), det(S) - det(F), trace(S)]
+    }
+    residual RigidSolid(F: Mat3x3) { let D = F - rotation_of(F); [D[0], D[1], D[2]] }
     /// The gradient of ½ ‖F − R‖² is F − R, so its Hessian is the Jacobian.
     residual Rigid(F: Mat2x2) { let D = F - rotation_of(F); [D[0], D[1]] }
     residual RigidMembrane(F: Mat3x2) { let D = F - rotation_of(F); [D[0], D[1], D[2]] }
@@ -78,4 +86,90 @@ fn a_vanishing_sum_is_flagged() {
     assert!(!Rigid::new().jacobian(&[2.0, 0.0, 0.0, -1.0]).flags.any());
     let at = RigidMembrane::new().jacobian(&[1.0, 2.0, 1.0, 2.0, -1.0, -2.0]);
     assert!(at.flags.degenerate && at.jacobian.iter().chain(&at.value).all(|x| f64::is_finite(*x)), "{at:?}");
+}
+
+/// R (in rows) times diag(σ) times the transpose of another rotation.
+fn with_singular_values(seed: usize, values: [f64; 3]) -> [f64; 9] {
+    let rotation = |seed: usize| {
+        let q = numbers::<4>(seed);
+        let length = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let [w, x, y, z] = q.map(|c| c / length);
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    };
+    let (u, v) = (rotation(2 * seed), rotation(2 * seed + 1));
+    std::array::from_fn(|e| (0..3).map(|k| u[e / 3][k] * values[k] * v[e % 3][k]).sum())
+}
+
+#[test]
+fn a_solid_has_a_rotation_and_a_symmetric_stretch() {
+    let lists = [
+        [1.0, 1.0, 1.0],
+        [1.0 + 1e-9, 1.0, 1.0 - 1e-9],
+        [3.0, 2.0, 1.0],
+        [3.0, 2.0, -1.0],
+        [1.0, 1.0, 0.0],
+        [2.0, 2.0, -0.5],
+        [100.0, 1.0, 0.01],
+        [1.0, 1e-3, 1e-3],
+        [1.0, 1e-3, -9e-4],
+        [1e150, 9e149, 1e140],
+        [1e-150, 9e-151, -1e-152],
+    ];
+    for (seed, values) in lists.into_iter().cycle().take(200).enumerate() {
+        let f = with_singular_values(seed, values);
+        let at = Solid::new().residual(&f);
+        let [first, second, third] = values;
+        // The condition number of R.
+        let kappa = first / (second + third);
+        let allowed = |scale: f64| 4e-15 * kappa * scale;
+        let errors = |range: std::ops::Range<usize>| at.value[range].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        assert!(errors(0..10) < 4e-15, "{values:?}: not a rotation: {at:?}");
+        assert!(errors(10..19) <= allowed(first), "{values:?}: {:e} of {:e}", errors(10..19), allowed(first));
+        let trace = at.value[21];
+        assert!((trace - (first + second + third)).abs() <= 1e-14 * first, "{values:?}: trace {trace}");
+        assert!(!at.flags.any(), "{values:?}: {:?}", at.flags);
+    }
+}
+
+#[test]
+fn derivatives_of_a_solid_are_finite_where_singular_values_meet() {
+    // At F = s I, stretches meet 1, rotations 1 − 1/s.
+    for s in [1.0_f64, 0.5, 3.0] {
+        let at = RigidSolid::new().jacobian(&[s, 0.0, 0.0, 0.0, s, 0.0, 0.0, 0.0, s]);
+        let (along, turned) = (1.0 - 0.5 / s, 0.5 / s);
+        for (entry, found) in at.jacobian.iter().enumerate() {
+            let (row, column) = (entry / 9, entry % 9);
+            let opposite = column % 3 * 3 + column / 3;
+            let expected = match row {
+                _ if row == column && row % 4 == 0 => 1.0,
+                _ if row == column => along,
+                _ if row == opposite => turned,
+                _ => 0.0,
+            };
+            assert!((found - expected).abs() < 1e-15, "({row}, {column}): {found}, expected {expected}");
+        }
+        assert!(!at.flags.any());
+    }
+}
+
+#[test]
+fn a_solid_without_a_rotation_is_flagged() {
+    // A reflection, a fold onto a line, nothing at all, and a rotated reflection.
+    let tilted = with_singular_values(3, [2.0, 1.0, -1.0]);
+    for f in [
+        [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0],
+        [1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 0.0, 0.0, 0.0],
+        [0.0; 9],
+        tilted,
+    ] {
+        let at = RigidSolid::new().jacobian(&f);
+        assert!(
+            at.flags.degenerate && at.jacobian.iter().chain(&at.value).all(|x| f64::is_finite(*x)),
+            "{f:?}: {at:?}"
+        );
+    }
 }

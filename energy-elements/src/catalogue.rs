@@ -68,6 +68,8 @@ macro_rules! for_each_element {
             StableNeoHookean,
             StableNeoHookeanLog,
             StrainRateDamping,
+            TetAsRigidAsPossible,
+            TetCorotational,
             TetStVK,
             TetStableNeoHookean,
             ThreadLimit,

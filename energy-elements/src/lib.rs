@@ -65,7 +65,7 @@ elements! {
     stable_neo_hookean: StableNeoHookean;
     strain_rate_damping: StrainRateDamping;
     stvk: StVK;
-    tetrahedra: TetStVK, TetStableNeoHookean;
+    tetrahedra: TetAsRigidAsPossible, TetCorotational, TetStVK, TetStableNeoHookean;
     thread_limit: ThreadLimit;
     tracking: BlendedMotion4, BlendedPoint1, BlendedPoint4, BlendedPoint8, Binding, BoneBinding, FrozenPlane1,
         FrozenPlane4, FrozenPlane8, GraphEdge, HuberLoss, NonrigidPlane1, NonrigidPlane4, NonrigidPlane8, PointToPlane,

@@ -13,11 +13,9 @@ energy! {
     pub energy StableNeoHookeanLog(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaling by a power of two brings triangles of any size near 1.
             let d = det(D_m);
-            let s = power_of_two(d);
-            let B = adjugate(D_m) * s;
-            let d2 = (d * s)^2;
+            let B = scaled_adjugate(D_m);
+            let d2 = scaled_det(D_m)^2;
             let per_d = 1 / d;
             let per_d2 = 1 / d2;
         }
@@ -55,11 +53,9 @@ energy! {
     pub energy NeoHookean(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaling by a power of two brings triangles of any size near 1.
             let d = det(D_m);
-            let s = power_of_two(d);
-            let B = adjugate(D_m) * s;
-            let d2 = (d * s)^2;
+            let B = scaled_adjugate(D_m);
+            let d2 = scaled_det(D_m)^2;
             let per_d = 1 / d;
             let per_d2 = 1 / d2;
         }

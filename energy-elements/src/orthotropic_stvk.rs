@@ -14,14 +14,12 @@ energy! {
     pub energy OrthotropicStVK(x0, x1, x2: Point; rest u0, u1, u2: Vec2; C_u, C_v, C_uv, C_ss: Scalar[N/m]) {
         rest {
             let D_m = columns(u1 - u0, u2 - u0);
-            // Scaling by a power of two brings triangles of any size near 1.
-            let s = power_of_two(det(D_m));
-            let B = adjugate(D_m) * s;
-            let d = (det(D_m) * s)^2;
+            let B = scaled_adjugate(D_m);
+            let d = scaled_det(D_m)^2;
             let per_d = 1 / (2 * d);
             let A = det(D_m) / 2;
         }
-        // F = D D_m⁻¹ times s det D_m. Dividing last gives an exact zero at rest for exactly representable edges.
+        // F = D D_m⁻¹ times the scaled det D_m. Dividing last gives an exact zero at rest for exactly representable edges.
         let F = columns(x1 - x0, x2 - x0) * B;
         let C = transpose(F) * F - d * identity(2);
         let c_u = C * vector(1, 0);

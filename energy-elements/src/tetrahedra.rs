@@ -58,4 +58,43 @@ energy! {
         let deviation = 3/4 * distortion - log1pmx(i / 4, (i + 4) / 4);
         V / 2 * (μ * deviation + λ * j^2)
     }
+
+    /// As-rigid-as-possible solid on a tetrahedron (Sorkine & Alexa 2007; Chao et al. 2010, *A Simple Geometric Model
+    /// for Elastic Deformations*): V μ/2 ‖F − R‖² with the rotation R of the polar decomposition F = R S, det R = 1.
+    ///
+    /// It is ½ V μ Σ (sᵢ − 1)² of the signed singular values s of F, so it resists inversion. Where two of them sum to
+    /// 0, R has no limit: derivatives are taken as 0 and flagged. The rest shape must have a positive volume.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy TetAsRigidAsPossible(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; μ: Scalar[Pa]) {
+        rest {
+            let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
+            let B = inverse(D_m);
+            // The root refuses an inverted rest shape.
+            let V = sqrt(det(D_m))^2 / 6;
+        }
+        let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
+        let D = F - rotation_of(F);
+        V * μ / 2 * ddot(D, D)
+    }
+
+    /// Corotational linear solid on a tetrahedron (McAdams et al. 2011, *Efficient Elasticity for Character Skinning*):
+    /// V (μ ‖F − R‖² + λ/2 tr²(S − I)) with the polar decomposition F = R S, det R = 1.
+    ///
+    /// Where two signed singular values of F sum to 0, R has no limit: derivatives are taken as 0 and flagged. The rest
+    /// shape must have a positive volume.
+    #[audit]
+    #[invariant(translation, rotation)]
+    #[rest_state(zero_force)]
+    pub energy TetCorotational(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; λ, μ: Scalar[Pa]) {
+        rest {
+            let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
+            let B = inverse(D_m);
+            let V = sqrt(det(D_m))^2 / 6;
+        }
+        let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
+        let D = F - rotation_of(F);
+        V / 2 * (2 * μ * ddot(D, D) + λ * (trace(stretch_of(F)) - 3)^2)
+    }
 }

@@ -164,6 +164,19 @@ energy! {
         ddot(D, D) + trace(E)^2 + ddot(E, E) + dot(vector(p.x, q.z), rotation_of(G)[0]) * det(stretch_of(F))
     }
 
+    #[audit(samples = 4)]
+    energy SpatialPolar(p, q, r: Point; M: Mat3x3) {
+        let F = columns(p, q, r) + M;
+        let S = stretch_of(F);
+        ddot(rotation_of(F), M) + trace(S)^2 + det(S) * S[0][1]
+    }
+
+    #[audit(samples = 4)]
+    force SpatialPolarGradients(p, q, r: Point; M: Mat3x3) {
+        let U = trace(stretch_of(columns(p, q, r) + M))^2;
+        [-gradient(U, p), -gradient(U, q), -gradient(U, r)]
+    }
+
     #[audit(samples = 50)]
     energy Bounds(p, q: Point; a, b: Scalar) {
         let x = dot(p, q);

@@ -5,7 +5,7 @@ use energy_catalogue::{catalogue, find};
 use energy_dsl::{ForceLaw, Inputs, Kind, Outputs, Potential};
 use energy_elements::{
     BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
-    StVK, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring,
+    StVK, TetAsRigidAsPossible, TetCorotational, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring,
 };
 use proptest::prelude::*;
 
@@ -193,13 +193,15 @@ fn membranes_stretch_and_refuse_a_flat_rest_shape() {
 }
 
 /// The energies of a tetrahedron of volume 1/6 with the gradient F of its deformation.
-fn solids(f: [[f64; 3]; 3], lambda: f64, mu: f64) -> [energy_dsl::Gradient<f64, [[f64; 3]; 4]>; 2] {
+fn solids(f: [[f64; 3]; 3], lambda: f64, mu: f64) -> [energy_dsl::Gradient<f64, [[f64; 3]; 4]>; 4] {
     let corners = [ORIGIN, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let [a, b, c, d] = corners;
     let moved = corners.map(|p| [0, 1, 2].map(|i| 0.5 + f[i][0] * p[0] + f[i][1] * p[1] + f[i][2] * p[2]));
     [
         TetStVK::new(a, b, c, d, lambda, mu).unwrap().gradient(&moved),
         TetStableNeoHookean::new(a, b, c, d, lambda, mu).unwrap().gradient(&moved),
+        TetAsRigidAsPossible::new(a, b, c, d, mu).unwrap().gradient(&moved),
+        TetCorotational::new(a, b, c, d, lambda, mu).unwrap().gradient(&moved),
     ]
 }
 
@@ -219,7 +221,7 @@ fn solids_have_the_energy_of_their_deformation() {
         (diagonal(-1.0, 1.0, 1.0), 0.0, 0.0, 3.0, -1.0),
         (diagonal(-2.0, 1.0, 1.0), 2.25, 1.5, 6.0, -2.0),
     ] {
-        let [stvk, stable] = solids(f, lambda, mu);
+        let [stvk, stable, ..] = solids(f, lambda, mu);
         let expected = (mu * square + lambda / 2.0 * trace * trace) / 6.0;
         assert!((stvk.value - expected).abs() < 1e-14, "{f:?}: {} is not {expected}", stvk.value);
         let volumetric = lambda / 2.0 * ((j - alpha).powi(2) - (1.0 - alpha).powi(2));
@@ -233,9 +235,36 @@ fn solids_have_the_energy_of_their_deformation() {
             assert!((stable - (mu * 2.0 * (1.0 - 1.0 / 7.0) + lambda * (2.0 - alpha))).abs() < 1e-13);
         }
     }
-    for at in solids([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], lambda, mu) {
+    let turned = solids([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], lambda, mu);
+    for at in &turned[..2] {
         assert_eq!((at.value, at.gradient), (0.0, [ORIGIN; 4]), "turned by a right angle, at rest");
     }
+    for at in &turned[2..] {
+        assert!(at.value < 1e-30 && at.gradient.iter().flatten().all(|f| f.abs() < 1e-14), "at rest: {at:?}");
+    }
+    // Signed singular values: those of the shear are the roots of s² − √(17/4) s + 1 = 0, and 1.
+    let shear_sum = 4.25_f64.sqrt();
+    for (f, square, trace) in [
+        (diagonal(2.0, 1.0, 1.0), 1.0, 1.0),
+        (diagonal(0.5, 3.0, 1.25), 0.25 + 4.0 + 0.0625, 1.75),
+        (diagonal(0.0, 1.0, 1.0), 1.0, -1.0),
+        (diagonal(-0.5, 1.0, 2.0), 2.25 + 1.0, -0.5),
+        // The smallest one has the sign of det F.
+        (diagonal(-2.0, 1.0, 1.5), 1.0 + 4.0 + 0.25, -0.5),
+        (shear, 3.25 - 2.0 * (shear_sum + 1.0) + 3.0, shear_sum - 2.0),
+    ] {
+        let [.., rigid, corotational] = solids(f, lambda, mu);
+        let expected = mu / 12.0 * square;
+        assert!((rigid.value - expected).abs() < 1e-14, "{f:?}: {} is not {expected}", rigid.value);
+        let expected = (mu * square + lambda / 2.0 * trace * trace) / 6.0;
+        assert!((corotational.value - expected).abs() < 1e-14, "{f:?}: {} is not {expected}", corotational.value);
+        assert!(!rigid.flags.any() && !corotational.flags.any(), "{f:?}");
+    }
+    // A reflection has no rotation. The energy is that of its neighbours, (−1 − 1)² for one axis.
+    let [.., rigid, corotational] = solids(diagonal(1.0, 1.0, -1.0), lambda, mu);
+    assert!(rigid.flags.degenerate && corotational.flags.degenerate);
+    assert!((rigid.value - mu / 3.0).abs() < 1e-14, "{}", rigid.value);
+    assert_eq!(rigid.gradient, [ORIGIN; 4]);
     // An inverted and a flat rest shape.
     let [a, b, c, d] = [ORIGIN, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     assert!(TetStVK::new(a, c, b, d, lambda, mu).is_err() && TetStVK::new(a, b, c, c, lambda, mu).is_err());

@@ -2,7 +2,7 @@
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Op};
+use crate::graph::{Form, Graph, NodeId, Op, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
@@ -115,7 +115,11 @@ fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
     {
         return Lowered::scalar(product);
     }
-    by_parts(g, args, Graph::sub)
+    let difference = by_parts(g, args, Graph::sub);
+    if matches!(g.origin(&args[1].parts), Some(Origin::Rotation { matrix }) if *matrix == args[0].parts) {
+        g.note_origin(&difference.parts, Origin::Unrotated { matrix: args[0].parts.clone() });
+    }
+    difference
 }
 
 /// Recognises x² − y² as (x − y)(x + y). One of the squares may be a constant with an exact root.

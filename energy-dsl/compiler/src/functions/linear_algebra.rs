@@ -4,6 +4,7 @@ use super::angle::recognise_cosine;
 use super::arithmetic::scaled;
 use super::inner_product::inner_product;
 use super::rotated::recognise_rotated_product;
+use super::spatial_polar::distance_to_rotation;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Origin};
 
@@ -80,6 +81,32 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "det(A) A⁻¹ of a 2×2, 3×3 or 4×4 matrix, without division. It is exact for integers.",
         shape: square_to_square,
         lower: adjugate,
+        accuracy: "",
+    },
+    Function {
+        name: "scaled_det",
+        usage: "scaled_det(A)",
+        docs: "det(A) times the power of two s = power_of_two(det(A)), so 1 or more and below 2, without unit.",
+        shape: square_to_scalar,
+        lower: |g, a| {
+            let determinant = det(g, a).node();
+            let scale = g.power_of_two_scale(determinant);
+            Lowered::scalar(g.mul(determinant, scale))
+        },
+        accuracy: "",
+    },
+    Function {
+        name: "scaled_adjugate",
+        usage: "scaled_adjugate(A)",
+        docs: "adjugate(A) times power_of_two(det(A)): A⁻¹ times scaled_det(A), without division. It brings rest \
+             shapes of any size near 1, and is exact for integers.",
+        shape: square_to_square,
+        lower: |g, a| {
+            let determinant = det(g, a).node();
+            let scale = g.power_of_two_scale(determinant);
+            let matrix = adjugate(g, a);
+            scaled(g, scale, &matrix)
+        },
         accuracy: "",
     },
     Function {
@@ -215,6 +242,11 @@ fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
         (Shape::Scalar, _) => scaled(g, x.node(), y),
         (_, Shape::Scalar) => scaled(g, y.node(), x),
         _ => {
+            if x.parts == y.parts
+                && let Some(Origin::Unrotated { matrix }) = g.origin(&x.parts).cloned()
+            {
+                return Lowered::scalar(distance_to_rotation(g, &matrix));
+            }
             let recognised = recognise_cosine(g, &x.parts, &y.parts);
             let recognised = recognised.or_else(|| recognise_rotated_product(g, &x.parts, &y.parts));
             Lowered::scalar(recognised.unwrap_or_else(|| inner_product(g, &x.parts, &y.parts)))
@@ -252,6 +284,9 @@ fn transpose(_: &mut Graph, a: &[Lowered]) -> Lowered {
 }
 
 fn trace(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    if let Some(&Origin::Stretch { trace, .. }) = g.origin(&a[0].parts) {
+        return Lowered::scalar(trace);
+    }
     let n = a[0].dimensions().0;
     let diagonal: Vec<_> = (0..n).map(|i| a[0].at(i, i)).collect();
     Lowered::scalar(g.sum(diagonal))
@@ -308,8 +343,12 @@ fn cofactors_by_pairs(g: &mut Graph, m: &Lowered) -> Vec<NodeId> {
 }
 
 fn det(g: &mut Graph, a: &[Lowered]) -> Lowered {
-    let cofactors = cofactors(g, &a[0]);
-    Lowered::scalar(determinant(g, &a[0], &cofactors))
+    let matrix = match g.origin(&a[0].parts) {
+        Some(Origin::Stretch { matrix, .. }) => Lowered { parts: matrix.clone(), ..a[0].clone() },
+        _ => a[0].clone(),
+    };
+    let cofactors = cofactors(g, &matrix);
+    Lowered::scalar(determinant(g, &matrix, &cofactors))
 }
 
 fn determinant(g: &mut Graph, a: &Lowered, cofactors: &[NodeId]) -> NodeId {

@@ -19,6 +19,7 @@ mod quaternion;
 mod rotated;
 mod shape;
 mod sinc;
+mod spatial_polar;
 mod trigonometric;
 
 pub use shape::{Lowered, Shape};
@@ -107,6 +108,12 @@ pub const RECOGNISERS: &[Recogniser] = &[
         square",
         ending: Ending::Difference,
         recognise: length::recognise_elongation,
+    },
+    Recogniser {
+        spelling: "trace(stretch_of(F)) - 3",
+        form: "the trace of the strain of a 3×3 matrix, accurate near rest",
+        ending: Ending::Difference,
+        recognise: spatial_polar::recognise_stretch_difference,
     },
     Recogniser {
         spelling: "sin(dihedral(a, b, c, d) / 2) - sin(y / 2)",

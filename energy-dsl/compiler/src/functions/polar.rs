@@ -2,41 +2,50 @@
 
 use super::length::unit;
 use super::linear_algebra::cross;
+use super::spatial_polar::{Polar, polar};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Graph, NodeId};
+use crate::graph::{Graph, NodeId, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "rotation_of",
         usage: "rotation_of(F)",
-        docs: "Rotation R of the polar decomposition F = R S, S symmetric. For a 2×2 matrix, det R = 1, and the \
-             singular values have the sign of det F on the smallest. Where their sum is 0, the result is taken as 0 \
-             and flagged. For a 3×2 matrix, R has orthonormal columns and S ≥ 0; the result is flagged where the \
-             columns are parallel.",
-        shape: |shapes| deformation(shapes).map(|()| shapes[0]),
+        docs: "Rotation R of the polar decomposition F = R S, S symmetric. For a square matrix (2×2 or 3×3), det R = \
+             1, and the singular values have the sign of det F on the smallest. Where two of them sum to 0, the result \
+             is taken as 0 and flagged; for a 3×3 matrix also where the sum is below 1e-7 of the largest. For a 3×2 \
+             matrix, R has orthonormal columns and S ≥ 0; the result is flagged where the columns are parallel.",
+        shape: |shapes| deformation(shapes).map(|_| shapes[0]),
         lower: |g, a| rotation(g, &a[0]),
         accuracy: "",
     },
     Function {
         name: "stretch_of",
         usage: "stretch_of(F)",
-        docs: "Symmetric 2×2 factor S = RᵀF of the polar decomposition, flagged like `rotation_of`. Its eigenvalues \
-             are the signed singular values of F: their sum is trace(S), their product det(S).",
-        shape: |shapes| deformation(shapes).map(|()| Shape::Matrix(2, 2)),
+        docs: "Symmetric factor S = RᵀF of the polar decomposition, flagged like `rotation_of`. Its eigenvalues are \
+             the signed singular values of F: their sum is trace(S), their product det(S), the sum of their squares \
+             ddot(S, S).",
+        shape: |shapes| deformation(shapes).map(|columns| Shape::Matrix(columns, columns)),
         lower: |g, a| stretch(g, &a[0]),
         accuracy: "",
     },
 ];
 
-fn deformation(shapes: &[Shape]) -> Result<(), String> {
+/// Returns the number of columns.
+fn deformation(shapes: &[Shape]) -> Result<u8, String> {
     match *shapes {
-        [Shape::Matrix(2 | 3, 2)] => Ok(()),
-        [other] => Err(format!("takes a 2×2 or 3×2 matrix, but this is {other}")),
+        [Shape::Matrix(2 | 3, 2)] => Ok(2),
+        [Shape::Matrix(3, 3)] => Ok(3),
+        [other] => Err(format!("takes a 2×2, 3×2 or 3×3 matrix, but this is {other}")),
         _ => Err(format!("takes one matrix, but got {}", super::arguments(shapes.len()))),
     }
 }
 
 fn rotation(g: &mut Graph, f: &Lowered) -> Lowered {
+    if f.dimensions() == (3, 3) {
+        let rotation = polar(g, f).rotation;
+        g.note_origin(&rotation, Origin::Rotation { matrix: f.parts.clone() });
+        return Lowered::matrix(3, 3, rotation);
+    }
     let columns = orthonormal_columns(g, f);
     let rows = f.dimensions().0;
     let parts = (0..rows).flat_map(|i| columns.iter().map(move |column| column.parts[i])).collect();
@@ -75,7 +84,30 @@ fn columns(f: &Lowered) -> [Lowered; 2] {
 }
 
 fn stretch(g: &mut Graph, f: &Lowered) -> Lowered {
+    if f.dimensions() == (3, 3) {
+        return spatial_stretch(g, f);
+    }
     let ([a, b], [r, s]) = (columns(f), orthonormal_columns(g, f));
     let (first, mixed, last) = (g.dot(&r.parts, &a.parts), g.dot(&r.parts, &b.parts), g.dot(&s.parts, &b.parts));
     Lowered::matrix(2, 2, vec![first, mixed, mixed, last])
+}
+
+/// Returns S = RᵀF of a 3×3 matrix, as the mean with its transpose.
+fn spatial_stretch(g: &mut Graph, f: &Lowered) -> Lowered {
+    let Polar { rotation, trace } = polar(g, f);
+    let column = |parts: &[NodeId], j: usize| [parts[j], parts[3 + j], parts[6 + j]];
+    let entry = |g: &mut Graph, i: usize, j: usize| g.dot(&column(&rotation, i), &column(&f.parts, j));
+    let half = g.constant(0.5);
+    let mut parts = vec![half; 9];
+    for i in 0..3 {
+        parts[4 * i] = entry(g, i, i);
+        for j in 0..i {
+            let (below, above) = (entry(g, i, j), entry(g, j, i));
+            let sum = g.add(below, above);
+            parts[3 * i + j] = g.mul(half, sum);
+            parts[3 * j + i] = parts[3 * i + j];
+        }
+    }
+    g.note_origin(&parts, Origin::Stretch { trace, matrix: f.parts.clone() });
+    Lowered::matrix(3, 3, parts)
 }

@@ -1,8 +1,8 @@
-//! Records how vectors and quaternions were made, so that functions can recognise their arguments.
+//! Records how vectors, quaternions and matrices were made, so that functions can recognise their arguments.
 
 use super::{Form, Graph, NodeId};
 
-/// The construction of a vector, a quaternion or a dual quaternion.
+/// The construction of a vector, a quaternion, a dual quaternion or a matrix.
 #[derive(Clone, Debug)]
 pub(crate) enum Origin {
     /// The cross product of two vectors.
@@ -13,6 +13,12 @@ pub(crate) enum Origin {
     Transformed { quaternion: Vec<NodeId>, dual: Vec<NodeId>, vector: Vec<NodeId> },
     /// A quaternion of length 1, or 0 where that is flagged.
     UnitQuaternion,
+    /// The symmetric factor S of F = R S, with its trace and det S = det F.
+    Stretch { trace: NodeId, matrix: Vec<NodeId> },
+    /// The rotation R of F = R S.
+    Rotation { matrix: Vec<NodeId> },
+    /// F − R of F = R S.
+    Unrotated { matrix: Vec<NodeId> },
     /// The exponential of a twist (θ, t), with cos ‖θ‖ and sin ‖θ‖/‖θ‖.
     Exponential { cosine: NodeId, sinc: NodeId, turn: Vec<NodeId>, shift: Vec<NodeId> },
 }

@@ -79,6 +79,14 @@ pub enum Primitive {
     HyperbolicTangent,
     /// erf x.
     ErrorFunction,
+    /// An entry of the rotation R of a polar decomposition F = R S.
+    Rotation(u8),
+    /// tr S of a polar decomposition F = R S.
+    StretchTrace,
+    /// tr S − 3.
+    StretchTraceExcess,
+    /// ‖F − R‖².
+    DistanceToRotation,
     /// A first partial derivative of another rule.
     Partial {
         /// Node that is differentiated.
@@ -128,6 +136,10 @@ impl Primitive {
             Self::HyperbolicCosine => "cosh x",
             Self::HyperbolicTangent => "tanh x",
             Self::ErrorFunction => "erf x",
+            Self::Rotation(_) => "rotation of a polar decomposition F = R S",
+            Self::StretchTrace => "tr S of a polar decomposition F = R S",
+            Self::StretchTraceExcess => "tr S − 3 of a polar decomposition F = R S",
+            Self::DistanceToRotation => "squared distance ‖F − R‖² to the rotation of F = R S",
             Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }

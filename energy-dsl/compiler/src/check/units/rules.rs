@@ -50,7 +50,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
         "norm_squared" => call.units[0].map(|d| d.power(2.0)),
         "det" => call.units[0].map(|d| d.power(size)),
         "adjugate" => call.units[0].map(|d| d.power(size - 1.0)),
-        "inverse" | "power_of_two" => call.units[0].map(|d| d.power(-1.0)),
+        "inverse" | "power_of_two" | "scaled_adjugate" => call.units[0].map(|d| d.power(-1.0)),
         "huber" | "pseudo_huber" => inference.same(call.name, &all, call.span).map(|d| d.power(2.0)),
         "norm" => call.units[0].clone(),
         "unit" if call.is(0, Shape::DualQuat) => {
@@ -60,7 +60,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
             inference.same(call.name, &all, call.span);
             number()
         }
-        "unit" | "angle" | "sign" | "identity" | "rotation_of" => number(),
+        "unit" | "angle" | "sign" | "identity" | "rotation_of" | "scaled_det" => number(),
         "[]" => component(call),
         "exp" if call.is(0, Shape::Twist) => {
             inference.number("exp", &call.main(0), call.span);
