@@ -43,6 +43,10 @@ fn a_file_is_audited_reported_and_run_again_at_its_inputs() {
         assert!(page.contains(part), "no {part}");
     }
     assert!(!page.contains("http-equiv") && !page.contains("src="), "the page needs nothing else");
+    assert!(page.contains("Not looked at") && page.contains("`verify stress` looks there"));
+    let written: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!(written["not_looked_at"].as_array().map(Vec::len), Some(2));
+    assert_eq!(written["sections"][0]["inputs"], 6);
     assert!(std::fs::read_to_string(junit).unwrap().contains("<testsuite name=\"Mine\""));
     let again = verify(&["audit", "--file", &file, "--at", &json]);
     assert!(again.status.success(), "{}{}", text(&again.stdout), text(&again.stderr));
@@ -50,6 +54,58 @@ fn a_file_is_audited_reported_and_run_again_at_its_inputs() {
     let refused = verify(&["audit", "--file", &file, "--at", &path("one.json")]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("`positions` holds 4 numbers, Mine takes 6"), "{}", text(&refused.stderr));
+}
+
+#[test]
+fn a_declaration_says_how_many_samples_it_wants() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (file, json) = (path("s.energy"), path("a.json"));
+    std::fs::write(&file, "#[audit(samples = 7)] energy Mine(p, q: Point; k: Scalar) = \"k ‖p − q‖²\";").unwrap();
+    let inputs = |more: &[&str]| {
+        let output = verify(&[&["audit", "--file", &file, "--json", &json], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stdout));
+        let report: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+        report["sections"][0]["inputs"].clone()
+    };
+    assert_eq!(inputs(&[]), 7);
+    assert_eq!(inputs(&["--samples", "9"]), 9);
+}
+
+#[test]
+fn declarations_of_a_file_are_evaluated_and_timed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (file, inputs, out) = (path("s.energy"), path("inputs.json"), path("out.json"));
+    let spring = "energy Mine(p, q: Point; k: Scalar[N/m], L: Scalar[m]) = \"k/2 (‖p − q‖ − L)²\";";
+    std::fs::write(&file, spring).unwrap();
+    let at = |q: &str| format!("{{\"positions\": [0, 0, 0, {q}], \"parameters\": [2, 1], \"rest\": []}}");
+    std::fs::write(&inputs, format!("[{}, {}, {}]", at("3, 0, 0"), at("0, 0, 0"), at("1, 1, 0"))).unwrap();
+    let evaluated = |more: &[&str]| -> serde_json::Value {
+        let output = verify(&[&["eval", &inputs, "--file", &file, "-o", &out], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        serde_json::from_str(&std::fs::read_to_string(&out).unwrap()).unwrap()
+    };
+    let records = evaluated(&[])["records"].clone();
+    assert_eq!(records[0]["out"]["energy"], "4.0000000000000000e0");
+    assert_eq!(records[0]["flags"]["hess"]["degenerate"], false);
+    assert_eq!(records[1]["flags"]["grad"]["degenerate"], true);
+    // (√2 − 1)².
+    let digits = evaluated(&["--digits", "40"])["records"][2]["out"]["energy"].clone();
+    assert!(digits.as_str().is_some_and(|digits| digits.contains("7157287525380990239662255158060384")), "{digits}");
+    std::fs::write(&inputs, "{\"positions\": [0, 0, 0, 1]}").unwrap();
+    let refused = verify(&["eval", &inputs, "--file", &file, "-o", &out]);
+    assert!(text(&refused.stderr).contains("`positions` holds 4 numbers, Mine takes 6"), "{}", text(&refused.stderr));
+
+    let timed = verify(&["bench", "--file", &file]);
+    let table = text(&timed.stdout);
+    assert!(timed.status.success(), "{}", text(&timed.stderr));
+    for method in ["central differences", "dual numbers", "compiled routines", "multi-precision"] {
+        assert!(table.contains(&format!("| Mine | {method}")), "{table}");
+    }
+    std::fs::write(&file, "residual Mine(a: Scalar; b: Scalar) { a - b }").unwrap();
+    let without = verify(&["bench", "--file", &file]);
+    assert!(text(&without.stderr).contains("energies and constraints do"), "{}", text(&without.stderr));
 }
 
 #[test]

@@ -25,7 +25,11 @@ pub fn html(report: &Report) -> String {
     for section in &report.sections {
         element(&mut page, report, section);
     }
-    page.push_str("</body></html>\n");
+    page.push_str("<section><h2>Not looked at</h2>\n<ul>\n");
+    for spot in report.blind_spots() {
+        let _ = writeln!(page, "<li>{}</li>", escaped(&spot));
+    }
+    page.push_str("</ul></section>\n</body></html>\n");
     page
 }
 

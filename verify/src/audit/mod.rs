@@ -40,6 +40,8 @@ use crate::sample::{Sample, has_points};
 pub struct Options {
     /// Random inputs per element.
     pub samples: usize,
+    /// Whether the samples that a declaration asks for count instead.
+    pub declared_samples: bool,
     /// Number of inputs with multi-precision results.
     pub truths: usize,
     /// Faults to plant in each element.
@@ -52,7 +54,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 200, truths: 24, mutations: 24, trials: 40, seed: 1 }
+        Self { samples: 200, declared_samples: false, truths: 24, mutations: 24, trials: 40, seed: 1 }
     }
 }
 
@@ -145,7 +147,8 @@ pub fn audit(declaration: &'static Declaration, evaluate: Evaluate, options: Opt
 }
 
 fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<Report, String> {
-    let cases = cases(subject, options.samples, options.truths, options.seed);
+    let declared = subject.declared_samples().filter(|_| options.declared_samples);
+    let cases = cases(subject, declared.unwrap_or(options.samples), options.truths, options.seed);
     let mut auditor = Auditor::new(subject);
     let mut section = section(subject, cases.len());
     let typical = typical_value(&cases);

@@ -271,6 +271,19 @@ impl Report {
         self.refused.is_empty() && self.lines.iter().all(|line| line.passed) && self.missed().next().is_none()
     }
 
+    /// Says where the audit did not look, one sentence each.
+    #[must_use]
+    pub fn blind_spots(&self) -> Vec<String> {
+        let near_kinks = self.sections.iter().filter(|section| section.without_differences > 0).map(|section| {
+            let Section { element, without_differences: none, inputs, .. } = section;
+            format!("{element}: no differences at {none} of {inputs} inputs, too near to a kink or a boundary.")
+        });
+        let range = "Inputs outside of the sampled range (points ½ to 8 apart, parameters ½ to 2, or the domain that a \
+                     declaration states) were not looked at.";
+        let singular = "Inputs near rest or a singularity were not looked at; `verify stress` looks there.";
+        near_kinks.chain([range.to_owned(), singular.to_owned()]).collect()
+    }
+
     /// Returns the lines that failed.
     pub fn failures(&self) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(|line| !line.passed)

@@ -156,6 +156,11 @@ impl Subject {
         Sampler::within(&self.formula.program().audit_scope, self.declaration, seed)
     }
 
+    /// Returns the samples that the declaration asks for, if it was read at run time.
+    pub(super) fn declared_samples(&self) -> Option<usize> {
+        self.routines.as_ref().and_then(Interpreted::audit_samples)
+    }
+
     /// Returns the largest error that a check allows, or that the declaration states.
     pub(super) fn tolerance(&self, check: Check) -> f64 {
         let stated = self.formula.program().audit_scope.tolerance;

@@ -34,6 +34,7 @@ pub struct Interpreted {
     routines: Vec<InterpretedRoutine>,
     /// The numbers of each term, if the routines compute one term of a sum.
     repetition: Option<Repetition>,
+    audit_samples: Option<usize>,
 }
 
 /// Routines that blocks are taken from.
@@ -110,7 +111,14 @@ impl Interpreted {
             rest: Tape::new(&routines.rest.graph, std::slice::from_ref(&routines.rest.outputs), &degenerate),
             routines: list.collect(),
             repetition: routines.repetition.clone(),
+            audit_samples: program.audit_samples,
         }
+    }
+
+    /// Returns the samples that `#[audit]` asks for; `None` without it.
+    #[must_use]
+    pub fn audit_samples(&self) -> Option<usize> {
+        self.audit_samples
     }
 
     /// Returns the declaration.

@@ -13,6 +13,7 @@ use super::complex::Complex;
 use verify::audit::Subject;
 use verify::blocks::BlockName;
 use verify::dual::Hyper;
+use verify::formula::expected_blocks;
 use verify::geometry::longest_distance;
 use verify::multiprecision::{TrueBlock, truth, worse};
 use verify::sample::Sample;
@@ -95,6 +96,46 @@ impl<'a> Methods<'a> {
         let timed = self.time(|i| discard(hessian(self.subject, &self.samples[i])));
         list.push(self.measured("multi-precision, 30 digits", timed, 1e-30));
         list
+    }
+
+    /// Measures the methods that need no compilation, from the least to the most exact.
+    pub(super) fn interpreted(&self) -> Result<Vec<Measured>, String> {
+        let Self { subject, samples, .. } = self;
+        for sample in *samples {
+            subject.answer(sample).map_err(|why| why.to_string())?;
+        }
+        let block = |sample: &Sample, name: BlockName| {
+            let answer = subject.answer(sample).expect("it has an answer at this input");
+            answer.block(name).numbers.clone()
+        };
+        let central = |i: usize| {
+            let h = longest_distance(&samples[i].positions).unwrap_or(1.0) * f64::EPSILON.powf(1.0 / 3.0);
+            let n = samples[i].positions.len();
+            let mut matrix = vec![0.0; n * n];
+            for column in 0..n {
+                let slope = |offset: f64| {
+                    let mut moved = samples[i].clone();
+                    moved.positions[column] += offset;
+                    block(&moved, BlockName::Gradient)
+                };
+                for (row, (ahead, behind)) in slope(h).into_iter().zip(slope(-h)).enumerate() {
+                    matrix[row * n + column] = (ahead - behind) / (2.0 * h);
+                }
+            }
+            matrix
+        };
+        let dual = |i: usize| {
+            let blocks = expected_blocks(subject.declaration, &subject.formula, &samples[i]);
+            let hessian = blocks.into_iter().find(|block| block.name == BlockName::Hessian);
+            hessian.expect("energies have Hessians").numbers
+        };
+        let timed = self.time(|i| discard(hessian(subject, &samples[i])));
+        Ok(vec![
+            self.measure("central differences, interpreted", central),
+            self.measure("dual numbers, interpreted", dual),
+            self.measure("compiled routines, interpreted", |i| block(&samples[i], BlockName::Hessian)),
+            self.measured("multi-precision, 30 digits", timed, 1e-30),
+        ])
     }
 
     fn measured(&self, method: &'static str, nanoseconds: f64, error: f64) -> Measured {

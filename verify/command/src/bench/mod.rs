@@ -7,6 +7,7 @@ mod methods;
 use std::fmt::Write as _;
 
 use energy_cli::plot::{Curve, logarithmic};
+use energy_dsl::Kind;
 
 pub use self::methods::Measured;
 use self::methods::Methods;
@@ -40,6 +41,26 @@ pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
         let mut sampler = subject.sampler(3);
         let samples: Vec<Sample> = (0..INPUTS).map(|_| in_single_precision(sampler.sample())).collect();
         list.extend(run(&Methods::new(&subject, &samples)));
+    }
+    Ok(list)
+}
+
+/// Times every method that needs no compilation on declarations of a file. Those without a Hessian are left out.
+///
+/// # Errors
+/// If no declaration has a Hessian, or one does not compile.
+pub fn bench_interpreted(targets: &[Target]) -> Result<Vec<Measured>, String> {
+    let mut list = Vec::new();
+    for target in targets {
+        let subject = target.subject()?;
+        if matches!(subject.declaration.kind, Kind::Energy | Kind::Constraint) {
+            let mut sampler = subject.sampler(3);
+            let samples: Vec<Sample> = (0..INPUTS).map(|_| sampler.sample()).collect();
+            list.extend(Methods::new(&subject, &samples).interpreted()?);
+        }
+    }
+    if list.is_empty() {
+        return Err("none of these declarations has a Hessian to time: energies and constraints do".into());
     }
     Ok(list)
 }
@@ -83,8 +104,9 @@ pub fn csv(list: &[Measured]) -> String {
 #[must_use]
 pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
     let of = |name: &str| list.iter().filter(|m| m.element == name).cloned().collect::<Vec<_>>();
-    let mut groups: Vec<(String, Vec<Measured>)> =
-        names().into_iter().map(|name| (name.to_owned(), of(name))).filter(|(_, list)| !list.is_empty()).collect();
+    let mut names: Vec<&str> = list.iter().map(|m| m.element).collect();
+    names.dedup();
+    let mut groups: Vec<(String, Vec<Measured>)> = names.into_iter().map(|name| (name.to_owned(), of(name))).collect();
     groups.push(("all".into(), list.to_vec()));
     groups
         .into_iter()

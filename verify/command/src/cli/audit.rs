@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde::Serialize;
 use verify::audit::{Options, Report, Target, audit_all, audit_at, describe_failure};
 
 use super::output::{table, write_json, write_text};
@@ -15,9 +16,9 @@ pub struct Audit {
     /// Audit the declarations of this file (`.energy`) instead of the catalogue's.
     #[arg(long)]
     file: Option<PathBuf>,
-    /// Random inputs per element.
-    #[arg(long, default_value_t = 200)]
-    samples: usize,
+    /// Random inputs per element [default: those that its `#[audit(samples = …)]` asks for, else 200].
+    #[arg(long)]
+    samples: Option<usize>,
     /// Seed of the random inputs.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -45,12 +46,21 @@ pub struct Audit {
     junit: Option<PathBuf>,
 }
 
+/// The report as it is written.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    not_looked_at: Vec<String>,
+}
+
 impl Audit {
     pub fn run(self) -> anyhow::Result<bool> {
         let Self { samples, seed, faults, .. } = self;
-        let options = match self.quick {
-            true => Options { seed, ..Options::quick() },
-            false => Options { samples, seed, mutations: faults, ..Options::default() },
+        let options = match (self.quick, samples) {
+            (true, _) => Options { seed, ..Options::quick() },
+            (false, None) => Options { declared_samples: true, seed, mutations: faults, ..Options::default() },
+            (false, Some(samples)) => Options { samples, seed, mutations: faults, ..Options::default() },
         };
         let file = self.file.as_deref();
         let targets = targets(&self.names, file)?;
@@ -60,7 +70,7 @@ impl Audit {
             None => audit_all(&targets, energy.as_ref(), options),
         };
         print(&report);
-        write_json(self.json.as_deref(), &report)?;
+        write_json(self.json.as_deref(), &Written { report: &report, not_looked_at: report.blind_spots() })?;
         write_text(self.html.as_deref(), || verify::audit::html(&report))?;
         write_text(self.junit.as_deref(), || verify::audit::junit(&report))?;
         Ok(report.passed())
@@ -113,24 +123,12 @@ fn print(report: &Report) {
         println!("\n{element}: no check noticed a planted fault: {}", mutant.fault);
     }
     print_mutation_scores(report);
-    print_blind_spots(report);
+    println!("\n{}", report.blind_spots().join("\n"));
     println!(
         "\n{} elements, {} checks, {} failed",
         report.elements(),
         report.lines.len(),
         report.failures().count() + report.refused.len() + report.missed().count()
-    );
-}
-
-/// Says where the audit did not look.
-fn print_blind_spots(report: &Report) {
-    for section in report.sections.iter().filter(|section| section.without_differences > 0) {
-        let (none, inputs) = (section.without_differences, section.inputs);
-        println!("{}: no differences at {none} of {inputs} inputs, too near to a kink or a boundary", section.element);
-    }
-    println!(
-        "\nNot looked at: inputs outside of the sampled range (points ½ to 8 apart, parameters ½ to 2, or the domain \
-         that a declaration states), and those near rest or a singularity, where `verify stress` looks"
     );
 }
 

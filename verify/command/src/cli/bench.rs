@@ -1,9 +1,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use verify_command::bench::{bench, csv, markdown, plots};
+use verify_command::bench::{bench, bench_interpreted, csv, markdown, plots};
 
 use super::output::{create_folder, write_text};
+use super::targets::targets;
 
 /// Times every method of computing a Hessian on one element of each family, and measures its error against
 /// multi-precision.
@@ -11,6 +12,9 @@ use super::output::{create_folder, write_text};
 pub struct Bench {
     /// Elements to time [default: all that can be timed].
     names: Vec<String>,
+    /// Time the declarations of this file (`.energy`). They are interpreted, not compiled.
+    #[arg(long, value_name = "FILE")]
+    file: Option<PathBuf>,
     /// Also write `bench.md`, `bench.csv` and a plot of each element to this folder.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -18,7 +22,11 @@ pub struct Bench {
 
 impl Bench {
     pub fn run(self) -> anyhow::Result<bool> {
-        let list = bench(&self.names).map_err(anyhow::Error::msg)?;
+        let list = match self.file {
+            None => bench(&self.names),
+            Some(file) => bench_interpreted(&targets(&self.names, Some(&file))?),
+        };
+        let list = list.map_err(anyhow::Error::msg)?;
         let table = markdown(&list);
         print!("{table}");
         if let Some(folder) = self.output {

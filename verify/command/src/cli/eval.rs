@@ -1,13 +1,18 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use verify_command::reference::{Source, evaluate_file};
+use verify_command::reference::{Source, evaluate_file, evaluate_inputs};
+
+use super::targets::targets;
 
 /// Evaluates the records of a file and writes them with the results of the generated code (17 digits) and flags.
 #[derive(Args)]
 pub struct Eval {
-    /// A `potref-1` or `potref-policy-1` file.
+    /// A `potref-1` or `potref-policy-1` file; with `--file`, inputs in the form that `verify audit --at` reads.
     records: PathBuf,
+    /// Evaluate the declarations of this file (`.energy`).
+    #[arg(long, value_name = "FILE")]
+    file: Option<PathBuf>,
     /// The file to write.
     #[arg(short, long)]
     output: PathBuf,
@@ -19,7 +24,10 @@ pub struct Eval {
 impl Eval {
     pub fn run(self) -> anyhow::Result<bool> {
         let source = self.digits.map_or(Source::GeneratedCode, |digits| Source::Truth { digits: digits.into() });
-        let count = evaluate_file(&self.records, &self.output, source)?;
+        let count = match self.file {
+            None => evaluate_file(&self.records, &self.output, source)?,
+            Some(file) => evaluate_inputs(&targets(&[], Some(&file))?, &self.records, &self.output, source)?,
+        };
         println!("{count} records evaluated, written to {}", self.output.display());
         Ok(true)
     }

@@ -1,13 +1,16 @@
 use std::path::Path;
 
+use anyhow::Context;
 use energy_compiler::Textbook;
-use energy_dsl::Flags;
+use energy_dsl::{Declaration, Flags};
 use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
 use super::mapping::{is_undeclared, mapping};
-use verify::blocks::{NoAnswer, evaluate};
-use verify::multiprecision::truth;
+use verify::audit::{Subject, Target, read_inputs};
+use verify::blocks::{Answer, NoAnswer, evaluate};
+use verify::multiprecision::{TrueBlock, truth};
+use verify::sample::Sample;
 
 /// The source of the blocks in evaluated records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +72,7 @@ fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result
         .iter()
         .find_map(|key| fields.get(*key).and_then(Value::as_object))
         .map(|blocks| blocks.keys().cloned().collect());
-    let (mut out, mut flags) = (Map::new(), Map::new());
+    let (out, flags);
     match evaluate(declaration, mapping.entry.evaluate, &sample.inputs()) {
         Ok(answer) => {
             let truths = match source {
@@ -80,22 +83,8 @@ fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result
                     truth(declaration, &formula, &sample, digits)
                 }
             };
-            for block in &answer.blocks {
-                let name = block.name.name();
-                if asked.as_ref().is_some_and(|asked| !asked.iter().any(|a| a == name)) {
-                    continue;
-                }
-                let digits: Vec<Value> = match (source, truths.iter().find(|t| t.block.name == block.name)) {
-                    (Source::Truth { digits }, Some(truth)) => {
-                        truth.block.numbers.iter().map(|x| json!(x.to_decimal(digits))).collect()
-                    }
-                    _ => block.numbers.iter().map(|x| json!(format!("{x:.16e}"))).collect(),
-                };
-                let single = digits.len() == 1 && name == "energy";
-                out.insert(name.into(), if single { digits[0].clone() } else { Value::Array(digits) });
-                let Flags { degenerate, kink } = answer.flags[block.name.order(declaration.kind)];
-                flags.insert(name.into(), json!({ "degenerate": degenerate, "kink": kink }));
-            }
+            let wanted = |name: &str| asked.as_ref().is_none_or(|asked| asked.iter().any(|a| a == name));
+            (out, flags) = described(declaration, &answer, (source, &truths), wanted);
         }
         Err(NoAnswer::Rest(error)) => return without_answer(fields, error.to_string()),
         Err(other) => return Err(other.to_string()),
@@ -103,4 +92,77 @@ fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result
     fields.insert("out".into(), Value::Object(out));
     fields.insert("flags".into(), Value::Object(flags));
     Ok(())
+}
+
+/// Evaluates declarations of a file at inputs in the form that `verify audit --at` reads, and writes for each input
+/// `element`, `input`, `out` and `flags`, or `error` if the rest shape is degenerate. An input that names no element is
+/// for the only one.
+///
+/// Returns the number of inputs.
+///
+/// # Errors
+/// If the inputs cannot be read or fit no element, or the output cannot be written. Nothing is written then.
+pub fn evaluate_inputs(targets: &[Target], inputs: &Path, output: &Path, source: Source) -> anyhow::Result<usize> {
+    let subjects: Vec<Subject> =
+        targets.iter().map(|target| target.subject().map_err(anyhow::Error::msg)).collect::<Result<_, _>>()?;
+    let mut records = Vec::new();
+    for (name, sample) in read_inputs(inputs)? {
+        let found = match &name {
+            Some(name) => subjects.iter().find(|subject| subject.declaration.name == name),
+            None => subjects.first().filter(|_| subjects.len() == 1),
+        };
+        let subject = found.with_context(|| match name {
+            Some(name) => format!("{}: no declaration is called {name}", inputs.display()),
+            None => format!("{}: name the element that the input is for", inputs.display()),
+        })?;
+        sample.fits(subject.declaration).map_err(|why| anyhow::anyhow!("{}: {why}", inputs.display()))?;
+        records.push(evaluated(subject, &sample, source)?);
+    }
+    let text = serde_json::to_string_pretty(&json!({ "records": records }))?;
+    energy_cli::write_whole(output, text.as_bytes()).with_context(|| format!("cannot write {}", output.display()))?;
+    Ok(records.len())
+}
+
+fn evaluated(subject: &Subject, sample: &Sample, source: Source) -> anyhow::Result<Value> {
+    let mut record = json!({ "element": subject.declaration.name, "input": sample });
+    let fields = record.as_object_mut().context("a record is an object")?;
+    match subject.answer(sample) {
+        Ok(answer) => {
+            let truths = match source {
+                Source::GeneratedCode => Vec::new(),
+                Source::Truth { digits } => truth(subject.declaration, &subject.formula, sample, digits),
+            };
+            let (out, flags) = described(subject.declaration, &answer, (source, &truths), |_| true);
+            fields.extend([("out".to_owned(), Value::Object(out)), ("flags".to_owned(), Value::Object(flags))]);
+        }
+        Err(NoAnswer::Rest(error)) => {
+            fields.insert("error".into(), json!(error.to_string()));
+        }
+        Err(other) => return Err(other.into()),
+    }
+    Ok(record)
+}
+
+/// Returns the numbers and the flags of the wanted blocks.
+fn described(
+    declaration: &Declaration,
+    answer: &Answer,
+    (source, truths): (Source, &[TrueBlock]),
+    wanted: impl Fn(&str) -> bool,
+) -> (Map<String, Value>, Map<String, Value>) {
+    let (mut out, mut flags) = (Map::new(), Map::new());
+    for block in answer.blocks.iter().filter(|block| wanted(block.name.name())) {
+        let name = block.name.name();
+        let digits: Vec<Value> = match (source, truths.iter().find(|t| t.block.name == block.name)) {
+            (Source::Truth { digits }, Some(truth)) => {
+                truth.block.numbers.iter().map(|x| json!(x.to_decimal(digits))).collect()
+            }
+            _ => block.numbers.iter().map(|x| json!(format!("{x:.16e}"))).collect(),
+        };
+        let single = digits.len() == 1 && name == "energy";
+        out.insert(name.into(), if single { digits[0].clone() } else { Value::Array(digits) });
+        let Flags { degenerate, kink } = answer.flags[block.name.order(declaration.kind)];
+        flags.insert(name.into(), json!({ "degenerate": degenerate, "kink": kink }));
+    }
+    (out, flags)
 }

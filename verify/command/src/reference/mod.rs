@@ -10,7 +10,7 @@ mod mapping;
 mod policy;
 mod report;
 
-pub use eval::{Source, evaluate_file};
+pub use eval::{Source, evaluate_file, evaluate_inputs};
 pub use exact::Truth;
 pub use file::{Record, RecordError};
 pub use fusion::{FamilyLine, evaluate_fusion, fusion_reference};
