@@ -171,6 +171,23 @@ fn vertices_that_start_inside_an_obstacle_give_a_warning() {
 }
 
 #[test]
+fn a_passage_through_an_obstacle_is_reported() {
+    let head = "dt = 0.01\nduration = 0.1\nintegrator = \"newton\"\ngravity = [0.0, 0.0, 0.0]";
+    let shot = |speed: f64| {
+        let motion = format!("keys = [{{ time = 0.0 }}, {{ time = 1.0, translate = [0.0, 0.0, {speed}] }}]");
+        let ball = "name = \"shot\"\nsphere = { centre = [0.0, 0.0, -0.35], radius = 0.1 }\n";
+        let text = format!("{}[[obstacles]]\n{ball}[obstacles.motion]\n{motion}\n", sheet(head, 8, 0.5));
+        finished(&text).summary().unwrap()
+    };
+    // 70 cm in a step, through the sheet from its front to its back.
+    let summary = shot(70.0);
+    let [passage] = &summary.totals.passages[..] else { panic!("{:?}", summary.totals.passages) };
+    assert!(passage.vertices > 0 && (passage.speed - 70.0).abs() < 1.0, "{passage:?}");
+    assert!(summary.warnings.iter().any(|warning| warning.contains("passed through shot")), "{:?}", summary.warnings);
+    assert!(shot(0.5).totals.passages.is_empty());
+}
+
+#[test]
 fn moving_obstacles_do_work_and_carry_cloth_along() {
     let head = "dt = 0.005\nduration = 0.6\nintegrator = \"newton\"";
     let lying = sheet(head, 4, 0.2)

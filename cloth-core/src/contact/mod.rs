@@ -10,6 +10,7 @@
 
 mod friction;
 mod mesh_solid;
+mod passage;
 mod solid;
 mod surface;
 mod term;
@@ -17,6 +18,7 @@ mod term;
 use energy_solve::Term;
 
 pub use mesh_solid::MeshSolid;
+pub use passage::Passage;
 pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
 pub use surface::{Feature, Nearest, Surface, SurfaceError};
 

@@ -183,6 +183,12 @@ impl Island {
         }
     }
 
+    /// Iterates over the free vertices: their positions in the scene, before the last step, and now.
+    pub(super) fn moves<'a>(&'a self, before: &'a [Vector3<f64>]) -> impl Iterator<Item = [Vector3<f64>; 2]> + 'a {
+        let free = self.body.system.dofs().free().iter();
+        free.map(|&local| [before[self.vertices[local]], self.body.x[local]])
+    }
+
     /// Copies positions and velocities to the scene.
     pub(super) fn scatter(&self, x: &mut [Vector3<f64>], v: &mut [Vector3<f64>]) {
         for (local, &vertex) in self.vertices.iter().enumerate() {

@@ -281,8 +281,8 @@ impl Simulation {
     /// Steps the islands that are awake and returns how many sleep. Positions, velocities and the ledger change only
     /// after every island has succeeded.
     fn step_islands(&mut self, step: u64) -> Result<(StepReport, u64), StepError> {
-        let Self { islands, x, v, ledger, .. } = self;
-        let context = StepContext::new(step, self.dt, &self.motions, &self.obstacles, self.may_sleep);
+        let Self { islands, x, v, ledger, obstacles, summary, .. } = self;
+        let context = StepContext::new(step, self.dt, &self.motions, obstacles, self.may_sleep);
         let (mut total, mut slept) = (StepReport::default(), 0);
         for (number, island) in islands.iter_mut().enumerate() {
             if island.sleeps_through(&context) {
@@ -298,6 +298,10 @@ impl Simulation {
         for (number, island) in islands.iter_mut().enumerate().filter(|(_, island)| !island.is_asleep()) {
             if island.try_to_sleep(&context) {
                 ledger.iter_mut().for_each(|ledger| ledger.note_sleep(number));
+            }
+            for obstacle in obstacles.iter() {
+                let passage = obstacle.passages([context.time, context.end], island.moves(x));
+                passage.into_iter().for_each(|passage| summary.totals.note(passage));
             }
             island.scatter(x, v);
         }

@@ -153,6 +153,7 @@ impl Simulation {
                 summary.crossings
             ));
         }
+        summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));
         summary.warnings.extend(self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator)));
         Ok(summary)
     }

@@ -2,6 +2,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::contact::Passage;
 use crate::integrator::{ContactWork, Phases, SolvedBy, StepReport};
 
 /// Running totals over all steps. Summaries and checkpoints hold these as keys of their own.
@@ -26,6 +27,9 @@ pub struct Totals {
     /// The work of contact of the cloth with itself.
     #[serde(default)]
     pub contact: ContactWork,
+    /// Vertices that passed through obstacles, one entry for each obstacle that any passed through.
+    #[serde(default)]
+    pub passages: Vec<Passage>,
     /// Wall time of all steps.
     pub stepping_time: Duration,
     /// Wall time by phase; zero for integrators that do not report it.
@@ -33,6 +37,14 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Adds passages through an obstacle.
+    pub(super) fn note(&mut self, passage: Passage) {
+        match self.passages.iter_mut().find(|known| known.obstacle == passage.obstacle) {
+            Some(known) => known.add(&passage),
+            None => self.passages.push(passage),
+        }
+    }
+
     /// Adds one completed step, during which `slept` islands were asleep.
     pub(super) fn add(&mut self, report: &StepReport, slept: u64, elapsed: Duration) {
         self.steps += 1;
