@@ -19,7 +19,7 @@ energy! {
             let per_d = 1 / (2 * d);
             let A = det(D_m) / 2;
         }
-        // F = D D_m⁻¹ times the scaled det D_m. Dividing last gives an exact zero at rest for exactly representable edges.
+        // F = D D_m⁻¹ times the scaled det D_m. Dividing last gives an exact zero at rest if edges are exact.
         let F = columns(x1 - x0, x2 - x0) * B;
         let C = transpose(F) * F - d * identity(2);
         let c_u = C * vector(1, 0);

@@ -7,7 +7,8 @@ use super::{positive, print};
 
 #[derive(Debug, Args)]
 pub struct Validate {
-    /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `orders`, `momentum`, `long-run`; default: all.
+    /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `orders`, `momentum`, `contact`,
+    /// `long-run`; default: all.
     #[arg(value_parser = PossibleValuesParser::new(validate::QUESTIONS))]
     questions: Vec<String>,
     /// Use coarser meshes and fewer cases; takes a few seconds.

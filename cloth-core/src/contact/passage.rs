@@ -1,5 +1,5 @@
-//! Notices vertices that pass through a solid. Contact pushes a vertex out along the gradient of the signed distance, so
-//! a vertex that a step moves past the middle of a solid leaves it on the other side.
+//! Notices vertices that pass through a solid. Contact pushes a vertex out along the gradient of the signed distance.
+//! So a vertex that a step moves past the middle of a solid leaves it on the other side.
 
 use energy_dsl::Vector3;
 use serde::{Deserialize, Serialize};
@@ -40,9 +40,9 @@ impl std::fmt::Display for Passage {
         let times = if *vertices == 1 { "once".to_owned() } else { format!("{vertices} times") };
         write!(
             f,
-            "a vertex passed through {obstacle} {times}, first at t = {time:.4} s. It moved up to {:.3} mm in a step, at \
-             {speed:.3} m/s relative to {obstacle}, where contact reaches {:.3} mm: use a smaller dt, a slower motion or \
-             a larger thickness",
+            "a vertex passed through {obstacle} {times}, first at t = {time:.4} s. It moved up to {:.3} mm in a step, \
+             at {speed:.3} m/s relative to {obstacle}, where contact reaches {:.3} mm: use a smaller dt, a slower \
+             motion or a larger thickness",
             1e3 * farthest,
             1e3 * thickness
         )
@@ -81,8 +81,8 @@ impl Obstacle {
     }
 }
 
-/// Whether a straight move enters the solid at one side and leaves it, or is pushed out, at another. Walks by the signed
-/// distance, which changes by at most the length of a step.
+/// Returns whether a straight move enters the solid at one side and leaves it, or is pushed out, at another. Walks by
+/// the signed distance, which changes by at most the length of a step.
 fn passes(solid: &AnySolid, start: Vector3<f64>, end: Vector3<f64>, thickness: f64) -> bool {
     let way = subtract(end, start);
     let length = norm(way);

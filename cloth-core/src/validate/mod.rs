@@ -6,6 +6,7 @@
 mod banded;
 mod cantilever;
 mod catenary;
+mod contact;
 mod critical_load;
 mod delaunay;
 mod elastica;
@@ -30,6 +31,8 @@ pub use strip::{MeshKind, Strip};
 use crate::fabric::FabricError;
 use crate::integrator::StepError;
 use crate::mesh::MeshError;
+use crate::scene::SceneError;
+use crate::simulation::SimulationError;
 
 /// A measured result with its exact value.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +91,12 @@ pub enum ValidateError {
     /// A step failed.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A scene is invalid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A scene cannot be simulated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
     /// The triangles do not cover the strip.
     #[error("the triangles cover {area:.6} m² of {strip:?}; choose a width of several spacings, or another spacing")]
     Strip {
@@ -116,8 +125,8 @@ pub enum ValidateError {
 }
 
 /// Names of the questions.
-pub const QUESTIONS: [&str; 8] =
-    ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "long-run"];
+pub const QUESTIONS: [&str; 9] =
+    ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "contact", "long-run"];
 
 /// Answers the named questions, or all if `names` is empty, and calls `report` with each finding. `quick` skips the
 /// finer meshes.
@@ -126,7 +135,7 @@ pub const QUESTIONS: [&str; 8] =
 /// Returns an error if a case cannot be set up or solved.
 pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
-    let all: [Ask; 8] = [
+    let all: [Ask; 9] = [
         cantilever::ask,
         lateral_buckling::ask,
         catenary::ask,
@@ -134,6 +143,7 @@ pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> R
         modes::ask,
         orders::ask,
         momentum::ask,
+        contact::ask,
         long_run::ask,
     ];
     let mut findings = Vec::new();

@@ -1,16 +1,16 @@
 //! The polar decomposition F = R S of 3×3 matrices with det R = 1.
 //!
-//! With singular values σ₁ ≥ σ₂ ≥ |σ₃|, where σ₃ has the sign of det F, T = tr S = σ₁ + σ₂ + σ₃ is the largest root of
-//! p(λ) = λ⁴ − 2iλ² − 8Jλ + 2‖FᵀF‖² − i², where i = ‖F‖² and J = det F. Its gradient is R, so differentiating p(T; F) = 0
+//! The singular values are σ₁ ≥ σ₂ ≥ |σ₃|; σ₃ has the sign of det F. T = tr S = σ₁ + σ₂ + σ₃ is the largest root of p(λ)
+//! = λ⁴ − 2iλ² − 8Jλ + 2‖FᵀF‖² − i² with i = ‖F‖² and J = det F. The gradient of T is R. So differentiating p(T; F) = 0
 //! gives
 //!
 //! ```text
 //! R = ((λ² + i) F + 2λ cof F − 2 F FᵀF) / (λ³ − iλ − 2J).
 //! ```
 //!
-//! Let rᵢ be the rows of R and K = T I − S. Moving F by X turns R by ω(X) = K⁻¹ a(X): dR = R \[ω\]ₓ, where \[a\]ₓ = RᵀX − XᵀR.
-//! For X = eₖ eₗᵀ, a = eₗ × rₖ. So the Hessian of T is a(X)ᵀ K⁻¹ a(Y). It is finite where singular values meet: det K = (σ₁ +
-//! σ₂)(σ₂ + σ₃)(σ₃ + σ₁).
+//! Let rᵢ be the rows of R and K = T I − S. Moving F by X turns R by ω(X) = K⁻¹ a(X): dR = R \[ω\]ₓ, where \[a\]ₓ = RᵀX −
+//! XᵀR. For X = eₖ eₗᵀ, a = eₗ × rₖ. So the Hessian of T is a(X)ᵀ K⁻¹ a(Y). It is finite where singular values meet: det
+//! K = (σ₁ + σ₂)(σ₂ + σ₃)(σ₃ + σ₁).
 
 use super::Lowered;
 use super::inner_product::inner_product;
@@ -181,8 +181,7 @@ pub(super) fn recognise_stretch_difference(g: &mut Graph, trace: NodeId, three: 
     Some(g.add_rule(Rule { primitive: Primitive::StretchTraceExcess, value, ..rule }, &[]))
 }
 
-/// Returns ‖F − R‖² = ‖E‖² with E = S − I. Its gradient is 2 (F − R) = 2 R E, its Hessian twice the identity minus that of
-/// tr S.
+/// Returns ‖F − R‖² = ‖E‖² with E = S − I. Its gradient is 2 (F − R) = 2 R E, its Hessian twice that of ½ ‖F‖² − tr S.
 pub(super) fn distance_to_rotation(g: &mut Graph, arguments: &[NodeId]) -> NodeId {
     let at = Decomposition::new(g, arguments);
     let strain = at.strain(g, arguments);
@@ -365,7 +364,8 @@ fn signed_singular_values(g: &mut Graph, quartic: &Quartic) -> [NodeId; 3] {
     [first, second, g.select(inverted, opposite, third)]
 }
 
-/// Returns R after a step of Newton's method: it turns R by K⁻¹ a with \[a\]ₓ = RᵀF − FᵀR, and makes it orthogonal again.
+/// Returns R after a step of Newton's method. It turns R by K⁻¹ a with \[a\]ₓ = RᵀF − FᵀR, and makes it orthogonal
+/// again.
 fn polished(g: &mut Graph, r: &Matrix, f: &Matrix) -> Matrix {
     let stretch = product(g, &transposed(r), f);
     let spin = [(2, 1), (0, 2), (1, 0)].map(|(i, j)| g.sub(stretch[i][j], stretch[j][i]));
@@ -416,8 +416,8 @@ fn inverted(g: &mut Graph, matrix: &Matrix) -> Compliance {
     Compliance { adjugate, determinant }
 }
 
-/// The second derivatives of R: d²R(X, Y) = R (\[ω(Y)\]ₓ \[ω(X)\]ₓ + \[dω\]ₓ) with dω = K⁻¹ (da − dK ω(X)). For X = eₖ eₗᵀ, da =
-/// eₗ × (rₖ × ω(Y)). Also, dK = tr(dS) I − dS with dS = RᵀY − \[ω(Y)\]ₓ S.
+/// The second derivatives of R: d²R(X, Y) = R (\[ω(Y)\]ₓ \[ω(X)\]ₓ + \[dω\]ₓ) with dω = K⁻¹ (da − dK ω(X)). For X = eₖ
+/// eₗᵀ, da = eₗ × (rₖ × ω(Y)). Also, dK = tr(dS) I − dS with dS = RᵀY − \[ω(Y)\]ₓ S.
 struct Seconds {
     /// dω for each pair X ≤ Y.
     changes: Vec<Vector>,

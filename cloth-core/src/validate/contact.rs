@@ -1,0 +1,105 @@
+//! Contact of cloth with itself: friction on an incline by Coulomb's law, and impacts that conserve momentum.
+
+use super::{Finding, ValidateError};
+use crate::geometry::norm;
+use crate::scene::Scene;
+use crate::simulation::Simulation;
+
+const GRAVITY: f64 = 9.81;
+
+pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    let slides: &[(f64, f64)] = if quick { &[(0.2, 0.5)] } else { &[(0.0, 0.3), (0.15, 0.3), (0.3, 0.5), (0.2, 0.5)] };
+    for &(friction, slope) in slides {
+        slide(friction, slope, report)?;
+    }
+    rest(report)?;
+    impact(report)
+}
+
+fn simulation(text: &str) -> Result<Simulation, ValidateError> {
+    let scene = Scene::parse(text, "validate.toml".as_ref())?;
+    Ok(Simulation::new(&scene)?)
+}
+
+/// A sheet at a place, with the friction of its fabric and further keys.
+fn sheet(name: &str, [cells, size]: [f64; 2], at: [f64; 3], friction: f64, keys: &str) -> String {
+    format!(
+        "[[garment]]\nname = \"{name}\"\nplacement.translate = {at:?}\n{keys}\n\
+         mesh.sheet = {{ cells = [{cells:.0}, {cells:.0}], size = [{size:?}, {size:?}] }}\n\
+         fabric = {{ friction = {friction:?}, density = 0.2, thickness = 1e-3, material.stvk = \
+         {{ stretch_stiffness = 40.0, poisson_ratio = 0.3, bending.flat.stiffness = 1e-5 }} }}\n"
+    )
+}
+
+/// A sheet that lies on a pinned one. Gravity has the slope tan α along x.
+fn incline(friction: f64, slope: f64) -> Result<Simulation, ValidateError> {
+    let (sine, cosine) = slope.atan().sin_cos();
+    let head = format!(
+        "dt = 0.01\nduration = 2.0\nintegrator = \"newton\"\ncontact = \"on\"\ntolerances.velocity = 1e-5\n\
+         gravity = [{:?}, 0.0, {:?}]\n",
+        GRAVITY * sine,
+        -GRAVITY * cosine
+    );
+    let ground = sheet("ground", [8.0, 0.8], [0.0; 3], friction, "");
+    // At rest, the barriers carry the sheet at this height.
+    let cloth = sheet("cloth", [5.0, 0.2], [-0.213, 0.02, 0.0027], friction, "");
+    simulation(&format!("{head}{ground}{cloth}[[pins]]\nof = \"ground\"\nall = true\n"))
+}
+
+/// Returns the mean velocity of the upper sheet down the slope, in m/s.
+fn speed(simulation: &Simulation) -> f64 {
+    let cloth = simulation.parts()[1].vertices.clone();
+    let count = cloth.len() as f64;
+    simulation.velocities()[cloth].iter().map(|v| v[0]).sum::<f64>() / count
+}
+
+fn advance(simulation: &mut Simulation, steps: u64) -> Result<(), ValidateError> {
+    (0..steps).try_for_each(|_| simulation.step().map(drop).map_err(ValidateError::from))
+}
+
+/// A sliding sheet accelerates by g (sin α − μ cos α).
+fn slide(friction: f64, slope: f64, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    let mut simulation = incline(friction, slope)?;
+    advance(&mut simulation, 20)?;
+    let before = speed(&simulation);
+    advance(&mut simulation, 30)?;
+    let measured = (speed(&simulation) - before) / 0.3;
+    let (sine, cosine) = slope.atan().sin_cos();
+    let case = format!("sheet on an incline, μ {friction}, tan α {slope}: m/s²");
+    report(Finding::relative("contact", case, measured, GRAVITY * (sine - friction * cosine), 0.01));
+    Ok(())
+}
+
+/// Below tan α = μ a sheet stays: it may creep at the speed at which friction is regularised, 1 mm/s.
+fn rest(report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    let mut simulation = incline(0.5, 0.45)?;
+    advance(&mut simulation, 50)?;
+    let case = "sheet on an incline, μ 0.5, tan α 0.45: m/s".to_owned();
+    report(Finding::absolute("contact", case, speed(&simulation), 0.0, 1e-3));
+    Ok(())
+}
+
+/// Two sheets meet in weightlessness: contact pushes them apart by opposite forces.
+fn impact(report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    let head = "dt = 0.01\nduration = 1.0\nintegrator = \"newton\"\ncontact = \"on\"\ngravity = [0.0, 0.0, 0.0]\n\
+                tolerances.velocity = 1e-11\n";
+    let left = sheet("left", [3.0, 0.1], [0.0; 3], 0.0, "velocity = [0.0, 0.0, 1.0]");
+    let keys = "velocity = [0.1, 0.0, -1.0]\nspin = [0.0, 1.0, 0.0]";
+    let right = sheet("right", [3.0, 0.1], [0.013, 0.021, 0.03], 0.0, keys);
+    let mut simulation = simulation(&format!("{head}{left}{right}"))?;
+    let momentum = |simulation: &Simulation| {
+        let add = |sum: [f64; 3], (mass, v): (&f64, &[f64; 3])| [0, 1, 2].map(|axis| sum[axis] + mass * v[axis]);
+        simulation.masses().iter().zip(simulation.velocities()).fold([0.0; 3], add)
+    };
+    let mass: f64 = simulation.masses().iter().sum();
+    let (before, mut crossings) = (momentum(&simulation), 0);
+    for _ in 0..12 {
+        advance(&mut simulation, 1)?;
+        crossings += simulation.crossings().len();
+    }
+    let after = momentum(&simulation);
+    let change = norm([0, 1, 2].map(|axis| after[axis] - before[axis])) / mass;
+    report(Finding::absolute("contact", "impact of two sheets at 2 m/s: ΔP/m".into(), change, 0.0, 1e-9));
+    report(Finding::absolute("contact", "impact of two sheets: crossings".into(), crossings as f64, 0.0, 0.0));
+    Ok(())
+}
