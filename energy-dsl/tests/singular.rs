@@ -15,6 +15,7 @@ energy! {
     energy Far(p: Point; ε: Scalar) { let n = norm(p); if n > ε { n } else { n^2 } }
     energy Size(p: Point) { abs(p.x) + norm_squared(p) }
     energy OneSided(p: Point) { max(p.x, 0)^2 }
+    energy DomainEdge(p: Point) { if log(p.y) < 0 { p.x } else { p.x^2 } }
     energy Jump(p: Point) { if p.x > 0 { 1 } else { 0 } }
     energy Sum(p: Point) { norm(p) * norm(p) + unit(p).x * norm(p) }
     energy Quadratic(p, q: Point; k: Scalar) { k * norm_squared(p - q) }
@@ -92,6 +93,15 @@ fn outside_the_domain_is_flagged() {
     assert_eq!((turn.value, turn.gradient, flags(&turn)), (0.0, [ORIGIN], (true, false)));
     let lost = Hooke::new(10.0, 1.0).hessian(&[[f64::NAN, 0.0, 0.0], ORIGIN]);
     assert!(lost.value.is_nan() && lost.flags.degenerate);
+}
+
+#[test]
+fn a_branch_that_ends_with_the_domain_of_its_condition_is_a_kink() {
+    // Where p.y < 0, the logarithm is no number, and the comparison fails.
+    let edge = DomainEdge::<f64>::new();
+    let at = edge.gradient(&[[0.5, 0.0, 0.0]]);
+    assert!(at.flags.any(), "{at:?}");
+    assert!(!edge.gradient(&[[0.5, 0.1, 0.0]]).flags.any() && !edge.gradient(&[[0.5, -0.1, 0.0]]).flags.any());
 }
 
 #[test]

@@ -50,8 +50,23 @@ impl Hazards {
         match g.op(mask) {
             Op::And(a, b) | Op::Or(a, b) => [a, b].into_iter().for_each(|mask| self.boundary(g, mask)),
             Op::Not(a) => self.boundary(g, a),
-            Op::Less(a, b) | Op::LessOrEqual(a, b) | Op::Equal(a, b) if g.varies(a) || g.varies(b) => self.tie(g, a, b),
+            Op::Less(a, b) | Op::LessOrEqual(a, b) | Op::Equal(a, b) if g.varies(a) || g.varies(b) => {
+                self.tie(g, a, b);
+                self.edge_of_domain(g, &[a, b]);
+            }
             _ => {}
+        }
+    }
+
+    /// Marks where a compared number stops being one: beyond, the comparison fails, so that the branch changes.
+    fn edge_of_domain(&mut self, g: &mut Graph, compared: &[NodeId]) {
+        for node in operations(g, compared) {
+            if let Op::Ln(x) | Op::Sqrt(x) | Op::Pow(x, _) = g.op(node)
+                && g.varies(x)
+            {
+                let zero = g.constant(0.0);
+                self.tie(g, x, zero);
+            }
         }
     }
 
