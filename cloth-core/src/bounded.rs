@@ -2,6 +2,9 @@
 
 use serde::de::{Deserialize, Deserializer, Error};
 
+/// The largest speed of anything, in m/s.
+pub(crate) const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
 fn checked<'de, D: Deserializer<'de>>(
     deserializer: D,
     fits: impl Fn(f64) -> bool,

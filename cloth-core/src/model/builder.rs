@@ -111,7 +111,8 @@ impl<'a> Builder<'a> {
         self.model.thickness.extend(vec![hair.thickness(); count]);
         self.model.friction.extend(vec![0.0; count]);
         self.model.x.extend(vertices);
-        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
+        let segment = hair.length / hair.segments as f64;
+        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment });
     }
 
     fn check_names(&self) -> Result<(), ModelError> {

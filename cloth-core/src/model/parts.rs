@@ -33,6 +33,8 @@ pub enum PartKind {
     Hair {
         /// Vertices of each strand.
         joints: usize,
+        /// Length of a segment at rest, in m.
+        segment: f64,
     },
 }
 
@@ -153,7 +155,7 @@ impl Model {
     /// Returns the vertex range of each strand of hair.
     pub fn strands(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.parts.iter().flat_map(|part| {
-            let joints = if let PartKind::Hair { joints } = part.kind { joints } else { usize::MAX };
+            let joints = if let PartKind::Hair { joints, .. } = part.kind { joints } else { usize::MAX };
             let starts = part.vertices.clone().step_by(joints).filter(move |_| joints < usize::MAX);
             starts.map(move |start| start..start + joints)
         })

@@ -43,7 +43,7 @@ impl<'a> Show<'a> {
         for part in simulation.parts() {
             let (triangles, strands) = match &part.kind {
                 PartKind::Cloth(mesh) => (mesh.triangles().to_vec(), Vec::new()),
-                PartKind::Hair { joints } => {
+                PartKind::Hair { joints, .. } => {
                     let starts = (0..part.vertices.len()).step_by(*joints);
                     (Vec::new(), starts.map(|start| start..start + joints).collect())
                 }

@@ -5,6 +5,7 @@ mod frame_store;
 mod progress;
 mod record;
 mod report;
+mod results;
 pub mod stats;
 
 use std::path::{Path, PathBuf};
@@ -16,13 +17,12 @@ pub use checkpoint::{Checkpoint, CheckpointError};
 pub use progress::Progress;
 pub use record::{Record, RecordError};
 pub use report::{ReportError, write_report};
+pub use results::Ending;
 
 use crate::integrator::StepReport;
-use crate::output::{
-    AnimationError, OutputError, OutputFolder, PictureError, Show, animation_glb, obj_text, ply_bytes, usd_text,
-};
+use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, obj_text, ply_bytes};
 use crate::scene::{Scene, SceneError};
-use crate::simulation::{Simulation, SimulationError, Summary};
+use crate::simulation::{Simulation, SimulationError};
 use frame_store::FrameStore;
 
 /// A run that cannot be started or completed.
@@ -55,6 +55,14 @@ pub enum RunError {
     /// The state contains numbers that JSON cannot represent.
     #[error("cannot save the state: {0}")]
     Json(#[from] serde_json::Error),
+    /// A step failed, and then a file with the results so far could not be written.
+    #[error("{failure}; and the results of the steps before it are incomplete: {error}")]
+    AlsoUnwritten {
+        /// The failed step.
+        failure: SimulationError,
+        /// The file that could not be written.
+        error: Box<RunError>,
+    },
 }
 
 /// A simulation with its output.
@@ -68,19 +76,6 @@ pub struct Run {
     frames: FrameStore,
     /// Steps between checkpoints; `None` for no checkpoints.
     checkpoint_interval: Option<u64>,
-}
-
-/// The outcome of a run.
-#[derive(Debug)]
-pub struct Ending {
-    /// Totals and final state.
-    pub summary: Summary,
-    /// The files written.
-    pub files: Vec<PathBuf>,
-    /// Number of frames written.
-    pub frames: usize,
-    /// Whether all steps were completed.
-    pub finished: bool,
 }
 
 impl Run {
@@ -138,10 +133,10 @@ impl Run {
     }
 
     /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each
-    /// step. The results so far are written in any case, also after a failed step.
+    /// step. The results so far are written in any case, also after a failed step, which [`Ending::failure`] holds.
     ///
     /// # Errors
-    /// Returns an error if a step fails or a file cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn go(
         &mut self,
         stop: &AtomicBool,
@@ -150,10 +145,7 @@ impl Run {
         while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
             let report = match self.simulation.step() {
                 Ok(report) => report,
-                Err(error) => {
-                    self.finish()?;
-                    return Err(error.into());
-                }
+                Err(failure) => return self.finish(Some(failure)),
             };
             on_step(&self.simulation, &report);
             let done = self.simulation.steps_done();
@@ -167,7 +159,7 @@ impl Run {
         if self.checkpoint_interval.is_some() && !self.simulation.is_finished() {
             self.save()?;
         }
-        self.finish()
+        self.finish(None)
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
@@ -196,47 +188,6 @@ impl Run {
         };
         self.folder.write(OutputFolder::CHECKPOINT, &checkpoint.to_bytes()?)?;
         Ok(())
-    }
-
-    /// Writes the files that cover the whole run.
-    fn finish(&mut self) -> Result<Ending, RunError> {
-        let summary = self.simulation.summary()?;
-        let (wanted, frames) = (self.scene.output, self.frames.frames());
-        let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
-        let show = Show::new(&self.simulation, frames, frame_time);
-        let mut files = Vec::new();
-        let mut write = |name: &str, contents: &[u8]| -> Result<(), RunError> {
-            files.push(self.folder.write(name, contents)?);
-            Ok(())
-        };
-        if wanted.picture {
-            let (x, time) = (self.simulation.positions(), self.simulation.time());
-            write(OutputFolder::PICTURE, &show.picture(x, time, false)?)?;
-        }
-        if wanted.gltf {
-            write(OutputFolder::ANIMATION, &animation_glb(&show.tracks(), frame_time)?)?;
-        }
-        if wanted.usd {
-            write(OutputFolder::USD, usd_text(&show.tracks(), 1.0 / frame_time).as_bytes())?;
-        }
-        if let Some(ledger) = self.simulation.ledger() {
-            write(OutputFolder::LEDGER, ledger.csv().as_bytes())?;
-            write(OutputFolder::LEDGER_PLOT, ledger.svg().map_err(RunError::Plot)?.as_bytes())?;
-        }
-        if wanted.png {
-            for (number, frame) in frames.iter().enumerate() {
-                let picture = show.picture(frame, number as f64 * frame_time, true)?;
-                self.folder.write_frame(number, "png", &picture)?;
-            }
-        }
-        let finished = self.simulation.is_finished();
-        let tables = stats::tables(&summary);
-        write(OutputFolder::SUMMARY, format!("{summary}\n\n{tables}").as_bytes())?;
-        let (scene, path) = (self.text.clone(), self.absolute_path());
-        let (version, frames) = (Record::VERSION, frames.len());
-        let record = Record { version, scene, path, finished, frames, summary: summary.clone() };
-        write(OutputFolder::RECORD, &serde_json::to_vec_pretty(&record)?)?;
-        Ok(Ending { summary, files, frames, finished })
     }
 
     /// The absolute path of the scene file, so that its relative paths still resolve when the run is read from

@@ -120,7 +120,6 @@ impl Simulation {
     /// Returns an error if an energy is not finite.
     pub fn summary(&mut self) -> Result<Summary, EvaluationError> {
         let mut summary = self.summary.clone();
-        summary.crossings = self.crossings().len();
         let mut energies: Vec<Option<f64>> = vec![None; self.labels.len()];
         let mut elements = vec![0; self.labels.len()];
         let add = |sum: &mut Vector3<f64>, part: Vector3<f64>| (0..3).for_each(|axis| sum[axis] += part[axis]);
@@ -146,6 +145,27 @@ impl Simulation {
             TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
         };
         summary.terms = self.counts().into_iter().enumerate().map(term).collect();
+        self.add_findings(&mut summary);
+        Ok(summary)
+    }
+
+    /// Returns the totals so far without energies, forces and momenta, for a state whose energies are not finite.
+    #[must_use]
+    pub fn summary_without_energies(&self) -> Summary {
+        let mut summary = self.summary.clone();
+        let term = |(label, counts): (&TermLabel, Counts)| {
+            let (name, element, reused) = (label.name.clone(), label.element.to_owned(), counts.reused);
+            TermSummary { name, element, elements: 0, energy: None, reused, counts }
+        };
+        summary.terms = self.labels.iter().zip(self.counts()).map(term).collect();
+        self.add_findings(&mut summary);
+        summary.warnings.push("the energies at the end are not finite".to_owned());
+        summary
+    }
+
+    /// Adds the crossings at the end and the balance of energy.
+    fn add_findings(&self, summary: &mut Summary) {
+        summary.crossings = self.crossings().len();
         if summary.crossings > 0 {
             summary.warnings.push(format!(
                 "the cloth passes through itself: at the end, edges cross triangles in {} places. \
@@ -154,7 +174,6 @@ impl Simulation {
             ));
         }
         summary.warnings.extend(self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator)));
-        Ok(summary)
     }
 }
 

@@ -1,0 +1,112 @@
+//! How runs end: by a failed step, by signals, while files are written.
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// A sheet that symplectic Euler cannot step stably.
+const UNSTABLE: &str = r#"dt = 0.01
+duration = 4.0
+frames_per_second = 50
+integrator = "symplectic-euler"
+
+[mesh.sheet]
+cells = [6, 6]
+size = [1.0, 1.0]
+
+[fabric]
+density = 0.15
+material.stvk = { stretch_stiffness = 500.0, poisson_ratio = 0.3 }
+
+[[pins]]
+nearest = [-0.5, 0.5, 0.0]
+"#;
+
+fn with_scene(text: &str) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    folder
+}
+
+fn cloth(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_cloth")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+#[test]
+fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
+    for ledger in [true, false] {
+        let folder = with_scene(&format!("{UNSTABLE}[output]\npng = {ledger}\nledger = {ledger}\n"));
+        let output = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        for part in ["error: step ", "triangle ", " of garment 0 (vertices [", "Try a smaller dt", "the files hold the "] {
+            assert!(message.to_lowercase().contains(&part.to_lowercase()), "{part}: {message}");
+        }
+        let out = folder.path().join("out");
+        let record: serde_json::Value = serde_json::from_slice(&read(&out, "run.json")).unwrap();
+        let (steps, frames) = (record["summary"]["steps"].as_u64().unwrap(), record["frames"].as_u64().unwrap());
+        assert!(record["finished"] == false && steps > 2 && frames == steps / 2 + 1, "{steps} {frames}");
+        assert!(read(&out, "cloth.png").starts_with(b"\x89PNG") && read(&out, "cloth.glb").starts_with(b"glTF"));
+        let usd = String::from_utf8(read(&out, "cloth.usda")).unwrap();
+        assert!(usd.contains(&format!("endTimeCode = {}\n", frames - 1)) && !usd.contains("inf") && !usd.contains("nan"));
+        assert!(String::from_utf8(read(&out, "summary.txt")).unwrap().contains("the run ended early: step "));
+        if ledger {
+            assert!(out.join(format!("frames/cloth_{:04}.png", frames - 1)).exists());
+            let lines = String::from_utf8(read(&out, "ledger.csv")).unwrap().lines().count() as u64;
+            assert_eq!(lines, steps + 2);
+            assert!(cloth(&["report", "out"], folder.path()).status.success());
+        }
+    }
+}
+
+/// A run that takes hours, with frames of few files.
+fn endless() -> String {
+    UNSTABLE.replace("symplectic-euler", "newton").replace("duration = 4.0", "duration = 10000.0")
+}
+
+#[cfg(unix)]
+fn wait_for(path: &Path) {
+    let start = Instant::now();
+    while !path.exists() {
+        assert!(start.elapsed() < Duration::from_secs(120), "{} was not written", path.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[cfg(unix)]
+fn send(signal: &str, child: &Child) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_set_the_exit_status_and_stay_ignored_if_they_were() {
+    let folder = with_scene(&endless());
+    let start = |program: &str, arguments: &[&str], out: &str| {
+        let mut command = Command::new(program);
+        command.args(arguments).args(["run", "scene.toml", "-o", out]).current_dir(folder.path());
+        let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        wait_for(&folder.path().join(out).join("frames/cloth_0002.obj"));
+        child
+    };
+    for (signal, status) in [("-TERM", 143), ("-HUP", 129), ("-INT", 130)] {
+        let mut child = start(env!("CARGO_BIN_EXE_cloth"), &[], signal.trim_start_matches('-'));
+        send(signal, &child);
+        assert_eq!(child.wait().unwrap().code(), Some(status), "{signal}");
+    }
+    // `nohup` ignores the signal and becomes the program.
+    let mut child = start("nohup", &[env!("CARGO_BIN_EXE_cloth")], "nohup");
+    send("-HUP", &child);
+    let frames = folder.path().join("nohup/frames");
+    let count = std::fs::read_dir(&frames).unwrap().count();
+    wait_for(&frames.join(format!("cloth_{:04}.obj", count + 3)));
+    assert!(child.try_wait().unwrap().is_none(), "it still runs");
+    send("-TERM", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+}
