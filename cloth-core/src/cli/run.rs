@@ -1,13 +1,13 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use cloth_core::output::OutputFolder;
 use cloth_core::run::{Ending, Progress, Run, RunError, stats};
 use cloth_core::scene::{self, Scene};
 
+use super::interrupts::Interrupts;
 use super::print;
 
 #[derive(Debug, Args)]
@@ -67,20 +67,24 @@ pub fn limit_threads(run: Run, threads: Option<u16>) -> Run {
     }
 }
 
-/// Simulates until the end or Ctrl-C, and prints the summary and the files written. The exit code is 130 if the run
-/// was interrupted.
+/// Simulates until the end or a signal, and prints the summary and the files written. The exit code is 128 and the
+/// number of the signal if the run was interrupted.
 pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
     run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let interrupted = interrupt_flag()?;
+    let interrupts = Interrupts::listen()?;
     let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
-    let ended = run.go(interrupted, |simulation, report| progress.step(simulation.steps_done(), report));
+    let ended = run.go(interrupts.flag(), |simulation, report| progress.step(simulation.steps_done(), report));
     progress.finish();
-    let Ending { summary, files, frames, finished } = ended?;
+    let Ending { summary, files, frames, finished, failure } = ended?;
     let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
     let folder = run.folder().path();
     let tables = if with_stats { format!("{}\n", stats::tables(&summary)) } else { String::new() };
     let frame_folder = folder.join(OutputFolder::FRAMES);
     print(&format!("{summary}\n\n{tables}{files}wrote {frames} frames to {}\n", frame_folder.display()))?;
+    if let Some(failure) = failure {
+        let kept = format!("the files hold the {} steps before it", run.simulation().steps_done());
+        return Err(anyhow::anyhow!("{failure}; {kept}"));
+    }
     if finished {
         return Ok(ExitCode::SUCCESS);
     }
@@ -89,17 +93,5 @@ pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
         false => "pass --checkpoint to be able to resume".to_owned(),
     };
     eprintln!("stopped after step {} of {}; {resume}", run.simulation().steps_done(), run.simulation().steps());
-    Ok(ExitCode::from(130))
-}
-
-/// Returns a flag that the first Ctrl-C sets. The second Ctrl-C exits at once.
-fn interrupt_flag() -> Result<&'static AtomicBool> {
-    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-    ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("cannot listen for Ctrl-C")?;
-    Ok(&INTERRUPTED)
+    Ok(interrupts.exit_code())
 }
