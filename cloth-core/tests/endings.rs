@@ -65,12 +65,16 @@ fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
     }
 }
 
+fn started(arguments: &[&str], folder: &Path) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cloth"));
+    command.args(arguments).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
 /// A run that takes hours, with frames of few files.
 fn endless() -> String {
     UNSTABLE.replace("symplectic-euler", "newton").replace("duration = 4.0", "duration = 10000.0")
 }
 
-#[cfg(unix)]
 fn wait_for(path: &Path) {
     let start = Instant::now();
     while !path.exists() {
@@ -109,4 +113,51 @@ fn signals_set_the_exit_status_and_stay_ignored_if_they_were() {
     assert!(child.try_wait().unwrap().is_none(), "it still runs");
     send("-TERM", &child);
     assert_eq!(child.wait().unwrap().code(), Some(143));
+}
+
+#[test]
+fn pictures_of_frames_are_drawn_while_the_run_continues() {
+    if std::thread::available_parallelism().map_or(1, usize::from) == 1 {
+        return; // a single thread draws after the last step
+    }
+    let folder = with_scene(&format!("{}[output]\npng = true\n", endless()));
+    let mut child = started(&["run", "scene.toml", "-o", "out"], folder.path());
+    wait_for(&folder.path().join("out/frames/cloth_0001.png"));
+    assert!(!folder.path().join("out/run.json").exists() && child.try_wait().unwrap().is_none());
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_while_files_are_written_leaves_what_a_report_needs() {
+    let scene = endless().replace("duration = 10000.0", "duration = 2.0");
+    let folder = with_scene(&format!("{scene}[output]\npng = true\n"));
+    let child = started(&["run", "scene.toml", "-o", "out"], folder.path());
+    let out = folder.path().join("out");
+    wait_for(&out.join("run.json"));
+    send("-INT", &child);
+    let (start, output) = (Instant::now(), child.wait_with_output().unwrap());
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert!(message.contains("stopped after step 200 of 200, before all files were written"), "{message}");
+    assert!(start.elapsed() < Duration::from_secs(10) && !out.join("frames/cloth_0100.png").exists());
+    let record: serde_json::Value = serde_json::from_slice(&read(&out, "run.json")).unwrap();
+    assert_eq!((&record["finished"], &record["frames"]), (&true.into(), &101.into()));
+    assert!(cloth(&["report", "out"], folder.path()).status.success());
+}
+
+#[test]
+fn pictures_of_all_frames_show_the_same_part_of_space() {
+    // With one thread and with two, and thus in any order of drawing, the pictures are the same.
+    let scene = endless().replace("duration = 10000.0", "duration = 0.04");
+    let folder = with_scene(&format!("{scene}[output]\npng = true\n"));
+    for (threads, out) in [("1", "one"), ("2", "two")] {
+        let output = cloth(&["run", "scene.toml", "-o", out, "--threads", threads], folder.path());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    for frame in 0..3 {
+        let [one, two] = ["one", "two"].map(|out| read(&folder.path().join(out), &format!("frames/cloth_{frame:04}.png")));
+        assert!(one == two, "frame {frame}");
+    }
 }

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 use cloth_core::output::OutputFolder;
-use cloth_core::run::{Ending, Progress, Run, RunError, stats};
+use cloth_core::run::{Ending, Event, Progress, Run, RunError, stats};
 use cloth_core::scene::{self, Scene};
 
 use super::interrupts::Interrupts;
@@ -73,9 +73,12 @@ pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
     run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let interrupts = Interrupts::listen()?;
     let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
-    let ended = run.go(interrupts.flag(), |simulation, report| progress.step(simulation.steps_done(), report));
+    let ended = run.go(interrupts.flag(), |event| match event {
+        Event::Step(simulation, report) => progress.step(simulation.steps_done(), report),
+        Event::LastStep => progress.last_step(),
+    });
     progress.finish();
-    let Ending { summary, files, frames, finished, failure } = ended?;
+    let Ending { summary, files, frames, finished, abandoned, failure } = ended?;
     let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
     let folder = run.folder().path();
     let tables = if with_stats { format!("{}\n", stats::tables(&summary)) } else { String::new() };
@@ -85,13 +88,15 @@ pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
         let kept = format!("the files hold the {} steps before it", run.simulation().steps_done());
         return Err(anyhow::anyhow!("{failure}; {kept}"));
     }
-    if finished {
+    if finished && !abandoned {
         return Ok(ExitCode::SUCCESS);
     }
     let resume = match run.leaves_checkpoints() {
         true => format!("resume with `cloth resume {}`", folder.display()),
         false => "pass --checkpoint to be able to resume".to_owned(),
     };
-    eprintln!("stopped after step {} of {}; {resume}", run.simulation().steps_done(), run.simulation().steps());
+    let missing = if abandoned { ", before all files were written" } else { "" };
+    let (done, all) = (run.simulation().steps_done(), run.simulation().steps());
+    eprintln!("stopped after step {done} of {all}{missing}; {resume}");
     Ok(interrupts.exit_code())
 }

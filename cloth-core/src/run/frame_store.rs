@@ -3,17 +3,21 @@
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
 use super::checkpoint::CheckpointError;
 use crate::output::OutputError;
 
+/// The positions of all vertices in one frame, in m. Pictures are drawn from them on another thread.
+pub(super) type Frame = Arc<[Vector3<f64>]>;
+
 /// Frames, each with the positions of all vertices. The file holds them one after the other, in little-endian double
 /// precision.
 #[derive(Debug)]
 pub(crate) struct FrameStore {
-    frames: Vec<Vec<Vector3<f64>>>,
+    frames: Vec<Frame>,
     file: Option<(PathBuf, File)>,
     checksum: crc32fast::Hasher,
 }
@@ -49,7 +53,7 @@ impl FrameStore {
         Ok(Self { frames, file: Some((path.to_owned(), file)), checksum: hasher })
     }
 
-    pub(crate) fn frames(&self) -> &[Vec<Vector3<f64>>] {
+    pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
@@ -58,7 +62,7 @@ impl FrameStore {
         self.checksum.clone().finalize()
     }
 
-    pub(crate) fn add(&mut self, frame: Vec<Vector3<f64>>) -> Result<(), OutputError> {
+    pub(crate) fn add(&mut self, frame: Frame) -> Result<(), OutputError> {
         if let Some((path, file)) = &mut self.file {
             let bytes: Vec<u8> = frame.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
             file.write_all(&bytes).map_err(|source| OutputError::File { path: path.clone(), source })?;

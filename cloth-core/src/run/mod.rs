@@ -1,6 +1,7 @@
 //! Runs a scene from start to end, and writes frames, checkpoints and results.
 
 mod checkpoint;
+mod frame_pictures;
 mod frame_store;
 mod progress;
 mod record;
@@ -20,10 +21,11 @@ pub use report::{ReportError, write_report};
 pub use results::Ending;
 
 use crate::integrator::StepReport;
-use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, obj_text, ply_bytes};
+use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery, obj_text, ply_bytes};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
-use frame_store::FrameStore;
+use frame_pictures::FramePictures;
+use frame_store::{Frame, FrameStore};
 
 /// A run that cannot be started or completed.
 #[derive(Debug, thiserror::Error)]
@@ -74,8 +76,21 @@ pub struct Run {
     folder: OutputFolder,
     simulation: Simulation,
     frames: FrameStore,
+    /// Pictures of the frames; `None` before the first step, or if the scene does not want them.
+    pictures: Option<FramePictures>,
+    /// The largest number of threads.
+    threads: usize,
     /// Steps between checkpoints; `None` for no checkpoints.
     checkpoint_interval: Option<u64>,
+}
+
+/// Progress of a run.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// A step was completed.
+    Step(&'a Simulation, &'a StepReport),
+    /// No step follows; the files that cover the whole run are written.
+    LastStep,
 }
 
 impl Run {
@@ -99,7 +114,9 @@ impl Run {
         }
         let folder = OutputFolder::open(output, overwrite)?;
         let frames = FrameStore::new(checkpoint_interval.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES)))?;
-        let mut run = Self { scene, text, path: path.to_owned(), folder, simulation, frames, checkpoint_interval };
+        let (pictures, threads) = (None, available_threads());
+        let path = path.to_owned();
+        let mut run = Self { scene, text, path, folder, simulation, frames, pictures, threads, checkpoint_interval };
         run.add_frame()?;
         Ok(run)
     }
@@ -107,7 +124,7 @@ impl Run {
     /// Limits the number of threads; see [`Simulation::with_threads`].
     #[must_use]
     pub fn with_threads(self, threads: usize) -> Self {
-        Self { simulation: self.simulation.with_threads(threads), ..self }
+        Self { simulation: self.simulation.with_threads(threads), threads, ..self }
     }
 
     /// Resumes from the checkpoint in a folder.
@@ -123,7 +140,8 @@ impl Run {
         let vertices = simulation.positions().len();
         let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
         let folder = OutputFolder::reopen(output)?;
-        Ok(Self { scene, text, path, folder, simulation, frames, checkpoint_interval: Some(every) })
+        let (pictures, threads, checkpoint_interval) = (None, available_threads(), Some(every));
+        Ok(Self { scene, text, path, folder, simulation, frames, pictures, threads, checkpoint_interval })
     }
 
     /// The simulation of the run.
@@ -132,22 +150,35 @@ impl Run {
         &self.simulation
     }
 
-    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each
-    /// step. The results so far are written in any case, also after a failed step, which [`Ending::failure`] holds.
+    /// Simulates to the end, or until `stop` is set; then the current step is completed. The results so far are written
+    /// in any case, also after a failed step, which [`Ending::failure`] holds. If `stop` is set only after the last
+    /// step, the remaining files are abandoned.
     ///
     /// # Errors
     /// Returns an error if a file cannot be written.
     pub fn go(
         &mut self,
         stop: &AtomicBool,
-        mut on_step: impl FnMut(&Simulation, &StepReport),
+        mut on_event: impl FnMut(Event<'_>),
     ) -> Result<Ending, RunError> {
+        self.start_pictures()?;
+        let failure = self.step_to_end(stop, &mut on_event)?;
+        on_event(Event::LastStep);
+        self.finish(failure, stop)
+    }
+
+    /// Takes the steps, and returns the failure of the last one.
+    fn step_to_end(
+        &mut self,
+        stop: &AtomicBool,
+        on_event: &mut impl FnMut(Event<'_>),
+    ) -> Result<Option<SimulationError>, RunError> {
         while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
             let report = match self.simulation.step() {
                 Ok(report) => report,
-                Err(failure) => return self.finish(Some(failure)),
+                Err(failure) => return Ok(Some(failure)),
             };
-            on_step(&self.simulation, &report);
+            on_event(Event::Step(&self.simulation, &report));
             let done = self.simulation.steps_done();
             if done.is_multiple_of(self.scene.steps_per_frame()) {
                 self.add_frame()?;
@@ -159,7 +190,21 @@ impl Run {
         if self.checkpoint_interval.is_some() && !self.simulation.is_finished() {
             self.save()?;
         }
-        self.finish(None)
+        Ok(None)
+    }
+
+    /// Starts to draw the pictures of frames, of which a resumed run has some. They take a thread of the simulation.
+    fn start_pictures(&mut self) -> Result<(), RunError> {
+        if !self.scene.output.png {
+            return Ok(());
+        }
+        let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
+        let scenery = Scenery::of(&self.simulation);
+        let mut pictures = FramePictures::start(scenery, self.folder.clone(), frame_time, self.threads);
+        self.simulation.set_threads(self.threads.saturating_sub(1).max(1));
+        self.frames.frames().iter().try_for_each(|frame| pictures.add(Frame::clone(frame)))?;
+        self.pictures = Some(pictures);
+        Ok(())
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
@@ -172,7 +217,11 @@ impl Run {
         if self.scene.output.ply {
             self.folder.write_frame(number, "ply", &ply_bytes(x, simulation.velocities(), triangles))?;
         }
-        self.frames.add(x.to_vec())?;
+        let frame = Frame::from(x);
+        if let Some(pictures) = &mut self.pictures {
+            pictures.add(Frame::clone(&frame))?;
+        }
+        self.frames.add(frame)?;
         Ok(())
     }
 
@@ -207,4 +256,8 @@ impl Run {
     pub fn leaves_checkpoints(&self) -> bool {
         self.checkpoint_interval.is_some()
     }
+}
+
+fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }

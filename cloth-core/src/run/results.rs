@@ -1,6 +1,7 @@
 //! The files that cover a whole run, written at its end.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{Record, Run, RunError, stats};
 use crate::output::{OutputFolder, Show, animation_glb, usd_text};
@@ -17,41 +18,68 @@ pub struct Ending {
     pub frames: usize,
     /// Whether all steps were completed.
     pub finished: bool,
+    /// Whether a signal after the last step kept files from being written.
+    pub abandoned: bool,
     /// The step that failed; `None` if none did. The results cover the steps before it.
     pub failure: Option<SimulationError>,
 }
 
 /// Files written so far, and the first error. A file that cannot be written does not keep the others from being
-/// written.
-#[derive(Debug, Default)]
-struct Written {
+/// written; a signal does.
+#[derive(Debug)]
+struct Written<'a> {
     files: Vec<PathBuf>,
     error: Option<RunError>,
+    stop: &'a AtomicBool,
+    /// Whether a signal had arrived before the first file. It ended the steps, and the files are written nevertheless.
+    was_stopped: bool,
 }
 
-impl Written {
-    fn add(&mut self, file: Result<PathBuf, RunError>) {
-        match file {
-            Ok(path) => self.files.push(path),
-            Err(error) => self.error = self.error.take().or(Some(error)),
+impl<'a> Written<'a> {
+    fn new(stop: &'a AtomicBool) -> Self {
+        Self { files: Vec::new(), error: None, stop, was_stopped: stop.load(Ordering::Relaxed) }
+    }
+
+    fn is_abandoned(&self) -> bool {
+        !self.was_stopped && self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Writes a file, if it is wanted.
+    fn add(&mut self, is_wanted: bool, write: impl FnOnce() -> Result<PathBuf, RunError>) {
+        if is_wanted && !self.is_abandoned() {
+            match write() {
+                Ok(path) => self.files.push(path),
+                Err(error) => self.note(error),
+            }
         }
+    }
+
+    fn note(&mut self, error: RunError) {
+        self.error = self.error.take().or(Some(error));
     }
 }
 
 impl Run {
     /// Writes the files that cover the whole run. The summary and the record come first: they are small, and
     /// `cloth report` needs them.
-    pub(super) fn finish(&mut self, failure: Option<SimulationError>) -> Result<Ending, RunError> {
+    pub(super) fn finish(&mut self, failure: Option<SimulationError>, stop: &AtomicBool) -> Result<Ending, RunError> {
+        let mut written = Written::new(stop);
         let summary = self.summary_of_good_steps(failure.as_ref())?;
-        let mut written = Written::default();
-        written.add(self.write_summary(&summary));
-        written.add(self.write_record(&summary));
+        written.add(true, || self.write_summary(&summary));
+        written.add(true, || self.write_record(&summary));
         self.write_ledger(&mut written);
         self.write_shows(&mut written);
+        if let Some(mut pictures) = self.pictures.take() {
+            pictures.finish(|| written.is_abandoned()).unwrap_or_else(|error| written.note(error));
+        }
+        let abandoned = written.is_abandoned();
+        if abandoned && self.checkpoint_interval.is_some() {
+            self.save()?;
+        }
         match (written.error, failure) {
             (None, failure) => {
                 let (frames, finished) = (self.frames.frames().len(), self.simulation.is_finished());
-                Ok(Ending { summary, files: written.files, frames, finished, failure })
+                Ok(Ending { summary, files: written.files, frames, finished, abandoned, failure })
             }
             (Some(error), None) => Err(error),
             (Some(error), Some(failure)) => Err(RunError::AlsoUnwritten { failure, error: Box::new(error) }),
@@ -82,38 +110,22 @@ impl Run {
         self.write(OutputFolder::RECORD, &serde_json::to_vec_pretty(&record)?)
     }
 
-    fn write_ledger(&self, written: &mut Written) {
+    fn write_ledger(&self, written: &mut Written<'_>) {
         let Some(ledger) = self.simulation.ledger() else { return };
-        written.add(self.write(OutputFolder::LEDGER, ledger.csv().as_bytes()));
-        let plot = ledger.svg().map_err(RunError::Plot);
-        written.add(plot.and_then(|plot| self.write(OutputFolder::LEDGER_PLOT, plot.as_bytes())));
+        written.add(true, || self.write(OutputFolder::LEDGER, ledger.csv().as_bytes()));
+        written.add(true, || self.write(OutputFolder::LEDGER_PLOT, ledger.svg().map_err(RunError::Plot)?.as_bytes()));
     }
 
-    /// Writes the picture, the animations and the pictures of the frames.
-    fn write_shows(&self, written: &mut Written) {
+    /// Writes the picture and the animations.
+    fn write_shows(&self, written: &mut Written<'_>) {
         let (wanted, frames) = (self.scene.output, self.frames.frames());
         let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
         let show = Show::new(&self.simulation, frames, frame_time);
-        if wanted.picture {
-            let (x, time) = (self.simulation.positions(), self.simulation.time());
-            let picture = show.picture(x, time, false).map_err(RunError::from);
-            written.add(picture.and_then(|picture| self.write(OutputFolder::PICTURE, &picture)));
-        }
-        if wanted.usd {
-            written.add(self.write(OutputFolder::USD, usd_text(&show.tracks(), 1.0 / frame_time).as_bytes()));
-        }
-        if wanted.gltf {
-            let animation = animation_glb(&show.tracks(), frame_time).map_err(RunError::from);
-            written.add(animation.and_then(|animation| self.write(OutputFolder::ANIMATION, &animation)));
-        }
-        if wanted.png {
-            for (number, frame) in frames.iter().enumerate() {
-                let picture = show.picture(frame, number as f64 * frame_time, true).map_err(RunError::from);
-                let file = picture.and_then(|picture| Ok(self.folder.write_frame(number, "png", &picture)?));
-                if let Err(error) = file {
-                    return written.add(Err(error));
-                }
-            }
-        }
+        let picture = || show.picture(self.simulation.positions(), self.simulation.time());
+        written.add(wanted.picture, || self.write(OutputFolder::PICTURE, &picture()?));
+        let usd = || usd_text(&show.tracks(), 1.0 / frame_time);
+        written.add(wanted.usd, || self.write(OutputFolder::USD, usd().as_bytes()));
+        let gltf = || animation_glb(&show.tracks(), frame_time);
+        written.add(wanted.gltf, || self.write(OutputFolder::ANIMATION, &gltf()?));
     }
 }

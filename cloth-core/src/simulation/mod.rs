@@ -139,8 +139,13 @@ impl Simulation {
     /// Results are bit-identical for every number of threads.
     #[must_use]
     pub fn with_threads(mut self, threads: usize) -> Self {
-        self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
+        self.set_threads(threads);
         self
+    }
+
+    /// Limits the number of threads of the next steps; see [`Simulation::with_threads`].
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
     }
 
     /// The garments and hair of the scene.

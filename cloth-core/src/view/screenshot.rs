@@ -35,6 +35,6 @@ pub fn screenshot(
     let look = Look { colours: (colouring != Colouring::Plain).then_some(&colours), wireframe };
     let frames = [stage.positions().to_vec()];
     let show = Show::new(stage.simulation(), &frames, stage.frame_time());
-    let png = show.picture_with(stage.positions(), stage.time(), false, &look)?;
+    let png = show.picture_with(stage.positions(), stage.time(), &look)?;
     Ok(Screenshot { png, time: stage.time(), legend: colouring.legend(most) })
 }

@@ -433,7 +433,7 @@ mod tests {
     fn a_run_is_played_from_its_frames() {
         let folder = tempfile::TempDir::new().unwrap();
         let mut run = crate::run::Run::new(SCENE.to_owned(), "s.toml".as_ref(), folder.path(), false, None).unwrap();
-        run.go(&std::sync::atomic::AtomicBool::new(false), |_, _| ()).unwrap();
+        run.go(&std::sync::atomic::AtomicBool::new(false), |_| ()).unwrap();
         let mut stage = Stage::open(folder.path()).unwrap();
         assert!(!stage.is_live() && stage.time() == 0.0 && !stage.hold(24, [0.0; 3]));
         stage.advance(0.05, || false).unwrap();
