@@ -6,17 +6,14 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use energy_dsl::Vector3;
+
 use super::RunError;
 use super::frame_store::Frame;
-use crate::geometry::Bounds;
 use crate::output::{Framing, Look, OutputFolder, Scenery};
 
 /// Time between two looks at a drawing thread that finishes.
 const POLL: Duration = Duration::from_millis(5);
-/// The margin around a frame that leaves the picture, over the size of what the picture then shows. Frames drawn
-/// before are drawn again; the margin keeps their number proportional to the number of frames.
-const MARGIN: f64 = 0.12;
-
 /// Draws the pictures of frames in the order in which they are added. All of them show the same part of space.
 #[derive(Debug)]
 pub(super) struct FramePictures {
@@ -37,7 +34,7 @@ impl FramePictures {
     pub(super) fn start(scenery: Scenery, folder: OutputFolder, frame_time: f64, threads: usize) -> Self {
         let abandoned = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&abandoned);
-        let drawing = Drawing { scenery, folder, frame_time, frames: Vec::new(), drawn: Vec::new(), shown: None };
+        let drawing = Drawing { scenery, folder, frame_time, frames: Vec::new(), drawn: Vec::new(), outermost: Vec::new(), framing: None };
         let hands = if threads > 1 {
             let (sender, receiver) = channel();
             let thread = std::thread::spawn(move || drawing.draw_received(&receiver, &stop));
@@ -110,10 +107,12 @@ struct Drawing {
     folder: OutputFolder,
     frame_time: f64,
     frames: Vec<Frame>,
-    /// Whether the picture of each frame exists and shows `shown`.
+    /// Whether the picture of each frame exists and has the current framing.
     drawn: Vec<bool>,
+    /// The outermost points of all frames, in m.
+    outermost: Vec<Vector3<f64>>,
     /// The part of space that the pictures show; `None` before the first frame.
-    shown: Option<Bounds>,
+    framing: Option<Framing>,
 }
 
 impl Drawing {
@@ -134,13 +133,15 @@ impl Drawing {
         Ok(())
     }
 
-    /// Adds a frame. If it leaves the part of space that is shown, all pictures are to be drawn again.
+    /// Adds a frame. If it leaves the part of space that is shown, that part grows, and all pictures are drawn again. The
+    /// space that the camera leaves around everything makes that rare.
     fn add(&mut self, frame: Frame) {
-        let needed = self.scenery.bounds(&frame, self.time(self.frames.len()));
-        if !self.shown.is_some_and(|shown| shown == shown.around(needed)) {
-            let (all, is_first) = (self.shown.map_or(needed, |shown| shown.around(needed)), self.shown.is_none());
-            let size = (0..3).map(|axis| all.high[axis] - all.low[axis]).fold(0.0, f64::max);
-            self.shown = Some(if is_first { all } else { all.extended(MARGIN * size) });
+        let time = self.time(self.frames.len());
+        let outermost = self.scenery.outermost(&frame, time);
+        let is_shown = self.framing.is_some_and(|framing| framing.shows(&outermost));
+        self.outermost.extend(outermost);
+        if !is_shown {
+            self.framing = Some(Framing::steady(&self.outermost, self.scenery.floor(time)));
             self.drawn.fill(false);
         }
         self.frames.push(frame);
@@ -160,7 +161,7 @@ impl Drawing {
     }
 
     fn draw(&mut self, number: usize) -> Result<(), RunError> {
-        let framing = Framing::steady(self.shown.unwrap_or(Bounds::EMPTY));
+        let Some(framing) = self.framing else { return Ok(()) };
         let positions = &self.frames[number];
         let picture = self.scenery.picture(positions, self.time(number), &framing, &Look::default())?;
         self.folder.write_frame(number, "png", &picture)?;
