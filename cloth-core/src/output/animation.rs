@@ -26,12 +26,12 @@ pub enum AnimationError {
 }
 
 /// Encodes an animation as a binary glTF 2.0 file (`.glb`). The first frame of a moving object is its mesh. Each later
-/// frame is a morph target, and the animation moves the weight from one target to the next. `frame_time` is in s.
+/// frame is a morph target, and the animation moves the weight from one target to the next.
 /// glTF's y axis points up: (x, y, z) becomes (x, z, −y).
 ///
 /// # Errors
 /// Returns an error if the file would be too large or its JSON part cannot be written.
-pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, AnimationError> {
+pub fn animation_glb(tracks: &[Track<'_>], frames_per_second: f64) -> Result<Vec<u8>, AnimationError> {
     let mut file = File::default();
     let mut nodes = Vec::new();
     let mut moving = Vec::new();
@@ -52,7 +52,7 @@ pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, A
     let (extensions, extras) = (None, Default::default());
     file.root.scene = Some(file.root.push(Scene { nodes, name: None, extensions, extras }));
     if !moving.is_empty() {
-        file.animate(&moving, frame_time);
+        file.animate(&moving, frames_per_second);
     }
     file.finish()
 }
@@ -199,10 +199,10 @@ impl File {
     }
 
     /// Adds an animation with weight 1 for target f − 1 at frame f, and 0 for the others.
-    fn animate(&mut self, moving: &[(Index<Node>, usize)], frame_time: f64) {
+    fn animate(&mut self, moving: &[(Index<Node>, usize)], frames_per_second: f64) {
         let (mut channels, mut samplers) = (Vec::new(), Vec::new());
         for &(node, targets) in moving {
-            let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 * frame_time) as f32).collect();
+            let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 / frames_per_second) as f32).collect();
             let weight = |frame: usize, target: usize| if frame == target + 1 { 1.0 } else { 0.0 };
             let weights: Vec<f32> =
                 (0..=targets).flat_map(|frame| (0..targets).map(move |target| weight(frame, target))).collect();

@@ -28,9 +28,9 @@ pub struct Show<'a> {
 }
 
 impl<'a> Show<'a> {
-    /// Collects the content of a simulation with these frames, `frame_time` seconds apart.
+    /// Collects the content of a simulation with these frames, `rate` of them per simulated second.
     #[must_use]
-    pub fn new<F: AsRef<[Vector3<f64>]>>(simulation: &'a Simulation, frames: &'a [F], frame_time: f64) -> Self {
+    pub fn new<F: AsRef<[Vector3<f64>]>>(simulation: &'a Simulation, frames: &'a [F], rate: f64) -> Self {
         let frames: Vec<&[Vector3<f64>]> = frames.iter().map(AsRef::as_ref).collect();
         let bounds = frames.iter().map(|frame| Bounds::of(frame)).fold(Bounds::EMPTY, Bounds::around);
         let (scenery, framing) = (Scenery::of(simulation), Framing::loose(bounds));
@@ -48,12 +48,12 @@ impl<'a> Show<'a> {
             show.strands.push(strands);
         }
         let count = show.frames.len();
-        let end = count.saturating_sub(1) as f64 * frame_time;
+        let end = count.saturating_sub(1) as f64 / rate;
         for obstacle in simulation.obstacles() {
             let moves = obstacle.motion.as_ref().is_some_and(|motion| motion.moves(0.0, end) || motion.keys.len() > 1);
             let count = if moves { count } else { 1 };
             let at = |frame: usize| {
-                let solid = obstacle.at(frame as f64 * frame_time);
+                let solid = obstacle.at(frame as f64 / rate);
                 SolidMesh::of(&solid, framing.centre(), framing.size())
             };
             show.solids.push((0..count).map(at).collect());

@@ -30,11 +30,11 @@ enum Hands {
 }
 
 impl FramePictures {
-    /// Starts to draw frames that are `frame_time` seconds apart, on a second thread if `threads` allows it.
-    pub(super) fn start(scenery: Scenery, folder: OutputFolder, frame_time: f64, threads: usize) -> Self {
+    /// Starts to draw frames, `frames_per_second` of them per simulated second, on a second thread if `threads` allows it.
+    pub(super) fn start(scenery: Scenery, folder: OutputFolder, frames_per_second: f64, threads: usize) -> Self {
         let abandoned = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&abandoned);
-        let drawing = Drawing { scenery, folder, frame_time, frames: Vec::new(), drawn: Vec::new(), outermost: Vec::new(), framing: None };
+        let drawing = Drawing { scenery, folder, frames_per_second, frames: Vec::new(), drawn: Vec::new(), outermost: Vec::new(), framing: None };
         let hands = if threads > 1 {
             let (sender, receiver) = channel();
             let thread = std::thread::spawn(move || drawing.draw_received(&receiver, &stop));
@@ -105,7 +105,7 @@ fn joined(thread: &mut Option<JoinHandle<Result<(), RunError>>>) -> Result<(), R
 struct Drawing {
     scenery: Scenery,
     folder: OutputFolder,
-    frame_time: f64,
+    frames_per_second: f64,
     frames: Vec<Frame>,
     /// Whether the picture of each frame exists and has the current framing.
     drawn: Vec<bool>,
@@ -149,7 +149,7 @@ impl Drawing {
     }
 
     fn time(&self, frame: usize) -> f64 {
-        frame as f64 * self.frame_time
+        frame as f64 / self.frames_per_second
     }
 
     /// Draws the first frame that has no valid picture. Returns `false` if there is none.

@@ -180,7 +180,7 @@ impl Run {
             };
             on_event(Event::Step(&self.simulation, &report));
             let done = self.simulation.steps_done();
-            if done.is_multiple_of(self.scene.steps_per_frame()) {
+            if done.is_multiple_of(self.scene.time_grid().steps_per_frame) {
                 self.add_frame()?;
             }
             if self.checkpoint_interval.is_some_and(|steps| done.is_multiple_of(steps)) {
@@ -198,9 +198,9 @@ impl Run {
         if !self.scene.output.png {
             return Ok(());
         }
-        let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
+        let rate = self.scene.time_grid().frames_per_second;
         let scenery = Scenery::of(&self.simulation);
-        let mut pictures = FramePictures::start(scenery, self.folder.clone(), frame_time, self.threads);
+        let mut pictures = FramePictures::start(scenery, self.folder.clone(), rate, self.threads);
         self.simulation.set_threads(self.threads.saturating_sub(1).max(1));
         self.frames.frames().iter().try_for_each(|frame| pictures.add(Frame::clone(frame)))?;
         self.pictures = Some(pictures);

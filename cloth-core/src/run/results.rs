@@ -119,13 +119,13 @@ impl Run {
     /// Writes the picture and the animations.
     fn write_shows(&self, written: &mut Written<'_>) {
         let (wanted, frames) = (self.scene.output, self.frames.frames());
-        let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
-        let show = Show::new(&self.simulation, frames, frame_time);
+        let rate = self.scene.time_grid().frames_per_second;
+        let show = Show::new(&self.simulation, frames, rate);
         let picture = || show.picture(self.simulation.positions(), self.simulation.time());
         written.add(wanted.picture, || self.write(OutputFolder::PICTURE, &picture()?));
-        let usd = || usd_text(&show.tracks(), 1.0 / frame_time);
+        let usd = || usd_text(&show.tracks(), rate);
         written.add(wanted.usd, || self.write(OutputFolder::USD, usd().as_bytes()));
-        let gltf = || animation_glb(&show.tracks(), frame_time);
+        let gltf = || animation_glb(&show.tracks(), rate);
         written.add(wanted.gltf, || self.write(OutputFolder::ANIMATION, &gltf()?));
     }
 }

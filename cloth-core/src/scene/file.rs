@@ -3,7 +3,7 @@ use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
 use super::{ContactChoice, Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
-use crate::bounded::{finite_triple, non_negative, positive};
+use crate::bounded::{finite_triple, non_negative, positive, some_positive};
 use crate::fabric::Fabric;
 use crate::integrator::{LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
@@ -71,15 +71,16 @@ pub(super) struct File {
     #[serde(default, deserialize_with = "super::sleep::sleep")]
     #[schemars(with = "super::sleep::SleepChoice")]
     sleep: Option<Sleep>,
-    /// Time step h, in s.
+    /// Time step h, in s. With `frames_per_second`, steps are shortened so that a whole number of equal steps ends with
+    /// each frame.
     #[serde(deserialize_with = "positive")]
     dt: f64,
     /// Simulated time, in s; rounded to whole steps.
     #[serde(deserialize_with = "non_negative")]
     duration: f64,
-    /// Frames written per simulated second, rounded to whole steps per frame. Default 25.
-    #[serde(default = "frame_rate", deserialize_with = "positive")]
-    frames_per_second: f64,
+    /// Frames written per simulated second. Default: the rate nearest to 25 whose frames are whole steps of `dt`.
+    #[serde(default, deserialize_with = "some_positive")]
+    frames_per_second: Option<f64>,
     /// The files to write.
     #[serde(default)]
     output: OutputChoice,
@@ -91,10 +92,6 @@ fn newest() -> u32 {
 
 fn standard_gravity() -> [f64; 3] {
     [0.0, 0.0, -9.81]
-}
-
-fn frame_rate() -> f64 {
-    25.0
 }
 
 fn some_fabric<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Fabric>, D::Error> {

@@ -12,6 +12,7 @@ mod pins;
 mod schema;
 mod seam;
 mod sleep;
+mod time_grid;
 
 use std::path::{Path, PathBuf};
 
@@ -28,6 +29,7 @@ pub use pins::{Pin, PinBox, PinChoice};
 pub use schema::schema;
 pub use seam::Seam;
 pub use sleep::Sleep;
+pub use time_grid::TimeGrid;
 
 use crate::fabric::Material;
 use crate::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
@@ -65,12 +67,12 @@ pub struct Scene {
     pub adaptive: bool,
     /// When islands fall asleep; `None` for never.
     pub sleep: Option<Sleep>,
-    /// Time step h, in s.
+    /// The largest time step h, in s; [`Scene::time_grid`] has the step that is taken.
     pub dt: f64,
     /// Simulated time, in s; rounded to whole steps.
     pub duration: f64,
-    /// Frames written per simulated second, rounded to whole steps per frame.
-    pub frames_per_second: f64,
+    /// Frames written per simulated second; `None` for about 25, in whole steps of `dt`.
+    pub frames_per_second: Option<f64>,
     /// The files to write.
     pub output: OutputChoice,
     /// The folder of the scene file, which relative paths refer to.
@@ -119,12 +121,12 @@ impl Scene {
     /// Number of steps.
     #[must_use]
     pub fn steps(&self) -> u64 {
-        (self.duration / self.dt).round() as u64
+        (self.duration / self.time_grid().step).round() as u64
     }
 
-    /// Number of steps per frame, at least 1.
+    /// Returns the times of steps and frames.
     #[must_use]
-    pub fn steps_per_frame(&self) -> u64 {
-        ((1.0 / (self.frames_per_second * self.dt)).round() as u64).max(1)
+    pub fn time_grid(&self) -> TimeGrid {
+        TimeGrid::new(self.dt, self.frames_per_second)
     }
 }

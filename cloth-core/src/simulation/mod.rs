@@ -123,7 +123,7 @@ impl Simulation {
             pinned,
             islands,
             may_sleep: scene.sleep.is_some(),
-            dt: scene.dt,
+            dt: scene.time_grid().step,
             steps: scene.steps(),
             summary,
             ledger: None,

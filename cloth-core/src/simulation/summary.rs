@@ -30,6 +30,9 @@ pub struct Summary {
     pub integrator: String,
     /// Time step, in s.
     pub dt: f64,
+    /// The time step of the scene, in s; `None` if it was not shortened to end steps with frames.
+    #[serde(default)]
+    pub shortened_from: Option<f64>,
     /// Totals over all steps.
     #[serde(flatten)]
     pub totals: Totals,
@@ -81,7 +84,8 @@ impl Summary {
             triangles: model.triangles.len(),
             islands,
             integrator: scene.stepper().name().to_owned(),
-            dt: scene.dt,
+            dt: scene.time_grid().step,
+            shortened_from: Some(scene.dt).filter(|&dt| dt != scene.time_grid().step),
             left_out: model.left_out.clone(),
             warnings: model.warnings.clone(),
             ..Self::default()
@@ -194,6 +198,9 @@ impl fmt::Display for Summary {
         let Totals { steps, solves, solved_by, iterations, projected, rejected, stepping_time, .. } = &self.totals;
         let simulated = *steps as f64 * self.dt;
         writeln!(f, "{}: {steps} steps of {} s = {simulated:.3} s", self.integrator, self.dt)?;
+        if let Some(dt) = self.shortened_from {
+            writeln!(f, "steps were shortened from {dt} s to end with the frames")?;
+        }
         writeln!(f, "{}", self.sleep())?;
         let seconds = stepping_time.as_secs_f64();
         writeln!(f, "{seconds:.2} s of computing, {:.2} ms per step", 1e3 * seconds / (*steps).max(1) as f64)?;
