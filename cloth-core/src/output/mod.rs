@@ -3,6 +3,7 @@
 mod animation;
 mod folder;
 mod frame;
+mod lock;
 mod picture;
 mod ply;
 mod projection;
@@ -15,7 +16,7 @@ mod usd;
 
 pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
-pub use frame::obj_text;
+pub use frame::{last_obj_line, obj_text};
 pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
 pub(crate) use scenery::Framing;
