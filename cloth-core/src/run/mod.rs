@@ -1,8 +1,10 @@
 //! Runs a scene from start to end, and writes frames, checkpoints and results.
 
 mod checkpoint;
+mod frame_files;
 mod frame_pictures;
 mod frame_store;
+mod input_files;
 mod progress;
 mod record;
 mod report;
@@ -12,16 +14,18 @@ pub mod stats;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
+pub use input_files::InputFile;
 pub use progress::Progress;
 pub use record::{Record, RecordError};
 pub use report::{ReportError, write_report};
 pub use results::Ending;
 
 use crate::integrator::StepReport;
-use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery, obj_text, ply_bytes};
+use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 use frame_pictures::FramePictures;
@@ -82,6 +86,11 @@ pub struct Run {
     threads: usize,
     /// Steps between checkpoints; `None` for no checkpoints.
     checkpoint_interval: Option<u64>,
+    /// The scene file and the files that it names, as they were when the run began.
+    scene_file: Option<InputFile>,
+    inputs: Vec<InputFile>,
+    /// What the user should know about the resumption.
+    notes: Vec<String>,
 }
 
 /// Progress of a run.
@@ -113,10 +122,21 @@ impl Run {
             simulation.keep_ledger()?;
         }
         let folder = OutputFolder::open(output, overwrite)?;
-        let frames = FrameStore::new(checkpoint_interval.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES)))?;
-        let (pictures, threads) = (None, available_threads());
-        let path = path.to_owned();
-        let mut run = Self { scene, text, path, folder, simulation, frames, pictures, threads, checkpoint_interval };
+        let saved = checkpoint_interval.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES));
+        let mut run = Self {
+            text,
+            path: path.to_owned(),
+            folder,
+            simulation,
+            frames: FrameStore::new(saved, scene.output.ply)?,
+            pictures: None,
+            threads: available_threads(),
+            checkpoint_interval,
+            scene_file: InputFile::scene_itself(path),
+            inputs: InputFile::of_scene(&scene),
+            notes: Vec::new(),
+            scene,
+        };
         run.add_frame()?;
         Ok(run)
     }
@@ -127,21 +147,73 @@ impl Run {
         Self { simulation: self.simulation.with_threads(threads), threads, ..self }
     }
 
-    /// Resumes from the checkpoint in a folder.
+    /// Resumes from the checkpoint in a folder. Frames that are missing or truncated are written again. With
+    /// `accept_edited`, continues with meshes and materials that were edited since the run began.
     ///
     /// # Errors
-    /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene.
-    pub fn resume(output: &Path) -> Result<Self, RunError> {
+    /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene, or if
+    /// files of the scene were edited.
+    pub fn resume(output: &Path, accept_edited: bool) -> Result<Self, RunError> {
         let file = output.join(OutputFolder::CHECKPOINT);
-        let Checkpoint { scene: text, path, every, frames, frames_checksum, state } = Checkpoint::read(&file)?;
-        let scene = Scene::parse(&text, &path)?;
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.restore(state).map_err(CheckpointError::State)?;
-        let vertices = simulation.positions().len();
-        let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
+        // Without a checkpoint, no folder is created.
+        if !file.exists() {
+            Checkpoint::read(&file)?;
+        }
         let folder = OutputFolder::reopen(output)?;
-        let (pictures, threads, checkpoint_interval) = (None, available_threads(), Some(every));
-        Ok(Self { scene, text, path, folder, simulation, frames, pictures, threads, checkpoint_interval })
+        let saved = Checkpoint::read(&file)?;
+        let scene = Scene::parse(&saved.scene, &saved.path)?;
+        let edited = saved.inputs.iter().find(|input| input.is_edited()).filter(|_| !accept_edited);
+        if let Some(InputFile { path, .. }) = edited {
+            return Err(CheckpointError::Edited { path: path.clone() }.into());
+        }
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.restore(saved.state).map_err(CheckpointError::State)?;
+        let (path, vertices) = (output.join(OutputFolder::SAVED_FRAMES), simulation.positions().len());
+        let (frames, velocities) =
+            FrameStore::reopen(&path, saved.frames, vertices, scene.output.ply, saved.frames_checksum)?;
+        let mut run = Self {
+            text: saved.scene,
+            path: saved.path,
+            folder,
+            simulation,
+            frames,
+            pictures: None,
+            threads: available_threads(),
+            checkpoint_interval: Some(saved.every),
+            scene_file: saved.scene_file,
+            inputs: InputFile::of_scene(&scene),
+            notes: Vec::new(),
+            scene,
+        };
+        run.note_edited_scene();
+        run.repair_frames(&velocities)?;
+        Ok(run)
+    }
+
+    fn note_edited_scene(&mut self) {
+        if let Some(file) = self.scene_file.as_ref().filter(|file| file.is_edited()) {
+            self.notes.push(format!(
+                "{} was edited since the run began; the run continues with the scene as it was then",
+                file.path.display()
+            ));
+        }
+    }
+
+    /// Writes frames again that are missing or truncated.
+    fn repair_frames(&mut self, velocities: &[Vec<Vector3<f64>>]) -> Result<(), RunError> {
+        let frames = self.frames.frames().iter().zip(velocities).enumerate();
+        let written = frames.map(|(number, (x, v))| self.write_frame_files(number, x, v, true));
+        let count: usize = written.sum::<Result<usize, RunError>>()?;
+        if count > 0 {
+            self.notes.push(format!("{count} files of frames were missing or truncated, and were written again"));
+        }
+        Ok(())
+    }
+
+    /// What the user should know about a resumed run; empty for a new one.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// The simulation of the run.
@@ -208,20 +280,13 @@ impl Run {
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
-        let (simulation, number) = (&self.simulation, self.frames.frames().len());
-        let (x, triangles) = (simulation.positions(), simulation.triangles());
-        if self.scene.output.obj {
-            let text = obj_text(x, triangles, simulation.strands());
-            self.folder.write_frame(number, "obj", text.as_bytes())?;
-        }
-        if self.scene.output.ply {
-            self.folder.write_frame(number, "ply", &ply_bytes(x, simulation.velocities(), triangles))?;
-        }
+        let (x, v) = (self.simulation.positions(), self.simulation.velocities());
+        self.write_frame_files(self.frames.frames().len(), x, v, false)?;
         let frame = Frame::from(x);
         if let Some(pictures) = &mut self.pictures {
             pictures.add(Frame::clone(&frame))?;
         }
-        self.frames.add(frame)?;
+        self.frames.add(frame, v)?;
         Ok(())
     }
 
@@ -230,6 +295,8 @@ impl Run {
         let checkpoint = Checkpoint {
             scene: self.text.clone(),
             path: self.absolute_path(),
+            scene_file: self.scene_file.clone(),
+            inputs: self.inputs.clone(),
             every: self.checkpoint_interval.unwrap_or(u64::MAX),
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),

@@ -5,6 +5,7 @@ mod error;
 mod fabric_choice;
 mod file;
 mod garment;
+mod inputs;
 mod obstacle;
 mod output;
 mod own_material;

@@ -202,6 +202,12 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
+    /// The path of the mesh, relative to the scene file's folder; `None` for other shapes.
+    #[must_use]
+    pub fn mesh_path(&self) -> Option<&Path> {
+        if let ShapeKeys::Mesh(keys) = &self.shape { Some(&keys.path) } else { None }
+    }
+
     /// Builds the obstacle with index `number` in the scene. Relative paths refer to `folder`.
     ///
     /// # Errors
