@@ -271,7 +271,7 @@ fn contradictory_scenes_are_rejected_with_a_remedy() {
         "fabric = \"demin\"\n{}",
         good.split("[garment.fabric]").next().unwrap().replace("[[garment]]\n", "[[garment]]\nfabric = \"demin\"\n")
     );
-    expect(fabric.split_once('\n').unwrap().1, &["unknown variant `demin`", "did you mean `denim`?"]);
+    expect(fabric.split_once('\n').unwrap().1, &["unknown fabric `demin`", "did you mean `denim`?"]);
     let keys = "[pins.motion]\nkeys = [{ time = 1.0 }, { time = 0.5 }]\n";
     expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must increase"]);
     let twice = "[[pins]]\nvertex = 0\n[[pins]]\nall = true\nmotion = { keys = [{ time = 0.0, angle = 5.0 }] }\n";

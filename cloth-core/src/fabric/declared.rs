@@ -8,6 +8,8 @@ use energy_dsl::{Declaration, Kind, Vector3};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::bounded::{RealMap, Signed};
+
 use super::Bending;
 use super::interpreted_term::InterpretedTerm;
 use crate::geometry::{norm, subtract};
@@ -32,7 +34,7 @@ pub struct Declared {
     #[serde(default)]
     pub elements: Option<Vec<String>>,
     /// Parameters by name, in the units of the declaration. `θ0`, `θ₀` and `theta0` are equivalent.
-    #[serde(default)]
+    #[serde(default, with = "RealMap::<Signed>")]
     pub parameters: BTreeMap<String, f64>,
     /// Additional bending resistance. Default none.
     #[serde(default)]

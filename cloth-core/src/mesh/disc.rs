@@ -4,6 +4,8 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::bounded::{Count, Positive, Real};
+
 use super::{MeshError, TriangleMesh};
 
 /// A built-in disc, centred on the origin in z = 0 with its front upwards.
@@ -11,10 +13,10 @@ use super::{MeshError, TriangleMesh};
 #[serde(deny_unknown_fields)]
 pub struct Disc {
     /// The radius, in m.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub radius: f64,
     /// Rings of triangles; ring k has 6 k vertices.
-    #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
+    #[serde(with = "Count::<1, 4096>")]
     pub rings: usize,
 }
 

@@ -1,6 +1,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::bounded::{Count, Positive, Real};
+
 use super::{Diagonals, Plane, Sheet};
 
 /// A built-in strip along the first axis, with nearly square cells and alternating diagonals.
@@ -8,13 +10,13 @@ use super::{Diagonals, Plane, Sheet};
 #[serde(deny_unknown_fields)]
 pub struct Strip {
     /// Length along the first axis, in m.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub length: f64,
     /// Width, in m.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub width: f64,
     /// Cells along the length.
-    #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
+    #[serde(with = "Count::<1, 4096>")]
     pub segments: usize,
     /// `horizontal` (the default) or `vertical`.
     #[serde(default)]

@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{finite_triple, nonzero_triple, number, positive};
+use crate::bounded::{Direction, Number, Positive, Real, Reals, Speed};
 use crate::fabric::Fabric;
 use crate::geometry::{Pose, cross, subtract};
 use crate::mesh::{
@@ -28,10 +28,10 @@ pub struct Garment {
     #[serde(default)]
     pub placement: Placement,
     /// Initial velocity, in m/s. Default 0.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Speed, 3>")]
     pub velocity: [f64; 3],
     /// Initial angular velocity about the placed origin, in rad/s. Default 0.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub spin: [f64; 3],
 }
 
@@ -57,13 +57,13 @@ pub enum Mesh {
 #[serde(deny_unknown_fields)]
 pub struct Placement {
     /// Scale factor. Default 1.
-    #[serde(default = "one", deserialize_with = "positive")]
+    #[serde(default = "one", with = "Real::<Positive>")]
     pub scale: f64,
     /// Rotation about an axis through the origin. Default none.
     #[serde(default)]
     pub rotate: Option<Turn>,
     /// Translation, in m. Default none.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub translate: [f64; 3],
 }
 
@@ -72,10 +72,10 @@ pub struct Placement {
 #[serde(deny_unknown_fields)]
 pub struct Turn {
     /// Direction of the axis.
-    #[serde(deserialize_with = "nonzero_triple")]
+    #[serde(with = "Direction")]
     pub axis: [f64; 3],
     /// Angle, in degrees.
-    #[serde(deserialize_with = "number")]
+    #[serde(with = "Real::<Number>")]
     pub angle: f64,
 }
 

@@ -32,6 +32,7 @@ pub use seam::Seam;
 pub use sleep::Sleep;
 pub use time_grid::TimeGrid;
 
+use crate::bounded::Strict;
 use crate::fabric::Material;
 use crate::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
@@ -102,7 +103,8 @@ impl Scene {
     /// # Errors
     /// Returns an error if a key is unknown, missing or invalid.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::invalid(path, text, &error))?;
+        let parsed = toml::Deserializer::parse(text).and_then(|toml| Self::deserialize(Strict(toml)));
+        let mut scene = parsed.map_err(|error| SceneError::invalid(path, text, &error))?;
         scene.folder = path.parent().map(Path::to_owned).unwrap_or_default();
         for garment in &mut scene.garments {
             if let Material::File(declared) = &mut garment.fabric.material {
