@@ -177,7 +177,9 @@ impl Simulation {
                 summary.crossings
             ));
         }
-        summary.warnings.extend(self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator)));
+        let Some(ledger) = &self.ledger else { return };
+        let integrator = &summary.integrator;
+        summary.warnings.extend(ledger.imbalance(integrator).or_else(|| ledger.loss(integrator)));
     }
 }
 
