@@ -45,7 +45,9 @@ fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
         let output = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
         let message = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{message}");
-        for part in ["error: step ", "triangle ", " of garment 0 (vertices [", "Try a smaller dt", "the files hold the "] {
+        for part in
+            ["error: step ", "triangle ", " of garment 0 (vertices [", "Try a smaller dt", "the files hold the "]
+        {
             assert!(message.to_lowercase().contains(&part.to_lowercase()), "{part}: {message}");
         }
         let out = folder.path().join("out");
@@ -54,7 +56,9 @@ fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
         assert!(record["finished"] == false && steps > 2 && frames == steps / 2 + 1, "{steps} {frames}");
         assert!(read(&out, "cloth.png").starts_with(b"\x89PNG") && read(&out, "cloth.glb").starts_with(b"glTF"));
         let usd = String::from_utf8(read(&out, "cloth.usda")).unwrap();
-        assert!(usd.contains(&format!("endTimeCode = {}\n", frames - 1)) && !usd.contains("inf") && !usd.contains("nan"));
+        assert!(
+            usd.contains(&format!("endTimeCode = {}\n", frames - 1)) && !usd.contains("inf") && !usd.contains("nan")
+        );
         assert!(String::from_utf8(read(&out, "summary.txt")).unwrap().contains("the run ended early: step "));
         if ledger {
             assert!(out.join(format!("frames/cloth_{:04}.png", frames - 1)).exists());
@@ -157,7 +161,8 @@ fn pictures_of_all_frames_show_the_same_part_of_space() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
     for frame in 0..2 {
-        let [one, two] = ["one", "two"].map(|out| read(&folder.path().join(out), &format!("frames/cloth_{frame:04}.png")));
+        let [one, two] =
+            ["one", "two"].map(|out| read(&folder.path().join(out), &format!("frames/cloth_{frame:04}.png")));
         assert!(one == two, "frame {frame}");
     }
 }

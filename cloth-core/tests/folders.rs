@@ -87,7 +87,10 @@ fn a_resumed_run_repairs_frames_and_tells_of_an_edited_scene() {
     std::fs::write(&ply, &whole[2][..50]).unwrap();
     std::fs::write(path.join("scene.toml"), SCENE.replace("density = 0.2", "density = 0.4")).unwrap();
     let message = notes(&["resume", "out"], path);
-    assert!(message.contains("scene.toml was edited since the run began; the run continues with the scene"), "{message}");
+    assert!(
+        message.contains("scene.toml was edited since the run began; the run continues with the scene"),
+        "{message}"
+    );
     assert!(message.contains("3 files of frames were missing or truncated"), "{message}");
     assert_eq!([&obj, &other, &ply].map(|file| std::fs::read(file).unwrap()), whole);
     std::fs::write(path.join("scene.toml"), SCENE).unwrap();

@@ -183,11 +183,14 @@ impl Checker {
             "anyOf" => each(rule).contains(&true),
             "oneOf" => each(rule).iter().filter(|&&one| one).count() == 1,
             "if" => !self.accepts(rule, value) || self.accepts(&schema["then"], value),
-            "required" => object
-                .is_none_or(|object| rule.as_array().unwrap().iter().all(|key| object.contains_key(key.as_str().unwrap()))),
+            "required" => object.is_none_or(|object| {
+                rule.as_array().unwrap().iter().all(|key| object.contains_key(key.as_str().unwrap()))
+            }),
             "dependentRequired" => object.is_none_or(|object| {
                 let rules = rule.as_object().unwrap().iter().filter(|(key, _)| object.contains_key(*key));
-                rules.flat_map(|(_, keys)| keys.as_array().unwrap()).all(|key| object.contains_key(key.as_str().unwrap()))
+                rules
+                    .flat_map(|(_, keys)| keys.as_array().unwrap())
+                    .all(|key| object.contains_key(key.as_str().unwrap()))
             }),
             "properties" => object.is_none_or(|object| {
                 let known = rule.as_object().unwrap().iter().filter_map(|(key, rule)| Some((rule, object.get(key)?)));
@@ -261,7 +264,8 @@ fn program_and_schema_agree_on_edited_scenes() {
     assert_eq!(program_accepts(&good), (Some(true), String::new()));
     assert!(checker.accepts(&checker.root, &good));
     let numbers = [-1e20, -2e9, -1.0, -0.5, 0.0, 1e-9, 0.5, 1.0, 1.5, 2.0, 5000.0, 2e9, 1e12, 1e13, 1e20];
-    let others = [json!("zebra"), json!(true), json!({}), json!([1.0, 2.0, 3.0, 4.0]), json!([]), json!([0.0, 0.0, 0.0])];
+    let others =
+        [json!("zebra"), json!(true), json!({}), json!([1.0, 2.0, 3.0, 4.0]), json!([]), json!([0.0, 0.0, 0.0])];
     let values: Vec<Value> = numbers.iter().map(|number| json!(number)).chain(others).collect();
     let mut all = Vec::new();
     pointers(&good, "", &mut all);
@@ -269,7 +273,8 @@ fn program_and_schema_agree_on_edited_scenes() {
     let mut compare = |what: String, edited: &Value| {
         let (accepted, message) = program_accepts(edited);
         if accepted.is_some_and(|accepted| accepted != checker.accepts(&checker.root, edited)) {
-            differences.push(format!("{what}: {}", if message.is_empty() { "only the schema refuses" } else { &message }));
+            differences
+                .push(format!("{what}: {}", if message.is_empty() { "only the schema refuses" } else { &message }));
         }
     };
     for pointer in &all {
@@ -300,7 +305,9 @@ fn visit(schema: &Value, at: &str, found: &mut impl FnMut(&str, &Value)) {
     found(at, schema);
     match schema {
         Value::Object(object) => object.iter().for_each(|(key, inner)| visit(inner, &format!("{at}/{key}"), found)),
-        Value::Array(items) => items.iter().enumerate().for_each(|(at_, inner)| visit(inner, &format!("{at}/{at_}"), found)),
+        Value::Array(items) => {
+            items.iter().enumerate().for_each(|(at_, inner)| visit(inner, &format!("{at}/{at_}"), found))
+        }
         _ => {}
     }
 }
@@ -357,7 +364,11 @@ fn messages_say_what_was_expected_and_what_to_write() {
     let listed = ["expected one of `implicit-euler`", "`newton`", "invalid type: integer `5`"];
     expect("integrator = \"newton\"", "integrator = 5", &listed);
     let kinds = "expected exactly one of `sheet`, `disc`, `strip`, `obj`, got";
-    expect("[mesh.sheet]", "[mesh.disc]\nradius = 1.0\nrings = 2\n[mesh.sheet]", &["scene.toml:", kinds, "`disc`", "`sheet`"]);
+    expect(
+        "[mesh.sheet]",
+        "[mesh.disc]\nradius = 1.0\nrings = 2\n[mesh.sheet]",
+        &["scene.toml:", kinds, "`disc`", "`sheet`"],
+    );
     expect("[mesh.sheet]", "[mesh.sheeet]", &["unknown variant `sheeet`", "did you mean `sheet`?"]);
     expect("mesh.disc = { radius = 1.0, rings = 3 }", "mesh = 5", &["expected one of `sheet`, `disc`"]);
     expect("min = [-1.0", "min = [2.0", &["its `min` exceeds its `max` along x, 2 > 1; exchange the two"]);

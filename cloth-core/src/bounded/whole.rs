@@ -90,9 +90,7 @@ impl<const LEAST: usize, const MOST: usize, const N: usize> Counts<LEAST, MOST, 
 }
 
 impl Pairs {
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Vec<[usize; 2]>>, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<[usize; 2]>>, D::Error> {
         struct One([usize; 2]);
         impl<'de> Deserialize<'de> for One {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 use cloth_core::output::OutputFolder;
-use cloth_core::run::{Ending, Event, Progress, Run, RunError, stats};
+use cloth_core::run::{Ending, Event, Progress, Run, RunError, RunOptions, stats};
 use cloth_core::scene::{self, Scene};
 
 use super::interrupts::Interrupts;
@@ -23,6 +23,9 @@ pub struct RunScene {
     /// Save the state every STEPS steps, for `cloth resume`.
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: Option<u64>,
+    /// Start even if the run seems not to fit into memory.
+    #[arg(long)]
+    ignore_memory: bool,
     /// Replace the material of every fabric by the elements that this file declares. They are interpreted, which is
     /// slower than built-in elements.
     #[arg(long, value_name = "FILE.energy")]
@@ -40,12 +43,13 @@ pub struct RunScene {
 
 impl RunScene {
     pub fn run(self) -> Result<ExitCode> {
-        let Self { scene, output, overwrite, checkpoint, material, parameters, stats, threads } = self;
+        let Self { scene, output, overwrite, checkpoint, ignore_memory, material, parameters, stats, threads } = self;
         let mut text = Scene::text(&scene)?;
         if let Some(file) = material {
             text = scene::with_material(&text, &file, &parameters);
         }
-        let run = Run::new(text, &scene, &output, overwrite, checkpoint).map_err(|error| match error {
+        let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
+        let run = Run::new(text, &scene, &output, options).map_err(|error| match error {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),
         })?;

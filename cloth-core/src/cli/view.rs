@@ -66,7 +66,11 @@ fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
 
 fn png_file(text: &str) -> Result<PathBuf, String> {
     let is_png = Path::new(text).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-    if is_png { Ok(PathBuf::from(text)) } else { Err("pictures are PNG; expected a name that ends with .png".to_owned()) }
+    if is_png {
+        Ok(PathBuf::from(text))
+    } else {
+        Err("pictures are PNG; expected a name that ends with .png".to_owned())
+    }
 }
 
 fn non_negative(text: &str) -> Result<f64, String> {

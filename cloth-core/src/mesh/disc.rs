@@ -4,9 +4,8 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{Count, Positive, Real};
-
 use super::{MeshError, TriangleMesh};
+use crate::bounded::{Count, Positive, Real};
 
 /// A built-in disc, centred on the origin in z = 0 with its front upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]

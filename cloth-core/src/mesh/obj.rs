@@ -4,6 +4,10 @@ use std::path::{Path, PathBuf};
 use tobj::{LoadError, LoadOptions};
 
 use super::{MeshError, TriangleMesh};
+use crate::input_text;
+
+/// The largest size of an OBJ file, in bytes: some ten million vertices.
+const LARGEST_FILE: u64 = 1 << 30;
 
 /// An OBJ file that is not a valid mesh.
 #[derive(Debug, thiserror::Error)]
@@ -39,8 +43,9 @@ pub enum ObjError {
 /// Returns an error if the file cannot be read, a line is malformed, or the mesh is invalid, with the line number if
 /// one line is at fault.
 pub fn read_obj(path: &Path) -> Result<TriangleMesh, ObjError> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
+    let text = input_text::read_regular(path, LARGEST_FILE)
+        .and_then(input_text::utf8)
+        .map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
     Lines::of(&text).read(path)
 }
 

@@ -4,9 +4,8 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{Counts, NonNegative, Positive, Real, Reals};
-
 use super::{MeshError, TriangleMesh};
+use crate::bounded::{Counts, NonNegative, Positive, Real, Reals};
 
 /// How the cells of a sheet are split into triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]

@@ -1,9 +1,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{Count, Positive, Real};
-
 use super::{Diagonals, Plane, Sheet};
+use crate::bounded::{Count, Positive, Real};
 
 /// A built-in strip along the first axis, with nearly square cells and alternating diagonals.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]

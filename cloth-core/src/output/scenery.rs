@@ -117,8 +117,7 @@ impl Scenery {
     ) -> Result<Vec<u8>, PictureError> {
         let solids: Vec<AnySolid> = self.obstacles.iter().map(|obstacle| obstacle.at(time)).collect();
         let drawn = solids.iter().filter(|solid| floor_height(solid).is_none());
-        let drawn: Vec<SolidMesh> =
-            drawn.map(|solid| SolidMesh::of(solid, framing.centre(), framing.size())).collect();
+        let drawn: Vec<SolidMesh> = drawn.map(|solid| SolidMesh::of(solid, framing.centre(), framing.size())).collect();
         picture_png(&View {
             positions,
             triangles: &self.triangles,

@@ -34,7 +34,15 @@ impl FramePictures {
     pub(super) fn start(scenery: Scenery, folder: OutputFolder, frames_per_second: f64, threads: usize) -> Self {
         let abandoned = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&abandoned);
-        let drawing = Drawing { scenery, folder, frames_per_second, frames: Vec::new(), drawn: Vec::new(), outermost: Vec::new(), framing: None };
+        let drawing = Drawing {
+            scenery,
+            folder,
+            frames_per_second,
+            frames: Vec::new(),
+            drawn: Vec::new(),
+            outermost: Vec::new(),
+            framing: None,
+        };
         let hands = if threads > 1 {
             let (sender, receiver) = channel();
             let thread = std::thread::spawn(move || drawing.draw_received(&receiver, &stop));

@@ -1,10 +1,12 @@
 //! Runs a scene from start to end, and writes frames, checkpoints and results.
 
+mod available_memory;
 mod checkpoint;
 mod frame_files;
 mod frame_pictures;
 mod frame_store;
 mod input_files;
+mod memory_need;
 mod progress;
 mod record;
 mod report;
@@ -19,6 +21,7 @@ use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use input_files::InputFile;
+pub use memory_need::MemoryNeed;
 pub use progress::Progress;
 pub use record::{Record, RecordError};
 pub use report::{ReportError, write_report};
@@ -28,8 +31,10 @@ use crate::integrator::StepReport;
 use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
+use available_memory::available_memory;
 use frame_pictures::FramePictures;
 use frame_store::{Frame, FrameStore};
+use memory_need::Gigabytes;
 
 /// A run that cannot be started or completed.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +45,17 @@ pub enum RunError {
     /// The simulation cannot be set up, or a step failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// The run would not fit into memory.
+    #[error(
+        "the run needs {need}, but only {} of memory are available. Use fewer cells or frames, write fewer files, or pass \
+         --ignore-memory", Gigabytes(*.available as f64)
+    )]
+    Memory {
+        /// What the run needs.
+        need: MemoryNeed,
+        /// The memory that is available, in bytes.
+        available: u64,
+    },
     /// The checkpoint cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
@@ -69,6 +85,17 @@ pub enum RunError {
         /// The file that could not be written.
         error: Box<RunError>,
     },
+}
+
+/// How to start a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunOptions {
+    /// Whether to replace the files of an earlier run.
+    pub overwrite: bool,
+    /// Number of steps between checkpoints; `None` for no checkpoints.
+    pub checkpoint_interval: Option<u64>,
+    /// Whether to start even if the run seems not to fit into memory.
+    pub ignore_memory: bool,
 }
 
 /// A simulation with its output.
@@ -103,20 +130,17 @@ pub enum Event<'a> {
 }
 
 impl Run {
-    /// Creates a run from the text of a scene file. `path` is used in messages and as the base of relative paths.
-    /// `checkpoint_interval` is the number of steps between checkpoints, `None` for no checkpoints. The output folder
-    /// is touched only after the scene has been validated.
+    /// Creates a run from the text of a scene file. `path` is used in messages and as the base of relative paths. The
+    /// output folder is touched only after the scene has been validated.
     ///
     /// # Errors
-    /// Returns an error if the scene is invalid or the folder cannot be written to.
-    pub fn new(
-        text: String,
-        path: &Path,
-        output: &Path,
-        overwrite: bool,
-        checkpoint_interval: Option<u64>,
-    ) -> Result<Self, RunError> {
+    /// Returns an error if the scene is invalid, does not fit into memory, or the folder cannot be written to.
+    pub fn new(text: String, path: &Path, output: &Path, options: RunOptions) -> Result<Self, RunError> {
+        let RunOptions { overwrite, checkpoint_interval, ignore_memory } = options;
         let scene = Scene::parse(&text, path)?;
+        if !ignore_memory {
+            check_memory(&scene)?;
+        }
         let mut simulation = Simulation::new(&scene)?;
         if scene.output.ledger {
             simulation.keep_ledger()?;
@@ -228,11 +252,7 @@ impl Run {
     ///
     /// # Errors
     /// Returns an error if a file cannot be written.
-    pub fn go(
-        &mut self,
-        stop: &AtomicBool,
-        mut on_event: impl FnMut(Event<'_>),
-    ) -> Result<Ending, RunError> {
+    pub fn go(&mut self, stop: &AtomicBool, mut on_event: impl FnMut(Event<'_>)) -> Result<Ending, RunError> {
         self.start_pictures()?;
         let failure = self.step_to_end(stop, &mut on_event)?;
         on_event(Event::LastStep);
@@ -327,4 +347,12 @@ impl Run {
 
 fn available_threads() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+fn check_memory(scene: &Scene) -> Result<(), RunError> {
+    let need = MemoryNeed::of(scene);
+    match available_memory(Path::new("/")) {
+        Some(available) if need.total() > available as f64 => Err(RunError::Memory { need, available }),
+        _ => Ok(()),
+    }
 }

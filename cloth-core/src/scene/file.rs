@@ -118,7 +118,9 @@ fn check_times(dt: f64, duration: f64) -> Result<(), String> {
     }
     if duration / dt > MOST_STEPS {
         let steps = duration / dt;
-        return Err(format!("`duration` takes {steps:.1e} steps of `dt`, more than {MOST_STEPS:e}; give a larger `dt`"));
+        return Err(format!(
+            "`duration` takes {steps:.1e} steps of `dt`, more than {MOST_STEPS:e}; give a larger `dt`"
+        ));
     }
     Ok(())
 }

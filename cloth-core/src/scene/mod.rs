@@ -34,8 +34,12 @@ pub use time_grid::TimeGrid;
 
 use crate::bounded::Strict;
 use crate::fabric::Material;
+use crate::input_text;
 use crate::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
+
+/// The largest size of a scene file, in bytes.
+const LARGEST_FILE: u64 = 16 << 20;
 
 /// A scene: what to simulate, and which files to write.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -95,7 +99,8 @@ impl Scene {
     /// # Errors
     /// Returns an error if the file cannot be read.
     pub fn text(path: &Path) -> Result<String, SceneError> {
-        std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
+        let text = input_text::read(path, LARGEST_FILE).and_then(input_text::utf8);
+        text.map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
     }
 
     /// Parses a scene. `path` is used in messages and as the base of relative paths.

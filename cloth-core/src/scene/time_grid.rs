@@ -68,6 +68,9 @@ mod tests {
                 assert!((frame * rate - 1.0).abs() < 1e-12 + SLACK, "{rate} {dt}: {grid:?}");
             }
         }
-        assert_eq!(TimeGrid::new(0.003, None), TimeGrid { step: 0.003, steps_per_frame: 13, frames_per_second: 1.0 / 0.039 });
+        assert_eq!(
+            TimeGrid::new(0.003, None),
+            TimeGrid { step: 0.003, steps_per_frame: 13, frames_per_second: 1.0 / 0.039 }
+        );
     }
 }

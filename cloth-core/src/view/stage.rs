@@ -432,7 +432,8 @@ mod tests {
     #[test]
     fn a_run_is_played_from_its_frames() {
         let folder = tempfile::TempDir::new().unwrap();
-        let mut run = crate::run::Run::new(SCENE.to_owned(), "s.toml".as_ref(), folder.path(), false, None).unwrap();
+        let options = crate::run::RunOptions::default();
+        let mut run = crate::run::Run::new(SCENE.to_owned(), "s.toml".as_ref(), folder.path(), options).unwrap();
         run.go(&std::sync::atomic::AtomicBool::new(false), |_| ()).unwrap();
         let mut stage = Stage::open(folder.path()).unwrap();
         assert!(!stage.is_live() && stage.time() == 0.0 && !stage.hold(24, [0.0; 3]));
