@@ -31,7 +31,7 @@ fn quadratic_height_fields_have_their_curvature_on_every_triangle_of_every_mesh(
         for orientation in [0.0, 30.0, 45.0] {
             let mesh = sheet(kind, orientation);
             let topology = Topology::of(&mesh);
-            let curvatures = curvatures(&mesh, &topology, Some([1.0, 0.0, 0.0])).unwrap();
+            let curvatures = curvatures(&mesh, &topology, Some([1.0, 0.0, 0.0].into())).unwrap();
             let inner: Vec<_> = curvatures.iter().filter(|one| one.free.is_empty()).collect();
             assert!(inner.len() > 100);
             for field in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {

@@ -3,7 +3,9 @@ use serde::Deserialize;
 
 use super::Declared;
 use super::plate::Rigidity;
-use crate::bounded::{AboveOne, Direction, MaybeReal, NonNegative, PoissonRatio, Positive, Real, Reals};
+use super::warp_choice::WarpChoice;
+use crate::bounded::{AboveOne, MaybeReal, NonNegative, PoissonRatio, Positive, Real, Reals};
+use crate::mesh::Warp;
 
 /// A fabric: its density and its resistance to deformation.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -21,9 +23,10 @@ pub struct Fabric {
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
     /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of your own.
     pub material: Material,
-    /// Direction of the warp in the rest shape, projected onto each triangle. Default [1, 0, 0].
-    #[serde(default = "first_axis", with = "Direction")]
-    pub warp: [f64; 3],
+    /// Direction of the warp in the rest shape, projected onto each triangle; or `uv`, the direction in which the first
+    /// texture coordinate of the OBJ file grows. Default [1, 0, 0].
+    #[serde(default = "first_axis", with = "WarpChoice")]
+    pub warp: Warp,
     /// Limits the stretch of the threads. Default none.
     #[serde(default)]
     pub strain_limit: Option<StrainLimit>,
@@ -57,8 +60,8 @@ impl Fabric {
 /// Mass per volume of plain cotton, in kg/m³: 0.1503 kg/m² at a thickness of 0.318 mm.
 const BULK_DENSITY: f64 = 470.0;
 
-fn first_axis() -> [f64; 3] {
-    [1.0, 0.0, 0.0]
+fn first_axis() -> Warp {
+    Warp::Direction([1.0, 0.0, 0.0])
 }
 
 /// Strain limit of triangles: energy A k/3 (o_u³ + o_v³), where o is the excess stretch of warp and weft.

@@ -3,6 +3,7 @@ use energy_dsl::Vector3;
 use super::track::{Joined, Track};
 use super::{Framing, Look, PictureError, Scenery, SolidMesh};
 use crate::geometry::Bounds;
+use crate::mesh::CornerAttributes;
 use crate::model::PartKind;
 use crate::simulation::Simulation;
 
@@ -11,6 +12,9 @@ const COLOURS: [[f32; 3]; 5] =
     [[0.16, 0.34, 0.52], [0.55, 0.20, 0.14], [0.20, 0.42, 0.24], [0.58, 0.42, 0.12], [0.36, 0.22, 0.44]];
 const HAIR: [f32; 3] = [0.28, 0.15, 0.07];
 const SOLID: [f32; 3] = [0.50, 0.48, 0.45];
+
+/// Solids have no attributes.
+const PLAIN: CornerAttributes = CornerAttributes { uvs: None, normals: None };
 
 /// The visible content of a run: the frames of its parts, and its solids.
 #[derive(Debug)]
@@ -71,12 +75,12 @@ impl<'a> Show<'a> {
                 PartKind::Cloth(_) => (Joined::Triangles(&self.triangles[number]), COLOURS[number % COLOURS.len()]),
                 PartKind::Hair { .. } => (Joined::Strands(&self.strands[number]), HAIR),
             };
-            tracks.push(Track { name: &part.name, colour, joined, frames });
+            tracks.push(Track { name: &part.name, colour, joined, corners: &part.corners, frames });
         }
         for (obstacle, meshes) in self.simulation.obstacles().iter().zip(&self.solids) {
             let frames = meshes.iter().map(|mesh| mesh.vertices.as_slice()).collect();
             let joined = Joined::Triangles(&meshes[0].triangles);
-            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, frames });
+            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, corners: const { &PLAIN }, frames });
         }
         tracks
     }

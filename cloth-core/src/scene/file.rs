@@ -144,7 +144,8 @@ impl TryFrom<File> for Scene {
         match (file.mesh, file.fabric) {
             (Some(mesh), Some(fabric)) => {
                 let placement = Placement::default();
-                let only = Garment { name: None, mesh, fabric, placement, velocity: [0.0; 3], spin: [0.0; 3] };
+                let (velocity, spin) = ([0.0; 3], [0.0; 3]);
+                let only = Garment { name: None, mesh, fabric, warp: None, placement, velocity, spin };
                 garments.insert(0, only);
             }
             (Some(_), None) => return Err("missing field `fabric`, the material of the mesh".to_owned()),
@@ -153,6 +154,9 @@ impl TryFrom<File> for Scene {
         }
         if garments.is_empty() && file.hair.is_empty() {
             return Err("nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned());
+        }
+        for garment in &mut garments {
+            garment.fabric.warp = garment.warp.unwrap_or(garment.fabric.warp);
         }
         let usual = ContactChoice::usual(file.integrator, file.sleep.is_some(), !garments.is_empty());
         Ok(Self {

@@ -19,7 +19,7 @@ pub struct Pin {
 }
 
 /// A choice of vertices.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum PinChoice {
     /// The vertex with this index, from 0.
     Vertex(usize),
@@ -27,6 +27,8 @@ pub enum PinChoice {
     Box(PinBox),
     /// The vertex nearest to a point, in m.
     Nearest(Vector3<f64>),
+    /// Every vertex of a group, object or material of the OBJ files.
+    Group(String),
     /// Every boundary vertex of the cloth.
     Boundary,
     /// Every vertex.
@@ -45,13 +47,14 @@ pub struct PinBox {
     pub max: Vector3<f64>,
 }
 
-/// The keys of a pin: exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`.
+/// The keys of a pin: exactly one of `vertex`, `box`, `nearest`, `group`, `boundary` and `all`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [
     { "required": ["vertex"] },
     { "required": ["box"] },
     { "required": ["nearest"] },
+    { "required": ["group"] },
     { "required": ["boundary"], "properties": { "boundary": { "const": true } } },
     { "required": ["all"], "properties": { "all": { "const": true } } },
 ]))]
@@ -65,6 +68,8 @@ struct Keys {
     /// The vertex nearest to a point, in m.
     #[serde(default, with = "MaybeReals::<Number, 3>")]
     nearest: Option<Vector3<f64>>,
+    /// Every vertex of this group, object or material of an OBJ file.
+    group: Option<String>,
     /// `true`: every boundary vertex of the cloth.
     #[serde(default)]
     boundary: bool,
@@ -81,7 +86,7 @@ impl TryFrom<Keys> for Pin {
     type Error = String;
 
     fn try_from(keys: Keys) -> Result<Self, String> {
-        let Keys { vertex, inside, nearest, boundary, all, of, motion } = keys;
+        let Keys { vertex, inside, nearest, group, boundary, all, of, motion } = keys;
         if let Some(PinBox { min, max }) = inside
             && let Some(axis) = (0..3).find(|&axis| min[axis] > max[axis])
         {
@@ -94,13 +99,14 @@ impl TryFrom<Keys> for Pin {
             vertex.map(PinChoice::Vertex),
             inside.map(PinChoice::Box),
             nearest.map(PinChoice::Nearest),
+            group.map(PinChoice::Group),
             boundary.then_some(PinChoice::Boundary),
             all.then_some(PinChoice::All),
         ];
-        let given: Vec<PinChoice> = choices.into_iter().flatten().collect();
-        match given[..] {
-            [choice] => Ok(Self { choice, of, motion }),
-            _ => Err("expected exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`".to_owned()),
+        let mut given = choices.into_iter().flatten();
+        match (given.next(), given.next()) {
+            (Some(choice), None) => Ok(Self { choice, of, motion }),
+            _ => Err("expected exactly one of `vertex`, `box`, `nearest`, `group`, `boundary` and `all`".to_owned()),
         }
     }
 }

@@ -40,6 +40,9 @@ pub struct Summary {
     pub terms: Vec<TermSummary>,
     /// Terms that were left out, with the reason.
     pub left_out: Vec<String>,
+    /// Descriptions of the garments from files: their pieces and welded vertices.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// Warnings about the scene and the run.
     pub warnings: Vec<String>,
     /// Number of edges of cloth and hair that touch or cross a triangle at the end.
@@ -87,6 +90,7 @@ impl Summary {
             dt: scene.time_grid().step,
             shortened_from: Some(scene.dt).filter(|&dt| dt != scene.time_grid().step),
             left_out: model.left_out.clone(),
+            notes: model.notes.clone(),
             warnings: model.warnings.clone(),
             ..Self::default()
         }
@@ -197,6 +201,9 @@ fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} vertices ({} pinned), {} triangles", self.vertices, self.pinned, self.triangles)?;
+        for note in &self.notes {
+            writeln!(f, "{note}")?;
+        }
         let Totals { steps, solves, solved_by, iterations, projected, rejected, stepping_time, .. } = &self.totals;
         let simulated = *steps as f64 * self.dt;
         writeln!(f, "{}: {steps} steps of {} s = {simulated:.3} s", self.integrator, self.dt)?;
