@@ -9,7 +9,7 @@ use tempfile::TempDir;
 /// A sheet that symplectic Euler cannot step stably.
 const UNSTABLE: &str = r#"dt = 0.01
 duration = 4.0
-frames_per_second = 50
+frames_per_second = 25
 integrator = "symplectic-euler"
 
 [mesh.sheet]
@@ -41,7 +41,8 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 #[test]
 fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
     for ledger in [true, false] {
-        let folder = with_scene(&format!("{UNSTABLE}[output]\npng = {ledger}\nledger = {ledger}\n"));
+        let folder =
+            with_scene(&format!("{UNSTABLE}[output]\npng = {ledger}\npicture = {ledger}\nledger = {ledger}\n"));
         let output = cloth(&["run", "scene.toml", "-o", "out"], folder.path());
         let message = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{message}");
@@ -53,14 +54,15 @@ fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
         let out = folder.path().join("out");
         let record: serde_json::Value = serde_json::from_slice(&read(&out, "run.json")).unwrap();
         let (steps, frames) = (record["summary"]["steps"].as_u64().unwrap(), record["frames"].as_u64().unwrap());
-        assert!(record["finished"] == false && steps > 2 && frames == steps / 2 + 1, "{steps} {frames}");
-        assert!(read(&out, "cloth.png").starts_with(b"\x89PNG") && read(&out, "cloth.glb").starts_with(b"glTF"));
+        assert!(record["finished"] == false && steps > 2 && frames == steps / 4 + 1, "{steps} {frames}");
+        assert!(read(&out, "cloth.glb").starts_with(b"glTF"));
         let usd = String::from_utf8(read(&out, "cloth.usda")).unwrap();
         assert!(
             usd.contains(&format!("endTimeCode = {}\n", frames - 1)) && !usd.contains("inf") && !usd.contains("nan")
         );
         assert!(String::from_utf8(read(&out, "summary.txt")).unwrap().contains("the run ended early: step "));
         if ledger {
+            assert!(read(&out, "cloth.png").starts_with(b"\x89PNG"));
             assert!(out.join(format!("frames/cloth_{:04}.png", frames - 1)).exists());
             let lines = String::from_utf8(read(&out, "ledger.csv")).unwrap().lines().count() as u64;
             assert_eq!(lines, steps + 2);
@@ -145,16 +147,16 @@ fn an_interrupt_while_files_are_written_leaves_what_a_report_needs() {
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{message}");
     assert!(message.contains("stopped after step 200 of 200, before all files were written"), "{message}");
-    assert!(start.elapsed() < Duration::from_secs(10) && !out.join("frames/cloth_0100.png").exists());
+    assert!(start.elapsed() < Duration::from_secs(10) && !out.join("frames/cloth_0050.png").exists());
     let record: serde_json::Value = serde_json::from_slice(&read(&out, "run.json")).unwrap();
-    assert_eq!((&record["finished"], &record["frames"]), (&true.into(), &101.into()));
+    assert_eq!((&record["finished"], &record["frames"]), (&true.into(), &51.into()));
     assert!(cloth(&["report", "out"], folder.path()).status.success());
 }
 
 #[test]
 fn pictures_of_all_frames_show_the_same_part_of_space() {
     // With one thread and with two, and thus in any order of drawing, the pictures are the same.
-    let scene = endless().replace("duration = 10000.0", "duration = 0.02");
+    let scene = endless().replace("duration = 10000.0", "duration = 0.04");
     let folder = with_scene(&format!("{scene}[output]\npng = true\npicture = false\n"));
     for (threads, out) in [("1", "one"), ("2", "two")] {
         let output = cloth(&["run", "scene.toml", "-o", out, "--threads", threads], folder.path());

@@ -71,8 +71,9 @@ fabric.density = 0.2
 fabric.material.mass-spring = { structural = 10.0, shear = 5.0, bending = 1.0, damping = 0.1 }
 
 [[garment]]
-mesh.obj = { path = "shape.obj" }
+mesh.obj = { path = "shape.obj", groups = ["front"], weld = 1e-5 }
 fabric = "denim"
+warp = "uv"
 
 [[garment]]
 mesh.disc = { radius = 1.0, rings = 3 }
@@ -106,13 +107,18 @@ stiffness = 10.0
 [[pins]]
 vertex = 3
 of = "skirt"
-motion = { axis = [0.0, 0.0, 1.0], centre = [0.0, 0.0, 0.0], keys = [{ time = 0.0, angle = 0.0, translate = [0.0, 0.0, 0.0] }] }
+motion.axis = [0.0, 0.0, 1.0]
+motion.centre = [0.0, 0.0, 0.0]
+motion.keys = [{ time = 0.0, angle = 0.0, translate = [0.0, 0.0, 0.0] }]
 
 [[pins]]
 box = { min = [-1.0, -1.0, -1.0], max = [1.0, 1.0, 1.0] }
 
 [[pins]]
 nearest = [0.0, 0.0, 0.0]
+
+[[pins]]
+group = "waist"
 
 [[pins]]
 boundary = true
@@ -286,10 +292,10 @@ fn program_and_schema_agree_on_edited_scenes() {
         let mut edited = good.clone();
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         match edited.pointer_mut(parent).unwrap() {
-            Value::Object(object) => object.remove(key).map(|_| ()),
-            Value::Array(items) => Some(drop(items.remove(key.parse().unwrap()))),
-            _ => None,
-        };
+            Value::Object(object) => drop(object.remove(key)),
+            Value::Array(items) => drop(items.remove(key.parse().unwrap())),
+            _ => unreachable!("the parent of a pointer has entries"),
+        }
         compare(format!("without {pointer}"), &edited);
         if let Some(Value::Object(object)) = edited.pointer_mut(parent) {
             object.insert("zebra".to_owned(), json!(1.0));

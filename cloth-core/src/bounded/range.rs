@@ -5,8 +5,8 @@ use serde::de::Error;
 pub(crate) const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 /// The largest coordinate, in m: beyond, single precision in files would not resolve a metre.
 const LARGEST_COORDINATE: f64 = 1e9;
-/// The largest of other quantities. Nothing that cloth is made of exceeds it in SI units; sums of larger numbers overflow
-/// or do not converge.
+/// The largest of other quantities. Nothing that cloth is made of exceeds it in SI units; sums of larger numbers
+/// overflow or do not converge.
 const LARGEST: f64 = 1e12;
 
 /// A range of real numbers.

@@ -205,8 +205,8 @@ impl Ledger {
         self.entries.iter().map(|entry| entry.unaccounted(&self.entries[0]).abs()).fold(0.0, f64::max)
     }
 
-    /// The energy put in, in J: the maximum over time of the initial kinetic energy, the potential energies released, and
-    /// the work done on the cloth.
+    /// The energy put in, in J: the maximum over time of the initial kinetic energy, the potential energies released,
+    /// and the work done on the cloth.
     #[must_use]
     pub fn put_in(&self) -> f64 {
         let first = &self.entries[0];
@@ -231,8 +231,8 @@ impl Ledger {
         let (lost, all) = (self.largest_loss(), self.put_in());
         (lost > Self::LOSS * all && all > f64::MIN_POSITIVE).then(|| {
             format!(
-                "{integrator} lost {lost:.2e} J of the {all:.2e} J put in ({:.0} %): the size of its steps damps the motion. \
-                 A smaller dt loses less, and so does `integrator = \"implicit-midpoint\"` or \"bdf2\"",
+                "{integrator} lost {lost:.2e} J of the {all:.2e} J put in ({:.0} %): the size of its steps damps the \
+                 motion. A smaller dt loses less, and so does `integrator = \"implicit-midpoint\"` or \"bdf2\"",
                 100.0 * lost / all
             )
         })

@@ -36,8 +36,8 @@ impl TriangleMesh {
         uvs.iter().enumerate().map(warp).collect()
     }
 
-    /// Maps a triangle to its plane, with the first axis along the warp; see [`thread_triangle`]. `None` if the triangle
-    /// stands across the warp or has no texture coordinates that tell it.
+    /// Maps a triangle to its plane, with the first axis along the warp; see [`thread_triangle`]. `None` if the
+    /// triangle stands across the warp or has no texture coordinates that tell it.
     #[must_use]
     pub fn thread_triangle(&self, triangle: usize, warp: Warp) -> Option<MaterialTriangle> {
         let direction = match warp {

@@ -104,8 +104,8 @@ impl OutputFolder {
         Ok(Self { _lock: FolderLock::take(path)?.map(Arc::new), ..folder })
     }
 
-    /// Opens the folder of a run that is reported, and checks that it can be written to. Does not lock it: the report is
-    /// not a file of the run.
+    /// Opens the folder of a run that is reported, and checks that it can be written to. Does not lock it: the report
+    /// is not a file of the run.
     ///
     /// # Errors
     /// Returns an error if the folder cannot be written to.

@@ -58,8 +58,8 @@ pub enum CheckpointError {
     Older { path: PathBuf, version: u32 },
     /// A mesh or material is not the one that the run began with.
     #[error(
-        "{} was edited since the run began, which could not be resumed as it was. Restore the file, start the run again, \
-         or pass --accept-edited to continue with the new one", .path.display()
+        "{} was edited since the run began, which could not be resumed as it was. Restore the file, start the run \
+         again, or pass --accept-edited to continue with the new one", .path.display()
     )]
     Edited { path: PathBuf },
     /// The saved state does not fit the scene.

@@ -26,11 +26,12 @@ enum Hands {
     /// A second thread draws. Both fields are `None` once it was joined.
     Second { frames: Option<Sender<Frame>>, thread: Option<JoinHandle<Result<(), RunError>>> },
     /// The only thread draws, after the last step.
-    Only(Drawing),
+    Only(Box<Drawing>),
 }
 
 impl FramePictures {
-    /// Starts to draw frames, `frames_per_second` of them per simulated second, on a second thread if `threads` allows it.
+    /// Starts to draw frames, `frames_per_second` of them per simulated second, on a second thread if `threads` allows
+    /// it.
     pub(super) fn start(scenery: Scenery, folder: OutputFolder, frames_per_second: f64, threads: usize) -> Self {
         let abandoned = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&abandoned);
@@ -48,7 +49,7 @@ impl FramePictures {
             let thread = std::thread::spawn(move || drawing.draw_received(&receiver, &stop));
             Hands::Second { frames: Some(sender), thread: Some(thread) }
         } else {
-            Hands::Only(drawing)
+            Hands::Only(Box::new(drawing))
         };
         Self { hands, abandoned }
     }
@@ -141,8 +142,8 @@ impl Drawing {
         Ok(())
     }
 
-    /// Adds a frame. If it leaves the part of space that is shown, that part grows, and all pictures are drawn again. The
-    /// space that the camera leaves around everything makes that rare.
+    /// Adds a frame. If it leaves the part of space that is shown, that part grows, and all pictures are drawn again.
+    /// The space that the camera leaves around everything makes that rare.
     fn add(&mut self, frame: Frame) {
         let time = self.time(self.frames.len());
         let outermost = self.scenery.outermost(&frame, time);

@@ -13,6 +13,9 @@ use crate::output::OutputError;
 /// The positions of all vertices in one frame, in m. Pictures are drawn from them on another thread.
 pub(super) type Frame = Arc<[Vector3<f64>]>;
 
+/// The velocities of all vertices in one frame, in m/s; empty if the file has none.
+pub(super) type Velocities = Vec<Vector3<f64>>;
+
 /// Frames, each with the positions of all vertices. The file holds them one after the other, in little-endian double
 /// precision; if frames are also written as PLY, each is followed by the velocities in single precision.
 #[derive(Debug)]
@@ -42,7 +45,7 @@ impl FrameStore {
         vertices: usize,
         has_velocities: bool,
         checksum: u32,
-    ) -> Result<(Self, Vec<Vec<Vector3<f64>>>), CheckpointError> {
+    ) -> Result<(Self, Vec<Velocities>), CheckpointError> {
         let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
         let bytes = std::fs::read(path).map_err(unreadable)?;
         let (of_positions, of_velocities) = (24 * vertices, if has_velocities { 12 * vertices } else { 0 });

@@ -47,8 +47,8 @@ pub enum RunError {
     Simulation(#[from] SimulationError),
     /// The run would not fit into memory.
     #[error(
-        "the run needs {need}, but only {} of memory are available. Use fewer cells or frames, write fewer files, or pass \
-         --ignore-memory", Gigabytes(*.available as f64)
+        "the run needs {need}, but only {} of memory are available. Use fewer cells or frames, write fewer files, or \
+         pass --ignore-memory", Gigabytes(*.available as f64)
     )]
     Memory {
         /// What the run needs.
@@ -81,7 +81,7 @@ pub enum RunError {
     #[error("{failure}; and the results of the steps before it are incomplete: {error}")]
     AlsoUnwritten {
         /// The failed step.
-        failure: SimulationError,
+        failure: Box<SimulationError>,
         /// The file that could not be written.
         error: Box<RunError>,
     },

@@ -82,7 +82,9 @@ impl Run {
                 Ok(Ending { summary, files: written.files, frames, finished, abandoned, failure })
             }
             (Some(error), None) => Err(error),
-            (Some(error), Some(failure)) => Err(RunError::AlsoUnwritten { failure, error: Box::new(error) }),
+            (Some(error), Some(failure)) => {
+                Err(RunError::AlsoUnwritten { failure: Box::new(failure), error: Box::new(error) })
+            }
         }
     }
 

@@ -82,14 +82,14 @@ pub(super) struct File {
     #[serde(default, deserialize_with = "super::sleep::sleep")]
     #[schemars(with = "super::sleep::SleepChoice")]
     sleep: Option<Sleep>,
-    /// Time step h, in s. With `frames_per_second`, steps are shortened so that a whole number of equal steps ends with
-    /// each frame.
+    /// The largest time step h, in s.
     #[serde(with = "Real::<Positive>")]
     dt: f64,
     /// Simulated time, in s; rounded to whole steps.
     #[serde(with = "Real::<NonNegative>")]
     duration: f64,
-    /// Frames written per simulated second. Default: the rate nearest to 25 whose frames are whole steps of `dt`.
+    /// Frames written per simulated second. Steps are shortened so that a whole number of equal steps ends with each
+    /// frame. Default: the rate nearest to 25 whose frames are whole steps of `dt`.
     #[serde(default, with = "MaybeReal::<Positive>")]
     frames_per_second: Option<f64>,
     /// The files to write.

@@ -26,8 +26,8 @@ pub struct Garment {
     #[serde(deserialize_with = "super::fabric_choice::fabric")]
     #[schemars(with = "super::fabric_choice::FabricChoice")]
     pub fabric: Fabric,
-    /// Direction of the warp, in place of that of the fabric: a direction, or `uv`; see the key of the fabric. Default that
-    /// of the fabric.
+    /// Direction of the warp, in place of that of the fabric: a direction, or `uv`; see the key of the fabric. Default
+    /// that of the fabric.
     #[serde(default, with = "MaybeWarpChoice")]
     pub warp: Option<Warp>,
     /// Initial placement. Default as built.

@@ -59,7 +59,7 @@ pub enum SimulationError {
         /// The time at the end of that step, in s.
         time: f64,
         /// The most deformed element before the step; `None` if the scene has no triangle and no segment.
-        deformed: Option<MostDeformed>,
+        deformed: Option<Box<MostDeformed>>,
         /// Why it failed.
         source: StepError,
     },
@@ -284,7 +284,7 @@ impl Simulation {
         let step = self.steps_done() + 1;
         let (report, slept) = self.step_islands(step).map_err(|source| {
             self.roll_back();
-            let deformed = deformed::most_deformed(&self.parts, &self.x, &source);
+            let deformed = deformed::most_deformed(&self.parts, &self.x, &source).map(Box::new);
             SimulationError::Step { step, time: step as f64 * self.dt, deformed, source }
         })?;
         self.summary.totals.add(&report, slept, start.elapsed());

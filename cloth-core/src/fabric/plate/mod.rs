@@ -35,8 +35,8 @@ use crate::mesh::{Topology, TriangleMesh, Warp, area, material_triangle};
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("triangle {triangle} {}", match .warp {
     Warp::Direction(warp) => format!(
-        "stands across the warp direction {warp:?}; choose a warp direction along the cloth, or `warp = \"uv\"` if its OBJ \
-         file has texture coordinates"
+        "stands across the warp direction {warp:?}; choose a warp direction along the cloth, or `warp = \"uv\"` if \
+         its OBJ file has texture coordinates"
     ),
     Warp::Uv => "has no texture coordinates that tell its warp; export UVs without collapsed faces".to_owned(),
 })]

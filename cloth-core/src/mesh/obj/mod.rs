@@ -34,7 +34,10 @@ pub enum ObjError {
         text: String,
     },
     /// The file has no such group.
-    #[error("{}: there is no group, object or material called `{name}`; there are {}", .path.display(), .known.join(", "))]
+    #[error(
+        "{}: there is no group, object or material called `{name}`; there are {}",
+        .path.display(), .known.join(", ")
+    )]
     UnknownGroup {
         path: PathBuf,
         name: String,
