@@ -232,7 +232,7 @@ impl Ledger {
         (lost > Self::LOSS * all && all > f64::MIN_POSITIVE).then(|| {
             format!(
                 "{integrator} lost {lost:.2e} J of the {all:.2e} J put in ({:.0} %): the size of its steps damps the \
-                 motion. A smaller dt loses less, and so does `integrator = \"implicit-midpoint\"` or \"bdf2\"",
+                 motion. A smaller dt loses less, and so do the integrators `bdf2` and `implicit-midpoint`",
                 100.0 * lost / all
             )
         })
