@@ -49,6 +49,7 @@ mod body;
 mod book;
 mod bounded;
 mod dissipation_term;
+mod input_text;
 
 pub mod barrier;
 pub mod bench;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{finite_triple, nonzero_triple, number};
+use crate::bounded::{Direction, Number, Real, Reals};
 use crate::geometry::Pose;
 
 /// A rigid motion, linear in time between keys and constant before the first and after the last. It maps a point x to c
@@ -22,13 +22,14 @@ use crate::geometry::Pose;
 #[serde(deny_unknown_fields)]
 pub struct Motion {
     /// Direction of the axis of rotation, right-handed. Default [0, 0, 1].
-    #[serde(default = "third_axis", deserialize_with = "nonzero_triple")]
+    #[serde(default = "third_axis", with = "Direction")]
     pub axis: [f64; 3],
     /// A point on the axis, in m. Default the origin.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub centre: [f64; 3],
     /// Keyframes, with increasing times.
     #[serde(deserialize_with = "keys")]
+    #[schemars(length(min = 1))]
     pub keys: Vec<Key>,
 }
 
@@ -37,13 +38,13 @@ pub struct Motion {
 #[serde(deny_unknown_fields)]
 pub struct Key {
     /// Time, in s.
-    #[serde(deserialize_with = "number")]
+    #[serde(with = "Real::<Number>")]
     pub time: f64,
     /// Angle of rotation, in degrees. Default 0.
-    #[serde(default, deserialize_with = "number")]
+    #[serde(default, with = "Real::<Number>")]
     pub angle: f64,
     /// Translation, in m. Default none.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub translate: [f64; 3],
 }
 

@@ -8,7 +8,7 @@ use energy_solve::{StepStart, Term};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{finite_triple, non_negative, number, positive};
+use crate::bounded::{NonNegative, Number, Positive, Real, Reals, Speed};
 use crate::dissipation_term::{DissipationLaw, DissipativeTerm};
 use crate::geometry::{cross, norm, subtract};
 
@@ -19,19 +19,19 @@ use crate::geometry::{cross, norm, subtract};
 #[serde(deny_unknown_fields)]
 pub struct Wind {
     /// The velocity of the air, in m/s.
-    #[serde(deserialize_with = "finite_triple")]
+    #[serde(with = "Reals::<Speed, 3>")]
     pub velocity: [f64; 3],
     /// Gusts added to the velocity. Default none.
     #[serde(default)]
     pub gusts: Vec<Gust>,
     /// Density ρ of the air, in kg/m³. Default 1.2.
-    #[serde(default = "air", deserialize_with = "positive")]
+    #[serde(default = "air", with = "Real::<Positive>")]
     pub density: f64,
     /// Drag coefficient C across the surface. Default 1.2, that of a flat plate.
-    #[serde(default = "plate", deserialize_with = "non_negative")]
+    #[serde(default = "plate", with = "Real::<NonNegative>")]
     pub across: f64,
     /// Drag coefficient C along the surface. Default 0.02.
-    #[serde(default = "skin", deserialize_with = "non_negative")]
+    #[serde(default = "skin", with = "Real::<NonNegative>")]
     pub along: f64,
 }
 
@@ -40,13 +40,13 @@ pub struct Wind {
 #[serde(deny_unknown_fields)]
 pub struct Gust {
     /// The largest velocity, in m/s.
-    #[serde(deserialize_with = "finite_triple")]
+    #[serde(with = "Reals::<Speed, 3>")]
     pub amplitude: [f64; 3],
     /// The time between gusts, in s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub period: f64,
     /// Phase at time 0, as a fraction of the period. Default 0.
-    #[serde(default, deserialize_with = "number")]
+    #[serde(default, with = "Real::<Number>")]
     pub phase: f64,
 }
 

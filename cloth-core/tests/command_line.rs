@@ -144,7 +144,7 @@ fn invalid_meshes_are_rejected_with_line_and_reason() {
     expect(&square.replace("1 1 0", "1 nan 0"), "shape.obj");
     expect(&format!("{}f 1 2 3\nf 1 3 4\n", square.replace("1 1 0", "1 nan 0")), "shape.obj:3: vertex 2 is not finite");
     expect(&format!("{square}f 1 2 3\nf 1 3 3\n"), "shape.obj:6: triangle 1 (vertices [0, 2, 2]) has no area");
-    expect(&format!("{square}f 1 2 3\n"), "shape.obj:4: vertex 3 belongs to no triangle");
+    expect(&format!("{square}f 1 2\n"), "shape.obj:5: a face needs at least three corners, got 2: `f 1 2`");
 }
 
 #[test]

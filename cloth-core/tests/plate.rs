@@ -31,7 +31,7 @@ fn quadratic_height_fields_have_their_curvature_on_every_triangle_of_every_mesh(
         for orientation in [0.0, 30.0, 45.0] {
             let mesh = sheet(kind, orientation);
             let topology = Topology::of(&mesh);
-            let curvatures = curvatures(&mesh, &topology, Some([1.0, 0.0, 0.0])).unwrap();
+            let curvatures = curvatures(&mesh, &topology, Some([1.0, 0.0, 0.0].into())).unwrap();
             let inner: Vec<_> = curvatures.iter().filter(|one| one.free.is_empty()).collect();
             assert!(inner.len() > 100);
             for field in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
@@ -183,8 +183,6 @@ fn a_warp_across_the_cloth_is_rejected() {
     let flat =
         TriangleMesh::new(mesh.vertices().iter().map(|p| [p[0], p[1], 0.0]).collect(), mesh.triangles().to_vec());
     let error = PlateTerm::new("bending", &flat.unwrap(), &WOVEN, [0.0, 0.0, 1.0]).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "triangle 0 stands across the warp direction [0.0, 0.0, 1.0]; choose a warp direction along the cloth"
-    );
+    let words = "triangle 0 stands across the warp direction [0.0, 0.0, 1.0]; choose a warp direction along the cloth";
+    assert!(error.to_string().starts_with(words), "{error}");
 }

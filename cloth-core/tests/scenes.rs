@@ -152,6 +152,20 @@ fn the_ledger_closes_for_conserving_integrators() {
 }
 
 #[test]
+fn an_integrator_that_loses_a_tenth_of_the_energy_gives_a_warning() {
+    // A pendulum: gravity puts energy in, and implicit Euler damps it by the size of its steps.
+    let warnings = |integrator: &str, dt: f64| {
+        let head = format!("dt = {dt}\nduration = 0.6\nintegrator = \"{integrator}\"");
+        let pin = "[[pins]]\nbox = { min = [-1.0, 0.099, -1.0], max = [1.0, 0.101, 1.0] }\n";
+        finished(&format!("{}{pin}", sheet(&head, 4, 0.2))).summary().unwrap().warnings
+    };
+    let coarse = warnings("implicit-euler", 0.02);
+    assert!(coarse.iter().any(|warning| warning.starts_with("implicit-euler lost ")), "{coarse:?}");
+    assert!(coarse.iter().any(|warning| warning.contains("A smaller dt loses less")), "{coarse:?}");
+    assert!(!warnings("implicit-midpoint", 0.002).iter().any(|warning| warning.contains(" lost ")));
+}
+
+#[test]
 fn an_energy_balance_that_does_not_close_gives_a_warning() {
     // A strong pull within one and a half steps.
     let head = "dt = 0.02\nduration = 0.3\nintegrator = \"implicit-midpoint\"";
@@ -288,7 +302,7 @@ fn contradictory_scenes_are_rejected_with_a_remedy() {
         "fabric = \"demin\"\n{}",
         good.split("[garment.fabric]").next().unwrap().replace("[[garment]]\n", "[[garment]]\nfabric = \"demin\"\n")
     );
-    expect(fabric.split_once('\n').unwrap().1, &["unknown variant `demin`", "did you mean `denim`?"]);
+    expect(fabric.split_once('\n').unwrap().1, &["unknown fabric `demin`", "did you mean `denim`?"]);
     let keys = "[pins.motion]\nkeys = [{ time = 1.0 }, { time = 0.5 }]\n";
     expect(&format!("{good}[[pins]]\nvertex = 0\n{keys}"), &["test.toml:14:8", "times of keys must increase"]);
     let twice = "[[pins]]\nvertex = 0\n[[pins]]\nall = true\nmotion = { keys = [{ time = 0.0, angle = 5.0 }] }\n";

@@ -118,3 +118,15 @@ fn invalid_requests_are_clear_errors() {
     assert_eq!(both.status.code(), Some(2));
     assert_eq!(cloth(&["view", "out", "--frame", "1"], path).status.code(), Some(2), "only with --screenshot");
 }
+
+#[test]
+fn only_png_pictures_are_promised() {
+    let folder = TempDir::new().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_cloth"))
+        .args(["view", "scene.toml", "--screenshot", "x.jpg"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && message.contains("expected a name that ends with .png"), "{message}");
+}

@@ -3,7 +3,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Args;
-use cloth_core::run::Run;
+use cloth_core::run::{Run, RunOptions};
 use cloth_core::{Simulation, demo};
 
 use super::print;
@@ -20,7 +20,8 @@ impl Demo {
     pub fn run(self) -> Result<ExitCode> {
         let scene = demo::scene()?;
         print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
-        let run = Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &self.output, true, None)?;
+        let options = RunOptions { overwrite: true, ..RunOptions::default() };
+        let run = Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &self.output, options)?;
         simulate(run, false)
     }
 }

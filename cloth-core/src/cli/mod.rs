@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod demo;
 pub mod fabrics;
+pub mod interrupts;
 pub mod materials;
 pub mod report;
 pub mod resume;

@@ -11,6 +11,9 @@ use super::run::{limit_threads, simulate};
 pub struct Resume {
     /// Folder of the run.
     folder: PathBuf,
+    /// Continue although meshes or materials were edited since the run began.
+    #[arg(long)]
+    accept_edited: bool,
     /// Print the tables of `cloth run --stats`.
     #[arg(long)]
     stats: bool,
@@ -21,6 +24,8 @@ pub struct Resume {
 
 impl Resume {
     pub fn run(self) -> Result<ExitCode> {
-        simulate(limit_threads(Run::resume(&self.folder)?, self.threads), self.stats)
+        let run = Run::resume(&self.folder, self.accept_edited)?;
+        run.notes().iter().for_each(|note| eprintln!("note: {note}"));
+        simulate(limit_threads(run, self.threads), self.stats)
     }
 }

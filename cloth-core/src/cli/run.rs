@@ -1,13 +1,13 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use cloth_core::output::OutputFolder;
-use cloth_core::run::{Ending, Progress, Run, RunError, stats};
+use cloth_core::run::{Ending, Event, Progress, Run, RunError, RunOptions, stats};
 use cloth_core::scene::{self, Scene};
 
+use super::interrupts::Interrupts;
 use super::print;
 
 #[derive(Debug, Args)]
@@ -23,6 +23,9 @@ pub struct RunScene {
     /// Save the state every STEPS steps, for `cloth resume`.
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: Option<u64>,
+    /// Start even if the run seems not to fit into memory.
+    #[arg(long)]
+    ignore_memory: bool,
     /// Replace the material of every fabric by the elements that this file declares. They are interpreted, which is
     /// slower than built-in elements.
     #[arg(long, value_name = "FILE.energy")]
@@ -40,12 +43,13 @@ pub struct RunScene {
 
 impl RunScene {
     pub fn run(self) -> Result<ExitCode> {
-        let Self { scene, output, overwrite, checkpoint, material, parameters, stats, threads } = self;
+        let Self { scene, output, overwrite, checkpoint, ignore_memory, material, parameters, stats, threads } = self;
         let mut text = Scene::text(&scene)?;
         if let Some(file) = material {
             text = scene::with_material(&text, &file, &parameters);
         }
-        let run = Run::new(text, &scene, &output, overwrite, checkpoint).map_err(|error| match error {
+        let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
+        let run = Run::new(text, &scene, &output, options).map_err(|error| match error {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),
         })?;
@@ -67,39 +71,36 @@ pub fn limit_threads(run: Run, threads: Option<u16>) -> Run {
     }
 }
 
-/// Simulates until the end or Ctrl-C, and prints the summary and the files written. The exit code is 130 if the run
-/// was interrupted.
+/// Simulates until the end or a signal, and prints the summary and the files written. The exit code is 128 and the
+/// number of the signal if the run was interrupted.
 pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
     run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let interrupted = interrupt_flag()?;
+    let interrupts = Interrupts::listen()?;
     let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
-    let ended = run.go(interrupted, |simulation, report| progress.step(simulation.steps_done(), report));
+    let ended = run.go(interrupts.flag(), |event| match event {
+        Event::Step(simulation, report) => progress.step(simulation.steps_done(), report),
+        Event::LastStep => progress.last_step(),
+    });
     progress.finish();
-    let Ending { summary, files, frames, finished } = ended?;
+    let Ending { summary, files, frames, finished, abandoned, failure } = ended?;
     let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
     let folder = run.folder().path();
     let tables = if with_stats { format!("{}\n", stats::tables(&summary)) } else { String::new() };
     let frame_folder = folder.join(OutputFolder::FRAMES);
     print(&format!("{summary}\n\n{tables}{files}wrote {frames} frames to {}\n", frame_folder.display()))?;
-    if finished {
+    if let Some(failure) = failure {
+        let kept = format!("the files hold the {} steps before it", run.simulation().steps_done());
+        return Err(anyhow::anyhow!("{failure}; {kept}"));
+    }
+    if finished && !abandoned {
         return Ok(ExitCode::SUCCESS);
     }
     let resume = match run.leaves_checkpoints() {
         true => format!("resume with `cloth resume {}`", folder.display()),
         false => "pass --checkpoint to be able to resume".to_owned(),
     };
-    eprintln!("stopped after step {} of {}; {resume}", run.simulation().steps_done(), run.simulation().steps());
-    Ok(ExitCode::from(130))
-}
-
-/// Returns a flag that the first Ctrl-C sets. The second Ctrl-C exits at once.
-fn interrupt_flag() -> Result<&'static AtomicBool> {
-    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-    ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("cannot listen for Ctrl-C")?;
-    Ok(&INTERRUPTED)
+    let missing = if abandoned { ", before all files were written" } else { "" };
+    let (done, all) = (run.simulation().steps_done(), run.simulation().steps());
+    eprintln!("stopped after step {done} of {all}{missing}; {resume}");
+    Ok(interrupts.exit_code())
 }

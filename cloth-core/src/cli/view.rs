@@ -18,7 +18,7 @@ pub struct View {
     #[arg(long)]
     wireframe: bool,
     /// Write a picture to this PNG file instead of opening a window.
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     screenshot: Option<PathBuf>,
     /// With --screenshot: the frame to draw, from 0; default: the last.
     #[arg(long, requires = "screenshot", conflicts_with = "time")]
@@ -62,6 +62,15 @@ fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
         "this build has no window; build one with `cargo build --release -p cloth-core --features view`, or write a \
          picture with --screenshot FILE.png"
     )
+}
+
+fn png_file(text: &str) -> Result<PathBuf, String> {
+    let is_png = Path::new(text).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+    if is_png {
+        Ok(PathBuf::from(text))
+    } else {
+        Err("pictures are PNG; expected a name that ends with .png".to_owned())
+    }
 }
 
 fn non_negative(text: &str) -> Result<f64, String> {

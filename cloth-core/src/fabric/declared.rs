@@ -10,8 +10,13 @@ use serde::Deserialize;
 
 use super::Bending;
 use super::interpreted_term::InterpretedTerm;
+use crate::bounded::{RealMap, Signed};
 use crate::geometry::{norm, subtract};
+use crate::input_text;
 use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, rest_angle};
+
+/// The largest size of an `.energy` file, in bytes.
+const LARGEST_FILE: u64 = 16 << 20;
 
 /// Elements declared in your own `.energy` file. Each energy acts on every vertex, edge, triangle or hinge, depending
 /// on whether it has one, two, three or four points. The points of a hinge are its two apexes, then the shared edge.
@@ -32,7 +37,7 @@ pub struct Declared {
     #[serde(default)]
     pub elements: Option<Vec<String>>,
     /// Parameters by name, in the units of the declaration. `θ0`, `θ₀` and `theta0` are equivalent.
-    #[serde(default)]
+    #[serde(default, with = "RealMap::<Signed>")]
     pub parameters: BTreeMap<String, f64>,
     /// Additional bending resistance. Default none.
     #[serde(default)]
@@ -118,8 +123,9 @@ impl Declared {
 
     fn read(&self) -> Result<Vec<Interpreted>, DeclaredError> {
         let path = || self.path.clone();
-        let text =
-            std::fs::read_to_string(&self.path).map_err(|source| DeclaredError::Unreadable { path: path(), source })?;
+        let text = input_text::read_regular(&self.path, LARGEST_FILE)
+            .and_then(input_text::utf8)
+            .map_err(|source| DeclaredError::Unreadable { path: path(), source })?;
         let all = Interpreted::from_file(&text, &self.path.display().to_string())
             .map_err(|errors| DeclaredError::Text { diagnostics: errors.to_string() })?;
         let known: Vec<String> = all.iter().map(|element| element.declaration().name.to_owned()).collect();

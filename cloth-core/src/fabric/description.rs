@@ -3,28 +3,30 @@ use serde::Deserialize;
 
 use super::Declared;
 use super::plate::Rigidity;
-use crate::bounded::{all_positive, finite_triple, non_negative, poisson_ratio, positive};
+use super::warp_choice::WarpChoice;
+use crate::bounded::{AboveOne, MaybeReal, NonNegative, PoissonRatio, Positive, Real, Reals};
+use crate::mesh::Warp;
 
 /// A fabric: its density and its resistance to deformation.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fabric {
     /// Mass per area σ, in kg/m².
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub density: f64,
     /// Thickness in contact with cloth, in m. Default `density` over 470 kg/m³, the bulk density of plain cotton.
-    #[serde(default, deserialize_with = "some_positive")]
-    #[schemars(with = "Option<f64>")]
+    #[serde(default, with = "MaybeReal::<Positive>")]
     pub thickness: Option<f64>,
     /// Coefficient of friction with cloth; between two fabrics, the mean of theirs. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     pub friction: f64,
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
     /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of your own.
     pub material: Material,
-    /// Direction of the warp in the rest shape, projected onto each triangle. Default [1, 0, 0].
-    #[serde(default = "first_axis", deserialize_with = "finite_triple")]
-    pub warp: [f64; 3],
+    /// Direction of the warp in the rest shape, projected onto each triangle; or `uv`, the direction in which the first
+    /// texture coordinate of the OBJ file grows. Default [1, 0, 0].
+    #[serde(default = "first_axis", with = "WarpChoice")]
+    pub warp: Warp,
     /// Limits the stretch of the threads. Default none.
     #[serde(default)]
     pub strain_limit: Option<StrainLimit>,
@@ -58,12 +60,8 @@ impl Fabric {
 /// Mass per volume of plain cotton, in kg/m³: 0.1503 kg/m² at a thickness of 0.318 mm.
 const BULK_DENSITY: f64 = 470.0;
 
-fn some_positive<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    positive(deserializer).map(Some)
-}
-
-fn first_axis() -> [f64; 3] {
-    [1.0, 0.0, 0.0]
+fn first_axis() -> Warp {
+    Warp::Direction([1.0, 0.0, 0.0])
 }
 
 /// Strain limit of triangles: energy A k/3 (o_u³ + o_v³), where o is the excess stretch of warp and weft.
@@ -71,10 +69,10 @@ fn first_axis() -> [f64; 3] {
 #[serde(deny_unknown_fields)]
 pub struct StrainLimit {
     /// Stretch above which the limit acts, relative to the rest length; greater than 1.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<AboveOne>")]
     pub stretch: f64,
     /// Stiffness k, in N/m. Adds 2 k o to the stiffness of the membrane.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub stiffness: f64,
 }
 
@@ -84,10 +82,10 @@ pub struct StrainLimit {
 #[serde(deny_unknown_fields)]
 pub struct Rayleigh {
     /// β of the membrane, in s; its viscosities are β λ and β μ. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     pub stretching: f64,
     /// β of bending, in s. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     pub bending: f64,
 }
 
@@ -121,7 +119,7 @@ pub enum Material {
 #[serde(deny_unknown_fields)]
 pub struct Arap {
     /// Stiffness μ, in N/m: tension per width over strain of a narrow strip.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub stretch_stiffness: f64,
     /// Bending resistance. Default none.
     #[serde(default)]
@@ -135,13 +133,13 @@ pub struct Arap {
 #[serde(deny_unknown_fields)]
 pub struct BaraffWitkin {
     /// Stretch stiffness K_s, in N/m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub stretch: f64,
     /// Shear stiffness K_h, in N/m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub shear: f64,
     /// Rest stretches b_u and b_v. Default 1: the mesh is the rest shape.
-    #[serde(default = "ones", deserialize_with = "all_positive")]
+    #[serde(default = "ones", with = "Reals::<Positive, 2>")]
     pub rest_stretch: [f64; 2],
     /// Bending resistance. Default none.
     #[serde(default)]
@@ -157,16 +155,16 @@ fn ones() -> [f64; 2] {
 #[serde(deny_unknown_fields)]
 pub struct Woven {
     /// Stiffness of a strip along the warp, in N/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub warp: f64,
     /// Stiffness of a strip along the weft, in N/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub weft: f64,
     /// Stiffness of a strip at 45° to both, in N/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub bias: f64,
     /// Contraction of a strip along the warp across its length, relative to its strain. Default 0.
-    #[serde(default, deserialize_with = "poisson_ratio")]
+    #[serde(default, with = "Real::<PoissonRatio>")]
     pub poisson_ratio: f64,
     /// Bending resistance. Default none.
     #[serde(default)]
@@ -179,17 +177,17 @@ pub struct Woven {
 #[serde(deny_unknown_fields)]
 pub struct MassSpring {
     /// Stiffness K of the springs along warp and weft, in N/m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub structural: f64,
     /// Stiffness K of the springs across the cells, in N/m. Only built-in sheets have them.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub shear: f64,
     /// Stiffness K of the springs between second neighbours, in N/m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub bending: f64,
     /// Damping k_d along each spring, in N s/m: the force −k_d n (n·(v_P − v_Q)), where n is the direction of the
     /// spring. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     pub damping: f64,
 }
 
@@ -198,10 +196,10 @@ pub struct MassSpring {
 #[serde(deny_unknown_fields)]
 pub struct Membrane {
     /// Young's modulus times thickness Y h, in N/m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub stretch_stiffness: f64,
     /// Poisson's ratio ν, in (−1, 1).
-    #[serde(deserialize_with = "poisson_ratio")]
+    #[serde(with = "Real::<PoissonRatio>")]
     pub poisson_ratio: f64,
     /// Bending resistance: `none` (the default), or the table `plate`, `bridson`, `bridson-force` or `flat`.
     #[serde(default)]
@@ -238,24 +236,24 @@ pub enum Bending {
     /// of the rest shape.
     Bridson {
         /// Stiffness K, in N m. A flat sheet with regular diagonals has the flexural rigidity D = K/4 along its grid.
-        #[serde(deserialize_with = "non_negative")]
+        #[serde(with = "Real::<NonNegative>")]
         stiffness: f64,
     },
     /// The quadratic potential 3 k/(4 (A₁ + A₂)) ‖Σ cᵢ xᵢ‖² of sheets that are flat at rest, with the weights c of the
     /// cotangent Laplacian. Its Hessian is constant.
     Flat {
         /// Stiffness k, in N m. A flat sheet with regular diagonals has the flexural rigidity D = 3 k/2 along its grid.
-        #[serde(deserialize_with = "non_negative")]
+        #[serde(with = "Real::<NonNegative>")]
         stiffness: f64,
     },
     /// The force as printed by Bridson et al. (2003), K ‖E‖²/(‖N₁‖ + ‖N₂‖) (sin(θ/2) − sin(θ₀/2)) uᵢ, which is not
     /// conservative.
     BridsonForce {
         /// Stiffness K, in N m.
-        #[serde(deserialize_with = "non_negative")]
+        #[serde(with = "Real::<NonNegative>")]
         stiffness: f64,
         /// Damping k_d, in N s: the force −k_d ‖E‖ (Σ uⱼ·vⱼ) uᵢ. Default 0.
-        #[serde(default, deserialize_with = "non_negative")]
+        #[serde(default, with = "Real::<NonNegative>")]
         damping: f64,
     },
 }

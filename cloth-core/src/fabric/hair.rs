@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{FabricError, FabricTerms, Place, Surroundings};
-use crate::bounded::{count, finite_triple, non_negative, nonzero_triple, positive};
+use crate::bounded::{Count, Direction, MaybeReals, NonNegative, Number, Positive, Real, Reals};
 use crate::geometry::norm;
 
 /// Strands of hair, straight at rest: springs along the segments, bending at the vertices between them.
@@ -15,31 +15,31 @@ pub struct Hair {
     #[serde(default)]
     pub name: Option<String>,
     /// Number of strands. Roots are evenly spaced from `root` to `last_root`.
-    #[serde(deserialize_with = "count::<1, _>")]
+    #[serde(with = "Count::<1, 4096>")]
     pub count: usize,
     /// Segments per strand.
-    #[serde(deserialize_with = "count::<2, _>")]
+    #[serde(with = "Count::<2, 4096>")]
     pub segments: usize,
     /// Length of a strand, in m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub length: f64,
     /// Root of the first strand, in m. Default the origin.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub root: [f64; 3],
     /// Root of the last strand, in m. Default the root of the first.
-    #[serde(default)]
+    #[serde(default, with = "MaybeReals::<Number, 3>")]
     pub last_root: Option<[f64; 3]>,
     /// Initial direction of the strands, away from the root. Default [0, 0, −1].
-    #[serde(default = "down", deserialize_with = "nonzero_triple")]
+    #[serde(default = "down", with = "Direction")]
     pub direction: [f64; 3],
     /// Mass per length, in kg/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub density: f64,
     /// Tension over strain, in N: Young's modulus times the area of the cross-section.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub stretch_stiffness: f64,
     /// Bending moment over curvature, in N m²: Young's modulus times the second moment of area of the cross-section.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub bend_stiffness: f64,
     /// Whether the roots keep their position and direction. Default true.
     #[serde(default = "yes")]

@@ -8,6 +8,7 @@ mod interpreted_term;
 mod library;
 pub mod plate;
 mod terms;
+mod warp_choice;
 
 pub use declared::{Declared, DeclaredError};
 pub use description::{
@@ -18,3 +19,4 @@ pub use hair::{Hair, hair_terms};
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
 pub use terms::{FabricTerms, Place, Surroundings, terms, terms_at};
+pub(crate) use warp_choice::MaybeWarpChoice;

@@ -13,8 +13,7 @@ use super::plate::{PlateTerm, Rigidity, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
-    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, lumped_masses, material_triangle, rest_angle,
-    thread_triangle,
+    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, Warp, lumped_masses, material_triangle, rest_angle,
 };
 
 /// External forces on every cloth.
@@ -142,7 +141,7 @@ pub fn terms_at(
 struct MaterialMesh<'a> {
     mesh: &'a TriangleMesh,
     triangles: Vec<MaterialTriangle>,
-    warp: Vector3<f64>,
+    warp: Warp,
 }
 
 /// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it.
@@ -153,7 +152,7 @@ fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<Materi
         return Ok(all.map(|triangle| material_triangle(mesh.corners(triangle))).collect());
     }
     let warp = fabric.warp;
-    all.map(|triangle| thread_triangle(mesh.corners(triangle), warp).ok_or(ThreadError { triangle, warp })).collect()
+    all.map(|triangle| mesh.thread_triangle(triangle, warp).ok_or(ThreadError { triangle, warp })).collect()
 }
 
 pub(super) fn area([a, b, c]: MaterialTriangle) -> f64 {

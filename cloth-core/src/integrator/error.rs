@@ -5,7 +5,7 @@ use energy_solve::{CholeskyError, EvaluationError, SingularBlock, StopReason};
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum StepError {
     /// A force could not be evaluated.
-    #[error(transparent)]
+    #[error("{0}. The motion has become unstable; try a smaller dt")]
     Evaluation(#[from] EvaluationError),
     /// A free vertex has neither mass nor stiffness, so its diagonal block is singular.
     #[error(transparent)]
@@ -90,6 +90,13 @@ pub enum StepError {
         /// The computed position, in m.
         position: [f64; 3],
     },
+    /// The new state is finite, but beyond physics.
+    #[error("vertex {vertex} would move at {speed:.1e} m/s, faster than light. The step is unstable; try a smaller dt")]
+    TooFast {
+        vertex: usize,
+        /// The computed speed, in m/s.
+        speed: f64,
+    },
 }
 
 impl StepError {
@@ -108,8 +115,22 @@ impl StepError {
                 Self::NotSolved { iterations, stopped, residual, target, vertex: vertices[vertex] }
             }
             Self::NonFinite { vertex, position } => Self::NonFinite { vertex: vertices[vertex], position },
+            Self::TooFast { vertex, speed } => Self::TooFast { vertex: vertices[vertex], speed },
             Self::Hopeless { dt, reason } => Self::Hopeless { dt, reason: Box::new(reason.on_vertices(vertices)) },
             other => other,
+        }
+    }
+    /// The vertices that the error names; empty if it names none.
+    #[must_use]
+    pub fn vertices(&self) -> Vec<usize> {
+        match self {
+            Self::Evaluation(EvaluationError::NonFiniteElement { vertices, .. }) => vertices.clone(),
+            Self::Evaluation(EvaluationError::NonFiniteState { vertex, .. })
+            | Self::NotSolved { vertex, .. }
+            | Self::NonFinite { vertex, .. }
+            | Self::TooFast { vertex, .. } => vec![*vertex],
+            Self::Hopeless { reason, .. } => reason.vertices(),
+            _ => Vec::new(),
         }
     }
 }

@@ -5,7 +5,7 @@ use super::{
     Bdf2, ExplicitEuler, ImplicitEuler, ImplicitMidpoint, Integrator, LinearSolverChoice, Newton, NewtonOptions,
     SymplecticEuler, Trapezoid, Verlet,
 };
-use crate::bounded::some_positive;
+use crate::bounded::{Fraction, MaybeCount, MaybeReal, Positive};
 
 /// The built-in integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -77,13 +77,14 @@ impl Scheme {
 pub struct Tolerances {
     /// A step converges once an iteration changes no velocity by more than this, in m/s. Default 1e-4 for `newton`,
     /// 1e-7 for schemes of second order.
-    #[serde(deserialize_with = "some_positive")]
+    #[serde(with = "MaybeReal::<Positive>")]
     pub velocity: Option<f64>,
     /// Residual of each linear system relative to its right-hand side. Default 0.01 for `newton`, 1e-3 for schemes of
     /// second order.
-    #[serde(deserialize_with = "some_positive")]
+    #[serde(with = "MaybeReal::<Fraction>")]
     pub linear: Option<f64>,
     /// The largest number of iterations; a step that needs more fails. Default 100.
+    #[serde(with = "MaybeCount::<1, 1_000_000>")]
     pub iterations: Option<usize>,
 }
 

@@ -89,6 +89,9 @@ impl Ledger {
     /// The unexplained fraction of the largest exchanged energy above which a warning is given.
     pub const TOLERANCE: f64 = 0.02;
 
+    /// The fraction of the energy put in that an integrator may lose without a warning.
+    pub const LOSS: f64 = 0.1;
+
     /// Creates a ledger with the current state as its first entry. Each body comes with the label of each of its terms;
     /// `names` holds the name of each label.
     ///
@@ -200,6 +203,39 @@ impl Ledger {
     #[must_use]
     pub fn largest_unaccounted(&self) -> f64 {
         self.entries.iter().map(|entry| entry.unaccounted(&self.entries[0]).abs()).fold(0.0, f64::max)
+    }
+
+    /// The energy put in, in J: the maximum over time of the initial kinetic energy, the potential energies released,
+    /// and the work done on the cloth.
+    #[must_use]
+    pub fn put_in(&self) -> f64 {
+        let first = &self.entries[0];
+        let gains = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(a, b)| (a - b).max(0.0)).sum::<f64>();
+        let size = |entry: &Entry| {
+            let driven = [[entry.pins, first.pins], [entry.obstacles, first.obstacles]];
+            let driven: f64 = driven.iter().map(|[now, then]| (now - then).max(0.0)).sum();
+            first.kinetic + driven + gains(&first.potential, &entry.potential) + gains(&entry.work, &first.work)
+        };
+        self.entries.iter().map(size).fold(0.0, f64::max)
+    }
+
+    /// The largest energy that disappeared without work, in J.
+    #[must_use]
+    pub fn largest_loss(&self) -> f64 {
+        self.entries.iter().map(|entry| -entry.unaccounted(&self.entries[0])).fold(0.0, f64::max)
+    }
+
+    /// Returns a warning if the integrator lost more than [`Ledger::LOSS`] of the energy put in; `None` otherwise.
+    #[must_use]
+    pub fn loss(&self, integrator: &str) -> Option<String> {
+        let (lost, all) = (self.largest_loss(), self.put_in());
+        (lost > Self::LOSS * all && all > f64::MIN_POSITIVE).then(|| {
+            format!(
+                "{integrator} lost {lost:.2e} J of the {all:.2e} J put in ({:.0} %): the size of its steps damps the \
+                 motion. A smaller dt loses less, and so do the integrators `bdf2` and `implicit-midpoint`",
+                100.0 * lost / all
+            )
+        })
     }
 
     /// Returns a warning if an integrator that should conserve energy leaves more than [`Ledger::TOLERANCE`] of the

@@ -5,16 +5,17 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{MeshError, TriangleMesh};
+use crate::bounded::{Count, Positive, Real};
 
 /// A built-in disc, centred on the origin in z = 0 with its front upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Disc {
     /// The radius, in m.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub radius: f64,
     /// Rings of triangles; ring k has 6 k vertices.
-    #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
+    #[serde(with = "Count::<1, 4096>")]
     pub rings: usize,
 }
 

@@ -1,5 +1,6 @@
 //! Triangle meshes: reading, building, validation, topology, rest geometry.
 
+mod corners;
 mod disc;
 mod obj;
 mod pieces;
@@ -8,9 +9,12 @@ mod sheet;
 mod strip;
 mod topology;
 mod triangle_mesh;
+mod warp;
 
+pub use corners::CornerAttributes;
+pub(crate) use corners::SplitMesh;
 pub use disc::Disc;
-pub use obj::{ObjError, read_obj};
+pub use obj::{ObjError, ObjOptions, ObjSurface, read_obj, read_obj_surface};
 pub(crate) use pieces::DisjointSets;
 pub(crate) use rest::area;
 pub use rest::{MaterialTriangle, lumped_masses, material_triangle, rest_angle, thread_triangle, vertex_angles};
@@ -18,3 +22,4 @@ pub use sheet::{Diagonals, Plane, Pleats, PleatsError, Sheet};
 pub use strip::Strip;
 pub use topology::{Hinge, SpringNetwork, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
+pub use warp::Warp;

@@ -74,9 +74,15 @@ impl TriangleMesh {
             shear: renumbered(&springs.shear),
             bending: renumbered(&springs.bending),
         };
-        let triangles = self.triangles().iter().map(|corners| corners.map(|corner| place[corner]));
-        let triangles = triangles.filter(|corners| corners[0] != usize::MAX).collect();
-        (Self::from_valid(vertices.iter().map(|&vertex| self.vertices()[vertex]).collect(), triangles), springs)
+        let is_inside = |corners: &[usize; 3]| place[corners[0]] != usize::MAX;
+        let inside = self.triangles().iter().filter(|corners| is_inside(corners));
+        let triangles = inside.map(|corners| corners.map(|corner| place[corner])).collect();
+        let warps = self.warps().map(|warps| {
+            let inside = self.triangles().iter().zip(warps).filter(|(corners, _)| is_inside(corners));
+            inside.map(|(_, warp)| *warp).collect()
+        });
+        let mesh = Self::from_valid(vertices.iter().map(|&vertex| self.vertices()[vertex]).collect(), triangles);
+        (mesh.with_warps(warps), springs)
     }
 }
 

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{MeshError, TriangleMesh};
+use crate::bounded::{Counts, NonNegative, Positive, Real, Reals};
 
 /// How the cells of a sheet are split into triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -33,10 +34,10 @@ pub enum Plane {
 #[serde(deny_unknown_fields)]
 pub struct Sheet {
     /// Cells along both directions.
-    #[serde(deserialize_with = "crate::bounded::cell_counts")]
+    #[serde(with = "Counts::<1, 4096, 2>")]
     pub cells: [usize; 2],
     /// Side lengths, in m.
-    #[serde(deserialize_with = "crate::bounded::all_positive")]
+    #[serde(with = "Reals::<Positive, 2>")]
     pub size: [f64; 2],
     /// `regular` (the default) or `alternating`.
     #[serde(default)]
@@ -55,10 +56,10 @@ pub struct Sheet {
 #[serde(deny_unknown_fields)]
 pub struct Pleats {
     /// Number of folds.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub count: f64,
     /// Amplitude out of the plane, in m.
-    #[serde(deserialize_with = "crate::bounded::non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     pub depth: f64,
 }
 

@@ -2,19 +2,20 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Diagonals, Plane, Sheet};
+use crate::bounded::{Count, Positive, Real};
 
 /// A built-in strip along the first axis, with nearly square cells and alternating diagonals.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Strip {
     /// Length along the first axis, in m.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub length: f64,
     /// Width, in m.
-    #[serde(deserialize_with = "crate::bounded::positive")]
+    #[serde(with = "Real::<Positive>")]
     pub width: f64,
     /// Cells along the length.
-    #[serde(deserialize_with = "crate::bounded::count::<1, _>")]
+    #[serde(with = "Count::<1, 4096>")]
     pub segments: usize,
     /// `horizontal` (the default) or `vertical`.
     #[serde(default)]

@@ -40,6 +40,8 @@ pub enum MeshError {
 pub struct TriangleMesh {
     vertices: Vec<Vector3<f64>>,
     triangles: Vec<[usize; 3]>,
+    /// The warp direction of each triangle, from texture coordinates; `None` without them.
+    warps: Option<Vec<Vector3<f64>>>,
 }
 
 impl TriangleMesh {
@@ -60,12 +62,22 @@ impl TriangleMesh {
         }
         check_edges(&triangles)?;
         check_references(vertices.len(), &triangles)?;
-        Ok(Self { vertices, triangles })
+        Ok(Self { vertices, triangles, warps: None })
     }
 
     /// Creates a mesh without validation, from parts of a valid one.
     pub(super) fn from_valid(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Self {
-        Self { vertices, triangles }
+        Self { vertices, triangles, warps: None }
+    }
+
+    /// Returns the mesh with a warp direction for each triangle.
+    pub(super) fn with_warps(self, warps: Option<Vec<Vector3<f64>>>) -> Self {
+        Self { warps, ..self }
+    }
+
+    /// The warp direction of each triangle, from texture coordinates; `None` without them.
+    pub(crate) fn warps(&self) -> Option<&[Vector3<f64>]> {
+        self.warps.as_deref()
     }
 
     /// Returns the mesh scaled by a factor.
@@ -74,7 +86,8 @@ impl TriangleMesh {
     /// Returns an error if the scaled mesh is invalid, because a number overflows or a triangle loses its area.
     pub fn scaled(self, factor: f64) -> Result<Self, MeshError> {
         let larger = |vertex: Vector3<f64>| vertex.map(|coordinate| factor * coordinate);
-        Self::new(self.vertices.into_iter().map(larger).collect(), self.triangles)
+        let scaled = Self::new(self.vertices.into_iter().map(larger).collect(), self.triangles)?;
+        Ok(scaled.with_warps(self.warps))
     }
 
     /// Returns the mesh after a rigid motion.

@@ -10,7 +10,7 @@ use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, Te
 use super::seam::Side;
 use super::{PinError, SeamError, pins, seam};
 use crate::fabric::{self, Hair, Place, Surroundings};
-use crate::mesh::{DisjointSets, SpringNetwork, Topology, TriangleMesh};
+use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
 use crate::scene::{ContactChoice, Garment, ObstacleError, Pin, Scene, Seam, Shape};
 
 /// A model under construction.
@@ -82,13 +82,14 @@ impl<'a> Builder<'a> {
             PartKind::Hair { .. } => vec![(0..vertices).collect()],
         };
         self.pieces.extend(pieces.into_iter().map(|vertices| Piece { part, vertices }));
-        self.model.parts.push(Part { name, vertices: first..first + vertices, kind });
+        let (corners, groups) = (CornerAttributes::default(), BTreeMap::new());
+        self.model.parts.push(Part { name, vertices: first..first + vertices, kind, corners, groups });
     }
 
     fn add_garment(&mut self, number: usize, garment: &Garment) -> Result<(), ModelError> {
         let part = garment.name.clone().unwrap_or_else(|| format!("garment {number}"));
         let shape = garment.shape(&self.scene.folder);
-        let Shape { mesh, start, velocities, springs } =
+        let Shape { mesh, start, velocities, springs, corners, groups, welded } =
             shape.map_err(|source| ModelError::Mesh { part: part.clone(), source })?;
         let model = &mut self.model;
         let first = model.x.len();
@@ -99,7 +100,11 @@ impl<'a> Builder<'a> {
         model.friction.resize(model.x.len(), garment.fabric.friction);
         self.edge.extend(Topology::boundary(&mesh).iter().map(|vertex| first + vertex));
         self.springs.push(springs);
+        self.model.notes.extend(welded.map(|welded| note_on(&part, &mesh, welded)));
         self.add_part(part, mesh.vertices().len(), PartKind::Cloth(mesh));
+        if let Some(added) = self.model.parts.last_mut() {
+            (added.corners, added.groups) = (corners, groups);
+        }
         Ok(())
     }
 
@@ -111,7 +116,8 @@ impl<'a> Builder<'a> {
         self.model.thickness.extend(vec![hair.thickness(); count]);
         self.model.friction.extend(vec![0.0; count]);
         self.model.x.extend(vertices);
-        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1 });
+        let segment = hair.length / hair.segments as f64;
+        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment });
     }
 
     fn check_names(&self) -> Result<(), ModelError> {
@@ -363,8 +369,19 @@ impl<'a> Builder<'a> {
             None => 0..self.model.x.len(),
         };
         let edge = self.edge_within(&range);
-        let chosen = pins::chosen(description, pin, &self.model.x[range.clone()], &edge)?;
+        let chosen = pins::chosen(description, pin, &self.model.x[range.clone()], &edge, &self.groups_in(&range))?;
         Ok(chosen.into_iter().map(|vertex| range.start + vertex).collect())
+    }
+
+    /// Returns the vertices of each group of the parts in a range, numbered within it.
+    fn groups_in(&self, range: &Range<usize>) -> BTreeMap<String, Vec<usize>> {
+        let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        let parts = self.model.parts.iter().filter(|part| range.contains(&part.vertices.start));
+        for (part, (name, vertices)) in parts.flat_map(|part| part.groups.iter().map(move |group| (part, group))) {
+            let offset = part.vertices.start - range.start;
+            groups.entry(name.clone()).or_default().extend(vertices.iter().map(|vertex| offset + vertex));
+        }
+        groups
     }
 
     /// The first two vertices of each rooted strand; pinned, they fix its position and direction.
@@ -376,6 +393,16 @@ impl<'a> Builder<'a> {
         };
         rooted.flat_map(roots).collect()
     }
+}
+
+/// Describes a garment from a file.
+fn note_on(part: &str, mesh: &TriangleMesh, welded: usize) -> String {
+    let pieces = match mesh.pieces(1).len() {
+        1 => "1 piece".to_owned(),
+        count => format!("{count} pieces"),
+    };
+    let welded = if welded == 0 { String::new() } else { format!(", {welded} doubled vertices welded") };
+    format!("{part}: {} vertices in {pieces}{welded}", mesh.vertices().len())
 }
 
 fn add_once(all: &mut Vec<String>, more: Vec<String>) {

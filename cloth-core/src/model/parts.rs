@@ -1,5 +1,6 @@
 //! The parts of a scene and the assembled model.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use energy_dsl::Vector3;
@@ -9,7 +10,7 @@ use super::builder::Builder;
 use super::{PinError, SeamError};
 use crate::contact::Obstacle;
 use crate::fabric::FabricError;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{CornerAttributes, TriangleMesh};
 use crate::motion::Motion;
 use crate::scene::{MeshSourceError, ObstacleError, Scene};
 
@@ -22,6 +23,10 @@ pub struct Part {
     pub vertices: Range<usize>,
     /// Cloth or hair.
     pub kind: PartKind,
+    /// Attributes of the corners of its triangles, from an OBJ file.
+    pub corners: CornerAttributes,
+    /// The vertices of each group of its OBJ file, numbered within the part.
+    pub groups: BTreeMap<String, Vec<usize>>,
 }
 
 /// The kind of a part.
@@ -33,6 +38,8 @@ pub enum PartKind {
     Hair {
         /// Vertices of each strand.
         joints: usize,
+        /// Length of a segment at rest, in m.
+        segment: f64,
     },
 }
 
@@ -98,6 +105,8 @@ pub struct Model {
     pub thickness: Vec<f64>,
     /// Coefficient of friction with cloth at each vertex.
     pub friction: Vec<f64>,
+    /// Descriptions of the garments from files: their pieces and welded vertices.
+    pub notes: Vec<String>,
     /// Warnings about the scene.
     pub warnings: Vec<String>,
     /// Obstacles, with their motions.
@@ -153,7 +162,7 @@ impl Model {
     /// Returns the vertex range of each strand of hair.
     pub fn strands(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.parts.iter().flat_map(|part| {
-            let joints = if let PartKind::Hair { joints } = part.kind { joints } else { usize::MAX };
+            let joints = if let PartKind::Hair { joints, .. } = part.kind { joints } else { usize::MAX };
             let starts = part.vertices.clone().step_by(joints).filter(move |_| joints < usize::MAX);
             starts.map(move |start| start..start + joints)
         })

@@ -1,3 +1,5 @@
+use std::collections::BTreeMap;
+
 use energy_dsl::Vector3;
 
 use super::UnknownPart;
@@ -33,6 +35,18 @@ pub enum PinError {
         /// Its largest corner.
         max: Vector3<f64>,
     },
+    /// No garment has the group.
+    #[error(
+        "pins[{pin}]: there is no group `{name}` in the chosen garments; {}",
+        if .known.is_empty() { "they have no groups".to_owned() } else { format!("there are {}", .known.join(", ")) }
+    )]
+    NoSuchGroup {
+        /// Index of the pin, from 0.
+        pin: usize,
+        name: String,
+        /// The groups of the chosen garments.
+        known: Vec<String>,
+    },
     /// The part has no boundary.
     #[error("pins[{pin}]: the chosen part has no boundary")]
     NoBoundary {
@@ -59,19 +73,24 @@ pub(super) fn chosen(
     pin: usize,
     start: &[Vector3<f64>],
     edge: &[usize],
+    groups: &BTreeMap<String, Vec<usize>>,
 ) -> Result<Vec<usize>, PinError> {
-    match description.choice {
-        PinChoice::Vertex(vertex) if vertex < start.len() => Ok(vec![vertex]),
-        PinChoice::Vertex(vertex) => Err(PinError::NoSuchVertex { pin, vertex, vertices: start.len() }),
-        PinChoice::Box(PinBox { min, max }) => {
+    match &description.choice {
+        &PinChoice::Vertex(vertex) if vertex < start.len() => Ok(vec![vertex]),
+        &PinChoice::Vertex(vertex) => Err(PinError::NoSuchVertex { pin, vertex, vertices: start.len() }),
+        &PinChoice::Box(PinBox { min, max }) => {
             let inside = |p: &Vector3<f64>| (0..3).all(|axis| (min[axis]..=max[axis]).contains(&p[axis]));
             let chosen: Vec<usize> = (0..start.len()).filter(|&vertex| inside(&start[vertex])).collect();
             if chosen.is_empty() { Err(PinError::EmptyBox { pin, min, max }) } else { Ok(chosen) }
         }
-        PinChoice::Nearest(point) => {
+        &PinChoice::Nearest(point) => {
             let distance = |vertex: &usize| norm(subtract(start[*vertex], point));
             Ok((0..start.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).into_iter().collect())
         }
+        PinChoice::Group(name) => groups.get(name).cloned().ok_or_else(|| {
+            let known = groups.keys().cloned().collect();
+            PinError::NoSuchGroup { pin, name: name.clone(), known }
+        }),
         PinChoice::Boundary if edge.is_empty() => Err(PinError::NoBoundary { pin }),
         PinChoice::Boundary => Ok(edge.to_vec()),
         PinChoice::All => Ok((0..start.len()).collect()),
@@ -85,12 +104,16 @@ mod tests {
     #[test]
     fn pins_choose_vertices_or_say_why_not() {
         let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let chosen = |choice| super::chosen(&Pin::fixed(choice), 1, &vertices, &[0, 2]);
+        let groups = BTreeMap::from([("collar".to_owned(), vec![1, 2])]);
+        let chosen = |choice| super::chosen(&Pin::fixed(choice), 1, &vertices, &[0, 2], &groups);
         assert_eq!(chosen(PinChoice::Nearest([0.9, 0.2, 0.0])).unwrap(), [1]);
         let inside = PinBox { min: [-0.1, 0.5, -0.1], max: [0.1, 1.5, 0.1] };
         assert_eq!(chosen(PinChoice::Box(inside)).unwrap(), [2]);
         assert_eq!(chosen(PinChoice::Boundary).unwrap(), [0, 2]);
         assert_eq!(chosen(PinChoice::All).unwrap(), [0, 1, 2]);
+        assert_eq!(chosen(PinChoice::Group("collar".to_owned())).unwrap(), [1, 2]);
+        let error = chosen(PinChoice::Group("hem".to_owned())).unwrap_err().to_string();
+        assert_eq!(error, "pins[1]: there is no group `hem` in the chosen garments; there are collar");
         let error = chosen(PinChoice::Vertex(3)).unwrap_err();
         assert_eq!(error.to_string(), "pins[1]: there is no vertex 3; the mesh has 3 (0 to 2)");
         let empty = PinBox { min: [5.0; 3], max: [6.0; 3] };

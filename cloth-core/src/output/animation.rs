@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use energy_dsl::Vector3;
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
@@ -10,6 +11,7 @@ use gltf_json::{Accessor, Animation, Buffer, Index, Material, Mesh, Node, Root, 
 
 use super::track::{Joined, Track};
 use super::vertex_normals;
+use crate::mesh::SplitMesh;
 
 /// An animation that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
@@ -26,23 +28,27 @@ pub enum AnimationError {
 }
 
 /// Encodes an animation as a binary glTF 2.0 file (`.glb`). The first frame of a moving object is its mesh. Each later
-/// frame is a morph target, and the animation moves the weight from one target to the next. `frame_time` is in s.
+/// frame is a morph target, and the animation moves the weight from one target to the next.
 /// glTF's y axis points up: (x, y, z) becomes (x, z, −y).
 ///
 /// # Errors
 /// Returns an error if the file would be too large or its JSON part cannot be written.
-pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, AnimationError> {
+pub fn animation_glb(tracks: &[Track<'_>], frames_per_second: f64) -> Result<Vec<u8>, AnimationError> {
     let mut file = File::default();
     let mut nodes = Vec::new();
     let mut moving = Vec::new();
     for track in tracks {
         let Some((&rest, later)) = track.frames.split_first() else { continue };
-        let (indices, mode) = file.indices(&track.joined);
-        let triangles = if let Joined::Triangles(triangles) = track.joined { triangles } else { &[] };
-        let first = Shape::of(rest, triangles);
-        let attributes = file.attributes(&first);
-        let targets: Vec<MorphTarget> =
-            later.iter().map(|frame| file.morph(&Shape::of(frame, triangles), &first)).collect();
+        let topology = Topology::of(track);
+        let (indices, mode) = file.indices(&topology);
+        let first = topology.shape(rest);
+        let mut attributes = file.attributes(&first);
+        if let Topology::Split(split) = &topology
+            && !split.uvs.is_empty()
+        {
+            attributes.insert(Valid(Semantic::TexCoords(0)), file.uvs(&split.uvs));
+        }
+        let targets: Vec<MorphTarget> = later.iter().map(|frame| file.morph(&topology.shape(frame), &first)).collect();
         let node = file.object(track, Parts { attributes, indices, mode, targets });
         if !later.is_empty() {
             moving.push((node, later.len()));
@@ -52,7 +58,7 @@ pub fn animation_glb(tracks: &[Track<'_>], frame_time: f64) -> Result<Vec<u8>, A
     let (extensions, extras) = (None, Default::default());
     file.root.scene = Some(file.root.push(Scene { nodes, name: None, extensions, extras }));
     if !moving.is_empty() {
-        file.animate(&moving, frame_time);
+        file.animate(&moving, frames_per_second);
     }
     file.finish()
 }
@@ -65,6 +71,35 @@ struct Parts {
     targets: Vec<MorphTarget>,
 }
 
+/// The connections between the points of a track.
+enum Topology<'a> {
+    Triangles(&'a [[usize; 3]]),
+    /// Triangles whose vertices are split where texture coordinates or normals differ.
+    Split(SplitMesh),
+    Strands(&'a [Range<usize>]),
+}
+
+impl<'a> Topology<'a> {
+    fn of(track: &Track<'a>) -> Self {
+        match track.joined {
+            Joined::Triangles(triangles) if track.corners.is_empty() => Self::Triangles(triangles),
+            Joined::Triangles(triangles) => Self::Split(track.corners.split(triangles)),
+            Joined::Strands(strands) => Self::Strands(strands),
+        }
+    }
+
+    fn shape(&self, frame: &[Vector3<f64>]) -> Shape {
+        match self {
+            Self::Triangles(triangles) => Shape::of(frame, &vertex_normals(frame, triangles)),
+            Self::Split(split) => {
+                let points: Vec<Vector3<f64>> = split.sources.iter().map(|&vertex| frame[vertex]).collect();
+                Shape::of(&points, &split.normals(frame))
+            }
+            Self::Strands(_) => Shape::of(frame, &[]),
+        }
+    }
+}
+
 struct Shape {
     positions: Vec<[f32; 3]>,
     /// Vertex normals; empty for polylines.
@@ -72,9 +107,8 @@ struct Shape {
 }
 
 impl Shape {
-    fn of(frame: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Self {
+    fn of(frame: &[Vector3<f64>], normals: &[Vector3<f64>]) -> Self {
         let upright = |p: &Vector3<f64>| [p[0] as f32, p[2] as f32, -p[1] as f32];
-        let normals = if triangles.is_empty() { Vec::new() } else { vertex_normals(frame, triangles) };
         Self { positions: frame.iter().map(upright).collect(), normals: normals.iter().map(upright).collect() }
     }
 }
@@ -98,6 +132,13 @@ impl File {
             vectors.iter().fold(start, |sum, v| std::array::from_fn(|axis| pick(sum[axis], v[axis]))).to_vec()
         };
         self.accessor(&bytes, vectors.len(), ComponentType::F32, Type::Vec3, Some((bound(f32::min), bound(f32::max))))
+    }
+
+    /// Adds texture coordinates. Their second axis points down in glTF.
+    fn uvs(&mut self, uvs: &[[f64; 2]]) -> Index<Accessor> {
+        let numbers = uvs.iter().flat_map(|[u, v]| [*u as f32, (1.0 - v) as f32]);
+        let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
+        self.accessor(&bytes, uvs.len(), ComponentType::F32, Type::Vec2, None)
     }
 
     fn scalars(&mut self, numbers: &[f32]) -> Index<Accessor> {
@@ -143,10 +184,11 @@ impl File {
         })
     }
 
-    fn indices(&mut self, joined: &Joined<'_>) -> (Index<Accessor>, Mode) {
-        let (corners, mode): (Vec<usize>, Mode) = match joined {
-            Joined::Triangles(triangles) => (triangles.as_flattened().to_vec(), Mode::Triangles),
-            Joined::Strands(strands) => {
+    fn indices(&mut self, topology: &Topology<'_>) -> (Index<Accessor>, Mode) {
+        let (corners, mode): (Vec<usize>, Mode) = match topology {
+            Topology::Triangles(triangles) => (triangles.as_flattened().to_vec(), Mode::Triangles),
+            Topology::Split(split) => (split.triangles.as_flattened().to_vec(), Mode::Triangles),
+            Topology::Strands(strands) => {
                 let segments = |strand: &std::ops::Range<usize>| {
                     (strand.start..strand.end.saturating_sub(1)).flat_map(|at| [at, at + 1])
                 };
@@ -199,10 +241,10 @@ impl File {
     }
 
     /// Adds an animation with weight 1 for target f − 1 at frame f, and 0 for the others.
-    fn animate(&mut self, moving: &[(Index<Node>, usize)], frame_time: f64) {
+    fn animate(&mut self, moving: &[(Index<Node>, usize)], frames_per_second: f64) {
         let (mut channels, mut samplers) = (Vec::new(), Vec::new());
         for &(node, targets) in moving {
-            let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 * frame_time) as f32).collect();
+            let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 / frames_per_second) as f32).collect();
             let weight = |frame: usize, target: usize| if frame == target + 1 { 1.0 } else { 0.0 };
             let weights: Vec<f32> =
                 (0..=targets).flat_map(|frame| (0..targets).map(move |target| weight(frame, target))).collect();

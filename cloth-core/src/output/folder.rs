@@ -1,4 +1,7 @@
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::lock::FolderLock;
 
 /// A folder or file that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -13,6 +16,13 @@ pub enum OutputError {
         /// A file of the earlier run.
         path: PathBuf,
     },
+    /// Another run writes to the folder.
+    #[error("{} is in use by process {process}; wait until it ends, or choose another folder with -o", .path.display())]
+    InUse {
+        path: PathBuf,
+        /// The process identifier of the other run.
+        process: String,
+    },
     /// A file cannot be written.
     #[error("cannot write {}", .path.display())]
     File { path: PathBuf, source: std::io::Error },
@@ -23,6 +33,8 @@ pub enum OutputError {
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,
+    /// Held by all clones; `None` for a report, and on file systems without locks.
+    _lock: Option<Arc<FolderLock>>,
 }
 
 impl OutputFolder {
@@ -63,11 +75,12 @@ impl OutputFolder {
         Self::SAVED_FRAMES,
     ];
 
-    /// Creates the folder and checks that it can be written to, before anything is computed. With `overwrite`, removes
-    /// the files of an earlier run, so that two runs never mix.
+    /// Creates the folder, locks it, and checks that it can be written to, before anything is computed. With
+    /// `overwrite`, removes the files of an earlier run, so that two runs never mix.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be created or written to, or holds results and `overwrite` is not set.
+    /// Returns an error if the folder cannot be created or written to, if another run writes to it, or if it holds
+    /// results and `overwrite` is not set.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, OutputError> {
         let folder = Self::reopen(path)?;
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
@@ -82,12 +95,22 @@ impl OutputFolder {
         }
     }
 
-    /// Opens the folder of a run that is resumed or reported, and checks that it can be written to.
+    /// Opens and locks the folder of a run that is resumed, and checks that it can be written to.
+    ///
+    /// # Errors
+    /// Returns an error if the folder cannot be written to, or if another run writes to it.
+    pub fn reopen(path: &Path) -> Result<Self, OutputError> {
+        let folder = Self::unlocked(path)?;
+        Ok(Self { _lock: FolderLock::take(path)?.map(Arc::new), ..folder })
+    }
+
+    /// Opens the folder of a run that is reported, and checks that it can be written to. Does not lock it: the report
+    /// is not a file of the run.
     ///
     /// # Errors
     /// Returns an error if the folder cannot be written to.
-    pub fn reopen(path: &Path) -> Result<Self, OutputError> {
-        let folder = Self { path: path.to_owned() };
+    pub fn unlocked(path: &Path) -> Result<Self, OutputError> {
+        let folder = Self { path: path.to_owned(), _lock: None };
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
         std::fs::create_dir_all(folder.frames()).map_err(unusable)?;
         for probed in [path.to_owned(), folder.frames()] {
@@ -118,7 +141,17 @@ impl OutputFolder {
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn write_frame(&self, number: usize, extension: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
-        self.write(&format!("{}/cloth_{number:04}.{extension}", Self::FRAMES), contents)
+        self.write(&Self::frame_name(number, extension), contents)
+    }
+
+    /// Returns the path of frame `number` in the format of the extension.
+    #[must_use]
+    pub fn frame_path(&self, number: usize, extension: &str) -> PathBuf {
+        self.path.join(Self::frame_name(number, extension))
+    }
+
+    fn frame_name(number: usize, extension: &str) -> String {
+        format!("{}/cloth_{number:04}.{extension}", Self::FRAMES)
     }
 
     fn frames(&self) -> PathBuf {

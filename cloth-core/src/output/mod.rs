@@ -3,10 +3,12 @@
 mod animation;
 mod folder;
 mod frame;
+mod lock;
 mod picture;
 mod ply;
 mod projection;
 mod raster;
+mod scenery;
 mod show;
 mod solid_mesh;
 mod track;
@@ -14,9 +16,11 @@ mod usd;
 
 pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
-pub use frame::obj_text;
+pub use frame::{last_obj_line, obj_text};
 pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
+pub(crate) use scenery::Framing;
+pub use scenery::Scenery;
 pub use show::Show;
 pub use solid_mesh::SolidMesh;
 pub use track::{Joined, Track};

@@ -48,8 +48,8 @@ pub struct View<'a> {
     pub solids: &'a [SolidMesh],
     /// Height of the floor, in m; `None` for slightly below everything.
     pub floor: Option<f64>,
-    /// Points of other frames that must also fit into the picture, in m.
-    pub framed: &'a [Vector3<f64>],
+    /// The camera; `None` to frame everything that is visible.
+    pub(crate) camera: Option<Camera>,
     /// Appearance of cloth and hair.
     pub look: Look<'a>,
 }
@@ -74,8 +74,8 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     let solids = view.solids.iter().flat_map(|solid| &solid.vertices);
     let everything: Vec<Vector3<f64>> = view.positions.iter().chain(solids).copied().collect();
     let shadow = shadow_points(&everything, view.floor);
-    let framed: Vec<Vector3<f64>> = everything.iter().chain(&shadow).chain(view.framed).copied().collect();
-    let camera = Camera::framing(&framed, VIEW, [f64::from(width), f64::from(height)], 0.86);
+    let all = || everything.iter().chain(&shadow).copied().collect::<Vec<_>>();
+    let camera = view.camera.unwrap_or_else(|| camera_on(&all()));
     draw_background(&mut background);
     draw_shadow(&mut background, &camera, &shadow, &all_triangles(view));
     let mut canvas = Canvas::new(background);
@@ -96,6 +96,20 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     }
     let small = averaged(&canvas.pixels).ok_or_else(|| PictureError("no memory".into()))?;
     small.encode_png().map_err(|error| PictureError(error.to_string()))
+}
+
+/// Size of a picture before downsampling, in pixels.
+const SIZE: [f64; 2] = [(WIDTH * OVERSAMPLING) as f64, (HEIGHT * OVERSAMPLING) as f64];
+
+/// Returns a camera that frames the points, with some space around them.
+pub(super) fn camera_on(points: &[Vector3<f64>]) -> Camera {
+    Camera::framing(points, VIEW, SIZE, 0.86)
+}
+
+/// Whether a point lies well within the picture.
+pub(super) fn is_visible(camera: &Camera, point: Vector3<f64>) -> bool {
+    let (place, depth) = camera.project(point);
+    depth > 0.0 && (0..2).all(|axis| (0.02..=0.98).contains(&(place[axis] / SIZE[axis])))
 }
 
 /// Returns the triangles of cloth and solids in one vertex numbering.
@@ -206,11 +220,13 @@ fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<
     let range = |pick: fn(f64, f64) -> f64, start| positions.iter().map(|p| p[2]).fold(start, pick);
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
     let floor = floor.unwrap_or(low - 0.08 * (high - low));
-    let cast = |p: &Vector3<f64>| {
-        let offset = (p[2] - floor) / LAMP[2];
-        [p[0] - offset * LAMP[0], p[1] - offset * LAMP[1], floor]
-    };
-    positions.iter().map(cast).collect()
+    positions.iter().map(|p| shadow_of(p, floor)).collect()
+}
+
+/// Returns the shadow of a point on the floor.
+pub(super) fn shadow_of(p: &Vector3<f64>, floor: f64) -> Vector3<f64> {
+    let offset = (p[2] - floor) / LAMP[2];
+    [p[0] - offset * LAMP[0], p[1] - offset * LAMP[1], floor]
 }
 
 /// Draws the shadow at low resolution; upscaling softens it.

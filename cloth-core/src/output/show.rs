@@ -1,8 +1,9 @@
 use energy_dsl::Vector3;
 
 use super::track::{Joined, Track};
-use super::{Look, PictureError, SolidMesh, View, picture_png};
-use crate::contact::AnySolid;
+use super::{Framing, Look, PictureError, Scenery, SolidMesh};
+use crate::geometry::Bounds;
+use crate::mesh::CornerAttributes;
 use crate::model::PartKind;
 use crate::simulation::Simulation;
 
@@ -12,38 +13,37 @@ const COLOURS: [[f32; 3]; 5] =
 const HAIR: [f32; 3] = [0.28, 0.15, 0.07];
 const SOLID: [f32; 3] = [0.50, 0.48, 0.45];
 
+/// Solids have no attributes.
+const PLAIN: CornerAttributes = CornerAttributes { uvs: None, normals: None };
+
 /// The visible content of a run: the frames of its parts, and its solids.
 #[derive(Debug)]
 pub struct Show<'a> {
     simulation: &'a Simulation,
-    frames: &'a [Vec<Vector3<f64>>],
+    frames: Vec<&'a [Vector3<f64>]>,
     /// For each garment its triangles, numbered within it; for each hair its strands.
     triangles: Vec<Vec<[usize; 3]>>,
     strands: Vec<Vec<std::ops::Range<usize>>>,
     /// Each solid in each frame; in a single frame if it does not move.
     solids: Vec<Vec<SolidMesh>>,
-    /// Centre of everything at the start, and side of the visible part of a plane, in m.
-    centre: Vector3<f64>,
-    size: f64,
+    scenery: Scenery,
+    /// The part of space that all frames need.
+    framing: Framing,
 }
 
 impl<'a> Show<'a> {
-    /// Collects the content of a simulation with these frames, `frame_time` seconds apart.
+    /// Collects the content of a simulation with these frames, `rate` of them per simulated second.
     #[must_use]
-    pub fn new(simulation: &'a Simulation, frames: &'a [Vec<Vector3<f64>>], frame_time: f64) -> Self {
-        let points = || frames.iter().flatten();
-        let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
-            std::array::from_fn(|axis| points().map(|p| p[axis]).fold(start, pick))
-        };
-        let (low, high) = (bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY));
-        let centre = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        let size = 1.6 * (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-        let mut show =
-            Self { simulation, frames, triangles: Vec::new(), strands: Vec::new(), solids: Vec::new(), centre, size };
+    pub fn new<F: AsRef<[Vector3<f64>]>>(simulation: &'a Simulation, frames: &'a [F], rate: f64) -> Self {
+        let frames: Vec<&[Vector3<f64>]> = frames.iter().map(AsRef::as_ref).collect();
+        let bounds = frames.iter().map(|frame| Bounds::of(frame)).fold(Bounds::EMPTY, Bounds::around);
+        let (scenery, framing) = (Scenery::of(simulation), Framing::loose(bounds));
+        let (triangles, strands, solids) = (Vec::new(), Vec::new(), Vec::new());
+        let mut show = Self { simulation, frames, triangles, strands, solids, scenery, framing };
         for part in simulation.parts() {
             let (triangles, strands) = match &part.kind {
                 PartKind::Cloth(mesh) => (mesh.triangles().to_vec(), Vec::new()),
-                PartKind::Hair { joints } => {
+                PartKind::Hair { joints, .. } => {
                     let starts = (0..part.vertices.len()).step_by(*joints);
                     (Vec::new(), starts.map(|start| start..start + joints).collect())
                 }
@@ -51,11 +51,15 @@ impl<'a> Show<'a> {
             show.triangles.push(triangles);
             show.strands.push(strands);
         }
-        let end = frames.len().saturating_sub(1) as f64 * frame_time;
+        let count = show.frames.len();
+        let end = count.saturating_sub(1) as f64 / rate;
         for obstacle in simulation.obstacles() {
             let moves = obstacle.motion.as_ref().is_some_and(|motion| motion.moves(0.0, end) || motion.keys.len() > 1);
-            let count = if moves { frames.len() } else { 1 };
-            let at = |frame: usize| SolidMesh::of(&obstacle.at(frame as f64 * frame_time), centre, size);
+            let count = if moves { count } else { 1 };
+            let at = |frame: usize| {
+                let solid = obstacle.at(frame as f64 / rate);
+                SolidMesh::of(&solid, framing.centre(), framing.size())
+            };
             show.solids.push((0..count).map(at).collect());
         }
         show
@@ -71,23 +75,22 @@ impl<'a> Show<'a> {
                 PartKind::Cloth(_) => (Joined::Triangles(&self.triangles[number]), COLOURS[number % COLOURS.len()]),
                 PartKind::Hair { .. } => (Joined::Strands(&self.strands[number]), HAIR),
             };
-            tracks.push(Track { name: &part.name, colour, joined, frames });
+            tracks.push(Track { name: &part.name, colour, joined, corners: &part.corners, frames });
         }
         for (obstacle, meshes) in self.simulation.obstacles().iter().zip(&self.solids) {
             let frames = meshes.iter().map(|mesh| mesh.vertices.as_slice()).collect();
             let joined = Joined::Triangles(&meshes[0].triangles);
-            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, frames });
+            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, corners: const { &PLAIN }, frames });
         }
         tracks
     }
 
-    /// Draws the vertices at a time, in s. Pictures of a `sequence` are framed for all frames. A horizontal plane
-    /// serves as the floor that receives shadows.
+    /// Draws the vertices at a time, in s. A horizontal plane serves as the floor that receives shadows.
     ///
     /// # Errors
     /// Returns an error if the picture cannot be encoded.
-    pub fn picture(&self, positions: &[Vector3<f64>], time: f64, sequence: bool) -> Result<Vec<u8>, PictureError> {
-        self.picture_with(positions, time, sequence, &Look::default())
+    pub fn picture(&self, positions: &[Vector3<f64>], time: f64) -> Result<Vec<u8>, PictureError> {
+        self.picture_with(positions, time, &Look::default())
     }
 
     /// Draws the vertices with another appearance.
@@ -98,31 +101,8 @@ impl<'a> Show<'a> {
         &self,
         positions: &[Vector3<f64>],
         time: f64,
-        sequence: bool,
         look: &Look<'_>,
     ) -> Result<Vec<u8>, PictureError> {
-        let (mut floor, mut solids) = (None, Vec::new());
-        for obstacle in self.simulation.obstacles() {
-            match obstacle.at(time) {
-                AnySolid::HalfSpace(plane) if plane.normal[2] > 0.999 => {
-                    floor = Some(floor.map_or(plane.point[2], |other: f64| other.max(plane.point[2])));
-                }
-                solid => solids.push(SolidMesh::of(&solid, self.centre, self.size)),
-            }
-        }
-        let step = (self.frames.len() / 12).max(1);
-        let framed: Vec<Vector3<f64>> = match sequence {
-            true => self.frames.iter().step_by(step).flatten().copied().collect(),
-            false => Vec::new(),
-        };
-        picture_png(&View {
-            positions,
-            triangles: self.simulation.triangles(),
-            strands: self.simulation.strands(),
-            solids: &solids,
-            floor,
-            framed: &framed,
-            look: *look,
-        })
+        self.scenery.picture(positions, time, &self.framing, look)
     }
 }

@@ -2,6 +2,8 @@ use std::ops::Range;
 
 use energy_dsl::Vector3;
 
+use crate::mesh::CornerAttributes;
+
 /// An animated object: its topology, and its points in each frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track<'a> {
@@ -11,6 +13,8 @@ pub struct Track<'a> {
     pub colour: [f32; 3],
     /// Topology of the points.
     pub joined: Joined<'a>,
+    /// Attributes of the corners of triangles, from a file.
+    pub corners: &'a CornerAttributes,
     /// The points in each frame, in m; a single frame if the object does not move.
     pub frames: Vec<&'a [Vector3<f64>]>,
 }

@@ -45,6 +45,7 @@ impl Usd {
                 self.line(format_args!("        int[] faceVertexCounts = [{counts}]"));
                 let corners: Vec<String> = triangles.iter().flatten().map(usize::to_string).collect();
                 self.line(format_args!("        int[] faceVertexIndices = [{}]", corners.join(", ")));
+                self.corner_attributes(track, triangles);
             }
             Joined::Strands(strands) => {
                 self.line(format_args!("    def BasisCurves \"{name}\"\n    {{"));
@@ -59,6 +60,29 @@ impl Usd {
         self.line(format_args!("        color3f[] primvars:displayColor = [({red}, {green}, {blue})]"));
         self.points(&track.frames);
         self.line(format_args!("    }}"));
+    }
+
+    /// Adds texture coordinates and normals of the corners of triangles, if a file gave them.
+    fn corner_attributes(&mut self, track: &Track<'_>, triangles: &[[usize; 3]]) {
+        let varying = "(\n            interpolation = \"faceVarying\"\n        )";
+        if let Some(uvs) = &track.corners.uvs {
+            let uvs: Vec<String> =
+                uvs.iter().flatten().map(|[u, v]| format!("({}, {})", *u as f32, *v as f32)).collect();
+            self.line(format_args!("        texCoord2f[] primvars:st = [{}] {varying}", uvs.join(", ")));
+        }
+        if track.corners.normals.is_some() {
+            let split = track.corners.split(triangles);
+            let normals = |frame: &[Vector3<f64>]| {
+                let normals = split.normals(frame);
+                tuples(&split.triangles.iter().flatten().map(|&corner| normals[corner]).collect::<Vec<_>>())
+            };
+            self.line(format_args!("        normal3f[] normals {varying}"));
+            self.line(format_args!("        normal3f[] normals.timeSamples = {{"));
+            for (number, frame) in track.frames.iter().enumerate() {
+                self.line(format_args!("            {number}: [{}],", normals(frame)));
+            }
+            self.line(format_args!("        }}"));
+        }
     }
 
     fn points(&mut self, frames: &[&[Vector3<f64>]]) {
@@ -108,15 +132,18 @@ fn tuples(points: &[Vector3<f64>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::CornerAttributes;
 
     #[test]
     fn names_become_unique_identifiers() {
         let triangles = [[0, 1, 2]];
+        let corners = CornerAttributes::default();
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]];
         let track = |name| Track {
             name,
             colour: [0.5; 3],
             joined: Joined::Triangles(&triangles),
+            corners: &corners,
             frames: vec![&points[..], &points[..]],
         };
         let text = usd_text(&[track("left sleeve"), track("left-sleeve"), track("1st")], 25.0);

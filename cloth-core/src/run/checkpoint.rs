@@ -2,10 +2,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::input_files::InputFile;
 use crate::simulation::{RestoreError, SavedState};
 
 /// The version of checkpoints that this program reads and writes.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// The first word of a checkpoint; version, length and CRC-32 of the rest follow.
 const KEYWORD: &str = "cloth-checkpoint";
 
@@ -16,6 +17,10 @@ pub struct Checkpoint {
     pub scene: String,
     /// The path of the scene file.
     pub path: PathBuf,
+    /// The scene file as it was when the run began; `None` if it was not a regular file.
+    pub scene_file: Option<InputFile>,
+    /// The meshes and materials of the scene as they were when the run began.
+    pub inputs: Vec<InputFile>,
     /// Steps between checkpoints.
     pub every: u64,
     /// Number of frames in the frame file next to the checkpoint.
@@ -51,6 +56,12 @@ pub enum CheckpointError {
         .path.display()
     )]
     Older { path: PathBuf, version: u32 },
+    /// A mesh or material is not the one that the run began with.
+    #[error(
+        "{} was edited since the run began, which could not be resumed as it was. Restore the file, start the run \
+         again, or pass --accept-edited to continue with the new one", .path.display()
+    )]
+    Edited { path: PathBuf },
     /// The saved state does not fit the scene.
     #[error(transparent)]
     State(#[from] RestoreError),

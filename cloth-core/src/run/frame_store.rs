@@ -3,36 +3,53 @@
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
 use super::checkpoint::CheckpointError;
 use crate::output::OutputError;
 
+/// The positions of all vertices in one frame, in m. Pictures are drawn from them on another thread.
+pub(super) type Frame = Arc<[Vector3<f64>]>;
+
+/// The velocities of all vertices in one frame, in m/s; empty if the file has none.
+pub(super) type Velocities = Vec<Vector3<f64>>;
+
 /// Frames, each with the positions of all vertices. The file holds them one after the other, in little-endian double
-/// precision.
+/// precision; if frames are also written as PLY, each is followed by the velocities in single precision.
 #[derive(Debug)]
 pub(crate) struct FrameStore {
-    frames: Vec<Vec<Vector3<f64>>>,
+    frames: Vec<Frame>,
+    has_velocities: bool,
     file: Option<(PathBuf, File)>,
     checksum: crc32fast::Hasher,
 }
 
 impl FrameStore {
     /// Creates an empty store, backed by a file if a path is given.
-    pub(crate) fn new(path: Option<PathBuf>) -> Result<Self, OutputError> {
+    pub(crate) fn new(path: Option<PathBuf>, has_velocities: bool) -> Result<Self, OutputError> {
         let open = |path: PathBuf| match File::create(&path) {
             Ok(file) => Ok((path, file)),
             Err(source) => Err(OutputError::File { path, source }),
         };
-        Ok(Self { frames: Vec::new(), file: path.map(open).transpose()?, checksum: crc32fast::Hasher::new() })
+        let (file, checksum) = (path.map(open).transpose()?, crc32fast::Hasher::new());
+        Ok(Self { frames: Vec::new(), has_velocities, file, checksum })
     }
 
     /// Reads the first frames of a file and truncates it after them: later frames were written after the checkpoint.
-    pub(crate) fn reopen(path: &Path, count: usize, vertices: usize, checksum: u32) -> Result<Self, CheckpointError> {
+    /// Also returns the velocities of each frame; empty if the file has none.
+    pub(crate) fn reopen(
+        path: &Path,
+        count: usize,
+        vertices: usize,
+        has_velocities: bool,
+        checksum: u32,
+    ) -> Result<(Self, Vec<Velocities>), CheckpointError> {
         let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        let size = 24 * vertices;
+        let (of_positions, of_velocities) = (24 * vertices, if has_velocities { 12 * vertices } else { 0 });
+        let size = of_positions + of_velocities;
         let damaged = |reason: &str| CheckpointError::Damaged { path: path.to_owned(), reason: reason.to_owned() };
         let kept = bytes.get(..count * size).ok_or_else(|| damaged("it is cut short"))?;
         let mut hasher = crc32fast::Hasher::new();
@@ -40,16 +57,19 @@ impl FrameStore {
         if hasher.clone().finalize() != checksum {
             return Err(damaged("its checksum does not match"));
         }
-        let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|byte| bytes[byte]));
-        let point = |bytes: &[u8]| -> Vector3<f64> { std::array::from_fn(|axis| number(&bytes[8 * axis..])) };
-        let frames = (0..count).map(|frame| kept[frame * size..][..size].chunks_exact(24).map(point).collect());
-        let frames = frames.collect();
+        let mut frames: Vec<Frame> = Vec::new();
+        let mut velocities = Vec::new();
+        for frame in 0..count {
+            let (x, v) = kept[frame * size..][..size].split_at(of_positions);
+            frames.push(x.chunks_exact(24).map(double_point).collect());
+            velocities.push(v.chunks_exact(12).map(single_point).collect());
+        }
         let file = OpenOptions::new().append(true).open(path).map_err(unreadable)?;
         file.set_len((count * size) as u64).map_err(unreadable)?;
-        Ok(Self { frames, file: Some((path.to_owned(), file)), checksum: hasher })
+        Ok((Self { frames, has_velocities, file: Some((path.to_owned(), file)), checksum: hasher }, velocities))
     }
 
-    pub(crate) fn frames(&self) -> &[Vec<Vector3<f64>>] {
+    pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
@@ -58,9 +78,12 @@ impl FrameStore {
         self.checksum.clone().finalize()
     }
 
-    pub(crate) fn add(&mut self, frame: Vec<Vector3<f64>>) -> Result<(), OutputError> {
+    pub(crate) fn add(&mut self, frame: Frame, velocities: &[Vector3<f64>]) -> Result<(), OutputError> {
         if let Some((path, file)) = &mut self.file {
-            let bytes: Vec<u8> = frame.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
+            let mut bytes: Vec<u8> = frame.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
+            if self.has_velocities {
+                bytes.extend(velocities.as_flattened().iter().flat_map(|&number| (number as f32).to_le_bytes()));
+            }
             file.write_all(&bytes).map_err(|source| OutputError::File { path: path.clone(), source })?;
             self.checksum.update(&bytes);
         }
@@ -73,4 +96,12 @@ impl FrameStore {
         let Some((path, file)) = &self.file else { return Ok(()) };
         file.sync_data().map_err(|source| OutputError::File { path: path.clone(), source })
     }
+}
+
+fn double_point(bytes: &[u8]) -> Vector3<f64> {
+    std::array::from_fn(|axis| f64::from_le_bytes(std::array::from_fn(|byte| bytes[8 * axis + byte])))
+}
+
+fn single_point(bytes: &[u8]) -> Vector3<f64> {
+    std::array::from_fn(|axis| f64::from(f32::from_le_bytes(std::array::from_fn(|byte| bytes[4 * axis + byte]))))
 }

@@ -1,29 +1,40 @@
 //! Runs a scene from start to end, and writes frames, checkpoints and results.
 
+mod available_memory;
 mod checkpoint;
+mod frame_files;
+mod frame_pictures;
 mod frame_store;
+mod input_files;
+mod memory_need;
 mod progress;
 mod record;
 mod report;
+mod results;
 pub mod stats;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
+pub use input_files::InputFile;
+pub use memory_need::MemoryNeed;
 pub use progress::Progress;
 pub use record::{Record, RecordError};
 pub use report::{ReportError, write_report};
+pub use results::Ending;
 
 use crate::integrator::StepReport;
-use crate::output::{
-    AnimationError, OutputError, OutputFolder, PictureError, Show, animation_glb, obj_text, ply_bytes, usd_text,
-};
+use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery};
 use crate::scene::{Scene, SceneError};
-use crate::simulation::{Simulation, SimulationError, Summary};
-use frame_store::FrameStore;
+use crate::simulation::{Simulation, SimulationError};
+use available_memory::available_memory;
+use frame_pictures::FramePictures;
+use frame_store::{Frame, FrameStore};
+use memory_need::Gigabytes;
 
 /// A run that cannot be started or completed.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +45,17 @@ pub enum RunError {
     /// The simulation cannot be set up, or a step failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// The run would not fit into memory.
+    #[error(
+        "the run needs {need}, but only {} of memory are available. Use fewer cells or frames, write fewer files, or \
+         pass --ignore-memory", Gigabytes(*.available as f64)
+    )]
+    Memory {
+        /// What the run needs.
+        need: MemoryNeed,
+        /// The memory that is available, in bytes.
+        available: u64,
+    },
     /// The checkpoint cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
@@ -55,6 +77,25 @@ pub enum RunError {
     /// The state contains numbers that JSON cannot represent.
     #[error("cannot save the state: {0}")]
     Json(#[from] serde_json::Error),
+    /// A step failed, and then a file with the results so far could not be written.
+    #[error("{failure}; and the results of the steps before it are incomplete: {error}")]
+    AlsoUnwritten {
+        /// The failed step.
+        failure: Box<SimulationError>,
+        /// The file that could not be written.
+        error: Box<RunError>,
+    },
+}
+
+/// How to start a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunOptions {
+    /// Whether to replace the files of an earlier run.
+    pub overwrite: bool,
+    /// Number of steps between checkpoints; `None` for no checkpoints.
+    pub checkpoint_interval: Option<u64>,
+    /// Whether to start even if the run seems not to fit into memory.
+    pub ignore_memory: bool,
 }
 
 /// A simulation with its output.
@@ -66,45 +107,60 @@ pub struct Run {
     folder: OutputFolder,
     simulation: Simulation,
     frames: FrameStore,
+    /// Pictures of the frames; `None` before the first step, or if the scene does not want them.
+    pictures: Option<FramePictures>,
+    /// The largest number of threads.
+    threads: usize,
     /// Steps between checkpoints; `None` for no checkpoints.
     checkpoint_interval: Option<u64>,
+    /// The scene file and the files that it names, as they were when the run began.
+    scene_file: Option<InputFile>,
+    inputs: Vec<InputFile>,
+    /// What the user should know about the resumption.
+    notes: Vec<String>,
 }
 
-/// The outcome of a run.
-#[derive(Debug)]
-pub struct Ending {
-    /// Totals and final state.
-    pub summary: Summary,
-    /// The files written.
-    pub files: Vec<PathBuf>,
-    /// Number of frames written.
-    pub frames: usize,
-    /// Whether all steps were completed.
-    pub finished: bool,
+/// Progress of a run.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// A step was completed.
+    Step(&'a Simulation, &'a StepReport),
+    /// No step follows; the files that cover the whole run are written.
+    LastStep,
 }
 
 impl Run {
-    /// Creates a run from the text of a scene file. `path` is used in messages and as the base of relative paths.
-    /// `checkpoint_interval` is the number of steps between checkpoints, `None` for no checkpoints. The output folder
-    /// is touched only after the scene has been validated.
+    /// Creates a run from the text of a scene file. `path` is used in messages and as the base of relative paths. The
+    /// output folder is touched only after the scene has been validated.
     ///
     /// # Errors
-    /// Returns an error if the scene is invalid or the folder cannot be written to.
-    pub fn new(
-        text: String,
-        path: &Path,
-        output: &Path,
-        overwrite: bool,
-        checkpoint_interval: Option<u64>,
-    ) -> Result<Self, RunError> {
+    /// Returns an error if the scene is invalid, does not fit into memory, or the folder cannot be written to.
+    pub fn new(text: String, path: &Path, output: &Path, options: RunOptions) -> Result<Self, RunError> {
+        let RunOptions { overwrite, checkpoint_interval, ignore_memory } = options;
         let scene = Scene::parse(&text, path)?;
+        if !ignore_memory {
+            check_memory(&scene)?;
+        }
         let mut simulation = Simulation::new(&scene)?;
         if scene.output.ledger {
             simulation.keep_ledger()?;
         }
         let folder = OutputFolder::open(output, overwrite)?;
-        let frames = FrameStore::new(checkpoint_interval.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES)))?;
-        let mut run = Self { scene, text, path: path.to_owned(), folder, simulation, frames, checkpoint_interval };
+        let saved = checkpoint_interval.map(|_| folder.path().join(OutputFolder::SAVED_FRAMES));
+        let mut run = Self {
+            text,
+            path: path.to_owned(),
+            folder,
+            simulation,
+            frames: FrameStore::new(saved, scene.output.ply)?,
+            pictures: None,
+            threads: available_threads(),
+            checkpoint_interval,
+            scene_file: InputFile::scene_itself(path),
+            inputs: InputFile::of_scene(&scene),
+            notes: Vec::new(),
+            scene,
+        };
         run.add_frame()?;
         Ok(run)
     }
@@ -112,23 +168,76 @@ impl Run {
     /// Limits the number of threads; see [`Simulation::with_threads`].
     #[must_use]
     pub fn with_threads(self, threads: usize) -> Self {
-        Self { simulation: self.simulation.with_threads(threads), ..self }
+        Self { simulation: self.simulation.with_threads(threads), threads, ..self }
     }
 
-    /// Resumes from the checkpoint in a folder.
+    /// Resumes from the checkpoint in a folder. Frames that are missing or truncated are written again. With
+    /// `accept_edited`, continues with meshes and materials that were edited since the run began.
     ///
     /// # Errors
-    /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene.
-    pub fn resume(output: &Path) -> Result<Self, RunError> {
+    /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene, or if
+    /// files of the scene were edited.
+    pub fn resume(output: &Path, accept_edited: bool) -> Result<Self, RunError> {
         let file = output.join(OutputFolder::CHECKPOINT);
-        let Checkpoint { scene: text, path, every, frames, frames_checksum, state } = Checkpoint::read(&file)?;
-        let scene = Scene::parse(&text, &path)?;
-        let mut simulation = Simulation::new(&scene)?;
-        simulation.restore(state).map_err(CheckpointError::State)?;
-        let vertices = simulation.positions().len();
-        let frames = FrameStore::reopen(&output.join(OutputFolder::SAVED_FRAMES), frames, vertices, frames_checksum)?;
+        // Without a checkpoint, no folder is created.
+        if !file.exists() {
+            Checkpoint::read(&file)?;
+        }
         let folder = OutputFolder::reopen(output)?;
-        Ok(Self { scene, text, path, folder, simulation, frames, checkpoint_interval: Some(every) })
+        let saved = Checkpoint::read(&file)?;
+        let scene = Scene::parse(&saved.scene, &saved.path)?;
+        let edited = saved.inputs.iter().find(|input| input.is_edited()).filter(|_| !accept_edited);
+        if let Some(InputFile { path, .. }) = edited {
+            return Err(CheckpointError::Edited { path: path.clone() }.into());
+        }
+        let mut simulation = Simulation::new(&scene)?;
+        simulation.restore(saved.state).map_err(CheckpointError::State)?;
+        let (path, vertices) = (output.join(OutputFolder::SAVED_FRAMES), simulation.positions().len());
+        let (frames, velocities) =
+            FrameStore::reopen(&path, saved.frames, vertices, scene.output.ply, saved.frames_checksum)?;
+        let mut run = Self {
+            text: saved.scene,
+            path: saved.path,
+            folder,
+            simulation,
+            frames,
+            pictures: None,
+            threads: available_threads(),
+            checkpoint_interval: Some(saved.every),
+            scene_file: saved.scene_file,
+            inputs: InputFile::of_scene(&scene),
+            notes: Vec::new(),
+            scene,
+        };
+        run.note_edited_scene();
+        run.repair_frames(&velocities)?;
+        Ok(run)
+    }
+
+    fn note_edited_scene(&mut self) {
+        if let Some(file) = self.scene_file.as_ref().filter(|file| file.is_edited()) {
+            self.notes.push(format!(
+                "{} was edited since the run began; the run continues with the scene as it was then",
+                file.path.display()
+            ));
+        }
+    }
+
+    /// Writes frames again that are missing or truncated.
+    fn repair_frames(&mut self, velocities: &[Vec<Vector3<f64>>]) -> Result<(), RunError> {
+        let frames = self.frames.frames().iter().zip(velocities).enumerate();
+        let written = frames.map(|(number, (x, v))| self.write_frame_files(number, x, v, true));
+        let count: usize = written.sum::<Result<usize, RunError>>()?;
+        if count > 0 {
+            self.notes.push(format!("{count} files of frames were missing or truncated, and were written again"));
+        }
+        Ok(())
+    }
+
+    /// What the user should know about a resumed run; empty for a new one.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// The simulation of the run.
@@ -137,27 +246,33 @@ impl Run {
         &self.simulation
     }
 
-    /// Simulates to the end, or until `stop` is set; then the current step is completed. Calls `on_step` after each
-    /// step. The results so far are written in any case, also after a failed step.
+    /// Simulates to the end, or until `stop` is set; then the current step is completed. The results so far are written
+    /// in any case, also after a failed step, which [`Ending::failure`] holds. If `stop` is set only after the last
+    /// step, the remaining files are abandoned.
     ///
     /// # Errors
-    /// Returns an error if a step fails or a file cannot be written.
-    pub fn go(
+    /// Returns an error if a file cannot be written.
+    pub fn go(&mut self, stop: &AtomicBool, mut on_event: impl FnMut(Event<'_>)) -> Result<Ending, RunError> {
+        self.start_pictures()?;
+        let failure = self.step_to_end(stop, &mut on_event)?;
+        on_event(Event::LastStep);
+        self.finish(failure, stop)
+    }
+
+    /// Takes the steps, and returns the failure of the last one.
+    fn step_to_end(
         &mut self,
         stop: &AtomicBool,
-        mut on_step: impl FnMut(&Simulation, &StepReport),
-    ) -> Result<Ending, RunError> {
+        on_event: &mut impl FnMut(Event<'_>),
+    ) -> Result<Option<SimulationError>, RunError> {
         while !self.simulation.is_finished() && !stop.load(Ordering::Relaxed) {
             let report = match self.simulation.step() {
                 Ok(report) => report,
-                Err(error) => {
-                    self.finish()?;
-                    return Err(error.into());
-                }
+                Err(failure) => return Ok(Some(failure)),
             };
-            on_step(&self.simulation, &report);
+            on_event(Event::Step(&self.simulation, &report));
             let done = self.simulation.steps_done();
-            if done.is_multiple_of(self.scene.steps_per_frame()) {
+            if done.is_multiple_of(self.scene.time_grid().steps_per_frame) {
                 self.add_frame()?;
             }
             if self.checkpoint_interval.is_some_and(|steps| done.is_multiple_of(steps)) {
@@ -167,20 +282,31 @@ impl Run {
         if self.checkpoint_interval.is_some() && !self.simulation.is_finished() {
             self.save()?;
         }
-        self.finish()
+        Ok(None)
+    }
+
+    /// Starts to draw the pictures of frames, of which a resumed run has some. They take a thread of the simulation.
+    fn start_pictures(&mut self) -> Result<(), RunError> {
+        if !self.scene.output.png {
+            return Ok(());
+        }
+        let rate = self.scene.time_grid().frames_per_second;
+        let scenery = Scenery::of(&self.simulation);
+        let mut pictures = FramePictures::start(scenery, self.folder.clone(), rate, self.threads);
+        self.simulation.set_threads(self.threads.saturating_sub(1).max(1));
+        self.frames.frames().iter().try_for_each(|frame| pictures.add(Frame::clone(frame)))?;
+        self.pictures = Some(pictures);
+        Ok(())
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
-        let (simulation, number) = (&self.simulation, self.frames.frames().len());
-        let (x, triangles) = (simulation.positions(), simulation.triangles());
-        if self.scene.output.obj {
-            let text = obj_text(x, triangles, simulation.strands());
-            self.folder.write_frame(number, "obj", text.as_bytes())?;
+        let (x, v) = (self.simulation.positions(), self.simulation.velocities());
+        self.write_frame_files(self.frames.frames().len(), x, v, false)?;
+        let frame = Frame::from(x);
+        if let Some(pictures) = &mut self.pictures {
+            pictures.add(Frame::clone(&frame))?;
         }
-        if self.scene.output.ply {
-            self.folder.write_frame(number, "ply", &ply_bytes(x, simulation.velocities(), triangles))?;
-        }
-        self.frames.add(x.to_vec())?;
+        self.frames.add(frame, v)?;
         Ok(())
     }
 
@@ -189,6 +315,8 @@ impl Run {
         let checkpoint = Checkpoint {
             scene: self.text.clone(),
             path: self.absolute_path(),
+            scene_file: self.scene_file.clone(),
+            inputs: self.inputs.clone(),
             every: self.checkpoint_interval.unwrap_or(u64::MAX),
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),
@@ -196,47 +324,6 @@ impl Run {
         };
         self.folder.write(OutputFolder::CHECKPOINT, &checkpoint.to_bytes()?)?;
         Ok(())
-    }
-
-    /// Writes the files that cover the whole run.
-    fn finish(&mut self) -> Result<Ending, RunError> {
-        let summary = self.simulation.summary()?;
-        let (wanted, frames) = (self.scene.output, self.frames.frames());
-        let frame_time = self.scene.steps_per_frame() as f64 * self.scene.dt;
-        let show = Show::new(&self.simulation, frames, frame_time);
-        let mut files = Vec::new();
-        let mut write = |name: &str, contents: &[u8]| -> Result<(), RunError> {
-            files.push(self.folder.write(name, contents)?);
-            Ok(())
-        };
-        if wanted.picture {
-            let (x, time) = (self.simulation.positions(), self.simulation.time());
-            write(OutputFolder::PICTURE, &show.picture(x, time, false)?)?;
-        }
-        if wanted.gltf {
-            write(OutputFolder::ANIMATION, &animation_glb(&show.tracks(), frame_time)?)?;
-        }
-        if wanted.usd {
-            write(OutputFolder::USD, usd_text(&show.tracks(), 1.0 / frame_time).as_bytes())?;
-        }
-        if let Some(ledger) = self.simulation.ledger() {
-            write(OutputFolder::LEDGER, ledger.csv().as_bytes())?;
-            write(OutputFolder::LEDGER_PLOT, ledger.svg().map_err(RunError::Plot)?.as_bytes())?;
-        }
-        if wanted.png {
-            for (number, frame) in frames.iter().enumerate() {
-                let picture = show.picture(frame, number as f64 * frame_time, true)?;
-                self.folder.write_frame(number, "png", &picture)?;
-            }
-        }
-        let finished = self.simulation.is_finished();
-        let tables = stats::tables(&summary);
-        write(OutputFolder::SUMMARY, format!("{summary}\n\n{tables}").as_bytes())?;
-        let (scene, path) = (self.text.clone(), self.absolute_path());
-        let (version, frames) = (Record::VERSION, frames.len());
-        let record = Record { version, scene, path, finished, frames, summary: summary.clone() };
-        write(OutputFolder::RECORD, &serde_json::to_vec_pretty(&record)?)?;
-        Ok(Ending { summary, files, frames, finished })
     }
 
     /// The absolute path of the scene file, so that its relative paths still resolve when the run is read from
@@ -255,5 +342,17 @@ impl Run {
     #[must_use]
     pub fn leaves_checkpoints(&self) -> bool {
         self.checkpoint_interval.is_some()
+    }
+}
+
+fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+fn check_memory(scene: &Scene) -> Result<(), RunError> {
+    let need = MemoryNeed::of(scene);
+    match available_memory(Path::new("/")) {
+        Some(available) if need.total() > available as f64 => Err(RunError::Memory { need, available }),
+        _ => Ok(()),
     }
 }

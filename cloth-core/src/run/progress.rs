@@ -59,9 +59,19 @@ impl Progress {
         let _ = self.steps.as_ref().map(|steps| steps.send(step));
     }
 
+    /// Records that no step follows: the watchdog stops.
+    pub fn last_step(&mut self) {
+        self.bar.set_message(", writing files");
+        self.stop_watchdog();
+    }
+
     /// Removes the progress bar and stops the watchdog.
     pub fn finish(mut self) {
         self.bar.finish_and_clear();
+        self.stop_watchdog();
+    }
+
+    fn stop_watchdog(&mut self) {
         drop(self.steps.take());
         if let Some(watchdog) = self.watchdog.take() {
             let _ = watchdog.join();
@@ -104,6 +114,8 @@ mod tests {
         // Finishing joins the watchdog.
         let mut progress = Progress::new(10, 3);
         progress.step(4, &StepReport::default());
+        progress.last_step();
+        assert!(progress.watchdog.is_none(), "no step is awaited while files are written");
         progress.finish();
     }
 

@@ -41,7 +41,7 @@ pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
     let plot = optional(&folder.join(OutputFolder::LEDGER_PLOT))?;
     let audit = audited(&record);
     let page = page(&record, picture.as_deref(), plot.as_deref(), &audit);
-    Ok(OutputFolder::reopen(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
+    Ok(OutputFolder::unlocked(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, ReportError> {

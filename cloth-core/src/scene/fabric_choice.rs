@@ -31,7 +31,7 @@ impl<'de> Visitor<'de> for Choice {
     type Value = Fabric;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the table of a fabric, or the name of a measured one")
+        f.write_str("the table of a fabric, or the name of a measured one in quotes")
     }
 
     fn visit_str<E: Error>(self, name: &str) -> Result<Fabric, E> {
@@ -45,7 +45,10 @@ impl<'de> Visitor<'de> for Choice {
             names
         };
         let found = MEASURED.iter().find(|fabric| fabric.name == name);
-        let found = found.ok_or_else(|| E::unknown_variant(name, &NAMES))?;
+        let found = found.ok_or_else(|| {
+            let known = NAMES.map(|known| format!("`{known}`")).join(", ");
+            E::custom(format!("unknown fabric `{name}`, expected a table or one of the measured fabrics {known}"))
+        })?;
         toml::from_str::<Alone>(found.table).map(|alone| alone.fabric).map_err(E::custom)
     }
 

@@ -3,23 +3,33 @@ use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
 use super::{ContactChoice, Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
-use crate::bounded::{finite_triple, non_negative, positive};
+use crate::bounded::{Count, MaybeReal, NonNegative, Number, Positive, Real, Reals};
 use crate::fabric::Fabric;
 use crate::integrator::{LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
 
 /// The version of scene files that this program reads.
-const VERSION: u32 = 1;
+const VERSION: usize = 1;
 
 /// The keys of a scene file.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "A scene of `cloth run`")]
+#[schemars(extend("dependentRequired" = { "mesh": ["fabric"], "fabric": ["mesh"] }))]
+#[schemars(extend("anyOf" = [
+    { "required": ["mesh"] },
+    { "required": ["garment"], "properties": { "garment": { "minItems": 1 } } },
+    { "required": ["hair"], "properties": { "hair": { "minItems": 1 } } },
+]))]
+#[schemars(extend("if" = { "properties": { "contact": { "const": "on" } }, "required": ["contact"] }))]
+#[schemars(extend("then" = { "properties": { "integrator": { "const": "newton" } }, "required": ["integrator"] }))]
 pub(super) struct File {
     /// Version of the format. Default 1.
-    #[serde(default = "newest")]
-    version: u32,
+    #[serde(default = "newest", with = "Count::<0, 1_000_000>")]
+    #[schemars(range(min = 1, max = 1))]
+    version: usize,
     /// The mesh of a single garment, with `fabric`. For several garments use `[[garment]]`.
+    #[serde(default)]
     mesh: Option<Mesh>,
     /// The fabric of the single garment: a table, or the name of a measured fabric.
     #[serde(default, deserialize_with = "some_fabric")]
@@ -43,10 +53,10 @@ pub(super) struct File {
     /// Wind. Default still air.
     wind: Option<Wind>,
     /// Acceleration of gravity, in m/s². Default [0, 0, −9.81].
-    #[serde(default = "standard_gravity", deserialize_with = "finite_triple")]
+    #[serde(default = "standard_gravity", with = "Reals::<Number, 3>")]
     gravity: [f64; 3],
     /// Drag per mass, in 1/s: the force −drag m v on every vertex. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     drag: f64,
     /// `implicit-euler` (the default), `newton`, `bdf2`, `implicit-midpoint`, `trapezoid`, `symplectic-euler`,
     /// `verlet`, `explicit-euler` or `explicit-euler-as-printed`.
@@ -58,6 +68,7 @@ pub(super) struct File {
     /// What collides: `on`, `obstacles` or `off`. `on` includes contact of cloth and hair with themselves and with each
     /// other, and needs the integrator `newton`. Default: `on` for cloth with `newton` and without `sleep`, otherwise
     /// `obstacles`.
+    #[serde(default)]
     contact: Option<ContactChoice>,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
     /// `multigrid`, `cholesky` or `incomplete-cholesky`.
@@ -71,21 +82,22 @@ pub(super) struct File {
     #[serde(default, deserialize_with = "super::sleep::sleep")]
     #[schemars(with = "super::sleep::SleepChoice")]
     sleep: Option<Sleep>,
-    /// Time step h, in s.
-    #[serde(deserialize_with = "positive")]
+    /// The largest time step h, in s.
+    #[serde(with = "Real::<Positive>")]
     dt: f64,
     /// Simulated time, in s; rounded to whole steps.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "Real::<NonNegative>")]
     duration: f64,
-    /// Frames written per simulated second, rounded to whole steps per frame. Default 25.
-    #[serde(default = "frame_rate", deserialize_with = "positive")]
-    frames_per_second: f64,
+    /// Frames written per simulated second. Steps are shortened so that a whole number of equal steps ends with each
+    /// frame. Default: the rate nearest to 25 whose frames are whole steps of `dt`.
+    #[serde(default, with = "MaybeReal::<Positive>")]
+    frames_per_second: Option<f64>,
     /// The files to write.
     #[serde(default)]
     output: OutputChoice,
 }
 
-fn newest() -> u32 {
+fn newest() -> usize {
     VERSION
 }
 
@@ -93,12 +105,24 @@ fn standard_gravity() -> [f64; 3] {
     [0.0, 0.0, -9.81]
 }
 
-fn frame_rate() -> f64 {
-    25.0
-}
-
 fn some_fabric<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Fabric>, D::Error> {
     super::fabric_choice::fabric(deserializer).map(Some)
+}
+
+/// The largest number of steps.
+const MOST_STEPS: f64 = 1e9;
+
+fn check_times(dt: f64, duration: f64) -> Result<(), String> {
+    if duration > 0.0 && dt > duration * (1.0 + 1e-9) {
+        return Err(format!("`dt` = {dt} s exceeds `duration` = {duration} s; give a `dt` of at most the duration"));
+    }
+    if duration / dt > MOST_STEPS {
+        let steps = duration / dt;
+        return Err(format!(
+            "`duration` takes {steps:.1e} steps of `dt`, more than {MOST_STEPS:e}; give a larger `dt`"
+        ));
+    }
+    Ok(())
 }
 
 impl TryFrom<File> for Scene {
@@ -112,11 +136,16 @@ impl TryFrom<File> for Scene {
         if file.contact == Some(ContactChoice::On) && file.integrator != Scheme::Newton {
             return Err("`contact = \"on\"` needs `integrator = \"newton\"`, which certifies its moves".to_owned());
         }
+        check_times(file.dt, file.duration)?;
+        if let Some(seam) = file.seams.iter().position(|seam| seam.pairs.is_some() == seam.within.is_some()) {
+            return Err(format!("seams[{seam}]: expected either `pairs` or `within`"));
+        }
         let mut garments = file.garment;
         match (file.mesh, file.fabric) {
             (Some(mesh), Some(fabric)) => {
                 let placement = Placement::default();
-                let only = Garment { name: None, mesh, fabric, placement, velocity: [0.0; 3], spin: [0.0; 3] };
+                let (velocity, spin) = ([0.0; 3], [0.0; 3]);
+                let only = Garment { name: None, mesh, fabric, warp: None, placement, velocity, spin };
                 garments.insert(0, only);
             }
             (Some(_), None) => return Err("missing field `fabric`, the material of the mesh".to_owned()),
@@ -125,6 +154,9 @@ impl TryFrom<File> for Scene {
         }
         if garments.is_empty() && file.hair.is_empty() {
             return Err("nothing to simulate: give `mesh` and `fabric`, `[[garment]]` or `[[hair]]`".to_owned());
+        }
+        for garment in &mut garments {
+            garment.fabric.warp = garment.warp.unwrap_or(garment.fabric.warp);
         }
         let usual = ContactChoice::usual(file.integrator, file.sleep.is_some(), !garments.is_empty());
         Ok(Self {

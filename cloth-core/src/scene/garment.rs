@@ -1,14 +1,16 @@
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{finite_triple, nonzero_triple, number, positive};
-use crate::fabric::Fabric;
+use crate::bounded::{Direction, MaybeReal, NonNegative, Number, Positive, Real, Reals, Speed};
+use crate::fabric::{Fabric, MaybeWarpChoice};
 use crate::geometry::{Pose, cross, subtract};
 use crate::mesh::{
-    Disc, MeshError, ObjError, PleatsError, Sheet, SpringNetwork, Strip, Topology, TriangleMesh, read_obj,
+    CornerAttributes, Disc, MeshError, ObjError, ObjOptions, PleatsError, Sheet, SpringNetwork, Strip, Topology,
+    TriangleMesh, Warp, read_obj_surface,
 };
 
 /// A piece of cloth.
@@ -24,14 +26,18 @@ pub struct Garment {
     #[serde(deserialize_with = "super::fabric_choice::fabric")]
     #[schemars(with = "super::fabric_choice::FabricChoice")]
     pub fabric: Fabric,
+    /// Direction of the warp, in place of that of the fabric: a direction, or `uv`; see the key of the fabric. Default
+    /// that of the fabric.
+    #[serde(default, with = "MaybeWarpChoice")]
+    pub warp: Option<Warp>,
     /// Initial placement. Default as built.
     #[serde(default)]
     pub placement: Placement,
     /// Initial velocity, in m/s. Default 0.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Speed, 3>")]
     pub velocity: [f64; 3],
     /// Initial angular velocity about the placed origin, in rad/s. Default 0.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub spin: [f64; 3],
 }
 
@@ -49,6 +55,13 @@ pub enum Mesh {
     Obj {
         /// Path, relative to the scene file's folder.
         path: PathBuf,
+        /// Names of groups, objects or materials of the file; only their faces become the garment. Default all faces.
+        #[serde(default)]
+        groups: Option<Vec<String>>,
+        /// Merges vertices that are at most this far apart, in m, such as those that exporters double along seams of
+        /// texture coordinates. Default: vertices stay apart.
+        #[serde(default, with = "MaybeReal::<NonNegative>")]
+        weld: Option<f64>,
     },
 }
 
@@ -57,13 +70,13 @@ pub enum Mesh {
 #[serde(deny_unknown_fields)]
 pub struct Placement {
     /// Scale factor. Default 1.
-    #[serde(default = "one", deserialize_with = "positive")]
+    #[serde(default = "one", with = "Real::<Positive>")]
     pub scale: f64,
     /// Rotation about an axis through the origin. Default none.
     #[serde(default)]
     pub rotate: Option<Turn>,
     /// Translation, in m. Default none.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     pub translate: [f64; 3],
 }
 
@@ -72,10 +85,10 @@ pub struct Placement {
 #[serde(deny_unknown_fields)]
 pub struct Turn {
     /// Direction of the axis.
-    #[serde(deserialize_with = "nonzero_triple")]
+    #[serde(with = "Direction")]
     pub axis: [f64; 3],
     /// Angle, in degrees.
-    #[serde(deserialize_with = "number")]
+    #[serde(with = "Real::<Number>")]
     pub angle: f64,
 }
 
@@ -123,6 +136,12 @@ pub struct Shape {
     pub velocities: Vec<Vector3<f64>>,
     /// The vertex pairs that a mass–spring fabric joins.
     pub springs: SpringNetwork,
+    /// Attributes of the corners, from an OBJ file.
+    pub corners: CornerAttributes,
+    /// The vertices of each group of an OBJ file.
+    pub groups: BTreeMap<String, Vec<usize>>,
+    /// Number of vertices that were merged with another one; `None` unless the garment comes from an OBJ file.
+    pub welded: Option<usize>,
 }
 
 impl Garment {
@@ -136,11 +155,17 @@ impl Garment {
             Mesh::Strip(strip) => Some(strip.sheet()),
             Mesh::Disc(_) | Mesh::Obj { .. } => None,
         };
+        let (mut corners, mut groups, mut welded) = (CornerAttributes::default(), BTreeMap::new(), None);
         let mesh = match &self.mesh {
             Mesh::Sheet(sheet) => sheet.mesh()?,
             Mesh::Strip(strip) => strip.sheet().mesh()?,
             Mesh::Disc(disc) => disc.mesh()?,
-            Mesh::Obj { path } => read_obj(&folder.join(path))?,
+            Mesh::Obj { path, groups: chosen, weld } => {
+                let options = ObjOptions { groups: chosen.as_deref(), weld: *weld };
+                let surface = read_obj_surface(&folder.join(path), options)?;
+                (corners, groups, welded) = (surface.corners, surface.groups, Some(surface.welded));
+                surface.mesh
+            }
         };
         let initial = sheet.map_or_else(|| Ok(mesh.vertices().to_vec()), |sheet| sheet.start())?;
         let springs = match &sheet {
@@ -155,6 +180,7 @@ impl Garment {
             let turning = cross(self.spin, subtract(*p, translate));
             std::array::from_fn(|axis| self.velocity[axis] + turning[axis])
         };
-        Ok(Shape { mesh, velocities: start.iter().map(velocity).collect(), start, springs })
+        let velocities = start.iter().map(velocity).collect();
+        Ok(Shape { mesh, velocities, start, springs, corners, groups, welded })
     }
 }

@@ -5,6 +5,7 @@ mod error;
 mod fabric_choice;
 mod file;
 mod garment;
+mod inputs;
 mod obstacle;
 mod output;
 mod own_material;
@@ -12,6 +13,7 @@ mod pins;
 mod schema;
 mod seam;
 mod sleep;
+mod time_grid;
 
 use std::path::{Path, PathBuf};
 
@@ -28,10 +30,16 @@ pub use pins::{Pin, PinBox, PinChoice};
 pub use schema::schema;
 pub use seam::Seam;
 pub use sleep::Sleep;
+pub use time_grid::TimeGrid;
 
+use crate::bounded::Strict;
 use crate::fabric::Material;
+use crate::input_text;
 use crate::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
 use crate::wind::Wind;
+
+/// The largest size of a scene file, in bytes.
+const LARGEST_FILE: u64 = 16 << 20;
 
 /// A scene: what to simulate, and which files to write.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -65,12 +73,12 @@ pub struct Scene {
     pub adaptive: bool,
     /// When islands fall asleep; `None` for never.
     pub sleep: Option<Sleep>,
-    /// Time step h, in s.
+    /// The largest time step h, in s; [`Scene::time_grid`] has the step that is taken.
     pub dt: f64,
     /// Simulated time, in s; rounded to whole steps.
     pub duration: f64,
-    /// Frames written per simulated second, rounded to whole steps per frame.
-    pub frames_per_second: f64,
+    /// Frames written per simulated second; `None` for about 25, in whole steps of `dt`.
+    pub frames_per_second: Option<f64>,
     /// The files to write.
     pub output: OutputChoice,
     /// The folder of the scene file, which relative paths refer to.
@@ -91,7 +99,8 @@ impl Scene {
     /// # Errors
     /// Returns an error if the file cannot be read.
     pub fn text(path: &Path) -> Result<String, SceneError> {
-        std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
+        let text = input_text::read(path, LARGEST_FILE).and_then(input_text::utf8);
+        text.map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
     }
 
     /// Parses a scene. `path` is used in messages and as the base of relative paths.
@@ -99,7 +108,8 @@ impl Scene {
     /// # Errors
     /// Returns an error if a key is unknown, missing or invalid.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let mut scene: Self = toml::from_str(text).map_err(|error| SceneError::invalid(path, text, &error))?;
+        let parsed = toml::Deserializer::parse(text).and_then(|toml| Self::deserialize(Strict(toml)));
+        let mut scene = parsed.map_err(|error| SceneError::invalid(path, text, &error))?;
         scene.folder = path.parent().map(Path::to_owned).unwrap_or_default();
         for garment in &mut scene.garments {
             if let Material::File(declared) = &mut garment.fabric.material {
@@ -119,12 +129,12 @@ impl Scene {
     /// Number of steps.
     #[must_use]
     pub fn steps(&self) -> u64 {
-        (self.duration / self.dt).round() as u64
+        (self.duration / self.time_grid().step).round() as u64
     }
 
-    /// Number of steps per frame, at least 1.
+    /// Returns the times of steps and frames.
     #[must_use]
-    pub fn steps_per_frame(&self) -> u64 {
-        ((1.0 / (self.frames_per_second * self.dt)).round() as u64).max(1)
+    pub fn time_grid(&self) -> TimeGrid {
+        TimeGrid::new(self.dt, self.frames_per_second)
     }
 }

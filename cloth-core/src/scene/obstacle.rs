@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Placement, Turn};
-use crate::bounded::{all_positive, finite_triple, non_negative, nonzero_triple, positive};
+use crate::bounded::{Direction, NonNegative, Number, Positive, Real, Reals};
 use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError};
 use crate::geometry::{Pose, norm};
 use crate::mesh::{MeshError, ObjError, read_obj};
@@ -22,6 +22,13 @@ pub struct ObstacleDescription {
 /// The keys of an obstacle in a scene file.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [
+    { "required": ["plane"] },
+    { "required": ["sphere"] },
+    { "required": ["capsule"] },
+    { "required": ["box"] },
+    { "required": ["mesh"] },
+]))]
 struct Keys {
     /// Everything below a plane.
     plane: Option<PlaneKeys>,
@@ -37,17 +44,17 @@ struct Keys {
     /// Name in the ledger and in messages. Default the shape's name and the obstacle's index from 0.
     name: Option<String>,
     /// Coefficient of friction. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     friction: f64,
     /// Sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Slower cloth sticks, but creeps.
     /// Default 0.001.
-    #[serde(default = "sticking", deserialize_with = "positive")]
+    #[serde(default = "sticking", with = "Real::<Positive>")]
     sticking: f64,
     /// Contact acts within this distance of the surface, in m. Default 0.005.
-    #[serde(default = "thickness", deserialize_with = "positive")]
+    #[serde(default = "thickness", with = "Real::<Positive>")]
     thickness: f64,
     /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. Default 5e6.
-    #[serde(default = "stiffness", deserialize_with = "positive")]
+    #[serde(default = "stiffness", with = "Real::<Positive>")]
     stiffness: f64,
     /// Motion over time. Default none.
     motion: Option<Motion>,
@@ -76,10 +83,10 @@ enum ShapeKeys {
 #[serde(deny_unknown_fields)]
 struct PlaneKeys {
     /// A point on the plane, in m. Default the origin.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     point: [f64; 3],
     /// Normal, pointing to the side of the cloth. Default [0, 0, 1].
-    #[serde(default = "up", deserialize_with = "nonzero_triple")]
+    #[serde(default = "up", with = "Direction")]
     normal: [f64; 3],
 }
 
@@ -87,10 +94,10 @@ struct PlaneKeys {
 #[serde(deny_unknown_fields)]
 struct SphereKeys {
     /// The centre, in m. Default the origin.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     centre: [f64; 3],
     /// The radius, in m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     radius: f64,
 }
 
@@ -98,13 +105,13 @@ struct SphereKeys {
 #[serde(deny_unknown_fields)]
 struct CapsuleKeys {
     /// One end of the segment, in m.
-    #[serde(deserialize_with = "finite_triple")]
+    #[serde(with = "Reals::<Number, 3>")]
     from: [f64; 3],
     /// Its other end, in m.
-    #[serde(deserialize_with = "finite_triple")]
+    #[serde(with = "Reals::<Number, 3>")]
     to: [f64; 3],
     /// The radius, in m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     radius: f64,
 }
 
@@ -112,16 +119,16 @@ struct CapsuleKeys {
 #[serde(deny_unknown_fields)]
 struct BoxKeys {
     /// The centre, in m. Default the origin.
-    #[serde(default, deserialize_with = "finite_triple")]
+    #[serde(default, with = "Reals::<Number, 3>")]
     centre: [f64; 3],
     /// Edge lengths, in m.
-    #[serde(deserialize_with = "all_positive")]
+    #[serde(with = "Reals::<Positive, 3>")]
     size: [f64; 3],
     /// Rotation about the centre. Default none.
     #[serde(default)]
     rotate: Option<Turn>,
     /// Radius of the rounded edges, which stay within the size, in m. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     rounding: f64,
 }
 
@@ -135,7 +142,7 @@ struct MeshKeys {
     #[serde(default)]
     placement: Placement,
     /// Extends the solid by this distance from the surface, in m. Required for an open mesh. Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     rounding: f64,
 }
 
@@ -202,6 +209,12 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
+    /// The path of the mesh, relative to the scene file's folder; `None` for other shapes.
+    #[must_use]
+    pub fn mesh_path(&self) -> Option<&Path> {
+        if let ShapeKeys::Mesh(keys) = &self.shape { Some(&keys.path) } else { None }
+    }
+
     /// Builds the obstacle with index `number` in the scene. Relative paths refer to `folder`.
     ///
     /// # Errors

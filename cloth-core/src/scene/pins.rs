@@ -2,7 +2,7 @@ use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::finite_triple;
+use crate::bounded::{MaybeCount, MaybeReals, Number, Reals};
 use crate::motion::Motion;
 
 /// Pinned vertices, fixed or moving.
@@ -19,7 +19,7 @@ pub struct Pin {
 }
 
 /// A choice of vertices.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum PinChoice {
     /// The vertex with this index, from 0.
     Vertex(usize),
@@ -27,6 +27,8 @@ pub enum PinChoice {
     Box(PinBox),
     /// The vertex nearest to a point, in m.
     Nearest(Vector3<f64>),
+    /// Every vertex of a group, object or material of the OBJ files.
+    Group(String),
     /// Every boundary vertex of the cloth.
     Boundary,
     /// Every vertex.
@@ -38,24 +40,36 @@ pub enum PinChoice {
 #[serde(deny_unknown_fields)]
 pub struct PinBox {
     /// The corner with the smallest coordinates, in m.
-    #[serde(deserialize_with = "finite_triple")]
+    #[serde(with = "Reals::<Number, 3>")]
     pub min: Vector3<f64>,
     /// The corner with the largest coordinates, in m.
-    #[serde(deserialize_with = "finite_triple")]
+    #[serde(with = "Reals::<Number, 3>")]
     pub max: Vector3<f64>,
 }
 
-/// The keys of a pin: exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`.
+/// The keys of a pin: exactly one of `vertex`, `box`, `nearest`, `group`, `boundary` and `all`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [
+    { "required": ["vertex"] },
+    { "required": ["box"] },
+    { "required": ["nearest"] },
+    { "required": ["group"] },
+    { "required": ["boundary"], "properties": { "boundary": { "const": true } } },
+    { "required": ["all"], "properties": { "all": { "const": true } } },
+]))]
 struct Keys {
     /// The vertex with this index, from 0, within `of`.
+    #[serde(default, with = "MaybeCount::<0, 4_294_967_295>")]
     vertex: Option<usize>,
     /// Every vertex in an axis-aligned box.
     #[serde(rename = "box")]
     inside: Option<PinBox>,
     /// The vertex nearest to a point, in m.
-    nearest: Option<Point>,
+    #[serde(default, with = "MaybeReals::<Number, 3>")]
+    nearest: Option<Vector3<f64>>,
+    /// Every vertex of this group, object or material of an OBJ file.
+    group: Option<String>,
     /// `true`: every boundary vertex of the cloth.
     #[serde(default)]
     boundary: bool,
@@ -68,27 +82,31 @@ struct Keys {
     motion: Option<Motion>,
 }
 
-/// A point, in m.
-#[derive(Deserialize, JsonSchema)]
-#[serde(transparent)]
-struct Point(#[serde(deserialize_with = "finite_triple")] Vector3<f64>);
-
 impl TryFrom<Keys> for Pin {
     type Error = String;
 
     fn try_from(keys: Keys) -> Result<Self, String> {
-        let Keys { vertex, inside, nearest, boundary, all, of, motion } = keys;
+        let Keys { vertex, inside, nearest, group, boundary, all, of, motion } = keys;
+        if let Some(PinBox { min, max }) = inside
+            && let Some(axis) = (0..3).find(|&axis| min[axis] > max[axis])
+        {
+            let (low, high, name) = (min[axis], max[axis], ["x", "y", "z"][axis]);
+            return Err(format!(
+                "the box is empty: its `min` exceeds its `max` along {name}, {low} > {high}; exchange the two"
+            ));
+        }
         let choices = [
             vertex.map(PinChoice::Vertex),
             inside.map(PinChoice::Box),
-            nearest.map(|Point(point)| PinChoice::Nearest(point)),
+            nearest.map(PinChoice::Nearest),
+            group.map(PinChoice::Group),
             boundary.then_some(PinChoice::Boundary),
             all.then_some(PinChoice::All),
         ];
-        let given: Vec<PinChoice> = choices.into_iter().flatten().collect();
-        match given[..] {
-            [choice] => Ok(Self { choice, of, motion }),
-            _ => Err("expected exactly one of `vertex`, `box`, `nearest`, `boundary` and `all`".to_owned()),
+        let mut given = choices.into_iter().flatten();
+        match (given.next(), given.next()) {
+            (Some(choice), None) => Ok(Self { choice, of, motion }),
+            _ => Err("expected exactly one of `vertex`, `box`, `nearest`, `group`, `boundary` and `all`".to_owned()),
         }
     }
 }

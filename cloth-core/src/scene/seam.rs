@@ -1,27 +1,28 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{non_negative, positive};
+use crate::bounded::{MaybeReal, NonNegative, Pair, Pairs, Positive, Real};
 
 /// Stitches between two garments: springs with rest length 0, energy ½ K ‖x_P − x_Q‖². Exactly one of `pairs` and
 /// `within` chooses the vertices.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["pairs"] }, { "required": ["within"] }]))]
 pub struct Seam {
     /// Names of the two garments; twice the same name for a seam within one garment.
+    #[serde(with = "Pair")]
     pub garments: [String; 2],
     /// Pairs of vertices, one of each garment, both with indices from 0 within their garment.
-    #[serde(default)]
+    #[serde(default, with = "Pairs")]
     pub pairs: Option<Vec<[usize; 2]>>,
     /// Joins each boundary vertex of the first garment to the nearest one of the second, if they are at most this far
     /// apart at the start, in m.
-    #[serde(default)]
-    #[schemars(range(min = 0.0))]
+    #[serde(default, with = "MaybeReal::<NonNegative>")]
     pub within: Option<f64>,
     /// Stiffness K of a stitch, in N/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Real::<Positive>")]
     pub stiffness: f64,
     /// Damping k_d of a stitch, in N s/m: the force −k_d (v_P − v_Q). Default 0.
-    #[serde(default, deserialize_with = "non_negative")]
+    #[serde(default, with = "Real::<NonNegative>")]
     pub damping: f64,
 }

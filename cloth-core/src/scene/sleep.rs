@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
-use crate::bounded::{positive, some_positive};
+use crate::bounded::{MaybeReal, Positive, Real};
 
 /// When islands (sets of vertices that no force couples) fall asleep. An island falls asleep once, for the time
 /// `after`, every vertex was slower than `speed` and changed its velocity by at most half of `speed`, and no pin or
@@ -17,10 +17,10 @@ use crate::bounded::{positive, some_positive};
 #[serde(deny_unknown_fields)]
 pub struct Sleep {
     /// Speed limit, in m/s. Default 0.001/s times the diagonal of the island's initial bounding box.
-    #[serde(default, deserialize_with = "some_positive")]
+    #[serde(default, with = "MaybeReal::<Positive>")]
     pub speed: Option<f64>,
     /// Time below the speed limit, in s. Default 0.5.
-    #[serde(default = "half_a_second", deserialize_with = "positive")]
+    #[serde(default = "half_a_second", with = "Real::<Positive>")]
     pub after: f64,
 }
 

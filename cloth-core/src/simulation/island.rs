@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sleep::{BoundingSphere, SleepState, StepContext, Stillness};
 use crate::body::Body;
+use crate::bounded::SPEED_OF_LIGHT;
 use crate::contact::Obstacle;
 use crate::integrator::{Integrator, IntegratorMemory, StepError, StepReport};
 use crate::ledger::Account;
@@ -132,6 +133,7 @@ impl Island {
         self.begin_step(context.time, dt)?;
         let opening = account.map(|_| Account::begin(&self.body, self.obstacle_power(context, false)));
         let report = self.integrator.step(&mut self.body, dt)?;
+        check_speeds(&self.body.v)?;
         let after = account
             .zip(opening)
             .map(|(account, opening)| account.after(&self.body, &opening, self.obstacle_power(context, true), dt));
@@ -194,5 +196,15 @@ impl Island {
         for (local, &vertex) in self.vertices.iter().enumerate() {
             (x[vertex], v[vertex]) = (self.body.x[local], self.body.v[local]);
         }
+    }
+}
+
+/// Returns an error if a vertex is faster than light. Such a state is finite, but its squares soon overflow, and single
+/// precision in files cannot hold its positions.
+fn check_speeds(v: &[Vector3<f64>]) -> Result<(), StepError> {
+    let fastest = v.iter().map(|v| crate::geometry::norm(*v)).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    match fastest {
+        Some((vertex, speed)) if speed > SPEED_OF_LIGHT => Err(StepError::TooFast { vertex, speed }),
+        _ => Ok(()),
     }
 }

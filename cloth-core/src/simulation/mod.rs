@@ -1,6 +1,7 @@
 //! Steps a scene through time: cloth and hair, divided into islands that may sleep.
 
 mod collision;
+mod deformed;
 mod island;
 mod saved;
 mod sleep;
@@ -13,6 +14,7 @@ use std::time::Instant;
 use energy_dsl::Vector3;
 use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError};
 
+pub use deformed::MostDeformed;
 pub use island::{Island, SavedIsland};
 pub use saved::{RestoreError, SavedCounts, SavedState};
 pub use summary::{Summary, TermSummary};
@@ -47,12 +49,17 @@ pub enum SimulationError {
     #[error("at the start: {0}")]
     Start(#[from] EvaluationError),
     /// A step failed.
-    #[error("step {step} (t = {time:.4} s): {source}")]
+    #[error(
+        "step {step} (t = {time:.4} s){}: {source}",
+        .deformed.as_ref().map(|element| format!(", before which {element}")).unwrap_or_default()
+    )]
     Step {
         /// The step that failed, from 1.
         step: u64,
         /// The time at the end of that step, in s.
         time: f64,
+        /// The most deformed element before the step; `None` if the scene has no triangle and no segment.
+        deformed: Option<Box<MostDeformed>>,
         /// Why it failed.
         source: StepError,
     },
@@ -116,7 +123,7 @@ impl Simulation {
             pinned,
             islands,
             may_sleep: scene.sleep.is_some(),
-            dt: scene.dt,
+            dt: scene.time_grid().step,
             steps: scene.steps(),
             summary,
             ledger: None,
@@ -132,8 +139,13 @@ impl Simulation {
     /// Results are bit-identical for every number of threads.
     #[must_use]
     pub fn with_threads(mut self, threads: usize) -> Self {
-        self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
+        self.set_threads(threads);
         self
+    }
+
+    /// Limits the number of threads of the next steps; see [`Simulation::with_threads`].
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
     }
 
     /// The garments and hair of the scene.
@@ -272,7 +284,8 @@ impl Simulation {
         let step = self.steps_done() + 1;
         let (report, slept) = self.step_islands(step).map_err(|source| {
             self.roll_back();
-            SimulationError::Step { step, time: step as f64 * self.dt, source }
+            let deformed = deformed::most_deformed(&self.parts, &self.x, &source).map(Box::new);
+            SimulationError::Step { step, time: step as f64 * self.dt, deformed, source }
         })?;
         self.summary.totals.add(&report, slept, start.elapsed());
         Ok(report)

@@ -30,6 +30,9 @@ pub struct Summary {
     pub integrator: String,
     /// Time step, in s.
     pub dt: f64,
+    /// The time step of the scene, in s; `None` if it was not shortened to end steps with frames.
+    #[serde(default)]
+    pub shortened_from: Option<f64>,
     /// Totals over all steps.
     #[serde(flatten)]
     pub totals: Totals,
@@ -37,6 +40,9 @@ pub struct Summary {
     pub terms: Vec<TermSummary>,
     /// Terms that were left out, with the reason.
     pub left_out: Vec<String>,
+    /// Descriptions of the garments from files: their pieces and welded vertices.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// Warnings about the scene and the run.
     pub warnings: Vec<String>,
     /// Number of edges of cloth and hair that touch or cross a triangle at the end.
@@ -81,8 +87,10 @@ impl Summary {
             triangles: model.triangles.len(),
             islands,
             integrator: scene.stepper().name().to_owned(),
-            dt: scene.dt,
+            dt: scene.time_grid().step,
+            shortened_from: Some(scene.dt).filter(|&dt| dt != scene.time_grid().step),
             left_out: model.left_out.clone(),
+            notes: model.notes.clone(),
             warnings: model.warnings.clone(),
             ..Self::default()
         }
@@ -120,7 +128,6 @@ impl Simulation {
     /// Returns an error if an energy is not finite.
     pub fn summary(&mut self) -> Result<Summary, EvaluationError> {
         let mut summary = self.summary.clone();
-        summary.crossings = self.crossings().len();
         let mut energies: Vec<Option<f64>> = vec![None; self.labels.len()];
         let mut elements = vec![0; self.labels.len()];
         let add = |sum: &mut Vector3<f64>, part: Vector3<f64>| (0..3).for_each(|axis| sum[axis] += part[axis]);
@@ -146,6 +153,27 @@ impl Simulation {
             TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
         };
         summary.terms = self.counts().into_iter().enumerate().map(term).collect();
+        self.add_findings(&mut summary);
+        Ok(summary)
+    }
+
+    /// Returns the totals so far without energies, forces and momenta, for a state whose energies are not finite.
+    #[must_use]
+    pub fn summary_without_energies(&self) -> Summary {
+        let mut summary = self.summary.clone();
+        let term = |(label, counts): (&TermLabel, Counts)| {
+            let (name, element, reused) = (label.name.clone(), label.element.to_owned(), counts.reused);
+            TermSummary { name, element, elements: 0, energy: None, reused, counts }
+        };
+        summary.terms = self.labels.iter().zip(self.counts()).map(term).collect();
+        self.add_findings(&mut summary);
+        summary.warnings.push("the energies at the end are not finite".to_owned());
+        summary
+    }
+
+    /// Adds the crossings at the end and the balance of energy.
+    fn add_findings(&self, summary: &mut Summary) {
+        summary.crossings = self.crossings().len();
         if summary.crossings > 0 {
             summary.warnings.push(format!(
                 "the cloth passes through itself: at the end, edges cross triangles in {} places. \
@@ -154,8 +182,9 @@ impl Simulation {
             ));
         }
         summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));
-        summary.warnings.extend(self.ledger.as_ref().and_then(|ledger| ledger.imbalance(&summary.integrator)));
-        Ok(summary)
+        let Some(ledger) = &self.ledger else { return };
+        let integrator = &summary.integrator;
+        summary.warnings.extend(ledger.imbalance(integrator).or_else(|| ledger.loss(integrator)));
     }
 }
 
@@ -173,9 +202,15 @@ fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} vertices ({} pinned), {} triangles", self.vertices, self.pinned, self.triangles)?;
+        for note in &self.notes {
+            writeln!(f, "{note}")?;
+        }
         let Totals { steps, solves, solved_by, iterations, projected, rejected, stepping_time, .. } = &self.totals;
         let simulated = *steps as f64 * self.dt;
         writeln!(f, "{}: {steps} steps of {} s = {simulated:.3} s", self.integrator, self.dt)?;
+        if let Some(dt) = self.shortened_from {
+            writeln!(f, "steps were shortened from {dt} s to end with the frames")?;
+        }
         writeln!(f, "{}", self.sleep())?;
         let seconds = stepping_time.as_secs_f64();
         writeln!(f, "{seconds:.2} s of computing, {:.2} ms per step", 1e3 * seconds / (*steps).max(1) as f64)?;

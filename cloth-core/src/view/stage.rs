@@ -153,19 +153,19 @@ impl Stage {
     pub fn time(&self) -> f64 {
         match &self.act {
             Act::Live { .. } => self.simulation.time(),
-            Act::Recorded { now, .. } => *now as f64 * self.frame_time(),
+            Act::Recorded { now, .. } => self.scene.time_grid().frame_time(*now),
         }
     }
 
     /// Time between frames, in s.
     #[must_use]
     pub fn frame_time(&self) -> f64 {
-        self.scene.steps_per_frame() as f64 * self.scene.dt
+        1.0 / self.scene.time_grid().frames_per_second
     }
 
     /// Time between updates, in s: a step of a scene, a frame of a run.
     fn interval(&self) -> f64 {
-        if self.is_live() { self.scene.dt } else { self.frame_time() }
+        if self.is_live() { self.scene.time_grid().step } else { self.frame_time() }
     }
 
     /// Current positions of the vertices, in m.
@@ -298,8 +298,8 @@ impl Stage {
             return Ok(());
         }
         let steps = match moment {
-            Moment::Frame(frame) => frame as u64 * self.scene.steps_per_frame(),
-            Moment::Time(time) => rounded(time, self.scene.dt) as u64,
+            Moment::Frame(frame) => frame as u64 * self.scene.time_grid().steps_per_frame,
+            Moment::Time(time) => rounded(time, self.scene.time_grid().step) as u64,
             Moment::End => self.scene.steps(),
         };
         while self.simulation.steps_done() < steps {
@@ -432,8 +432,9 @@ mod tests {
     #[test]
     fn a_run_is_played_from_its_frames() {
         let folder = tempfile::TempDir::new().unwrap();
-        let mut run = crate::run::Run::new(SCENE.to_owned(), "s.toml".as_ref(), folder.path(), false, None).unwrap();
-        run.go(&std::sync::atomic::AtomicBool::new(false), |_, _| ()).unwrap();
+        let options = crate::run::RunOptions::default();
+        let mut run = crate::run::Run::new(SCENE.to_owned(), "s.toml".as_ref(), folder.path(), options).unwrap();
+        run.go(&std::sync::atomic::AtomicBool::new(false), |_| ()).unwrap();
         let mut stage = Stage::open(folder.path()).unwrap();
         assert!(!stage.is_live() && stage.time() == 0.0 && !stage.hold(24, [0.0; 3]));
         stage.advance(0.05, || false).unwrap();

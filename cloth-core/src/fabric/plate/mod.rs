@@ -29,17 +29,22 @@ pub use rigidity::{Rigidity, RigidityError};
 pub use term::{PlateError, PlateTerm};
 pub use tilt::Tilts;
 
-use crate::mesh::{Topology, TriangleMesh, area, material_triangle, thread_triangle};
-use energy_dsl::Vector3;
+use crate::mesh::{Topology, TriangleMesh, Warp, area, material_triangle};
 
 /// A triangle without a warp direction.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("triangle {triangle} stands across the warp direction {warp:?}; choose a warp direction along the cloth")]
+#[error("triangle {triangle} {}", match .warp {
+    Warp::Direction(warp) => format!(
+        "stands across the warp direction {warp:?}; choose a warp direction along the cloth, or `warp = \"uv\"` if \
+         its OBJ file has texture coordinates"
+    ),
+    Warp::Uv => "has no texture coordinates that tell its warp; export UVs without collapsed faces".to_owned(),
+})]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub struct ThreadError {
     pub triangle: usize,
     /// The direction of the warp.
-    pub warp: Vector3<f64>,
+    pub warp: Warp,
 }
 
 /// The curvature of one triangle as a function of dihedral angles: κ = Σ b (θ − θ̄).
@@ -58,11 +63,7 @@ pub struct Curvature {
 ///
 /// # Errors
 /// Returns an error if a triangle is perpendicular to the warp.
-pub fn curvatures(
-    mesh: &TriangleMesh,
-    topology: &Topology,
-    warp: Option<Vector3<f64>>,
-) -> Result<Vec<Curvature>, ThreadError> {
+pub fn curvatures(mesh: &TriangleMesh, topology: &Topology, warp: Option<Warp>) -> Result<Vec<Curvature>, ThreadError> {
     let tilts = Tilts::of(mesh, topology, warp)?;
     let mut curvatures = Vec::with_capacity(mesh.triangles().len());
     for (triangle, sides) in tilts.sides.iter().enumerate() {
@@ -103,11 +104,10 @@ fn add(angles: &mut Vec<(usize, [f64; 3])>, hinge: usize, scale: f64, weight: [f
 fn material_coordinates(
     mesh: &TriangleMesh,
     triangle: usize,
-    warp: Option<Vector3<f64>>,
+    warp: Option<Warp>,
 ) -> Result<[[f64; 2]; 3], ThreadError> {
-    let corners = mesh.corners(triangle);
     match warp {
-        None => Ok(material_triangle(corners)),
-        Some(warp) => thread_triangle(corners, warp).ok_or(ThreadError { triangle, warp }),
+        None => Ok(material_triangle(mesh.corners(triangle))),
+        Some(warp) => mesh.thread_triangle(triangle, warp).ok_or(ThreadError { triangle, warp }),
     }
 }

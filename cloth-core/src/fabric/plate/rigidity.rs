@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::bounded::{non_negative, poisson_ratio, positive};
+use crate::bounded::{NonNegative, PoissonRatio, Positive, Real};
 
 /// The flexural rigidity of a plate.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -10,37 +10,37 @@ pub enum Rigidity {
     /// An isotropic plate: D = E h³/(12 (1 − ν²)).
     Isotropic {
         /// Young's modulus E, in Pa.
-        #[serde(deserialize_with = "non_negative")]
+        #[serde(with = "Real::<NonNegative>")]
         young_modulus: f64,
         /// Thickness h, in m.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Real::<Positive>")]
         thickness: f64,
         /// Poisson's ratio ν, in (−1, 1).
-        #[serde(deserialize_with = "poisson_ratio")]
+        #[serde(with = "Real::<PoissonRatio>")]
         poisson_ratio: f64,
     },
     /// An isotropic plate, given its flexural rigidity.
     Flexural {
         /// Flexural rigidity D, in N m.
-        #[serde(deserialize_with = "non_negative")]
+        #[serde(with = "Real::<NonNegative>")]
         rigidity: f64,
         /// Poisson's ratio ν, in (−1, 1).
-        #[serde(deserialize_with = "poisson_ratio")]
+        #[serde(with = "Real::<PoissonRatio>")]
         poisson_ratio: f64,
     },
     /// A woven plate, from cantilever tests of narrow strips along warp, weft and bias, per width.
     Orthotropic {
         /// Rigidity of a strip along the warp, in N m.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Real::<Positive>")]
         warp: f64,
         /// Rigidity of a strip along the weft, in N m.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Real::<Positive>")]
         weft: f64,
         /// Rigidity of a strip at 45° to both, in N m.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Real::<Positive>")]
         bias: f64,
         /// Opposite curvature across a strip along the warp, relative to the curvature along it. Default 0.
-        #[serde(default, deserialize_with = "poisson_ratio")]
+        #[serde(default, with = "Real::<PoissonRatio>")]
         poisson_ratio: f64,
     },
 }

@@ -12,6 +12,7 @@ use super::assembly::{CurvedPart, OuterProducts};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
 use crate::geometry::dot;
+use crate::mesh::Warp;
 use crate::mesh::{Topology, TriangleMesh};
 
 /// Plate bending of a mesh: Σ ½ ‖r‖² over the triangles. Each r = Σ b (θ − θ̄) consists of three combinations of the
@@ -85,7 +86,7 @@ impl PlateTerm {
         name: impl Into<String>,
         mesh: &TriangleMesh,
         rigidity: &Rigidity,
-        warp: Vector3<f64>,
+        warp: impl Into<Warp>,
     ) -> Result<Self, PlateError> {
         let factor = cholesky(&rigidity.matrix()?);
         let topology = Topology::of(mesh);
@@ -93,7 +94,7 @@ impl PlateTerm {
         let angle = ArcAngle::<f64>::new();
         let rest = hinges.iter().map(|hinge| angle.value(&hinge.map(|vertex| mesh.vertices()[vertex])).value).collect();
         let woven = matches!(rigidity, Rigidity::Orthotropic { .. });
-        let curvatures = curvatures(mesh, &topology, woven.then_some(warp))?;
+        let curvatures = curvatures(mesh, &topology, woven.then(|| warp.into()))?;
         let patches: Vec<Patch> = curvatures.iter().filter_map(|one| Patch::new(one, &factor, &hinges)).collect();
         let arity = patches.iter().map(|patch| patch.vertices.len()).max().unwrap_or(1);
         let mut stencils = Vec::with_capacity(arity * patches.len());

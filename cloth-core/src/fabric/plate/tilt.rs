@@ -1,7 +1,5 @@
-use energy_dsl::Vector3;
-
 use super::{ThreadError, material_coordinates};
-use crate::mesh::{Topology, TriangleMesh};
+use crate::mesh::{Topology, TriangleMesh, Warp};
 
 /// For each edge, the deviation of the surface's normal at the midpoint from the bisector of the triangles' normals.
 ///
@@ -49,7 +47,7 @@ impl Tilts {
     ///
     /// # Errors
     /// Returns an error if a triangle is perpendicular to the warp.
-    pub fn of(mesh: &TriangleMesh, topology: &Topology, warp: Option<Vector3<f64>>) -> Result<Self, ThreadError> {
+    pub fn of(mesh: &TriangleMesh, topology: &Topology, warp: Option<Warp>) -> Result<Self, ThreadError> {
         let mut sides = Vec::with_capacity(mesh.triangles().len());
         for triangle in 0..mesh.triangles().len() {
             sides.push(sides_of(material_coordinates(mesh, triangle, warp)?));

@@ -1,0 +1,151 @@
+use std::borrow::Cow;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Serialize;
+use serde::de::{Deserialize, Deserializer, Error, Visitor};
+
+use super::exactly;
+
+/// A whole number of any size.
+struct AnyWhole(i64);
+
+impl<'de> Deserialize<'de> for AnyWhole {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WholeVisitor;
+        impl Visitor<'_> for WholeVisitor {
+            type Value = AnyWhole;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a whole number")
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> Result<AnyWhole, E> {
+                Ok(AnyWhole(number))
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> Result<AnyWhole, E> {
+                Ok(AnyWhole(i64::try_from(number).unwrap_or(i64::MAX)))
+            }
+
+            fn visit_f64<E: Error>(self, number: f64) -> Result<AnyWhole, E> {
+                // JSON schemas call 4.0 an integer.
+                if number.fract() == 0.0 {
+                    Ok(AnyWhole(number as i64))
+                } else {
+                    Err(E::invalid_type(serde::de::Unexpected::Float(number), &self))
+                }
+            }
+        }
+        deserializer.deserialize_any(WholeVisitor)
+    }
+}
+
+fn check<const LEAST: usize, const MOST: usize, E: Error>(AnyWhole(number): AnyWhole) -> Result<usize, E> {
+    let fits = usize::try_from(number).ok().filter(|number| (LEAST..=MOST).contains(number));
+    fits.ok_or_else(|| E::custom(format!("expected a whole number from {LEAST} to {MOST}, got {number}")))
+}
+
+fn whole<'de, const LEAST: usize, const MOST: usize, const N: usize, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<[usize; N], D::Error> {
+    let numbers = Vec::<AnyWhole>::deserialize(deserializer)?;
+    exactly(numbers.into_iter().map(check::<LEAST, MOST, _>).collect::<Result<_, _>>()?)
+}
+
+/// A number of parts.
+pub(crate) struct Count<const LEAST: usize, const MOST: usize>;
+
+/// A number of parts, or none.
+pub(crate) struct MaybeCount<const LEAST: usize, const MOST: usize>;
+
+/// N numbers of parts.
+pub(crate) struct Counts<const LEAST: usize, const MOST: usize, const N: usize>;
+
+/// A list of pairs of vertices.
+pub(crate) struct Pairs;
+
+/// Two names.
+pub(crate) struct Pair;
+
+/// The largest index of a vertex.
+const LARGEST_INDEX: usize = u32::MAX as usize;
+
+impl<const LEAST: usize, const MOST: usize> Count<LEAST, MOST> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+        check::<LEAST, MOST, _>(AnyWhole::deserialize(deserializer)?)
+    }
+}
+
+impl<const LEAST: usize, const MOST: usize> MaybeCount<LEAST, MOST> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<usize>, D::Error> {
+        Count::<LEAST, MOST>::deserialize(deserializer).map(Some)
+    }
+}
+
+impl<const LEAST: usize, const MOST: usize, const N: usize> Counts<LEAST, MOST, N> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[usize; N], D::Error> {
+        whole::<LEAST, MOST, N, D>(deserializer)
+    }
+}
+
+impl Pairs {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<[usize; 2]>>, D::Error> {
+        struct One([usize; 2]);
+        impl<'de> Deserialize<'de> for One {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                whole::<0, LARGEST_INDEX, 2, D>(deserializer).map(One)
+            }
+        }
+        Vec::<One>::deserialize(deserializer).map(|pairs| Some(pairs.into_iter().map(|One(pair)| pair).collect()))
+    }
+}
+
+impl Pair {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[String; 2], D::Error> {
+        exactly(Vec::deserialize(deserializer)?)
+    }
+}
+
+fn integer(least: usize, most: usize) -> Schema {
+    json_schema!({ "type": "integer", "minimum": least, "maximum": most })
+}
+
+fn array(items: &Schema, count: usize) -> Schema {
+    json_schema!({ "type": "array", "items": items, "minItems": count, "maxItems": count })
+}
+
+/// Implements the schema of a type, and the serialisation of its values, which the schema's defaults need.
+macro_rules! described {
+    ([$($generics:tt)*] $name:ty, $value:ty, $schema:expr) => {
+        impl<$($generics)*> JsonSchema for $name {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                $schema
+            }
+        }
+
+        impl<$($generics)*> $name {
+            #[allow(dead_code, reason = "only fields with a default need it")]
+            pub(crate) fn serialize<S: serde::Serializer>(value: &$value, serializer: S) -> Result<S::Ok, S::Error> {
+                value.serialize(serializer)
+            }
+        }
+    };
+}
+
+described!([const LEAST: usize, const MOST: usize] Count<LEAST, MOST>, usize, integer(LEAST, MOST));
+described!([const LEAST: usize, const MOST: usize] MaybeCount<LEAST, MOST>, Option<usize>, integer(LEAST, MOST));
+described!([const LEAST: usize, const MOST: usize, const N: usize] Counts<LEAST, MOST, N>, [usize],
+    array(&integer(LEAST, MOST), N));
+described!([] Pairs, Option<Vec<[usize; 2]>>, json_schema!({
+    "type": "array", "items": array(&integer(0, LARGEST_INDEX), 2)
+}));
+described!([] Pair, [String], array(&json_schema!({ "type": "string" }), 2));

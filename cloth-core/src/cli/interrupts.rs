@@ -1,0 +1,62 @@
+//! Signals that end a run early: Ctrl-C, a request to terminate, a closed terminal.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use anyhow::{Context, Result};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
+#[cfg(unix)]
+const ENDING: [i32; 3] = [SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
+#[cfg(not(unix))]
+const ENDING: [i32; 2] = [SIGINT, SIGTERM];
+
+/// The signals that arrived so far.
+#[derive(Debug, Default)]
+pub struct Interrupts {
+    stop: Arc<AtomicBool>,
+    last: Arc<AtomicUsize>,
+}
+
+impl Interrupts {
+    /// Listens for signals. The first one sets the flag; the second one exits at once. Signals that were ignored when
+    /// the program started stay ignored, so that `nohup cloth run` outlives its terminal.
+    pub fn listen() -> Result<Self> {
+        let interrupts = Self::default();
+        let ignored = ignored_at_start();
+        for signal in ENDING.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0) {
+            interrupts.listen_for(signal).context("cannot listen for signals")?;
+        }
+        Ok(interrupts)
+    }
+
+    fn listen_for(&self, signal: i32) -> std::io::Result<()> {
+        // Actions run in the order of their registration: the first signal finds the flag unset.
+        flag::register_conditional_shutdown(signal, exit_status(signal).into(), Arc::clone(&self.stop))?;
+        flag::register_usize(signal, Arc::clone(&self.last), signal as usize)?;
+        flag::register(signal, Arc::clone(&self.stop)).map(|_| ())
+    }
+
+    /// Whether a signal has arrived.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.stop
+    }
+
+    /// The exit code of a run that a signal ended: 128 and the number of the signal, as shells report it.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(exit_status(self.last.load(Ordering::Relaxed) as i32))
+    }
+}
+
+fn exit_status(signal: i32) -> u8 {
+    128 + signal as u8
+}
+
+/// Returns the set of ignored signals; bit n − 1 stands for signal n. Empty where the system has no `/proc`.
+fn ignored_at_start() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}

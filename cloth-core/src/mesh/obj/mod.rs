@@ -1,0 +1,275 @@
+//! Reads OBJ files as exporters write them.
+
+mod file;
+mod lines;
+mod weld;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use energy_dsl::Vector3;
+
+use super::{CornerAttributes, MeshError, TriangleMesh};
+use crate::input_text;
+use file::{Corner, Face, Malformed, ObjFile};
+
+/// The largest size of an OBJ file, in bytes: some ten million vertices.
+const LARGEST_FILE: u64 = 1 << 30;
+
+/// An OBJ file that is not a valid mesh.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
+pub enum ObjError {
+    /// The file cannot be read.
+    #[error("cannot read {}", .path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// A line is malformed.
+    #[error("{}:{line}: {reason}: `{text}`", .path.display())]
+    Line {
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        reason: String,
+        /// The text of the line.
+        text: String,
+    },
+    /// The file has no such group.
+    #[error(
+        "{}: there is no group, object or material called `{name}`; there are {}",
+        .path.display(), .known.join(", ")
+    )]
+    UnknownGroup {
+        path: PathBuf,
+        name: String,
+        /// The names in the file.
+        known: Vec<String>,
+    },
+    /// The mesh is invalid.
+    #[error("{}{}: {source}", .path.display(), .line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Unfit {
+        path: PathBuf,
+        /// The line of the invalid vertex or triangle, from 1; `None` if no single line is at fault.
+        line: Option<usize>,
+        source: MeshError,
+    },
+}
+
+/// Which part of an OBJ file to read, and how.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ObjOptions<'a> {
+    /// Groups, objects or materials whose faces are read; `None` for all faces.
+    pub groups: Option<&'a [String]>,
+    /// Merges vertices up to this distance, in m; `None` to keep them apart.
+    pub weld: Option<f64>,
+}
+
+/// A surface from an OBJ file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjSurface {
+    /// The mesh. Vertices that no face uses are left out; the others keep their order.
+    pub mesh: TriangleMesh,
+    /// Texture coordinates and normals of the corners.
+    pub corners: CornerAttributes,
+    /// The vertices of each group, object and material.
+    pub groups: BTreeMap<String, Vec<usize>>,
+    /// Number of vertices that were merged with another one.
+    pub welded: usize,
+}
+
+/// Reads a mesh from an OBJ file; see [`read_obj_surface`].
+///
+/// # Errors
+/// Returns an error if the file cannot be read, a line is malformed, or the mesh is invalid.
+pub fn read_obj(path: &Path) -> Result<TriangleMesh, ObjError> {
+    read_obj_surface(path, ObjOptions::default()).map(|surface| surface.mesh)
+}
+
+/// Reads a surface from an OBJ file. Polygons are split into triangle fans. The text is UTF-8 or Latin-1.
+///
+/// # Errors
+/// Returns an error if the file cannot be read, a line is malformed, a group does not exist, or the mesh is invalid,
+/// with the line number if one line is at fault.
+pub fn read_obj_surface(path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
+    let contents = input_text::read_regular(path, LARGEST_FILE);
+    let contents = contents.map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
+    surface(&lines::decoded(contents), path, options)
+}
+
+fn surface(text: &str, path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
+    let file = ObjFile::parse(&lines::logical(text)).map_err(|Malformed { line, reason, text }| {
+        let path = path.to_owned();
+        ObjError::Line { path, line, reason, text }
+    })?;
+    let faces = chosen_faces(&file, path, options.groups)?;
+    Triangulation::new(&file, &faces, options.weld).surface(&file, path)
+}
+
+/// Returns the faces of the groups.
+fn chosen_faces<'a>(file: &'a ObjFile, path: &Path, groups: Option<&[String]>) -> Result<Vec<&'a Face>, ObjError> {
+    let Some(groups) = groups else { return Ok(file.faces.iter().collect()) };
+    let number = |name: &String| {
+        let unknown =
+            || ObjError::UnknownGroup { path: path.to_owned(), name: name.clone(), known: file.names.clone() };
+        file.names.iter().position(|known| known == name).ok_or_else(unknown)
+    };
+    let wanted: Vec<usize> = groups.iter().map(number).collect::<Result<_, _>>()?;
+    Ok(file.faces.iter().filter(|face| face.groups.iter().any(|group| wanted.contains(group))).collect())
+}
+
+/// The triangles of faces, with vertices numbered from 0 without unused ones.
+struct Triangulation {
+    /// The vertex of the file for each vertex.
+    sources: Vec<usize>,
+    triangles: Vec<[usize; 3]>,
+    /// Of each triangle: its corners in the file, its line, and the groups of its face.
+    corners: Vec<[Corner; 3]>,
+    lines: Vec<usize>,
+    groups: Vec<Vec<usize>>,
+    welded: usize,
+}
+
+impl Triangulation {
+    fn new(file: &ObjFile, faces: &[&Face], weld: Option<f64>) -> Self {
+        let mut used = vec![false; file.vertices.len()];
+        faces.iter().flat_map(|face| &face.corners).for_each(|corner| used[corner.vertex] = true);
+        let used: Vec<usize> = (0..used.len()).filter(|&vertex| used[vertex]).collect();
+        // The vertex of the file that stands for each.
+        let mut merged: Vec<usize> = (0..file.vertices.len()).collect();
+        if let Some(distance) = weld {
+            let positions: Vec<Vector3<f64>> = used.iter().map(|&vertex| file.vertices[vertex]).collect();
+            let first = weld::welded(&positions, distance);
+            used.iter().zip(first).for_each(|(&vertex, first)| merged[vertex] = used[first]);
+        }
+        let sources: Vec<usize> = used.iter().copied().filter(|&vertex| merged[vertex] == vertex).collect();
+        let mut number = vec![usize::MAX; file.vertices.len()];
+        sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex] = place);
+        let welded = used.len() - sources.len();
+        let (triangles, corners, lines, groups) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self { sources, triangles, corners, lines, groups, welded };
+        for face in faces {
+            for end in 2..face.corners.len() {
+                let corners = [face.corners[0], face.corners[end - 1], face.corners[end]];
+                let triangle = corners.map(|corner| number[merged[corner.vertex]]);
+                let [a, b, c] = triangle;
+                // Welding closes triangles that are smaller than its distance.
+                if weld.is_none() || a != b && b != c && c != a {
+                    all.triangles.push(triangle);
+                    all.corners.push(corners);
+                    all.lines.push(face.line);
+                    all.groups.push(face.groups.clone());
+                }
+            }
+        }
+        all
+    }
+
+    fn surface(self, file: &ObjFile, path: &Path) -> Result<ObjSurface, ObjError> {
+        let vertices = self.sources.iter().map(|&vertex| file.vertices[vertex]).collect();
+        let corners = self.attributes(file);
+        let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (triangle, names) in self.triangles.iter().zip(&self.groups) {
+            names.iter().for_each(|&name| groups.entry(file.names[name].clone()).or_default().extend(triangle));
+        }
+        for vertices in groups.values_mut() {
+            vertices.sort_unstable();
+            vertices.dedup();
+        }
+        let mesh = TriangleMesh::new(vertices, self.triangles.clone());
+        let mesh = mesh.map_err(|source| self.unfit(file, path, source))?;
+        let warps = corners.uvs.as_ref().map(|uvs| mesh.warps_of(uvs));
+        Ok(ObjSurface { mesh: mesh.with_warps(warps), corners, groups, welded: self.welded })
+    }
+
+    /// Texture coordinates and normals, each only if all corners have them.
+    fn attributes(&self, file: &ObjFile) -> CornerAttributes {
+        let of = |pick: fn(&Corner) -> Option<usize>| -> Option<Vec<[usize; 3]>> {
+            let triangle = |corners: &[Corner; 3]| -> Option<[usize; 3]> {
+                let [a, b, c] = corners.each_ref().map(pick);
+                Some([a?, b?, c?])
+            };
+            self.corners.iter().map(triangle).collect()
+        };
+        let uvs = of(|corner| corner.uv);
+        let uvs = uvs.map(|uvs| uvs.into_iter().map(|corners| corners.map(|corner| file.uvs[corner])).collect());
+        CornerAttributes { uvs, normals: of(|corner| corner.normal) }
+    }
+
+    fn unfit(&self, file: &ObjFile, path: &Path, source: MeshError) -> ObjError {
+        let line = match &source {
+            MeshError::NonFiniteVertex { vertex, .. } | MeshError::Unreferenced { vertex, .. } => {
+                self.sources.get(*vertex).map(|&vertex| file.vertex_lines[vertex])
+            }
+            MeshError::VertexOutOfRange { triangle, .. } | MeshError::ZeroArea { triangle, .. } => {
+                Some(self.lines[*triangle])
+            }
+            MeshError::NonManifoldEdge { triangles, .. } => triangles.last().map(|&last| self.lines[last]),
+            MeshError::Empty { .. } => None,
+        };
+        ObjError::Unfit { path: path.to_owned(), line, source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_with(text: &str, options: ObjOptions<'_>) -> Result<ObjSurface, String> {
+        surface(text, Path::new("sheet.obj"), options).map_err(|error| error.to_string())
+    }
+
+    fn read(text: &str) -> Result<TriangleMesh, String> {
+        read_with(text, ObjOptions::default()).map(|surface| surface.mesh)
+    }
+
+    const VERTICES: &str = "# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn vertices_keep_the_order_of_the_file() {
+        let text = format!("{VERTICES}vt 0 0\nvn 0 0 1\no part\nf 3/1/1 4//1 1\ng other\nusemtl red\nf -4 -3 -2\n");
+        let mesh = read(&text).unwrap();
+        assert_eq!(mesh.triangles(), [[2, 3, 0], [0, 1, 2]]);
+        assert_eq!(mesh.vertices()[3], [0.0, 1.0, 0.0]);
+        assert_eq!(read(&format!("{VERTICES}f 1 2 3 4\n")).unwrap().triangles(), [[0, 1, 2], [0, 2, 3]]);
+        // Relative numbers count from the line of the face; unused vertices are left out.
+        let mesh = read(&format!("v 9 9 9\n{VERTICES}f -4 -3 -2\nv 2 2 2\nf -4 -3 -2\n")).unwrap();
+        assert_eq!(mesh.triangles(), [[0, 1, 2], [1, 2, 3]]);
+        assert_eq!((mesh.vertices().len(), mesh.vertices()[0]), (4, [0.0; 3]));
+    }
+
+    #[test]
+    fn groups_choose_faces_and_doubled_vertices_are_welded() {
+        let doubled = format!("{VERTICES}v 0 0 1e-9\nv 1 1 0\ng left\nf 1 2 3\ng right top\nf 5 6 4\n");
+        let all = read_with(&doubled, ObjOptions::default()).unwrap();
+        assert_eq!((all.mesh.pieces(1).len(), all.welded), (2, 0));
+        assert_eq!(all.groups["right"], [3, 4, 5]);
+        let welded = read_with(&doubled, ObjOptions { weld: Some(1e-6), ..ObjOptions::default() }).unwrap();
+        assert_eq!((welded.mesh.pieces(1).len(), welded.welded), (1, 2));
+        assert_eq!(welded.mesh.triangles(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(welded.groups["top"], [0, 2, 3]);
+        let names = ["right".to_owned()];
+        let right = read_with(&doubled, ObjOptions { groups: Some(&names), ..ObjOptions::default() }).unwrap();
+        assert_eq!((right.mesh.vertices().len(), right.mesh.triangles()), (3, &[[1, 2, 0]][..]));
+        let names = ["rihgt".to_owned()];
+        let message = read_with(&doubled, ObjOptions { groups: Some(&names), ..ObjOptions::default() }).unwrap_err();
+        assert_eq!(
+            message,
+            "sheet.obj: there is no group, object or material called `rihgt`; there are left, right, top"
+        );
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let message = |more: &str| read(&format!("{VERTICES}{more}")).unwrap_err();
+        assert!(read("").unwrap_err().starts_with("sheet.obj: the mesh has 0 vertices"));
+        assert!(message("f 1 2 3\nf 1 3 9\n").starts_with("sheet.obj:7: the face refers to a vertex"));
+        assert!(message("f 1 2 3\nf 1 0 4\n").starts_with("sheet.obj:7: "));
+        assert!(message("f 1 2 3\nf 1 x 4\n").starts_with("sheet.obj:7: expected a whole number, got `x`"));
+        assert!(message("f 1 2 3\nf 1 4\n").starts_with("sheet.obj:7: a face needs at least three corners, got 2"));
+        assert!(message("f 1/1 2/1 3/1\n").starts_with("sheet.obj:6: the face refers to a texture coordinate"));
+        assert!(message("v 1 2 z\nf 1 2 3\n").starts_with("sheet.obj:6: expected a number, got `z`"));
+        assert!(message("v 1 2\nf 1 2 3\n").starts_with("sheet.obj:6: expected 3 numbers, got 2"));
+        assert!(message("v 1 NaN 0\nf 1 2 3\nf 3 4 5\n").starts_with("sheet.obj:6: vertex 4 is not finite"));
+        assert!(message("f 1 2 3\nf 1 3 4\nf 1 3 2\n").starts_with("sheet.obj:8: edge 0–2 is shared by 3"));
+        assert!(message("f 1 2 3\nf 1 1 4\n").starts_with("sheet.obj:7: triangle 1"));
+    }
+}

@@ -1,0 +1,30 @@
+//! Merges vertices at the same place, which exporters double along seams of texture coordinates.
+
+use std::collections::HashMap;
+
+use energy_dsl::Vector3;
+
+use crate::geometry::{norm, subtract};
+use crate::mesh::DisjointSets;
+
+/// Returns for each vertex the first one that it is merged with: those within `distance`, in m, and those within that
+/// distance of them.
+pub(super) fn welded(vertices: &[Vector3<f64>], distance: f64) -> Vec<usize> {
+    // Cells that are not smaller than the distance; below that, rounding of the coordinates would decide.
+    let largest = vertices.iter().flatten().fold(0.0, |largest: f64, c| largest.max(c.abs()));
+    let size = distance.max(1e-15 * largest).max(f64::MIN_POSITIVE);
+    let cell = |p: &Vector3<f64>| p.map(|coordinate| (coordinate / size).floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    let mut sets = DisjointSets::singletons(vertices.len());
+    for (vertex, p) in vertices.iter().enumerate() {
+        let home = cell(p);
+        for neighbour in 0..27_i64 {
+            let offset = [neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1];
+            let at = std::array::from_fn(|axis| home[axis].saturating_add(offset[axis]));
+            let near = cells.get(&at).into_iter().flatten();
+            near.filter(|&&other| norm(subtract(*p, vertices[other])) <= distance).for_each(|&o| sets.join(o, vertex));
+        }
+        cells.entry(home).or_default().push(vertex);
+    }
+    (0..vertices.len()).map(|vertex| sets.representative(vertex)).collect()
+}
