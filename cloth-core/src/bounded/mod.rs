@@ -4,6 +4,7 @@
 //! differ. [`Strict`] reads tables and choices.
 
 mod choice;
+mod described;
 mod range;
 mod real;
 mod strict;

@@ -1,12 +1,11 @@
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::Serialize;
+use schemars::{Schema, json_schema};
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
+use super::described::{array, described};
 use super::exactly;
 use super::range::{Number, Range};
 
@@ -106,35 +105,6 @@ impl Direction {
         let square: f64 = numbers.iter().map(|number| number * number).sum();
         Ok(if square.is_normal() { numbers } else { numbers.map(|number| number / largest) })
     }
-}
-
-/// Implements the schema of a type, and the serialisation of its values, which the schema's defaults need.
-macro_rules! described {
-    ([$($generics:tt)*] $name:ty, $value:ty, $schema:expr) => {
-        impl<$($generics)*> JsonSchema for $name {
-            fn inline_schema() -> bool {
-                true
-            }
-
-            fn schema_name() -> Cow<'static, str> {
-                stringify!($name).into()
-            }
-
-            fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                $schema
-            }
-        }
-
-        impl<$($generics)*> $name {
-            pub(crate) fn serialize<S: serde::Serializer>(value: &$value, serializer: S) -> Result<S::Ok, S::Error> {
-                value.serialize(serializer)
-            }
-        }
-    };
-}
-
-fn array(items: &Schema, count: usize) -> Schema {
-    json_schema!({ "type": "array", "items": items, "minItems": count, "maxItems": count })
 }
 
 fn direction() -> Schema {

@@ -1,10 +1,9 @@
-use std::borrow::Cow;
 use std::fmt;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::Serialize;
+use schemars::{Schema, json_schema};
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
+use super::described::{array, described};
 use super::exactly;
 
 /// A whole number of any size.
@@ -109,36 +108,6 @@ impl Pair {
 
 fn integer(least: usize, most: usize) -> Schema {
     json_schema!({ "type": "integer", "minimum": least, "maximum": most })
-}
-
-fn array(items: &Schema, count: usize) -> Schema {
-    json_schema!({ "type": "array", "items": items, "minItems": count, "maxItems": count })
-}
-
-/// Implements the schema of a type, and the serialisation of its values, which the schema's defaults need.
-macro_rules! described {
-    ([$($generics:tt)*] $name:ty, $value:ty, $schema:expr) => {
-        impl<$($generics)*> JsonSchema for $name {
-            fn inline_schema() -> bool {
-                true
-            }
-
-            fn schema_name() -> Cow<'static, str> {
-                stringify!($name).into()
-            }
-
-            fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                $schema
-            }
-        }
-
-        impl<$($generics)*> $name {
-            #[allow(dead_code, reason = "only fields with a default need it")]
-            pub(crate) fn serialize<S: serde::Serializer>(value: &$value, serializer: S) -> Result<S::Ok, S::Error> {
-                value.serialize(serializer)
-            }
-        }
-    };
 }
 
 described!([const LEAST: usize, const MOST: usize] Count<LEAST, MOST>, usize, integer(LEAST, MOST));

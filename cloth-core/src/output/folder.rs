@@ -34,7 +34,8 @@ pub enum OutputError {
 pub struct OutputFolder {
     path: PathBuf,
     /// Held by all clones; `None` for a report, and on file systems without locks.
-    _lock: Option<Arc<FolderLock>>,
+    #[expect(dead_code, reason = "held until the last clone is dropped")]
+    lock: Option<Arc<FolderLock>>,
 }
 
 impl OutputFolder {
@@ -101,7 +102,7 @@ impl OutputFolder {
     /// Returns an error if the folder cannot be written to, or if another run writes to it.
     pub fn reopen(path: &Path) -> Result<Self, OutputError> {
         let folder = Self::unlocked(path)?;
-        Ok(Self { _lock: FolderLock::take(path)?.map(Arc::new), ..folder })
+        Ok(Self { lock: FolderLock::take(path)?.map(Arc::new), ..folder })
     }
 
     /// Opens the folder of a run that is reported, and checks that it can be written to. Does not lock it: the report
@@ -110,7 +111,7 @@ impl OutputFolder {
     /// # Errors
     /// Returns an error if the folder cannot be written to.
     pub fn unlocked(path: &Path) -> Result<Self, OutputError> {
-        let folder = Self { path: path.to_owned(), _lock: None };
+        let folder = Self { path: path.to_owned(), lock: None };
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
         std::fs::create_dir_all(folder.frames()).map_err(unusable)?;
         for probed in [path.to_owned(), folder.frames()] {
