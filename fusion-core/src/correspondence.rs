@@ -31,6 +31,8 @@ pub struct MatchCounts {
     pub matched: usize,
     /// Facing away from the camera.
     pub back_facing: usize,
+    /// Behind another part of the body.
+    pub hidden: usize,
     /// Outside the image, or behind the camera.
     pub outside: usize,
     /// Without a measured depth or normal.
@@ -42,7 +44,7 @@ pub struct MatchCounts {
 }
 
 /// Matches each vertex with the point measured in its pixel. `origin` is the model's origin in the camera's
-/// coordinates.
+/// coordinates. `hidden` vertices have no match; an empty list hides none.
 #[must_use]
 pub fn correspondences(
     moved: &Moved,
@@ -50,6 +52,7 @@ pub fn correspondences(
     image: &DepthImage,
     camera: &Camera,
     gates: &Gates,
+    hidden: &[bool],
 ) -> (Vec<Pair>, MatchCounts) {
     let (mut pairs, mut counts) = (Vec::new(), MatchCounts::default());
     let least_cosine = gates.angle.cos();
@@ -57,6 +60,10 @@ pub fn correspondences(
         let seen = place + origin;
         if normal.dot(&seen) >= 0.0 {
             counts.back_facing += 1;
+            continue;
+        }
+        if hidden.get(vertex) == Some(&true) {
+            counts.hidden += 1;
             continue;
         }
         let Some(pixel) = camera.pixel(&seen) else {

@@ -1,9 +1,9 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use energy_cli::write_file;
-use fusion_core::body::obj_text;
+use fusion_core::body::{Bone, obj_text};
 use fusion_core::depth::DepthSequence;
 use fusion_core::energy::BoneMode;
 use fusion_core::model::{DeformationModel, ModelOptions};
@@ -67,7 +67,18 @@ struct Line {
     skeleton: f64,
     prior: f64,
     joints: f64,
+    /// Empty if the image was used.
     reason: String,
+    visible: f64,
+    inliers: f64,
+    residual_mm: f64,
+}
+
+impl Line {
+    /// Whether the image was used.
+    fn is_tracked(&self) -> bool {
+        self.reason.is_empty()
+    }
 }
 
 /// Motions of the nodes.
@@ -80,14 +91,6 @@ struct NodeMotions<'a> {
     nodes: Vec<[f64; 3]>,
     /// Twists by frame, then node.
     frames: &'a [Vec<Twist>],
-}
-
-/// Numbers of frames.
-pub struct Tracked {
-    /// Tracked frames.
-    pub tracked: usize,
-    /// Skipped frames; the table has the reasons.
-    pub skipped: usize,
 }
 
 impl Track {
@@ -105,29 +108,28 @@ impl Track {
         }
     }
 
-    pub fn run(&self) -> Result<Tracked> {
+    /// # Errors
+    /// If an input cannot be used, or no image could be tracked. In the latter case the table of frames has the
+    /// reasons.
+    pub fn run(&self) -> Result<()> {
         let sequence = DepthSequence::open(&self.recording)?;
         let model = self.model.clone().unwrap_or_else(|| self.recording.join(MODEL));
         let body = read_any_body(&model).context("the model")?;
-        let skeleton = self.skeleton()?;
         let parameters = self.parameters()?;
         let model = DeformationModel::new(&body, parameters.model)?;
         if !model.fill.left.is_empty() {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
         }
-        if let Some(skeleton) = &skeleton {
-            // Report missing bones before tracking starts.
-            skeleton.motions(0, &model.bones)?;
-        }
+        let skeleton = self.skeleton(sequence.len(), &model.bones)?;
         let mut tracker = Tracker::new(model, sequence.info.camera, parameters.tracker)?;
         prepare(&self.output, &["meshes"], &[FRAMES, NODES], self.overwrite)?;
-        let mut lines = Vec::new();
+        let mut lines: Vec<Line> = Vec::new();
         let mut motions = Vec::new();
         let progress = progress_bar(sequence.len(), "tracking");
         for frame in 0..sequence.len() {
-            let line = self.frame(frame, &sequence, skeleton.as_ref(), &mut tracker);
-            if !line.reason.is_empty() {
-                progress.suspend(|| eprintln!("warning: frame {frame} skipped: {}", line.reason));
+            let line = track_frame(frame, &sequence, skeleton.as_ref(), &mut tracker);
+            if let Some(warning) = change(lines.last(), &line) {
+                progress.suspend(|| eprintln!("warning: {warning}"));
             }
             lines.push(line);
             let mesh = obj_text(&tracker.vertices(), &tracker.model().mesh.triangles);
@@ -137,24 +139,47 @@ impl Track {
         }
         progress.finish_and_clear();
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
-        let skipped = lines.iter().filter(|line| !line.reason.is_empty()).count();
+        let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
+        if let (0, Some(first)) = (tracked, lines.first()) {
+            let table = self.output.join(FRAMES);
+            bail!("none of {skipped} frames could be tracked; see {}; the first: {}", table.display(), first.reason);
+        }
         print(&format!(
             "tracked {tracked} frames with {} nodes, skipped {skipped}; wrote {}\n",
             tracker.model().nodes.len(),
             self.output.display()
-        ))?;
-        Ok(Tracked { tracked, skipped })
+        ))
     }
 
-    fn skeleton(&self) -> Result<Option<Skeleton>> {
+    /// Reads the skeleton, and checks that it fits before anything is tracked.
+    fn skeleton(&self, images: usize, bones: &[Bone]) -> Result<Option<Skeleton>> {
         let default = self.recording.join(SKELETON);
-        match &self.skeleton {
-            _ if self.no_bones => Ok(None),
-            Some(path) => Ok(Some(Skeleton::read(path)?)),
-            None if default.exists() => Ok(Some(Skeleton::read(&default)?)),
-            None => Ok(None),
-        }
+        let path = match &self.skeleton {
+            _ if self.no_bones => return Ok(None),
+            Some(path) => path.clone(),
+            None if default.exists() => default,
+            None if self.unknown_bones => {
+                bail!(
+                    "--unknown-bones needs reported bones, but {} does not exist; add it, or name one by --skeleton",
+                    default.display()
+                );
+            }
+            None => {
+                eprintln!("warning: {} does not exist; tracking without bones", default.display());
+                return Ok(None);
+            }
+        };
+        let skeleton = Skeleton::read(&path)?;
+        let frames = skeleton.frames.len();
+        ensure!(
+            frames >= images,
+            "{}: expected bones for each of {images} images, got {frames} frames; \
+             complete the skeleton, shorten depth.txt, or track with --no-bones",
+            path.display()
+        );
+        skeleton.motions(0, bones).with_context(|| path.display().to_string())?;
+        Ok(Some(skeleton))
     }
 
     fn parameters(&self) -> Result<Parameters> {
@@ -173,28 +198,6 @@ impl Track {
         Ok(parameters)
     }
 
-    /// Tracks one frame. An error is recorded in the row, and tracking continues.
-    fn frame(
-        &self,
-        frame: usize,
-        sequence: &DepthSequence,
-        skeleton: Option<&Skeleton>,
-        tracker: &mut Tracker,
-    ) -> Line {
-        let mut attempt = || -> Result<FrameReport> {
-            let image = sequence.image(frame)?;
-            let bones = match skeleton {
-                Some(skeleton) => skeleton.motions(frame, &tracker.model().bones)?,
-                None => None,
-            };
-            Ok(tracker.track(&image, bones.as_deref())?)
-        };
-        match attempt() {
-            Ok(report) => line(frame, &report),
-            Err(error) => Line { frame, status: "skipped", reason: format!("{error:#}"), ..Line::default() },
-        }
-    }
-
     fn write(&self, lines: &[Line], motions: &[Vec<Twist>], tracker: &Tracker, options: TrackerOptions) -> Result<()> {
         let mut table = csv::Writer::from_writer(Vec::new());
         lines.iter().try_for_each(|line| table.serialize(line))?;
@@ -207,6 +210,49 @@ impl Track {
             frames: motions,
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
+    }
+}
+
+/// Tracks one frame. If its image cannot be used, the body moves by its bones or its last motion, and the row has the
+/// reason.
+fn track_frame(frame: usize, sequence: &DepthSequence, skeleton: Option<&Skeleton>, tracker: &mut Tracker) -> Line {
+    let skipped =
+        |error: &anyhow::Error| Line { frame, status: "skipped", reason: format!("{error:#}"), ..Line::default() };
+    let bones = skeleton.map_or(Ok(None), |skeleton| skeleton.motions(frame, &tracker.model().bones));
+    let (bones, fault) = match bones {
+        Ok(bones) => (bones, None),
+        Err(error) => (None, Some(anyhow::Error::new(error))),
+    };
+    let image = match fault {
+        None => sequence.image(frame).map_err(anyhow::Error::new),
+        Some(fault) => Err(fault),
+    };
+    match image {
+        Ok(image) => match tracker.track(&image, bones.as_deref()) {
+            Ok(report) => line(frame, &report),
+            Err(error) => skipped(&error.into()),
+        },
+        Err(error) => {
+            let moved = tracker.predict(bones.as_deref());
+            skipped(&moved.err().map_or(error, anyhow::Error::new))
+        }
+    }
+}
+
+/// Describes the loss or the recovery of the track from one frame to the next; `None` without either.
+fn change(before: Option<&Line>, now: &Line) -> Option<String> {
+    match (before.is_none_or(Line::is_tracked), now.is_tracked()) {
+        (true, false) => Some(format!(
+            "track lost in frame {}: {}; following the bones, or the last motion without bones",
+            now.frame, now.reason
+        )),
+        (false, true) => Some(format!(
+            "track recovered in frame {}: {:.0} % of the visible vertices match, {:.1} mm from the surface",
+            now.frame,
+            100.0 * now.inliers,
+            now.residual_mm
+        )),
+        _ => None,
     }
 }
 
@@ -228,5 +274,8 @@ fn line(frame: usize, report: &FrameReport) -> Line {
         prior: of("prior"),
         joints: of("joints"),
         reason: String::new(),
+        visible: report.quality.visible,
+        inliers: report.quality.inliers,
+        residual_mm: 1e3 * report.quality.residual,
     }
 }

@@ -16,13 +16,15 @@ pub struct TermWeights {
     pub binding: f64,
     /// Distances of unknown bones from the reported ones.
     pub prior: f64,
+    /// Distances of unknown bones from the motions predicted from the last frames.
+    pub motion: f64,
     /// Gaps between unknown bones at their joints.
     pub joints: f64,
 }
 
 impl Default for TermWeights {
     fn default() -> Self {
-        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 3.0, joints: 1000.0 }
+        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 0.5, motion: 0.1, joints: 1000.0 }
     }
 }
 
@@ -83,7 +85,7 @@ pub enum BoneMode {
 }
 
 /// Options of the energy.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnergyOptions {
     /// Weights λ of the terms.
@@ -96,8 +98,26 @@ pub struct EnergyOptions {
     pub normal: NormalDerivative,
     /// Whether bones are unknowns.
     pub bones: BoneMode,
+    /// Distance in m from a bone's joint at which unknown bones are compared with reported and predicted ones: errors of
+    /// position and errors of rotation times this distance weigh the same.
+    pub prior_reach: f64,
     /// Tukey's limit of the data term, in m; `None` for least squares.
     pub data_tukey: Option<f64>,
     /// Huber's limit of the graph, in m; `None` for least squares.
     pub graph_huber: Option<f64>,
+}
+
+impl Default for EnergyOptions {
+    fn default() -> Self {
+        Self {
+            weights: TermWeights::default(),
+            edges: EdgeWeight::default(),
+            angle: AngleConvention::default(),
+            normal: NormalDerivative::default(),
+            bones: BoneMode::default(),
+            prior_reach: 0.4,
+            data_tukey: None,
+            graph_huber: None,
+        }
+    }
 }
