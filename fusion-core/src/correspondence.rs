@@ -14,7 +14,7 @@ pub struct Gates {
     pub distance: f64,
     /// Largest angle between their normals, in rad.
     pub angle: f64,
-    /// Pixels on each side from which the measured normal is computed.
+    /// Pixels on each side to which a plane is fitted for the measured normal.
     pub normal_reach: usize,
 }
 
@@ -81,7 +81,7 @@ pub fn correspondences(
         }
         match image.normal(camera, pixel, gates.normal_reach) {
             None => counts.no_depth += 1,
-            Some(measured) if measured.dot(normal) < least_cosine => counts.turned += 1,
+            Some(measured) if measured.normal.dot(normal) < least_cosine => counts.turned += 1,
             Some(_) => {
                 counts.matched += 1;
                 pairs.push(Pair { vertex: vertex as u32, point: point - origin });
