@@ -18,6 +18,11 @@ pub struct Gates {
     pub normal_reach: usize,
 }
 
+impl Gates {
+    /// Largest [`Self::normal_reach`].
+    pub const FURTHEST_REACH: usize = 20;
+}
+
 impl Default for Gates {
     fn default() -> Self {
         Self { distance: 0.04, angle: 45.0_f64.to_radians(), normal_reach: 2 }

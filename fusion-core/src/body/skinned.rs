@@ -5,6 +5,7 @@ use super::mesh::Mesh;
 
 /// A bone at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bone {
     /// Name of the bone.
     pub name: String,

@@ -45,6 +45,7 @@ pub enum BodyFileError {
 }
 
 #[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Stored {
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,

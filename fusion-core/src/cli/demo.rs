@@ -16,7 +16,7 @@ pub struct Demo {
     #[arg(short, long, default_value = "out/fusion")]
     output: PathBuf,
     /// Frames to track, at 30 Hz.
-    #[arg(long, default_value_t = 60)]
+    #[arg(long, default_value_t = 60, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
     frames: usize,
 }
 
@@ -32,7 +32,7 @@ impl Demo {
             print(&format!("{name}:\n"))?;
             let folder = self.output.join(name.replace(' ', "-"));
             let (recording, track) = (folder.join("recording"), folder.join("track"));
-            Render::figure(self.frames.max(1), noise, &recording).run()?;
+            Render::figure(self.frames, noise, &recording).run()?;
             Track::of(&recording, unknown_bones, &track).run()?;
             rows.push((name, Evaluate::of(&recording, &track).run()?));
             print("\n")?;

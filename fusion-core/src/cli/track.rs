@@ -11,6 +11,7 @@ use fusion_core::skeleton::Skeleton;
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare};
 use super::render::read_any_body;
@@ -46,7 +47,7 @@ pub struct Track {
 }
 
 /// Options in a file.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Parameters {
     model: ModelOptions,
@@ -182,18 +183,22 @@ impl Track {
         Ok(Some(skeleton))
     }
 
+    /// Reads the options. Those that the file lacks have the defaults for known or for unknown bones.
     fn parameters(&self) -> Result<Parameters> {
-        let mut parameters = match &self.options {
-            Some(path) => {
-                let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-                serde_json::from_str(&text).with_context(|| path.display().to_string())?
-            }
-            None => Parameters::default(),
-        };
-        match (self.unknown_bones, &self.options) {
-            (true, None) => parameters.tracker = TrackerOptions::with_unknown_bones(),
-            (true, Some(_)) => parameters.tracker.energy.bones = BoneMode::Unknown,
-            (false, _) => {}
+        let mut defaults = Parameters::default();
+        if self.unknown_bones {
+            defaults.tracker = TrackerOptions::with_unknown_bones();
+        }
+        let Some(path) = &self.options else { return Ok(defaults) };
+        let here = || path.display().to_string();
+        let text = std::fs::read_to_string(path).with_context(here)?;
+        // Reports an unknown key or a wrong type with its position.
+        serde_json::from_str::<Parameters>(&text).with_context(here)?;
+        let mut all = serde_json::to_value(defaults)?;
+        replace(&mut all, serde_json::from_str(&text).with_context(here)?);
+        let mut parameters: Parameters = serde_json::from_value(all).with_context(here)?;
+        if self.unknown_bones {
+            parameters.tracker.energy.bones = BoneMode::Unknown;
         }
         Ok(parameters)
     }
@@ -210,6 +215,18 @@ impl Track {
             frames: motions,
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
+    }
+}
+
+/// Replaces the values that another object has, at any depth.
+fn replace(value: &mut Value, by: Value) {
+    match (value, by) {
+        (Value::Object(own), Value::Object(other)) => {
+            for (key, by) in other {
+                replace(own.entry(key).or_insert(Value::Null), by);
+            }
+        }
+        (value, by) => *value = by,
     }
 }
 

@@ -16,6 +16,7 @@ use self::data_term::{DataTerm, data_term};
 pub use self::data_term::{Moved, Pair};
 pub use self::options::{BoneMode, EdgeWeight, EnergyOptions, NormalDerivative, TermWeights};
 use crate::model::DeformationModel;
+use crate::option_error::OptionError;
 use crate::twist::{Twist, blended};
 
 /// An energy that cannot be created.
@@ -24,6 +25,9 @@ pub enum EnergyError {
     /// There are fewer bones than the four that a declared residual blends.
     #[error("expected at least four bones if bones are unknowns, got {0}")]
     TooFewBones(usize),
+    /// An option cannot be used.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The model names a node or bone that does not exist, which is a bug.
     #[error(transparent)]
     Coupling(#[from] CouplingError),
@@ -56,8 +60,9 @@ impl FusionEnergy {
     /// Creates the energy of a model, without data.
     ///
     /// # Errors
-    /// If bones are unknowns and there are fewer than four.
+    /// If an option cannot be used, or bones are unknowns and there are fewer than four.
     pub fn new(model: &DeformationModel, options: EnergyOptions) -> Result<Self, EnergyError> {
+        options.validate()?;
         let nodes = model.nodes.len();
         let unknown_bones = options.bones == BoneMode::Unknown;
         if unknown_bones && model.bones.len() < 4 {

@@ -1,5 +1,6 @@
 use serde::{Deserialize, Serialize};
 
+use crate::option_error::OptionError;
 use crate::twist::AngleConvention;
 
 /// Weights λ of the terms, in 1/m² for a dimensionless energy.
@@ -119,5 +120,34 @@ impl Default for EnergyOptions {
             data_tukey: None,
             graph_huber: None,
         }
+    }
+}
+
+impl EnergyOptions {
+    /// Checks every option.
+    ///
+    /// # Errors
+    /// Names the first option that cannot be used.
+    pub fn validate(&self) -> Result<(), OptionError> {
+        let TermWeights { nonrigid, skeleton, graph, binding, prior, motion, joints } = self.weights;
+        // Without these terms, data or bones would have no influence, or nodes without data would not be determined.
+        OptionError::ensure_positive("tracker.energy.weights.nonrigid", nonrigid)?;
+        OptionError::ensure_positive("tracker.energy.weights.graph", graph)?;
+        OptionError::ensure_positive("tracker.energy.weights.binding", binding)?;
+        OptionError::ensure_not_negative("tracker.energy.weights.skeleton", skeleton)?;
+        OptionError::ensure_not_negative("tracker.energy.weights.motion", motion)?;
+        OptionError::ensure_not_negative("tracker.energy.weights.joints", joints)?;
+        match self.bones {
+            BoneMode::Known => OptionError::ensure_not_negative("tracker.energy.weights.prior", prior)?,
+            // The motion alone drifts.
+            BoneMode::Unknown => OptionError::ensure_positive("tracker.energy.weights.prior", prior)?,
+        }
+        OptionError::ensure_positive("tracker.energy.prior_reach", self.prior_reach)?;
+        for (name, limit) in
+            [("tracker.energy.data_tukey", self.data_tukey), ("tracker.energy.graph_huber", self.graph_huber)]
+        {
+            limit.map_or(Ok(()), |limit| OptionError::ensure_positive(name, limit))?;
+        }
+        Ok(())
     }
 }

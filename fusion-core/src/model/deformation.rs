@@ -5,6 +5,7 @@ use super::attachments::{Attachments, FillReport};
 use super::neighbours::Near;
 use super::node_space::{NodeDistance, NodeSpace};
 use crate::body::{Bone, Mesh, SkinnedBody};
+use crate::option_error::OptionError;
 
 /// Options of a [`DeformationModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +43,26 @@ impl Default for ModelOptions {
     }
 }
 
+impl ModelOptions {
+    /// Largest number of relaxations: attachments are then the same on the whole body.
+    const MOST_RELAXATIONS: usize = 100;
+
+    /// Checks every option except the number of nodes per vertex, which has an error of its own.
+    ///
+    /// # Errors
+    /// Names the first option that cannot be used.
+    pub fn validate(&self) -> Result<(), OptionError> {
+        OptionError::ensure_positive("model.node_radius", self.node_radius)?;
+        OptionError::ensure(self.graph_neighbours > 0, "model.graph_neighbours", "at least 1", self.graph_neighbours)?;
+        OptionError::ensure_not_negative("model.attachment_length", self.attachment_length)?;
+        if let Some(reach) = self.attachment_reach {
+            OptionError::ensure_positive("model.attachment_reach", reach)?;
+        }
+        let few = self.relaxations <= Self::MOST_RELAXATIONS;
+        OptionError::ensure(few, "model.relaxations", "at most 100", self.relaxations)
+    }
+}
+
 /// A body for which no model can be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ModelError {
@@ -63,12 +84,9 @@ pub enum ModelError {
         /// Sampling radius, in mm.
         radius_mm: usize,
     },
-    /// A length is not positive and finite.
-    #[error("expected a positive and finite `{name}`")]
-    BadLength {
-        /// Name of the option.
-        name: &'static str,
-    },
+    /// An option cannot be used.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Nodes on a body, and everything that is constant while they move. Coordinates are relative to [`Self::origin`], the
@@ -103,17 +121,12 @@ impl DeformationModel {
     /// Samples nodes on a body and connects them.
     ///
     /// # Errors
-    /// If K is not 1, 4 or 8, a length is invalid, or there are too few nodes.
+    /// If an option cannot be used, K is not 1, 4 or 8, or there are too few nodes.
     pub fn new(body: &SkinnedBody, options: ModelOptions) -> Result<Self, ModelError> {
         let ModelOptions { node_radius, nodes_per_vertex, graph_neighbours, attachment_length, .. } = options;
+        options.validate()?;
         if ![1, 4, 8].contains(&nodes_per_vertex) {
             return Err(ModelError::NodesPerVertex(nodes_per_vertex));
-        }
-        if !(node_radius > 0.0 && node_radius.is_finite()) {
-            return Err(ModelError::BadLength { name: "node_radius" });
-        }
-        if !(attachment_length >= 0.0 && attachment_length.is_finite()) {
-            return Err(ModelError::BadLength { name: "attachment_length" });
         }
         let origin = body.mesh.centroid();
         let mut mesh = body.mesh.clone();

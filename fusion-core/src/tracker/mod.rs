@@ -47,8 +47,12 @@ impl Tracker {
     /// Creates a tracker of a model at rest, in the camera's coordinates.
     ///
     /// # Errors
-    /// If bones are unknowns and there are too few, or memory runs out.
+    /// If an option or the camera cannot be used, bones are unknowns and there are too few, or memory runs out.
     pub fn new(model: DeformationModel, camera: Camera, options: TrackerOptions) -> Result<Self, TrackerError> {
+        options.validate()?;
+        if let Some(fault) = camera.fault() {
+            return Err(TrackerError::Camera(fault));
+        }
         let energy = FusionEnergy::new(&model, options.energy)?;
         let steps = GaussNewtonOptions { damping: options.damping, ..GaussNewtonOptions::default() };
         let solver = GaussNewton::new(energy.pattern().clone(), steps)?;

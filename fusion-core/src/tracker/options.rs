@@ -1,7 +1,10 @@
+use std::f64::consts::FRAC_PI_2;
+
 use serde::{Deserialize, Serialize};
 
 use crate::correspondence::Gates;
 use crate::energy::{BoneMode, EnergyOptions};
+use crate::option_error::OptionError;
 
 /// Options of a [`Tracker`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,6 +38,28 @@ impl Default for TrackerOptions {
 }
 
 impl TrackerOptions {
+    /// Largest number of searches per frame.
+    const MOST_ITERATIONS: usize = 1000;
+
+    /// Checks every option.
+    ///
+    /// # Errors
+    /// Names the first option that cannot be used.
+    pub fn validate(&self) -> Result<(), OptionError> {
+        let Self { energy, iterations, gates, first_distance, damping, least_matches } = self;
+        energy.validate()?;
+        let some = (1..=Self::MOST_ITERATIONS).contains(iterations);
+        OptionError::ensure(some, "tracker.iterations", "a number from 1 to 1000", iterations)?;
+        OptionError::ensure_positive("tracker.gates.distance", gates.distance)?;
+        let acute = gates.angle > 0.0 && gates.angle <= FRAC_PI_2;
+        OptionError::ensure(acute, "tracker.gates.angle", "an angle in rad, above 0 and at most π/2", gates.angle)?;
+        let window = (1..=Gates::FURTHEST_REACH).contains(&gates.normal_reach);
+        OptionError::ensure(window, "tracker.gates.normal_reach", "1 to 20 pixels", gates.normal_reach)?;
+        OptionError::ensure_positive("tracker.first_distance", *first_distance)?;
+        OptionError::ensure_not_negative("tracker.damping", *damping)?;
+        OptionError::ensure(*least_matches > 0, "tracker.least_matches", "at least 1", least_matches)
+    }
+
     /// Options for a body tracker with errors of a few degrees and centimetres: bones are unknowns, and searches reach
     /// further and are repeated more often.
     #[must_use]

@@ -2,10 +2,17 @@ use energy_solve::{GaussNewtonError, IterationReport, SolverError};
 
 use crate::correspondence::MatchCounts;
 use crate::energy::{EnergyError, Moved, Pair};
+use crate::option_error::OptionError;
 
 /// A tracker that cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum TrackerError {
+    /// An option cannot be used.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// The camera has an invalid parameter.
+    #[error("the camera: {0}")]
+    Camera(&'static str),
     /// The energy cannot be created.
     #[error(transparent)]
     Energy(#[from] EnergyError),
@@ -77,8 +84,8 @@ pub struct FrameReport {
 /// Agreement of a tracked body with an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameQuality {
-    /// Fraction of the vertices that face the camera, and are not behind another part of the body, that project into the image: the visible share. 0 if the body is out
-    /// of view.
+    /// Visible share: the fraction of the vertices that face the camera, and are not behind another part of the body,
+    /// that project into the image. 0 if the body is out of view.
     pub visible: f64,
     /// Fraction of the visible vertices that match a measured point within the gates.
     pub inliers: f64,
