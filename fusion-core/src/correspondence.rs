@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::depth::{Camera, DepthImage};
+use crate::depth::NormalMap;
 use crate::energy::{Moved, Pair};
 
 /// Criteria for accepting a match.
@@ -54,11 +54,11 @@ pub struct MatchCounts {
 pub fn correspondences(
     moved: &Moved,
     origin: &Vector3<f64>,
-    image: &DepthImage,
-    camera: &Camera,
+    normals: &mut NormalMap<'_>,
     gates: &Gates,
     hidden: &[bool],
 ) -> (Vec<Pair>, MatchCounts) {
+    let (image, camera) = (normals.image, normals.camera);
     let (mut pairs, mut counts) = (Vec::new(), MatchCounts::default());
     let least_cosine = gates.angle.cos();
     for (vertex, (place, normal)) in moved.vertices.iter().zip(&moved.normals).enumerate() {
@@ -84,7 +84,7 @@ pub fn correspondences(
             counts.far += 1;
             continue;
         }
-        match image.normal(camera, pixel, gates.normal_reach) {
+        match normals.at(pixel) {
             None => counts.no_depth += 1,
             Some(measured) if measured.normal.dot(normal) < least_cosine => counts.turned += 1,
             Some(_) => {

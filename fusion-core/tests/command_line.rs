@@ -28,8 +28,10 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
-    let output = fusion(&["track", recording, "-o", track]);
+    let output = fusion(&["track", recording, "--stats", "-o", track]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(printed.contains("time per frame: mean") && printed.contains("Hz"), "{printed}");
     let table = std::fs::read_to_string(Path::new(track).join("frames.csv")).unwrap();
     let status: Vec<&str> = table.lines().skip(1).map(|line| line.split(',').nth(1).unwrap()).collect();
     assert_eq!(status, ["tracked", "tracked", "skipped", "skipped", "tracked"], "{table}");

@@ -1,4 +1,5 @@
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
@@ -41,6 +42,9 @@ pub struct Track {
     /// Output folder.
     #[arg(short, long)]
     output: PathBuf,
+    /// Print the times of frames.
+    #[arg(long)]
+    stats: bool,
     /// Replace an earlier track.
     #[arg(long)]
     overwrite: bool,
@@ -73,6 +77,8 @@ struct Line {
     visible: f64,
     inliers: f64,
     residual_mm: f64,
+    /// Time of the frame without reading and writing files.
+    time_ms: f64,
 }
 
 impl Line {
@@ -105,6 +111,7 @@ impl Track {
             unknown_bones,
             options: None,
             output: output.to_owned(),
+            stats: false,
             overwrite: true,
         }
     }
@@ -150,7 +157,8 @@ impl Track {
             "tracked {tracked} frames with {} nodes, skipped {skipped}; wrote {}\n",
             tracker.model().nodes.len(),
             self.output.display()
-        ))
+        ))?;
+        if self.stats { print(&times(&lines)) } else { Ok(()) }
     }
 
     /// Reads the skeleton, and checks that it fits before anything is tracked.
@@ -183,12 +191,14 @@ impl Track {
         Ok(Some(skeleton))
     }
 
-    /// Reads the options. Those that the file lacks have the defaults for known or for unknown bones.
+    /// Reads the options. Those that the file lacks have the defaults for known, unknown or no bones.
     fn parameters(&self) -> Result<Parameters> {
         let mut defaults = Parameters::default();
-        if self.unknown_bones {
-            defaults.tracker = TrackerOptions::with_unknown_bones();
-        }
+        defaults.tracker = match (self.unknown_bones, self.no_bones) {
+            (true, _) => TrackerOptions::with_unknown_bones(),
+            (false, true) => TrackerOptions::without_bones(),
+            (false, false) => defaults.tracker,
+        };
         let Some(path) = &self.options else { return Ok(defaults) };
         let here = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(here)?;
@@ -245,15 +255,35 @@ fn track_frame(frame: usize, sequence: &DepthSequence, skeleton: Option<&Skeleto
         Some(fault) => Err(fault),
     };
     match image {
-        Ok(image) => match tracker.track(&image, bones.as_deref()) {
-            Ok(report) => line(frame, &report),
-            Err(error) => skipped(&error.into()),
-        },
+        Ok(image) => {
+            let start = Instant::now();
+            let result = tracker.track(&image, bones.as_deref());
+            let time_ms = 1e3 * start.elapsed().as_secs_f64();
+            match result {
+                Ok(report) => Line { time_ms, ..line(frame, &report) },
+                Err(error) => Line { time_ms, ..skipped(&error.into()) },
+            }
+        }
         Err(error) => {
             let moved = tracker.predict(bones.as_deref());
             skipped(&moved.err().map_or(error, anyhow::Error::new))
         }
     }
+}
+
+/// Summarises the times of the tracked frames.
+fn times(lines: &[Line]) -> String {
+    let mut times: Vec<f64> = lines.iter().filter(|line| line.is_tracked()).map(|line| line.time_ms).collect();
+    times.sort_by(f64::total_cmp);
+    let quantile = |q: f64| times.get((q * times.len().saturating_sub(1) as f64).round() as usize).unwrap_or(&0.0);
+    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+    format!(
+        "time per frame: mean {mean:.1} ms ({:.0} Hz), median {:.1} ms, 95 % {:.1} ms, longest {:.1} ms\n",
+        1e3 / mean,
+        quantile(0.5),
+        quantile(0.95),
+        quantile(1.0)
+    )
 }
 
 /// Describes the loss or the recovery of the track from one frame to the next; `None` without either.
@@ -294,5 +324,6 @@ fn line(frame: usize, report: &FrameReport) -> Line {
         visible: report.quality.visible,
         inliers: report.quality.inliers,
         residual_mm: 1e3 * report.quality.residual,
+        time_ms: 0.0,
     }
 }

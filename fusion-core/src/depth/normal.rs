@@ -57,6 +57,37 @@ impl DepthImage {
     }
 }
 
+/// The normals of one image. Each is fitted once, when it is first asked for.
+#[derive(Clone, Debug)]
+pub struct NormalMap<'a> {
+    /// The image.
+    pub image: &'a DepthImage,
+    /// Its camera.
+    pub camera: &'a Camera,
+    reach: usize,
+    /// One more than the index in `fitted` of each pixel's normal; 0 before it is fitted.
+    index: Vec<u32>,
+    fitted: Vec<Option<SurfaceNormal>>,
+}
+
+impl<'a> NormalMap<'a> {
+    /// Creates a map of normals fitted up to `reach` pixels on each side; see [`DepthImage::normal`].
+    #[must_use]
+    pub fn new(image: &'a DepthImage, camera: &'a Camera, reach: usize) -> Self {
+        Self { image, camera, reach, index: vec![0; image.depth.len()], fitted: Vec::new() }
+    }
+
+    /// Returns the normal at a pixel of the image; `None` if it cannot be determined.
+    pub fn at(&mut self, pixel: [usize; 2]) -> Option<SurfaceNormal> {
+        let index = &mut self.index[pixel[1] * self.image.width + pixel[0]];
+        if *index == 0 {
+            self.fitted.push(self.image.normal(self.camera, pixel, self.reach));
+            *index = self.fitted.len() as u32;
+        }
+        self.fitted[*index as usize - 1]
+    }
+}
+
 /// Returns the sum of Δu² over a window without holes.
 fn full_spread(reach: usize) -> f64 {
     let (r, side) = (reach as f64, (2 * reach + 1) as f64);
@@ -162,6 +193,16 @@ mod tests {
         let found = image.normal(&CAMERA, [10, 10], 2).unwrap();
         assert!((found.normal - slanted()).norm() < 1e-4, "{found:?}");
         assert!(found.confidence < 0.6, "{found:?}");
+    }
+
+    #[test]
+    fn a_map_repeats_the_normals_of_the_image() {
+        let image = plane(slanted());
+        let mut map = NormalMap::new(&image, &CAMERA, 2);
+        for pixel in [[3, 4], [20, 0], [3, 4], [4, 3]] {
+            assert_eq!(map.at(pixel), image.normal(&CAMERA, pixel, 2), "{pixel:?}");
+        }
+        assert_eq!(map.fitted.len(), 3, "the repeated pixel is fitted once");
     }
 
     #[test]

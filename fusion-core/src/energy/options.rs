@@ -25,7 +25,7 @@ pub struct TermWeights {
 
 impl Default for TermWeights {
     fn default() -> Self {
-        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 0.5, motion: 0.1, joints: 1000.0 }
+        Self { nonrigid: 1.0, skeleton: 1.0, graph: 0.3, binding: 1.0, prior: 0.5, motion: 0.1, joints: 1000.0 }
     }
 }
 

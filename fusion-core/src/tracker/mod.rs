@@ -4,7 +4,7 @@ mod options;
 mod prediction;
 mod report;
 
-use energy_solve::{GaussNewton, GaussNewtonOptions, Outcome};
+use energy_solve::{GaussNewton, GaussNewtonOptions, NormalSolverKind, Outcome};
 use nalgebra::{Isometry3, Vector3};
 
 pub use self::options::TrackerOptions;
@@ -12,7 +12,7 @@ use self::prediction::Prediction;
 pub use self::report::{FrameError, FrameQuality, FrameReport, TrackerError};
 use crate::body::Mesh;
 use crate::correspondence::{Gates, MatchCounts, correspondences};
-use crate::depth::{Camera, DepthImage, hidden_vertices};
+use crate::depth::{Camera, DepthImage, NormalMap, hidden_vertices};
 use crate::energy::{BoneMode, BoneTargets, FusionEnergy, Moved, skeleton_energy};
 use crate::model::DeformationModel;
 use crate::twist::{Twist, blended};
@@ -54,7 +54,13 @@ impl Tracker {
             return Err(TrackerError::Camera(fault));
         }
         let energy = FusionEnergy::new(&model, options.energy)?;
-        let steps = GaussNewtonOptions { damping: options.damping, ..GaussNewtonOptions::default() };
+        let solver = match options.solver_tolerance {
+            Some(relative_tolerance) => {
+                NormalSolverKind::ConjugateGradients { relative_tolerance, iteration_limit: MOST_SOLVER_ITERATIONS }
+            }
+            None => NormalSolverKind::Cholesky,
+        };
+        let steps = GaussNewtonOptions { damping: options.damping, solver, ..GaussNewtonOptions::default() };
         let solver = GaussNewton::new(energy.pattern().clone(), steps)?;
         let twists = vec![[0.0; 6]; energy.pattern().blocks()];
         let offsets = vec![Isometry3::identity(); model.nodes.len()];
@@ -181,15 +187,14 @@ impl Tracker {
             skeleton_energy: None,
             quality: FrameQuality::default(),
         };
-        let mut hidden = Vec::new();
+        let camera = self.camera;
+        let mut normals = NormalMap::new(image, &camera, self.options.gates.normal_reach);
+        let mut hidden = None;
         for iteration in 0..self.options.iterations {
             let moved = self.energy.moved(&self.twists);
-            // Bones move by centimetres in the first half of the searches, and by millimetres in the second.
-            if iteration == 0 || iteration == self.options.iterations / 2 {
-                hidden = self.hidden(&moved);
-            }
+            let hidden = hidden.get_or_insert_with(|| self.hidden(&moved));
             let gates = Gates { distance: self.distance(iteration), ..self.options.gates };
-            let (pairs, counts) = correspondences(&moved, &self.model.origin, image, &self.camera, &gates, &hidden);
+            let (pairs, counts) = correspondences(&moved, &self.model.origin, &mut normals, &gates, hidden);
             report.counts = counts;
             if counts.matched < self.options.least_matches {
                 return Err(FrameError::TooFewMatches { counts, least: self.options.least_matches });
@@ -210,7 +215,7 @@ impl Tracker {
                 break;
             }
         }
-        report.quality = self.quality(image);
+        report.quality = self.quality(&mut normals);
         Ok(report)
     }
 
@@ -221,11 +226,10 @@ impl Tracker {
     }
 
     /// Compares the tracked body with the image.
-    fn quality(&self, image: &DepthImage) -> FrameQuality {
+    fn quality(&self, normals: &mut NormalMap<'_>) -> FrameQuality {
         let moved = self.energy.moved(&self.twists);
         let hidden = self.hidden(&moved);
-        let (pairs, counts) =
-            correspondences(&moved, &self.model.origin, image, &self.camera, &self.options.gates, &hidden);
+        let (pairs, counts) = correspondences(&moved, &self.model.origin, normals, &self.options.gates, &hidden);
         FrameQuality::new(&moved, &pairs, &counts)
     }
 
@@ -286,3 +290,6 @@ const WITHOUT_DATA: usize = 3;
 
 /// Distance in m behind the visible surface from which a vertex counts as hidden.
 const HIDDEN: f64 = 0.03;
+
+/// Iterations of conjugate gradients after which the damping grows.
+const MOST_SOLVER_ITERATIONS: usize = 1000;

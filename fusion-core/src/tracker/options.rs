@@ -3,7 +3,7 @@ use std::f64::consts::FRAC_PI_2;
 use serde::{Deserialize, Serialize};
 
 use crate::correspondence::Gates;
-use crate::energy::{BoneMode, EnergyOptions};
+use crate::energy::{BoneMode, EnergyOptions, TermWeights};
 use crate::option_error::OptionError;
 
 /// Options of a [`Tracker`].
@@ -20,6 +20,8 @@ pub struct TrackerOptions {
     pub first_distance: f64,
     /// Levenberg's damping μ.
     pub damping: f64,
+    /// Tolerance of conjugate gradients, relative to the right-hand side; `None` for a Cholesky factorisation.
+    pub solver_tolerance: Option<f64>,
     /// Frames with fewer matches are skipped.
     pub least_matches: usize,
 }
@@ -32,6 +34,7 @@ impl Default for TrackerOptions {
             gates: Gates::default(),
             first_distance: 0.06,
             damping: 1e-3,
+            solver_tolerance: Some(0.03),
             least_matches: 50,
         }
     }
@@ -46,7 +49,7 @@ impl TrackerOptions {
     /// # Errors
     /// Names the first option that cannot be used.
     pub fn validate(&self) -> Result<(), OptionError> {
-        let Self { energy, iterations, gates, first_distance, damping, least_matches } = self;
+        let Self { energy, iterations, gates, first_distance, damping, solver_tolerance, least_matches } = self;
         energy.validate()?;
         let some = (1..=Self::MOST_ITERATIONS).contains(iterations);
         OptionError::ensure(some, "tracker.iterations", "a number from 1 to 1000", iterations)?;
@@ -57,6 +60,10 @@ impl TrackerOptions {
         OptionError::ensure(window, "tracker.gates.normal_reach", "1 to 20 pixels", gates.normal_reach)?;
         OptionError::ensure_positive("tracker.first_distance", *first_distance)?;
         OptionError::ensure_not_negative("tracker.damping", *damping)?;
+        if let Some(tolerance) = *solver_tolerance {
+            let part = tolerance > 0.0 && tolerance < 1.0;
+            OptionError::ensure(part, "tracker.solver_tolerance", "a number between 0 and 1", tolerance)?;
+        }
         OptionError::ensure(*least_matches > 0, "tracker.least_matches", "at least 1", least_matches)
     }
 
@@ -64,8 +71,17 @@ impl TrackerOptions {
     /// further and are repeated more often.
     #[must_use]
     pub fn with_unknown_bones() -> Self {
-        let mut options = Self { iterations: 12, first_distance: 0.1, ..Self::default() };
+        let mut options = Self { iterations: 6, first_distance: 0.1, ..Self::default() };
         options.energy.bones = BoneMode::Unknown;
+        options.energy.weights = TermWeights { graph: 2.0, binding: 5.0, ..options.energy.weights };
+        options
+    }
+
+    /// Options for tracking without bones: a stiffer graph takes the place of the bones.
+    #[must_use]
+    pub fn without_bones() -> Self {
+        let mut options = Self::default();
+        options.energy.weights.graph = 2.0;
         options
     }
 }
