@@ -100,3 +100,20 @@ fn a_track_without_any_usable_image_fails() {
     let table = std::fs::read_to_string(track.join("frames.csv")).unwrap();
     assert_eq!(table.lines().filter(|line| line.contains("skipped")).count(), 3, "{table}");
 }
+
+#[test]
+fn a_mesh_without_bones_is_tracked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, track) = (folder.path().join("recording"), folder.path().join("track"));
+    assert!(fusion(&["render", "--to", "3", "-o", text(&recording)]).status.success());
+    // The true mesh of the first frame is the model.
+    let model = recording.join("truth/000000.obj");
+    let output = fusion(&["track", text(&recording), "--model", text(&model), "-o", text(&track)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = fusion(&["evaluate", text(&recording), text(&track)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(track.join("errors.csv")).unwrap();
+    let medians: Vec<f64> =
+        table.lines().skip(1).map(|line| line.split(',').nth(3).unwrap().parse().unwrap()).collect();
+    assert!(medians.len() == 6 && medians.iter().all(|&median| median < 8.0), "{table}");
+}

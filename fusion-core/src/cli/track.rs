@@ -4,7 +4,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use energy_cli::write_file;
-use fusion_core::body::{Bone, obj_text};
+use fusion_core::body::{Bone, SkinnedBody, obj_text};
 use fusion_core::depth::DepthSequence;
 use fusion_core::energy::BoneMode;
 use fusion_core::model::{DeformationModel, ModelOptions};
@@ -24,7 +24,7 @@ pub struct Track {
     /// Folder of depth images with `intrinsics.json`, and `depth.txt` or `depth/*.png`. The first image shows the model
     /// at rest.
     recording: PathBuf,
-    /// Model in the camera's coordinates: `.json`, `.glb` or a folder [default: the recording's `model.json`].
+    /// Model in the camera's coordinates: `.json`, `.glb`, `.obj` without bones, or a folder [default: the recording's `model.json`].
     #[arg(long)]
     model: Option<PathBuf>,
     /// Bones of a body tracker [default: the recording's `skeleton.json`, if it exists].
@@ -123,7 +123,7 @@ impl Track {
         let sequence = DepthSequence::open(&self.recording)?;
         let model = self.model.clone().unwrap_or_else(|| self.recording.join(MODEL));
         let body = read_any_body(&model).context("the model")?;
-        let parameters = self.parameters()?;
+        let parameters = self.parameters(&body)?;
         let model = DeformationModel::new(&body, parameters.model)?;
         if !model.fill.left.is_empty() {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
@@ -165,7 +165,7 @@ impl Track {
     fn skeleton(&self, images: usize, bones: &[Bone]) -> Result<Option<Skeleton>> {
         let default = self.recording.join(SKELETON);
         let path = match &self.skeleton {
-            _ if self.no_bones => return Ok(None),
+            _ if self.no_bones || bones.is_empty() => return Ok(None),
             Some(path) => path.clone(),
             None if default.exists() => default,
             None if self.unknown_bones => {
@@ -192,9 +192,9 @@ impl Track {
     }
 
     /// Reads the options. Those that the file lacks have the defaults for known, unknown or no bones.
-    fn parameters(&self) -> Result<Parameters> {
+    fn parameters(&self, body: &SkinnedBody) -> Result<Parameters> {
         let mut defaults = Parameters::default();
-        defaults.tracker = match (self.unknown_bones, self.no_bones) {
+        defaults.tracker = match (self.unknown_bones, self.no_bones || body.bones.is_empty()) {
             (true, _) => TrackerOptions::with_unknown_bones(),
             (false, true) => TrackerOptions::without_bones(),
             (false, false) => defaults.tracker,

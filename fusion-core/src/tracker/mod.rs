@@ -150,8 +150,9 @@ impl Tracker {
 
     /// Collects what is known before the image, and moves the unknowns there.
     fn start(&mut self, bones: Option<&[Isometry3<f64>]>) -> Start {
-        let reported: Option<Vec<Isometry3<f64>>> =
-            bones.map(|bones| bones.iter().map(|motion| self.model.centred(motion)).collect());
+        let reported: Option<Vec<Isometry3<f64>>> = bones
+            .filter(|bones| !bones.is_empty())
+            .map(|bones| bones.iter().map(|motion| self.model.centred(motion)).collect());
         Start { reported, expected_bones: self.bone_prediction.next(), expected_nodes: self.node_prediction.next() }
     }
 
