@@ -31,10 +31,17 @@ impl<const D: usize> NormalEquations<D> {
         self.matrix.clear();
         self.right.fill([0.0; D]);
     }
+
+    /// Adds equations of the same pattern.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.matrix.add(&other.matrix);
+        let other = other.right.as_flattened();
+        self.right.as_flattened_mut().iter_mut().zip(other).for_each(|(sum, part)| *sum += part);
+    }
 }
 
 /// A sum of squared residuals over blocks of D unknowns.
-pub trait LeastSquaresTerm<const D: usize>: Debug {
+pub trait LeastSquaresTerm<const D: usize>: Debug + Sync {
     /// The term's name, for people.
     fn name(&self) -> &str;
     /// The declaration of the term's elements.
@@ -262,7 +269,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     }
 }
 
-impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for ResidualTerm<E, D> {
+impl<E: PackedResidual<f64> + Debug + Sync, const D: usize> LeastSquaresTerm<D> for ResidualTerm<E, D> {
     fn name(&self) -> &str {
         &self.name
     }

@@ -60,7 +60,8 @@ impl Tracker {
             }
             None => NormalSolverKind::Cholesky,
         };
-        let steps = GaussNewtonOptions { damping: options.damping, solver, ..GaussNewtonOptions::default() };
+        let steps =
+            GaussNewtonOptions { damping: options.damping, solver, two_threads: true, ..GaussNewtonOptions::default() };
         let solver = GaussNewton::new(energy.pattern().clone(), steps)?;
         let twists = vec![[0.0; 6]; energy.pattern().blocks()];
         let offsets = vec![Isometry3::identity(); model.nodes.len()];

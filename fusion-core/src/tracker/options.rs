@@ -34,7 +34,7 @@ impl Default for TrackerOptions {
             gates: Gates::default(),
             first_distance: 0.06,
             damping: 1e-3,
-            solver_tolerance: Some(0.03),
+            solver_tolerance: Some(0.01),
             least_matches: 50,
         }
     }
