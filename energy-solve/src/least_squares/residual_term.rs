@@ -84,7 +84,8 @@ pub struct ResidualTerm<E, const D: usize> {
     numbers: Vec<f64>,
     stencils: Vec<u32>,
     weights: Vec<f64>,
-    element_type: std::marker::PhantomData<E>,
+    /// A function type: the term stores numbers only, so threads can share it whatever E is.
+    element_type: std::marker::PhantomData<fn() -> E>,
 }
 
 impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
@@ -269,7 +270,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
     }
 }
 
-impl<E: PackedResidual<f64> + Debug + Sync, const D: usize> LeastSquaresTerm<D> for ResidualTerm<E, D> {
+impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for ResidualTerm<E, D> {
     fn name(&self) -> &str {
         &self.name
     }

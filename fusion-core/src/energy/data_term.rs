@@ -33,9 +33,9 @@ pub struct Moved {
 
 /// Residuals that blend K nodes.
 trait Blend<const K: usize>: Debug + Send {
-    type Plane: PackedResidual<f64> + Debug + Send + Sync;
-    type Frozen: PackedResidual<f64> + Debug + Send + Sync;
-    type Point: PackedResidual<f64> + Debug + Send + Sync;
+    type Plane: PackedResidual<f64> + Debug + Send;
+    type Frozen: PackedResidual<f64> + Debug + Send;
+    type Point: PackedResidual<f64> + Debug + Send;
 
     fn plane(turn: f64, w: [f64; K], v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> Self::Plane;
     fn frozen(turn: f64, w: [f64; K], v: [f64; 3], m: [f64; 3], u: [f64; 3]) -> Self::Frozen;
