@@ -9,7 +9,7 @@ use energy_dsl::Residual;
 use energy_elements::NonrigidPlane4;
 use energy_solve::{GaussNewton, GaussNewtonOptions, NormalSolverKind};
 use fusion_core::body::{Bone, Mesh, SkinnedBody};
-use fusion_core::energy::{EnergyOptions, FusionEnergy, Pair};
+use fusion_core::energy::{BoneTargets, EnergyOptions, FusionEnergy, Pair};
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::twist::{AngleConvention, Twist};
 use nalgebra::{Isometry3, SVector, Vector3};
@@ -79,7 +79,8 @@ fn model(vertices: usize, nodes: usize, k: usize) -> DeformationModel {
 fn measure(vertices: usize, nodes: usize, k: usize) {
     let model = model(vertices, nodes, k);
     let mut energy = FusionEnergy::new(&model, EnergyOptions::default()).expect("the energy can be made");
-    energy.set_bones(&model, Some(&[Isometry3::identity(); 4]));
+    let rest = [Isometry3::identity(); 4];
+    energy.set_bones(&model, &BoneTargets { reported: Some(&rest), expected: &rest });
     let mut random = fastrand::Rng::with_seed(1);
     let mut near = |size: f64| size * (2.0 * random.f64() - 1.0);
     let x: Vec<Twist> =

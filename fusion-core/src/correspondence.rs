@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::depth::{Camera, DepthImage};
+use crate::depth::NormalMap;
 use crate::energy::{Moved, Pair};
 
 /// Criteria for accepting a match.
@@ -14,8 +14,13 @@ pub struct Gates {
     pub distance: f64,
     /// Largest angle between their normals, in rad.
     pub angle: f64,
-    /// Pixels on each side from which the measured normal is computed.
+    /// Pixels on each side to which a plane is fitted for the measured normal.
     pub normal_reach: usize,
+}
+
+impl Gates {
+    /// Largest [`Self::normal_reach`].
+    pub const FURTHEST_REACH: usize = 20;
 }
 
 impl Default for Gates {
@@ -31,6 +36,8 @@ pub struct MatchCounts {
     pub matched: usize,
     /// Facing away from the camera.
     pub back_facing: usize,
+    /// Behind another part of the body.
+    pub hidden: usize,
     /// Outside the image, or behind the camera.
     pub outside: usize,
     /// Without a measured depth or normal.
@@ -42,21 +49,26 @@ pub struct MatchCounts {
 }
 
 /// Matches each vertex with the point measured in its pixel. `origin` is the model's origin in the camera's
-/// coordinates.
+/// coordinates. `hidden` vertices have no match; an empty list hides none.
 #[must_use]
 pub fn correspondences(
     moved: &Moved,
     origin: &Vector3<f64>,
-    image: &DepthImage,
-    camera: &Camera,
+    normals: &mut NormalMap<'_>,
     gates: &Gates,
+    hidden: &[bool],
 ) -> (Vec<Pair>, MatchCounts) {
+    let (image, camera) = (normals.image, normals.camera);
     let (mut pairs, mut counts) = (Vec::new(), MatchCounts::default());
     let least_cosine = gates.angle.cos();
     for (vertex, (place, normal)) in moved.vertices.iter().zip(&moved.normals).enumerate() {
         let seen = place + origin;
         if normal.dot(&seen) >= 0.0 {
             counts.back_facing += 1;
+            continue;
+        }
+        if hidden.get(vertex) == Some(&true) {
+            counts.hidden += 1;
             continue;
         }
         let Some(pixel) = camera.pixel(&seen) else {
@@ -72,9 +84,9 @@ pub fn correspondences(
             counts.far += 1;
             continue;
         }
-        match image.normal(camera, pixel, gates.normal_reach) {
+        match normals.at(pixel) {
             None => counts.no_depth += 1,
-            Some(measured) if measured.dot(normal) < least_cosine => counts.turned += 1,
+            Some(measured) if measured.normal.dot(normal) < least_cosine => counts.turned += 1,
             Some(_) => {
                 counts.matched += 1;
                 pairs.push(Pair { vertex: vertex as u32, point: point - origin });

@@ -39,9 +39,12 @@ pub mod depth;
 pub mod energy;
 pub mod evaluation;
 pub mod model;
+mod option_error;
 pub mod plot;
 pub mod protocol;
 mod random;
 pub mod skeleton;
 pub mod tracker;
 pub mod twist;
+
+pub use option_error::OptionError;

@@ -46,7 +46,7 @@ fn obey(command: Command) -> Result<()> {
     match command {
         Command::Demo(demo) => demo.run(),
         Command::Render(render) => render.run(),
-        Command::Track(track) => track.run().map(drop),
+        Command::Track(track) => track.run(),
         Command::Evaluate(evaluate) => evaluate.run().map(drop),
     }
 }

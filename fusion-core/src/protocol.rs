@@ -18,6 +18,8 @@ pub struct Recording {
     pub motions: Vec<Vec<Isometry3<f64>>>,
     /// The depth camera.
     pub camera: Camera,
+    /// Seed of the random numbers: recordings with different seeds have independent noise.
+    pub seed: u64,
 }
 
 impl Recording {
@@ -25,19 +27,32 @@ impl Recording {
     /// bones are from the body's own rest, with y up. The first bone's z axis points to the front in the first frame.
     #[must_use]
     pub fn new(body: &SkinnedBody, motions: &[Vec<Isometry3<f64>>], camera: Camera, distance: f64) -> Self {
+        Self::seen_from(body, motions, camera, distance, 0.0)
+    }
+
+    /// Places a camera as [`Self::new`] does, turned about the body by `azimuth` in rad: π/2 sees its left side.
+    #[must_use]
+    pub fn seen_from(
+        body: &SkinnedBody,
+        motions: &[Vec<Isometry3<f64>>],
+        camera: Camera,
+        distance: f64,
+        azimuth: f64,
+    ) -> Self {
         let Some(first) = motions.first() else {
-            return Self { body: body.clone(), motions: Vec::new(), camera };
+            return Self { body: body.clone(), motions: Vec::new(), camera, seed: 0 };
         };
         let centroid = body.posed(first).centroid();
         let forwards = first.first().map_or(Vector3::z(), |root| root.rotation * Vector3::z());
         let forwards = Vector3::new(forwards.x, 0.0, forwards.z).try_normalize(1e-9).unwrap_or(Vector3::z());
+        let forwards = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), azimuth) * forwards;
         let view = view(centroid + distance * forwards, -forwards);
         let start: Vec<Isometry3<f64>> = first.iter().map(|motion| view * motion).collect();
         let motions = motions
             .iter()
             .map(|frame| frame.iter().zip(&start).map(|(motion, start)| view * motion * start.inverse()).collect())
             .collect();
-        Self { body: body.at_rest_in(&start), motions, camera }
+        Self { body: body.at_rest_in(&start), motions, camera, seed: 0 }
     }
 
     /// Returns the true mesh in a frame.
@@ -51,15 +66,20 @@ impl Recording {
     #[must_use]
     pub fn image(&self, frame: usize, noise: SensorNoise) -> DepthImage {
         let mut image = render(&self.truth(frame), &self.camera);
-        noise.add(&mut image, &mut fastrand::Rng::with_seed(frame as u64));
+        noise.add(&mut image, &mut fastrand::Rng::with_seed(self.stream(frame)));
         image
+    }
+
+    /// Returns the seed of a frame's random numbers.
+    fn stream(&self, frame: usize) -> u64 {
+        (self.seed << 32).wrapping_add(frame as u64)
     }
 }
 
 /// Returns the bones that a body tracker reports: the true motions with errors, which are reproducible for a frame.
 #[must_use]
 pub fn reported_bones(recording: &Recording, frame: usize, noise: BoneNoise) -> Vec<Isometry3<f64>> {
-    let mut random = fastrand::Rng::with_seed(1000 + frame as u64);
+    let mut random = fastrand::Rng::with_seed(1000 + recording.stream(frame));
     noisy(&recording.body.bones, &recording.motions[frame], noise, &mut random)
 }
 

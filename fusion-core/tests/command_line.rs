@@ -28,12 +28,20 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
-    let output = fusion(&["track", recording, "-o", track]);
+    let output = fusion(&["track", recording, "--stats", "-o", track]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(printed.contains("time per frame: mean") && printed.contains("Hz"), "{printed}");
     let table = std::fs::read_to_string(Path::new(track).join("frames.csv")).unwrap();
     let status: Vec<&str> = table.lines().skip(1).map(|line| line.split(',').nth(1).unwrap()).collect();
     assert_eq!(status, ["tracked", "tracked", "skipped", "skipped", "tracked"], "{table}");
     assert!(table.contains("000002.png"), "{table}");
+    let warnings = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        warnings.contains("track lost in frame 2") && warnings.contains("track recovered in frame 4"),
+        "{warnings}"
+    );
+    assert!(!warnings.contains("frame 3"), "lost frames in a row have one warning: {warnings}");
 
     let output = fusion(&["evaluate", recording, track]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -75,4 +83,37 @@ fn unusable_input_is_rejected_with_a_reason() {
     assert!(few.contains("nodes, but 8 are needed"), "{few}");
     let body = error_of(&fusion(&["render", "--body", here, "-o", recording, "--overwrite"]));
     assert!(body.contains("no file base"), "{body}");
+}
+
+#[test]
+fn a_track_without_any_usable_image_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, track) = (folder.path().join("recording"), folder.path().join("track"));
+    assert!(fusion(&["render", "--to", "2", "-o", text(&recording)]).status.success());
+    for frame in 0..3 {
+        std::fs::write(recording.join(format!("depth/{frame:06}.png")), b"no image").unwrap();
+    }
+    let output = fusion(&["track", text(&recording), "-o", text(&track)]);
+    assert_eq!(output.status.code(), Some(1));
+    let error = error_of(&output);
+    assert!(error.contains("none of 3 frames could be tracked") && error.contains("000000.png"), "{error}");
+    let table = std::fs::read_to_string(track.join("frames.csv")).unwrap();
+    assert_eq!(table.lines().filter(|line| line.contains("skipped")).count(), 3, "{table}");
+}
+
+#[test]
+fn a_mesh_without_bones_is_tracked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, track) = (folder.path().join("recording"), folder.path().join("track"));
+    assert!(fusion(&["render", "--to", "3", "-o", text(&recording)]).status.success());
+    // The true mesh of the first frame is the model.
+    let model = recording.join("truth/000000.obj");
+    let output = fusion(&["track", text(&recording), "--model", text(&model), "-o", text(&track)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = fusion(&["evaluate", text(&recording), text(&track)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(track.join("errors.csv")).unwrap();
+    let medians: Vec<f64> =
+        table.lines().skip(1).map(|line| line.split(',').nth(3).unwrap().parse().unwrap()).collect();
+    assert!(medians.len() == 6 && medians.iter().all(|&median| median < 8.0), "{table}");
 }

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
 use crate::least_squares::normal_solver::{NormalSolver, NormalSolverKind, SolverError};
-use crate::least_squares::residual_term::{LeastSquaresTerm, NormalEquations};
+use crate::least_squares::residual_term::{LeastSquaresTerm, NormalEquations, TermSum};
 
 /// Options of [`GaussNewton`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,12 +15,21 @@ pub struct GaussNewtonOptions {
     pub halvings: usize,
     /// The solver of the normal equations.
     pub solver: NormalSolverKind,
+    /// Linearise the terms in two groups, on two threads. Sums are then rounded differently than without, and the same
+    /// on every machine.
+    pub two_threads: bool,
 }
 
 impl Default for GaussNewtonOptions {
-    /// μ = 10⁻⁴, at most 10⁴; four halvings; Cholesky.
+    /// μ = 10⁻⁴, at most 10⁴; four halvings; Cholesky; one thread.
     fn default() -> Self {
-        Self { damping: 1e-4, largest_damping: 1e4, halvings: 4, solver: NormalSolverKind::Cholesky }
+        Self {
+            damping: 1e-4,
+            largest_damping: 1e4,
+            halvings: 4,
+            solver: NormalSolverKind::Cholesky,
+            two_threads: false,
+        }
     }
 }
 
@@ -132,6 +141,8 @@ pub enum GaussNewtonError {
 #[derive(Debug)]
 pub struct GaussNewton<const D: usize> {
     equations: NormalEquations<D>,
+    /// Equations of the second group of terms; `None` for one thread.
+    second: Option<NormalEquations<D>>,
     solver: NormalSolver<D>,
     /// Damping, backtracking and linear solver.
     pub options: GaussNewtonOptions,
@@ -145,7 +156,9 @@ impl<const D: usize> GaussNewton<D> {
     pub fn new(pattern: Arc<NormalPattern>, options: GaussNewtonOptions) -> Result<Self, SolverError> {
         let solver = NormalSolver::new(options.solver, &pattern)?;
         let right = vec![[0.0; D]; pattern.blocks()];
-        Ok(Self { equations: NormalEquations { matrix: NormalMatrix::zeros(pattern), right }, solver, options })
+        let equations = NormalEquations { matrix: NormalMatrix::zeros(pattern), right };
+        let second = options.two_threads.then(|| equations.clone());
+        Ok(Self { equations, second, solver, options })
     }
 
     /// Returns JᵀJ and Jᵀr of the last linearisation.
@@ -165,9 +178,17 @@ impl<const D: usize> GaussNewton<D> {
     ) -> Result<Vec<TermCost>, GaussNewtonError> {
         self.check(x)?;
         self.equations.clear();
+        let sums: Vec<TermSum> = match &mut self.second {
+            None => terms.iter().map(|term| term.linearise(x, &mut self.equations)).collect(),
+            Some(second) => {
+                second.clear();
+                let sums = linearise_on_two(terms, x, [&mut self.equations, &mut *second]);
+                self.equations.add(second);
+                sums
+            }
+        };
         let mut costs = Vec::with_capacity(terms.len());
-        for term in terms {
-            let sum = term.linearise(x, &mut self.equations);
+        for (term, sum) in terms.iter().zip(sums) {
             if !sum.energy.is_finite() {
                 let element = term.find_non_finite(x);
                 return Err(GaussNewtonError::NonFiniteEnergy { term: term.name().to_owned(), element });
@@ -314,5 +335,49 @@ impl<const D: usize> GaussNewton<D> {
             }
         }
         Ok(())
+    }
+}
+
+/// Linearises the terms in two groups with about the same number of elements, at the same time.
+fn linearise_on_two<const D: usize>(
+    terms: &[&dyn LeastSquaresTerm<D>],
+    x: &[[f64; D]],
+    [first, second]: [&mut NormalEquations<D>; 2],
+) -> Vec<TermSum> {
+    let groups = two_groups(&terms.iter().map(|term| term.len()).collect::<Vec<_>>());
+    let linearise = |group: bool, equations: &mut NormalEquations<D>| -> Vec<Option<TermSum>> {
+        let own = |(term, of): (&&dyn LeastSquaresTerm<D>, &bool)| (*of == group).then(|| term.linearise(x, equations));
+        terms.iter().zip(&groups).map(own).collect()
+    };
+    let (a, b) = std::thread::scope(|scope| {
+        let other = scope.spawn(|| linearise(true, second));
+        let own = linearise(false, first);
+        (own, other.join())
+    });
+    // A panic of the other thread goes on here.
+    let b = b.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    a.into_iter().zip(b).map(|(a, b)| a.or(b).unwrap_or_default()).collect()
+}
+
+/// Divides numbers into two groups with similar sums: the largest first, each to the smaller group.
+fn two_groups(sizes: &[usize]) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by_key(|&at| std::cmp::Reverse(sizes[at]));
+    let (mut sums, mut groups) = ([0, 0], vec![false; sizes.len()]);
+    for at in order {
+        groups[at] = sums[1] < sums[0];
+        sums[usize::from(groups[at])] += sizes[at];
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::two_groups;
+
+    #[test]
+    fn groups_are_balanced() {
+        assert_eq!(two_groups(&[5, 3, 5, 1]), [false, false, true, true]);
+        assert_eq!(two_groups(&[]), [false; 0]);
     }
 }

@@ -1,6 +1,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use energy_dsl::{Kernel, Lane, Level, Number, dispatch};
+
 /// Numbers in a stored row of a block: the lanes of the widest register, so that one or a few loads read a row. Numbers
 /// past the block's own columns are ignored.
 pub(crate) const WIDTH: usize = 8;
@@ -204,6 +206,13 @@ impl<const D: usize> NormalMatrix<D> {
         self.values.fill([[0.0; WIDTH]; D]);
     }
 
+    /// Adds a matrix of the same pattern.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let other = other.values.as_flattened().as_flattened();
+        let own = self.values.as_flattened_mut().as_flattened_mut();
+        own.iter_mut().zip(other).for_each(|(sum, part)| *sum += part);
+    }
+
     /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> [[f64; D]; D] {
@@ -217,29 +226,71 @@ impl<const D: usize> NormalMatrix<D> {
 
     /// Computes y = (A + μ 1) x.
     pub fn multiply_damped(&self, damping: f64, x: &[[f64; D]], y: &mut [[f64; D]]) {
-        for (y, x) in y.iter_mut().zip(x) {
-            *y = x.map(|x| damping * x);
-        }
-        for row in 0..self.pattern.blocks() {
-            let start = self.pattern.row_start(row);
-            for (at, &column) in self.pattern.row(row).iter().enumerate() {
-                let (block, column) = (&self.values[start + at], column as usize);
-                for i in 0..D {
-                    y[row][i] += (0..D).map(|j| block[i][j] * x[column][j]).sum::<f64>();
-                }
-                if column != row {
-                    for i in 0..D {
-                        for j in 0..D {
-                            y[column][j] += block[i][j] * x[row][i];
-                        }
-                    }
-                }
-            }
-        }
+        dispatch(Product { matrix: self, damping, x, y });
     }
 
     pub(crate) fn diagonal(&self, row: usize) -> &WideBlock<D> {
         &self.values[self.pattern.row_start(row)]
+    }
+}
+
+/// Computes y = (A + μ 1) x with one register per row of a block.
+struct Product<'a, const D: usize> {
+    matrix: &'a NormalMatrix<D>,
+    damping: f64,
+    x: &'a [[f64; D]],
+    y: &'a mut [[f64; D]],
+}
+
+impl<const D: usize> Kernel for Product<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { matrix, damping, x, y } = self;
+        let pattern = &matrix.pattern;
+        // Rows as wide as a stored block. Padding of blocks only reaches padding of sums, which is never read.
+        let wide: Vec<[f64; WIDTH]> =
+            x.iter().map(|x| std::array::from_fn(|i| if i < D { x[i] } else { 0.0 })).collect();
+        let mut below = vec![[0.0; WIDTH]; x.len()];
+        for row in 0..pattern.blocks() {
+            let start = pattern.row_start(row);
+            let mut sums = [[0.0; WIDTH]; D];
+            for (at, &column) in pattern.row(row).iter().enumerate() {
+                let (block, column) = (&matrix.values[start + at], column as usize);
+                for i in 0..D {
+                    add_product::<L>(&mut sums[i], &block[i], &wide[column]);
+                }
+                if column != row {
+                    for i in 0..D {
+                        add_scaled::<L>(&mut below[column], wide[row][i], &block[i]);
+                    }
+                }
+            }
+            for i in 0..D {
+                y[row][i] = damping * x[row][i] + sums[i][..D].iter().sum::<f64>();
+            }
+        }
+        for (y, below) in y.iter_mut().zip(&below) {
+            y.iter_mut().zip(below).for_each(|(y, below)| *y += below);
+        }
+    }
+}
+
+/// Adds the products of entries.
+#[inline(always)]
+fn add_product<L: Level>(sum: &mut [f64; WIDTH], a: &[f64; WIDTH], b: &[f64; WIDTH]) {
+    for c in (0..WIDTH).step_by(L::F64::LANES) {
+        L::F64::load(&a[c..]).mul_add::<L>(L::F64::load(&b[c..]), L::F64::load(&sum[c..])).store(&mut sum[c..]);
+    }
+}
+
+/// Adds a multiple of a row.
+#[inline(always)]
+fn add_scaled<L: Level>(sum: &mut [f64; WIDTH], factor: f64, row: &[f64; WIDTH]) {
+    let factor = L::F64::splat(factor);
+    for c in (0..WIDTH).step_by(L::F64::LANES) {
+        factor.mul_add::<L>(L::F64::load(&row[c..]), L::F64::load(&sum[c..])).store(&mut sum[c..]);
     }
 }
 

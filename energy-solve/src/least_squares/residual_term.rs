@@ -31,10 +31,17 @@ impl<const D: usize> NormalEquations<D> {
         self.matrix.clear();
         self.right.fill([0.0; D]);
     }
+
+    /// Adds equations of the same pattern.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.matrix.add(&other.matrix);
+        let other = other.right.as_flattened();
+        self.right.as_flattened_mut().iter_mut().zip(other).for_each(|(sum, part)| *sum += part);
+    }
 }
 
 /// A sum of squared residuals over blocks of D unknowns.
-pub trait LeastSquaresTerm<const D: usize>: Debug {
+pub trait LeastSquaresTerm<const D: usize>: Debug + Sync {
     /// The term's name, for people.
     fn name(&self) -> &str;
     /// The declaration of the term's elements.
@@ -77,7 +84,8 @@ pub struct ResidualTerm<E, const D: usize> {
     numbers: Vec<f64>,
     stencils: Vec<u32>,
     weights: Vec<f64>,
-    element_type: std::marker::PhantomData<E>,
+    /// A function type: the term stores numbers only, so threads can share it whatever E is.
+    element_type: std::marker::PhantomData<fn() -> E>,
 }
 
 impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {

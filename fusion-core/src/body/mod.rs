@@ -12,4 +12,4 @@ pub use gltf_file::{GltfError, read_gltf};
 pub use makehuman::{MakeHumanError, read_makehuman};
 pub use mesh::{Mesh, obj_text, vertex_normals};
 pub use skinned::{BodyError, Bone, SkinnedBody};
-pub use stored::{BodyFileError, read_body, read_vertices, write_body};
+pub use stored::{BodyFileError, read_body, read_obj, read_vertices, write_body};

@@ -5,6 +5,7 @@ use super::mesh::Mesh;
 
 /// A bone at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bone {
     /// Name of the bone.
     pub name: String,
@@ -60,14 +61,14 @@ pub enum BodyError {
     },
 }
 
-/// A mesh that moves with bones by linear blend skinning.
+/// A mesh that moves with bones by linear blend skinning. Without bones, rows of weights are empty, and the mesh stays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkinnedBody {
     /// The mesh at rest.
     pub mesh: Mesh,
     /// The bones at rest.
     pub bones: Vec<Bone>,
-    /// Bones and weights of each vertex; each row sums to 1.
+    /// Bones and weights of each vertex; each row sums to 1, or is empty without bones.
     pub weights: Vec<Vec<(usize, f64)>>,
 }
 
@@ -97,6 +98,9 @@ impl SkinnedBody {
         }
         for (vertex, row) in weights.iter_mut().enumerate() {
             let sum: f64 = row.iter().map(|(_, weight)| weight).sum();
+            if bones.is_empty() && row.is_empty() {
+                continue;
+            }
             let good = row.iter().all(|&(bone, weight)| bone < bones.len() && weight >= 0.0);
             if !(good && sum > 0.0 && sum.is_finite()) {
                 return Err(BodyError::BadWeights { vertex });
@@ -106,6 +110,15 @@ impl SkinnedBody {
         Ok(Self { mesh, bones, weights })
     }
 
+    /// Creates a body without bones.
+    ///
+    /// # Errors
+    /// If the mesh is empty or malformed.
+    pub fn without_bones(mesh: Mesh) -> Result<Self, BodyError> {
+        let weights = vec![Vec::new(); mesh.vertices.len()];
+        Self::new(mesh, Vec::new(), weights)
+    }
+
     /// Returns the mesh moved by the bones' motions from rest, Σ η_j T_j v, with unit normals.
     ///
     /// # Panics
@@ -113,6 +126,9 @@ impl SkinnedBody {
     #[must_use]
     pub fn posed(&self, motions: &[Isometry3<f64>]) -> Mesh {
         assert_eq!(motions.len(), self.bones.len(), "a motion for every bone");
+        if self.bones.is_empty() {
+            return self.mesh.clone();
+        }
         let blend = |vertex: usize, of: &dyn Fn(&Isometry3<f64>) -> Vector3<f64>| {
             self.weights[vertex].iter().map(|&(bone, weight)| weight * of(&motions[bone])).sum::<Vector3<f64>>()
         };
@@ -165,6 +181,13 @@ mod tests {
         let posed = body.posed(&motions);
         assert_eq!(posed.vertices, [Vector3::zeros(), Vector3::new(1.0, 0.0, 0.5), Vector3::new(0.0, 1.0, 1.0)]);
         assert_eq!(body.at_rest_in(&motions).bones[1].tail, [0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_body_without_bones_stays() {
+        let body = SkinnedBody::without_bones(triangle()).unwrap();
+        assert_eq!(body.posed(&[]), triangle());
+        assert_eq!(body.at_rest_in(&[]), body);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use energy_cli::write_file;
 use fusion_core::body::{
-    SkinnedBody, figure, figure_motion, obj_text, read_body, read_gltf, read_makehuman, write_body,
+    SkinnedBody, figure, figure_motion, obj_text, read_body, read_gltf, read_makehuman, read_obj, write_body,
 };
 use fusion_core::depth::{Camera, DepthSequence, SensorNoise, SequenceInfo, write_depth};
 use fusion_core::protocol::{Recording, reported_bones};
@@ -177,6 +177,7 @@ pub fn read_any_body(path: &Path) -> Result<SkinnedBody> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("glb") => Ok(read_gltf(path)?),
         Some("json") => Ok(read_body(path)?),
-        _ => bail!("{}: expected a folder, or a .glb or .json file", path.display()),
+        Some("obj") => Ok(read_obj(path)?),
+        _ => bail!("{}: expected a folder, or a .glb, .json or .obj file", path.display()),
     }
 }

@@ -42,6 +42,22 @@ impl Camera {
         Vector3::new((u as f64 - self.cx) / self.fx, (v as f64 - self.cy) / self.fy, 1.0) * depth
     }
 
+    /// Returns the camera with one pixel in place of `factor` × `factor`.
+    #[must_use]
+    pub fn reduced(&self, factor: usize) -> Self {
+        let by = factor.max(1) as f64;
+        // Pixel centres have integer coordinates, so the image begins at -1/2.
+        let centre = |c: f64| (c + 0.5) / by - 0.5;
+        Self {
+            fx: self.fx / by,
+            fy: self.fy / by,
+            cx: centre(self.cx),
+            cy: centre(self.cy),
+            width: self.width.div_ceil(factor.max(1)),
+            height: self.height.div_ceil(factor.max(1)),
+        }
+    }
+
     /// Returns a description of an invalid parameter; `None` if all are valid.
     #[must_use]
     pub fn fault(&self) -> Option<&'static str> {

@@ -33,6 +33,16 @@ pub enum SequenceError {
         /// Description of the error.
         fault: &'static str,
     },
+    /// A line of the list of images is malformed.
+    #[error("{}:{line}: expected a timestamp in s and a file, got `{found}`", .path.display())]
+    List {
+        /// Path of the list.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: usize,
+        /// The line.
+        found: String,
+    },
     /// The folder contains no images.
     #[error("{}: no images; expected depth.txt (`timestamp file` on each line) or depth/*.png", .path.display())]
     Empty {
@@ -56,13 +66,34 @@ pub enum SequenceError {
 
 /// Contents of a sequence's `intrinsics.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "StoredInfo")]
 pub struct SequenceInfo {
     /// The depth camera.
     #[serde(flatten)]
     pub camera: Camera,
     /// Steps of the images per metre.
-    #[serde(default = "millimetres")]
     pub depth_scale: f64,
+}
+
+/// The keys of the file. Unknown ones are errors, which `flatten` would hide.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredInfo {
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    width: usize,
+    height: usize,
+    #[serde(default = "millimetres")]
+    depth_scale: f64,
+}
+
+impl From<StoredInfo> for SequenceInfo {
+    fn from(stored: StoredInfo) -> Self {
+        let StoredInfo { fx, fy, cx, cy, width, height, depth_scale } = stored;
+        Self { camera: Camera { fx, fy, cx, cy, width, height }, depth_scale }
+    }
 }
 
 fn millimetres() -> f64 {
@@ -98,18 +129,16 @@ impl DepthSequence {
             std::fs::read_to_string(&path).map_err(|source| SequenceError::File { path: path.clone(), source })?;
         let info: SequenceInfo =
             serde_json::from_str(&text).map_err(|source| SequenceError::Json { path: path.clone(), source })?;
-        let scale =
-            (info.depth_scale.is_nan() || info.depth_scale <= 0.0).then_some("expected a `depth_scale` greater than 0");
+        let scale = (!(info.depth_scale > 0.0 && info.depth_scale.is_finite()))
+            .then_some("expected a `depth_scale` greater than 0");
         if let Some(fault) = info.camera.fault().or(scale) {
             return Err(SequenceError::Camera { path, fault });
         }
-        let images = match std::fs::read_to_string(folder.join(Self::LIST)) {
-            Ok(list) => list
-                .lines()
-                .filter(|line| !line.trim_start().starts_with('#'))
-                .filter_map(|line| line.split_whitespace().nth(1).map(PathBuf::from))
-                .collect(),
-            Err(_) => images_in(folder),
+        let list = folder.join(Self::LIST);
+        let images = match std::fs::read_to_string(&list) {
+            Ok(text) => listed(&list, &text)?,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => images_in(folder),
+            Err(source) => return Err(SequenceError::File { path: list, source }),
         };
         if images.is_empty() {
             return Err(SequenceError::Empty { path: folder.to_owned() });
@@ -150,6 +179,20 @@ impl DepthSequence {
         }
         Ok(image)
     }
+}
+
+/// Parses a list of images. Empty lines and comments after `#` are skipped.
+fn listed(path: &Path, text: &str) -> Result<Vec<PathBuf>, SequenceError> {
+    let lines = text.lines().enumerate().map(|(at, line)| (at, line.trim()));
+    let image = |(at, line): (usize, &str)| {
+        let mut words = line.split_whitespace();
+        let time = words.next().and_then(|word| word.parse::<f64>().ok()).filter(|time| time.is_finite());
+        match (time, words.next()) {
+            (Some(_), Some(file)) => Ok(PathBuf::from(file)),
+            _ => Err(SequenceError::List { path: path.to_owned(), line: at + 1, found: line.to_owned() }),
+        }
+    };
+    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(image).collect()
 }
 
 fn images_in(folder: &Path) -> Vec<PathBuf> {

@@ -6,7 +6,8 @@ use energy_elements::{Binding, BoneBinding, GraphEdge, SkeletonPlane};
 use energy_solve::{CouplingError, Couplings, Loss, NormalPattern, Placed, ResidualTerm};
 use nalgebra::Vector3;
 
-use super::options::EnergyOptions;
+use super::BoneTargets;
+use super::options::{EnergyOptions, TermWeights};
 use crate::body::Bone;
 use crate::model::DeformationModel;
 use crate::twist::Twist;
@@ -23,6 +24,22 @@ pub(super) struct BoneTerms {
 }
 
 impl BoneTerms {
+    /// Replaces the motions near which bones stay: the reported ones with the weight λ_prior, and the expected ones
+    /// with the weight λ_motion.
+    pub(super) fn set_targets(&mut self, model: &DeformationModel, options: &EnergyOptions, targets: &BoneTargets<'_>) {
+        let (turn, TermWeights { prior, motion, .. }) = (options.angle.turn(), options.weights);
+        let sources = [targets.reported.map(|motions| (prior, motions)), Some((motion, targets.expected))];
+        let elements = sources.into_iter().flatten().flat_map(|(weight, motions)| {
+            model.bones.iter().enumerate().flat_map(move |(bone, at)| {
+                prior_places(at, options.prior_reach).map(move |x| {
+                    let target = motions[bone].transform_point(&x.into()).coords;
+                    Placed { element: Binding::new(turn, x.into(), target.into()), stencil: bone as u32, weight }
+                })
+            })
+        });
+        self.prior.set_elements(elements.filter(|placed| placed.weight > 0.0));
+    }
+
     pub(super) fn evaluate_jacobians(&self, x: &[Twist]) -> f64 {
         let Self { skeleton, binding, prior, joints, .. } = self;
         let data = skeleton.evaluate_jacobians(x) + binding.evaluate_jacobians(x);
@@ -30,11 +47,12 @@ impl BoneTerms {
     }
 }
 
-/// Returns four points around a bone's joint, at which its motion is compared with another.
-pub(super) fn prior_places(bone: &Bone) -> [Vector3<f64>; 4] {
-    const REACH: f64 = 0.1;
+/// Returns four points around a bone's joint, at which its motion is compared with another: the corners of a
+/// tetrahedron, so that rotation and translation do not mix.
+fn prior_places(bone: &Bone, reach: f64) -> [Vector3<f64>; 4] {
     let head = Vector3::from(bone.head);
-    [head, head + REACH * Vector3::x(), head + REACH * Vector3::y(), head + REACH * Vector3::z()]
+    [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]
+        .map(|corner| head + reach / 3.0_f64.sqrt() * Vector3::from(corner))
 }
 
 /// Stencils of the terms for unknown bones. The blocks of the bones follow those of the nodes.
@@ -92,7 +110,7 @@ impl BoneStencils {
             weight: 1.0,
         }));
         let own: Vec<[u32; 1]> = (0..model.bones.len() as u32).map(|bone| [first + bone]).collect();
-        let prior = ResidualTerm::new("prior", Arc::new(Couplings::new(pattern, &own)?), weights.prior);
+        let prior = ResidualTerm::new("prior", Arc::new(Couplings::new(pattern, &own)?), 1.0);
         let couplings = Arc::new(Couplings::new(pattern, &self.joints)?);
         let mut joints = ResidualTerm::new("joints", couplings, weights.joints);
         joints.set_elements(self.joints.iter().enumerate().map(|(joint, &[_, child])| Placed {

@@ -11,12 +11,13 @@ use energy_elements::{Binding, GraphEdge, SkeletonPlane};
 use energy_solve::{CouplingError, Couplings, LeastSquaresTerm, Loss, NormalPattern, Placed, ResidualTerm};
 use nalgebra::{Isometry3, Vector3};
 
-use self::bones::{BoneStencils, BoneTerms, prior_places};
+use self::bones::{BoneStencils, BoneTerms};
 use self::data_term::{DataTerm, data_term};
 pub use self::data_term::{Moved, Pair};
 pub use self::options::{BoneMode, EdgeWeight, EnergyOptions, NormalDerivative, TermWeights};
 use crate::model::DeformationModel;
-use crate::twist::Twist;
+use crate::option_error::OptionError;
+use crate::twist::{Twist, blended};
 
 /// An energy that cannot be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -24,9 +25,21 @@ pub enum EnergyError {
     /// There are fewer bones than the four that a declared residual blends.
     #[error("expected at least four bones if bones are unknowns, got {0}")]
     TooFewBones(usize),
+    /// An option cannot be used.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The model names a node or bone that does not exist, which is a bug.
     #[error(transparent)]
     Coupling(#[from] CouplingError),
+}
+
+/// Motions near which bones are expected, in the model's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct BoneTargets<'a> {
+    /// Motions that a body tracker reports; `None` without one.
+    pub reported: Option<&'a [Isometry3<f64>]>,
+    /// Motions predicted from the last frames.
+    pub expected: &'a [Isometry3<f64>],
 }
 
 /// The energy of a model. The data change with each search for correspondences, the other terms do not.
@@ -47,8 +60,9 @@ impl FusionEnergy {
     /// Creates the energy of a model, without data.
     ///
     /// # Errors
-    /// If bones are unknowns and there are fewer than four.
+    /// If an option cannot be used, or bones are unknowns and there are fewer than four.
     pub fn new(model: &DeformationModel, options: EnergyOptions) -> Result<Self, EnergyError> {
+        options.validate()?;
         let nodes = model.nodes.len();
         let unknown_bones = options.bones == BoneMode::Unknown;
         if unknown_bones && model.bones.len() < 4 {
@@ -110,28 +124,32 @@ impl FusionEnergy {
         }
     }
 
-    /// Replaces the reported motions of the bones, in the model's coordinates. `None` releases nodes from their bones.
-    pub fn set_bones(&mut self, model: &DeformationModel, motions: Option<&[Isometry3<f64>]>) {
+    /// Replaces the targets of bones, in the model's coordinates. Without reported motions, known bones release their
+    /// nodes, and unknown ones stay near the expected motions.
+    pub fn set_bones(&mut self, model: &DeformationModel, targets: &BoneTargets<'_>) {
         let turn = self.options.angle.turn();
-        let Some(motions) = motions else {
+        if let Some(bones) = &mut self.bones {
+            bones.set_targets(model, &self.options, targets);
+            return;
+        }
+        let Some(motions) = targets.reported else {
             self.binding.set_elements([]);
-            if let Some(bones) = &mut self.bones {
-                bones.prior.set_elements([]);
-            }
             return;
         };
-        match &mut self.bones {
-            Some(bones) => bones.prior.set_elements((0..model.bones.len()).flat_map(|bone| {
-                prior_places(&model.bones[bone]).map(move |x| {
-                    let target = motions[bone].transform_point(&x.into()).coords;
-                    Placed { element: Binding::new(turn, x.into(), target.into()), stencil: bone as u32, weight: 1.0 }
-                })
-            })),
-            None => self.binding.set_elements(model.nodes.iter().enumerate().map(|(node, x)| {
-                let target = bound_place(x, &model.attachments.rows[node], motions);
-                Placed { element: Binding::new(turn, (*x).into(), target.into()), stencil: node as u32, weight: 1.0 }
-            })),
-        }
+        self.binding.set_elements(model.nodes.iter().enumerate().map(|(node, x)| {
+            let target = bound_place(x, &model.attachments.rows[node], motions);
+            Placed { element: Binding::new(turn, (*x).into(), target.into()), stencil: node as u32, weight: 1.0 }
+        }));
+    }
+
+    /// Returns the motions between the reported and the expected ones where unknown bones start: rotations and
+    /// translations are averaged with the weights of the terms.
+    #[must_use]
+    pub fn bone_start(&self, targets: &BoneTargets<'_>) -> Vec<Isometry3<f64>> {
+        let TermWeights { prior, motion, .. } = self.options.weights;
+        let Some(reported) = targets.reported.filter(|_| prior > 0.0) else { return targets.expected.to_vec() };
+        let both = reported.iter().zip(targets.expected);
+        both.map(|(reported, expected)| blended([(prior, reported), (motion, expected)].into_iter())).collect()
     }
 
     /// Returns the terms that depend on the unknowns.

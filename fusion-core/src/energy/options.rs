@@ -1,5 +1,6 @@
 use serde::{Deserialize, Serialize};
 
+use crate::option_error::OptionError;
 use crate::twist::AngleConvention;
 
 /// Weights λ of the terms, in 1/m² for a dimensionless energy.
@@ -16,13 +17,15 @@ pub struct TermWeights {
     pub binding: f64,
     /// Distances of unknown bones from the reported ones.
     pub prior: f64,
+    /// Distances of unknown bones from the motions predicted from the last frames.
+    pub motion: f64,
     /// Gaps between unknown bones at their joints.
     pub joints: f64,
 }
 
 impl Default for TermWeights {
     fn default() -> Self {
-        Self { nonrigid: 1.0, skeleton: 1.0, graph: 2.0, binding: 5.0, prior: 3.0, joints: 1000.0 }
+        Self { nonrigid: 1.0, skeleton: 1.0, graph: 0.3, binding: 1.0, prior: 0.5, motion: 0.1, joints: 1000.0 }
     }
 }
 
@@ -83,7 +86,7 @@ pub enum BoneMode {
 }
 
 /// Options of the energy.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnergyOptions {
     /// Weights λ of the terms.
@@ -96,8 +99,55 @@ pub struct EnergyOptions {
     pub normal: NormalDerivative,
     /// Whether bones are unknowns.
     pub bones: BoneMode,
+    /// Distance in m from a bone's joint at which unknown bones are compared with reported and predicted ones: errors of
+    /// position and errors of rotation times this distance weigh the same.
+    pub prior_reach: f64,
     /// Tukey's limit of the data term, in m; `None` for least squares.
     pub data_tukey: Option<f64>,
     /// Huber's limit of the graph, in m; `None` for least squares.
     pub graph_huber: Option<f64>,
+}
+
+impl Default for EnergyOptions {
+    fn default() -> Self {
+        Self {
+            weights: TermWeights::default(),
+            edges: EdgeWeight::default(),
+            angle: AngleConvention::default(),
+            normal: NormalDerivative::default(),
+            bones: BoneMode::default(),
+            prior_reach: 0.4,
+            data_tukey: None,
+            graph_huber: None,
+        }
+    }
+}
+
+impl EnergyOptions {
+    /// Checks every option.
+    ///
+    /// # Errors
+    /// Names the first option that cannot be used.
+    pub fn validate(&self) -> Result<(), OptionError> {
+        let TermWeights { nonrigid, skeleton, graph, binding, prior, motion, joints } = self.weights;
+        // Without these terms, data or bones would have no influence, or nodes without data would not be determined.
+        OptionError::ensure_positive("tracker.energy.weights.nonrigid", nonrigid)?;
+        OptionError::ensure_positive("tracker.energy.weights.graph", graph)?;
+        OptionError::ensure_positive("tracker.energy.weights.binding", binding)?;
+        OptionError::ensure_not_negative("tracker.energy.weights.skeleton", skeleton)?;
+        OptionError::ensure_not_negative("tracker.energy.weights.motion", motion)?;
+        OptionError::ensure_not_negative("tracker.energy.weights.joints", joints)?;
+        match self.bones {
+            BoneMode::Known => OptionError::ensure_not_negative("tracker.energy.weights.prior", prior)?,
+            // The motion alone drifts.
+            BoneMode::Unknown => OptionError::ensure_positive("tracker.energy.weights.prior", prior)?,
+        }
+        OptionError::ensure_positive("tracker.energy.prior_reach", self.prior_reach)?;
+        for (name, limit) in
+            [("tracker.energy.data_tukey", self.data_tukey), ("tracker.energy.graph_huber", self.graph_huber)]
+        {
+            limit.map_or(Ok(()), |limit| OptionError::ensure_positive(name, limit))?;
+        }
+        Ok(())
+    }
 }

@@ -2,9 +2,10 @@ use nalgebra::{Isometry3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::attachments::{Attachments, FillReport};
-use super::neighbours::nearest;
-use super::nodes::sample_nodes;
+use super::neighbours::Near;
+use super::node_space::{NodeDistance, NodeSpace};
 use crate::body::{Bone, Mesh, SkinnedBody};
+use crate::option_error::OptionError;
 
 /// Options of a [`DeformationModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,6 +25,8 @@ pub struct ModelOptions {
     pub attachment_reach: Option<f64>,
     /// Passes of relaxation after a fill.
     pub relaxations: usize,
+    /// Distance of nodes from each other and from vertices.
+    pub distance: NodeDistance,
 }
 
 impl Default for ModelOptions {
@@ -35,7 +38,28 @@ impl Default for ModelOptions {
             attachment_length: 0.1,
             attachment_reach: None,
             relaxations: 2,
+            distance: NodeDistance::Surface,
         }
+    }
+}
+
+impl ModelOptions {
+    /// Largest number of relaxations: attachments are then the same on the whole body.
+    const MOST_RELAXATIONS: usize = 100;
+
+    /// Checks every option except the number of nodes per vertex, which has an error of its own.
+    ///
+    /// # Errors
+    /// Names the first option that cannot be used.
+    pub fn validate(&self) -> Result<(), OptionError> {
+        OptionError::ensure_positive("model.node_radius", self.node_radius)?;
+        OptionError::ensure(self.graph_neighbours > 0, "model.graph_neighbours", "at least 1", self.graph_neighbours)?;
+        OptionError::ensure_not_negative("model.attachment_length", self.attachment_length)?;
+        if let Some(reach) = self.attachment_reach {
+            OptionError::ensure_positive("model.attachment_reach", reach)?;
+        }
+        let few = self.relaxations <= Self::MOST_RELAXATIONS;
+        OptionError::ensure(few, "model.relaxations", "at most 100", self.relaxations)
     }
 }
 
@@ -60,12 +84,9 @@ pub enum ModelError {
         /// Sampling radius, in mm.
         radius_mm: usize,
     },
-    /// A length is not positive and finite.
-    #[error("expected a positive and finite `{name}`")]
-    BadLength {
-        /// Name of the option.
-        name: &'static str,
-    },
+    /// An option cannot be used.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Nodes on a body, and everything that is constant while they move. Coordinates are relative to [`Self::origin`], the
@@ -100,17 +121,12 @@ impl DeformationModel {
     /// Samples nodes on a body and connects them.
     ///
     /// # Errors
-    /// If K is not 1, 4 or 8, a length is invalid, or there are too few nodes.
+    /// If an option cannot be used, K is not 1, 4 or 8, or there are too few nodes.
     pub fn new(body: &SkinnedBody, options: ModelOptions) -> Result<Self, ModelError> {
         let ModelOptions { node_radius, nodes_per_vertex, graph_neighbours, attachment_length, .. } = options;
+        options.validate()?;
         if ![1, 4, 8].contains(&nodes_per_vertex) {
             return Err(ModelError::NodesPerVertex(nodes_per_vertex));
-        }
-        if !(node_radius > 0.0 && node_radius.is_finite()) {
-            return Err(ModelError::BadLength { name: "node_radius" });
-        }
-        if !(attachment_length >= 0.0 && attachment_length.is_finite()) {
-            return Err(ModelError::BadLength { name: "attachment_length" });
         }
         let origin = body.mesh.centroid();
         let mut mesh = body.mesh.clone();
@@ -122,8 +138,8 @@ impl DeformationModel {
             .map(|bone| Bone { head: shifted(bone.head), tail: shifted(bone.tail), ..bone.clone() })
             .collect();
 
-        let chosen = sample_nodes(&mesh.vertices, node_radius);
-        let nodes: Vec<Vector3<f64>> = chosen.iter().map(|&vertex| mesh.vertices[vertex]).collect();
+        let space = NodeSpace::new(body, &mesh.vertices, options.distance, node_radius);
+        let nodes: Vec<Vector3<f64>> = space.nodes.iter().map(|&vertex| mesh.vertices[vertex]).collect();
         for (needed, what) in
             [(nodes_per_vertex, "to move a vertex"), (graph_neighbours + 1, "for a node's neighbours")]
         {
@@ -137,24 +153,18 @@ impl DeformationModel {
             body.weights[vertex].iter().for_each(|&(bone, weight)| row[bone] += weight);
             row
         };
-        let skinning: Vec<Vec<f64>> = chosen.iter().map(|&vertex| dense(vertex)).collect();
-        let (attachments, fill) = attach(&nodes, &bones, &skinning, &options);
+        let skinning: Vec<Vec<f64>> = (0..mesh.vertices.len()).map(dense).collect();
+        let (attachments, fill) = attach(&space, &nodes, &bones, &skinning, &options);
 
         let square_length = attachment_length * attachment_length;
-        let graph: Vec<Vec<usize>> = (0..nodes.len())
-            .map(|i| {
-                let extra = |j: usize| square_length * attachments.square_distance(i, j);
-                nearest(&nodes[i], &nodes, graph_neighbours, extra, Some(i)).into_iter().map(|(j, _)| j).collect()
-            })
-            .collect();
+        let near = space.around_nodes(graph_neighbours, |i, j| square_length * attachments.square_distance(i, j));
+        let graph = near.into_iter().map(|near| near.into_iter().map(|(node, _)| node).collect()).collect();
+        let apart = |vertex: usize, node: usize| {
+            let there = &skinning[space.nodes[node]];
+            square_length * skinning[vertex].iter().zip(there).map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
+        };
         let (mut vertex_nodes, mut vertex_weights, mut vertex_bones) = (Vec::new(), Vec::new(), Vec::new());
-        for (vertex, place) in mesh.vertices.iter().enumerate() {
-            let own = dense(vertex);
-            let extra = |j: usize| {
-                let square: f64 = own.iter().zip(&skinning[j]).map(|(a, b)| (a - b) * (a - b)).sum();
-                square_length * square
-            };
-            let around = nearest(place, &nodes, nodes_per_vertex, extra, None);
+        for around in space.around_vertices(nodes_per_vertex, apart) {
             // The nearest node has weight 1, so that the weights of distant nodes do not all vanish.
             let weights: Vec<f64> =
                 around.iter().map(|(_, s)| (-(s - around[0].1) / (2.0 * node_radius * node_radius)).exp()).collect();
@@ -187,33 +197,36 @@ impl DeformationModel {
 
 /// Returns the attachments of the nodes: the body's skinning weights, or the nearest bones, smoothed.
 fn attach(
+    space: &NodeSpace<'_>,
     nodes: &[Vector3<f64>],
     bones: &[Bone],
     skinning: &[Vec<f64>],
     options: &ModelOptions,
 ) -> (Attachments, FillReport) {
     let Some(reach) = options.attachment_reach else {
-        return (Attachments::given(skinning.to_vec()), FillReport { passes: 0, left: Vec::new() });
+        let rows = space.nodes.iter().map(|&vertex| skinning[vertex].clone()).collect();
+        return (Attachments::given(rows), FillReport { passes: 0, left: Vec::new() });
     };
     let segments: Vec<[Vector3<f64>; 2]> = bones.iter().map(|bone| [bone.head.into(), bone.tail.into()]).collect();
     let mut attachments = Attachments::nearest_bone(nodes, &segments, reach);
-    // The graph must be symmetric: otherwise a fill could not reach nodes that are not neighbours of others.
-    let mut graph: Vec<Vec<usize>> = (0..nodes.len())
-        .map(|i| {
-            let around = nearest(&nodes[i], nodes, options.graph_neighbours, |_| 0.0, Some(i));
-            around.into_iter().map(|(j, _)| j).collect()
-        })
-        .collect();
-    for (i, around) in graph.clone().iter().enumerate() {
-        for &j in around {
+    let graph = symmetric(&space.around_nodes(options.graph_neighbours, |_, _| 0.0));
+    let report = attachments.fill(&graph);
+    (0..options.relaxations).for_each(|_| attachments.relax_once(&graph));
+    (attachments, report)
+}
+
+/// Returns a graph with the edges of both directions: otherwise a fill could not reach nodes that are not neighbours of
+/// others.
+fn symmetric(near: &[Near]) -> Vec<Vec<usize>> {
+    let mut graph: Vec<Vec<usize>> = near.iter().map(|near| near.iter().map(|&(node, _)| node).collect()).collect();
+    for (i, near) in near.iter().enumerate() {
+        for &(j, _) in near {
             if !graph[j].contains(&i) {
                 graph[j].push(i);
             }
         }
     }
-    let report = attachments.fill(&graph);
-    (0..options.relaxations).for_each(|_| attachments.relax_once(&graph));
-    (attachments, report)
+    graph
 }
 
 /// Returns Σ w_k H_k/Σ w_k, with bones from the largest weight on.

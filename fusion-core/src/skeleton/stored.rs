@@ -42,6 +42,7 @@ pub enum SkeletonError {
 
 /// Bones of a body tracker: for each frame, the motion of each bone from the model's rest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Skeleton {
     /// Names of the bones.
     pub bones: Vec<String>,
