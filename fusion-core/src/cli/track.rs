@@ -24,7 +24,8 @@ pub struct Track {
     /// Folder of depth images with `intrinsics.json`, and `depth.txt` or `depth/*.png`. The first image shows the model
     /// at rest.
     recording: PathBuf,
-    /// Model in the camera's coordinates: `.json`, `.glb`, `.obj` without bones, or a folder [default: the recording's `model.json`].
+    /// Model in the camera's coordinates: `.json`, `.glb`, `.obj` without bones, or a folder [default: the recording's
+    /// `model.json`].
     #[arg(long)]
     model: Option<PathBuf>,
     /// Bones of a body tracker [default: the recording's `skeleton.json`, if it exists].

@@ -99,8 +99,8 @@ pub struct EnergyOptions {
     pub normal: NormalDerivative,
     /// Whether bones are unknowns.
     pub bones: BoneMode,
-    /// Distance in m from a bone's joint at which unknown bones are compared with reported and predicted ones: errors of
-    /// position and errors of rotation times this distance weigh the same.
+    /// Distance in m from a bone's joint at which unknown bones are compared with reported and predicted ones. Errors
+    /// of position and errors of rotation times this distance weigh the same.
     pub prior_reach: f64,
     /// Tukey's limit of the data term, in m; `None` for least squares.
     pub data_tukey: Option<f64>,

@@ -6,7 +6,7 @@ use crate::correspondence::Gates;
 use crate::energy::{BoneMode, EnergyOptions, TermWeights};
 use crate::option_error::OptionError;
 
-/// Options of a [`Tracker`].
+/// Options of a [`Tracker`](super::Tracker).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerOptions {

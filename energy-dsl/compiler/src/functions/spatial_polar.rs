@@ -1,16 +1,16 @@
 //! The polar decomposition F = R S of 3×3 matrices with det R = 1.
 //!
-//! The singular values are σ₁ ≥ σ₂ ≥ |σ₃|; σ₃ has the sign of det F. T = tr S = σ₁ + σ₂ + σ₃ is the largest root of p(λ)
-//! = λ⁴ − 2iλ² − 8Jλ + 2‖FᵀF‖² − i² with i = ‖F‖² and J = det F. The gradient of T is R. So differentiating p(T; F) = 0
-//! gives
+//! The singular values are σ₁ ≥ σ₂ ≥ |σ₃|; σ₃ has the sign of det F. T = tr S = σ₁ + σ₂ + σ₃ is the largest root of
+//! p(λ) = λ⁴ − 2iλ² − 8Jλ + 2‖FᵀF‖² − i² with i = ‖F‖² and J = det F. The gradient of T is R. So differentiating
+//! p(T; F) = 0 gives
 //!
 //! ```text
 //! R = ((λ² + i) F + 2λ cof F − 2 F FᵀF) / (λ³ − iλ − 2J).
 //! ```
 //!
-//! Let rᵢ be the rows of R and K = T I − S. Moving F by X turns R by ω(X) = K⁻¹ a(X): dR = R \[ω\]ₓ, where \[a\]ₓ = RᵀX −
-//! XᵀR. For X = eₖ eₗᵀ, a = eₗ × rₖ. So the Hessian of T is a(X)ᵀ K⁻¹ a(Y). It is finite where singular values meet: det
-//! K = (σ₁ + σ₂)(σ₂ + σ₃)(σ₃ + σ₁).
+//! Let rᵢ be the rows of R and K = T I − S. Moving F by X turns R by ω(X) = K⁻¹ a(X): dR = R \[ω\]ₓ with \[a\]ₓ = RᵀX −
+//! XᵀR. For X = eₖ eₗᵀ, a = eₗ × rₖ. So the Hessian of T is a(X)ᵀ K⁻¹ a(Y). It is finite where singular values meet:
+//! det K = (σ₁ + σ₂)(σ₂ + σ₃)(σ₃ + σ₁).
 
 use super::Lowered;
 use super::inner_product::inner_product;
