@@ -16,8 +16,7 @@ energy! {
         rest {
             let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
             let B = inverse(D_m);
-            // The root refuses an inverted rest shape.
-            let V = sqrt(det(D_m))^2 / 6;
+            let V = det(D_m) / 6;
         }
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
         let A = transpose(F) * F - identity(3);
@@ -41,7 +40,7 @@ energy! {
             let B = inverse(D_m);
             let d = det(D_m);
             let per_d = 1 / d;
-            let V = sqrt(d)^2 / 6;
+            let V = d / 6;
         }
         let D = columns(x1 - x0, x2 - x0, x3 - x0);
         let F = D * B;
@@ -71,8 +70,7 @@ energy! {
         rest {
             let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
             let B = inverse(D_m);
-            // The root refuses an inverted rest shape.
-            let V = sqrt(det(D_m))^2 / 6;
+            let V = det(D_m) / 6;
         }
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
         let D = F - rotation_of(F);
@@ -91,7 +89,7 @@ energy! {
         rest {
             let D_m = columns(X1 - X0, X2 - X0, X3 - X0);
             let B = inverse(D_m);
-            let V = sqrt(det(D_m))^2 / 6;
+            let V = det(D_m) / 6;
         }
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
         let D = F - rotation_of(F);

@@ -57,7 +57,6 @@ impl Obstacle {
         [from, to]: [f64; 2],
         moves: impl Iterator<Item = [Vector3<f64>; 2]>,
     ) -> Option<Passage> {
-        let solid = self.at(from);
         let poses = self.motion.as_ref().filter(|motion| motion.moves(from, to));
         let poses = poses.map(|motion| [motion.pose(from), motion.pose(to)]);
         // The obstacle at the start of the step is the frame in which it rests.
@@ -65,13 +64,17 @@ impl Obstacle {
             Some([before, after]) => before.transform(after.inverse_transform(x)),
             None => x,
         };
+        let far = |[start, end]: &[Vector3<f64>; 2]| norm(subtract(*end, *start)) > self.thickness;
+        let moves: Vec<[Vector3<f64>; 2]> = moves.map(|[start, end]| [start, end_at_rest(end)]).filter(far).collect();
+        if moves.is_empty() {
+            return None;
+        }
+        let solid = self.at(from);
         let (mut vertices, mut farthest) = (0, 0.0);
         for [start, end] in moves {
-            let end = end_at_rest(end);
-            let length = norm(subtract(end, start));
-            if length > self.thickness && passes(&solid, start, end, self.thickness) {
+            if passes(&solid, start, end, self.thickness) {
                 vertices += 1;
-                farthest = f64::max(farthest, length);
+                farthest = f64::max(farthest, norm(subtract(end, start)));
             }
         }
         let speed = farthest / (to - from);

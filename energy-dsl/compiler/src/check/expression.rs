@@ -416,12 +416,7 @@ impl<'a> Checker<'a> {
                 let within = within || binding.rest;
                 seen.insert((*number, within)) && self.rest_reads(&binding.value, input, within, seen)
             }
-            TypedKind::Call(_, list) | TypedKind::Array(list) => {
-                list.iter().any(|part| self.rest_reads(part, input, within, seen))
-            }
-            TypedKind::Select(a, b, c) => [a, b, c].into_iter().any(|part| self.rest_reads(part, input, within, seen)),
-            TypedKind::Gradient(of, ..) => self.rest_reads(of, input, within, seen),
-            TypedKind::Constant(_) | TypedKind::Pi => false,
+            _ => typed.parts().into_iter().any(|part| self.rest_reads(part, input, within, seen)),
         }
     }
 }

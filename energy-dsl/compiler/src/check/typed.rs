@@ -124,6 +124,33 @@ pub struct Typed {
     pub span: Span,
 }
 
+impl Typed {
+    /// Returns the parts of the expression. A binding has none here.
+    pub(crate) fn parts(&self) -> Vec<&Self> {
+        match &self.kind {
+            TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().collect(),
+            TypedKind::Select(a, b, c) => vec![&**a, &**b, &**c],
+            TypedKind::Gradient(of, ..) => vec![&**of],
+            TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) | TypedKind::Binding(_) => Vec::new(),
+        }
+    }
+
+    /// Returns the expression with `change` applied to each of its parts.
+    pub(crate) fn map_parts(&self, mut change: impl FnMut(&Self) -> Self) -> Self {
+        let kind = match &self.kind {
+            TypedKind::Call(function, list) => TypedKind::Call(function, list.iter().map(change).collect()),
+            TypedKind::Array(list) => TypedKind::Array(list.iter().map(change).collect()),
+            TypedKind::Select(a, b, c) => {
+                let [a, b, c] = [a, b, c].map(|part| Box::new(change(part)));
+                TypedKind::Select(a, b, c)
+            }
+            TypedKind::Gradient(of, source, first) => TypedKind::Gradient(Box::new(change(of)), *source, *first),
+            other => other.clone(),
+        };
+        Self { kind, ..self.clone() }
+    }
+}
+
 /// The kinds of checked expression.
 #[derive(Clone, Debug)]
 pub enum TypedKind {

@@ -241,6 +241,9 @@ impl Interpreted {
 
     /// Runs a routine for all terms, and adds the results.
     fn run<T: Number>(&self, routine: &InterpretedRoutine, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Results<T> {
+        if self.repetition.is_none() {
+            return routine.run(inputs, precomputed);
+        }
         let mut results = self.terms(precomputed).into_iter().map(|term| routine.run(inputs, &term));
         let first = results.next().expect("compiler bug: a sum has terms");
         results.fold(first, Results::plus)

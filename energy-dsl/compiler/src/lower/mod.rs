@@ -56,34 +56,37 @@ pub fn lower(program: &Program) -> (RestFormula, Formula) {
 
 /// Returns the numbers to store, and the formula.
 fn unrolled(program: &Program, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) {
+    let (outputs, slots) = stored(rest, stored_bindings(program));
+    (outputs, moving(program, &slots))
+}
+
+/// Returns the numbers of bindings, and the place of each binding among them.
+fn stored(rest: &mut Lowering<'_>, bindings: impl IntoIterator<Item = usize>) -> (Vec<NodeId>, BTreeMap<usize, usize>) {
     let mut outputs = Vec::new();
     let mut slots = BTreeMap::new();
-    for binding in stored_bindings(program) {
+    for binding in bindings {
         slots.insert(binding, outputs.len());
         outputs.extend(rest.binding(binding).parts);
     }
-    (outputs, moving(program, &slots))
+    (outputs, slots)
 }
 
 /// Returns the numbers to store for all terms of a sum, and the formula of one term.
 fn repeated(sum: &LikeTerms, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) {
-    let LikeTerms { term, terms, stored, constants } = sum;
-    let own: BTreeSet<usize> = stored.iter().map(|(b, _)| b).chain(constants.iter().map(|(b, _)| b)).copied().collect();
-    let mut outputs = Vec::new();
-    let mut slots = BTreeMap::new();
-    for binding in stored_bindings(term).into_iter().filter(|binding| !own.contains(binding)) {
-        slots.insert(binding, outputs.len());
-        outputs.extend(rest.binding(binding).parts);
-    }
+    let LikeTerms { term, terms, stored: each, constants } = sum;
+    let own: Vec<usize> = each.iter().map(|(b, _)| *b).chain(constants.iter().map(|(b, _)| *b)).collect();
+    let common = stored_bindings(term).into_iter().filter(|binding| !own.contains(binding));
+    let (mut outputs, mut slots) = stored(rest, common);
     let shared = outputs.len();
+    let size = |binding: usize| term.bindings[binding].value.shape.size();
     let mut next = shared;
-    for binding in stored.iter().map(|(b, _)| b).chain(constants.iter().map(|(b, _)| b)) {
-        slots.insert(*binding, next);
-        next += term.bindings[*binding].value.shape.size();
+    for binding in own {
+        slots.insert(binding, next);
+        next += size(binding);
     }
-    let stride = stored.iter().map(|(binding, _)| term.bindings[*binding].value.shape.size()).sum();
+    let stride = each.iter().map(|(binding, _)| size(*binding)).sum();
     for number in 0..*terms {
-        outputs.extend(stored.iter().flat_map(|(_, of)| rest.binding(of[number]).parts));
+        outputs.extend(each.iter().flat_map(|(_, of)| rest.binding(of[number]).parts));
     }
     let row = |number: usize| constants.iter().flat_map(|(_, rows)| rows[number].clone()).collect();
     let table = (0..*terms).map(row).collect();
@@ -141,10 +144,7 @@ fn stored_bindings(program: &Program) -> Vec<usize> {
                     visit(program, &program.bindings[*number].value, seen);
                 }
             }
-            TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().for_each(|e| visit(program, e, seen)),
-            TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|e| visit(program, e, seen)),
-            TypedKind::Gradient(of, ..) => visit(program, of, seen),
-            TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
+            _ => expression.parts().into_iter().for_each(|part| visit(program, part, seen)),
         }
     }
     let mut seen = vec![false; program.bindings.len()];
@@ -264,18 +264,11 @@ fn input_of(source: Source) -> fn(u16) -> Input {
 /// Returns the parameter numbers that a program differentiates by.
 fn differentiated_parameters(program: &Program) -> BTreeSet<u16> {
     fn visit(typed: &Typed, found: &mut BTreeSet<u16>) {
-        match &typed.kind {
-            TypedKind::Gradient(of, source, first) => {
-                if *source == Source::Parameter {
-                    let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
-                    found.extend((0..typed.shape.size()).map(number));
-                }
-                visit(of, found);
-            }
-            TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().for_each(|part| visit(part, found)),
-            TypedKind::Select(a, b, c) => [a, b, c].into_iter().for_each(|part| visit(part, found)),
-            TypedKind::Binding(_) | TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) => {}
+        if let TypedKind::Gradient(_, Source::Parameter, first) = &typed.kind {
+            let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
+            found.extend((0..typed.shape.size()).map(number));
         }
+        typed.parts().into_iter().for_each(|part| visit(part, found));
     }
     let mut found = BTreeSet::new();
     program.bindings.iter().map(|binding| &binding.value).chain([&program.result]).for_each(|t| visit(t, &mut found));

@@ -151,8 +151,8 @@ impl<'a> Unifier<'a> {
         if let Some(numbers) = terms.iter().map(|term| self.literal(term)).collect::<Option<Vec<_>>>() {
             return Some(self.constant(first, numbers));
         }
-        let part = |number: usize| -> Vec<&Typed> { terms.iter().map(|term| parts(term)[number]).collect() };
-        if terms.iter().any(|term| parts(term).len() != parts(first).len()) {
+        let part = |number: usize| -> Vec<&Typed> { terms.iter().map(|term| term.parts()[number]).collect() };
+        if terms.iter().any(|term| term.parts().len() != first.parts().len()) {
             return None;
         }
         let same = |known: fn(&TypedKind, &TypedKind) -> bool| terms.iter().all(|term| known(&first.kind, &term.kind));
@@ -177,10 +177,10 @@ impl<'a> Unifier<'a> {
         if !alike {
             return None;
         }
-        let count = parts(first).len();
+        let count = first.parts().len();
         let unified: Vec<Typed> = (0..count).map(|number| self.unified(&part(number))).collect::<Option<_>>()?;
         let mut unified = unified.into_iter();
-        Some(super::rest::map_parts(first, |_| unified.next().expect("compiler bug: as many parts")))
+        Some(first.map_parts(|_| unified.next().expect("compiler bug: as many parts")))
     }
 
     /// Returns the numbers of an expression without inputs.
@@ -196,7 +196,7 @@ impl<'a> Unifier<'a> {
                     }
                     stack.push(&binding.value);
                 }
-                _ => stack.extend(parts(part)),
+                _ => stack.extend(part.parts()),
             }
         }
         let mut lowering = Lowering::new(self.program, Form::Robust, None);
@@ -250,15 +250,5 @@ impl<'a> Unifier<'a> {
     fn add(&mut self, value: Typed, rest: bool) -> usize {
         self.bindings.push(Binding { value, rest, unit: None });
         self.bindings.len() - 1
-    }
-}
-
-/// Returns the parts of an expression.
-fn parts(typed: &Typed) -> Vec<&Typed> {
-    match &typed.kind {
-        TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().collect(),
-        TypedKind::Select(a, b, c) => vec![&**a, &**b, &**c],
-        TypedKind::Gradient(of, ..) => vec![&**of],
-        TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) | TypedKind::Binding(_) => Vec::new(),
     }
 }

@@ -50,25 +50,11 @@ fn is_constant(typed: &Typed, bindings: &[bool]) -> bool {
     match &typed.kind {
         TypedKind::Constant(_) | TypedKind::Pi => true,
         TypedKind::Binding(number) => bindings[*number],
-        TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().all(|part| is_constant(part, bindings)),
-        TypedKind::Select(a, b, c) => [a, b, c].into_iter().all(|part| is_constant(part, bindings)),
         TypedKind::Input(..) | TypedKind::Gradient(..) => false,
-    }
-}
-
-/// Returns the expression with `change` applied to each of its parts.
-pub(super) fn map_parts(typed: &Typed, mut change: impl FnMut(&Typed) -> Typed) -> Typed {
-    let kind = match &typed.kind {
-        TypedKind::Call(function, list) => TypedKind::Call(function, list.iter().map(change).collect()),
-        TypedKind::Array(list) => TypedKind::Array(list.iter().map(change).collect()),
-        TypedKind::Select(a, b, c) => {
-            let [a, b, c] = [a, b, c].map(|part| Box::new(change(part)));
-            TypedKind::Select(a, b, c)
+        TypedKind::Call(..) | TypedKind::Array(_) | TypedKind::Select(..) => {
+            typed.parts().into_iter().all(|part| is_constant(part, bindings))
         }
-        TypedKind::Gradient(of, source, first) => TypedKind::Gradient(Box::new(change(of)), *source, *first),
-        other => other.clone(),
-    };
-    Typed { kind, shape: typed.shape, span: typed.span.clone() }
+    }
 }
 
 /// Splits determinants of products of a moving and a constant matrix.
@@ -86,7 +72,7 @@ impl<'a> Split<'a> {
 
     fn expression(&self, typed: &Typed) -> Typed {
         let TypedKind::Call(det, list) = &typed.kind else {
-            return map_parts(typed, |part| self.expression(part));
+            return typed.map_parts(|part| self.expression(part));
         };
         match self.factors(&list[0]).filter(|_| det.name == "det") {
             Some(factors) => {
@@ -96,7 +82,7 @@ impl<'a> Split<'a> {
                 });
                 Typed { kind: TypedKind::Call(self.times, determinants.collect()), ..typed.clone() }
             }
-            None => map_parts(typed, |part| self.expression(part)),
+            None => typed.map_parts(|part| self.expression(part)),
         }
     }
 
@@ -136,7 +122,7 @@ impl<'a> Mover<'a> {
     fn expression(&mut self, typed: &Typed) -> Typed {
         match self.moved(typed) {
             Some(number) => Typed { kind: TypedKind::Binding(number), ..typed.clone() },
-            None => map_parts(typed, |part| self.expression(part)),
+            None => typed.map_parts(|part| self.expression(part)),
         }
     }
 
