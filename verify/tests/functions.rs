@@ -171,6 +171,13 @@ energy! {
         ddot(rotation_of(F), M) + trace(S)^2 + det(S) * S[0][1]
     }
 
+    #[audit(samples = 50)]
+    energy SingularValues(p, q: Point; M: Mat2x2, k: Scalar) {
+        let s = singular_values(columns(vector(p.x, p.y), vector(q.x, q.y)) + M);
+        let t = singular_values(columns(p, q));
+        k * sin(s[0] + s[1]) + exp(s[0] / 4) * t[1]^2 + (t[0]^k + t[1]^k) * p.z + atan2(s[1], 1 + s[0]^2)
+    }
+
     #[audit(samples = 4)]
     force SpatialPolarGradients(p, q, r: Point; M: Mat3x3) {
         let U = trace(stretch_of(columns(p, q, r) + M))^2;

@@ -3,8 +3,10 @@
 //!
 //! `PROPTEST_CASES=10000 cargo test --release -p verify --test singular_programs` is the long run.
 
+use std::sync::LazyLock;
+
 use energy_compiler::{Interpreted, Textbook};
-use energy_dsl::Inputs;
+use energy_dsl::{Declaration, Inputs};
 use proptest::prelude::*;
 use verify::Sample;
 use verify::multiprecision::{self, Big};
@@ -82,6 +84,15 @@ const MOVES: &str = "let p = a + e * da; let q = b + e * db; let r = c + e * dc;
 /// A formula must use all inputs.
 const USES: &str = "0 * (k + norm_squared(p) + norm_squared(q) + norm_squared(r))";
 
+/// Returns the declaration that all moved formulas have. To compile each would take most of the time of this test.
+fn moved_declaration() -> &'static Declaration {
+    static MOVED_SIGNATURE: LazyLock<Interpreted> = LazyLock::new(|| {
+        let source = format!("energy Moved({MOVED}) {{ {MOVES} {USES} }}");
+        Interpreted::from_source(&source).expect("a valid signature").remove(0)
+    });
+    MOVED_SIGNATURE.declaration()
+}
+
 /// Directions whose components are dyadic, so that doubles hold them.
 const DIRECTIONS: [[f64; 9]; 10] = [
     [-0.5625, -0.65625, 0.40625, -0.34375, -0.65625, 0.3125, -0.78125, 0.53125, -0.375],
@@ -101,7 +112,6 @@ type Blocks = [Vec<f64>; 3];
 
 /// A point x with the formula moved from it.
 struct Place<'a> {
-    source: &'a str,
     textbook: &'a Textbook,
     k: f64,
     x: &'a [f64],
@@ -115,11 +125,10 @@ impl Place<'_> {
 
     /// Computes the blocks at x + ε d; `None` if the formula has no value there.
     fn beside(&self, direction: &[f64; 9], distance: f64) -> Option<Blocks> {
-        let Self { source, textbook, k, x } = *self;
+        let Self { textbook, k, x } = *self;
         let parameters = [&[k, distance], &direction[..]].concat();
         let sample = Sample { parameters, rest: vec![], positions: x.into(), velocities: vec![] };
-        let declaration = Interpreted::from_source(source).ok()?.first()?.declaration();
-        let blocks = multiprecision::truth(declaration, textbook, &sample, 70);
+        let blocks = multiprecision::truth(moved_declaration(), textbook, &sample, 70);
         let numbers = |k: usize| blocks[k].block.numbers.iter().map(Big::to_f64).collect::<Vec<f64>>();
         blocks.iter().all(|block| block.is_defined).then(|| [numbers(0), numbers(1), numbers(2)])
     }
@@ -177,7 +186,7 @@ fn check(formula: &str, k: f64, x: &[f64]) -> Result<(), TestCaseError> {
         return Ok(());
     }
     let Ok(textbook) = Textbook::from_source(&moved) else { return Err(TestCaseError::reject("refused")) };
-    let place = Place { source: &moved, textbook: &textbook, k, x };
+    let place = Place { textbook: &textbook, k, x };
     // Only inputs with a neighbourhood in the domain.
     let Some(found) = place.around(2.0_f64.powi(-100)) else { return Ok(()) };
     // Directions may differ less and less, but too slowly to tell, as 1/ln ‖p‖ does.

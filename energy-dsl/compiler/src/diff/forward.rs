@@ -84,7 +84,7 @@ pub fn first_derivatives(
 }
 
 /// Returns the second dual parts: entry (i, j), i ≤ j, at index i·n + j.
-pub(super) fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<usize, NodeId> {
+pub fn second_derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> BTreeMap<usize, NodeId> {
     let n = coordinates.len();
     let tangents = tangents(g, &[output], coordinates, Order::Second);
     let mut curvatures: BTreeMap<NodeId, Sparse> = BTreeMap::new();

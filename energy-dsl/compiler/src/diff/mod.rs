@@ -14,7 +14,7 @@ mod local;
 mod plan;
 
 pub use coordinates::{Coordinates, Moving};
-pub use forward::first_derivatives;
+pub use forward::{first_derivatives, second_derivatives};
 pub use local::Order;
 pub use plan::{Plan, SecondOrder, first_order, hessian_vector, second_order};
 

@@ -19,6 +19,7 @@ mod quaternion;
 mod rotated;
 mod shape;
 mod sinc;
+mod singular;
 mod spatial_polar;
 mod trigonometric;
 
@@ -62,6 +63,7 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
         loss::FUNCTIONS,
         linear_algebra::FUNCTIONS,
         polar::FUNCTIONS,
+        singular::FUNCTIONS,
         length::FUNCTIONS,
         angle::FUNCTIONS,
         dihedral::FUNCTIONS,

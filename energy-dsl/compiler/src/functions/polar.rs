@@ -31,7 +31,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
 ];
 
 /// Returns the number of columns.
-fn deformation(shapes: &[Shape]) -> Result<u8, String> {
+pub(super) fn deformation(shapes: &[Shape]) -> Result<u8, String> {
     match *shapes {
         [Shape::Matrix(2 | 3, 2)] => Ok(2),
         [Shape::Matrix(3, 3)] => Ok(3),

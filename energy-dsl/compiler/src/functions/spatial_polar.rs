@@ -235,7 +235,7 @@ impl Decomposition {
         let (zero, one) = (g.constant(0.0), g.constant(1.0));
         let moderate = g.is_moderate(quartic.square, 2);
         g.assume(scale, one, moderate);
-        let singular = signed_singular_values(g, &quartic);
+        let singular = eigenvalue_roots(g, &quartic);
         let mut root = g.sum(singular);
         for _ in 0..2 {
             root = quartic.newton(g, root);
@@ -317,8 +317,14 @@ struct Strain {
     small: NodeId,
 }
 
-/// Returns σ₁, σ₂ and σ₃, from the eigenvalues of FᵀF by the trigonometric formula. Half of the digits suffice.
-fn signed_singular_values(g: &mut Graph, quartic: &Quartic) -> [NodeId; 3] {
+/// Returns σ₁, σ₂ and σ₃ of a 3×3 matrix. Near equal ones, half of the digits are lost.
+pub(super) fn signed_singular_values(g: &mut Graph, f: &[NodeId]) -> [NodeId; 3] {
+    let quartic = Quartic::new(g, &rows(f));
+    eigenvalue_roots(g, &quartic)
+}
+
+/// Returns σ₁, σ₂ and σ₃, from the eigenvalues of FᵀF by the trigonometric formula.
+fn eigenvalue_roots(g: &mut Graph, quartic: &Quartic) -> [NodeId; 3] {
     let [zero, one, two, three, six] = [0.0, 1.0, 2.0, 3.0, 6.0].map(|number| g.constant(number));
     let mean = g.div(quartic.square, three);
     let mut deviator = quartic.gram;
@@ -334,10 +340,9 @@ fn signed_singular_values(g: &mut Graph, quartic: &Quartic) -> [NodeId; 3] {
     let cube = g.mul(variance, spread);
     let cube = g.mul(two, cube);
     let cosine = g.div(determinant, cube);
-    let (alike, minus_one) = (g.equal(cube, zero), g.neg(one));
-    let cosine = g.select(alike, one, cosine);
-    let below = g.min(cosine, one);
-    let cosine = g.max(below, minus_one);
+    // The textbook form has no value where two are equal: neither has its derivative.
+    let is_robust = g.form() == Form::Robust;
+    let cosine = if is_robust { between_minus_one_and_one(g, cosine, cube) } else { cosine };
     let (less, more) = (g.sub(one, cosine), g.add(one, cosine));
     let product = g.mul(less, more);
     let sine = g.sqrt(product);
@@ -356,12 +361,21 @@ fn signed_singular_values(g: &mut Graph, quartic: &Quartic) -> [NodeId; 3] {
     let both = g.add(largest, smallest);
     let middle = g.sub(quartic.square, both);
     let [first, second, third] = [largest, middle, smallest].map(|eigenvalue| {
-        let positive = g.max(eigenvalue, zero);
+        let positive = if is_robust { g.max(eigenvalue, zero) } else { eigenvalue };
         g.sqrt(positive)
     });
     let inverted = g.less(quartic.determinant, zero);
     let opposite = g.neg(third);
     [first, second, g.select(inverted, opposite, third)]
+}
+
+/// Returns a cosine whose divisor may be 0.
+fn between_minus_one_and_one(g: &mut Graph, cosine: NodeId, divisor: NodeId) -> NodeId {
+    let (zero, one) = (g.constant(0.0), g.constant(1.0));
+    let (alike, minus_one) = (g.equal(divisor, zero), g.neg(one));
+    let cosine = g.select(alike, one, cosine);
+    let below = g.min(cosine, one);
+    g.max(below, minus_one)
 }
 
 /// Returns R after a step of Newton's method. It turns R by K⁻¹ a with \[a\]ₓ = RᵀF − FᵀR, and makes it orthogonal

@@ -4,6 +4,7 @@
 mod build;
 mod count;
 mod fuse;
+mod interpret;
 mod mask;
 mod node;
 mod ordinary;
@@ -12,15 +13,20 @@ mod recognise;
 mod rounding;
 mod rule;
 mod signs;
+mod spectrum;
+mod substitute;
 mod sums;
 
 pub use count::{count, reachable};
+pub use interpret::{Computed, apply, branches_with, interpret, interpret_mask, interpret_with};
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub(crate) use origin::Origin;
 pub use recognise::{Ending, Recogniser};
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 pub use signs::with_signs_inside;
+pub(crate) use spectrum::{Dependence, Spectrum};
+pub(crate) use substitute::Substitution;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -49,6 +55,8 @@ pub struct Graph {
     assumptions: Vec<Assumption>,
     /// Origins of vectors, by their components; see `origin.rs`.
     origins: HashMap<Vec<NodeId>, Origin>,
+    /// Singular values, with the vectors that their derivatives need.
+    spectra: Vec<Spectrum>,
     /// Determinants of square matrices. That of a rest shape must be positive.
     determinants: Vec<NodeId>,
     /// Nodes that are rounded before every use; see `fuse.rs`.
@@ -88,6 +96,7 @@ impl Graph {
             rule_index: HashMap::new(),
             assumptions: Vec::new(),
             origins: HashMap::new(),
+            spectra: Vec::new(),
             determinants: Vec::new(),
             rounded: BTreeSet::new(),
             weighable: BTreeMap::new(),
@@ -134,6 +143,11 @@ impl Graph {
     #[must_use]
     pub fn op(&self, node: NodeId) -> Op {
         self.nodes[node.0 as usize]
+    }
+
+    /// Returns all operations, by index.
+    pub(crate) fn ops(&self) -> impl Iterator<Item = Op> {
+        self.nodes.iter().copied()
     }
 
     /// Returns whether the node depends on positions, velocities or unknowns, not only on parameters and rest shape.

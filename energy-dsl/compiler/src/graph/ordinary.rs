@@ -23,6 +23,11 @@ impl Graph {
         ordinary(self, &[mask]).is_some_and(|(masks, _)| matches!(self.op(masks[0]), Op::Truth(_)))
     }
 
+    /// Returns all assumptions.
+    pub(super) fn assumptions(&self) -> &[Assumption] {
+        &self.assumptions
+    }
+
     /// Records that `node` equals `instead` where `guard` holds.
     pub(crate) fn assume(&mut self, node: NodeId, instead: NodeId, guard: NodeId) {
         if node != instead && !self.assumptions.iter().any(|a| a.node == node) {
@@ -33,7 +38,7 @@ impl Graph {
 
 /// Returns `outputs` with all precautions.
 pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
-    let mut path = Path { assumptions: BTreeMap::new(), done: BTreeMap::new(), guards: BTreeSet::new() };
+    let mut path = Path::default();
     let (cautious, always) = (g.cautious(), g.truth(true));
     path.done.insert(cautious, always);
     outputs.iter().map(|&output| path.rebuild(g, output)).collect()
@@ -41,11 +46,7 @@ pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
 
 /// Returns `outputs` under all assumptions, and the mask where these hold; `None` if there are no precautions.
 pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeId)> {
-    let mut path = Path {
-        assumptions: g.assumptions.iter().map(|a| (a.node, *a)).collect(),
-        done: BTreeMap::new(),
-        guards: BTreeSet::new(),
-    };
+    let mut path = Path { assumptions: g.assumptions.iter().map(|a| (a.node, *a)).collect(), ..Path::default() };
     let (cautious, never) = (g.cautious(), g.truth(false));
     path.done.insert(cautious, never);
     let outputs = outputs.iter().map(|&output| path.rebuild(g, output)).collect();
@@ -59,16 +60,29 @@ pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeI
     Some((outputs, guard))
 }
 
-struct Path {
+/// A rebuilt copy of some expressions.
+#[derive(Default)]
+pub(super) struct Path {
     assumptions: BTreeMap<NodeId, Assumption>,
+    /// What each node becomes.
     done: BTreeMap<NodeId, NodeId>,
     guards: BTreeSet<NodeId>,
 }
 
 impl Path {
+    /// Replaces some nodes by others.
+    pub(super) fn replacing(done: BTreeMap<NodeId, NodeId>) -> Self {
+        Self { done, ..Self::default() }
+    }
+
+    /// Returns what a node has become, if it was rebuilt.
+    pub(super) fn known(&self, node: NodeId) -> Option<NodeId> {
+        self.done.get(&node).copied()
+    }
+
     /// Rebuilds a node under the assumptions. Operands have smaller indices, so a stack of pending nodes suffices.
     /// Operands of a decided selection that it does not use are never visited.
-    fn rebuild(&mut self, g: &mut Graph, node: NodeId) -> NodeId {
+    pub(super) fn rebuild(&mut self, g: &mut Graph, node: NodeId) -> NodeId {
         let node = g.resolve(node);
         let mut stack = vec![node];
         while let Some(&next) = stack.last() {

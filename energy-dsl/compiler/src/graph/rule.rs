@@ -87,6 +87,10 @@ pub enum Primitive {
     StretchTraceExcess,
     /// ‖F − R‖².
     DistanceToRotation,
+    /// A singular value of F.
+    SingularValue(u8),
+    /// A function of the singular values of F.
+    Spectral,
     /// A first partial derivative of another rule.
     Partial {
         /// Node that is differentiated.
@@ -140,6 +144,7 @@ impl Primitive {
             Self::StretchTrace => "tr S of a polar decomposition F = R S",
             Self::StretchTraceExcess => "tr S − 3 of a polar decomposition F = R S",
             Self::DistanceToRotation => "squared distance ‖F − R‖² to the rotation of F = R S",
+            Self::SingularValue(_) | Self::Spectral => "functions of singular values",
             Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
         })
     }
@@ -178,6 +183,8 @@ pub struct Rule {
     pub half_square: Option<NodeId>,
     /// The vector of a length; `None` for other rules.
     pub vector: Option<Vec<NodeId>>,
+    /// An expression that the user wrote inside of the rule; `None` for other rules. Its singularities count.
+    pub inner: Option<NodeId>,
 }
 
 /// Factors that are multiplied from left to right. A weight multiplies the first factor, so that entries which share
@@ -252,6 +259,7 @@ impl Graph {
                 dihedral: None,
                 half_square: None,
                 vector: None,
+                inner: None,
             },
             &[],
         )
@@ -293,6 +301,7 @@ impl Rule {
             dihedral: None,
             half_square: None,
             vector: None,
+            inner: None,
         }
     }
 

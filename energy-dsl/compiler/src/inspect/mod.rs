@@ -1,7 +1,6 @@
 //! Views of a declaration other than its generated code, for the audit, materials read at run time, and the command
 //! line. Compiling a declaration does not need them.
 
-mod interpret;
 mod interpreted;
 mod layout;
 mod listing;

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::{Graph, NodeId, Op, reachable};
-use crate::inspect::interpret::{Computed, apply};
+use crate::graph::{Computed, Graph, NodeId, Op, apply, reachable};
 use energy_runtime::{Inputs, Number};
 
 /// Operations in topological order. Operands are indices into the list.

@@ -2,8 +2,7 @@ use proc_macro2::TokenStream;
 
 use crate::check::{Program, Source, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
-use crate::graph::{Input, NodeId, Op, reachable};
-use crate::inspect::interpret::{branches_with, interpret_with};
+use crate::graph::{Input, NodeId, Op, branches_with, interpret_with, reachable};
 use crate::inspect::tower::Tower;
 use crate::lower::{TextbookFormula, lower_textbook};
 use crate::syntax::{parse, parse_file};

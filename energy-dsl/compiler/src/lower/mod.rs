@@ -2,6 +2,7 @@
 
 mod repeated;
 mod rest;
+mod spectral;
 
 pub use repeated::Repetition;
 
@@ -13,6 +14,7 @@ use crate::diff::{Coordinates, Moving, Order, first_derivatives};
 use crate::functions::{Lowered, RECOGNISERS, Shape};
 use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
 use repeated::{LikeTerms, like_terms};
+use spectral::Spectral;
 
 /// A program as a graph.
 #[derive(Clone, Debug)]
@@ -98,7 +100,8 @@ fn moving(program: &Program, slots: &BTreeMap<usize, usize>) -> Formula {
     let formula = |outward: bool| {
         let mut moving = Lowering::new(program, Form::Robust, Some(slots.clone()));
         moving.graph.move_outward(outward);
-        let outputs = moving.expression(&program.result).parts;
+        let mut outputs = moving.expression(&program.result).parts;
+        moving.spectral.close(&mut moving.graph, &mut outputs);
         moving.graph.move_outward(false);
         Formula { graph: moving.graph, outputs, repetition: None }
     };
@@ -160,6 +163,7 @@ struct Lowering<'a> {
     slots: Option<BTreeMap<usize, usize>>,
     /// Derivatives that the evaluation of the textbook form must supply.
     gradients: Vec<(NodeId, Source, usize)>,
+    spectral: Spectral,
 }
 
 impl<'a> Lowering<'a> {
@@ -170,7 +174,7 @@ impl<'a> Lowering<'a> {
         };
         graph.compensate(!program.uncompensated);
         differentiated_parameters(program).into_iter().for_each(|number| graph.vary(Input::Parameter(number)));
-        Self { program, graph, done: BTreeMap::new(), slots, gradients: Vec::new() }
+        Self { program, graph, done: BTreeMap::new(), slots, gradients: Vec::new(), spectral: Spectral::default() }
     }
 
     fn inputs(&mut self, shape: Shape, first: usize, input: fn(u16) -> Input) -> Lowered {
@@ -199,12 +203,15 @@ impl<'a> Lowering<'a> {
             TypedKind::Input(source, first) => self.inputs(expression.shape, *first, input_of(*source)),
             TypedKind::Binding(number) => self.binding(*number),
             TypedKind::Call(function, arguments) => {
-                let arguments: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
+                let mut arguments: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
+                self.spectral.separate(&mut self.graph, &mut arguments);
                 (function.lower)(&mut self.graph, &arguments)
             }
             TypedKind::Select(condition, yes, no) => {
-                let mask = self.expression(condition).node();
-                let (yes, no) = (self.expression(yes), self.expression(no));
+                let mut operands = [condition, yes, no].map(|operand| self.expression(operand));
+                self.spectral.separate(&mut self.graph, &mut operands);
+                let [condition, yes, no] = operands;
+                let mask = condition.node();
                 let parts = yes.parts.iter().zip(&no.parts).map(|(&y, &n)| self.graph.select(mask, y, n)).collect();
                 Lowered { shape: expression.shape, parts }
             }
@@ -213,7 +220,9 @@ impl<'a> Lowering<'a> {
                 Lowered { shape: expression.shape, parts }
             }
             TypedKind::Gradient(of, source, first) => {
-                let (of, shape) = (self.expression(of).node(), expression.shape);
+                let mut of = [self.expression(of).node()];
+                self.spectral.close(&mut self.graph, &mut of);
+                let ([of], shape) = (of, expression.shape);
                 let parts = match (self.graph.form(), source) {
                     (Form::Textbook, _) => self.textbook_gradient(of, *source, *first..*first + shape.size()),
                     (Form::Robust, Source::Position) => self.gradient_by_point(of, first / 3),

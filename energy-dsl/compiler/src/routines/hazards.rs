@@ -132,14 +132,14 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
     found
 }
 
-/// Returns the operations that `roots` depend on. A robust primitive counts as one.
+/// Returns the operations that `roots` depend on. A robust primitive counts as one, but for what users wrote inside.
 pub(super) fn operations(g: &Graph, roots: &[NodeId]) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack = roots.to_vec();
     while let Some(node) = stack.pop() {
         if seen.insert(node) {
             match g.rule(node) {
-                Some(rule) => stack.extend(&rule.arguments),
+                Some(rule) => stack.extend(rule.arguments.iter().chain(&rule.inner)),
                 None => stack.extend(g.op(node).operands()),
             }
         }

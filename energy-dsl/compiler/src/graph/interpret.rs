@@ -1,6 +1,6 @@
-//! Evaluates a graph over any number type: doubles, dual numbers, multi-precision. The audit uses it.
+//! Evaluates a graph over any number type: doubles, dual numbers, multi-precision.
 
-use crate::graph::{Graph, Input, NodeId, Op, reachable};
+use super::{Graph, Input, NodeId, Op, reachable};
 use energy_runtime::{Baseline, Inputs, Mask, Number};
 
 /// The result of an operation.
