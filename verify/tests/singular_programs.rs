@@ -35,6 +35,8 @@ fn scalar(depth: u32) -> BoxedStrategy<String> {
         2 => less().prop_map(|a| format!("sqrt({a})")),
         1 => less().prop_map(|a| format!("log({a})")),
         1 => less().prop_map(|a| format!("sin({a})")),
+        1 => less().prop_map(|a| format!("exp(-{a})")),
+        1 => less().prop_map(|a| format!("tanh({a})")),
         1 => less().prop_map(|a| format!("(1 - cos({a}))")),
         1 => (less(), less()).prop_map(|(a, b)| format!("atan2({a}, ({b})^2)")),
         2 => less().prop_map(|a| format!("abs({a})")),
@@ -251,6 +253,16 @@ fn full(triangle: &[f64]) -> Vec<f64> {
         triangle[9 * block + 3 * (row % 3) + column % 3]
     };
     (0..81).map(|i| entry(i / 9, i % 9)).collect()
+}
+
+/// A number is the larger one where the other is none, but its derivatives are none, either.
+#[test]
+fn derivatives_at_infinite_inputs_are_flagged() {
+    let mut x = [0.0; 9];
+    x[1] = f64::INFINITY;
+    for formula in ["max(p.x, dot((r - q), (q - p)))", "exp(-norm_squared(p))", "tanh(norm_squared(p))", "atan(p.y^2)"] {
+        check(formula, 1.0, &x).unwrap_or_else(|error| panic!("{error}"));
+    }
 }
 
 /// Its limit 0 is approached as slowly as a logarithm grows.

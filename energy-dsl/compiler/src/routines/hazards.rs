@@ -37,6 +37,13 @@ impl Hazards {
         }
     }
 
+    /// Requires a number that is not infinite. Its function may be finite there while derivatives are not.
+    fn require_finite(&mut self, g: &mut Graph, a: NodeId) {
+        let (size, infinity) = (g.abs(a), g.constant(f64::INFINITY));
+        let finite = g.less(size, infinity);
+        self.require(g, finite);
+    }
+
     /// Marks a = b, where derivatives may have two sides.
     fn tie(&mut self, g: &mut Graph, a: NodeId, b: NodeId) {
         let equal = g.equal(a, b);
@@ -96,8 +103,9 @@ impl Hazards {
                 }
             }
             Op::Exp(a) if g.as_constant(a).is_none() => {
-                let most = g.constant(LARGEST_EXPONENT);
-                let below = g.less(a, most);
+                let (least, most) = (g.constant(f64::MIN), g.constant(LARGEST_EXPONENT));
+                let (above, below) = (g.less(least, a), g.less(a, most));
+                self.require(g, above);
                 self.require(g, below);
             }
             Op::Atan2(y, x) => {
@@ -107,7 +115,12 @@ impl Hazards {
                 self.flag(g, Flag::Kink, at_zero);
             }
             Op::Abs(a) if order >= 1 => self.tie(g, a, zero),
-            Op::Min(a, b) | Op::Max(a, b) if order >= 1 => self.tie(g, a, b),
+            Op::Min(a, b) | Op::Max(a, b) if order >= 1 => {
+                // Where one is no number, the other one is returned.
+                let sum = g.add(a, b);
+                self.require_finite(g, sum);
+                self.tie(g, a, b);
+            }
             Op::Select(mask, ..) => self.boundary(g, mask),
             _ => {}
         }
@@ -121,8 +134,13 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
         for node in operations(g, &[root]) {
             match g.rule(node) {
                 Some(rule) => {
-                    for flag in rule.flags.clone().into_iter().filter(|flag| flag.order <= order) {
+                    let (flags, arguments) = (rule.flags.clone(), rule.arguments.clone());
+                    let saturates = order >= 1 && rule.primitive.saturates();
+                    for flag in flags.into_iter().filter(|flag| flag.order <= order) {
                         found.flag(g, flag.flag, flag.mask);
+                    }
+                    for argument in arguments.into_iter().filter(|_| saturates) {
+                        found.require_finite(g, argument);
                     }
                 }
                 None => found.operation(g, node, order),
