@@ -24,7 +24,6 @@ pub(crate) struct InterpretedTerm {
 struct Bound {
     parameters: Vec<f64>,
     rest: Vec<f64>,
-    precomputed: Vec<f64>,
 }
 
 /// The results of a routine, by group, and whether an element was flagged.
@@ -44,8 +43,8 @@ impl InterpretedTerm {
     ) -> Result<Self, (usize, RestError)> {
         let bind = |(number, (parameters, rest)): (usize, (Vec<f64>, Vec<f64>))| {
             let at = Inputs { parameters: &parameters, rest: &rest, positions: &[], velocities: &[] };
-            let precomputed = element.precomputed(&at).map_err(|error| (number, error))?;
-            Ok(Bound { parameters, rest, precomputed })
+            element.check_rest(&at).map_err(|error| (number, error))?;
+            Ok(Bound { parameters, rest })
         };
         let bound = inputs.into_iter().enumerate().map(bind).collect::<Result<Vec<_>, _>>()?;
         let arity = element.declaration().points.len();
@@ -59,10 +58,10 @@ impl InterpretedTerm {
 
     fn run(&self, routine: &str, number: usize, x: &[Vector3<f64>]) -> Results {
         let positions: Vec<f64> = self.stencil(number).iter().flat_map(|&vertex| x[vertex as usize]).collect();
-        let Bound { parameters, rest, precomputed } = &self.bound[number];
+        let Bound { parameters, rest } = &self.bound[number];
         let inputs = Inputs { parameters, rest, positions: &positions, velocities: &[] };
         let (groups, Flags { degenerate, kink }) =
-            self.element.routine(routine, &inputs, precomputed).expect("energies have this routine");
+            self.element.routine(routine, &inputs).expect("checked").expect("energies have this routine");
         (groups, degenerate.any() || kink.any())
     }
 
