@@ -35,27 +35,28 @@ pub struct BlockResults<'a, S> {
 }
 
 impl<S: Float> TapeElements<S> {
-    /// Calls `work` with the results of a routine, block by block, for a range of elements that starts at a multiple of
-    /// [`TAPE_BLOCK`].
+    /// Calls `work` with the results of a routine, block by block, for ranges of elements that start at multiples of
+    /// [`TAPE_BLOCK`]. [`Places::Rows`] start with the first range.
     ///
     /// # Panics
     /// When the routine has another name, or a range or a slice does not fit.
     pub fn for_each_block(
         &self,
         routine: &str,
-        range: Range<usize>,
+        ranges: &[Range<usize>],
         places: Places<'_, S>,
         velocities: Option<Places<'_, S>>,
         work: &mut impl FnMut(BlockResults<'_, S>),
     ) {
         let routine = self.routines.find(routine).unwrap_or_else(|| panic!("{}: no {routine}", self.routines.name));
         let mut runner = Runner::new(self, routine);
-        let mut first = range.start;
-        while first < range.end {
-            let count = TAPE_BLOCK.min(range.end - first);
-            runner.run(range.start, first, count, places, velocities);
-            work(BlockResults { first, count, results: runner.results(), flags: runner.flags() });
-            first += count;
+        let rows = ranges.first().map_or(0, |range| range.start);
+        for range in ranges {
+            for first in range.clone().step_by(TAPE_BLOCK) {
+                let count = TAPE_BLOCK.min(range.end - first);
+                runner.run(rows, first, count, places, velocities);
+                work(BlockResults { first, count, results: runner.results(), flags: runner.flags() });
+            }
         }
     }
 
@@ -82,7 +83,7 @@ impl<S: Float> TapeElements<S> {
         let mut expander = expansion.map(Expander::new);
         let routine = if expansion.is_some() { "reduced_hessian" } else { routine };
         let mut flagged = Vec::new();
-        self.for_each_block(routine, range.clone(), places, velocities, &mut |block| {
+        self.for_each_block(routine, &[range.clone()], places, velocities, &mut |block| {
             let BlockResults { first, count, results, flags } = block;
             let results = match &mut expander {
                 Some(expander) => expander.expand(count, results),
@@ -115,7 +116,7 @@ impl<S: Float> TapeElements<S> {
         let name = if expansion.is_some() { "reduced_hessian" } else { routine };
         let sizes = expansion.or_else(|| self.routines.find(name)).map(Routine::sizes).unwrap_or_default();
         let (mut groups, mut flagged) = (Vec::with_capacity(sizes.len()), [false; 2]);
-        self.for_each_block(name, 0..1, places, velocities, &mut |BlockResults { results, flags, .. }| {
+        self.for_each_block(name, &[0..1], places, velocities, &mut |BlockResults { results, flags, .. }| {
             let results = match &mut expander {
                 Some(expander) => expander.expand(1, results),
                 None => results,

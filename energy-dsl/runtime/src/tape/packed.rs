@@ -80,6 +80,17 @@ impl<S: Float> Numbers<S> {
         }
     }
 
+    /// Returns a number of an element.
+    fn of(&self, number: usize, element: usize) -> S {
+        match self.sources[number] {
+            Source::Same(value) => value,
+            Source::Each(column) => {
+                self.blocks.as_chunks::<TAPE_BLOCK>().0[element / TAPE_BLOCK * self.columns + column]
+                    [element % TAPE_BLOCK]
+            }
+        }
+    }
+
     /// Fills a slot with a number of a block's elements.
     #[inline]
     pub(super) fn fill(&self, number: usize, block: usize, slot: &mut Slot<S>) {
@@ -124,6 +135,37 @@ impl<S: Float> TapeElements<S> {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// Returns the parameters and the stored numbers of an element.
+    ///
+    /// # Panics
+    /// When there is no such element.
+    #[must_use]
+    pub fn numbers_of(&self, element: usize) -> Vec<S> {
+        assert!(element < self.count, "element {element} of {}", self.count);
+        (0..self.numbers.sources.len()).map(|number| self.numbers.of(number, element)).collect()
+    }
+
+    /// Returns the elements at some indices.
+    ///
+    /// # Panics
+    /// When there is no such element.
+    #[must_use]
+    pub fn selected(&self, indices: &[usize]) -> Self {
+        let blocks = indices.len().div_ceil(TAPE_BLOCK);
+        let columns = self.numbers.columns;
+        let mut stored = Aligned::new(blocks * columns * TAPE_BLOCK, S::from_f64(0.0));
+        let old = self.numbers.blocks.as_chunks::<TAPE_BLOCK>().0;
+        for (place, slot) in stored.as_chunks_mut::<TAPE_BLOCK>().0.iter_mut().enumerate() {
+            let (block, column) = (place / columns, place % columns);
+            for (element, number) in slot.iter_mut().enumerate() {
+                let index = indices[(block * TAPE_BLOCK + element).min(indices.len() - 1)];
+                *number = old[index / TAPE_BLOCK * columns + column][index % TAPE_BLOCK];
+            }
+        }
+        let numbers = Numbers { sources: self.numbers.sources.clone(), columns, blocks: stored };
+        Self { routines: Arc::clone(&self.routines), count: indices.len(), numbers }
     }
 
     /// Returns the routines.

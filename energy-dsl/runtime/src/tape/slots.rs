@@ -95,7 +95,9 @@ pub struct Results<'a, S> {
 }
 
 impl<'a, S> Results<'a, S> {
-    pub(super) fn new(numbers: &'a [Slot<S>], at: &'a [u16]) -> Self {
+    /// Creates results: number i is `numbers[at[i]]`.
+    #[must_use]
+    pub fn new(numbers: &'a [Slot<S>], at: &'a [u16]) -> Self {
         Self { numbers, at }
     }
 
