@@ -1,6 +1,7 @@
 //! Writes statements to tapes, for declarations that are read at run time.
 
 mod recorder;
+mod steps;
 
 use crate::check::Program;
 use crate::graph::{Input, NodeId};

@@ -1,7 +1,9 @@
 //! Assigns slots to the results of statements.
 
+use super::steps::{Step, steps};
+
 use crate::graph::{Input, NodeId, Op};
-use crate::statements::Code;
+use crate::statements::{Code, RETURNED};
 use energy_runtime::tape::{Constant, Instruction, Operation, Tape};
 
 /// A routine with more numbers than a tape has slots.
@@ -19,13 +21,20 @@ pub(super) struct Recorded {
 /// Writes statements to a tape. The inputs have the first slots, in the given order.
 pub(super) fn record(code: &Code, inputs: &[Input]) -> Result<Recorded, TooLarge> {
     let list = code.statements.list();
-    let last_uses = code.statements.last_uses(code.returned());
+    let steps = steps(code);
+    let mut last_uses = vec![0; list.len()];
+    for (place, step) in steps.iter().enumerate() {
+        step.iter().flat_map(|step| &step.reads).for_each(|&operand| last_uses[operand] = place);
+    }
+    code.returned().for_each(|result| last_uses[result.0 as usize] = RETURNED);
     let mut recorder = Recorder { numbers: Slots::of(inputs.len()), ..Recorder::default() };
     for op in list {
         recorder.place_fixed(*op, inputs)?;
     }
-    for (place, op) in list.iter().enumerate() {
-        recorder.compute(place, *op, list, &last_uses)?;
+    for (place, step) in steps.iter().enumerate() {
+        if let Some(step) = step {
+            recorder.compute(place, step, list, &last_uses)?;
+        }
     }
     let Recorder { numbers, masks, mut tape, places } = recorder;
     (tape.slots, tape.masks) = (numbers.count, masks.count);
@@ -97,32 +106,27 @@ impl Recorder {
         Ok(())
     }
 
-    fn compute(&mut self, place: usize, op: Op, list: &[Op], last_uses: &[usize]) -> Result<(), TooLarge> {
-        if is_fixed(op) {
-            return Ok(());
-        }
-        let (operation, degree) = operation(op);
-        let mut operands = [0; 3];
-        let read: Vec<usize> = op.operands().map(|operand| operand.0 as usize).collect();
-        for (slot, &operand) in operands.iter_mut().zip(&read) {
+    fn compute(&mut self, place: usize, step: &Step, list: &[Op], last_uses: &[usize]) -> Result<(), TooLarge> {
+        let mut operands = [0; 6];
+        for (slot, &operand) in operands.iter_mut().zip(&step.reads) {
             *slot = self.places[operand];
         }
-        if let Some(degree) = degree {
+        if let Op::IsModerate(_, degree) = list[place] {
             operands[1] = u16::from(degree);
         }
-        for (number, &operand) in read.iter().enumerate() {
-            let is_last = last_uses[operand] == place && !read[..number].contains(&operand);
+        for (number, &operand) in step.reads.iter().enumerate() {
+            let is_last = last_uses[operand] == place && !step.reads[..number].contains(&operand);
             if is_last && !is_fixed(list[operand]) {
                 let slot = self.places[operand];
                 self.slots(list[operand]).free.push(slot);
             }
         }
-        let target = self.slots(op).take()?;
+        let target = self.slots(list[place]).take()?;
         self.places[place] = target;
-        self.tape.instructions.push(Instruction { operation, target, operands });
+        self.tape.instructions.push(Instruction { operation: step.operation, target, operands });
         // A result that nothing reads: a planted fault may leave one.
         if last_uses[place] == 0 {
-            self.slots(op).free.push(target);
+            self.slots(list[place]).free.push(target);
         }
         Ok(())
     }
@@ -133,13 +137,13 @@ impl Recorder {
     }
 }
 
-fn is_fixed(op: Op) -> bool {
+pub(super) fn is_fixed(op: Op) -> bool {
     matches!(op, Op::Input(_) | Op::Constant(_) | Op::Pi | Op::Truth(_))
 }
 
-/// Returns the operation of a statement, and the degree of a moderate number.
-fn operation(op: Op) -> (Operation, Option<u8>) {
-    let operation = match op {
+/// Returns the operation of a statement.
+pub(super) fn operation(op: Op) -> Operation {
+    match op {
         Op::Neg(_) => Operation::Neg,
         Op::Add(..) => Operation::Add,
         Op::Sub(..) => Operation::Sub,
@@ -169,7 +173,7 @@ fn operation(op: Op) -> (Operation, Option<u8>) {
         Op::Less(..) => Operation::Less,
         Op::LessOrEqual(..) => Operation::LessOrEqual,
         Op::Equal(..) => Operation::Equal,
-        Op::IsModerate(_, degree) => return (Operation::IsModerate, Some(degree)),
+        Op::IsModerate(..) => Operation::IsModerate,
         Op::And(..) => Operation::And,
         Op::Or(..) => Operation::Or,
         Op::Not(_) => Operation::Not,
@@ -177,6 +181,5 @@ fn operation(op: Op) -> (Operation, Option<u8>) {
         Op::Input(_) | Op::Constant(_) | Op::Pi | Op::Truth(_) | Op::Rule(_) | Op::Cautious => {
             unreachable!("compiler bug: inputs and constants have slots, rules are resolved and caution is decided")
         }
-    };
-    (operation, None)
+    }
 }

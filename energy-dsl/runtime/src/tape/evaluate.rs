@@ -58,6 +58,7 @@ impl<S: Float> TapeElements<S> {
                 work(BlockResults { first, count, results: runner.results(), flags: runner.flags() });
             }
         }
+        runner.finish();
     }
 
     /// Writes the results of a routine (`value`, `gradient`, `jacobians`, …) for a range of elements that starts at a
@@ -210,6 +211,10 @@ impl<S: Float> Kernel for StoreRows<'_, S> {
     fn run<L: Level>(self) {
         let Self { results, layout, count, rows } = self;
         let (width, lanes) = (layout.len(), <S::Lanes<L> as Lane<S>>::LANES);
+        if width == 1 {
+            let numbers = results.number(usize::from(layout[0]));
+            return rows[..count].copy_from_slice(&numbers[..count]);
+        }
         let mut numbers = [S::Lanes::<L>::from_f64(0.0); TOGETHER];
         let mut first = 0;
         while first < count {

@@ -9,8 +9,8 @@ pub struct Instruction {
     pub operation: Operation,
     /// Slot of the result.
     pub target: u16,
-    /// Slots of the operands a, b and c.
-    pub operands: [u16; 3],
+    /// Slots of the operands a, b, ….
+    pub operands: [u16; 6],
 }
 
 /// A number that is known before the tape runs.

@@ -56,11 +56,12 @@ macro_rules! define_run {
             let lanes = <S::Lanes<L> as Lane<S>>::LANES;
             for instruction in instructions {
                 let target = usize::from(instruction.target);
-                let [first, second, third] = instruction.operands;
-                let [i, j, k] = [usize::from(first), usize::from(second), usize::from(third)];
+                let operands = instruction.operands;
+                let [i, j, k] = [usize::from(operands[0]), usize::from(operands[1]), usize::from(operands[2])];
                 match instruction.operation {
                     $(Operation::$name => {
-                        let [$($operand,)* ..] = [i, j, k];
+                        let [$($operand,)* ..] = operands;
+                        $(let $operand = usize::from($operand);)*
                         $(assert!($operand < slots.len());)*
                         assert!(target < slots.len());
                         let mut at = 0;
@@ -83,7 +84,7 @@ macro_rules! define_run {
                             ELEMENTS, lanes);
                     }
                     Operation::IsModerate => {
-                        let degree = second.to_le_bytes()[0];
+                        let degree = operands[1].to_le_bytes()[0];
                         masks[target] = bits!(|at| load::<S, L>(slots, i, at).is_moderate(degree), ELEMENTS, lanes);
                     }
                     Operation::And => masks[target] = masks[i] & masks[j],

@@ -29,4 +29,4 @@ pub use scalar::Values;
 pub use slots::Results;
 
 /// Elements per block of a tape.
-pub const TAPE_BLOCK: usize = 32;
+pub const TAPE_BLOCK: usize = 64;

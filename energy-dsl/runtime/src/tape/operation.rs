@@ -56,13 +56,38 @@ macro_rules! with_operations {
             NegMulSub(a, b, c) = (-a).mul_add::<L>(b, -c);
             /// The power of two that scales |a| into [1, 2).
             PowerOfTwoScale(a) = a.power_of_two_scale();
+            // Pairs and triples of statements, of which only the last result is read. They save loads and stores.
+            /// a · b + c · d, the second product fused.
+            MulThenMulAdd(a, b, c, d) = c.mul_add::<L>(d, a * b);
+            /// a · b − c · d, the second product fused.
+            MulThenNegMulAdd(a, b, c, d) = (-c).mul_add::<L>(d, a * b);
+            /// a · b + c · d + e · f, the last two products fused.
+            MulThenTwoMulAdds(a, b, c, d, e, f) = e.mul_add::<L>(f, c.mul_add::<L>(d, a * b));
+            /// c + a · b + d · e.
+            TwoMulAdds(a, b, c, d, e) = d.mul_add::<L>(e, a.mul_add::<L>(b, c));
+            /// c + a · b − d · e.
+            MulAddThenNegMulAdd(a, b, c, d, e) = (-d).mul_add::<L>(e, a.mul_add::<L>(b, c));
+            /// c − a · b + d · e.
+            NegMulAddThenMulAdd(a, b, c, d, e) = d.mul_add::<L>(e, (-a).mul_add::<L>(b, c));
+            /// c − a · b − d · e.
+            TwoNegMulAdds(a, b, c, d, e) = (-d).mul_add::<L>(e, (-a).mul_add::<L>(b, c));
+            /// a · b − c · d, each product rounded.
+            TwoMulsThenSub(a, b, c, d) = a * b - c * d;
+            /// c · (a · b).
+            TwoMuls(a, b, c) = c * (a * b);
+            /// d · (a · b + c).
+            MulAddThenMul(a, b, c, d) = d * a.mul_add::<L>(b, c);
+            /// d · (a · b + c) + e.
+            MulAddThenMulAdd(a, b, c, d, e) = d.mul_add::<L>(a.mul_add::<L>(b, c), e);
+            /// (a + b) + c.
+            TwoAdds(a, b, c) = (a + b) + c;
         }
     };
 }
 
 macro_rules! define {
     ($($(#[$docs:meta])* $name:ident($($operand:ident),*) = $meaning:expr;)*) => {
-        /// What an [`Instruction`](super::Instruction) computes from its operands a, b and c.
+        /// What an [`Instruction`](super::Instruction) computes from its operands a, b, ….
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
         pub enum Operation {

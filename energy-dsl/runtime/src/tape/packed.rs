@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::TAPE_BLOCK;
 use super::lanes::Slot;
 use super::routine::{Input, Routines};
+use super::runner::Spare;
 use super::slots::Slots;
 use crate::aligned::Aligned;
 use crate::element::RestError;
@@ -26,6 +27,7 @@ pub struct TapeElements<S = f64> {
     pub(super) count: usize,
     /// The parameters, then the stored numbers.
     pub(super) numbers: Numbers<S>,
+    pub(super) spare: Spare<S>,
 }
 
 /// Numbers of elements. Those that all elements share are held once.
@@ -122,7 +124,7 @@ impl<S: Float> TapeElements<S> {
         let mut columns = parameters.to_vec();
         columns.push((stored.column(), routines.rest.groups[0].len()));
         let numbers = Numbers::new(count, &columns);
-        Ok(Self { routines, count, numbers })
+        Ok(Self { routines, count, numbers, spare: Spare::default() })
     }
 
     /// Returns the number of elements.
@@ -165,7 +167,7 @@ impl<S: Float> TapeElements<S> {
             }
         }
         let numbers = Numbers { sources: self.numbers.sources.clone(), columns, blocks: stored };
-        Self { routines: Arc::clone(&self.routines), count: indices.len(), numbers }
+        Self { routines: Arc::clone(&self.routines), count: indices.len(), numbers, spare: Spare::default() }
     }
 
     /// Returns the routines.

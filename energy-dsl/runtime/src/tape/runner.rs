@@ -1,5 +1,7 @@
 //! Runs one routine of many elements, block by block.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::TAPE_BLOCK;
 use super::lanes::Slot;
 use super::packed::TapeElements;
@@ -88,6 +90,13 @@ impl<S: Float> Kernel for Gather<'_, S> {
 pub(super) struct Runner<'a, S> {
     elements: &'a TapeElements<S>,
     routine: &'a Routine,
+    state: State<S>,
+}
+
+/// The slots of a routine, ready for blocks of the elements that they belong to.
+#[derive(Debug)]
+struct State<S> {
+    name: &'static str,
     slots: Slots<S>,
     /// Slots and numbers of the inputs that differ between elements, but not between terms.
     stored: Vec<(usize, usize)>,
@@ -97,8 +106,36 @@ pub(super) struct Runner<'a, S> {
     sum: Option<Sum<S>>,
 }
 
-impl<'a, S: Float> Runner<'a, S> {
-    pub(super) fn new(elements: &'a TapeElements<S>, routine: &'a Routine) -> Self {
+/// States that no thread uses. Filling slots costs as much as some blocks.
+#[derive(Debug)]
+pub(super) struct Spare<S>(Mutex<Vec<State<S>>>);
+
+impl<S> Default for Spare<S> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+/// A copy starts without states.
+impl<S> Clone for Spare<S> {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<S> Spare<S> {
+    fn take(&self, name: &str) -> Option<State<S>> {
+        let mut states = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        states.iter().position(|state| state.name == name).map(|found| states.swap_remove(found))
+    }
+
+    fn put(&self, state: State<S>) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(state);
+    }
+}
+
+impl<S: Float> State<S> {
+    fn new(elements: &TapeElements<S>, routine: &Routine) -> Self {
         let mut slots = Slots::new(routine);
         let repetition = elements.routines.repetition.as_ref();
         let (mut stored, mut of_term) = (Vec::new(), Vec::new());
@@ -119,7 +156,19 @@ impl<'a, S: Float> Runner<'a, S> {
             }
         }
         let sum = repetition.map(|_| Sum::new(routine));
-        Self { elements, routine, slots, stored, of_term, sum }
+        Self { name: routine.name, slots, stored, of_term, sum }
+    }
+}
+
+impl<'a, S: Float> Runner<'a, S> {
+    pub(super) fn new(elements: &'a TapeElements<S>, routine: &'a Routine) -> Self {
+        let state = elements.spare.take(routine.name).unwrap_or_else(|| State::new(elements, routine));
+        Self { elements, routine, state }
+    }
+
+    /// Returns the slots to the elements, for the next call.
+    pub(super) fn finish(self) {
+        self.elements.spare.put(self.state);
     }
 
     /// Runs the routine on the `count` elements from `first` on, a multiple of [`TAPE_BLOCK`]. Rows of `places` and
@@ -132,7 +181,7 @@ impl<'a, S: Float> Runner<'a, S> {
         places: Places<'_, S>,
         velocities: Option<Places<'_, S>>,
     ) {
-        let Self { elements, routine, slots, stored, of_term, sum } = self;
+        let Self { elements, routine, state: State { slots, stored, of_term, sum, .. } } = self;
         let coordinates = elements.routines.coordinates;
         let (positions, others) = slots.numbers_mut().split_at_mut(coordinates);
         places.fill(rows, first, count, positions);
@@ -165,12 +214,12 @@ impl<'a, S: Float> Runner<'a, S> {
 
     /// Returns the results of the last block.
     pub(super) fn results(&self) -> Results<'_, S> {
-        self.sum.as_ref().map_or_else(|| self.slots.results(), Sum::results)
+        self.state.sum.as_ref().map_or_else(|| self.state.slots.results(), Sum::results)
     }
 
     /// Returns the bits of the last block's flagged elements: degenerate, kink.
     pub(super) fn flags(&self) -> [u64; 2] {
-        self.sum.as_ref().map_or(self.slots.flags, |sum| sum.flags)
+        self.state.sum.as_ref().map_or(self.state.slots.flags, |sum| sum.flags)
     }
 }
 

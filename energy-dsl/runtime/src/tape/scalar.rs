@@ -73,11 +73,12 @@ macro_rules! define_step {
             values: &mut Values<T>,
             note: &mut dyn FnMut(T::Mask),
         ) {
-            let [first, second, third] = instruction.operands;
+            let operands = instruction.operands;
+            let [first, second, third, ..] = operands;
             let mask = |slot: u16| values.masks[usize::from(slot)];
             let mask = match instruction.operation {
                 $(Operation::$name => {
-                    let [$($operand,)* ..] = [first, second, third];
+                    let [$($operand,)* ..] = operands;
                     $(let $operand = values.number($operand);)*
                     values.numbers[usize::from(instruction.target)] = $meaning;
                     return;
