@@ -1,9 +1,11 @@
 //! Evaluation of one element: all blocks, or one routine.
 
-use super::Interpreted;
-use energy_runtime::tape::{Column, Places, Routine, Routines, TapeElements, TermNumber};
-use energy_runtime::{Baseline, Flags, Float, Inputs, Kind, Mask, Number, Outputs, RestError, triangle_index};
 use std::sync::Arc;
+
+use super::Interpreted;
+use super::mutants::EVALUATED;
+use energy_runtime::tape::{Column, Input, Places, Routine, Routines, TapeElements, TermNumber};
+use energy_runtime::{Baseline, Flags, Float, Inputs, Kind, Mask, Number, Outputs, RestError, triangle_index};
 
 /// The results of a routine by group, and its flags.
 type Results<T> = (Vec<Vec<T>>, Flags<T>);
@@ -76,7 +78,7 @@ impl Interpreted {
     pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Result<Vec<bool>, RestError> {
         let stored = self.stored(inputs)?;
         let mut outcomes = Vec::new();
-        for routine in self.routines.list.iter().filter(|routine| super::mutants::EVALUATED.contains(&routine.name)) {
+        for routine in self.routines.list.iter().filter(|routine| EVALUATED.contains(&routine.name)) {
             for term in terms(&self.routines) {
                 let numbers = read(&self.routines, routine, term, inputs, &stored);
                 let _ = routine.tape.run_noting::<f64, Baseline>(numbers, &mut |outcome| outcomes.push(outcome));
@@ -192,7 +194,6 @@ fn read<T: Number>(
     inputs: &Inputs<'_, T>,
     stored: &[T],
 ) -> Vec<T> {
-    use energy_runtime::tape::Input;
     let zero = || T::from_f64(0.0);
     let number = |input: &Input| match *input {
         Input::Position(i) => inputs.positions[usize::from(i)].clone(),

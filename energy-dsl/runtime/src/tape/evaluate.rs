@@ -1,6 +1,7 @@
 //! Evaluation of a range of elements.
 
 use std::ops::Range;
+use std::slice;
 
 use super::TAPE_BLOCK;
 use super::packed::TapeElements;
@@ -80,11 +81,10 @@ impl<S: Float> TapeElements<S> {
         outputs: &mut [Output<'_, S>],
     ) -> Result<Flagged, BatchError> {
         self.check(&range, [Some(places), velocities].into_iter().flatten(), outputs)?;
-        let expansion = self.routines.expansion.as_ref().filter(|_| routine == "hessian");
-        let mut expander = expansion.map(Expander::new);
-        let routine = if expansion.is_some() { "reduced_hessian" } else { routine };
+        let mut expander = if routine == "hessian" { Expander::new(self) } else { None };
+        let routine = if expander.is_some() { "reduced_hessian" } else { routine };
         let mut flagged = Vec::new();
-        self.for_each_block(routine, &[range.clone()], places, velocities, &mut |block| {
+        self.for_each_block(routine, slice::from_ref(&range), places, velocities, &mut |block| {
             let BlockResults { first, count, results, flags } = block;
             let results = match &mut expander {
                 Some(expander) => expander.expand(count, results),
@@ -98,6 +98,7 @@ impl<S: Float> TapeElements<S> {
                 note_flags(&mut flagged, first, flags);
             }
         });
+        expander.into_iter().for_each(Expander::finish);
         Ok(flagged)
     }
 
@@ -112,12 +113,13 @@ impl<S: Float> TapeElements<S> {
         places: Places<'_, S>,
         velocities: Option<Places<'_, S>>,
     ) -> (Vec<Vec<S>>, [bool; 2]) {
-        let expansion = self.routines.expansion.as_ref().filter(|_| routine == "hessian");
-        let mut expander = expansion.map(Expander::new);
-        let name = if expansion.is_some() { "reduced_hessian" } else { routine };
-        let sizes = expansion.or_else(|| self.routines.find(name)).map(Routine::sizes).unwrap_or_default();
+        let mut expander = if routine == "hessian" { Expander::new(self) } else { None };
+        let name = if expander.is_some() { "reduced_hessian" } else { routine };
+        let last = expander.as_ref().map(|expander| expander.routine).or_else(|| self.routines.find(name));
+        let sizes = last.map(Routine::sizes).unwrap_or_default();
         let (mut groups, mut flagged) = (Vec::with_capacity(sizes.len()), [false; 2]);
-        self.for_each_block(name, &[0..1], places, velocities, &mut |BlockResults { results, flags, .. }| {
+        self.for_each_block(name, slice::from_ref(&(0..1)), places, velocities, &mut |block| {
+            let BlockResults { results, flags, .. } = block;
             let results = match &mut expander {
                 Some(expander) => expander.expand(1, results),
                 None => results,
@@ -164,15 +166,23 @@ impl<S: Float> TapeElements<S> {
 /// Expands reduced derivatives of a block to points.
 #[derive(Debug)]
 pub struct Expander<'a, S> {
+    elements: &'a TapeElements<S>,
     routine: &'a Routine,
     slots: Slots<S>,
 }
 
 impl<'a, S: Float> Expander<'a, S> {
-    /// Creates the slots of [`super::Routines::expansion`].
+    /// Prepares the expansion of energies; `None` if elements of this kind have none.
     #[must_use]
-    pub fn new(routine: &'a Routine) -> Self {
-        Self { routine, slots: Slots::new(routine) }
+    pub fn new(elements: &'a TapeElements<S>) -> Option<Self> {
+        let routine = elements.routines.expansion.as_ref()?;
+        let slots = elements.spare.take_expansion().unwrap_or_else(|| Slots::new(routine));
+        Some(Self { elements, routine, slots })
+    }
+
+    /// Returns the slots to the elements, for the next call.
+    pub fn finish(self) {
+        self.elements.spare.put_expansion(self.slots);
     }
 
     /// Returns U, ∂U/∂x and the triangle of ∂²U/∂x² for the results of the routine `reduced_hessian`.

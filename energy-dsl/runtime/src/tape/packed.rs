@@ -9,7 +9,7 @@ use super::runner::Spare;
 use super::slots::Slots;
 use crate::aligned::Aligned;
 use crate::element::RestError;
-use crate::numbers::{Float, Mask};
+use crate::numbers::{Float, Number};
 
 /// The numbers of one parameter or one part of the rest shape.
 #[derive(Clone, Copy, Debug)]
@@ -219,8 +219,7 @@ impl<S: Float> Stored<S> {
             for element in 0..block {
                 let stored = &mut numbers[(first + element) * size..][..size];
                 stored.iter_mut().enumerate().for_each(|(number, stored)| *stored = results.number(number)[element]);
-                let is_finite = |number: &S| (*number - *number).equal(S::from_f64(0.0));
-                if slots.flags[0] >> element & 1 == 1 || !stored.iter().all(|number| is_finite(number).all()) {
+                if slots.flags[0] >> element & 1 == 1 || !stored.iter().all(Number::is_representable) {
                     return Err((first + element, RestError { element: routines.name }));
                 }
             }

@@ -1,13 +1,13 @@
 //! Runs one routine of many elements, block by block.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::TAPE_BLOCK;
 use super::lanes::Slot;
 use super::packed::TapeElements;
 use super::routine::{Input, Routine, TermNumber};
 use super::slots::{Results, Slots};
-use crate::numbers::{Float, Kernel, Lane, Level, Mask, dispatch};
+use crate::numbers::{Float, Kernel, Lane, Level, dispatch};
 
 /// Where the points (or unknowns) of elements are, or the velocities of these points.
 #[derive(Clone, Copy, Debug)]
@@ -106,17 +106,21 @@ struct State<S> {
     sum: Option<Sum<S>>,
 }
 
-/// States that no thread uses. Filling slots costs as much as some blocks.
+/// Slots that no thread uses. Filling new ones costs as much as some blocks.
 #[derive(Debug)]
-pub(super) struct Spare<S>(Mutex<Vec<State<S>>>);
+pub(super) struct Spare<S> {
+    states: Mutex<Vec<State<S>>>,
+    /// Slots of the expansion.
+    expansions: Mutex<Vec<Slots<S>>>,
+}
 
 impl<S> Default for Spare<S> {
     fn default() -> Self {
-        Self(Mutex::default())
+        Self { states: Mutex::default(), expansions: Mutex::default() }
     }
 }
 
-/// A copy starts without states.
+/// A copy starts without slots.
 impl<S> Clone for Spare<S> {
     fn clone(&self) -> Self {
         Self::default()
@@ -125,13 +129,21 @@ impl<S> Clone for Spare<S> {
 
 impl<S> Spare<S> {
     fn take(&self, name: &str) -> Option<State<S>> {
-        let mut states = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut states = lock(&self.states);
         states.iter().position(|state| state.name == name).map(|found| states.swap_remove(found))
     }
 
-    fn put(&self, state: State<S>) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(state);
+    pub(super) fn take_expansion(&self) -> Option<Slots<S>> {
+        lock(&self.expansions).pop()
     }
+
+    pub(super) fn put_expansion(&self, slots: Slots<S>) {
+        lock(&self.expansions).push(slots);
+    }
+}
+
+fn lock<T>(list: &Mutex<T>) -> MutexGuard<'_, T> {
+    list.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<S: Float> State<S> {
@@ -168,7 +180,7 @@ impl<'a, S: Float> Runner<'a, S> {
 
     /// Returns the slots to the elements, for the next call.
     pub(super) fn finish(self) {
-        self.elements.spare.put(self.state);
+        lock(&self.elements.spare.states).push(self.state);
     }
 
     /// Runs the routine on the `count` elements from `first` on, a multiple of [`TAPE_BLOCK`]. Rows of `places` and
@@ -267,8 +279,7 @@ impl<S: Float> Sum<S> {
                 }
                 sum = sum + all;
             }
-            let is_finite = (sum - sum).equal(S::from_f64(0.0)).all();
-            self.flags[0] |= u64::from(!is_finite) << element;
+            self.flags[0] |= u64::from(!sum.is_representable()) << element;
         }
     }
 

@@ -73,8 +73,7 @@ impl Evaluated for TapePacks {
     }
 
     fn hessians(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Hessians<'_, '_>) {
-        let expansion = self.elements.routines().expansion.as_ref().expect("an energy has an expansion");
-        let mut expander = Expander::new(expansion);
+        let mut expander = Expander::new(&self.elements).expect("an energy has an expansion");
         let mut reduced: Vec<Slot<f64>> = vec![[0.0; TAPE_BLOCK]; self.identity.len()];
         self.for_each_block("reduced_hessian", packs, x, &mut |block, stencils| {
             let BlockResults { first, count, results, flags } = block;
@@ -94,11 +93,12 @@ impl Evaluated for TapePacks {
             let block = BlockResults { first, count, results, flags };
             dispatch(AddHessians { block, stencils, projected: &projected, work });
         });
+        expander.finish();
     }
 
     fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64])) {
         let all = 0..self.elements.len();
-        self.for_each_block("gradient", &[all], x, &mut |block, _| {
+        self.for_each_block("gradient", std::slice::from_ref(&all), x, &mut |block, _| {
             for element in 0..block.count {
                 let number = |result: usize| block.results.number(result)[element];
                 let gradient: Vec<f64> = (1..block.results.len()).map(number).collect();
