@@ -71,6 +71,6 @@ pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Stor
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
     Character, Counts, Curvature, Divisible, ElementList, ForceTerm, Linearisation, ListError, PlacedTerm,
-    PotentialTerm, Quantity, Share, State, Stencils, StepStart, Tally, Term, TermDescription, TrianglePlaces, Weights,
-    change_dense,
+    PotentialTerm, Quantity, Share, State, Stencils, StepStart, Tally, TapeTerm, Term, TermDescription, TrianglePlaces,
+    Weights, change_dense,
 };

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use energy_compiler::{Interpreted, canonical_name};
-use energy_dsl::{Declaration, Kind, Vector3};
+use energy_compiler::{BindError, Interpreted, canonical_name};
+use energy_dsl::tape::Column;
+use energy_dsl::{Declaration, Field, Kind, Vector3};
+use energy_solve::TapeTerm;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::Bending;
-use super::interpreted_term::InterpretedTerm;
 use crate::bounded::{RealMap, Signed};
 use crate::geometry::{norm, subtract};
 use crate::input_text;
@@ -20,7 +21,7 @@ const LARGEST_FILE: u64 = 16 << 20;
 
 /// Elements declared in your own `.energy` file. Each energy acts on every vertex, edge, triangle or hinge, depending
 /// on whether it has one, two, three or four points. The points of a hinge are its two apexes, then the shared edge.
-/// The elements are interpreted, which is 10 to 100 times slower than generated code.
+/// The elements are interpreted, a block of them at a time, with the bits of generated code.
 ///
 /// A rest shape consists of the rest position of each point (`Vec3`), or, for a triangle, of the corners in its plane
 /// with the first axis along the warp (`Vec2`).
@@ -108,7 +109,7 @@ pub(super) struct TargetMesh<'a> {
 
 impl Declared {
     /// Returns a term for each element used.
-    pub(super) fn terms(&self, target: &TargetMesh<'_>) -> Result<Vec<InterpretedTerm>, DeclaredError> {
+    pub(super) fn terms(&self, target: &TargetMesh<'_>) -> Result<Vec<TapeTerm>, DeclaredError> {
         let elements = self.read()?;
         let known: BTreeSet<String> = elements
             .iter()
@@ -140,7 +141,7 @@ impl Declared {
         wanted.iter().map(find).collect()
     }
 
-    fn term(&self, element: Interpreted, target: &TargetMesh<'_>) -> Result<InterpretedTerm, DeclaredError> {
+    fn term(&self, element: Interpreted, target: &TargetMesh<'_>) -> Result<TapeTerm, DeclaredError> {
         let declaration = element.declaration();
         let unfit =
             |what: String| DeclaredError::Unfit { path: self.path.clone(), element: declaration.name.to_owned(), what };
@@ -150,12 +151,20 @@ impl Declared {
         let sites = sites(declaration.points.len(), target)
             .ok_or_else(|| unfit(format!("an energy of {} points", declaration.points.len())))?;
         let inputs = sites.iter().map(|site| self.inputs(declaration, site, target, &unfit));
-        let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
+        let inputs: Vec<(Vec<f64>, Vec<f64>)> = inputs.collect::<Result<_, _>>()?;
+        let parameters = columns(declaration.parameters, inputs.iter().map(|(parameters, _)| &parameters[..]));
+        let rest = columns(declaration.rest, inputs.iter().map(|(_, rest)| &rest[..]));
+        let [rest, parameters] =
+            [&rest, &parameters].map(|all| all.iter().map(|c| Column::Each(c)).collect::<Vec<_>>());
+        let elements = element.elements(sites.len(), &rest, &parameters).map_err(|error| match error {
+            BindError::Rest { index, error: source } => {
+                DeclaredError::Rest { path: self.path.clone(), vertices: sites[index].vertices.clone(), source }
+            }
+            other => unfit(format!("an energy with other inputs than its declaration has ({other})")),
+        })?;
         let stencils = sites.iter().flat_map(|site| site.vertices.iter().map(|vertex| target.first + vertex));
         let name = format!("{}{}", target.prefix, declaration.name);
-        InterpretedTerm::new(name, element, stencils.collect(), inputs).map_err(|(number, source)| {
-            DeclaredError::Rest { path: self.path.clone(), vertices: sites[number].vertices.clone(), source }
-        })
+        Ok(TapeTerm::new(name, declaration, elements.tape().clone(), stencils))
     }
 
     /// Returns the parameters and the rest shape of an element, flattened.
@@ -168,7 +177,7 @@ impl Declared {
     ) -> Result<(Vec<f64>, Vec<f64>), DeclaredError> {
         let given: BTreeMap<String, f64> =
             self.parameters.iter().map(|(name, value)| (canonical_name(name), *value)).collect();
-        let parameter = |field: &energy_dsl::Field| {
+        let parameter = |field: &Field| {
             let name = canonical_name(field.name);
             let value = given.get(&name).copied().or_else(|| site.default_of(&name)).filter(|_| field.size == 1);
             value.ok_or_else(|| DeclaredError::Missing {
@@ -189,6 +198,16 @@ impl Declared {
         };
         Ok((parameters, rest))
     }
+}
+
+/// Returns the numbers of each field for all elements, one element after the other.
+fn columns<'a>(fields: &[Field], elements: impl Iterator<Item = &'a [f64]> + Clone) -> Vec<Vec<f64>> {
+    let mut first = 0;
+    let column = |field: &Field| {
+        first += field.size;
+        elements.clone().flat_map(|numbers| numbers[first - field.size..first].to_vec()).collect()
+    };
+    fields.iter().map(column).collect()
 }
 
 /// The vertices that one element acts on.

@@ -4,7 +4,6 @@ mod declared;
 mod description;
 mod error;
 mod hair;
-mod interpreted_term;
 mod library;
 pub mod plate;
 mod terms;

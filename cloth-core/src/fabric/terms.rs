@@ -4,11 +4,10 @@ use energy_elements::{
     FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
     StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
 };
-use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term, TermDescription};
+use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
 use super::declared::{Declared, TargetMesh};
 use super::error::FabricError;
-use super::interpreted_term::InterpretedTerm;
 use super::plate::{PlateTerm, Rigidity, ThreadError};
 use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
@@ -253,10 +252,6 @@ impl FabricTerms {
         let Place { first, prefix } = &self.place;
         let (mesh, triangles) = (cloth.mesh, cloth.triangles.as_slice());
         let terms = declared.terms(&TargetMesh { mesh, triangles, density, first: *first, prefix })?;
-        let slow = |term: &InterpretedTerm| {
-            format!("{} is interpreted, which is 10 to 100 times slower than a built-in element", term.name())
-        };
-        self.warnings.extend(terms.iter().map(slow));
         self.terms.extend(terms.into_iter().map(|term| -> Box<dyn Term> { Box::new(term) }));
         Ok(())
     }

@@ -18,7 +18,7 @@ fn compiled(formula: &str, columns: usize) -> Interpreted {
 fn evaluate(element: &Interpreted, columns: &[[f64; 3]]) -> (Vec<Vec<f64>>, Flags<f64>) {
     let positions: Vec<f64> = std::iter::once(&[0.0; 3]).chain(columns).flatten().copied().collect();
     let inputs = Inputs { parameters: &[], rest: &[], positions: &positions, velocities: &[] };
-    element.routine("hessian", &inputs, &[]).expect("an energy has a Hessian")
+    element.routine("hessian", &inputs).expect("no rest shape").expect("an energy has a Hessian")
 }
 
 /// Compares two formulas at matrices.

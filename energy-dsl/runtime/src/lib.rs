@@ -13,6 +13,7 @@ mod evaluate;
 pub mod interop;
 mod numbers;
 mod results;
+pub mod tape;
 
 #[doc(hidden)]
 pub use accumulate::Accumulate;

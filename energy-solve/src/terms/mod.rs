@@ -20,7 +20,7 @@ pub use curvature::{Curvature, change_dense};
 pub use element_list::{ElementList, ListError};
 pub use force_term::ForceTerm;
 pub use linearisation::{Linearisation, Weights};
-pub use potential::PotentialTerm;
+pub use potential::{PotentialTerm, TapeTerm};
 pub use share::{Divisible, Share};
 pub use state::{State, StepStart};
 pub use stencils::Stencils;

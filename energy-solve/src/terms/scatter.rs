@@ -1,9 +1,36 @@
 //! Adds the results of a batch to the vectors and blocks of its vertices, one element after the other, so that sums do
 //! not depend on the number of lanes.
 
-use energy_dsl::{BLOCK, Batch, Block, Lane, Level, PackedPotential, Vector3, triangle_index};
+use energy_dsl::{BLOCK, Block, Lane, Level, Vector3, triangle_index};
 
 use crate::matrix::precision::Precision;
+
+/// Elements that are evaluated together, one per lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lanes<'a> {
+    /// Index of the first element among the active ones.
+    pub(crate) first: usize,
+    /// Number of elements.
+    pub(crate) count: usize,
+    /// Vertices of the elements and of those that follow, point by point.
+    pub(crate) stencils: &'a [u32],
+    /// Vertices per point.
+    pub(crate) stride: usize,
+}
+
+impl<'a> Lanes<'a> {
+    /// Returns the vertices of point `point` of the elements.
+    #[inline(always)]
+    pub(crate) fn vertices(&self, point: usize) -> &'a [u32] {
+        &self.stencils[point * self.stride..][..self.count]
+    }
+
+    /// Returns the vertices of point `point` of the elements and of those that follow.
+    #[inline(always)]
+    pub(crate) fn all_vertices(&self, point: usize) -> &'a [u32] {
+        &self.stencils[point * self.stride..]
+    }
+}
 
 /// Scratch buffer for one vector per point of a batch's elements; each component is stored for all elements together.
 #[derive(Debug)]
@@ -18,9 +45,9 @@ impl VectorBuffer {
 
     /// Subtracts the vectors at the elements' points from `sums`, which holds the vertices from `first_vertex` on.
     #[inline(always)]
-    pub(crate) fn subtract<E: PackedPotential<f64>, L: Level>(
+    pub(crate) fn subtract<L: Level>(
         &mut self,
-        batch: &Batch<'_, E, L::F64>,
+        lanes: &Lanes<'_>,
         vectors: &[Vector3<L::F64>],
         first_vertex: usize,
         sums: &mut [Vector3<f64>],
@@ -29,9 +56,9 @@ impl VectorBuffer {
         for (stored, number) in numbers.iter_mut().zip(vectors.as_flattened()) {
             number.store(stored);
         }
-        for lane in 0..batch.count.min(BLOCK) {
+        for lane in 0..lanes.count.min(BLOCK) {
             for point in 0..vectors.len() {
-                let vertex = (batch.vertices(point)[lane] as usize).wrapping_sub(first_vertex);
+                let vertex = (lanes.vertices(point)[lane] as usize).wrapping_sub(first_vertex);
                 if let Some(vector) = sums.get_mut(vertex) {
                     for axis in 0..3 {
                         vector[axis] -= numbers[3 * point + axis][lane];

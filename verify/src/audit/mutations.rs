@@ -89,7 +89,7 @@ fn exact_differences(sound: &Interpreted, broken: &Interpreted, sample: &Sample)
     let big = |numbers: &[f64]| numbers.iter().map(|&x| Big::from_f64(x)).collect::<Vec<_>>();
     let lists = [&sample.parameters, &sample.rest, &sample.positions, &sample.velocities].map(|list| big(list));
     let inputs = Inputs { parameters: &lists[0], rest: &lists[1], positions: &lists[2], velocities: &lists[3] };
-    let (before, after) = (sound.evaluate(&inputs).ok()?, broken.evaluate(&inputs).ok()?);
+    let (before, after) = (sound.evaluate_over(&inputs).ok()?, broken.evaluate_over(&inputs).ok()?);
     let numbers = |outputs: Outputs<Big>| {
         let blocks: Vec<_> = outputs.blocks.into_iter().map(|(_, numbers)| numbers).collect();
         let repeats: Vec<_> = outputs.repeats.into_iter().map(|(_, _, numbers)| numbers).collect();

@@ -119,7 +119,7 @@ impl Subject {
         Ok(Self { routines: Some(routines.clone()), ..subject })
     }
 
-    /// Evaluates the block whose differences are taken. Interprets one routine instead of all, because differences need
+    /// Evaluates the block whose differences are taken. Runs one routine instead of all, because differences need
     /// hundreds of values.
     ///
     /// # Errors
@@ -134,8 +134,7 @@ impl Subject {
         };
         if let (Some(routines), Some((name, group))) = (&self.routines, routine) {
             let inputs = sample.inputs();
-            let precomputed = routines.precomputed(&inputs).map_err(NoAnswer::Rest)?;
-            if let Some((mut groups, _)) = routines.routine(name, &inputs, &precomputed) {
+            if let Some((mut groups, _)) = routines.routine(name, &inputs).map_err(NoAnswer::Rest)? {
                 return Ok(groups.swap_remove(group));
             }
         }

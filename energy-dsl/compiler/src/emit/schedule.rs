@@ -1,31 +1,24 @@
-use std::collections::BTreeMap;
+//! Renders statements as Rust.
 
-use proc_macro2::{Ident, Literal, TokenStream};
+use proc_macro2::{Literal, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 
 use crate::graph::{Graph, Input, NodeId, Op};
+use crate::statements::Sequence;
 
 /// Emits the expression that reads an input.
 pub(super) type Reader<'a> = &'a dyn Fn(Input) -> TokenStream;
 
 /// Straight-line code. Each node is computed just before its first use.
 pub(super) struct Schedule<'a> {
-    graph: &'a Graph,
+    sequence: Sequence<'a>,
     read: Reader<'a>,
-    places: BTreeMap<NodeId, TokenStream>,
-    statements: Vec<Statement>,
-    /// Last statement that reads each node; [`RETURNED`] if it is returned.
-    last_use: BTreeMap<NodeId, usize>,
+    /// The expression of each statement's result: a variable, or an input.
+    names: Vec<TokenStream>,
+    /// Number of statements that are no inputs.
+    computed: usize,
+    returned: Vec<NodeId>,
 }
-
-/// A statement `let name = expression;`.
-struct Statement {
-    name: Ident,
-    node: NodeId,
-    expression: TokenStream,
-}
-
-const RETURNED: usize = usize::MAX;
 
 /// Statements per block. Each `let` opens a scope within the previous one, and rustc recurses over scopes, so long
 /// routines are split into blocks that return what later ones read.
@@ -33,55 +26,54 @@ const BLOCK: usize = 128;
 
 impl<'a> Schedule<'a> {
     pub(super) fn new(graph: &'a Graph, read: Reader<'a>) -> Self {
-        Self { graph, read, places: BTreeMap::new(), statements: Vec::new(), last_use: BTreeMap::new() }
+        Self { sequence: Sequence::new(graph), read, names: Vec::new(), computed: 0, returned: Vec::new() }
     }
 
     /// Returns the statements so far.
-    pub(super) fn statements(self) -> TokenStream {
-        if self.statements.len() <= 2 * BLOCK {
-            return lets(&self.statements);
+    pub(super) fn statements(&self) -> TokenStream {
+        let list = self.sequence.statements().list();
+        let computed: Vec<usize> = (0..list.len()).filter(|&place| !matches!(list[place], Op::Input(_))).collect();
+        if computed.len() <= 2 * BLOCK {
+            return self.lets(&computed);
         }
-        let blocks = self.statements.chunks(BLOCK).enumerate();
-        blocks
-            .map(|(number, block)| {
-                let end = number * BLOCK + block.len();
-                let handed_on: Vec<&Ident> = block
-                    .iter()
-                    .filter(|s| self.last_use.get(&s.node).is_some_and(|&u| u >= end))
-                    .map(|s| &s.name)
-                    .collect();
-                let lets = lets(block);
-                quote!(let (#(#handed_on,)*) = { #lets (#(#handed_on,)*) };)
+        let last_uses = self.sequence.statements().last_uses(self.returned.iter().copied());
+        let blocks = computed.chunks(BLOCK).map(|block| {
+            let end = block[block.len() - 1];
+            let handed_on: Vec<&TokenStream> =
+                block.iter().filter(|&&place| last_uses[place] > end).map(|&place| &self.names[place]).collect();
+            let lets = self.lets(block);
+            quote!(let (#(#handed_on,)*) = { #lets (#(#handed_on,)*) };)
+        });
+        blocks.collect()
+    }
+
+    fn lets(&self, places: &[usize]) -> TokenStream {
+        let list = self.sequence.statements().list();
+        places
+            .iter()
+            .map(|&place| {
+                let (name, expression) = (&self.names[place], self.expression(list[place]));
+                quote!(let #name = #expression;)
             })
             .collect()
     }
 
     /// Returns the expression of a node, after the statements that compute it.
     pub(super) fn value(&mut self, node: NodeId) -> TokenStream {
-        let node = self.graph.resolve(node);
-        // Uses an explicit stack, because expressions may be deep.
-        let mut stack = vec![node];
-        while let Some(&next) = stack.last() {
-            if self.places.contains_key(&next) {
-                stack.pop();
-                continue;
-            }
-            let missing: Vec<NodeId> = self
-                .graph
-                .fused(next)
-                .operands()
-                .map(|o| self.graph.resolve(o))
-                .filter(|o| !self.places.contains_key(o))
-                .collect();
-            if missing.is_empty() {
-                self.compute(next);
-                stack.pop();
-            } else {
-                stack.extend(missing.into_iter().rev());
-            }
+        let place = self.sequence.value(node);
+        let Self { sequence, read, names, computed, .. } = self;
+        for op in &sequence.statements().list()[names.len()..] {
+            names.push(match *op {
+                Op::Input(input) => read(input),
+                _ => {
+                    let name = format_ident!("t{computed}");
+                    *computed += 1;
+                    quote!(#name)
+                }
+            });
         }
-        self.last_use.insert(node, RETURNED);
-        self.places[&node].clone()
+        self.returned.push(place);
+        self.names[place.0 as usize].clone()
     }
 
     /// Returns an array of nodes.
@@ -110,24 +102,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    fn compute(&mut self, node: NodeId) {
-        if let Op::Input(input) = self.graph.op(node) {
-            self.places.insert(node, (self.read)(input));
-            return;
-        }
-        let expression = self.expression(node);
-        let number = self.statements.len();
-        for operand in self.graph.fused(node).operands() {
-            let last = self.last_use.entry(self.graph.resolve(operand)).or_default();
-            *last = number.max(*last);
-        }
-        let name = format_ident!("t{number}");
-        self.places.insert(node, quote!(#name));
-        self.statements.push(Statement { name, node, expression });
-    }
-
-    fn expression(&self, node: NodeId) -> TokenStream {
-        let p = |node: NodeId| &self.places[&self.graph.resolve(node)];
+    fn expression(&self, op: Op) -> TokenStream {
+        let p = |place: NodeId| &self.names[place.0 as usize];
         let infix = |a, operator: TokenStream, b| {
             let (a, b) = (p(a), p(b));
             quote!(#a #operator #b)
@@ -141,7 +117,7 @@ impl<'a> Schedule<'a> {
             let (name, a, rest) = (format_ident!("{name}"), p(a), rest.iter().map(|&r| p(r)));
             quote!(#a.#name::<L>(#(#rest),*))
         };
-        match self.graph.fused(node) {
+        match op {
             Op::Constant(bits) => {
                 let magnitude = f64::from_bits(bits).abs();
                 // Constants such as 1/0 and 0/0 cannot be literals.
@@ -220,8 +196,4 @@ impl<'a> Schedule<'a> {
             }
         }
     }
-}
-
-fn lets(statements: &[Statement]) -> TokenStream {
-    statements.iter().map(|Statement { name, expression, .. }| quote!(let #name = #expression;)).collect()
 }

@@ -5,7 +5,7 @@ use energy_runtime::{Baseline, Inputs, Mask, Number};
 
 /// The result of an operation.
 #[derive(Clone)]
-pub enum Computed<T: Number> {
+enum Computed<T: Number> {
     /// A number of the evaluated type.
     Number(T),
     /// A mask of the evaluated type.
@@ -90,7 +90,7 @@ fn compute<T: Number>(
 }
 
 /// Evaluates one operation; `n` and `m` return its operands.
-pub fn apply<T: Number>(
+fn apply<T: Number>(
     op: Op,
     inputs: &Inputs<'_, T>,
     precomputed: &[T],

@@ -18,7 +18,7 @@ mod substitute;
 mod sums;
 
 pub use count::{count, reachable};
-pub use interpret::{Computed, apply, branches_with, interpret, interpret_mask, interpret_with};
+pub use interpret::{branches_with, interpret, interpret_mask, interpret_with};
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub(crate) use origin::Origin;

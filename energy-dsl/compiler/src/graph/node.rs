@@ -1,21 +1,8 @@
+pub use energy_runtime::tape::Input;
+
 /// Index of a node. Operands have smaller indices than their uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId(pub(crate) u32);
-
-/// The source of an input number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Input {
-    /// Coordinate of the positions (point · 3 + axis), or an unknown of a residual.
-    Position(u16),
-    /// Coordinate of the velocities.
-    Velocity(u16),
-    /// Index among the parameter numbers.
-    Parameter(u16),
-    /// Index among the rest-shape numbers.
-    Rest(u16),
-    /// Index among the numbers that the `rest` block computes once for each element.
-    Precomputed(u16),
-}
 
 /// A scalar operation. Comparisons and connectives return masks, all others numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -145,6 +132,48 @@ impl Op {
             | Self::NegMulSub(a, b, c) => (3, [a, b, c]),
         };
         list.into_iter().take(count)
+    }
+
+    /// Returns the operation on other operands.
+    #[must_use]
+    pub fn with_operands(self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
+        match self {
+            Self::Constant(_) | Self::Truth(_) | Self::Cautious | Self::Pi | Self::Input(_) | Self::Rule(_) => self,
+            Self::Neg(a) => Self::Neg(to(a)),
+            Self::Sqrt(a) => Self::Sqrt(to(a)),
+            Self::Abs(a) => Self::Abs(to(a)),
+            Self::Sin(a) => Self::Sin(to(a)),
+            Self::Cos(a) => Self::Cos(to(a)),
+            Self::Exp(a) => Self::Exp(to(a)),
+            Self::Ln(a) => Self::Ln(to(a)),
+            Self::PowerOfTwoScale(a) => Self::PowerOfTwoScale(to(a)),
+            Self::IsModerate(a, degree) => Self::IsModerate(to(a), degree),
+            Self::Not(a) => Self::Not(to(a)),
+            Self::Add(a, b) => Self::Add(to(a), to(b)),
+            Self::Sub(a, b) => Self::Sub(to(a), to(b)),
+            Self::Mul(a, b) => Self::Mul(to(a), to(b)),
+            Self::Div(a, b) => Self::Div(to(a), to(b)),
+            Self::Min(a, b) => Self::Min(to(a), to(b)),
+            Self::Max(a, b) => Self::Max(to(a), to(b)),
+            Self::Atan2(a, b) => Self::Atan2(to(a), to(b)),
+            Self::ModerateAtan2(a, b) => Self::ModerateAtan2(to(a), to(b)),
+            Self::Pow(a, b) => Self::Pow(to(a), to(b)),
+            Self::SumError(a, b) => Self::SumError(to(a), to(b)),
+            Self::DifferenceError(a, b) => Self::DifferenceError(to(a), to(b)),
+            Self::ProductError(a, b) => Self::ProductError(to(a), to(b)),
+            Self::RootError(a, b) => Self::RootError(to(a), to(b)),
+            Self::Less(a, b) => Self::Less(to(a), to(b)),
+            Self::LessOrEqual(a, b) => Self::LessOrEqual(to(a), to(b)),
+            Self::Equal(a, b) => Self::Equal(to(a), to(b)),
+            Self::And(a, b) => Self::And(to(a), to(b)),
+            Self::Or(a, b) => Self::Or(to(a), to(b)),
+            Self::FusedMulSub(a, b, c) => Self::FusedMulSub(to(a), to(b), to(c)),
+            Self::MulAdd(a, b, c) => Self::MulAdd(to(a), to(b), to(c)),
+            Self::MulSub(a, b, c) => Self::MulSub(to(a), to(b), to(c)),
+            Self::NegMulSub(a, b, c) => Self::NegMulSub(to(a), to(b), to(c)),
+            Self::NegMulAdd(a, b, c) => Self::NegMulAdd(to(a), to(b), to(c)),
+            Self::Select(mask, a, b) => Self::Select(to(mask), to(a), to(b)),
+        }
     }
 
     /// Returns whether the node is a rounding error or a scale. Its derivative is zero for all operands.

@@ -9,33 +9,7 @@ use crate::functions::Shape;
 use crate::graph::Form;
 use energy_runtime::Kind;
 
-/// The numbers of each term of a sum. Term q reads the stored numbers 0 to `shared` − 1, then its own `stride` numbers,
-/// from `shared` + q · `stride`, then row q of the table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Repetition {
-    /// Stored numbers that all terms read.
-    pub shared: usize,
-    /// Stored numbers that one term reads.
-    pub stride: usize,
-    /// Constants of each term.
-    pub table: Vec<Vec<f64>>,
-}
-
-impl Repetition {
-    /// Returns the number of terms.
-    #[must_use]
-    pub fn terms(&self) -> usize {
-        self.table.len()
-    }
-
-    /// Returns the numbers that a term reads.
-    #[must_use]
-    pub fn numbers<T: Clone>(&self, term: usize, stored: &[T], constant: impl Fn(f64) -> T) -> Vec<T> {
-        let own = self.shared + term * self.stride;
-        let constants = self.table[term].iter().map(|&number| constant(number));
-        stored[..self.shared].iter().chain(&stored[own..own + self.stride]).cloned().chain(constants).collect()
-    }
-}
+pub use energy_runtime::tape::Repetition;
 
 /// A sum of like terms.
 pub(super) struct LikeTerms {

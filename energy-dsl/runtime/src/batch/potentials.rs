@@ -25,6 +25,13 @@ pub struct Batch<'a, E: PackedPotential<S>, V: Lane<S>, S: Float = f64> {
 }
 
 impl<'a, S: Float, E: PackedPotential<S>, V: Lane<S>> Batch<'a, E, V, S> {
+    /// Returns the vertex indices from the first element of the batch on: those of point p start at p · [`BLOCK`].
+    #[inline(always)]
+    #[must_use]
+    pub fn stencils(&self) -> &'a [u32] {
+        self.stencils
+    }
+
     /// Returns the vertex index of point `point` of each element.
     #[inline(always)]
     #[must_use]

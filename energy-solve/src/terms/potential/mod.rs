@@ -1,16 +1,21 @@
 //! Terms with f = −∇U.
 
+mod evaluated;
 mod pack_energies;
 mod placed;
+mod tapes;
 mod work;
 
 use std::fmt::Debug;
 
-use energy_dsl::{Declaration, PackedPotential};
+use energy_dsl::tape::TapeElements;
+use energy_dsl::{Declaration, Packed, PackedPotential};
 
 use self::placed::PlacedPotentialTerm;
+use self::tapes::TapePacks;
 use crate::matrix::dof_map::DofMap;
-use crate::matrix::pattern::Pattern;
+use crate::matrix::pattern::{Pattern, index};
+use crate::terms::active::Active;
 use crate::terms::element_list::ElementList;
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Term, TermDescription};
@@ -53,7 +58,77 @@ impl<E: PackedPotential<f64> + Debug + Sync> TermDescription for PotentialTerm<E
 
 impl<E: PackedPotential<f64> + Debug + Sync + 'static> Term for PotentialTerm<E> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
-        Box::new(PlacedPotentialTerm::new(self.list, dofs, pattern))
+        let list = self.list;
+        let (stencils, count) = (list.stencils(), list.elements().len());
+        let active = Active::new(stencils, dofs);
+        let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
+        let element = |number: usize| &list.elements()[active.element(number)];
+        let packed = Packed::from_fn(active.len(), list.arity(), element, vertex);
+        let (name, vertices) = list.into_name_and_vertices();
+        Box::new(PlacedPotentialTerm::new(name, (count, vertices), (active, packed), dofs, pattern))
+    }
+}
+
+/// A term with f = −∇U whose elements were read at run time. It does what [`PotentialTerm`] does, with the same bits;
+/// routines are interpreted, a block of elements at a time.
+#[derive(Debug)]
+pub struct TapeTerm {
+    name: String,
+    declaration: &'static Declaration,
+    elements: TapeElements,
+    vertices: Vec<u32>,
+}
+
+impl TapeTerm {
+    /// Creates the sum of the energies of some elements. Each stencil has as many `vertices` as the declaration has
+    /// points; they follow each other.
+    ///
+    /// # Panics
+    /// When the declaration is not an energy or constraint, or there are not as many stencils as elements.
+    #[must_use]
+    pub fn new(
+        name: String,
+        declaration: &'static Declaration,
+        elements: TapeElements,
+        vertices: impl IntoIterator<Item = usize>,
+    ) -> Self {
+        let vertices: Vec<u32> = vertices.into_iter().map(index).collect();
+        assert!(elements.routines().expansion.is_some(), "{name}: {} is no energy", declaration.name);
+        assert_eq!(vertices.len(), elements.len() * declaration.points.len(), "{name}: every element needs a stencil");
+        Self { name, declaration, elements, vertices }
+    }
+}
+
+impl TermDescription for TapeTerm {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        self.declaration
+    }
+
+    fn character(&self) -> Character {
+        character(self.declaration)
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils::new(self.declaration.points.len(), &self.vertices)
+    }
+}
+
+impl Term for TapeTerm {
+    fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
+        let stencils = self.stencils();
+        let active = Active::new(stencils, dofs);
+        let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
+        let elements = match active.is_all() {
+            true => self.elements.clone(),
+            false => self.elements.selected(&active.iter().collect::<Vec<_>>()),
+        };
+        let packed = TapePacks::new(self.declaration, elements, vertex);
+        let Self { name, elements, vertices, .. } = *self;
+        Box::new(PlacedPotentialTerm::new(name, (elements.len(), vertices), (active, packed), dofs, pattern))
     }
 }
 

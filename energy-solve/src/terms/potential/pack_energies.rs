@@ -1,6 +1,8 @@
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use energy_dsl::{BLOCK, Batch, Lane, Level, PackedPotential};
+use energy_dsl::{BLOCK, Lane, Level};
+
+use crate::terms::scatter::Lanes;
 
 /// Writes Σ U of each pack. The order of summation is fixed, so the sum is the same for any number of lanes.
 pub(super) struct PackEnergies<'a> {
@@ -18,7 +20,7 @@ impl<'a> PackEnergies<'a> {
     }
 
     #[inline(always)]
-    pub(super) fn note<E: PackedPotential<f64>, L: Level>(&mut self, batch: &Batch<'_, E, L::F64>, values: L::F64) {
+    pub(super) fn note<L: Level>(&mut self, batch: &Lanes<'_>, values: L::F64) {
         let place = batch.first % BLOCK;
         values.store(&mut self.values[place..]);
         let next = place + <L::F64 as Lane<f64>>::LANES;

@@ -2,11 +2,10 @@ use std::fmt::Debug;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use energy_dsl::{
-    Array, BLOCK, Declaration, Packed, PackedPotential, Potential, Vector3, WidePoints, for_each_batch_in,
-};
+use energy_dsl::{BLOCK, Declaration, Vector3};
 
 use super::character;
+use super::evaluated::Evaluated;
 use super::pack_energies::PackEnergies;
 use super::work::{Gradients, Hessians, Values};
 use crate::matrix::dof_map::DofMap;
@@ -14,7 +13,6 @@ use crate::matrix::pattern::{Pattern, Storage};
 use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::Orthonormal;
-use crate::terms::element_list::ElementList;
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::Places;
 use crate::terms::share::{Divisible, Share};
@@ -36,7 +34,7 @@ pub(super) struct PlacedPotentialTerm<E> {
     /// All stencils; empty if every element is active, because the packs hold them too.
     vertices: Vec<u32>,
     active: Active,
-    packed: Packed<E>,
+    packed: E,
     /// Places of the blocks (i, j), i ≤ j.
     places: Places,
     /// Places of the blocks (j, i), i < j, if the pattern stores both halves.
@@ -48,26 +46,28 @@ pub(super) struct PlacedPotentialTerm<E> {
     energies: Vec<AtomicU64>,
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync> PlacedPotentialTerm<E> {
-    pub(super) fn new(list: ElementList<E>, dofs: &DofMap, pattern: &Pattern) -> Self {
-        let active = Active::new(list.stencils(), dofs);
-        let stencils = list.stencils();
-        let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
-        let element = |number: usize| &list.elements()[active.element(number)];
-        let packed = Packed::from_fn(active.len(), list.arity(), element, vertex);
-        let (arity, count) = (list.arity(), list.elements().len());
-        let (name, vertices) = list.into_name_and_vertices();
+impl<E: Evaluated> PlacedPotentialTerm<E> {
+    /// Creates the term of `count` elements with these `vertices`, whose active ones are `packed`.
+    pub(super) fn new(
+        name: String,
+        (count, vertices): (usize, Vec<u32>),
+        (active, packed): (Active, E),
+        dofs: &DofMap,
+        pattern: &Pattern,
+    ) -> Self {
+        let declaration = packed.declaration();
+        let has_vertices = E::PACK == BLOCK && active.is_all() && active.len() > 0;
         let mut term = Self {
             name,
-            arity,
+            arity: declaration.points.len(),
             count,
-            vertices: if active.is_all() && !packed.is_empty() { Vec::new() } else { vertices },
+            vertices: if has_vertices { Vec::new() } else { vertices },
             energies: (0..active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect(),
             active,
             packed,
             places: Places::default(),
             mirrored: Places::default(),
-            orthonormal: Orthonormal::new(E::DECLARATION),
+            orthonormal: Orthonormal::new(declaration),
             shares: Vec::new(),
         };
         // Constant Jacobians are evaluated once: their places are looked up then and freed afterwards.
@@ -87,19 +87,13 @@ impl<E: PackedPotential<f64> + Debug + Sync> PlacedPotentialTerm<E> {
         if share.number == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
     }
 
-    /// Returns the points of an active element, by its index among the active ones.
-    fn points(&self, number: usize, x: &[Vector3<f64>]) -> WidePoints<E, f64> {
-        let (stencils, element) = (self.stencils(), self.active.element(number));
-        WidePoints::<E, f64>::from_fn(|point| x[stencils.vertex(element, point) as usize])
-    }
-
     /// Returns the packs with an element on one of these vertices, as ranges of elements.
     fn packs_at(&self, vertices: &Range<usize>) -> Vec<Range<usize>> {
         let mut packs: Vec<Range<usize>> = Vec::new();
         let (stencils, inside) = (self.stencils(), |vertex: u32| vertices.contains(&(vertex as usize)));
         let needed = |number| stencils.stencil(self.active.element(number)).any(inside);
-        for start in (0..self.active.len()).step_by(BLOCK) {
-            let end = (start + BLOCK).min(self.active.len());
+        for start in (0..self.active.len()).step_by(E::PACK) {
+            let end = (start + E::PACK).min(self.active.len());
             if (start..end).any(needed) {
                 match packs.last_mut() {
                     Some(last) if last.end == start => last.end = end,
@@ -119,9 +113,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> PlacedPotentialTerm<E> {
         force: &mut [Vector3<f64>],
     ) -> u64 {
         let mut gradients = Gradients::new(self.arity, force, first_vertex, self.pack_energies());
-        for pack in packs {
-            for_each_batch_in(&self.packed, pack.clone(), x, &mut gradients);
-        }
+        self.packed.gradients(packs, x, &mut gradients);
         gradients.flagged
     }
 
@@ -137,9 +129,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> PlacedPotentialTerm<E> {
         let places = (&self.places, &self.mirrored);
         let orthonormal = self.orthonormal.as_ref();
         let mut hessians = Hessians::new(self.arity, sum, first, state.v, places, orthonormal, self.pack_energies());
-        for pack in packs {
-            for_each_batch_in(&self.packed, pack.clone(), state.x, &mut hessians);
-        }
+        self.packed.hessians(packs, state.x, &mut hessians);
         (hessians.flagged, hessians.projected)
     }
 
@@ -159,7 +149,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> PlacedPotentialTerm<E> {
     }
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PlacedPotentialTerm<E> {
+impl<E: Evaluated> Divisible for PlacedPotentialTerm<E> {
     fn energy_parts(&self) -> usize {
         // At least one, which reports the skipped elements.
         self.energies.len().div_ceil(ENERGY_PART).max(1)
@@ -169,7 +159,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PlacedPotentialTerm<E
         let mut values = Values::new(self.pack_energies());
         let packs = part * ENERGY_PART..(part + 1) * ENERGY_PART;
         let elements = packs.start * BLOCK..(packs.end * BLOCK).min(self.active.len());
-        for_each_batch_in(&self.packed, elements, x, &mut values);
+        self.packed.values(&[elements], x, &mut values);
         let flagged = values.flagged;
         let tally = if part == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } };
         (self.found_in(part), tally)
@@ -186,17 +176,17 @@ impl<E: PackedPotential<f64> + Debug + Sync> Divisible for PlacedPotentialTerm<E
     }
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync> TermDescription for PlacedPotentialTerm<E> {
+impl<E: Evaluated> TermDescription for PlacedPotentialTerm<E> {
     fn name(&self) -> &str {
         &self.name
     }
 
     fn declaration(&self) -> &'static Declaration {
-        E::DECLARATION
+        self.packed.declaration()
     }
 
     fn character(&self) -> Character {
-        character(E::DECLARATION)
+        character(self.packed.declaration())
     }
 
     fn stencils(&self) -> Stencils<'_> {
@@ -208,7 +198,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> TermDescription for PlacedPotential
     }
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync> PlacedTerm for PlacedPotentialTerm<E> {
+impl<E: Evaluated> PlacedTerm for PlacedPotentialTerm<E> {
     fn place_blocks(&mut self, dofs: &DofMap, pattern: &Pattern) {
         if !self.character().curved || !self.places.is_empty() {
             return;
@@ -253,8 +243,9 @@ impl<E: PackedPotential<f64> + Debug + Sync> PlacedTerm for PlacedPotentialTerm<
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        let value = |number: usize| self.packed.element(number).value(&self.points(number, x)).value;
-        Some(self.active.iter().enumerate().map(|(number, element)| (element, value(number))).collect())
+        let mut energies = Vec::with_capacity(self.active.len());
+        self.packed.each_gradient(x, &mut |number, energy, _| energies.push((self.active.element(number), energy)));
+        Some(energies)
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -267,13 +258,14 @@ impl<E: PackedPotential<f64> + Debug + Sync> PlacedTerm for PlacedPotentialTerm<
     }
 
     fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize> {
-        let is_finite = |number: usize| {
-            let result = self.packed.element(number).gradient(&self.points(number, state.x));
-            match quantity {
-                Quantity::Energy => result.value.is_finite(),
-                Quantity::Force => result.gradient.as_ref().as_flattened().iter().all(|number| number.is_finite()),
-            }
-        };
-        (0..self.active.len()).find(|&number| !is_finite(number)).map(|number| self.active.element(number))
+        let mut found = None;
+        self.packed.each_gradient(state.x, &mut |number, energy, gradient| {
+            let is_finite = match quantity {
+                Quantity::Energy => energy.is_finite(),
+                Quantity::Force => gradient.iter().all(|number| number.is_finite()),
+            };
+            found = found.or((!is_finite).then_some(number));
+        });
+        found.map(|number| self.active.element(number))
     }
 }

@@ -1,18 +1,15 @@
-use energy_dsl::{
-    Array, BLOCK, Batch, BatchWork, Lane, Level, Mask, Number, PackedPotential, Potential, ReducedPotential, Vector3,
-    triangle_index,
-};
+use energy_dsl::{BLOCK, Declaration, Lane, Level, Mask, Number, Vector3, triangle_index};
 
 use super::pack_energies::PackEnergies;
 use crate::matrix::precision::Blocks;
 use crate::terms::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::Places;
-use crate::terms::scatter::{TriangleBuffer, VectorBuffer, points_of_triangle};
+use crate::terms::scatter::{Lanes, TriangleBuffer, VectorBuffer, points_of_triangle};
 
 /// Returns the first `count` lanes of a mask as bits.
 #[inline(always)]
-fn lanes_in(mask: impl Mask, count: usize) -> u32 {
+pub(super) fn lanes_in(mask: impl Mask, count: usize) -> u32 {
     mask.bits() & (u32::MAX >> (32 - count))
 }
 
@@ -39,13 +36,12 @@ impl<'a> Values<'a> {
     }
 }
 
-impl<E: PackedPotential<f64>> BatchWork<E> for Values<'_> {
+impl Values<'_> {
+    /// Notes U of each lane.
     #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
-        let result = batch.element.value_at::<L>(batch.points);
-        self.energies.note::<E, L>(&batch, result.value);
-        let flags = result.flags.degenerate | result.flags.kink;
-        self.flagged += u64::from(lanes_in(flags, batch.count).count_ones());
+    pub(super) fn add<L: Level>(&mut self, lanes: &Lanes<'_>, value: L::F64, flagged: u32) {
+        self.energies.note::<L>(lanes, value);
+        self.flagged += u64::from(flagged.count_ones());
     }
 }
 
@@ -69,15 +65,19 @@ impl<'a> Gradients<'a> {
     }
 }
 
-impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
+impl Gradients<'_> {
+    /// Subtracts the gradients of all lanes from the forces.
     #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
-        let result = batch.element.gradient_at::<L>(batch.points);
-        let gradient = result.gradient.as_ref();
-        self.energies.note::<E, L>(&batch, result.value);
-        self.buffer.subtract::<E, L>(&batch, gradient, self.first_vertex, self.force);
-        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        self.flagged += count_owned(flagged, batch.vertices(0), self.first_vertex, self.force.len());
+    pub(super) fn add<L: Level>(
+        &mut self,
+        lanes: &Lanes<'_>,
+        value: L::F64,
+        gradient: &[Vector3<L::F64>],
+        flagged: u32,
+    ) {
+        self.energies.note::<L>(lanes, value);
+        self.buffer.subtract::<L>(lanes, gradient, self.first_vertex, self.force);
+        self.flagged += count_owned(flagged, lanes.vertices(0), self.first_vertex, self.force.len());
     }
 }
 
@@ -127,55 +127,74 @@ impl<'a, 'b> Hessians<'a, 'b> {
     }
 }
 
-impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
+impl Hessians<'_, '_> {
+    /// Returns whether Hessians are made positive semi-definite before they are expanded to points.
+    pub(super) fn is_projected(&self) -> bool {
+        self.orthonormal.is_some() && self.sum.curvature != Curvature::Exact
+    }
+
+    /// Makes the reduced Hessians of all lanes positive semi-definite, if that is asked for. Returns a bit mask of the
+    /// changed lanes.
     #[inline(always)]
-    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
-        let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
-        let exact = self.sum.curvature == Curvature::Exact;
-        let mut projected = 0;
+    pub(super) fn project<L: Level>(
+        &mut self,
+        declaration: &Declaration,
+        lanes: &Lanes<'_>,
+        hessian: &mut [L::F64],
+        n: usize,
+        points: &[Vector3<L::F64>],
+    ) -> u32 {
         if let Some(orthonormal) = self.orthonormal
-            && !exact
+            && self.sum.curvature != Curvature::Exact
         {
-            let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
-            let hessian = reduced.hessian.as_mut();
-            let open = (!is_semi_definite(hessian, n)).bits() & (u32::MAX >> (32 - batch.count));
+            let open = (!is_semi_definite(hessian, n)).bits() & (u32::MAX >> (32 - lanes.count));
             if open != 0 {
-                projected = self.change_indefinite::<E, L>(orthonormal, hessian, open, batch.points.as_ref());
+                return self.change_indefinite::<L>(declaration, orthonormal, hessian, open, points);
             }
         }
-        let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
-        if self.orthonormal.is_none() && !exact {
-            projected = change_one_by_one(result.hessian.as_mut(), batch.count, self.sum.curvature);
+        0
+    }
+
+    /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two vectors
+    /// per point.
+    #[inline(always)]
+    pub(super) fn add<L: Level>(
+        &mut self,
+        lanes: &Lanes<'_>,
+        (value, gradient, triangle): (L::F64, &[Vector3<L::F64>], &mut [[Vector3<L::F64>; 3]]),
+        (flagged, mut projected): (u32, u32),
+        scratch: [&mut [Vector3<L::F64>]; 2],
+    ) {
+        if self.orthonormal.is_none() && self.sum.curvature != Curvature::Exact {
+            projected = change_one_by_one(triangle, lanes.count, self.sum.curvature);
         }
-        self.energies.note::<E, L>(&batch, result.value);
-        self.vectors.subtract::<E, L>(&batch, result.gradient.as_ref(), self.first_vertex, self.sum.force);
+        self.energies.note::<L>(lanes, value);
+        self.vectors.subtract::<L>(lanes, gradient, self.first_vertex, self.sum.force);
         if let Some(product) = &mut self.sum.stiffness_times_velocity {
             let first_vertex = self.first_vertex;
-            let triangle = result.hessian.as_ref();
-            subtract_product::<E, L>(&batch, triangle, self.velocities, &mut self.vectors, first_vertex, product);
+            subtract_product::<L>(lanes, triangle, self.velocities, scratch, &mut self.vectors, first_vertex, product);
         }
-        self.turn::<L>(batch.first, result.hessian.as_mut());
-        self.scatter::<L>(batch.first, batch.count, result.hessian.as_ref());
-        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        let (vertices, first, count) = (batch.vertices(0), self.first_vertex, self.sum.force.len());
+        self.turn::<L>(lanes.first, triangle);
+        self.scatter::<L>(lanes.first, lanes.count, triangle);
+        let (vertices, first, count) = (lanes.vertices(0), self.first_vertex, self.sum.force.len());
         self.flagged += count_owned(flagged, vertices, first, count);
         self.projected += count_owned(projected, vertices, first, count);
     }
-}
 
-impl Hessians<'_, '_> {
     /// Projects the Hessians of the `open` lanes. Returns a bit mask of the changed lanes.
     #[inline(always)]
-    fn change_indefinite<E: PackedPotential<f64>, L: Level>(
+    fn change_indefinite<L: Level>(
         &mut self,
+        declaration: &Declaration,
         orthonormal: &Orthonormal,
         hessian: &mut [L::F64],
         open: u32,
         points: &[Vector3<L::F64>],
     ) -> u32 {
         let lanes = <L::F64 as Lane<f64>>::LANES;
-        let vectors = E::DECLARATION.reduced_vectors.len();
-        let known = if vectors <= 2 { difference_vectors::<E, L>(points) } else { [[L::F64::splat(0.0); 3]; 2] };
+        let vectors = declaration.reduced_vectors.len();
+        let known =
+            if vectors <= 2 { difference_vectors::<L>(declaration, points) } else { [[L::F64::splat(0.0); 3]; 2] };
         for (number, stored) in hessian.iter().chain(known.as_flattened()).zip(self.numbers.chunks_exact_mut(lanes)) {
             number.store(stored);
         }
@@ -226,9 +245,9 @@ impl Hessians<'_, '_> {
 
 /// Returns the one or two difference vectors of an element.
 #[inline(always)]
-fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
+fn difference_vectors<L: Level>(declaration: &Declaration, points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
     let mut vectors = [[L::F64::splat(0.0); 3]; 2];
-    for (vector, terms) in vectors.iter_mut().zip(E::DECLARATION.reduced_vectors) {
+    for (vector, terms) in vectors.iter_mut().zip(declaration.reduced_vectors) {
         for &(point, added) in *terms {
             for axis in 0..3 {
                 let part = points[point][axis];
@@ -241,22 +260,21 @@ fn difference_vectors<E: PackedPotential<f64>, L: Level>(points: &[Vector3<L::F6
 
 /// Subtracts ∇²U v.
 #[inline(always)]
-fn subtract_product<E: PackedPotential<f64>, L: Level>(
-    batch: &Batch<'_, E, L::F64>,
+fn subtract_product<L: Level>(
+    lanes: &Lanes<'_>,
     triangle: &[[Vector3<L::F64>; 3]],
     velocities: &[Vector3<f64>],
+    [v, sums]: [&mut [Vector3<L::F64>]; 2],
     buffer: &mut VectorBuffer,
     first_vertex: usize,
     product: &mut [Vector3<f64>],
 ) {
-    let n = batch.points.as_ref().len();
+    let n = v.len();
     let zero = [L::F64::splat(0.0); 3];
-    let (mut v, mut sums) = (*batch.points, *batch.points);
     for point in 0..n {
-        v.as_mut()[point] = L::F64::gather(velocities, batch.vertices(point));
-        sums.as_mut()[point] = zero;
+        v[point] = L::F64::gather(velocities, lanes.all_vertices(point));
+        sums[point] = zero;
     }
-    let (v, sums) = (v.as_ref(), sums.as_mut());
     for i in 0..n {
         for j in i..n {
             let block = &triangle[triangle_index(n, i, j)];
@@ -270,7 +288,7 @@ fn subtract_product<E: PackedPotential<f64>, L: Level>(
             }
         }
     }
-    buffer.subtract::<E, L>(batch, sums, first_vertex, product);
+    buffer.subtract::<L>(lanes, sums, first_vertex, product);
 }
 
 /// Fallback for elements with more coordinates than lanes support. Returns a bit mask of the changed lanes.

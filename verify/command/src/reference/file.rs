@@ -94,7 +94,10 @@ pub struct Record {
 
 impl Record {
     /// Returns the inputs of an element; finds its parameters and rest shape by name.
-    pub(super) fn sample(&self, mapping: &super::Mapping) -> Result<Sample, String> {
+    ///
+    /// # Errors
+    /// If the record does not have the numbers that the element reads.
+    pub fn sample(&self, mapping: &super::Mapping) -> Result<Sample, String> {
         let positions = numbers(&self.x, &self.x_bits, "x")?;
         let expected: usize = mapping.entry.declaration.points.iter().map(|p| p.size).sum();
         if positions.len() != expected {

@@ -1,0 +1,235 @@
+//! Evaluation of many elements of one declaration.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::{Interpreted, Layouts};
+use energy_runtime::tape::{Output, Places, TapeElements};
+use energy_runtime::{BatchError, Declaration, Flagged, Float};
+
+/// Elements of one declaration, bound to their parameters and rest shapes.
+///
+/// Methods take a range of elements that starts at a multiple of [`TAPE_BLOCK`](energy_runtime::tape::TAPE_BLOCK), and
+/// slices of that range alone: positions, p points of three coordinates per element, and places for the results. They
+/// return the indices and flags of flagged elements. Several threads may call them for different ranges.
+#[derive(Clone, Debug)]
+pub struct Elements<S = f64> {
+    element: Interpreted,
+    tape: TapeElements<S>,
+}
+
+/// Elements that cannot be evaluated. Nothing was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EvaluateError {
+    /// Declarations of this kind do not have the routine.
+    Routine {
+        /// The declaration.
+        declaration: &'static Declaration,
+        /// The routine.
+        routine: &'static str,
+    },
+    /// Range and slices do not fit each other.
+    Batch(BatchError),
+}
+
+impl fmt::Display for EvaluateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Routine { declaration, routine } => {
+                let names: Vec<&str> = declaration.routines.iter().map(|routine| routine.name).collect();
+                let (name, kind) = (declaration.name, declaration.kind.keyword());
+                write!(f, "{name}: no `{routine}` of this {kind}; it has {}", names.join(", "))
+            }
+            Self::Batch(error) => write!(f, "{error}"),
+        }
+    }
+}
+
+impl std::error::Error for EvaluateError {}
+
+impl From<BatchError> for EvaluateError {
+    fn from(error: BatchError) -> Self {
+        Self::Batch(error)
+    }
+}
+
+impl<S: Float> Elements<S> {
+    pub(super) fn new(element: Interpreted, tape: TapeElements<S>) -> Self {
+        Self { element, tape }
+    }
+
+    /// Returns the declaration that was bound.
+    #[must_use]
+    pub fn element(&self) -> &Interpreted {
+        &self.element
+    }
+
+    /// Returns the elements as tapes.
+    #[must_use]
+    pub fn tape(&self) -> &TapeElements<S> {
+        &self.tape
+    }
+
+    /// Returns the number of elements.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.tape.len()
+    }
+
+    /// Returns whether there are no elements.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.tape.is_empty()
+    }
+
+    /// Writes U of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    pub fn values(&self, range: Range<usize>, x: &[S], energies: &mut [S]) -> Result<Flagged, EvaluateError> {
+        let Layouts { value, .. } = self.layouts();
+        self.evaluate("value", range, x, None, &mut [output("energies", value, energies)])
+    }
+
+    /// Writes U and ∂U/∂x (3 p numbers) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    pub fn gradients(
+        &self,
+        range: Range<usize>,
+        x: &[S],
+        energies: &mut [S],
+        gradients: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { value, gradient, .. } = self.layouts();
+        let outputs = &mut [output("energies", value, energies), output("gradients", gradient, gradients)];
+        self.evaluate("gradient", range, x, None, outputs)
+    }
+
+    /// Writes U, ∂U/∂x (3 p numbers) and ∂²U/∂x² (3 p × 3 p numbers, row by row) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    pub fn hessians(
+        &self,
+        range: Range<usize>,
+        x: &[S],
+        energies: &mut [S],
+        gradients: &mut [S],
+        hessians: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { value, gradient, hessian, .. } = self.layouts();
+        let (energies, gradients) = (output("energies", value, energies), output("gradients", gradient, gradients));
+        let outputs = &mut [energies, gradients, output("Hessians", hessian, hessians)];
+        self.evaluate("hessian", range, x, None, outputs)
+    }
+
+    /// Writes (∂²U/∂x²) v (3 p numbers) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    pub fn hessian_vectors(
+        &self,
+        range: Range<usize>,
+        x: &[S],
+        v: &[S],
+        products: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { vectors, .. } = self.layouts();
+        self.evaluate("hessian_vector", range, x, Some(v), &mut [output("products", vectors, products)])
+    }
+
+    /// Writes f(x, v) (3 p numbers) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no force or constraint, or the slices do not fit the range.
+    pub fn forces(&self, range: Range<usize>, x: &[S], v: &[S], forces: &mut [S]) -> Result<Flagged, EvaluateError> {
+        let Layouts { vectors, .. } = self.layouts();
+        self.evaluate("force", range, x, Some(v), &mut [output("forces", vectors, forces)])
+    }
+
+    /// Writes f(x, v) (3 p numbers), ∂f/∂x and ∂f/∂v (3 p × 3 p numbers each, row by row) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no force or constraint, or the slices do not fit the range.
+    pub fn force_jacobians(
+        &self,
+        range: Range<usize>,
+        x: &[S],
+        v: &[S],
+        forces: &mut [S],
+        by_position: &mut [S],
+        by_velocity: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { vectors, force_jacobians: [position, velocity], .. } = self.layouts();
+        let by_position = output("Jacobians by position", position, by_position);
+        let by_velocity = output("Jacobians by velocity", velocity, by_velocity);
+        let outputs = &mut [output("forces", vectors, forces), by_position, by_velocity];
+        self.evaluate("jacobians", range, x, Some(v), outputs)
+    }
+
+    /// Writes C (one number per row) and ∂C/∂x (3 p numbers per row) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no constraint, or the slices do not fit the range.
+    pub fn constraints(
+        &self,
+        range: Range<usize>,
+        x: &[S],
+        constraints: &mut [S],
+        jacobians: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { rows, jacobian, .. } = self.layouts();
+        let outputs = &mut [output("constraints", rows, constraints), output("Jacobians", jacobian, jacobians)];
+        self.evaluate("constraint_jacobian", range, x, None, outputs)
+    }
+
+    /// Writes r (one number per row) of each element. `u` holds all unknowns of each element, in declared order.
+    ///
+    /// # Errors
+    /// When the declaration is no residual, or the slices do not fit the range.
+    pub fn residuals(&self, range: Range<usize>, u: &[S], residuals: &mut [S]) -> Result<Flagged, EvaluateError> {
+        let Layouts { rows, .. } = self.layouts();
+        self.evaluate("residual", range, u, None, &mut [output("residuals", rows, residuals)])
+    }
+
+    /// Writes r (one number per row) and ∂r/∂u (one number per row and unknown) of each element.
+    ///
+    /// # Errors
+    /// When the declaration is no residual, or the slices do not fit the range.
+    pub fn jacobians(
+        &self,
+        range: Range<usize>,
+        u: &[S],
+        residuals: &mut [S],
+        jacobians: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { rows, jacobian, .. } = self.layouts();
+        let outputs = &mut [output("residuals", rows, residuals), output("Jacobians", jacobian, jacobians)];
+        self.evaluate("jacobian", range, u, None, outputs)
+    }
+
+    fn layouts(&self) -> &Layouts {
+        &self.element.layouts
+    }
+
+    fn evaluate(
+        &self,
+        routine: &'static str,
+        range: Range<usize>,
+        x: &[S],
+        v: Option<&[S]>,
+        outputs: &mut [Output<'_, S>],
+    ) -> Result<Flagged, EvaluateError> {
+        let routines = self.tape.routines();
+        if routines.find(routine).is_none() && !(routine == "hessian" && routines.expansion.is_some()) {
+            return Err(EvaluateError::Routine { declaration: self.element.declaration, routine });
+        }
+        Ok(self.tape.evaluate(routine, range, Places::Rows(x), v.map(Places::Rows), outputs)?)
+    }
+}
+
+fn output<'a, S>(name: &'static str, layout: &'a [u16], numbers: &'a mut [S]) -> Output<'a, S> {
+    Output { name, layout, numbers }
+}

@@ -1,0 +1,57 @@
+//! Where the numbers of full matrices are among the results of a routine.
+
+use energy_runtime::{Declaration, Kind, triangle_index};
+
+/// Indices among the results of a routine, in the order of the full matrices that callers want.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layouts {
+    /// The first result: U.
+    pub value: Vec<u16>,
+    /// The first three numbers per point: a force.
+    pub vectors: Vec<u16>,
+    /// Three numbers per point after one number: ∂U/∂x.
+    pub gradient: Vec<u16>,
+    /// ∂²U/∂x², row by row.
+    pub hessian: Vec<u16>,
+    /// The triangle of ∂²U/∂x², block by block.
+    pub triangle: Vec<u16>,
+    /// ∂f/∂x and ∂f/∂v, row by row.
+    pub force_jacobians: [Vec<u16>; 2],
+    /// The rows of C or r.
+    pub rows: Vec<u16>,
+    /// ∂C/∂x or ∂r/∂u, row by row.
+    pub jacobian: Vec<u16>,
+}
+
+impl Layouts {
+    pub(super) fn of(declaration: &Declaration) -> Self {
+        let points = if declaration.kind == Kind::Residual { 0 } else { declaration.points.len() };
+        let coordinates: usize = declaration.points.iter().map(|field| field.size).sum();
+        let (n, rows) = (3 * points, declaration.rows);
+        let entries = || (0..n).flat_map(move |row| (0..n).map(move |column| (row, column)));
+        let hessian = entries().map(|(row, column)| {
+            let (row, column) = if row / 3 <= column / 3 { (row, column) } else { (column, row) };
+            1 + n + 9 * triangle_index(points, row / 3, column / 3) + row % 3 * 3 + column % 3
+        });
+        let square = |first: usize| {
+            let entry = |(row, column)| first + 9 * (row / 3 * points + column / 3) + row % 3 * 3 + column % 3;
+            indices(entries().map(entry))
+        };
+        Self {
+            value: indices(0..1),
+            vectors: indices(0..n),
+            gradient: indices(1..1 + n),
+            hessian: indices(hessian),
+            triangle: indices(1 + n..1 + n + 9 * points * (points + 1) / 2),
+            force_jacobians: [square(n), square(n + n * n)],
+            rows: indices(0..rows),
+            jacobian: indices(rows..rows + rows * coordinates),
+        }
+    }
+}
+
+/// Converts indices. A routine has fewer than 2¹⁶ results; layouts of routines that an element does not have may be cut
+/// short, and nothing reads them.
+fn indices(list: impl Iterator<Item = usize>) -> Vec<u16> {
+    list.map_while(|index| u16::try_from(index).ok()).collect()
+}

@@ -1,0 +1,158 @@
+//! The statements of a routine in the order of execution. The Rust renderer (`emit`), the block tape (`tape`) and
+//! planted faults read the same list.
+
+use std::collections::BTreeMap;
+
+use crate::graph::{Graph, NodeId, Op};
+
+/// Straight-line code. Each statement is one operation; its operands are the numbers of earlier statements.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Statements {
+    list: Vec<Op>,
+}
+
+impl Statements {
+    /// Returns all statements. Those that read an input come just before their first use.
+    pub(crate) fn list(&self) -> &[Op] {
+        &self.list
+    }
+
+    /// Returns the statements with another operation at one place.
+    pub(crate) fn with(&self, place: usize, op: Op) -> Self {
+        let mut statements = self.clone();
+        statements.list[place] = op;
+        statements
+    }
+
+    /// Returns the last statement that reads the result of each statement; [`RETURNED`] for those in `returned`, and 0
+    /// for those that no other reads.
+    pub(crate) fn last_uses(&self, returned: impl IntoIterator<Item = NodeId>) -> Vec<usize> {
+        let mut last_uses = vec![0; self.list.len()];
+        for (place, op) in self.list.iter().enumerate() {
+            op.operands().for_each(|operand| last_uses[operand.0 as usize] = place);
+        }
+        returned.into_iter().for_each(|result| last_uses[result.0 as usize] = RETURNED);
+        last_uses
+    }
+}
+
+/// The last use of a result that is returned.
+pub(crate) const RETURNED: usize = usize::MAX;
+
+/// Puts the nodes of a graph in order: each is computed just before its first use.
+pub(crate) struct Sequence<'a> {
+    graph: &'a Graph,
+    places: BTreeMap<NodeId, NodeId>,
+    statements: Statements,
+}
+
+impl<'a> Sequence<'a> {
+    pub(crate) fn new(graph: &'a Graph) -> Self {
+        Self { graph, places: BTreeMap::new(), statements: Statements::default() }
+    }
+
+    /// Returns the statements so far.
+    pub(crate) fn statements(&self) -> &Statements {
+        &self.statements
+    }
+
+    /// Returns the statements.
+    pub(crate) fn into_statements(self) -> Statements {
+        self.statements
+    }
+
+    /// Returns the statement that computes a node, after adding those that it needs.
+    pub(crate) fn value(&mut self, node: NodeId) -> NodeId {
+        let node = self.graph.resolve(node);
+        // Uses an explicit stack, because expressions may be deep.
+        let mut stack = vec![node];
+        while let Some(&next) = stack.last() {
+            if self.places.contains_key(&next) {
+                stack.pop();
+                continue;
+            }
+            let missing: Vec<NodeId> = self
+                .graph
+                .fused(next)
+                .operands()
+                .map(|o| self.graph.resolve(o))
+                .filter(|o| !self.places.contains_key(o))
+                .collect();
+            if missing.is_empty() {
+                self.compute(next);
+                stack.pop();
+            } else {
+                stack.extend(missing.into_iter().rev());
+            }
+        }
+        self.places[&node]
+    }
+
+    /// Returns the statements that compute some nodes.
+    pub(crate) fn values(&mut self, nodes: &[NodeId]) -> Vec<NodeId> {
+        nodes.iter().map(|&node| self.value(node)).collect()
+    }
+
+    fn compute(&mut self, node: NodeId) {
+        let op = self.graph.fused(node).with_operands(|operand| self.places[&self.graph.resolve(operand)]);
+        let place = NodeId(u32::try_from(self.statements.list.len()).expect("fewer than 2³² statements"));
+        self.places.insert(node, place);
+        self.statements.list.push(op);
+    }
+}
+
+/// The statements of a path of a routine, with its results.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Code {
+    pub(crate) statements: Statements,
+    /// Results by group: value, gradient, ….
+    pub(crate) groups: Vec<Vec<NodeId>>,
+    /// Masks of the flags: degenerate, kink.
+    pub(crate) flags: [Option<NodeId>; 2],
+    /// Mask where the ordinary path suffices.
+    pub(crate) guard: Option<NodeId>,
+}
+
+impl Code {
+    /// Puts the statements that compute groups of numbers and flags in order.
+    pub(crate) fn new(graph: &Graph, groups: &[Vec<NodeId>], flags: [Option<NodeId>; 2]) -> Self {
+        let mut sequence = Sequence::new(graph);
+        let groups = groups.iter().map(|group| sequence.values(group)).collect();
+        let flags = flags.map(|flag| flag.map(|node| sequence.value(node)));
+        Self { statements: sequence.into_statements(), groups, flags, guard: None }
+    }
+
+    /// Puts the statements that compute a guard in order.
+    pub(crate) fn guard(graph: &Graph, node: NodeId) -> Self {
+        let mut sequence = Sequence::new(graph);
+        let guard = Some(sequence.value(node));
+        Self { statements: sequence.into_statements(), guard, ..Self::default() }
+    }
+
+    /// Adds the statements of a guard. If `shared`, those that the code already has are not repeated.
+    pub(crate) fn with_guard(&self, guard: &Self, shared: bool) -> Self {
+        let mut code = self.clone();
+        let list = &mut code.statements.list;
+        let mut known = BTreeMap::new();
+        if shared {
+            known.extend(list.iter().zip(0..).map(|(&op, place)| (op, NodeId(place))));
+        }
+        let mut places: Vec<NodeId> = Vec::with_capacity(guard.statements.list.len());
+        for op in &guard.statements.list {
+            let op = op.with_operands(|operand| places[operand.0 as usize]);
+            let place = *known.entry(op).or_insert_with(|| {
+                list.push(op);
+                NodeId(u32::try_from(list.len() - 1).expect("fewer than 2³² statements"))
+            });
+            places.push(place);
+        }
+        code.guard = guard.guard.map(|place| places[place.0 as usize]);
+        code
+    }
+
+    /// Returns all results and masks.
+    pub(crate) fn returned(&self) -> impl Iterator<Item = NodeId> {
+        let masks = self.flags.into_iter().chain([self.guard]).flatten();
+        self.groups.iter().flatten().copied().chain(masks)
+    }
+}

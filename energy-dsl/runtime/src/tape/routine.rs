@@ -1,0 +1,185 @@
+//! The routines of an element as tapes.
+
+use super::instruction::Tape;
+use super::scalar::Values;
+use crate::numbers::{Flags, Fused, Level, Mask, Number, Ray, Roles, settle};
+
+/// The source of an input number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Input {
+    /// Coordinate of the positions (point · 3 + axis), or an unknown of a residual.
+    Position(u16),
+    /// Coordinate of the velocities.
+    Velocity(u16),
+    /// Index among the parameter numbers.
+    Parameter(u16),
+    /// Index among the rest-shape numbers.
+    Rest(u16),
+    /// Index among the numbers that the `rest` block computes once for each element.
+    Precomputed(u16),
+}
+
+/// The numbers of each term of a sum of like terms. Term q reads the stored numbers 0 to `shared` − 1, then its own
+/// `stride` numbers, from `shared` + q · `stride`, then row q of the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repetition {
+    /// Stored numbers that all terms read.
+    pub shared: usize,
+    /// Stored numbers that one term reads.
+    pub stride: usize,
+    /// Constants of each term.
+    pub table: Vec<Vec<f64>>,
+}
+
+impl Repetition {
+    /// Returns the number of terms.
+    #[must_use]
+    pub fn terms(&self) -> usize {
+        self.table.len()
+    }
+
+    /// Returns the source of a number that a term reads.
+    #[must_use]
+    pub fn number(&self, term: usize, number: usize) -> TermNumber {
+        match number.checked_sub(self.shared) {
+            None => TermNumber::Stored(number),
+            Some(own) if own < self.stride => TermNumber::Stored(self.shared + term * self.stride + own),
+            Some(own) => TermNumber::Constant(self.table[term][own - self.stride]),
+        }
+    }
+}
+
+/// The source of a number that one term of a sum reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TermNumber {
+    /// Index among the stored numbers of the element.
+    Stored(usize),
+    /// A constant.
+    Constant(f64),
+}
+
+/// A routine as tapes.
+#[derive(Clone, Debug)]
+pub struct Routine {
+    /// Name of the routine.
+    pub name: &'static str,
+    /// The inputs, in the order of the first slots.
+    pub inputs: Vec<Input>,
+    /// The ordinary path.
+    pub tape: Tape,
+    /// Slots of the results, group by group: value, gradient, ….
+    pub groups: Vec<Vec<u16>>,
+    /// Mask slots of the flags of the ordinary path: degenerate, kink.
+    pub flags: [Option<u16>; 2],
+    /// The general path; `None` if there are no precautions.
+    pub general: Option<General>,
+}
+
+/// The general path of a routine, with all precautions. It runs over numbers with an extended exponent.
+#[derive(Clone, Debug)]
+pub struct General {
+    /// Mask slot of the ordinary tape: where the ordinary path suffices.
+    pub ordinary: u16,
+    /// Indices among the inputs of the routine, in the order of the first slots.
+    pub inputs: Vec<u16>,
+    /// Whether derivatives are taken with respect to an input.
+    pub moves: Vec<bool>,
+    /// The path.
+    pub tape: Tape,
+    /// Slots of the results, in the order of the routine's results.
+    pub results: Vec<u16>,
+    /// Mask slots of inputs at which a result may be a convention: degenerate, kink.
+    pub flags: [Option<u16>; 2],
+    /// Whether the first group is of values, not of derivatives.
+    pub values_first: bool,
+    /// Index from which results are added to each other later.
+    pub summed: usize,
+}
+
+impl Routine {
+    /// Returns the number of results in each group.
+    #[must_use]
+    pub fn sizes(&self) -> Vec<usize> {
+        self.groups.iter().map(Vec::len).collect()
+    }
+
+    /// Runs the routine on one element of any number type, on the general path where that is needed. Returns all
+    /// results and the flags.
+    #[must_use]
+    pub fn run<T: Number, L: Level>(&self, inputs: &[T]) -> (Vec<T>, Flags<T>) {
+        let values = self.tape.run::<T, L>(inputs.iter().cloned());
+        match &self.general {
+            Some(general) if !values.mask(Some(general.ordinary)).all() => {
+                general.run(&self.sizes(), |input| inputs[usize::from(input)].clone())
+            }
+            _ => {
+                let results = self.groups.iter().flatten().map(|&slot| values.number(slot)).collect();
+                (results, flags(&values, self.flags))
+            }
+        }
+    }
+}
+
+impl General {
+    /// Runs the path. `input` returns a number by its index among the inputs of the routine, which has groups of these
+    /// `sizes`.
+    #[cold]
+    pub(super) fn run<T: Number>(&self, sizes: &[usize], input: impl Fn(u16) -> T) -> (Vec<T>, Flags<T>) {
+        let inputs: Vec<T::Unbounded> = self.inputs.iter().map(|&number| input(number).unbounded(0)).collect();
+        let (mut results, mut flags) = self.at(&inputs);
+        let roles = Roles { moves: &self.moves, groups: sizes, values_first: self.values_first };
+        let along = |rays: &[Ray]| {
+            let (results, flags) = self.at(rays);
+            (!flags.degenerate).then_some(results)
+        };
+        settle(&inputs, roles, &mut results, &mut flags, &along);
+        let bounded = |(number, value): (usize, T::Unbounded)| {
+            let mut result = T::from_f64(0.0);
+            result.set_lane(0, if number < self.summed { value } else { value.saturated() });
+            result
+        };
+        let mask = |mask: <T::Unbounded as Number>::Mask| T::Mask::from_bits(u32::from(mask.any()));
+        let flags = Flags { degenerate: mask(flags.degenerate), kink: mask(flags.kink) };
+        (results.into_iter().enumerate().map(bounded).collect(), flags)
+    }
+
+    /// Always runs with fused operations, as the general paths of generated code do.
+    fn at<T: Number>(&self, inputs: &[T]) -> (Vec<T>, Flags<T>) {
+        let values = self.tape.run::<T, Fused>(inputs.iter().cloned());
+        (self.results.iter().map(|&slot| values.number(slot)).collect(), flags(&values, self.flags))
+    }
+}
+
+fn flags<T: Number>(values: &Values<T>, slots: [Option<u16>; 2]) -> Flags<T> {
+    Flags { degenerate: values.mask(slots[0]), kink: values.mask(slots[1]) }
+}
+
+/// The routines of an element as tapes.
+#[derive(Clone, Debug)]
+pub struct Routines {
+    /// Name of the element.
+    pub name: &'static str,
+    /// Coordinates of the points, or unknowns of a residual. They are the first inputs of every routine but `rest`;
+    /// velocities follow, if the routine reads any.
+    pub coordinates: usize,
+    /// Number of parameter numbers.
+    pub parameters: usize,
+    /// Number of rest-shape numbers.
+    pub shape: usize,
+    /// The `rest` block: its results are the stored numbers; where its first flag is set, the shape is degenerate.
+    pub rest: Routine,
+    /// The moving part, or one term of it.
+    pub list: Vec<Routine>,
+    /// Expands the results of the routine `reduced_hessian`, its inputs, to U, ∂U/∂x and the triangle of ∂²U/∂x².
+    pub expansion: Option<Routine>,
+    /// The numbers of each term, if the routines compute one term of a sum.
+    pub repetition: Option<Repetition>,
+}
+
+impl Routines {
+    /// Returns a routine by its name.
+    #[must_use]
+    pub fn find(&self, name: &str) -> Option<&Routine> {
+        self.list.iter().find(|routine| routine.name == name)
+    }
+}

@@ -1,0 +1,104 @@
+//! Elements that a term evaluates in lanes: generated ones, or tapes.
+
+use std::fmt::Debug;
+use std::ops::Range;
+
+use energy_dsl::{
+    Array, BLOCK, Batch, BatchWork, Declaration, Lane, Level, Packed, PackedPotential, Potential, ReducedPotential,
+    Vector3, WidePoints, for_each_batch_in,
+};
+
+use super::work::{Gradients, Hessians, Values, lanes_in};
+use crate::terms::scatter::Lanes;
+
+/// Elements of one type, packed for lanes. Ranges start at multiples of [`Evaluated::PACK`].
+pub(super) trait Evaluated: Debug + Sync {
+    /// Elements that are evaluated together.
+    const PACK: usize;
+
+    /// Returns the declaration of the elements.
+    fn declaration(&self) -> &'static Declaration;
+    /// Returns the vertices of all elements by pack, point, element.
+    fn stencils(&self) -> &[u32];
+    /// Evaluates Σ U.
+    fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>);
+    /// Evaluates U and ∇U.
+    fn gradients(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Gradients<'_>);
+    /// Evaluates U, ∇U and ∇²U.
+    fn hessians(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Hessians<'_, '_>);
+    /// Calls `each` with the index, U and ∇U of each element.
+    fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64]));
+}
+
+impl<E: PackedPotential<f64> + Debug + Sync> Evaluated for Packed<E> {
+    const PACK: usize = BLOCK;
+
+    fn declaration(&self) -> &'static Declaration {
+        E::DECLARATION
+    }
+
+    fn stencils(&self) -> &[u32] {
+        Packed::stencils(self)
+    }
+
+    fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>) {
+        packs.iter().for_each(|pack| for_each_batch_in(self, pack.clone(), x, work));
+    }
+
+    fn gradients(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Gradients<'_>) {
+        packs.iter().for_each(|pack| for_each_batch_in(self, pack.clone(), x, work));
+    }
+
+    fn hessians(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Hessians<'_, '_>) {
+        packs.iter().for_each(|pack| for_each_batch_in(self, pack.clone(), x, work));
+    }
+
+    fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64])) {
+        let points = <WidePoints<E, f64> as Array<Vector3<f64>>>::LEN;
+        for number in 0..self.len() {
+            let vertex = |point: usize| self.stencils()[(number / BLOCK * points + point) * BLOCK + number % BLOCK];
+            let own = WidePoints::<E, f64>::from_fn(|point| x[vertex(point) as usize]);
+            let result = self.element(number).gradient(&own);
+            each(number, result.value, result.gradient.as_ref().as_flattened());
+        }
+    }
+}
+
+/// Returns the elements of a batch.
+#[inline(always)]
+fn lanes<'a, E: PackedPotential<f64>, V: Lane<f64>>(batch: &Batch<'a, E, V>) -> Lanes<'a> {
+    Lanes { first: batch.first, count: batch.count, stencils: batch.stencils(), stride: BLOCK }
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Values<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let result = batch.element.value_at::<L>(batch.points);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        self.add::<L>(&lanes(&batch), result.value, flagged);
+    }
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let result = batch.element.gradient_at::<L>(batch.points);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        self.add::<L>(&lanes(&batch), result.value, result.gradient.as_ref(), flagged);
+    }
+}
+
+impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
+    #[inline(always)]
+    fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
+        let lanes = lanes(&batch);
+        let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
+        let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
+        let projected = self.project::<L>(E::DECLARATION, &lanes, reduced.hessian.as_mut(), n, batch.points.as_ref());
+        let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
+        let (mut v, mut sums) = (*batch.points, *batch.points);
+        let numbers = (result.value, result.gradient.as_ref(), result.hessian.as_mut());
+        self.add::<L>(&lanes, numbers, (flagged, projected), [v.as_mut(), sums.as_mut()]);
+    }
+}

@@ -1,0 +1,133 @@
+//! Terms of elements that are read at run time do what terms of generated elements do, with the same bits: on several
+//! threads, with pinned vertices, projected Hessians, constant blocks and degenerate elements.
+
+use energy_compiler::Interpreted;
+use energy_dsl::tape::Column;
+use energy_dsl::{Block, Element, PackedPotential, Vector3};
+use energy_elements::{Gravity, QuadraticHinge, StVK, ZeroLengthSpring};
+use energy_solve::{
+    Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, TapeTerm, Term, Weights,
+};
+
+/// Cells per side: enough vertices for three threads.
+const CELLS: usize = 140;
+
+/// A list of elements, with the numbers that they are made from.
+struct List<E, const N: usize> {
+    name: &'static str,
+    elements: Vec<E>,
+    stencils: Vec<[usize; N]>,
+    rest: Vec<Vec<f64>>,
+    parameters: Vec<Vec<f64>>,
+}
+
+impl<E: PackedPotential<f64> + Element + std::fmt::Debug + Sync + 'static, const N: usize> List<E, N> {
+    fn compiled(self) -> Box<dyn Term> {
+        Box::new(PotentialTerm::<E>::new(ElementList::new(self.name, self.elements, &self.stencils).unwrap()))
+    }
+
+    fn read(self) -> Box<dyn Term> {
+        let element = Interpreted::from_source(E::DECLARATION.source).unwrap().pop().unwrap();
+        let each = |columns: &[Vec<f64>]| columns.iter().map(|c| Column::Each(c.clone().leak())).collect::<Vec<_>>();
+        let elements = element.elements(self.elements.len(), &each(&self.rest), &each(&self.parameters)).unwrap();
+        let vertices = self.stencils.into_iter().flatten();
+        Box::new(TapeTerm::new(self.name.into(), element.declaration(), elements.tape().clone(), vertices))
+    }
+
+    fn term(self, read: bool) -> Box<dyn Term> {
+        if read { self.read() } else { self.compiled() }
+    }
+}
+
+/// A crumpled sheet with pinned vertices and a triangle without area.
+fn sheet(read: bool) -> (System, Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
+    let vertex = |i: usize, j: usize| j * (CELLS + 1) + i;
+    let (mut triangles, mut hinges) = (Vec::new(), Vec::new());
+    for (i, j) in (0..CELLS).flat_map(|j| (0..CELLS).map(move |i| (i, j))) {
+        let [a, b, c, d] = [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
+        triangles.extend([[a, b, c], [a, c, d]]);
+        hinges.push([b, d, a, c]);
+    }
+    // Elements should not be in the order of the vertices.
+    triangles.reverse();
+    let u: Vec<[f64; 2]> =
+        (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| [i as f64, j as f64].map(|k| k / CELLS as f64))).collect();
+    let fold = |x: f64| 2e-3 * (97.0 * x).sin();
+    let mut x: Vec<Vector3<f64>> = u.iter().map(|&[u, v]| [u + fold(v), v - fold(u), fold(u + 2.0 * v)]).collect();
+    let v = u.iter().map(|&[u, v]| [v, u * v, (31.0 * u).cos()]).collect();
+    let last = x.len() - 1;
+    x[last] = x[last - 1];
+    let corner = |which: usize| triangles.iter().flat_map(|t| u[t[which]]).collect::<Vec<f64>>();
+    let membrane = List {
+        name: "membrane",
+        elements: triangles.iter().map(|t| StVK::new(u[t[0]], u[t[1]], u[t[2]], 40.0, 50.0).unwrap()).collect(),
+        rest: vec![corner(0), corner(1), corner(2)],
+        parameters: vec![vec![40.0; triangles.len()], vec![50.0; triangles.len()]],
+        stencils: triangles,
+    };
+    let bending = List {
+        name: "bending",
+        elements: hinges.iter().map(|_| QuadraticHinge::new(1e-5, 0.1)).collect::<Vec<_>>(),
+        rest: Vec::new(),
+        parameters: vec![vec![1e-5; hinges.len()], vec![0.1; hinges.len()]],
+        stencils: hinges.clone(),
+    };
+    let links = List {
+        name: "links",
+        elements: hinges.iter().map(|_| ZeroLengthSpring::new(0.5, 0.0)).collect::<Vec<_>>(),
+        rest: Vec::new(),
+        parameters: vec![vec![0.5; hinges.len()], vec![0.0; hinges.len()]],
+        stencils: hinges.iter().map(|hinge| [hinge[0], hinge[1]]).collect(),
+    };
+    let points: Vec<[usize; 1]> = (0..u.len()).map(|point| [point]).collect();
+    let gravity = List {
+        name: "gravity",
+        elements: points.iter().map(|_| Gravity::new(1e-3, [0.0, 0.0, -9.81])).collect::<Vec<_>>(),
+        rest: Vec::new(),
+        parameters: vec![vec![1e-3; points.len()], [0.0, 0.0, -9.81].repeat(points.len())],
+        stencils: points,
+    };
+    let terms = vec![membrane.term(read), bending.term(read), links.term(read), gravity.term(read)];
+    let pinned: Vec<bool> = (0..u.len()).map(|vertex| vertex % 11 == 0 || vertex < 200).collect();
+    (System::new(terms, &pinned).unwrap(), x, v)
+}
+
+#[derive(Debug, PartialEq)]
+struct Sums {
+    energies: Vec<Option<u64>>,
+    elements: Vec<(usize, f64)>,
+    forces: Vec<Vector3<f64>>,
+    linear: Vec<Vector3<f64>>,
+    product: Vec<Vector3<f64>>,
+    blocks: Vec<Block<f64>>,
+    counts: Vec<Counts>,
+}
+
+fn sums(read: bool, threads: usize, curvature: Curvature) -> Sums {
+    let (mut system, x, v) = sheet(read);
+    system.set_threads(threads);
+    let state = State { x: &x, v: &v };
+    let energies = system.energies(&x).unwrap().into_iter().map(|term| term.energy.map(f64::to_bits)).collect();
+    let elements = system.terms().next().and_then(|(term, _)| term.element_energies(&x)).unwrap_or_default();
+    let forces = system.forces(state).unwrap();
+    let mut matrix = system.matrix();
+    let weights = Weights { position: -1e-4, velocity: -1e-2 };
+    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
+    let product = system.linearise(state, options, &mut matrix).unwrap().stiffness_times_velocity;
+    let options = LinearisationOptions { stiffness_times_velocity: false, ..options };
+    let linear = system.linearise(state, options, &mut matrix).unwrap().force;
+    let counts = system.terms().map(|(_, counts)| counts).collect();
+    Sums { energies, elements, forces, linear, product, blocks: matrix.values().to_vec(), counts }
+}
+
+#[test]
+fn terms_that_are_read_have_the_bits_of_compiled_ones() {
+    for (threads, curvature) in [(1, Curvature::Clamped), (3, Curvature::Clamped), (2, Curvature::Exact)] {
+        let (compiled, read) = (sums(false, threads, curvature), sums(true, threads, curvature));
+        assert_eq!(compiled.counts, read.counts, "{threads} threads, {curvature:?}");
+        assert!(compiled == read, "{threads} threads, {curvature:?}");
+        let (membrane, bending) = (&compiled.counts[0], &compiled.counts[1]);
+        assert!(bending.hessian.flagged > 0 && membrane.hessian.skipped > 0, "{bending:?}, {membrane:?}");
+        assert_eq!(membrane.hessian.projected > 100, curvature == Curvature::Clamped, "{membrane:?}");
+    }
+}
