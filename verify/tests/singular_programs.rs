@@ -260,7 +260,8 @@ fn full(triangle: &[f64]) -> Vec<f64> {
 fn derivatives_at_infinite_inputs_are_flagged() {
     let mut x = [0.0; 9];
     x[1] = f64::INFINITY;
-    for formula in ["max(p.x, dot((r - q), (q - p)))", "exp(-norm_squared(p))", "tanh(norm_squared(p))", "atan(p.y^2)"] {
+    for formula in ["max(p.x, dot((r - q), (q - p)))", "exp(-norm_squared(p))", "tanh(norm_squared(p))", "atan(p.y^2)"]
+    {
         check(formula, 1.0, &x).unwrap_or_else(|error| panic!("{error}"));
     }
 }

@@ -131,11 +131,22 @@ fn aligned(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> Aligned {
 
 /// Creates â·b̂ as one primitive.
 pub(super) fn recognise_cosine(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
-    let (a, b) = (vector_of_unit(g, x)?, vector_of_unit(g, y)?);
-    let at = aligned(g, &a, &b);
+    let arguments = [vector_of_unit(g, x)?, vector_of_unit(g, y)?].concat();
+    Some(cosine(g, arguments))
+}
+
+/// Recognises cos φ of the angle φ between two vectors. Unlike φ, it is smooth where they are aligned.
+pub(super) fn recognise_cosine_of_angle(g: &mut Graph, angle: NodeId, _: NodeId) -> Option<NodeId> {
+    let arguments = g.rule(angle).filter(|r| r.primitive == Primitive::Angle)?.arguments.clone();
+    Some(cosine(g, arguments))
+}
+
+/// Creates â·b̂ of the vectors that the arguments list.
+fn cosine(g: &mut Graph, arguments: Vec<NodeId>) -> NodeId {
+    let at = aligned(g, &arguments[..3], &arguments[3..]);
     let (first, second) = cosine_derivatives(g, &at, false);
-    let rule = Rule::factored(Primitive::Cosine, [a, b].concat(), at.cosine, first, second);
-    Some(g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[]))
+    let rule = Rule::factored(Primitive::Cosine, arguments, at.cosine, first, second);
+    g.add_rule(rule.flagged(0, Flag::Degenerate, at.degenerate), &[])
 }
 
 /// Recognises 1 − â·b̂.

@@ -145,6 +145,12 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: angle::recognise_root,
     },
     Recogniser {
+        spelling: "cos(angle(a, b))",
+        form: "the cosine of the vectors, without the angle",
+        ending: Ending::Cosine,
+        recognise: angle::recognise_cosine_of_angle,
+    },
+    Recogniser {
         spelling: "sin(dihedral(a, b, c, d)), and of half the angle",
         form: "the sine from the triangles' normals, \
             without the angle",

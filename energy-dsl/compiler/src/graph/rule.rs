@@ -104,10 +104,7 @@ impl Primitive {
     /// Returns whether it may be finite where an argument is infinite.
     #[must_use]
     pub const fn saturates(self) -> bool {
-        matches!(
-            self,
-            Self::ArcTangent | Self::HyperbolicTangent | Self::ErrorFunction | Self::Softplus | Self::Expm1
-        )
+        matches!(self, Self::ArcTangent | Self::HyperbolicTangent | Self::ErrorFunction | Self::Softplus | Self::Expm1)
     }
 
     /// Returns its name in the documentation of generated code; `None` if it is internal.
