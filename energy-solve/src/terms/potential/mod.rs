@@ -71,7 +71,7 @@ impl<E: PackedPotential<f64> + Debug + Sync + 'static> Term for PotentialTerm<E>
 
 /// A term with f = −∇U whose elements were read at run time. It does what [`PotentialTerm`] does, with the same bits;
 /// routines are interpreted, a block of elements at a time.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct TapeTerm {
     name: String,
     declaration: &'static Declaration,

@@ -1,0 +1,24 @@
+use pyo3::create_exception;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+create_exception!(energy_dsl, EnergyError, PyValueError, "A text, a scene or a rest shape that is wrong, with its place.");
+
+/// Turns any error into a `ValueError` of the package.
+pub fn wrong(error: impl std::fmt::Display) -> PyErr {
+    EnergyError::new_err(error.to_string())
+}
+
+/// Turns any error, with its causes, into a `RuntimeError`.
+pub fn failed(error: impl std::error::Error) -> PyErr {
+    let mut message = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        let cause_text = cause.to_string();
+        if !message.contains(&cause_text) {
+            message = format!("{message}: {cause_text}");
+        }
+        source = cause.source();
+    }
+    PyRuntimeError::new_err(message)
+}

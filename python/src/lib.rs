@@ -1,0 +1,27 @@
+//! The compiled half of the Python package `energy_dsl`: elements from text, sums over meshes, cloth.
+
+mod arrays;
+mod element;
+mod errors;
+mod evaluation;
+mod simulation;
+mod system;
+mod tools;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("EnergyError", module.py().get_type::<errors::EnergyError>())?;
+    module.add_class::<element::Element>()?;
+    module.add_class::<element::Input>()?;
+    module.add_class::<evaluation::Elements>()?;
+    module.add_class::<system::System>()?;
+    module.add_class::<simulation::Simulation>()?;
+    module.add_function(wrap_pyfunction!(element::energies, module)?)?;
+    module.add_function(wrap_pyfunction!(element::catalogue, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::run, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::resume, module)?)?;
+    module.add_function(wrap_pyfunction!(tools::audit, module)?)?;
+    module.add_function(wrap_pyfunction!(tools::show, module)?)
+}

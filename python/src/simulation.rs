@@ -1,0 +1,167 @@
+//! Scenes of cloth: stepped by hand, or run to an output folder.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use cloth_core::run::{Ending, Event, Run, RunError, RunOptions};
+use cloth_core::scene::Scene;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
+use pyo3::prelude::*;
+
+use crate::errors::{failed, wrong};
+
+/// A scene that is stepped by hand.
+#[pyclass(unsendable, subclass, module = "energy_dsl")]
+pub struct Simulation {
+    inner: cloth_core::Simulation,
+}
+
+/// A scene's text; JSON objects are written as TOML.
+fn toml_text(text: &str) -> PyResult<String> {
+    if !text.trim_start().starts_with('{') {
+        return Ok(text.to_owned());
+    }
+    let value: serde_json::Value = serde_json::from_str(text).map_err(wrong)?;
+    toml::to_string(&value).map_err(wrong)
+}
+
+#[pymethods]
+impl Simulation {
+    /// Reads the text of a scene. Relative paths in it start at the folder of `path`.
+    #[new]
+    #[pyo3(signature = (text, path = PathBuf::from("scene.toml"), threads = None))]
+    fn new(text: &str, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
+        let scene = Scene::parse(&toml_text(text)?, &path).map_err(wrong)?;
+        let inner = cloth_core::Simulation::new(&scene).map_err(wrong)?;
+        Ok(Self { inner: match threads { Some(threads) => inner.with_threads(threads), None => inner } })
+    }
+
+    /// Takes steps of the scene's time grid, at most until its end. Returns the number taken.
+    #[pyo3(signature = (steps = 1))]
+    fn step(&mut self, py: Python<'_>, steps: u64) -> PyResult<u64> {
+        for done in 0..steps {
+            if self.inner.is_finished() {
+                return Ok(done);
+            }
+            py.check_signals()?;
+            self.inner.step().map_err(failed)?;
+        }
+        Ok(steps)
+    }
+
+    /// Time, in s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.time()
+    }
+
+    #[getter]
+    fn is_finished(&self) -> bool {
+        self.inner.is_finished()
+    }
+
+    /// Steps from start to end.
+    #[getter]
+    fn steps(&self) -> u64 {
+        self.inner.steps()
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings().to_vec()
+    }
+
+    /// Positions of all vertices, in m, as an array of shape (vertices, 3).
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, self.inner.positions())
+    }
+
+    /// Velocities of all vertices, in m/s.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, self.inner.velocities())
+    }
+
+    /// Triangles, as indices of vertices.
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let numbers: Vec<i64> = self.inner.triangles().iter().flatten().map(|&vertex| vertex as i64).collect();
+        let rows = numbers.len() / 3;
+        PyArray1::from_vec(py, numbers).reshape([rows, 3])
+    }
+}
+
+fn vectors<'py>(py: Python<'py>, vectors: &[[f64; 3]]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_vec(py, vectors.as_flattened().to_vec()).reshape([vectors.len(), 3])
+}
+
+/// Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps taken.
+#[pyfunction]
+#[pyo3(signature = (text, path, output, *, overwrite = false, checkpoint = None, ignore_memory = false, threads = None))]
+#[expect(clippy::too_many_arguments, reason = "all but three are keywords")]
+pub fn run(
+    py: Python<'_>,
+    text: &str,
+    path: &str,
+    output: &str,
+    overwrite: bool,
+    checkpoint: Option<u64>,
+    ignore_memory: bool,
+    threads: Option<usize>,
+) -> PyResult<u64> {
+    let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
+    let text = toml_text(text)?;
+    to_the_end(py, threads, || Run::new(text, Path::new(path), Path::new(output), options))
+}
+
+/// Resumes an interrupted run from the checkpoint in its folder, as `cloth resume` does.
+#[pyfunction]
+#[pyo3(signature = (output, *, accept_edited = false, threads = None))]
+pub fn resume(py: Python<'_>, output: &str, accept_edited: bool, threads: Option<usize>) -> PyResult<u64> {
+    to_the_end(py, threads, || Run::resume(Path::new(output), accept_edited))
+}
+
+/// How a run ended, without the interpreter's lock.
+enum Outcome {
+    Refused(String),
+    Failed(String),
+    Interrupted,
+    Done(u64),
+}
+
+/// Simulates to the end without the interpreter's lock. Ctrl-C completes the current step and keeps the results.
+fn to_the_end(
+    py: Python<'_>,
+    threads: Option<usize>,
+    start: impl FnOnce() -> Result<Run, RunError> + Send,
+) -> PyResult<u64> {
+    let outcome = py.detach(|| {
+        let mut run = match (start(), threads) {
+            (Ok(run), Some(threads)) => run.with_threads(threads),
+            (Ok(run), None) => run,
+            (Err(error), _) => return Outcome::Refused(error.to_string()),
+        };
+        let stop = AtomicBool::new(false);
+        let ending = run.go(&stop, |event| {
+            if matches!(event, Event::Step(..)) && Python::attach(|py| py.check_signals()).is_err() {
+                stop.store(true, Ordering::Relaxed);
+            }
+        });
+        match ending {
+            Err(error) => Outcome::Failed(error.to_string()),
+            Ok(Ending { failure: Some(failure), .. }) => Outcome::Failed(failure.to_string()),
+            Ok(_) if stop.load(Ordering::Relaxed) => Outcome::Interrupted,
+            Ok(_) => Outcome::Done(run.simulation().steps_done()),
+        }
+    });
+    match outcome {
+        Outcome::Refused(message) => Err(wrong(message)),
+        Outcome::Failed(message) => Err(PyRuntimeError::new_err(message)),
+        Outcome::Interrupted => {
+            Err(PyKeyboardInterrupt::new_err("the run was interrupted; its results so far were written"))
+        }
+        Outcome::Done(steps) => Ok(steps),
+    }
+}

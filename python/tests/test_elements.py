@@ -1,0 +1,175 @@
+"""Elements: values, derivatives, shapes and messages."""
+
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import energy_dsl as ed
+
+SPRING = "energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) { k / 2 * (norm(p - q) - L)^2 }"
+
+
+@pytest.fixture(scope="module")
+def spring():
+    return ed.energy(SPRING)
+
+
+def positions(count, points, seed=1):
+    return np.random.default_rng(seed).normal(size=(count, points, 3))
+
+
+def test_derivatives_agree_with_differences():
+    hinge = ed.element("HingeAngle")
+    x = positions(5, 4)
+    U, g, H = hinge.hessian(x)
+    assert U.shape == (5,) and g.shape == (5, 4, 3) and H.shape == (5, 12, 12)
+    step = 1e-6
+    for i in range(12):
+        moved = x.reshape(5, 12).copy()
+        moved[:, i] += step
+        ahead = hinge.gradient(moved.reshape(5, 4, 3))
+        moved[:, i] -= 2 * step
+        behind = hinge.gradient(moved.reshape(5, 4, 3))
+        np.testing.assert_allclose((ahead[0] - behind[0]) / (2 * step), g.reshape(5, 12)[:, i], rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(
+            (ahead[1] - behind[1]).reshape(5, 12) / (2 * step), H[:, i], rtol=1e-5, atol=1e-6 * np.abs(H).max()
+        )
+    assert np.array_equal(H, H.transpose(0, 2, 1))
+
+
+def test_one_value_for_all_equals_one_for_each(spring):
+    x = positions(70, 2)
+    same = spring.hessian(x, k=3.0, L=0.5)
+    each = spring.hessian(x, k=np.full(70, 3.0), L=np.full(70, 0.5))
+    assert all(np.array_equal(a, b) for a, b in zip(same, each))
+    bound = spring.bind(70, k=3.0, L=0.5)
+    assert len(bound) == 70 and all(np.array_equal(a, b) for a, b in zip(same, bound.hessian(x)))
+
+
+def test_results_are_written_to_given_arrays(spring):
+    x = positions(9, 2)
+    out = (np.empty(9), np.empty((9, 2, 3)))
+    found = spring.gradient(x, k=2, L=1, out=out)
+    assert found[0] is out[0] and found[1] is out[1]
+    assert np.array_equal(out[1], spring.gradient(x, k=2, L=1)[1])
+    with pytest.raises(ValueError, match=r"out, gradient: expected shape \(9, 2, 3\), got \(9, 6\)"):
+        spring.gradient(x, k=2, L=1, out=(np.empty(9), np.empty((9, 6))))
+    with pytest.raises(TypeError, match="float64"):
+        spring.gradient(x, k=2, L=1, out=(np.empty(9, "f4"), np.empty((9, 2, 3))))
+    with pytest.raises(ValueError, match="C-contiguous"):
+        spring.gradient(x, k=2, L=1, out=(np.empty(18)[::2], np.empty((9, 2, 3))))
+    with pytest.raises(ValueError, match="expected 2 arrays"):
+        spring.gradient(x, k=2, L=1, out=np.empty(9))
+
+
+def test_singular_inputs_are_flagged(spring):
+    x = positions(3, 2)
+    x[1, 1] = x[1, 0]
+    U, g, flags = spring.gradient(x, k=1, L=1, flags=True)
+    assert flags.tolist() == [0, 1, 0] and np.isfinite(g).all()
+
+
+def test_forces_constraints_and_residuals():
+    drag = ed.energy(
+        "force Drag(p, q: Point, v, w: Velocity; c: Scalar) { let f = c * (v - w) + 0 * (p - q); [-f, f] }"
+    )
+    x, v = positions(4, 2), positions(4, 2, 2)
+    f, by_x, by_v = drag.force_jacobians(x, v, c=2.0)
+    assert np.array_equal(f[:, 0], -2 * (v[:, 0] - v[:, 1])) and not by_x.any() and by_v[0, 0, 0] == -2
+    length = ed.energy("constraint Length(p, q: Point; L: Scalar) { norm(p - q) - L }")
+    C, J = length.constraint(x, L=1)
+    assert C.shape == (4, 1) and J.shape == (4, 1, 6)
+    fit = ed.energy("residual Fit(a: Vec3, s: Scalar; m: Vec3) { s * (a - m) }")
+    r, J = fit.jacobian(np.ones((4, 4)), m=[1.0, 2.0, 3.0])
+    assert r.shape == (4, 3) and J.shape == (4, 3, 4) and r[0].tolist() == [0, -1, -2]
+    with pytest.raises(ValueError, match="no `hessian`"):
+        drag.hessian(x, c=1)
+
+
+def test_descriptions_name_inputs_with_shapes_and_units(spring):
+    assert repr(spring) == "<energy Spring(p, q, k, L)>"
+    assert spring.points == 2 and spring.kind == "energy"
+    assert [(i.name, i.kind, i.unit) for i in spring.inputs][2:] == [("k", "parameter", "N/m"), ("L", "parameter", "m")]
+    assert "in N/m" in spring.description
+
+
+def test_messages_say_what_was_expected(spring):
+    x = positions(3, 2)
+    with pytest.raises(TypeError, match="missing parameter `L`; expected k, L"):
+        spring.value(x, k=1)
+    with pytest.raises(TypeError, match="no input `m` to bind"):
+        spring.value(x, k=1, L=1, m=2)
+    with pytest.raises(ValueError, match=r"x: expected shape \(3, 2, 3\), got \(3, 6\)"):
+        spring.value(x.reshape(3, 6), k=1, L=1)
+    with pytest.raises(ValueError, match=r"k: expected shape \(\) or \(3,\), got \(2,\)"):
+        spring.value(x, k=[1, 2], L=1)
+    with pytest.raises(TypeError, match="array of numbers"):
+        spring.value("here", k=1, L=1)
+    x[2, 0, 1] = np.nan
+    with pytest.raises(ValueError, match="x: entry 13 .* NaN"):
+        spring.value(x, k=1, L=1)
+
+
+def test_texts_that_are_wrong_are_refused_with_their_place():
+    with pytest.raises(ed.EnergyError, match="u.energy:1:22"):
+        ed.energy("energy U(p: Point) { nrm(p) }", "u.energy")
+    with pytest.raises(ed.EnergyError, match="expected one declaration, got 2"):
+        ed.energy(SPRING + SPRING.replace("Spring", "Other"))
+    with pytest.raises(KeyError, match="catalogue"):
+        ed.element("Sprong")
+
+
+def test_degenerate_rest_shapes_are_refused():
+    sheet = ed.element("StVK")
+    rest = {i.name: np.zeros(i.shape) for i in sheet.inputs if i.kind == "rest"}
+    parameters = {i.name: np.ones(i.shape) for i in sheet.inputs if i.kind == "parameter"}
+    with pytest.raises(ed.EnergyError, match="rest"):
+        sheet.value(positions(1, 3), **rest, **parameters)
+
+
+@given(count=st.integers(0, 140), seed=st.integers(0, 2**31))
+@settings(max_examples=30, deadline=None)
+def test_batches_of_any_size_equal_single_elements(count, seed):
+    spring = ed.energy(SPRING)
+    x = positions(count, 2, seed)
+    U, g, H = spring.hessian(x, k=2.0, L=0.7)
+    assert U.shape == (count,) and H.shape == (count, 6, 6)
+    for i in range(0, count, 29):
+        single = spring.hessian(x[i : i + 1], k=2.0, L=0.7)
+        assert U[i] == single[0][0] and np.array_equal(g[i], single[1][0]) and np.array_equal(H[i], single[2][0])
+
+
+@given(stride=st.integers(2, 4), dtype=st.sampled_from(["f4", "f8", "i8"]))
+@settings(max_examples=20, deadline=None)
+def test_strides_and_types_are_converted(stride, dtype):
+    spring = ed.energy(SPRING)
+    wide = (10 * positions(8 * stride, 2)).astype(dtype)
+    strided = wide[::stride]
+    expected = spring.value(np.ascontiguousarray(strided, dtype="f8"), k=1, L=1)
+    assert np.array_equal(spring.value(strided, k=1, L=1), expected)
+
+
+def test_threads_share_elements(spring):
+    bound = spring.bind(640, k=2.0, L=1.0)
+    x = positions(640, 2)
+    expected = bound.hessian(x)[2]
+    results = [None] * 4
+
+    def work(i):
+        for _ in range(20):
+            results[i] = bound.hessian(x)[2]
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert all(np.array_equal(result, expected) for result in results)
+
+
+def test_audits_find_what_is_false():
+    assert ed.audit(SPRING, quick=True)
+    false = ed.audit("#[invariant(rotation)] energy Weight(p, q: Point; k: Scalar) { k * (p - q).z }", quick=True)
+    assert not false and "rotation" in " ".join(false.failures)
+    assert "fn gradient" in ed.show(SPRING)
