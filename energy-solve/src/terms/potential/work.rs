@@ -155,8 +155,8 @@ impl Hessians<'_, '_> {
         0
     }
 
-    /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two vectors
-    /// per point.
+    /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two
+    /// vectors per point.
     #[inline(always)]
     pub(super) fn add<L: Level>(
         &mut self,
