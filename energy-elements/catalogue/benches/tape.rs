@@ -292,7 +292,10 @@ macro_rules! table {
     };
 }
 
-const ELEMENTS: &[(&str, fn() -> Vec<Line>)] = table! {
+/// Name of an element, and the function that measures it.
+type Entry = (&'static str, fn() -> Vec<Line>);
+
+const ELEMENTS: &[Entry] = table! {
     potential: ArcAngle AsRigidAsPossible BaraffWitkinShear BaraffWitkinStretch BoxContact BridsonBending
         CapsuleContact Distance DistanceBarrier DistanceSquared EdgeEdgeDistance FlatBending Gravity HairBend HingeAngle
         HingeCos HingeCosHalf HingeSinHalf HookeSpring NeoHookean OrthotropicStVK ParallelEdges PlaneContact
