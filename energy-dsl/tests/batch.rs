@@ -267,7 +267,7 @@ fn batches_of_residuals_are_residuals_in_both_precisions() {
 fn misfits_are_errors_with_their_numbers() {
     let packed = Packed::new(&[Spring { k: 1.0, L: 1.0 }; 40], &stencils::<2>(40));
     let (x, mut out) = (positions(), [0.0; 40]);
-    let range = |range: std::ops::Range<usize>| BatchError::Range { range, elements: 40 };
+    let range = |range: std::ops::Range<usize>| BatchError::Range { range, elements: 40, block: BLOCK };
     assert_eq!(packed.values(8..40, &x, &mut out[8..]).unwrap_err(), range(8..40));
     assert_eq!(packed.values(0..41, &x, &mut out).unwrap_err(), range(0..41));
     let backwards = std::ops::Range { start: 32, end: 16 };

@@ -2,7 +2,8 @@
 //! are a loop in the generated code.
 #![allow(mixed_script_confusables)]
 
-use energy_dsl::{Element, Potential, energy};
+use energy_compiler::Interpreted;
+use energy_dsl::{Element, Inputs, Outputs, Potential, energy};
 
 energy! {
     fn slope(a, b, c, r, s, t) {
@@ -119,6 +120,27 @@ fn a_flag_of_one_term_is_a_flag_of_the_sum() {
     let parts = single_points(rest).map(|point| Point { μ: 2e307, λ: 0.0, ..point }.value(&scaled));
     assert!(parts.iter().all(|part| part.value.is_finite() && !part.flags.any()), "{parts:?}");
     assert!(stiff.value(&scaled).flags.any());
+}
+
+/// The brick as text runs the same loop over its tape: ordinary, with an inverted corner, and where the sum overflows.
+#[test]
+fn a_tape_runs_the_loop_with_the_same_bits() {
+    let read = Interpreted::from_source(<Brick as Element>::DECLARATION.source).unwrap().pop().unwrap();
+    let (rest, x) = shapes();
+    let mut inverted = x;
+    inverted[6] = [-1.5, -1.5, -1.5];
+    let scaled = x.map(|point| point.map(|c| 2.0 * c));
+    for (x, parameters) in [(x, [3.0, 2.0]), (inverted, [3.0, 2.0]), (scaled, [0.0, 2e307])] {
+        let (rest, positions) = (rest.as_flattened(), x.as_flattened());
+        let inputs = Inputs { parameters: &parameters, rest, positions, velocities: &[] };
+        let numbers = |outputs: Outputs<f64>| {
+            let flags = outputs.flags.map(|flags| (flags.degenerate, flags.kink));
+            let blocks = outputs.blocks.into_iter().flat_map(|(_, numbers)| numbers);
+            (blocks.map(|x| if x.is_nan() { u64::MAX } else { x.to_bits() }).collect::<Vec<_>>(), flags)
+        };
+        let compiled = <Brick as Element>::evaluate(&inputs).unwrap();
+        assert_eq!(numbers(compiled), numbers(read.evaluate(&inputs).unwrap()), "{positions:?}");
+    }
 }
 
 #[test]

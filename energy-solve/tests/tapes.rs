@@ -28,8 +28,9 @@ impl<E: PackedPotential<f64> + Element + std::fmt::Debug + Sync + 'static, const
 
     fn read(self) -> Box<dyn Term> {
         let element = Interpreted::from_source(E::DECLARATION.source).unwrap().pop().unwrap();
-        let each = |columns: &[Vec<f64>]| columns.iter().map(|c| Column::Each(c.clone().leak())).collect::<Vec<_>>();
-        let elements = element.elements(self.elements.len(), &each(&self.rest), &each(&self.parameters)).unwrap();
+        let [rest, parameters] = [&self.rest, &self.parameters]
+            .map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
+        let elements = element.elements(self.elements.len(), &rest, &parameters).unwrap();
         let vertices = self.stencils.into_iter().flatten();
         Box::new(TapeTerm::new(self.name.into(), element.declaration(), elements.tape().clone(), vertices))
     }

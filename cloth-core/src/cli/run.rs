@@ -26,8 +26,8 @@ pub struct RunScene {
     /// Start even if the run seems not to fit into memory.
     #[arg(long)]
     ignore_memory: bool,
-    /// Replace the material of every fabric by the elements that this file declares. They are interpreted, which is
-    /// slower than built-in elements.
+    /// Replace the material of every fabric by the elements that this file declares. They are interpreted, two
+    /// to three times slower than built-in elements.
     #[arg(long, value_name = "FILE.energy")]
     material: Option<PathBuf>,
     /// Parameters of these elements, such as `k=20,nu=0.3`, in the units of the declaration.

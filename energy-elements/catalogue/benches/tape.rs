@@ -9,14 +9,50 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use energy_compiler::{Elements, Interpreted};
+use energy_compiler::{Elements, InputKind, InputNumbers, Interpreted};
 use energy_dsl::tape::{Column, Output, Places, TapeElements, stencil_blocks};
-use energy_dsl::{Inputs, Packed, PackedForce, PackedPotential, PackedResidual, Vector3};
+use energy_dsl::{Declaration, Inputs, Kind, Packed, PackedForce, PackedPotential, PackedResidual, Vector3};
 use energy_elements::*;
-use verify::sample::Sampler;
 
 /// Elements per call.
 const COUNT: usize = 512;
+
+/// Returns random numbers from −1 to 1.
+fn numbers() -> impl FnMut() -> f64 {
+    let mut state = 5_u64;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+/// Returns a sound rest shape.
+fn rest_shape(declaration: &Declaration) -> Vec<f64> {
+    match declaration.rest.iter().map(|field| field.size).sum::<usize>() {
+        0 => vec![],
+        6 => vec![0.0, 0.0, 1.0, 0.25, 0.25, 1.0],
+        12 if declaration.name.starts_with("Tet") => {
+            vec![0.0, 0.0, 0.0, 1.0, 0.25, 0.0, 0.0, 1.0, 0.25, 0.25, 0.0, 1.0]
+        }
+        12 => vec![0.5, -1.0, 0.0, 0.25, 0.75, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        18 => vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.25, 1.0, 0.0, 1.0, 1.0, 0.0, -0.75, 0.75, 0.0, 0.5, -1.0, 0.0],
+        other => panic!("{}: no rest shape of {other} numbers here", declaration.name),
+    }
+}
+
+/// Returns places near the rest shape; distinct ones, if there is none.
+fn places(declaration: &Declaration) -> Vec<f64> {
+    let points = declaration.points.len();
+    let shape = rest_shape(declaration);
+    if declaration.points.iter().any(|field| field.size != 3) || declaration.kind == Kind::Residual {
+        return vec![0.5; declaration.points.iter().map(|field| field.size).sum()];
+    }
+    match shape.len() {
+        6 => shape.chunks(2).flat_map(|corner| [corner[0], corner[1], 0.0]).collect(),
+        size if size == 3 * points && size > 0 => shape,
+        _ => [0.5, -1.0, 0.0, 0.25, 0.75, 0.25, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0][..3 * points].to_vec(),
+    }
+}
 
 /// Measured routine of an element.
 struct Line {
@@ -39,34 +75,33 @@ struct Case {
 }
 
 impl Case {
-    fn of(declaration: &'static energy_dsl::Declaration) -> Self {
+    fn of(declaration: &'static Declaration) -> Self {
         let element = Interpreted::from_source(declaration.source).expect("it compiles").pop().expect("it is there");
-        let mut sampler = Sampler::new(declaration, 5);
-        let samples: Vec<_> = (0..COUNT).map(|_| sampler.sample()).collect();
-        let columns = |numbers: &dyn Fn(usize) -> Vec<f64>, sizes: Vec<usize>| -> Vec<Vec<f64>> {
-            let mut first = 0;
-            let own = sizes.into_iter().map(|size| {
-                first += size;
-                (0..COUNT).flat_map(|i| numbers(i)[first - size..first].to_vec()).collect()
-            });
-            own.collect()
-        };
-        let sizes = |kind| element.inputs().iter().filter(move |i| i.kind == kind).map(|i| i.size()).collect();
-        let rest = columns(&|i| samples[i].rest.clone(), sizes(energy_compiler::InputKind::Rest));
-        let parameters = columns(&|i| samples[i].parameters.clone(), sizes(energy_compiler::InputKind::Parameter));
-        let each = |columns: &'static [Vec<f64>]| columns.iter().map(|c| Column::Each(c)).collect::<Vec<_>>();
-        let (rest, parameters) = (each(rest.leak()), each(parameters.leak()));
+        let mut draw = numbers();
+        let mut column =
+            |input: &InputNumbers| -> Vec<f64> { (0..COUNT * input.size()).map(|_| 1.0 + 0.5 * draw()).collect() };
+        let of = |kind| element.inputs().iter().filter(move |input| input.kind == kind);
+        let parameters: Vec<Vec<f64>> = of(InputKind::Parameter).map(&mut column).collect();
+        let shape = rest_shape(declaration);
+        let mut first = 0;
+        let rest: Vec<Vec<f64>> = of(InputKind::Rest)
+            .map(|input| {
+                first += input.size();
+                let own = &shape[first - input.size()..first];
+                (0..COUNT).flat_map(|_| own.iter().map(|x| x + 0.05 * draw()).collect::<Vec<_>>()).collect()
+            })
+            .collect();
+        let [rest, parameters] =
+            [&rest, &parameters].map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
         let elements = element.elements(COUNT, &rest, &parameters).expect("sound rest shapes");
         let tape = elements.tape().clone();
+        let (n, at_rest) = (element.coordinates(), places(declaration));
         Self {
             numbers: (0..COUNT).map(|i| tape.numbers_of(i)).collect(),
             tape,
             elements,
-            positions: samples.iter().flat_map(|s| s.positions.clone()).collect(),
-            velocities: samples
-                .iter()
-                .flat_map(|s| if s.velocities.is_empty() { vec![0.0; s.positions.len()] } else { s.velocities.clone() })
-                .collect(),
+            positions: (0..COUNT * n).map(|i| at_rest[i % n] + 0.2 * draw()).collect(),
+            velocities: (0..COUNT * n).map(|_| draw()).collect(),
         }
     }
 
@@ -257,7 +292,10 @@ macro_rules! table {
     };
 }
 
-const ELEMENTS: &[(&str, fn() -> Vec<Line>)] = table! {
+/// Name of an element, and the function that measures it.
+type Entry = (&'static str, fn() -> Vec<Line>);
+
+const ELEMENTS: &[Entry] = table! {
     potential: ArcAngle AsRigidAsPossible BaraffWitkinShear BaraffWitkinStretch BoxContact BridsonBending
         CapsuleContact Distance DistanceBarrier DistanceSquared EdgeEdgeDistance FlatBending Gravity HairBend HingeAngle
         HingeCos HingeCosHalf HingeSinHalf HookeSpring NeoHookean OrthotropicStVK ParallelEdges PlaneContact

@@ -51,7 +51,7 @@ fn samples(declaration: &'static Declaration) -> Vec<Sample> {
     let mut sampler = Sampler::new(declaration, 11);
     let mut list: Vec<Sample> = (0..8).map(|_| sampler.sample()).collect();
     list.extend((0..8).map(|_| sampler.lattice_sample()));
-    list.extend((0..40).map(|_| sampler.odd_sample()));
+    list.extend((0..16).map(|_| sampler.odd_sample()));
     list.extend(sweeps(declaration).into_iter().flat_map(|sweep| sweep.inputs).map(|(_, sample)| sample));
     list
 }
@@ -107,8 +107,9 @@ fn blocks_have_the_bits_of_single_elements() {
         };
         let (rest, parameters) =
             (columns(InputKind::Rest, &|s| s.rest.clone()), columns(InputKind::Parameter, &|s| s.parameters.clone()));
-        let each = |columns: &'static [Vec<f64>]| columns.iter().map(|c| Column::Each(c)).collect::<Vec<_>>();
-        let elements = element.elements(count, &each(rest.leak()), &each(parameters.leak())).unwrap();
+        let [rest, parameters] =
+            [&rest, &parameters].map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
+        let elements = element.elements(count, &rest, &parameters).unwrap();
         let x: Vec<f64> = samples.iter().flat_map(|sample| sample.positions.clone()).collect();
         let (n, rows) = (element.coordinates(), entry.declaration.rows);
         let (first, second) = if entry.declaration.kind == Kind::Energy { (1, n * n) } else { (rows, rows * n) };

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::ops::Range;
 
-use super::packed::BLOCK;
 use crate::numbers::{Flags, Mask};
 
 /// Index among the packed elements and flags of each flagged element, in ascending order.
@@ -19,6 +18,8 @@ pub enum BatchError {
         range: Range<usize>,
         /// Number of packed elements.
         elements: usize,
+        /// Elements per block.
+        block: usize,
     },
     /// Stencils of another size than the element.
     Stencil {
@@ -32,6 +33,15 @@ pub enum BatchError {
         /// One more than the largest index.
         needed: usize,
         /// Number of points or unknowns.
+        given: usize,
+    },
+    /// A slice of inputs of another length than the elements need.
+    Input {
+        /// What the slice holds.
+        of: &'static str,
+        /// Numbers that the elements need.
+        needed: usize,
+        /// Length of the slice.
         given: usize,
     },
     /// A slice of results of another length than the range needs.
@@ -48,9 +58,9 @@ pub enum BatchError {
 impl fmt::Display for BatchError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Range { range, elements } => write!(
+            Self::Range { range, elements, block } => write!(
                 f,
-                "{range:?} of {elements} elements: a range starts at a multiple of {BLOCK} and ends at {elements} or \
+                "{range:?} of {elements} elements: a range starts at a multiple of {block} and ends at {elements} or \
                  before"
             ),
             Self::Stencil { needed, given } => {
@@ -61,6 +71,9 @@ impl fmt::Display for BatchError {
             }
             Self::Missing { needed, given } => {
                 write!(f, "point {needed} of {given}: a stencil names a point or unknown that is not given")
+            }
+            Self::Input { of, needed, given } => {
+                write!(f, "{given} numbers for the {of}: expected {needed}")
             }
             Self::Output { of, needed, given } => {
                 write!(f, "{given} places for {needed} numbers of the {of}: outputs belong to the range alone")

@@ -146,7 +146,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         if within && range.start.is_multiple_of(BLOCK) {
             Ok(())
         } else {
-            Err(BatchError::Range { range: range.clone(), elements: self.elements })
+            Err(BatchError::Range { range: range.clone(), elements: self.elements, block: BLOCK })
         }
     }
 

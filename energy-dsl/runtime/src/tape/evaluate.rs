@@ -141,25 +141,28 @@ impl<S: Float> TapeElements<S> {
         S: 'p,
     {
         if range.start > range.end || range.end > self.count || !range.start.is_multiple_of(TAPE_BLOCK) {
-            return Err(BatchError::Range { range: range.clone(), elements: self.count });
+            return Err(BatchError::Range { range: range.clone(), elements: self.count, block: TAPE_BLOCK });
         }
-        let output = |of, needed: usize, given: usize| match needed == given {
+        let input = |of, needed: usize, given: usize| match needed == given {
             true => Ok(()),
-            false => Err(BatchError::Output { of, needed, given }),
+            false => Err(BatchError::Input { of, needed, given }),
         };
         for places in places {
             match places {
-                Places::Rows(rows) => output("coordinates", range.len() * self.routines.coordinates, rows.len())?,
+                Places::Rows(rows) => input("coordinates", range.len() * self.routines.coordinates, rows.len())?,
                 Places::Gathered { vectors, stencils } => {
                     let needed = self.count.next_multiple_of(TAPE_BLOCK) * self.routines.coordinates / 3;
-                    output("stencils", needed, stencils.len())?;
+                    input("stencils", needed, stencils.len())?;
                     if let Some(&last) = stencils.iter().max().filter(|&&last| last as usize >= vectors.len()) {
                         return Err(BatchError::Missing { needed: last as usize + 1, given: vectors.len() });
                     }
                 }
             }
         }
-        outputs.iter().try_for_each(|o| output(o.name, range.len() * o.layout.len(), o.numbers.len()))
+        outputs.iter().try_for_each(|output| {
+            let (of, needed, given) = (output.name, range.len() * output.layout.len(), output.numbers.len());
+            if needed == given { Ok(()) } else { Err(BatchError::Output { of, needed, given }) }
+        })
     }
 }
 

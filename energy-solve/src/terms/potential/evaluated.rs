@@ -8,7 +8,7 @@ use energy_dsl::{
     Vector3, WidePoints, for_each_batch_in,
 };
 
-use super::work::{Gradients, Hessians, Values, lanes_in};
+use super::work::{Expanded, Gradients, Hessians, Values, lanes_in};
 use crate::terms::scatter::Lanes;
 
 /// Elements of one type, packed for lanes. Ranges start at multiples of [`Evaluated::PACK`].
@@ -98,7 +98,8 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
         let (mut v, mut sums) = (*batch.points, *batch.points);
-        let numbers = (result.value, result.gradient.as_ref(), result.hessian.as_mut());
+        let (gradient, triangle) = (result.gradient.as_ref(), result.hessian.as_mut());
+        let numbers = Expanded { value: result.value, gradient, triangle };
         self.add::<L>(&lanes, numbers, (flagged, projected), [v.as_mut(), sums.as_mut()]);
     }
 }

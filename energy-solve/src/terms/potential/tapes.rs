@@ -6,7 +6,7 @@ use energy_dsl::tape::{BlockResults, Expander, Places, Results, Slot, TAPE_BLOCK
 use energy_dsl::{Declaration, Kernel, Lane, Level, Vector3, dispatch};
 
 use super::evaluated::Evaluated;
-use super::work::{Gradients, Hessians, Values};
+use super::work::{Expanded, Gradients, Hessians, Values};
 use crate::terms::scatter::Lanes;
 
 /// Elements as tapes, with their vertices.
@@ -244,7 +244,8 @@ impl Kernel for AddHessians<'_, '_, '_> {
             let value = L::F64::load(&results.number(0)[at..]);
             let bits = (flagged(flags, &lanes, at), self.projected[at]);
             let (v, sums) = scratch.split_at_mut(points);
-            self.work.add::<L>(&lanes, (value, gradient, &mut triangle), bits, [v, sums]);
+            let numbers = Expanded { value, gradient, triangle: &mut triangle };
+            self.work.add::<L>(&lanes, numbers, bits, [v, sums]);
             at += <L::F64 as Lane<f64>>::LANES;
         }
     }

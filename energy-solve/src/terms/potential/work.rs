@@ -81,6 +81,13 @@ impl Gradients<'_> {
     }
 }
 
+/// Energy and derivatives of the elements in lanes, in terms of points.
+pub(super) struct Expanded<'a, V> {
+    pub(super) value: V,
+    pub(super) gradient: &'a [Vector3<V>],
+    pub(super) triangle: &'a mut [[Vector3<V>; 3]],
+}
+
 /// f ← f − ∇U and A ← A − α ∇²U for the vertices and blocks from `first_vertex` and `first_block` on.
 pub(super) struct Hessians<'a, 'b> {
     sum: &'a mut Linearisation<'b>,
@@ -155,13 +162,13 @@ impl Hessians<'_, '_> {
         0
     }
 
-    /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two vectors
-    /// per point.
+    /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two
+    /// vectors per point.
     #[inline(always)]
     pub(super) fn add<L: Level>(
         &mut self,
         lanes: &Lanes<'_>,
-        (value, gradient, triangle): (L::F64, &[Vector3<L::F64>], &mut [[Vector3<L::F64>; 3]]),
+        Expanded { value, gradient, triangle }: Expanded<'_, L::F64>,
         (flagged, mut projected): (u32, u32),
         scratch: [&mut [Vector3<L::F64>]; 2],
     ) {

@@ -1,8 +1,11 @@
 //! The methods of computing an element's Hessian. All but multi-precision run the same generated code.
 
+use std::cell::RefCell;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use energy_compiler::{InputKind, InputNumbers};
+use energy_dsl::tape::Column;
 use energy_dsl::{
     Array, Batch, BatchWork, Block, Level, Packed, PackedPotential, Potential, Real, Vector3, for_each_batch,
     triangle_index,
@@ -130,10 +133,13 @@ impl<'a> Methods<'a> {
             hessian.expect("energies have Hessians").numbers
         };
         let timed = self.time(|i| discard(hessian(subject, &samples[i])));
+        // Lanes have the bits of single elements.
+        let error = self.error(|i| block(&samples[i], BlockName::Hessian));
         Ok(vec![
             self.measure("central differences, interpreted", central),
             self.measure("dual numbers, interpreted", dual),
-            self.measure("compiled routines, interpreted", |i| block(&samples[i], BlockName::Hessian)),
+            self.measure("tape, one element at a time", |i| block(&samples[i], BlockName::Hessian)),
+            self.measured("tape, f64 lanes", time_tape(subject, samples)?, error),
             self.measured("multi-precision, 30 digits", timed, 1e-30),
         ])
     }
@@ -276,4 +282,29 @@ fn time_lanes<E: PackedPotential<f64>>(elements: &[(E, E::Points)]) -> f64 {
     let packed = Packed::from_fn(MANY, n, |element| &own(element).0, |element, point| (n * element + point) as u32);
     let positions: Vec<Vector3<f64>> = (0..MANY).flat_map(|element| own(element).1.as_ref().to_vec()).collect();
     least(MANY, || for_each_batch(black_box(&packed), &positions, &mut Discarded))
+}
+
+/// Returns the nanoseconds per Hessian of a declaration that was read, in blocks of elements.
+fn time_tape(subject: &Subject, samples: &[Sample]) -> Result<f64, String> {
+    let element = subject.interpreted.as_ref().ok_or("this declaration was not read at run time")?;
+    let own = |number: usize| &samples[number % samples.len()];
+    let columns = |kind: InputKind, numbers: fn(&Sample) -> &[f64]| {
+        let mut first = 0;
+        let column = |input: &InputNumbers| {
+            first += input.size();
+            (0..MANY).flat_map(|i| numbers(own(i))[first - input.size()..first].to_vec()).collect::<Vec<f64>>()
+        };
+        element.inputs().iter().filter(|input| input.kind == kind).map(column).collect::<Vec<_>>()
+    };
+    let (rest, parameters) = (columns(InputKind::Rest, |s| &s.rest), columns(InputKind::Parameter, |s| &s.parameters));
+    let [rest, parameters] =
+        [&rest, &parameters].map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
+    let elements = element.elements(MANY, &rest, &parameters).map_err(|error| error.to_string())?;
+    let x: Vec<f64> = (0..MANY).flat_map(|i| own(i).positions.clone()).collect();
+    let n = element.coordinates();
+    let outputs = RefCell::new((vec![0.0; MANY], vec![0.0; MANY * n], vec![0.0; MANY * n * n]));
+    Ok(least(MANY, || {
+        let (energies, gradients, hessians) = &mut *outputs.borrow_mut();
+        discard(elements.hessians(0..MANY, black_box(&x), energies, gradients, hessians));
+    }))
 }

@@ -12,7 +12,7 @@ use super::targets::targets;
 pub struct Bench {
     /// Elements to time [default: all that can be timed].
     names: Vec<String>,
-    /// Time the declarations of this file (`.energy`). They are interpreted, not compiled.
+    /// Time the declarations of this file (`.energy`). They run as tapes, not as compiled code.
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
     /// Also write `bench.md`, `bench.csv` and a plot of each element to this folder.
