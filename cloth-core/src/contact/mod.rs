@@ -6,8 +6,10 @@
 //!
 //! On a mesh, the nearest face, edge or corner acts as a plane, a capsule or a sphere of radius 0.
 //!
-//! Only vertices touch solids, not the triangles between them. For cloth on cloth see [`crate::barrier`].
+//! Only vertices touch solids, not the triangles between them. The integrator `newton` does without these terms: solids
+//! take part in [`crate::barrier`], which knows them by their cores.
 
+mod cores;
 mod friction;
 mod mesh_solid;
 mod passage;

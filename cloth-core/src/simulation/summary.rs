@@ -48,6 +48,9 @@ pub struct Summary {
     /// Number of edges of cloth and hair that touch or cross a triangle at the end.
     #[serde(default)]
     pub crossings: usize,
+    /// Number of places where cloth or hair crosses an obstacle at the end.
+    #[serde(default)]
+    pub obstacle_crossings: usize,
     /// ½ Σ m v², in J.
     pub kinetic_energy: f64,
     /// Σ m v, in kg m/s.
@@ -174,11 +177,19 @@ impl Simulation {
     /// Adds the crossings at the end and the balance of energy.
     fn add_findings(&self, summary: &mut Summary) {
         summary.crossings = self.crossings().len();
+        summary.obstacle_crossings = self.obstacle_crossings();
         if summary.crossings > 0 {
             summary.warnings.push(format!(
                 "the cloth passes through itself: at the end, edges cross triangles in {} places. \
                  `integrator = \"newton\"` with `contact = \"on\"` prevents this",
                 summary.crossings
+            ));
+        }
+        if summary.obstacle_crossings > 0 {
+            summary.warnings.push(format!(
+                "the cloth crosses obstacles in {} places at the end: `{}` keeps only vertices out of obstacles. \
+                 `integrator = \"newton\"` keeps edges and triangles out, too",
+                summary.obstacle_crossings, summary.integrator
             ));
         }
         summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));

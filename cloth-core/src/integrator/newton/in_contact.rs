@@ -9,12 +9,12 @@ use super::super::ContactWork;
 use super::incremental_potential::IncrementalPotential;
 use crate::body::Body;
 
-/// Moves of the pins within a step, after which they count as blocked.
+/// Moves of pins and obstacles within a step, after which they count as blocked.
 pub(super) const PIN_MOVES: usize = 40;
 
 impl IncrementalPotential<'_> {
     /// Forgets the pairs of the last step, and shortens the move to the first iterate x until it is certain to have no
-    /// crossing. Returns the part that is left.
+    /// crossing. Returns the part of their way that pins and obstacles have gone.
     pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
         let Body { system, x: start, .. } = &mut *self.body;
         if let Some((contact, _)) = system.contact() {
@@ -23,7 +23,9 @@ impl IncrementalPotential<'_> {
         let to = std::mem::replace(x, self.body.x.clone());
         let part = self.certified(x, &to);
         blend(x, &to, part);
-        part
+        let is_prescribed = |vertex: usize| self.body.system.dofs().place(vertex).is_none();
+        let is_driven = (0..x.len()).any(|vertex| is_prescribed(vertex) && self.body.v[vertex] != [0.0; 3]);
+        if is_driven { part } else { 1.0 }
     }
 
     /// Returns the part of the straight move that has no crossing.
@@ -88,8 +90,8 @@ impl IncrementalPotential<'_> {
         contacts
     }
 
-    /// Moves pins that contact has stopped further towards their places at the end of the step. Returns the part of
-    /// the rest of their way that they went.
+    /// Moves pins and obstacles that contact has stopped further towards their places at the end of the step. Returns
+    /// the part of the rest of their way that they went.
     pub(super) fn move_pins(&mut self, x: &mut [Vector3<f64>]) -> f64 {
         let mut to = x.to_vec();
         for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().place(vertex).is_none()) {
