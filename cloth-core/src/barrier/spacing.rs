@@ -35,8 +35,9 @@ pub(super) struct Spacings {
 }
 
 impl Spacing {
-    pub fn clearance(self) -> Clearance {
-        Clearance { thickness: self.thickness, reach: self.thickness + self.gap }
+    /// The distances that the pair must keep. `is_plane` if its triangle stands for a plane.
+    pub fn clearance(self, is_plane: bool) -> Clearance {
+        Clearance { thickness: self.thickness, reach: self.thickness + self.gap, is_plane }
     }
 }
 

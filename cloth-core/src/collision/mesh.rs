@@ -3,7 +3,7 @@ use std::ops::Range;
 use energy_dsl::Vector3;
 use energy_solve::index;
 
-use super::{Core, Pair};
+use super::{Core, Pair, PairKind};
 use crate::geometry::{Bounds, norm, subtract};
 
 /// The points, edges and triangles of cloth and hair that can collide, and those of obstacles after them.
@@ -111,6 +111,22 @@ impl CollisionMesh {
     pub(crate) fn obstacle_of(&self, pair: &Pair) -> Option<usize> {
         let [first, second] = [pair.vertices[0], pair.vertices[pair.first()]];
         self.obstacle(first.max(second))
+    }
+
+    /// Whether a vertex is the centre of a ball, or the end of a rail.
+    #[inline]
+    pub(crate) fn is_round(&self, vertex: u32) -> bool {
+        vertex as usize >= self.own && self.first_triangles[vertex as usize].is_none()
+    }
+
+    /// Whether a pair is a point and a plane of an obstacle. A triangle that stands for a plane has no edges.
+    #[inline]
+    pub(crate) fn has_plane(&self, pair: &Pair) -> bool {
+        let [_, a, b, c] = pair.vertices;
+        pair.kind == PairKind::PointTriangle
+            && a as usize >= self.own
+            && b != c
+            && self.neighbours[a as usize].is_empty()
     }
 
     /// The numbers of points, triangles and edges of cloth and hair. Those of obstacles follow.

@@ -16,6 +16,7 @@ mod measured;
 mod mesh;
 mod neighbourhood;
 mod pair;
+mod plane;
 mod search;
 mod solid_core;
 

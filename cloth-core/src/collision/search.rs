@@ -180,6 +180,14 @@ impl Search {
 
     /// Adds two edges if they can collide.
     fn add_edges(&self, mesh: &CollisionMesh, one: usize, other: usize, found: &mut Found) {
+        // The triangles of an edge collide with points, such as the centre of a ball.
+        let is_covered = |point: usize, edge: usize| {
+            let [a, b] = mesh.edges()[point];
+            a == b && !mesh.apexes(edge).is_empty()
+        };
+        if is_covered(one, other) || is_covered(other, one) {
+            return;
+        }
         if self.can_collide(mesh, &mesh.edges()[one], &mesh.edges()[other]) {
             found.of_edges.push([index(one.min(other)), index(one.max(other))]);
         }

@@ -9,8 +9,8 @@ pub(crate) struct Core {
     pub triangles: Vec<[usize; 3]>,
     /// Segments, whose ends collide too. A segment from a vertex to itself is a point.
     pub segments: Vec<[usize; 2]>,
-    /// Triangles whose sides and corners do not collide, such as a part of a plane. A segment a–b as a face [a, b, b]
-    /// collides with points.
+    /// Triangles whose sides and corners do not collide. One that shares no vertex with other features stands for its
+    /// whole plane. A segment a–b as a face [a, b, b] collides with points.
     pub faces: Vec<[usize; 3]>,
     /// The radius, in m.
     pub radius: f64,

@@ -47,9 +47,8 @@ impl HalfSpace {
 
     fn core(&self) -> Core {
         let [u, w] = self.tangents();
-        let corner = |along: f64, across: f64| {
-            add_scaled(add_scaled(self.point, PLANE_SIZE * along, u), PLANE_SIZE * across, w)
-        };
+        let corner =
+            |along: f64, across: f64| add_scaled(add_scaled(self.point, PLANE_SIZE * along, u), PLANE_SIZE * across, w);
         let half = 0.75_f64.sqrt();
         let vertices = vec![corner(1.0, 0.0), corner(-0.5, half), corner(-0.5, -half)];
         Core { vertices, faces: vec![[0, 1, 2]], ..Core::default() }

@@ -46,14 +46,15 @@ pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool)
     let thickest = all.clone().fold(0.0, f64::max);
     // Coarse fabrics on fine meshes get thinner, with a gap in proportion.
     let scale = (LARGEST_REACH * shortest / ((1.0 + GAP) * thickest)).min(1.0);
-    let start = |(obstacle, radius): (&Obstacle, f64)| {
-        ObstacleStart { name: obstacle.name.clone(), radius, reach: obstacle.thickness }
+    let start = |(obstacle, radius): (&Obstacle, f64)| ObstacleStart {
+        name: obstacle.name.clone(),
+        radius,
+        reach: obstacle.thickness,
     };
     let prescribed = island.prescribed();
     let cores = prescribed.cores();
-    let held_here = |(vertex, obstacle): (u32, usize)| {
-        local[vertex as usize].map(|place| (energy_solve::index(place), obstacle))
-    };
+    let held_here =
+        |(vertex, obstacle): (u32, usize)| local[vertex as usize].map(|place| (energy_solve::index(place), obstacle));
     let participants = Participants {
         is_free: (0..x.len()).map(|vertex| island.body().system.dofs().place(vertex).is_some()).collect(),
         radii: all.map(|thickness| 0.5 * scale * thickness).collect(),

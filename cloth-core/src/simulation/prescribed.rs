@@ -59,14 +59,14 @@ impl Prescribed {
     /// Returns the positions at each of some times, in s, for cloth about a point at the first of them.
     pub fn positions<const N: usize>(&self, times: [f64; N], about: Vector3<f64>) -> [Vec<Vector3<f64>>; N] {
         let poses: Vec<[Pose; N]> = self.obstacles.iter().map(|part| times.map(|time| part.pose(time))).collect();
-        let offsets: Vec<_> = self.obstacles.iter().zip(&poses).map(|(part, poses)| part.offset(poses, about)).collect();
+        let offsets: Vec<_> =
+            self.obstacles.iter().zip(&poses).map(|(part, poses)| part.offset(poses, about)).collect();
         std::array::from_fn(|at| {
             let all = || self.obstacles.iter().zip(&poses).zip(&offsets);
             let cores = all().flat_map(|((part, poses), offset)| {
                 part.core.vertices.iter().map(move |x| poses[at].transform(add_scaled(*x, 1.0, *offset)))
             });
-            let frames =
-                all().flat_map(|((part, poses), _)| part.frame().iter().map(move |x| poses[at].transform(*x)));
+            let frames = all().flat_map(|((part, poses), _)| part.frame().iter().map(move |x| poses[at].transform(*x)));
             cores.chain(frames).collect()
         })
     }

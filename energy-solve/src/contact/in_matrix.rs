@@ -26,7 +26,8 @@ impl<T: Precision> BlockMatrix<T> {
         let contents = self.take_contents();
         let mut replaced = Vec::new();
         for contact in &fitting {
-            for ((row, c), (column, d)) in contact.free().flat_map(|one| contact.free().map(move |other| (one, other))) {
+            for ((row, c), (column, d)) in contact.free().flat_map(|one| contact.free().map(move |other| (one, other)))
+            {
                 let Some((place, flipped)) = pattern.place(row, column) else { continue };
                 // An upper triangle stores each pair of rows once.
                 if flipped {
