@@ -1,23 +1,26 @@
 //! Friction of cloth with itself and with obstacles.
 //!
-//! A step of a pair in contact has the potential μ λ (√(‖t‖² + ε²) − ε) ([`SlidingFriction`]). The sliding t is the
-//! tangential part of the displacement of the closest points relative to each other, since the start of the step.
+//! A pair in contact has the potential μ λ (√(‖t‖² + ε²) − ε) ([`SlidingFriction`]) of the way t that it has slid
+//! from where it sticks. This way is a bristle: it bends by up to a tenth of a millimetre, then the pair slips and the
+//! bristle follows. A bristle at rest stays at rest, so a pair that sticks does not creep. With ε a tenth of the length
+//! of a bristle, a pair that slips has 0.995 of the friction μ λ.
+//!
 //! Closest points, normal and normal force λ are lagged: taken at the start of the step, so that friction has a
-//! potential (Li et al. 2020, "Incremental potential contact", §5.5). Sliding slower than ε per step sticks, but
-//! creeps.
+//! potential (Li et al. 2020, "Incremental potential contact", §5.5).
 //!
 //! On an obstacle, the closest point is a material point of its surface, which moves with it.
 
 use energy_dsl::{Potential, Vector3};
 use energy_elements::SlidingFriction;
-use energy_solve::Contact;
+use energy_solve::{Contact, ContactMemory};
 
+use super::bristle::{Bristles, LENGTH};
 use super::joined::Law;
 use crate::collision::{Closest, CollisionMesh, Pair};
 use crate::geometry::{add_scaled, dot, subtract};
 
-/// The sliding velocity at which friction is μ/√2 times the normal force, in m/s.
-const STICKING: f64 = 1e-3;
+/// The deflection ε of a bristle at which friction is μ/√2 times the normal force, in m.
+const SOFTNESS: f64 = 0.1 * LENGTH;
 
 /// The friction of a step.
 #[derive(Debug, Default)]
@@ -28,10 +31,10 @@ pub(super) struct Friction {
     pub grips: Vec<Grip>,
     /// Positions at the start of the step.
     pub start: Vec<Vector3<f64>>,
-    /// The size of the step, in s.
-    dt: f64,
-    /// The pairs in contact at the start.
-    sliding: Vec<Sliding>,
+    /// The deflections at the start.
+    bristles: Bristles,
+    /// The pairs in contact at the start; `None` before they are known.
+    sliding: Option<Vec<Sliding>>,
 }
 
 /// The friction of an obstacle.
@@ -39,8 +42,6 @@ pub(super) struct Friction {
 pub(crate) struct Grip {
     /// The coefficient of friction.
     pub coefficient: f64,
-    /// The sliding velocity at which friction is μ/√2 times the normal force, in m/s.
-    pub sticking: f64,
     /// The first of four vertices that move with the obstacle: an origin, and the ends of three orthogonal unit
     /// vectors from there. `None` if the obstacle is fixed.
     pub frame: Option<u32>,
@@ -54,6 +55,9 @@ struct Sliding {
     weights: [f64; 4],
     /// The point of a moving obstacle that slides.
     anchor: Option<Anchor>,
+    normal: Vector3<f64>,
+    /// The vector between the sliding points while the bristle is straight, up to a multiple of the normal.
+    straight: Vector3<f64>,
     element: SlidingFriction,
 }
 
@@ -67,12 +71,38 @@ struct Anchor {
 }
 
 impl Friction {
-    pub fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
-        self.sliding.clear();
+    /// Begins a step at x, where the last step ended. After a step that failed, x is where that step began, and the
+    /// bristles are as before.
+    pub fn begin_step(&mut self, x: &[Vector3<f64>]) {
+        self.bristles = self.bristles_at(x);
+        self.sliding = None;
         if self.is_rough() {
             x.clone_into(&mut self.start);
-            self.dt = dt;
         }
+    }
+
+    /// Returns the bristles at the end of a step.
+    fn bristles_at(&self, x: &[Vector3<f64>]) -> Bristles {
+        let Some(sliding) = &self.sliding else { return self.bristles.clone() };
+        let way = |one: &Sliding| {
+            let way = subtract(one.between(x), one.straight);
+            (one.pair, one.normal, add_scaled(way, -dot(way, one.normal), one.normal))
+        };
+        Bristles::new(sliding.iter().map(way))
+    }
+
+    /// Returns the bristles at x, where the last step ended, for a checkpoint.
+    pub fn memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
+        self.bristles_at(x).memory()
+    }
+
+    /// Restores the bristles of a checkpoint.
+    pub fn restore(&mut self, memory: ContactMemory) {
+        (self.bristles, self.sliding) = (Bristles::restored(memory), None);
+    }
+
+    fn slidings(&self) -> &[Sliding] {
+        self.sliding.as_deref().unwrap_or_default()
     }
 
     /// Whether anything has friction.
@@ -80,30 +110,30 @@ impl Friction {
         !self.coefficients.is_empty() || self.grips.iter().any(|grip| grip.coefficient > 0.0)
     }
 
-    /// The coefficient of friction of a pair, and its sticking velocity in m/s.
-    fn law_of(&self, mesh: &CollisionMesh, pair: &Pair) -> [f64; 2] {
+    /// The coefficient of friction of a pair.
+    fn coefficient(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {
         if let Some(obstacle) = mesh.obstacle_of(pair) {
-            let Grip { coefficient, sticking, .. } = self.grips[obstacle];
-            return [coefficient, sticking];
+            return self.grips[obstacle].coefficient;
         }
         let of = |vertex: u32| self.coefficients.get(vertex as usize).copied().unwrap_or(0.0);
-        [0.5 * (of(pair.vertices[0]) + of(pair.vertices[pair.first()])), STICKING]
+        0.5 * (of(pair.vertices[0]) + of(pair.vertices[pair.first()]))
     }
 
-    /// Takes the pairs in contact at the start, with their laws and closest points.
+    /// Takes the pairs in contact at the start, in order, with their laws and closest points.
     pub fn take(&mut self, mesh: &CollisionMesh, touching: Vec<(Pair, Law, Closest)>) {
         let of = |(pair, law, closest): (Pair, Law, Closest)| {
-            let [coefficient, sticking] = self.law_of(mesh, &pair);
-            let limit = coefficient * law.force(law.apart(&closest));
+            let limit = self.coefficient(mesh, &pair) * law.force(law.apart(&closest));
             if limit <= 0.0 {
                 return None;
             }
             let (weights, anchor) = self.sliding_point(mesh, &pair, &closest);
+            let normal = closest.normal;
             let between = sliding(&pair, &weights, anchor, &self.start);
-            let element = SlidingFriction::new(closest.normal, between, limit, sticking * self.dt);
-            Some(Sliding { pair, weights, anchor, element })
+            let straight = subtract(between, self.bristles.deflection(&pair, normal));
+            let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
+            Some(Sliding { pair, weights, anchor, normal, straight, element })
         };
-        self.sliding = touching.into_iter().filter_map(of).collect();
+        self.sliding = Some(touching.into_iter().filter_map(of).collect());
     }
 
     /// Returns the coefficients of the closest points on cloth and hair, and the closest point of an obstacle.
@@ -127,12 +157,12 @@ impl Friction {
 
     /// Returns Σ μ λ (√(‖t‖² + ε²) − ε), in J.
     pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-        self.sliding.iter().map(|one| one.element.value(&[one.between(x)]).value).sum()
+        self.slidings().iter().map(|one| one.element.value(&[one.between(x)]).value).sum()
     }
 
     /// Adds the forces of friction, in N.
     pub fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        for one in &self.sliding {
+        for one in self.slidings() {
             let [slope] = one.element.gradient(&[one.between(x)]).gradient;
             let drag = slope.map(|component| -component);
             one.pair.add(one.weights, drag, force);
@@ -144,7 +174,7 @@ impl Friction {
 
     /// Adds the stiffness of friction. `row` is the row of a vertex in the matrix.
     pub fn add_contacts(&self, x: &[Vector3<f64>], row: impl Fn(&u32) -> u32, contacts: &mut Vec<Contact>) {
-        contacts.extend(self.sliding.iter().map(|one| Contact {
+        contacts.extend(self.slidings().iter().map(|one| Contact {
             rows: one.pair.vertices.each_ref().map(&row),
             weights: one.weights,
             block: one.element.hessian(&[one.between(x)]).hessian.as_ref()[0],

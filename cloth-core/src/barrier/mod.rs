@@ -21,6 +21,7 @@
 //! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
 //! certified states only.
 
+mod bristle;
 mod feasible;
 mod friction;
 mod joined;
@@ -30,7 +31,7 @@ mod spacing;
 mod start;
 
 use energy_dsl::{Block, Vector3};
-use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
+use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
 
 pub(crate) use friction::Grip;
 pub use start::ContactError;
@@ -164,8 +165,8 @@ struct Judgement {
 }
 
 impl ContactModel for BarrierContact {
-    fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
-        self.friction.begin_step(x, dt);
+    fn begin_step(&mut self, x: &[Vector3<f64>]) {
+        self.friction.begin_step(x);
         self.joined.clear();
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
@@ -274,6 +275,14 @@ impl ContactModel for BarrierContact {
 
     fn counts(&self) -> ContactCounts {
         self.counts
+    }
+
+    fn memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
+        self.friction.memory(x)
+    }
+
+    fn restore(&mut self, memory: ContactMemory) {
+        self.friction.restore(memory);
     }
 }
 

@@ -116,8 +116,8 @@ mod tests {
     }
 
     impl ContactModel for Watched {
-        fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
-            self.inner.begin_step(x, dt);
+        fn begin_step(&mut self, x: &[Vector3<f64>]) {
+            self.inner.begin_step(x);
         }
 
         fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {

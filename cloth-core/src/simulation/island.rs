@@ -1,6 +1,6 @@
 use energy_dsl::{Element, Vector3};
 use energy_elements::WindDrag;
-use energy_solve::{EvaluationError, State, StepStart, System, SystemError};
+use energy_solve::{ContactMemory, EvaluationError, State, StepStart, System, SystemError};
 use serde::{Deserialize, Serialize};
 
 use super::prescribed::Prescribed;
@@ -40,6 +40,9 @@ pub struct SavedIsland {
     integrator: IntegratorMemory,
     #[serde(rename = "rest")]
     sleep: SleepState,
+    /// The bristles of friction in certified contact: names of pairs, and their vectors.
+    #[serde(default)]
+    bristles: (Vec<[u32; 3]>, Vec<[Vector3<f64>; 2]>),
 }
 
 impl Island {
@@ -146,7 +149,7 @@ impl Island {
             let here = self.body.x[pin.vertex];
             self.body.v[pin.vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / dt);
         }
-        self.begin_obstacles(context);
+        self.move_obstacles([context.time, context.end]);
         self.begin_step(context.time, dt)?;
         let own = self.vertices.len();
         let opening = account.map(|_| Account::begin(&self.body, own, self.obstacle_power(context, false)));
@@ -155,20 +158,30 @@ impl Island {
         let after = account
             .zip(opening)
             .map(|(account, opening)| account.after(&self.body, &opening, self.obstacle_power(context, true), dt));
+        self.place_obstacles(context.end);
         Ok((report, after.transpose()?))
     }
 
-    /// Places the vertices of obstacles at the start of the step, with the velocities that lead them to its end.
-    /// Positions follow from the time alone, so that a resumed run finds the same bits.
-    fn begin_obstacles(&mut self, context: &StepContext<'_>) {
+    /// Places the vertices of obstacles at a time, with the velocities that lead them to the next time.
+    fn move_obstacles(&mut self, [time, next]: [f64; 2]) {
         let own = self.vertices.len();
         if self.body.x.len() == own {
             return;
         }
-        let [from, to] = self.prescribed.positions([context.time, context.end], mean(&self.body.x[..own]));
+        let [from, to] = self.prescribed.positions([time, next], mean(&self.body.x[..own]));
         for ((from, to), vertex) in from.iter().zip(&to).zip(own..) {
             self.body.x[vertex] = *from;
-            self.body.v[vertex] = std::array::from_fn(|axis| (to[axis] - from[axis]) / context.dt);
+            self.body.v[vertex] = std::array::from_fn(|axis| (to[axis] - from[axis]) / (next - time));
+        }
+    }
+
+    /// Places the vertices of obstacles at a time exactly: steps end there to rounding only. So positions follow from
+    /// the time alone, and a resumed run finds the same bits.
+    fn place_obstacles(&mut self, time: f64) {
+        let own = self.vertices.len();
+        if self.body.x.len() > own {
+            let [at] = self.prescribed.positions([time], mean(&self.body.x[..own]));
+            self.body.x[own..].copy_from_slice(&at);
         }
     }
 
@@ -206,12 +219,18 @@ impl Island {
     }
 
     pub(super) fn save(&self) -> SavedIsland {
-        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone() }
+        let ContactMemory { names, vectors } = self.body.system.contact_memory(&self.body.x);
+        let bristles = (names, vectors);
+        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone(), bristles }
     }
 
     pub(super) fn restore(&mut self, saved: SavedIsland) {
         self.integrator.restore(saved.integrator);
         self.sleep = saved.sleep;
+        if let Some((contact, _)) = self.body.system.contact() {
+            let (names, vectors) = saved.bristles;
+            contact.restore(ContactMemory { names, vectors });
+        }
     }
 
     /// Copies positions and velocities from the scene.

@@ -51,7 +51,7 @@ impl Prescribed {
         let mut grip = |(part, obstacle): (&Part, &Obstacle)| {
             let frame = (!part.frame().is_empty()).then(|| energy_solve::index(next));
             next += part.frame().len();
-            Grip { coefficient: obstacle.friction, sticking: obstacle.sticking, frame }
+            Grip { coefficient: obstacle.friction, frame }
         };
         self.obstacles.iter().zip(obstacles).map(&mut grip).collect()
     }

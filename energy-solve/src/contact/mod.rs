@@ -11,4 +11,4 @@ mod model;
 pub use block::Contact;
 pub(crate) use block::factors;
 pub use in_matrix::ContactsInMatrix;
-pub use model::{ContactCounts, ContactModel};
+pub use model::{ContactCounts, ContactMemory, ContactModel};

@@ -18,7 +18,7 @@ impl IncrementalPotential<'_> {
     pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
         let Body { system, x: start, .. } = &mut *self.body;
         if let Some((contact, _)) = system.contact() {
-            contact.begin_step(start, self.dt);
+            contact.begin_step(start);
         }
         let to = std::mem::replace(x, self.body.x.clone());
         let part = self.certified(x, &to);
