@@ -185,8 +185,8 @@ impl Simulation {
         });
         let Some(energy) = energies.reduce(|sum, energy| sum + energy) else { return Vec::new() };
         let named = [
-            ("contact", DistanceBarrier::DECLARATION.name, Some(energy)),
-            ("friction of contact", SlidingFriction::DECLARATION.name, None),
+            ("contact", <DistanceBarrier as Element>::DECLARATION.name, Some(energy)),
+            ("friction of contact", <SlidingFriction as Element>::DECLARATION.name, None),
         ];
         let term = |(name, element, energy): (&str, &str, Option<f64>)| {
             let (name, element, counts) = (name.to_owned(), element.to_owned(), Counts::default());
