@@ -1,7 +1,7 @@
 //! Contact of cloth with itself and with obstacles: friction on an incline by Coulomb's law, cloth that sticks without
-//! creeping, and impacts that conserve momentum.
+//! creeping, the capstan, and impacts that conserve momentum.
 
-use super::{Finding, ValidateError};
+use super::{Finding, ValidateError, capstan};
 use crate::geometry::norm;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
@@ -14,10 +14,13 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
         slide(friction, slope, report)?;
     }
     rest(quick, report)?;
+    for friction in if quick { &[0.3][..] } else { &[0.2, 0.3, 0.5] } {
+        capstan::ask(*friction, report)?;
+    }
     impact(report)
 }
 
-fn simulation(text: &str) -> Result<Simulation, ValidateError> {
+pub(super) fn simulation(text: &str) -> Result<Simulation, ValidateError> {
     let scene = Scene::parse(text, "validate.toml".as_ref())?;
     Ok(Simulation::new(&scene)?)
 }
@@ -54,7 +57,7 @@ fn speed(simulation: &Simulation) -> f64 {
     simulation.velocities()[cloth].iter().map(|v| v[0]).sum::<f64>() / count
 }
 
-fn advance(simulation: &mut Simulation, steps: u64) -> Result<(), ValidateError> {
+pub(super) fn advance(simulation: &mut Simulation, steps: u64) -> Result<(), ValidateError> {
     (0..steps).try_for_each(|_| simulation.step().map(drop).map_err(ValidateError::from))
 }
 
