@@ -50,8 +50,8 @@ pub enum ContactError {
     },
     /// Free vertices are inside an obstacle.
     #[error(
-        "{count} vertices start inside {obstacle}, the deepest is vertex {vertex}, {:.3} mm below the surface. Move the \
-         cloth out of {obstacle}, or pin what belongs inside", 1e3 * .depth
+        "{count} vertices start inside {obstacle}, the deepest is vertex {vertex}, {:.3} mm below the surface. Move \
+         the cloth out of {obstacle}, or pin what belongs inside", 1e3 * .depth
     )]
     Inside {
         /// The name of the obstacle.
@@ -65,8 +65,8 @@ pub enum ContactError {
     },
     /// An edge or a triangle of the cloth crosses an obstacle.
     #[error(
-        "the cloth crosses {obstacle} in {count} places at the start, first between the vertices {}. Move the cloth out \
-         of {obstacle}, or refine its mesh there", listed(.vertices)
+        "the cloth crosses {obstacle} in {count} places at the start, first between the vertices {}. Move the cloth \
+         out of {obstacle}, or refine its mesh there", listed(.vertices)
     )]
     CrossesObstacle {
         /// The name of the obstacle.

@@ -35,8 +35,8 @@ pub(super) fn safe_part(from: &[Vector3<f64>; 4], to: &[Vector3<f64>; 4], level:
     0.0
 }
 
-/// Returns the height of the point at the start and the smallest coefficient of its height, both times the length of the
-/// normal, and the largest length of the normal.
+/// Returns the height of the point at the start and the smallest coefficient of its height, both times the length of
+/// the normal, and the largest length of the normal.
 fn heights(from: &[Vector3<f64>; 4], to: &[Vector3<f64>; 4]) -> ([f64; 2], f64) {
     let sides = |[p, a, b, c]: &[Vector3<f64>; 4]| [subtract(*p, *a), subtract(*b, *a), subtract(*c, *a)];
     let ([y0, u0, w0], [y1, u1, w1]) = (sides(from), sides(to));

@@ -89,13 +89,14 @@ pub struct Obstacle {
     pub solid: AnySolid,
     /// The motion; `None` if the obstacle is fixed.
     pub motion: Option<Motion>,
-    /// Contact acts within this distance of the surface, in m.
+    /// Contact acts within this distance of the surface, in m. With certified contact, nothing comes nearer than a
+    /// third of it.
     pub thickness: f64,
-    /// Contact stiffness k over the mass of the vertex, in 1/s².
+    /// Contact stiffness k over the mass of the vertex, in 1/s². Unused in certified contact.
     pub stiffness: f64,
     /// Coefficient of friction.
     pub friction: f64,
-    /// The sliding velocity at which friction reaches 1/√2 of its full size, in m/s.
+    /// The sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Unused in certified contact.
     pub sticking: f64,
 }
 

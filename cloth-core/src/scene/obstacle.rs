@@ -54,8 +54,8 @@ struct Keys {
     /// Default 0.005.
     #[serde(default = "thickness", with = "Real::<Positive>")]
     thickness: f64,
-    /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. No meaning with
-    /// `newton`. Default 5e6.
+    /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. No meaning
+    /// with `newton`. Default 5e6.
     #[serde(default = "stiffness", with = "Real::<Positive>")]
     stiffness: f64,
     /// Motion over time. Default none.

@@ -21,8 +21,8 @@ pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
     CollisionMesh::new(model.x.len(), &model.triangles, &segments, &model.sewn)
 }
 
-/// Returns the pinned vertices that start within reach of an obstacle, or inside. They are held there: their features do
-/// not collide with it.
+/// Returns the pinned vertices that start within reach of an obstacle, or inside. They are held there: their features
+/// do not collide with it.
 pub(super) fn held(model: &Model) -> BTreeSet<(u32, usize)> {
     let pinned: Vec<usize> = (0..model.x.len()).filter(|&vertex| model.pinned[vertex]).collect();
     let near = |(number, obstacle): (usize, &Obstacle)| {

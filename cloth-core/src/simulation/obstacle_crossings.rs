@@ -10,9 +10,9 @@ use crate::geometry::Bounds;
 const ROUNDING: f64 = 1e-12;
 
 impl Simulation {
-    /// Returns the number of places where cloth or hair crosses an obstacle now: an edge and a triangle that cross, by an
-    /// exact test, or a part that is nearer to the core of a rounded solid than its radius. Parts that are pinned in an
-    /// obstacle do not count.
+    /// Returns the number of places where cloth or hair crosses an obstacle now: an edge and a triangle that cross, by
+    /// an exact test, or a part that is nearer to the core of a rounded solid than its radius. Parts that are pinned in
+    /// an obstacle do not count.
     #[must_use]
     pub fn obstacle_crossings(&self) -> usize {
         if self.obstacles.is_empty() {

@@ -11,8 +11,8 @@ use crate::motion::Motion;
 /// A plane is placed about the cloth in steps of this size, in m, so that the cloth never leaves its triangle.
 const GRID: f64 = 1e3;
 
-/// Vertices that move as prescribed, after those of cloth and hair: the cores of all obstacles, then the frames of those
-/// that move.
+/// Vertices that move as prescribed, after those of cloth and hair: the cores of all obstacles, then the frames of
+/// those that move.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prescribed {
     obstacles: Vec<Part>,

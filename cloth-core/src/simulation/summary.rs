@@ -208,8 +208,8 @@ impl Simulation {
         }
         if summary.obstacle_crossings > 0 {
             summary.warnings.push(format!(
-                "the cloth crosses obstacles in {} places at the end. The integrator `newton` keeps edges and triangles \
-                 out of obstacles, others only vertices",
+                "the cloth crosses obstacles in {} places at the end. The integrator `newton` keeps edges and \
+                 triangles out of obstacles, others only vertices",
                 summary.obstacle_crossings
             ));
         }

@@ -136,7 +136,7 @@ impl System {
         self.contact.as_ref().map(|contact| contact.energy(x))
     }
 
-    /// Returns what contact keeps from step to step, at x, where the last step ended. Empty if the body does not collide.
+    /// Returns what contact keeps from step to step, at x, where the last step ended. Empty without contact.
     #[must_use]
     pub fn contact_memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
         self.contact.as_ref().map_or_else(ContactMemory::default, |contact| contact.memory(x))

@@ -11,8 +11,8 @@ use crate::body::Body;
 
 /// Moves of pins and obstacles within a step, after which they count as blocked.
 pub(super) const PIN_MOVES: usize = 60;
-/// The part of a certified way that pins and obstacles go if they cannot go all the way. An iteration of Newton's method
-/// doubles a small gap. If pins took more than half of it, gaps would shrink from move to move until barriers overflow.
+/// The part of a certified way that pins and obstacles go if they cannot go all the way. An iteration of Newton's
+/// method doubles a small gap. If pins took more than half of it, gaps would shrink until barriers overflow.
 const PIN_SHARE: f64 = 0.5;
 
 impl IncrementalPotential<'_> {
