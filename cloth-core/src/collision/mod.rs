@@ -6,7 +6,8 @@
 //! contact of an edge with a triangle is either an end of the edge on the triangle, or the edge on a side of the
 //! triangle. Features that share a vertex, or whose vertices are sewn together, never count as a pair.
 //!
-//! Obstacles join the mesh with their [`Core`]: their vertices follow those of the cloth, and move as prescribed.
+//! Obstacles join the mesh with the cores of their solids. The vertices of cores follow those of the cloth, and move as
+//! prescribed.
 
 mod certificate;
 mod closest;
