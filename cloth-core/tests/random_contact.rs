@@ -1,5 +1,6 @@
-//! Random drops, pulls and folds of small sheets: no state has a crossing or a NaN, and no step stalls without saying
-//! so. `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test random_contact` runs a hundred thousand steps.
+//! Random drops, pulls and folds of small sheets, also onto obstacles: no state has a crossing or a NaN, and no step
+//! stalls without saying so. `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test random_contact` runs a
+//! hundred thousand steps.
 #![allow(missing_docs)]
 
 use cloth_core::Simulation;
@@ -48,6 +49,29 @@ fn drop() -> impl Strategy<Value = String> {
     )
 }
 
+/// A spinning sheet flies onto solids that stand on a floor and turn.
+fn drop_on_solids() -> impl Strategy<Value = String> {
+    let vector = |size: f64| prop::array::uniform3(-size..size);
+    let solid = prop_oneof![
+        (0.005..0.03_f64).prop_map(|radius| format!("sphere = {{ radius = {radius:?} }}")),
+        (vector(0.06), 0.003..0.02_f64).prop_map(|(to, radius)| {
+            format!("capsule = {{ from = [0.0, 0.0, -0.01], to = {to:?}, radius = {radius:?} }}")
+        }),
+        prop::array::uniform3(0.005..0.06_f64).prop_map(|size| format!("box = {{ size = {size:?} }}")),
+    ];
+    (fabric(), solid, vector(1.0), vector(20.0), 0.0..10.0_f64, 0.0..0.8_f64, -300.0..300.0_f64).prop_map(
+        |(cloth, solid, drift, spin, speed, friction, angle)| {
+            let motion = format!("velocity = {:?}\nspin = {spin:?}\n", [drift[0], drift[1], -speed]);
+            let turns = format!(
+                "friction = {friction:?}\nmotion.keys = [{{ time = 0.0 }}, {{ time = 1.0, angle = {angle:?} }}]\n"
+            );
+            let floor = "[[obstacles]]\nplane = { point = [0.0, 0.0, -0.03] }\nfriction = 0.3\n";
+            sheet("cloth", 5, [0.011, 0.007, 0.16], &motion, &cloth)
+                + &format!("[[obstacles]]\n{solid}\nthickness = 0.002\n{turns}{floor}")
+        },
+    )
+}
+
 /// The corners of a sheet are pulled to random places.
 fn pull() -> impl Strategy<Value = String> {
     let corner = prop::option::weighted(0.7, prop::array::uniform3(-0.1..0.1_f64));
@@ -81,7 +105,7 @@ fn fold() -> impl Strategy<Value = String> {
 
 /// A scene, and whether its pins move. Moving pins may demand the impossible.
 fn scene() -> impl Strategy<Value = (String, bool)> {
-    let still = drop().prop_map(|text| (text, false));
+    let still = prop_oneof![drop(), drop_on_solids()].prop_map(|text| (text, false));
     let moving = prop_oneof![pull(), fold()].prop_map(|text| (text, true));
     (0.001..0.033_f64, prop_oneof![still, moving]).prop_map(|(dt, (rest, moves))| {
         let text = format!(
@@ -110,6 +134,7 @@ proptest! {
                 break;
             }
             prop_assert_eq!(simulation.crossings(), []);
+            prop_assert_eq!(simulation.obstacle_crossings(), 0, "step {}", step);
             prop_assert!(simulation.positions().as_flattened().iter().all(|coordinate| coordinate.is_finite()));
         }
     }

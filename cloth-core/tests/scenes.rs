@@ -71,15 +71,24 @@ fn cloth_stays_outside_obstacles_and_distant_vertices_are_skipped() {
          rotate = { axis = [0.0, 0.0, 1.0], angle = 30.0 } }",
         "plane = { point = [0.0, 0.0, -0.1], normal = [0.2, 0.0, 1.0] }",
     ];
-    for obstacle in obstacles {
-        let head = "dt = 0.01\nduration = 0.5\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\n\
-            drag = 0.5";
-        let text = format!("{}[[obstacles]]\n{obstacle}\nfriction = 0.3\n", sheet(head, 16, 0.5));
+    for (obstacle, integrator) in obstacles.iter().flat_map(|one| [(one, "newton"), (one, "implicit-euler")]) {
+        let dt = if integrator == "newton" { 0.01 } else { 0.002 };
+        let head = format!(
+            "dt = {dt}\nduration = 0.5\nintegrator = \"{integrator}\"\nadaptive = true\n\
+             tolerances.velocity = 1e-3\ndrag = 0.5"
+        );
+        let text = format!("{}[[obstacles]]\n{obstacle}\nfriction = 0.3\n", sheet(&head, 16, 0.5));
         let mut simulation = finished(&text);
         let solid = simulation.obstacles()[0].at(0.0);
         let deepest = simulation.positions().iter().map(|&x| solid.signed_distance(x)).fold(f64::INFINITY, f64::min);
-        assert!(deepest > 0.0 && deepest < 0.005, "{obstacle}: {deepest}");
         let summary = simulation.summary().unwrap();
+        if integrator == "newton" {
+            // Triangles rest on the solid, so vertices may be a little higher than contact reaches.
+            assert!(deepest > 0.002 && deepest < 0.007, "{obstacle}: {deepest}");
+            assert!(summary.totals.contact.active > 0 && simulation.obstacle_crossings() == 0);
+            continue;
+        }
+        assert!(deepest > 0.0 && deepest < 0.005, "{obstacle}: {deepest}");
         let contact = summary.terms.iter().find(|term| term.element.ends_with("Contact")).unwrap();
         assert!(contact.counts.hessian.evaluated > 0, "{contact:?}");
         assert!(contact.counts.hessian.skipped > 0, "{contact:?}");
@@ -186,7 +195,7 @@ fn vertices_that_start_inside_an_obstacle_give_a_warning() {
 
 #[test]
 fn a_passage_through_an_obstacle_is_reported() {
-    let head = "dt = 0.01\nduration = 0.1\nintegrator = \"newton\"\ngravity = [0.0, 0.0, 0.0]";
+    let head = "dt = 0.01\nduration = 0.1\ngravity = [0.0, 0.0, 0.0]";
     let shot = |speed: f64| {
         let motion = format!("keys = [{{ time = 0.0 }}, {{ time = 1.0, translate = [0.0, 0.0, {speed}] }}]");
         let ball = "name = \"shot\"\nsphere = { centre = [0.0, 0.0, -0.35], radius = 0.1 }\n";
@@ -209,10 +218,12 @@ fn moving_obstacles_do_work_and_carry_cloth_along() {
     let motion = "keys = [{ time = 0.0 }, { time = 0.6, translate = [0.18, 0.0, 0.12] }]";
     let simulation =
         finished(&format!("{lying}[[obstacles]]\nplane = {{}}\nfriction = 1.0\n[obstacles.motion]\n{motion}\n"));
-    let (weight, last) = (0.2 * 0.04 * 9.81, simulation.ledger().unwrap().entries().last().unwrap());
+    let (mass, last) = (0.2 * 0.04, simulation.ledger().unwrap().entries().last().unwrap());
     let carried = simulation.positions().iter().map(|x| x[0]).sum::<f64>() / 25.0;
     assert!((carried - 0.18).abs() < 0.02, "{carried}");
-    assert!((last.obstacles / (weight * 0.12) - 1.0).abs() < 0.1, "{} of {}", last.obstacles, weight * 0.12);
+    // Lifted by 12 cm, and taken from rest to 0.36 m/s at once: the plane puts in m v², of which half is lost.
+    let expected = mass * (9.81 * 0.12 + 0.3 * 0.3 + 0.2 * 0.2);
+    assert!((last.obstacles / expected - 1.0).abs() < 1e-2, "{} of {expected}", last.obstacles);
 }
 
 #[test]

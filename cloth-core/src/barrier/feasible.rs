@@ -18,8 +18,8 @@ const PARALLEL: f64 = 0.01;
 
 /// Decides which pairs become contacts at x.
 pub(super) struct Meeting<'a> {
-    mesh: &'a CollisionMesh,
-    x: &'a [Vector3<f64>],
+    pub(super) mesh: &'a CollisionMesh,
+    pub(super) x: &'a [Vector3<f64>],
     /// The edge that was last looked at, and whether it is a ridge in some direction.
     last: Option<(u32, bool)>,
 }
@@ -33,16 +33,22 @@ impl<'a> Meeting<'a> {
     pub fn may_join(&mut self, pair: &Pair, closest: &Closest) -> bool {
         match pair.kind {
             PairKind::PointTriangle => self.is_feasible_on_triangle(pair, closest),
+            PairKind::EdgeEdge if self.mesh.obstacle_of(pair).is_some() => self.edges_meet_obstacle(pair, closest),
             PairKind::EdgeEdge => self.may_be_ridge(pair.features[0]) && self.are_ridges(pair, closest),
         }
     }
 
     fn is_feasible_on_triangle(&self, pair: &Pair, closest: &Closest) -> bool {
         let [point, corners @ ..] = pair.vertices;
+        if self.mesh.is_round(point) {
+            return true;
+        }
         let is_touched = |corner: &usize| closest.weights[1 + corner] != 0.0;
         let mut touched = (0..3).filter(is_touched).map(|corner| corners[corner]);
         match (touched.next(), touched.next(), touched.next()) {
             (Some(_), Some(_), Some(_)) => true,
+            // A rail.
+            _ if corners[1] == corners[2] => true,
             (Some(a), Some(b), None) => on_edge(self.mesh, self.x, [a, b], corners, closest.normal),
             (Some(a), None, None) => on_vertex(self.mesh, self.x, point, a, corners),
             _ => false,
@@ -78,16 +84,27 @@ impl<'a> Meeting<'a> {
     }
 }
 
-fn are_parallel(x: &[Vector3<f64>], first: [u32; 2], second: [u32; 2]) -> bool {
+pub(super) fn are_parallel(x: &[Vector3<f64>], first: [u32; 2], second: [u32; 2]) -> bool {
     let [u, v] = [first, second].map(|[a, b]| subtract(x[b as usize], x[a as usize]));
     let area = cross(u, v);
     dot(area, area) <= PARALLEL * dot(u, u) * dot(v, v)
 }
 
 /// Whether the triangles of an edge all fall away from a direction.
-fn is_ridge(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: u32, direction: Vector3<f64>) -> bool {
+pub(super) fn is_ridge(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: u32, direction: Vector3<f64>) -> bool {
+    falls_away(mesh, x, edge, direction, -RIDGE)
+}
+
+/// Whether no triangle of an edge rises in a direction by more than an angle, given its sine.
+pub(super) fn falls_away(
+    mesh: &CollisionMesh,
+    x: &[Vector3<f64>],
+    edge: u32,
+    direction: Vector3<f64>,
+    sine: f64,
+) -> bool {
     let ends = mesh.edges()[edge as usize];
-    mesh.apexes(edge as usize).iter().all(|&apex| dot(across(x, ends, apex), direction) <= -RIDGE)
+    mesh.apexes(edge as usize).iter().all(|&apex| dot(across(x, ends, apex), direction) <= sine)
 }
 
 /// Whether a point nearest to the inside of an edge, in this direction, is nearest to it among the edge's triangles.

@@ -3,6 +3,7 @@ use std::cell::RefCell;
 use energy_dsl::{Potential, Vector3};
 use energy_elements::DistanceBarrier;
 
+use super::spacing::Spacing;
 use crate::collision::{Closest, Measured, Pair};
 
 /// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
@@ -66,9 +67,8 @@ impl Joined {
 }
 
 impl Law {
-    /// The law of a pair with this thickness and activation gap, in m, and this resistance to a displacement along its
-    /// normal, in N/m.
-    pub fn new(thickness: f64, gap: f64, resistance: f64) -> Self {
+    /// The law of a pair with this spacing, and this resistance to a displacement along its normal, in N/m.
+    pub fn new(Spacing { thickness, gap }: Spacing, resistance: f64) -> Self {
         Self { thickness, gap, stiffness: STIFFNESS_RATIO / CURVATURE_AT_HALF * resistance }
     }
 

@@ -1,11 +1,15 @@
-//! Contact of cloth and hair with itself: a barrier on the gap of each pair of features, and a certificate of every
-//! move.
+//! Contact of cloth and hair with themselves and with obstacles: a barrier on the gap of each pair of features, and a
+//! certificate of every move.
 //!
 //! **Energy.** A pair at distance d, with thickness ξ and activation gap g, has the energy K β(s), β(s) =
 //! −(1 − s)² ln s, s = (d − ξ)/g, below s = 1, and none above. It is the element
 //! [`DistanceBarrier`](energy_elements::DistanceBarrier) of the gap. d is the distance of two closed features: a point
 //! and a triangle, or two edges. Its gradient is c ⊗ n for the unit normal n and the coefficients c of the closest
 //! points, so forces and torques of a contact cancel to rounding. Friction is in `friction.rs`.
+//!
+//! **Obstacles.** The vertices of an obstacle's core follow those of the cloth. They are not free: each step moves them
+//! on straight lines from pose to pose, as far as the certificate allows. The distance of a pair with an obstacle is
+//! that of its core, so its thickness includes the radius of the solid.
 //!
 //! **Which pairs act.** Two surfaces meet in many pairs. A pair joins at an iterate if its closest points are a local
 //! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a single
@@ -17,22 +21,28 @@
 //! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
 //! certified states only.
 
+mod bristle;
 mod feasible;
 mod friction;
 mod joined;
+mod obstacle_features;
 mod resistance;
+mod spacing;
 mod start;
 
 use energy_dsl::{Block, Vector3};
-use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
+use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
 
+pub(crate) use friction::Grip;
 pub use start::ContactError;
+pub(crate) use start::{ObstacleStart, Participants};
 
-use crate::collision::{Clearance, Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
+use crate::collision::{Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
 use feasible::Meeting;
 use friction::Friction;
 use joined::{Joined, Law};
 use resistance::Resistance;
+use spacing::{Spacing, Spacings};
 
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
@@ -40,16 +50,11 @@ const JOINING: f64 = 1.25;
 /// Part of the displacement of the last long move that an iterate may stray before the next search.
 const STRAYING: f64 = 0.5;
 
-/// Contact of a body with itself.
+/// Contact of a body with itself and with obstacles.
 #[derive(Debug)]
 pub struct BarrierContact {
     mesh: CollisionMesh,
-    /// Half of the thickness at each vertex, in m.
-    radii: Vec<f64>,
-    /// Activation gap g, in m.
-    gap: f64,
-    /// Largest distance at which a pair has an energy, in m.
-    reach: f64,
+    spacings: Spacings,
     /// The least and the largest distance that vertices may move before the next search, in m.
     slack: [f64; 2],
     search: Search,
@@ -66,9 +71,8 @@ pub struct BarrierContact {
 }
 
 impl BarrierContact {
-    /// The distance at which a pair touches, in m.
-    fn thickness(&self, pair: &Pair) -> f64 {
-        self.radii[pair.vertices[0] as usize] + self.radii[pair.vertices[pair.first()] as usize]
+    fn spacing(&self, pair: &Pair) -> Spacing {
+        self.spacings.of(&self.mesh, pair)
     }
 
     /// Sets the coefficient of friction μ at each vertex. That of a pair is the mean of its two features.
@@ -79,9 +83,16 @@ impl BarrierContact {
         self
     }
 
+    /// Sets the friction of each obstacle.
+    #[must_use]
+    pub(crate) fn with_grips(mut self, grips: Vec<Grip>) -> Self {
+        self.friction.grips = grips;
+        self
+    }
+
     /// Finds the pairs in contact at the start of the step, on which friction acts.
     fn begin_friction(&mut self) {
-        if self.friction.coefficients.is_empty() {
+        if !self.friction.is_rough() {
             return;
         }
         let start = std::mem::take(&mut self.friction.start);
@@ -91,18 +102,19 @@ impl BarrierContact {
         let mut touching = Vec::new();
         for (number, pair) in self.neighbourhood.pairs().iter().enumerate() {
             let closest = measured.closest(number);
-            let is_active = closest.distance - self.thickness(pair) < self.gap;
+            let Spacing { thickness, gap } = self.spacing(pair);
+            let is_active = closest.distance - thickness < gap;
             if is_active && meeting.may_join(pair, &closest) {
                 touching.push((*pair, self.law(pair, &closest), closest));
             }
         }
         self.friction.start = start;
-        self.friction.take(touching);
+        self.friction.take(&self.mesh, touching);
     }
 
     /// The law of a pair that joins with these closest points.
     fn law(&self, pair: &Pair, closest: &Closest) -> Law {
-        Law::new(self.thickness(pair), self.gap, self.resistance.of(pair, closest))
+        Law::new(self.spacing(pair), self.resistance.of(pair, closest))
     }
 
     /// Makes all pairs near an iterate known, and measures them there.
@@ -127,11 +139,11 @@ impl BarrierContact {
     fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
         let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
         for (number, (pair, separation)) in pairs.iter().zip(measured.separations()).enumerate() {
-            if step.stays_beyond(self.reach, pair, *separation) {
+            let clearance = self.spacing(pair).clearance(self.mesh.has_plane(pair));
+            if step.stays_beyond(clearance.reach, pair, *separation) {
                 continue;
             }
             judgement.tested += 1;
-            let clearance = Clearance { thickness: self.thickness(pair), reach: self.reach };
             let own = step.safe_part(pair, &measured.closest(number), clearance, judgement.part);
             if own < 1.0 {
                 judgement.blocking.push(*pair);
@@ -153,8 +165,8 @@ struct Judgement {
 }
 
 impl ContactModel for BarrierContact {
-    fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
-        self.friction.begin_step(x, dt);
+    fn begin_step(&mut self, x: &[Vector3<f64>]) {
+        self.friction.begin_step(x);
         self.joined.clear();
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
@@ -175,7 +187,7 @@ impl ContactModel for BarrierContact {
         } else {
             self.strides.copy_from_slice(step.excursions());
             self.counts.searches += 1;
-            let pairs = self.search.pairs(&self.mesh, swept(from, to), JOINING * self.reach);
+            let pairs = self.search.pairs(&self.mesh, swept(from, to));
             let mut measured = Measured::default();
             measured.measure(&pairs, from);
             (pairs.len(), self.judge(&step, &pairs, &measured))
@@ -208,7 +220,7 @@ impl ContactModel for BarrierContact {
         let mut meeting = Meeting::new(&self.mesh, x);
         let mut added = Vec::new();
         for (number, (pair, separation)) in self.neighbourhood.pairs().iter().zip(measured.separations()).enumerate() {
-            if *separation > JOINING * self.reach {
+            if *separation > self.spacings.joining(&self.mesh, pair) {
                 continue;
             }
             while known.next_if(|other| *other < pair).is_some() {}
@@ -263,6 +275,14 @@ impl ContactModel for BarrierContact {
 
     fn counts(&self) -> ContactCounts {
         self.counts
+    }
+
+    fn memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
+        self.friction.memory(x)
+    }
+
+    fn restore(&mut self, memory: ContactMemory) {
+        self.friction.restore(memory);
     }
 }
 

@@ -14,7 +14,7 @@ const GAP: f64 = 2e-3;
 fn contact(x: &[Vector3<f64>]) -> BarrierContact {
     let mesh = CollisionMesh::new(6, &[[0, 1, 2], [3, 4, 5]], &[], &[]);
     let mut contact = BarrierContact::new(mesh, x, vec![true; 6], vec![0.5 * THICKNESS; 6], GAP).unwrap();
-    contact.begin_step(x, 0.01);
+    contact.begin_step(x);
     let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
     contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
     contact
@@ -74,7 +74,7 @@ fn friction_opposes_sliding() {
     for x in states() {
         let force_at = |coefficient: f64, to: &[Vector3<f64>]| {
             let mut contact = contact(&x).with_friction(vec![coefficient; 6]);
-            contact.begin_step(&x, 0.01);
+            contact.begin_step(&x);
             let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
             contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
             contact.meet(&x);
@@ -239,7 +239,7 @@ fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
 fn contact_of_layers() -> BarrierContact {
     let (mesh, x) = layers();
     let mut contact = BarrierContact::new(mesh, &x, vec![true; 50], vec![0.5 * THICKNESS; 50], GAP).unwrap();
-    contact.begin_step(&x, 0.01);
+    contact.begin_step(&x);
     let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
     contact.set_resistance(&DofMap::new(&[false; 50]), vec![block; 50], vec![1.0; 50]);
     contact

@@ -18,7 +18,7 @@ use energy_dsl::Vector3;
 
 use super::closest::separation;
 use super::displacement::excursions;
-use super::{Closest, Pair};
+use super::{Closest, Pair, plane};
 use crate::geometry::{add_scaled, dot, subtract};
 
 /// The part of the gap beyond the thickness that a move must leave.
@@ -37,6 +37,8 @@ pub(crate) struct Clearance {
     pub thickness: f64,
     /// Distance beyond which nothing needs to be kept, in m; infinite if a part of every gap is kept.
     pub reach: f64,
+    /// Whether the triangle stands for its whole plane. The point then stays on its side of the plane.
+    pub is_plane: bool,
 }
 
 /// A straight move of all vertices.
@@ -81,6 +83,9 @@ impl<'a> Move<'a> {
         let end = Closest::of(pair, &to);
         if end.separation >= level && separation(&end.normal, &from, pair.first()) >= level {
             return 1.0;
+        }
+        if clearance.is_plane {
+            return plane::safe_part(&from, &to, level);
         }
         self.advance(pair, &from, &to, level, wanted)
     }

@@ -20,7 +20,7 @@ pub struct Crossing {
 /// The signs of determinants are exact (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust
 /// geometric predicates", 1997), so the answer is that of real arithmetic on the given coordinates. An edge that starts
 /// at a corner of the triangle crosses it if they share more than this corner. Pairs that are sewn together are
-/// skipped. A triangle without area is its sides.
+/// skipped, and so are pairs of two obstacles. A triangle without area is its sides.
 ///
 /// ```
 /// use cloth_core::collision::{CollisionMesh, crossings};
@@ -40,7 +40,9 @@ pub fn crossings(mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Crossing> {
     for edge in mesh.edges() {
         let (around, mut crossed) = (bounds(x, edge), Vec::new());
         tree.near(&around, |triangle| {
-            if crosses(mesh, x, edge, &mesh.triangles()[triangle]) {
+            let corners = &mesh.triangles()[triangle];
+            let is_own = mesh.obstacle(edge[0]).is_none() || mesh.obstacle(corners[0]).is_none();
+            if is_own && crosses(mesh, x, edge, corners) {
                 crossed.push(triangle);
             }
         });

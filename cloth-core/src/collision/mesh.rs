@@ -1,9 +1,12 @@
+use std::ops::Range;
+
 use energy_dsl::Vector3;
 use energy_solve::index;
 
+use super::{Core, Pair, PairKind};
 use crate::geometry::{Bounds, norm, subtract};
 
-/// The points, edges and triangles of cloth and hair that can collide.
+/// The points, edges and triangles of cloth and hair that can collide, and those of obstacles after them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CollisionMesh {
     points: Vec<u32>,
@@ -19,7 +22,14 @@ pub struct CollisionMesh {
     neighbours: Vec<Vec<u32>>,
     /// The first triangle at each vertex.
     first_triangles: Vec<Option<[u32; 3]>>,
+    /// The number of vertices of cloth and hair. Those of obstacles follow.
+    own: usize,
+    /// The obstacle of each vertex from `own` on.
+    owners: Vec<u32>,
 }
+
+/// A side of a triangle with the opposite vertex, or a segment alone. The smaller end comes first.
+type Side = ([u32; 2], Option<u32>);
 
 impl CollisionMesh {
     /// Creates the mesh of `vertices` vertices. `segments` are edges without triangles, such as those of hair; `sewn`
@@ -29,53 +39,132 @@ impl CollisionMesh {
     /// If an index is not below `vertices`.
     #[must_use]
     pub fn new(vertices: usize, triangles: &[[usize; 3]], segments: &[[usize; 2]], sewn: &[[usize; 2]]) -> Self {
-        let sides = triangles.iter().flat_map(|&[a, b, c]| [([a, b], Some(c)), ([b, c], Some(a)), ([c, a], Some(b))]);
-        let lone = segments.iter().map(|&ends| (ends, None));
-        let ascending = |[a, b]: [usize; 2]| [index(a.min(b)), index(a.max(b))];
-        let mut sides: Vec<([u32; 2], Option<u32>)> =
-            sides.chain(lone).map(|(ends, apex)| (ascending(ends), apex.map(index))).collect();
-        sides.sort_unstable();
-        let (mut edges, mut apexes, mut neighbours) = (Vec::new(), Vec::new(), vec![Vec::new(); vertices]);
-        for same in sides.chunk_by(|a, b| a.0 == b.0) {
+        let mut mesh = Self {
+            points: Vec::new(),
+            edges: Vec::new(),
+            triangles: Vec::new(),
+            sewn: representatives(vertices, sewn),
+            has_seams: sewn.iter().any(|[a, b]| a != b),
+            apexes: Vec::new(),
+            neighbours: Vec::new(),
+            first_triangles: Vec::new(),
+            own: vertices,
+            owners: Vec::new(),
+        };
+        mesh.add(0..vertices, triangles, segments);
+        mesh
+    }
+
+    /// Adds the features of the next vertices.
+    fn add(&mut self, vertices: Range<usize>, triangles: &[[usize; 3]], segments: &[[usize; 2]]) {
+        self.neighbours.resize(vertices.end, Vec::new());
+        for same in sides(triangles, segments).chunk_by(|a, b| a.0 == b.0) {
             let [a, b] = same[0].0;
-            edges.push([a, b]);
-            apexes.push(same.iter().filter_map(|(_, apex)| *apex).collect());
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
+            self.edges.push([a, b]);
+            self.apexes.push(same.iter().filter_map(|(_, apex)| *apex).collect());
+            self.neighbours[a as usize].push(b);
+            self.neighbours[b as usize].push(a);
         }
-        let is_used = |vertex: &u32| !neighbours[*vertex as usize].is_empty();
-        let points = (0..index(vertices)).filter(is_used).collect();
-        let triangles: Vec<[u32; 3]> = triangles.iter().map(|corners| corners.map(index)).collect();
-        let mut first_triangles = vec![None; vertices];
-        for corners in triangles.iter().rev() {
-            corners.iter().for_each(|&corner| first_triangles[corner as usize] = Some(*corners));
+        let is_used = |vertex: &usize| !self.neighbours[*vertex].is_empty();
+        self.points.extend(vertices.clone().filter(is_used).map(index));
+        self.first_triangles.resize(vertices.end, None);
+        for corners in triangles.iter().rev().map(|corners| corners.map(index)) {
+            corners.iter().for_each(|&corner| self.first_triangles[corner as usize] = Some(corners));
         }
-        let (sewn, has_seams) = (representatives(vertices, sewn), sewn.iter().any(|[a, b]| a != b));
-        Self { has_seams, points, edges, triangles, sewn, apexes, neighbours, first_triangles }
+        self.triangles.extend(triangles.iter().map(|corners| corners.map(index)));
     }
 
-    /// Returns the mesh with vertex i renamed `number[i]`, a permutation.
+    /// Adds the cores of obstacles. Their vertices follow those of cloth and hair, in order.
     #[must_use]
-    pub(crate) fn renumbered(&self, number: &[usize]) -> Self {
-        let triangles: Vec<_> = self.triangles.iter().map(|corners| corners.map(|c| number[c as usize])).collect();
-        let edges: Vec<_> = self.edges.iter().map(|ends| ends.map(|end| number[end as usize])).collect();
-        let sewn = self.sewn.iter().enumerate().map(|(vertex, &first)| [number[vertex], number[first as usize]]);
-        // Edges of triangles occur twice, which makes no difference.
-        Self::new(number.len(), &triangles, &edges, &sewn.collect::<Vec<_>>())
+    pub(crate) fn with_obstacles(mut self, cores: &[Core]) -> Self {
+        for (number, core) in (0..).zip(cores) {
+            let first = self.neighbours.len();
+            let end = first + core.vertices.len();
+            let triangles: Vec<_> = core.triangles.iter().map(|corners| corners.map(|c| first + c)).collect();
+            let segments: Vec<_> = core.segments.iter().map(|ends| ends.map(|end| first + end)).collect();
+            self.add(first..end, &triangles, &segments);
+            self.triangles.extend(core.faces.iter().map(|corners| corners.map(|corner| index(first + corner))));
+            self.sewn.extend(index(first)..index(end));
+            self.owners.resize(end - self.own, number);
+        }
+        self
     }
 
-    /// Returns the length of the shortest edge at x, in m.
+    /// The number of vertices, with those of obstacles.
+    pub(crate) fn vertices(&self) -> usize {
+        self.neighbours.len()
+    }
+
+    /// The number of vertices of cloth and hair. Those of obstacles follow.
+    pub(crate) fn own_vertices(&self) -> usize {
+        self.own
+    }
+
+    /// The obstacle that a vertex belongs to; `None` for cloth and hair.
+    #[inline]
+    pub(crate) fn obstacle(&self, vertex: u32) -> Option<usize> {
+        (vertex as usize).checked_sub(self.own).map(|place| self.owners[place] as usize)
+    }
+
+    /// The obstacle that takes part in a pair; `None` for two features of cloth and hair.
+    #[inline]
+    pub(crate) fn obstacle_of(&self, pair: &Pair) -> Option<usize> {
+        let [first, second] = [pair.vertices[0], pair.vertices[pair.first()]];
+        self.obstacle(first.max(second))
+    }
+
+    /// Whether a vertex is the centre of a ball, or the end of a rail.
+    #[inline]
+    pub(crate) fn is_round(&self, vertex: u32) -> bool {
+        vertex as usize >= self.own && self.first_triangles[vertex as usize].is_none()
+    }
+
+    /// Whether a pair is a point and a plane of an obstacle. A triangle that stands for a plane has no edges.
+    #[inline]
+    pub(crate) fn has_plane(&self, pair: &Pair) -> bool {
+        let [_, a, b, c] = pair.vertices;
+        pair.kind == PairKind::PointTriangle
+            && a as usize >= self.own
+            && b != c
+            && self.neighbours[a as usize].is_empty()
+    }
+
+    /// The numbers of points, triangles and edges of cloth and hair. Those of obstacles follow.
+    pub(super) fn own_features(&self) -> [usize; 3] {
+        let is_own = |vertex: u32| (vertex as usize) < self.own;
+        [
+            self.points.partition_point(|&point| is_own(point)),
+            self.triangles.partition_point(|corners| is_own(corners[0])),
+            self.edges.partition_point(|ends| is_own(ends[0])),
+        ]
+    }
+
+    /// Returns the features whose vertices are all kept, with vertex i renamed `number[i]`; `None` for a vertex that is
+    /// not kept. The mesh has no obstacles yet.
+    #[must_use]
+    pub(crate) fn restricted(&self, number: &[Option<usize>], vertices: usize) -> Self {
+        let of = |vertex: u32| number[vertex as usize];
+        let triangles = self.triangles.iter().filter_map(|&[a, b, c]| Some([of(a)?, of(b)?, of(c)?]));
+        let edges = self.edges.iter().filter_map(|&[a, b]| Some([of(a)?, of(b)?]));
+        let sewn = (0..).zip(&self.sewn).filter_map(|(vertex, &first)| Some([of(vertex)?, of(first)?]));
+        // Edges of triangles occur twice, which makes no difference.
+        let (triangles, edges, sewn): (Vec<_>, Vec<_>, Vec<_>) = (triangles.collect(), edges.collect(), sewn.collect());
+        Self::new(vertices, &triangles, &edges, &sewn)
+    }
+
+    /// Returns the length of the shortest edge of cloth and hair at x, in m.
     #[must_use]
     pub(crate) fn shortest_edge(&self, x: &[Vector3<f64>]) -> f64 {
         let length = |&[a, b]: &[u32; 2]| norm(subtract(x[a as usize], x[b as usize]));
-        self.edges.iter().map(length).fold(f64::INFINITY, f64::min)
+        self.edges[..self.own_features()[2]].iter().map(length).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the mean length of the edges at x, in m.
+    /// Returns the mean length of the edges of cloth and hair at x, in m.
     #[must_use]
     pub(crate) fn mean_edge(&self, x: &[Vector3<f64>]) -> f64 {
         let length = |&[a, b]: &[u32; 2]| norm(subtract(x[a as usize], x[b as usize]));
-        self.edges.iter().map(length).sum::<f64>() / self.edges.len().max(1) as f64
+        let own = &self.edges[..self.own_features()[2]];
+        own.iter().map(length).sum::<f64>() / own.len().max(1) as f64
     }
 
     /// The vertices that belong to an edge or a triangle, ascending.
@@ -119,6 +208,16 @@ impl CollisionMesh {
         let sewn = |vertex: &u32| self.sewn[*vertex as usize];
         a.iter().any(|p| b.iter().any(|q| sewn(p) == sewn(q)))
     }
+}
+
+/// Returns the sides of triangles, and segments, in order.
+fn sides(triangles: &[[usize; 3]], segments: &[[usize; 2]]) -> Vec<Side> {
+    let sides = triangles.iter().flat_map(|&[a, b, c]| [([a, b], Some(c)), ([b, c], Some(a)), ([c, a], Some(b))]);
+    let lone = segments.iter().map(|&ends| (ends, None));
+    let ascending = |[a, b]: [usize; 2]| [index(a.min(b)), index(a.max(b))];
+    let mut sides: Vec<Side> = sides.chain(lone).map(|(ends, apex)| (ascending(ends), apex.map(index))).collect();
+    sides.sort_unstable();
+    sides
 }
 
 /// Returns the box around some vertices.

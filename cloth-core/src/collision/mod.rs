@@ -5,6 +5,9 @@
 //! triangle, and two edges. If no such pair touches while all vertices move, no edge ever crosses a triangle: the first
 //! contact of an edge with a triangle is either an end of the edge on the triangle, or the edge on a side of the
 //! triangle. Features that share a vertex, or whose vertices are sewn together, never count as a pair.
+//!
+//! Obstacles join the mesh with the cores of their solids. The vertices of cores follow those of the cloth, and move as
+//! prescribed.
 
 mod certificate;
 mod closest;
@@ -14,7 +17,9 @@ mod measured;
 mod mesh;
 mod neighbourhood;
 mod pair;
+mod plane;
 mod search;
+mod solid_core;
 
 pub(crate) use certificate::{Clearance, Move};
 pub(crate) use closest::Closest;
@@ -23,7 +28,8 @@ pub(crate) use measured::Measured;
 pub use mesh::CollisionMesh;
 pub(crate) use neighbourhood::{Neighbourhood, swept};
 pub(crate) use pair::{Pair, PairKind};
-pub(crate) use search::Search;
+pub(crate) use search::{Rules, Search};
+pub(crate) use solid_core::Core;
 
 #[cfg(test)]
 mod tests;

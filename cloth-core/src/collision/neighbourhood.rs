@@ -10,10 +10,8 @@ use crate::geometry::{Bounds, norm, subtract};
 /// Distances do not change if all vertices are translated, so balls move with the mean of all vertices. Late iterates
 /// of a step move little and need no search. Where a few vertices leave their balls, these grow, and only the pairs of
 /// these vertices are searched for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Neighbourhood {
-    /// Distance within which pairs are found, in m. It exceeds what contact needs by far more than rounding errors.
-    reach: f64,
     /// The centre of each vertex's ball, relative to the mean of all vertices.
     centres: Vec<Vector3<f64>>,
     /// The radius of each ball, in m. Empty before the first search.
@@ -28,12 +26,6 @@ const GROWTH: f64 = 2.0;
 const FEW: f64 = 0.2;
 
 impl Neighbourhood {
-    /// Creates an empty neighbourhood.
-    pub fn new(reach: f64) -> Self {
-        let (centres, radii, pairs, measured) = Default::default();
-        Self { reach, centres, radii, pairs, measured }
-    }
-
     /// The pairs, in order.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
@@ -61,8 +53,8 @@ impl Neighbourhood {
         let mean = mean(x);
         self.centres = x.iter().map(|x| subtract(*x, mean)).collect();
         self.radii = radii;
-        self.pairs = search.pairs(mesh, self.balls(), self.reach);
-        self.keep_near(x);
+        self.pairs = search.pairs(mesh, self.balls());
+        self.keep_near(search, x);
     }
 
     /// Makes the balls cover x, if they lack few vertices. Balls are convex: if they cover both ends of a straight
@@ -84,8 +76,8 @@ impl Neighbourhood {
             self.radii[vertex] = GROWTH * away[vertex];
         }
         let known = std::mem::take(&mut self.pairs);
-        self.pairs = search.pairs_with(&is_outside, mesh, self.balls(), self.reach);
-        self.keep_near(x);
+        self.pairs = search.pairs_with(&is_outside, mesh, self.balls());
+        self.keep_near(search, x);
         self.pairs.extend(known);
         // Two runs in order are merged in linear time.
         self.pairs.sort();
@@ -107,11 +99,11 @@ impl Neighbourhood {
 
     /// Measures the pairs at x, and drops those that cannot come within reach: boxes of tilted features meet long
     /// before the features do.
-    fn keep_near(&mut self, x: &[Vector3<f64>]) {
+    fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>]) {
         self.measured.clear();
         self.measured.measure(&self.pairs, x);
         let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
-        let is_near = |(pair, separation): (&Pair, &f64)| separation - pair.approach(&farthest) <= self.reach;
+        let is_near = |(pair, separation): (&Pair, &f64)| separation - pair.approach(&farthest) <= search.reach(pair);
         let is_kept: Vec<bool> = self.pairs.iter().zip(self.measured.separations()).map(is_near).collect();
         self.measured.retain(&is_kept);
         let mut kept = is_kept.into_iter();

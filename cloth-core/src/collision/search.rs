@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use energy_dsl::Vector3;
 use energy_solve::index;
 
@@ -8,11 +10,31 @@ use crate::geometry::{Bounds, Hierarchy};
 /// Finds the pairs whose vertices may meet within given regions.
 #[derive(Clone, Debug)]
 pub(crate) struct Search {
+    own: Trees,
+    obstacles: Trees,
+    rules: Rules,
+}
+
+/// Which features may collide, and how near.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rules {
+    /// Half the reach at each vertex, in m: pairs within the sum of the halves of their features are found.
+    pub halves: Vec<f64>,
+    /// Whether each vertex may respond to a contact. Pairs without such a vertex are never found.
+    pub is_free: Vec<bool>,
+    /// Vertices of cloth and hair that are held in an obstacle. Their features do not collide with it.
+    pub held: BTreeSet<(u32, usize)>,
+    /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
+    pub with_itself: bool,
+}
+
+/// Hierarchies of the points, triangles and edges from certain places in the mesh's lists on.
+#[derive(Clone, Debug)]
+struct Trees {
     points: Hierarchy,
     triangles: Hierarchy,
     edges: Hierarchy,
-    /// Whether each vertex may respond to a contact.
-    is_free: Vec<bool>,
+    first: [usize; 3],
 }
 
 /// The boxes around the regions of all features, extended by half the reach.
@@ -23,8 +45,8 @@ struct Boxes {
 }
 
 impl Boxes {
-    fn new(mesh: &CollisionMesh, mut regions: Vec<Bounds>, reach: f64) -> Self {
-        regions.iter_mut().for_each(|region| *region = region.extended(0.5 * reach));
+    fn new(mesh: &CollisionMesh, mut regions: Vec<Bounds>, halves: &[f64]) -> Self {
+        regions.iter_mut().zip(halves).for_each(|(region, half)| *region = region.extended(*half));
         let around =
             |vertices: &[u32]| vertices.iter().fold(Bounds::EMPTY, |all, &vertex| all.around(regions[vertex as usize]));
         Self {
@@ -33,89 +55,166 @@ impl Boxes {
             edges: mesh.edges().iter().map(|ends| around(ends)).collect(),
         }
     }
+
+    /// Splits the boxes into those of cloth and hair, and those of obstacles.
+    fn split(&self, [points, triangles, edges]: [usize; 3]) -> [[&[Bounds]; 3]; 2] {
+        let (own_points, other_points) = self.points.split_at(points);
+        let (own_triangles, other_triangles) = self.triangles.split_at(triangles);
+        let (own_edges, other_edges) = self.edges.split_at(edges);
+        [[own_points, own_triangles, own_edges], [other_points, other_triangles, other_edges]]
+    }
+}
+
+impl Trees {
+    fn new(boxes: [&[Bounds]; 3], first: [usize; 3]) -> Self {
+        let [points, triangles, edges] = boxes.map(Hierarchy::new);
+        Self { points, triangles, edges, first }
+    }
+
+    fn refit(&mut self, [points, triangles, edges]: [&[Bounds]; 3]) {
+        self.points.refit(points);
+        self.triangles.refit(triangles);
+        self.edges.refit(edges);
+    }
 }
 
 /// Features by their places in the mesh's lists, as pairs are ordered.
 type Features = [u32; 2];
 
+/// The features that a search found.
+#[derive(Default)]
+struct Found {
+    on_triangles: Vec<Features>,
+    of_edges: Vec<Features>,
+}
+
 impl Search {
-    /// Prepares searches in a mesh that starts at x. Pairs without a vertex of `is_free` are never found.
-    pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], is_free: Vec<bool>) -> Self {
-        let boxes = Boxes::new(mesh, x.iter().map(|x| Bounds::of(&[*x])).collect(), 0.0);
-        let [points, triangles, edges] =
-            [&boxes.points, &boxes.triangles, &boxes.edges].map(|boxes| Hierarchy::new(boxes));
-        Self { points, triangles, edges, is_free }
+    /// Prepares searches in a mesh that starts at x.
+    pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
+        let boxes = Boxes::new(mesh, x.iter().map(|x| Bounds::of(&[*x])).collect(), &rules.halves);
+        let first = mesh.own_features();
+        let [own, obstacles] = boxes.split(first);
+        Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), rules }
     }
 
-    /// Returns all pairs that can come within `reach` of each other while each vertex stays in its region, and others
-    /// whose boxes meet. Pairs are in order.
-    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>, reach: f64) -> Vec<Pair> {
-        self.refit(mesh, regions, reach);
-        let (mut on_triangles, mut of_edges) = (Vec::new(), Vec::new());
-        self.points.meeting(&self.triangles, |point, triangle| {
-            on_triangles.extend(self.point_and_triangle(mesh, point, triangle));
+    /// The distance within which a pair is found, in m. It exceeds what contact needs by far more than rounding errors.
+    #[inline]
+    pub fn reach(&self, pair: &Pair) -> f64 {
+        let half = |vertex: u32| self.rules.halves[vertex as usize];
+        half(pair.vertices[0]) + half(pair.vertices[pair.first()])
+    }
+
+    /// Returns all pairs that can come within their reach while each vertex stays in its region, and others whose boxes
+    /// meet. Pairs are in order.
+    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>) -> Vec<Pair> {
+        self.refit(mesh, regions);
+        let Self { own, obstacles, .. } = &*self;
+        let mut found = Found::default();
+        if self.rules.with_itself {
+            own.points.meeting(&own.triangles, |point, triangle| {
+                self.add_point_and_triangle(mesh, point, triangle, &mut found);
+            });
+            own.edges.meeting_itself(|one, other| self.add_edges(mesh, one, other, &mut found));
+        }
+        let [points, triangles, edges] = obstacles.first;
+        own.points.meeting(&obstacles.triangles, |point, triangle| {
+            self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
         });
-        self.edges.meeting_itself(|one, other| of_edges.extend(self.two_edges(mesh, one, other)));
-        in_order(mesh, on_triangles, of_edges)
+        obstacles.points.meeting(&own.triangles, |point, triangle| {
+            self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
+        });
+        own.edges.meeting(&obstacles.edges, |one, other| self.add_edges(mesh, one, edges + other, &mut found));
+        in_order(mesh, found)
     }
 
     /// Those of [`Search::pairs`] that have a changed vertex.
-    pub fn pairs_with(
-        &mut self,
-        is_changed: &[bool],
-        mesh: &CollisionMesh,
-        regions: Vec<Bounds>,
-        reach: f64,
-    ) -> Vec<Pair> {
-        let boxes = self.refit(mesh, regions, reach);
-        let (mut on_triangles, mut of_edges) = (Vec::new(), Vec::new());
+    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: Vec<Bounds>) -> Vec<Pair> {
+        let boxes = self.refit(mesh, regions);
+        let mut found = Found::default();
         let changed = |vertices: &[u32]| vertices.iter().any(|vertex| is_changed[*vertex as usize]);
         for (point, around) in boxes.points.iter().enumerate().filter(|(point, _)| changed(&[mesh.points()[*point]])) {
-            self.triangles.near(around, |triangle| {
-                on_triangles.extend(self.point_and_triangle(mesh, point, triangle));
-            });
+            for trees in self.partners(mesh, mesh.points()[point]) {
+                trees.triangles.near(around, |triangle| {
+                    self.add_point_and_triangle(mesh, point, trees.first[1] + triangle, &mut found);
+                });
+            }
         }
         let triangles = mesh.triangles().iter().zip(&boxes.triangles).enumerate();
-        for (triangle, (_, around)) in triangles.filter(|(_, (corners, _))| changed(*corners)) {
-            self.points.near(around, |point| {
-                on_triangles.extend(self.point_and_triangle(mesh, point, triangle));
-            });
+        for (triangle, (corners, around)) in triangles.filter(|(_, (corners, _))| changed(*corners)) {
+            for trees in self.partners(mesh, corners[0]) {
+                trees.points.near(around, |point| {
+                    self.add_point_and_triangle(mesh, trees.first[0] + point, triangle, &mut found);
+                });
+            }
         }
-        for (edge, (_, around)) in mesh.edges().iter().zip(&boxes.edges).enumerate().filter(|(_, (e, _))| changed(*e)) {
-            self.edges.near(around, |other| {
-                of_edges.extend(self.two_edges(mesh, edge, other));
-            });
+        let edges = mesh.edges().iter().zip(&boxes.edges).enumerate();
+        for (edge, (ends, around)) in edges.filter(|(_, (ends, _))| changed(*ends)) {
+            for trees in self.partners(mesh, ends[0]) {
+                trees.edges.near(around, |other| self.add_edges(mesh, edge, trees.first[2] + other, &mut found));
+            }
         }
-        in_order(mesh, on_triangles, of_edges)
+        in_order(mesh, found)
     }
 
-    fn refit(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>, reach: f64) -> Boxes {
-        let boxes = Boxes::new(mesh, regions, reach);
-        self.points.refit(&boxes.points);
-        self.triangles.refit(&boxes.triangles);
-        self.edges.refit(&boxes.edges);
+    /// The features with which those at a vertex may collide.
+    fn partners(&self, mesh: &CollisionMesh, vertex: u32) -> impl Iterator<Item = &Trees> {
+        let is_own = mesh.obstacle(vertex).is_none();
+        let itself = (!is_own || self.rules.with_itself).then_some(&self.own);
+        itself.into_iter().chain(is_own.then_some(&self.obstacles))
+    }
+
+    fn refit(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>) -> Boxes {
+        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
+        let [own, obstacles] = boxes.split(self.obstacles.first);
+        self.own.refit(own);
+        self.obstacles.refit(obstacles);
         boxes
     }
 
-    /// Returns a point and a triangle if they can collide.
-    fn point_and_triangle(&self, mesh: &CollisionMesh, point: usize, triangle: usize) -> Option<Features> {
-        let can_collide = self.can_collide(mesh, &[mesh.points()[point]], &mesh.triangles()[triangle]);
-        can_collide.then(|| [index(point), index(triangle)])
+    /// Adds a point and a triangle if they can collide.
+    fn add_point_and_triangle(&self, mesh: &CollisionMesh, point: usize, triangle: usize, found: &mut Found) {
+        if self.can_collide(mesh, &[mesh.points()[point]], &mesh.triangles()[triangle]) {
+            found.on_triangles.push([index(point), index(triangle)]);
+        }
     }
 
-    /// Returns two edges if they can collide.
-    fn two_edges(&self, mesh: &CollisionMesh, one: usize, other: usize) -> Option<Features> {
-        let can_collide = self.can_collide(mesh, &mesh.edges()[one], &mesh.edges()[other]);
-        can_collide.then(|| [index(one.min(other)), index(one.max(other))])
+    /// Adds two edges if they can collide.
+    fn add_edges(&self, mesh: &CollisionMesh, one: usize, other: usize, found: &mut Found) {
+        // The triangles of an edge collide with points, such as the centre of a ball.
+        let is_covered = |point: usize, edge: usize| {
+            let [a, b] = mesh.edges()[point];
+            a == b && !mesh.apexes(edge).is_empty()
+        };
+        if is_covered(one, other) || is_covered(other, one) {
+            return;
+        }
+        if self.can_collide(mesh, &mesh.edges()[one], &mesh.edges()[other]) {
+            found.of_edges.push([index(one.min(other)), index(one.max(other))]);
+        }
     }
 
     fn can_collide(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        !mesh.are_joined(a, b) && a.iter().chain(b).any(|vertex| self.is_free[*vertex as usize])
+        !mesh.are_joined(a, b)
+            && a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
+            && !self.rules.are_held(mesh, a, b)
+    }
+}
+
+impl Rules {
+    /// Whether one of two features is an obstacle's that holds a vertex of the other.
+    pub fn are_held(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+        if self.held.is_empty() {
+            return false;
+        }
+        let holds = |obstacle: Option<usize>, other: &[u32]| {
+            obstacle.is_some_and(|obstacle| other.iter().any(|vertex| self.held.contains(&(*vertex, obstacle))))
+        };
+        holds(mesh.obstacle(a[0]), b) || holds(mesh.obstacle(b[0]), a)
     }
 }
 
 /// Returns the pairs of these features once and in order.
-fn in_order(mesh: &CollisionMesh, mut on_triangles: Vec<Features>, mut of_edges: Vec<Features>) -> Vec<Pair> {
+fn in_order(mesh: &CollisionMesh, Found { mut on_triangles, mut of_edges }: Found) -> Vec<Pair> {
     for features in [&mut on_triangles, &mut of_edges] {
         features.sort_unstable_by_key(|[a, b]| u64::from(*a) << 32 | u64::from(*b));
         features.dedup();

@@ -32,7 +32,12 @@ fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 
 
 /// The part of a move that is safe for a pair; `from` holds its corners at the start.
 fn safe_part_of(step: &Move<'_>, pair: &Pair, from: &[Vector3<f64>; 4], thickness: f64, wanted: f64) -> f64 {
-    step.safe_part(pair, &Closest::of(pair, from), Clearance { thickness, reach: f64::INFINITY }, wanted)
+    step.safe_part(
+        pair,
+        &Closest::of(pair, from),
+        Clearance { thickness, reach: f64::INFINITY, is_plane: false },
+        wanted,
+    )
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -191,6 +196,11 @@ fn sewn_vertices_count_as_one() {
     assert_eq!((with(&[]), with(&[[4, 2]])), (1, 0));
 }
 
+/// All features of a sheet collide within a reach.
+fn rules(reach: f64) -> Rules {
+    Rules { halves: vec![0.5 * reach; 25], is_free: vec![true; 25], with_itself: true, ..Rules::default() }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -209,10 +219,10 @@ proptest! {
         }).collect();
         let x = at(&from, &to, time);
         let within = |pair: &Pair, x: &[Vector3<f64>]| Closest::of(pair, &pair.corners(x)).distance <= REACH;
-        let mut search = Search::new(&mesh, &flat, vec![true; 25]);
-        let swept = search.pairs(&mesh, swept(&from, &to), REACH);
+        let mut search = Search::new(&mesh, &flat, rules(REACH));
+        let swept = search.pairs(&mesh, swept(&from, &to));
         prop_assert!(swept.is_sorted() && swept.windows(2).all(|two| two[0] != two[1]));
-        let mut neighbourhood = Neighbourhood::new(REACH);
+        let mut neighbourhood = Neighbourhood::default();
         prop_assert!(!neighbourhood.cover(&mut search, &mesh, &from).0);
         neighbourhood.renew(&mut search, &mesh, &from, vec![1e-3; 25]);
         let grown = neighbourhood.cover(&mut search, &mesh, &from).0 && neighbourhood.cover(&mut search, &mesh, &x).0;
@@ -238,8 +248,8 @@ proptest! {
         for &(vertex, stray) in &strays {
             x[vertex] = add_scaled(start[vertex], 1.0, stray);
         }
-        let mut search = Search::new(&mesh, &flat, vec![true; 25]);
-        let mut neighbourhood = Neighbourhood::new(REACH);
+        let mut search = Search::new(&mesh, &flat, rules(REACH));
+        let mut neighbourhood = Neighbourhood::default();
         neighbourhood.renew(&mut search, &mesh, &start, vec![5e-3; 25]);
         let (is_covered, _) = neighbourhood.cover(&mut search, &mesh, &x);
         prop_assert!(is_covered);

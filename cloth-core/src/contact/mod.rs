@@ -6,8 +6,10 @@
 //!
 //! On a mesh, the nearest face, edge or corner acts as a plane, a capsule or a sphere of radius 0.
 //!
-//! Only vertices touch solids, not the triangles between them. For cloth on cloth see [`crate::barrier`].
+//! Only vertices touch solids, not the triangles between them. The integrator `newton` does without these terms: solids
+//! take part in [`crate::barrier`], which knows them by their cores.
 
+mod cores;
 mod friction;
 mod mesh_solid;
 mod passage;
@@ -87,13 +89,14 @@ pub struct Obstacle {
     pub solid: AnySolid,
     /// The motion; `None` if the obstacle is fixed.
     pub motion: Option<Motion>,
-    /// Contact acts within this distance of the surface, in m.
+    /// Contact acts within this distance of the surface, in m. With certified contact, nothing comes nearer than a
+    /// third of it.
     pub thickness: f64,
-    /// Contact stiffness k over the mass of the vertex, in 1/s².
+    /// Contact stiffness k over the mass of the vertex, in 1/s². Unused in certified contact.
     pub stiffness: f64,
     /// Coefficient of friction.
     pub friction: f64,
-    /// The sliding velocity at which friction reaches 1/√2 of its full size, in m/s.
+    /// The sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Unused in certified contact.
     pub sticking: f64,
 }
 

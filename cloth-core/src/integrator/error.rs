@@ -44,13 +44,13 @@ pub enum StepError {
         /// Whether contact shortened a move of this step.
         in_contact: bool,
     },
-    /// Contact does not let pins reach their places at the end of the step.
+    /// Contact does not let pins and obstacles reach their places at the end of the step.
     #[error(
-        "contact stopped the pins after {:.1} % of their way, in {moves} moves; they may press cloth against cloth. \
-         Try a smaller dt, or slower pins", 100.0 * .part
+        "contact stopped pins and obstacles after {:.1} % of their way, in {moves} moves; they may press cloth against \
+         cloth. Try a smaller dt, or slower motions", 100.0 * .part
     )]
     PinsBlocked {
-        /// Moves of the pins.
+        /// Moves of the pins and obstacles.
         moves: usize,
         /// The part of their way that they went.
         part: f64,

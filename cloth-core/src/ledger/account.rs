@@ -32,8 +32,10 @@ pub(crate) struct Account {
 #[derive(Debug)]
 pub(crate) struct Opening {
     powers: Vec<f64>,
-    /// Moving pinned vertices: index, force of the potentials in N, position in m.
+    /// Moving pinned vertices, and those of moving obstacles: index, force of the potentials in N, position in m.
     pins: Vec<(usize, Vector3<f64>, Vector3<f64>)>,
+    /// The number of vertices before those of obstacles.
+    own: usize,
     /// Power of moving obstacles, in W.
     obstacles: f64,
     /// Positions, if the body collides.
@@ -59,11 +61,15 @@ impl Account {
         })
     }
 
-    /// Starts a step, after the terms were told of it. `obstacles` is the power of moving obstacles, in W.
-    pub(crate) fn begin(body: &Body, obstacles: f64) -> Opening {
-        let pins = pin_forces(body).into_iter().map(|(vertex, force)| (vertex, force, body.x[vertex])).collect();
+    /// Starts a step, after the terms were told of it. The first `own` vertices are those of the island, the others
+    /// those of obstacles. `obstacles` is the power of moving obstacles that have no vertices, in W.
+    pub(crate) fn begin(body: &Body, own: usize, obstacles: f64) -> Opening {
+        let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
+        let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
+        let forces = potential_forces(body, &moving).into_iter();
+        let pins = moving.iter().zip(forces).map(|(&vertex, force)| (vertex, force, body.x[vertex])).collect();
         let x = body.system.has_contact().then(|| body.x.clone());
-        Opening { powers: powers(body), pins, obstacles, x }
+        Opening { powers: powers(body), pins, own, obstacles, x }
     }
 
     /// Returns the account after the step.
@@ -78,9 +84,14 @@ impl Account {
         for (((_, work), before), now) in after.work.iter_mut().zip(&opening.powers).zip(powers(body)) {
             *work += 0.5 * dt * (before + now);
         }
-        for ((vertex, before, from), (_, now)) in opening.pins.iter().zip(pin_forces(body)) {
-            let part = |axis: usize| 0.5 * (before[axis] + now[axis]) * (body.x[*vertex][axis] - from[axis]);
-            after.pins -= (0..3).map(part).sum::<f64>();
+        // Pairs in contact are known at the end of the step only.
+        let mut contact = vec![[0.0; 3]; body.x.len()];
+        body.system.add_contact_force(&body.x, &mut contact);
+        let moving: Vec<usize> = opening.pins.iter().map(|(vertex, ..)| *vertex).collect();
+        for ((vertex, before, from), now) in opening.pins.iter().zip(potential_forces(body, &moving)) {
+            let force = |axis: usize| 0.5 * (before[axis] + now[axis]) + contact[*vertex][axis];
+            let work: f64 = (0..3).map(|axis| force(axis) * (body.x[*vertex][axis] - from[axis])).sum();
+            *(if *vertex < opening.own { &mut after.pins } else { &mut after.obstacles }) -= work;
         }
         after.obstacles += 0.5 * dt * (opening.obstacles + obstacles);
         let renewed = opening.x.as_ref().and_then(|x| body.system.contact_energy(x));
@@ -137,11 +148,9 @@ fn dot_of_free(body: &Body, force: &[Vector3<f64>]) -> f64 {
     body.system.dofs().free().iter().map(one).sum()
 }
 
-/// Returns the forces of the potentials on moving pinned vertices, in N.
-fn pin_forces(body: &Body) -> Vec<(usize, Vector3<f64>)> {
-    let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
-    let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
-    if moving.is_empty() {
+/// Returns the forces of the potentials, without contact, on some vertices, in N.
+fn potential_forces(body: &Body, vertices: &[usize]) -> Vec<Vector3<f64>> {
+    if vertices.is_empty() {
         return Vec::new();
     }
     let still = vec![[0.0; 3]; body.v.len()];
@@ -149,6 +158,5 @@ fn pin_forces(body: &Body) -> Vec<(usize, Vector3<f64>)> {
     for (term, _) in body.system.terms().filter(|(term, _)| term.has_energy()) {
         term.add_force(State { x: &body.x, v: &still }, &mut force);
     }
-    body.system.add_contact_force(&body.x, &mut force);
-    moving.into_iter().map(|vertex| (vertex, force[vertex])).collect()
+    vertices.iter().map(|&vertex| force[vertex]).collect()
 }

@@ -15,8 +15,9 @@ use account::works;
 ///
 /// The energy is the kinetic energy of the free vertices plus the potential energy of the terms. It changes by the work
 /// of non-conservative forces (drag, damping, friction, wind), of moving pins and of moving obstacles, and by the
-/// kinetic energy removed when an island falls asleep. Contact of cloth with itself chooses new barriers in each step;
-/// the change of its energy by that choice counts as work. Work is the time integral of power, by the trapezoidal rule.
+/// kinetic energy removed when an island falls asleep. Certified contact chooses new barriers in each step; the change
+/// of its energy by that choice counts as work. Work is the time integral of power, by the trapezoidal rule. That of
+/// certified contact on pins and obstacles is the force at the end of each step times the way.
 /// The remainder, [`Entry::unaccounted`], is the error of the integrator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {

@@ -317,8 +317,9 @@ impl<'a> Builder<'a> {
         let obstacles = obstacles.collect::<Result<Vec<_>, _>>()?;
         let masses = |island: &IslandModel| island.vertices.iter().map(|&vertex| self.model.masses[vertex]).collect();
         let masses: Vec<Vec<f64>> = self.model.islands.iter().map(masses).collect();
-        let colliding: &[_] = if self.scene.contact == ContactChoice::Off { &[] } else { &obstacles };
-        for obstacle in colliding {
+        // Certified contact needs no terms: obstacles join the surface of the cloth.
+        let is_penalty = self.scene.contact != ContactChoice::Off && !self.scene.is_certified();
+        for obstacle in if is_penalty { &obstacles[..] } else { &[] } {
             let since = self.model.labels.len();
             for (island, masses) in masses.iter().enumerate() {
                 obstacle.terms(masses).into_iter().for_each(|term| self.add_term(island, since, term));

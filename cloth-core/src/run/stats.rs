@@ -32,6 +32,10 @@ pub fn tables(summary: &Summary) -> String {
         count => format!("{count} times an edge crosses a triangle at the end"),
     };
     writeln!(text, "{crossings}").expect("writing to a string succeeds");
+    if summary.obstacle_crossings > 0 {
+        let count = summary.obstacle_crossings;
+        writeln!(text, "{count} times cloth crosses an obstacle at the end").expect("writing to a string succeeds");
+    }
     if summary.totals.contact != ContactWork::default() {
         writeln!(text, "contact: {}", summary.totals.contact).expect("writing to a string succeeds");
     }

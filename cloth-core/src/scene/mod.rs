@@ -126,6 +126,12 @@ impl Scene {
         if self.adaptive { Box::new(Adaptive::new(scheme)) } else { scheme }
     }
 
+    /// Whether every move is certified to cross nothing: only the integrator `newton` can do that.
+    #[must_use]
+    pub fn is_certified(&self) -> bool {
+        self.integrator == Scheme::Newton && self.contact != ContactChoice::Off
+    }
+
     /// Number of steps.
     #[must_use]
     pub fn steps(&self) -> u64 {

@@ -46,14 +46,16 @@ struct Keys {
     /// Coefficient of friction. Default 0.
     #[serde(default, with = "Real::<NonNegative>")]
     friction: f64,
-    /// Sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Slower cloth sticks, but creeps.
-    /// Default 0.001.
+    /// Sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Slower cloth sticks, but creeps. No
+    /// meaning with `newton`, whose friction does not creep. Default 0.001.
     #[serde(default = "sticking", with = "Real::<Positive>")]
     sticking: f64,
-    /// Contact acts within this distance of the surface, in m. Default 0.005.
+    /// Contact acts within this distance of the surface, in m. With `newton`, nothing comes nearer than a third of it.
+    /// Default 0.005.
     #[serde(default = "thickness", with = "Real::<Positive>")]
     thickness: f64,
-    /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. Default 5e6.
+    /// Contact stiffness per mass, in 1/s²: at the surface, the acceleration is this times the thickness. No meaning
+    /// with `newton`. Default 5e6.
     #[serde(default = "stiffness", with = "Real::<Positive>")]
     stiffness: f64,
     /// Motion over time. Default none.

@@ -1,7 +1,10 @@
-//! Contact of a scene with itself.
+//! Contact of a scene with itself and with obstacles.
 
-use crate::barrier::{BarrierContact, ContactError};
+use std::collections::BTreeSet;
+
+use crate::barrier::{BarrierContact, ContactError, ObstacleStart, Participants};
 use crate::collision::CollisionMesh;
+use crate::contact::{AnySolid, Obstacle};
 use crate::model::Model;
 
 use super::Island;
@@ -18,23 +21,68 @@ pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
     CollisionMesh::new(model.x.len(), &model.triangles, &segments, &model.sewn)
 }
 
-/// Adds contact to an island that holds all vertices of the model.
-pub(super) fn add_contact(island: &mut Island, model: &Model) -> Result<(), ContactError> {
-    let mut local = vec![usize::MAX; model.x.len()];
-    island.vertices().iter().enumerate().for_each(|(place, &vertex)| local[vertex] = place);
-    let renumbered = mesh_of(model).renumbered(&local);
+/// Returns the pinned vertices that start within reach of an obstacle, or inside. They are held there: their features
+/// do not collide with it.
+pub(super) fn held(model: &Model) -> BTreeSet<(u32, usize)> {
+    let pinned: Vec<usize> = (0..model.x.len()).filter(|&vertex| model.pinned[vertex]).collect();
+    let near = |(number, obstacle): (usize, &Obstacle)| {
+        let solid = obstacle.at(0.0);
+        let is_near = |vertex: &&usize| solid.signed_distance(model.x[**vertex]) < obstacle.thickness;
+        pinned.iter().filter(is_near).map(|&vertex| (energy_solve::index(vertex), number)).collect::<Vec<_>>()
+    };
+    model.obstacles.iter().enumerate().flat_map(near).collect()
+}
+
+/// Adds contact to an island: with obstacles, and with itself if it holds all vertices of the model.
+pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool) -> Result<(), ContactError> {
+    let vertices = island.vertices();
+    let mut local = vec![None; model.x.len()];
+    vertices.iter().enumerate().for_each(|(place, &vertex)| local[vertex] = Some(place));
+    let own = mesh_of(model).restricted(&local, vertices.len());
+    check_sides(island, model)?;
     let x = &island.body().x;
-    let shortest = renumbered.shortest_edge(x);
-    let all = island.vertices().iter().map(|&vertex| model.thickness[vertex]);
+    let shortest = own.shortest_edge(x);
+    let all = vertices.iter().map(|&vertex| model.thickness[vertex]);
     let thickest = all.clone().fold(0.0, f64::max);
     // Coarse fabrics on fine meshes get thinner, with a gap in proportion.
     let scale = (LARGEST_REACH * shortest / ((1.0 + GAP) * thickest)).min(1.0);
-    let radii = all.map(|thickness| 0.5 * scale * thickness).collect();
-    let is_free = island.vertices().iter().map(|&vertex| !model.pinned[vertex]).collect();
-    let contact = BarrierContact::new(renumbered, x, is_free, radii, GAP * scale * thickest);
-    let contact = contact.map_err(|error| error.on_vertices(island.vertices()))?;
-    let contact = contact.with_friction(island.vertices().iter().map(|&vertex| model.friction[vertex]).collect());
+    let start = |(obstacle, radius): (&Obstacle, f64)| ObstacleStart {
+        name: obstacle.name.clone(),
+        radius,
+        reach: obstacle.thickness,
+    };
+    let prescribed = island.prescribed();
+    let cores = prescribed.cores();
+    let held_here =
+        |(vertex, obstacle): (u32, usize)| local[vertex as usize].map(|place| (energy_solve::index(place), obstacle));
+    let participants = Participants {
+        is_free: (0..x.len()).map(|vertex| island.body().system.dofs().place(vertex).is_some()).collect(),
+        radii: all.map(|thickness| 0.5 * scale * thickness).collect(),
+        gap: GAP * scale * thickest,
+        obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
+        held: held(model).into_iter().filter_map(held_here).collect(),
+        with_itself,
+        mesh: own.with_obstacles(&cores),
+    };
+    let contact = BarrierContact::among(participants, x).map_err(|error| error.on_vertices(vertices))?;
+    let contact = contact.with_friction(vertices.iter().map(|&vertex| model.friction[vertex]).collect());
+    let contact = contact.with_grips(prescribed.grips(&model.obstacles, vertices.len()));
     island.body_mut().system.set_contact(Box::new(contact));
+    Ok(())
+}
+
+/// Returns an error if a free vertex starts inside an obstacle.
+fn check_sides(island: &Island, model: &Model) -> Result<(), ContactError> {
+    let body = island.body();
+    for obstacle in &model.obstacles {
+        let solid: AnySolid = obstacle.at(0.0);
+        let depth = |&vertex: &usize| (vertex, -solid.signed_distance(body.x[vertex]));
+        let inside: Vec<_> = body.system.dofs().free().iter().map(depth).filter(|(_, depth)| *depth > 0.0).collect();
+        if let Some(&(vertex, depth)) = inside.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+            let (obstacle, vertex) = (obstacle.name.clone(), island.vertices()[vertex]);
+            return Err(ContactError::Inside { obstacle, count: inside.len(), vertex, depth });
+        }
+    }
     Ok(())
 }
 
@@ -68,8 +116,8 @@ mod tests {
     }
 
     impl ContactModel for Watched {
-        fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64) {
-            self.inner.begin_step(x, dt);
+        fn begin_step(&mut self, x: &[Vector3<f64>]) {
+            self.inner.begin_step(x);
         }
 
         fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {

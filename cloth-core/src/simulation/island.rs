@@ -1,8 +1,9 @@
 use energy_dsl::{Element, Vector3};
 use energy_elements::WindDrag;
-use energy_solve::{EvaluationError, State, StepStart, System, SystemError};
+use energy_solve::{ContactMemory, EvaluationError, State, StepStart, System, SystemError};
 use serde::{Deserialize, Serialize};
 
+use super::prescribed::Prescribed;
 use super::sleep::{BoundingSphere, SleepState, StepContext, Stillness};
 use crate::body::Body;
 use crate::bounded::SPEED_OF_LIGHT;
@@ -17,7 +18,10 @@ use crate::scene::Scene;
 pub struct Island {
     vertices: Vec<usize>,
     labels: Vec<usize>,
+    /// The vertices of the island, then those of obstacles, if contact is certified.
     body: Body,
+    /// The vertices of obstacles in the body.
+    prescribed: Prescribed,
     integrator: Box<dyn Integrator>,
     /// Pinned vertices that move, with indices within the island.
     moving: Vec<MovingPin>,
@@ -36,6 +40,9 @@ pub struct SavedIsland {
     integrator: IntegratorMemory,
     #[serde(rename = "rest")]
     sleep: SleepState,
+    /// The bristles of friction in certified contact: names of pairs, and their vectors.
+    #[serde(default)]
+    bristles: (Vec<[u32; 3]>, Vec<[Vector3<f64>; 2]>),
 }
 
 impl Island {
@@ -44,17 +51,24 @@ impl Island {
         let IslandModel { vertices, terms, labels } = island;
         let gather =
             |all: &[Vector3<f64>]| -> Vec<Vector3<f64>> { vertices.iter().map(|&vertex| all[vertex]).collect() };
-        let pinned: Vec<bool> = vertices.iter().map(|&vertex| model.pinned[vertex]).collect();
-        let masses = vertices.iter().map(|&vertex| model.masses[vertex]).collect();
-        let (x, v, system) = (gather(&model.x), gather(&model.v), System::new(terms, &pinned)?);
+        let mut pinned: Vec<bool> = vertices.iter().map(|&vertex| model.pinned[vertex]).collect();
+        let mut masses: Vec<f64> = vertices.iter().map(|&vertex| model.masses[vertex]).collect();
+        let (mut x, mut v) = (gather(&model.x), gather(&model.v));
+        let stillness = scene.sleep.map(|sleep| Stillness::new(&sleep, &x));
+        let prescribed = if scene.is_certified() { Prescribed::new(&model.obstacles) } else { Prescribed::default() };
+        let [obstacles] = prescribed.positions([0.0], mean(&x));
+        x.extend(obstacles);
+        pinned.resize(x.len(), true);
+        masses.resize(x.len(), 0.0);
+        v.resize(x.len(), [0.0; 3]);
+        let system = System::new(terms, &pinned)?;
         let body = Body { x, v, masses, system };
-        let stillness = scene.sleep.map(|sleep| Stillness::new(&sleep, &body.x));
         let in_wind =
             body.system.terms().any(|(term, _)| term.declaration().name == <WindDrag as Element>::DECLARATION.name);
         let in_gusts = in_wind && scene.wind.as_ref().is_some_and(|wind| !wind.gusts.is_empty());
         let (integrator, sleep) = (scene.stepper(), SleepState::AWAKE);
         let (moving, motions) = (Vec::new(), Vec::new());
-        Ok(Self { vertices, labels, body, integrator, moving, motions, in_gusts, stillness, sleep })
+        Ok(Self { vertices, labels, body, prescribed, integrator, moving, motions, in_gusts, stillness, sleep })
     }
 
     /// Adds a moving pin, whose vertex is an index within the island.
@@ -81,6 +95,11 @@ impl Island {
     #[must_use]
     pub fn body(&self) -> &Body {
         &self.body
+    }
+
+    /// The vertices of obstacles in the body.
+    pub(super) fn prescribed(&self) -> &Prescribed {
+        &self.prescribed
     }
 
     pub(super) fn body_mut(&mut self) -> &mut Body {
@@ -130,18 +149,48 @@ impl Island {
             let here = self.body.x[pin.vertex];
             self.body.v[pin.vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / dt);
         }
+        self.move_obstacles([context.time, context.end]);
         self.begin_step(context.time, dt)?;
-        let opening = account.map(|_| Account::begin(&self.body, self.obstacle_power(context, false)));
+        let own = self.vertices.len();
+        let opening = account.map(|_| Account::begin(&self.body, own, self.obstacle_power(context, false)));
         let report = self.integrator.step(&mut self.body, dt)?;
-        check_speeds(&self.body.v)?;
+        check_speeds(&self.body.v[..own])?;
         let after = account
             .zip(opening)
             .map(|(account, opening)| account.after(&self.body, &opening, self.obstacle_power(context, true), dt));
+        self.place_obstacles(context.end);
         Ok((report, after.transpose()?))
     }
 
-    /// The power of moving obstacles on the island at the start or the end of the step, in W.
+    /// Places the vertices of obstacles at a time, with the velocities that lead them to the next time.
+    fn move_obstacles(&mut self, [time, next]: [f64; 2]) {
+        let own = self.vertices.len();
+        if self.body.x.len() == own {
+            return;
+        }
+        let [from, to] = self.prescribed.positions([time, next], mean(&self.body.x[..own]));
+        for ((from, to), vertex) in from.iter().zip(&to).zip(own..) {
+            self.body.x[vertex] = *from;
+            self.body.v[vertex] = std::array::from_fn(|axis| (to[axis] - from[axis]) / (next - time));
+        }
+    }
+
+    /// Places the vertices of obstacles at a time exactly: steps end there to rounding only. So positions follow from
+    /// the time alone, and a resumed run finds the same bits.
+    fn place_obstacles(&mut self, time: f64) {
+        let own = self.vertices.len();
+        if self.body.x.len() > own {
+            let [at] = self.prescribed.positions([time], mean(&self.body.x[..own]));
+            self.body.x[own..].copy_from_slice(&at);
+        }
+    }
+
+    /// The power of moving obstacles on the island at the start or the end of the step, in W. 0 if contact is
+    /// certified: the account then finds the work from the forces on the vertices of obstacles.
     fn obstacle_power(&self, context: &StepContext<'_>, at_end: bool) -> f64 {
+        if self.body.system.has_contact() {
+            return 0.0;
+        }
         let span = [context.time, context.time + context.dt];
         context.obstacles.iter().map(|obstacle: &Obstacle| obstacle.power(span, at_end, &self.body)).sum()
     }
@@ -156,10 +205,11 @@ impl Island {
     /// fell asleep.
     pub(super) fn try_to_sleep(&mut self, context: &StepContext<'_>) -> bool {
         let Some(stillness) = &self.stillness else { return false };
-        if !self.sleep.update(&self.body.v, context.dt, stillness) {
+        let own = self.vertices.len();
+        if !self.sleep.update(&self.body.v[..own], context.dt, stillness) {
             return false;
         }
-        let bounds = BoundingSphere::around(&self.body.x);
+        let bounds = BoundingSphere::around(&self.body.x[..own]);
         if self.is_disturbed(context, &bounds) {
             return false;
         }
@@ -169,12 +219,18 @@ impl Island {
     }
 
     pub(super) fn save(&self) -> SavedIsland {
-        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone() }
+        let ContactMemory { names, vectors } = self.body.system.contact_memory(&self.body.x);
+        let bristles = (names, vectors);
+        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone(), bristles }
     }
 
     pub(super) fn restore(&mut self, saved: SavedIsland) {
         self.integrator.restore(saved.integrator);
         self.sleep = saved.sleep;
+        if let Some((contact, _)) = self.body.system.contact() {
+            let (names, vectors) = saved.bristles;
+            contact.restore(ContactMemory { names, vectors });
+        }
     }
 
     /// Copies positions and velocities from the scene.
@@ -197,6 +253,12 @@ impl Island {
             (x[vertex], v[vertex]) = (self.body.x[local], self.body.v[local]);
         }
     }
+}
+
+/// Returns the mean of some positions.
+fn mean(x: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum = x.iter().fold([0.0; 3], |sum, x| crate::geometry::add_scaled(sum, 1.0, *x));
+    sum.map(|component| component / x.len().max(1) as f64)
 }
 
 /// Returns an error if a vertex is faster than light. Such a state is finite, but its squares soon overflow, and single

@@ -3,11 +3,14 @@
 mod collision;
 mod deformed;
 mod island;
+mod obstacle_crossings;
+mod prescribed;
 mod saved;
 mod sleep;
 mod summary;
 mod totals;
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -31,6 +34,7 @@ use crate::model::{Model, ModelError, MovingPin, Part, PartKind, TermLabel};
 use crate::motion::Motion;
 use crate::scene::{ContactChoice, Scene};
 use collision::add_contact;
+use prescribed::Prescribed;
 use sleep::StepContext;
 
 /// A scene that cannot be set up, or a step that failed.
@@ -79,6 +83,11 @@ pub struct Simulation {
     motions: Vec<Motion>,
     /// The features of all parts, for the test for crossings.
     collision_mesh: CollisionMesh,
+    /// The same with the cores of obstacles.
+    obstacle_mesh: CollisionMesh,
+    prescribed: Prescribed,
+    /// Pinned vertices that start in an obstacle, with its number.
+    held: BTreeSet<(u32, usize)>,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
     masses: Vec<f64>,
@@ -109,6 +118,9 @@ impl Simulation {
         let islands = create_islands(scene, &mut model)?;
         let summary = Summary::at_start(scene, &model, islands.len());
         let collision_mesh = collision::mesh_of(&model);
+        let prescribed = Prescribed::new(&model.obstacles);
+        let obstacle_mesh = collision_mesh.clone().with_obstacles(&prescribed.cores());
+        let held = collision::held(&model);
         let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, .. } = model;
         let mut simulation = Self {
             parts,
@@ -117,6 +129,9 @@ impl Simulation {
             obstacles,
             motions,
             collision_mesh,
+            obstacle_mesh,
+            prescribed,
+            held,
             x,
             v,
             masses,
@@ -312,7 +327,9 @@ impl Simulation {
             if island.try_to_sleep(&context) {
                 ledger.iter_mut().for_each(|ledger| ledger.note_sleep(number));
             }
-            for obstacle in obstacles.iter() {
+            // Certified moves pass through nothing.
+            let passable = if island.body().system.has_contact() { &[] } else { &obstacles[..] };
+            for obstacle in passable {
                 let passage = obstacle.passages([context.time, context.end], island.moves(x));
                 passage.into_iter().for_each(|passage| summary.totals.note(passage));
             }
@@ -381,8 +398,9 @@ fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, Simul
     let islands = std::mem::take(&mut model.islands).into_iter();
     let mut islands =
         islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, SystemError>>()?;
-    if scene.contact == ContactChoice::On {
-        islands.iter_mut().try_for_each(|island| add_contact(island, model))?;
+    let with_itself = scene.contact == ContactChoice::On;
+    if scene.is_certified() && (with_itself || !model.obstacles.is_empty()) {
+        islands.iter_mut().try_for_each(|island| add_contact(island, model, with_itself))?;
     }
     distribute_moving_pins(&mut islands, model);
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);

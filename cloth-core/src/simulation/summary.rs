@@ -1,7 +1,8 @@
 use std::fmt;
 use std::time::Duration;
 
-use energy_dsl::Vector3;
+use energy_dsl::{Element, Vector3};
+use energy_elements::{DistanceBarrier, SlidingFriction};
 use energy_solve::{Counts, EvaluationError, State, Tally};
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +49,9 @@ pub struct Summary {
     /// Number of edges of cloth and hair that touch or cross a triangle at the end.
     #[serde(default)]
     pub crossings: usize,
+    /// Number of places where cloth or hair crosses an obstacle at the end.
+    #[serde(default)]
+    pub obstacle_crossings: usize,
     /// ½ Σ m v², in J.
     pub kinetic_energy: f64,
     /// Σ m v, in kg m/s.
@@ -153,6 +157,7 @@ impl Simulation {
             TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
         };
         summary.terms = self.counts().into_iter().enumerate().map(term).collect();
+        summary.terms.extend(self.contact_terms());
         self.add_findings(&mut summary);
         Ok(summary)
     }
@@ -171,14 +176,41 @@ impl Simulation {
         summary
     }
 
+    /// Returns the elements of certified contact, which is not a term: the energy of the pairs at the end, friction
+    /// included. Their number changes all the time; [`Totals::contact`] counts the work.
+    fn contact_terms(&self) -> Vec<TermSummary> {
+        let energies = self.islands.iter().filter_map(|island| {
+            let body = island.body();
+            body.system.contact_energy(&body.x)
+        });
+        let Some(energy) = energies.reduce(|sum, energy| sum + energy) else { return Vec::new() };
+        let named = [
+            ("contact", <DistanceBarrier as Element>::DECLARATION.name, Some(energy)),
+            ("friction of contact", <SlidingFriction as Element>::DECLARATION.name, None),
+        ];
+        let term = |(name, element, energy): (&str, &str, Option<f64>)| {
+            let (name, element, counts) = (name.to_owned(), element.to_owned(), Counts::default());
+            TermSummary { name, element, elements: 0, energy, counts, reused: 0 }
+        };
+        named.map(term).into()
+    }
+
     /// Adds the crossings at the end and the balance of energy.
     fn add_findings(&self, summary: &mut Summary) {
         summary.crossings = self.crossings().len();
+        summary.obstacle_crossings = self.obstacle_crossings();
         if summary.crossings > 0 {
             summary.warnings.push(format!(
                 "the cloth passes through itself: at the end, edges cross triangles in {} places. \
                  `integrator = \"newton\"` with `contact = \"on\"` prevents this",
                 summary.crossings
+            ));
+        }
+        if summary.obstacle_crossings > 0 {
+            summary.warnings.push(format!(
+                "the cloth crosses obstacles in {} places at the end. The integrator `newton` keeps edges and \
+                 triangles out of obstacles, others only vertices",
+                summary.obstacle_crossings
             ));
         }
         summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));

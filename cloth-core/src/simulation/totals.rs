@@ -24,7 +24,7 @@ pub struct Totals {
     /// Steps skipped by sleeping islands, summed over the islands.
     #[serde(default)]
     pub slept: u64,
-    /// The work of contact of the cloth with itself.
+    /// The work of certified contact.
     #[serde(default)]
     pub contact: ContactWork,
     /// Vertices that passed through obstacles, one entry for each obstacle that any passed through.

@@ -1,6 +1,7 @@
-//! Contact of cloth with itself: friction on an incline by Coulomb's law, and impacts that conserve momentum.
+//! Contact of cloth with itself and with obstacles: friction on an incline by Coulomb's law, cloth that sticks without
+//! creeping, the capstan, and impacts that conserve momentum.
 
-use super::{Finding, ValidateError};
+use super::{Finding, ValidateError, capstan};
 use crate::geometry::norm;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
@@ -12,11 +13,14 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
     for &(friction, slope) in slides {
         slide(friction, slope, report)?;
     }
-    rest(report)?;
+    rest(quick, report)?;
+    for friction in if quick { &[0.3][..] } else { &[0.2, 0.3, 0.5] } {
+        capstan::ask(*friction, report)?;
+    }
     impact(report)
 }
 
-fn simulation(text: &str) -> Result<Simulation, ValidateError> {
+pub(super) fn simulation(text: &str) -> Result<Simulation, ValidateError> {
     let scene = Scene::parse(text, "validate.toml".as_ref())?;
     Ok(Simulation::new(&scene)?)
 }
@@ -53,7 +57,7 @@ fn speed(simulation: &Simulation) -> f64 {
     simulation.velocities()[cloth].iter().map(|v| v[0]).sum::<f64>() / count
 }
 
-fn advance(simulation: &mut Simulation, steps: u64) -> Result<(), ValidateError> {
+pub(super) fn advance(simulation: &mut Simulation, steps: u64) -> Result<(), ValidateError> {
     (0..steps).try_for_each(|_| simulation.step().map(drop).map_err(ValidateError::from))
 }
 
@@ -70,17 +74,51 @@ fn slide(friction: f64, slope: f64, report: &mut dyn FnMut(Finding)) -> Result<(
     Ok(())
 }
 
-/// Below tan α = μ a sheet creeps. Friction is μ v/√(v² + ε²) times the normal force with ε = 1 mm/s, so it holds the
-/// sheet at v = ε r/√(1 − r²) with r = tan α/μ.
-fn rest(report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
-    let (friction, slope) = (0.5, 0.45);
-    let mut simulation = incline(friction, slope)?;
-    advance(&mut simulation, 50)?;
-    let ratio: f64 = slope / friction;
-    let creep = 1e-3 * ratio / (1.0 - ratio * ratio).sqrt();
-    let case = format!("sheet at rest, μ {friction}, tan α {slope}: creep in m/s");
-    report(Finding::relative("contact", case, speed(&simulation), creep, 0.01));
+/// Returns the mean place of the cloth along x, in m.
+fn place(simulation: &Simulation) -> f64 {
+    let cloth = simulation.parts().last().map_or(0..0, |part| part.vertices.clone());
+    let count = cloth.len() as f64;
+    simulation.positions()[cloth].iter().map(|x| x[0]).sum::<f64>() / count
+}
+
+/// The length of a bristle of friction, in m.
+const BRISTLE: f64 = 1e-4;
+
+/// Below tan α = μ a sheet stays where it is: bristles bend, but do not creep. Above, it slides.
+fn rest(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
+    let steps = if quick { 300 } else { 10_000 };
+    let mut on_cloth = incline(0.5, 0.45)?;
+    let mut on_plane = incline_of_obstacle(0.5, 0.45)?;
+    for (name, simulation) in [("cloth", &mut on_cloth), ("a plane", &mut on_plane)] {
+        // The sheet sinks to its height of rest first.
+        advance(simulation, 30)?;
+        let before = place(simulation);
+        advance(simulation, steps)?;
+        let case = format!("sheet at rest on {name}, tan α = 0.9 μ: way in {steps} steps, m");
+        report(Finding::absolute("contact", case, place(simulation) - before, 0.0, BRISTLE));
+    }
+    for (ratio, sticks) in [(0.99, true), (1.01, false)] {
+        let mut simulation = incline_of_obstacle(0.5, 0.5 * ratio)?;
+        advance(&mut simulation, 30)?;
+        let before = place(&simulation);
+        advance(&mut simulation, 100)?;
+        let stayed = if (place(&simulation) - before).abs() < BRISTLE { 1.0 } else { 0.0 };
+        let case = format!("sheet on a plane, tan α = {ratio} μ: sticks");
+        report(Finding::absolute("contact", case, stayed, f64::from(u8::from(sticks)), 0.0));
+    }
     Ok(())
+}
+
+/// A sheet that lies on a plane. Gravity has the slope tan α along x.
+fn incline_of_obstacle(friction: f64, slope: f64) -> Result<Simulation, ValidateError> {
+    let (sine, cosine) = slope.atan().sin_cos();
+    let cloth = sheet("cloth", [5.0, 0.2], [0.0, 0.0, 0.0044], 0.0, "");
+    simulation(&format!(
+        "dt = 0.01\nduration = 2.0\nintegrator = \"newton\"\ntolerances.velocity = 1e-5\n\
+         gravity = [{:?}, 0.0, {:?}]\n{cloth}[[obstacles]]\nplane = {{}}\nfriction = {friction:?}\n",
+        GRAVITY * sine,
+        -GRAVITY * cosine
+    ))
 }
 
 /// Two sheets meet in weightlessness: contact pushes them apart by opposite forces.

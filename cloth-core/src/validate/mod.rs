@@ -5,6 +5,7 @@
 
 mod banded;
 mod cantilever;
+mod capstan;
 mod catenary;
 mod contact;
 mod critical_load;

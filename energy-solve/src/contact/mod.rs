@@ -5,8 +5,10 @@
 //! instead, which solvers apply without a place in the matrix.
 
 mod block;
+mod in_matrix;
 mod model;
 
 pub use block::Contact;
 pub(crate) use block::factors;
-pub use model::{ContactCounts, ContactModel};
+pub use in_matrix::ContactsInMatrix;
+pub use model::{ContactCounts, ContactMemory, ContactModel};

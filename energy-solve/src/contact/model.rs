@@ -16,8 +16,8 @@ use crate::matrix::dof_map::DofMap;
 ///    a line search sees a single function.
 /// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
 pub trait ContactModel: std::fmt::Debug {
-    /// Begins a step of size `dt`, in s, at x: forgets all pairs.
-    fn begin_step(&mut self, x: &[Vector3<f64>], dt: f64);
+    /// Begins a step at x: forgets all pairs.
+    fn begin_step(&mut self, x: &[Vector3<f64>]);
 
     /// Returns the part of the straight move between two states that certainly has no crossing: 1 for the whole move.
     /// Pairs that shorten the move join at the next [`ContactModel::meet`].
@@ -30,8 +30,7 @@ pub trait ContactModel: std::fmt::Debug {
     /// Adds the pairs that meet at an iterate. Returns the change of the energy there, in J.
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64;
 
-    /// Returns Σ U, in J; infinite if a pair is within its thickness. With friction, U includes its potential since the
-    /// start of the step.
+    /// Returns Σ U, in J; infinite if a pair is within its thickness. With friction, U includes its potential.
     fn energy(&self, x: &[Vector3<f64>]) -> f64;
 
     /// Adds −∇U to the forces on all vertices, in N.
@@ -43,6 +42,23 @@ pub trait ContactModel: std::fmt::Debug {
 
     /// Returns what was counted so far.
     fn counts(&self) -> ContactCounts;
+
+    /// Returns what later steps depend on, for a checkpoint at x, where the last step ended. Default nothing.
+    fn memory(&self, _x: &[Vector3<f64>]) -> ContactMemory {
+        ContactMemory::default()
+    }
+
+    /// Restores the memory of a checkpoint.
+    fn restore(&mut self, _memory: ContactMemory) {}
+}
+
+/// What contact keeps from step to step, such as how far sticking pairs have slid.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactMemory {
+    /// One name for each entry.
+    pub names: Vec<[u32; 3]>,
+    /// Two vectors for each entry.
+    pub vectors: Vec<[Vector3<f64>; 2]>,
 }
 
 /// Numbers of pairs and moves.

@@ -13,7 +13,7 @@ use energy_dsl::Vector3;
 use self::constant::ConstantPart;
 pub use self::error::{EvaluationError, SystemError};
 pub use self::linearise::{LinearisationOptions, LinearisedForces};
-use crate::contact::ContactModel;
+use crate::contact::{ContactMemory, ContactModel};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
@@ -134,6 +134,12 @@ impl System {
     #[must_use]
     pub fn contact_energy(&self, x: &[Vector3<f64>]) -> Option<f64> {
         self.contact.as_ref().map(|contact| contact.energy(x))
+    }
+
+    /// Returns what contact keeps from step to step, at x, where the last step ended. Empty without contact.
+    #[must_use]
+    pub fn contact_memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
+        self.contact.as_ref().map_or_else(ContactMemory::default, |contact| contact.memory(x))
     }
 
     /// Adds the forces of the contacts of the last step at x, in N.

@@ -9,21 +9,27 @@ use super::super::ContactWork;
 use super::incremental_potential::IncrementalPotential;
 use crate::body::Body;
 
-/// Moves of the pins within a step, after which they count as blocked.
-pub(super) const PIN_MOVES: usize = 40;
+/// Moves of pins and obstacles within a step, after which they count as blocked.
+pub(super) const PIN_MOVES: usize = 60;
+/// The part of a certified way that pins and obstacles go if they cannot go all the way. An iteration of Newton's
+/// method doubles a small gap. If pins took more than half of it, gaps would shrink until barriers overflow.
+const PIN_SHARE: f64 = 0.5;
 
 impl IncrementalPotential<'_> {
     /// Forgets the pairs of the last step, and shortens the move to the first iterate x until it is certain to have no
-    /// crossing. Returns the part that is left.
+    /// crossing. Returns the part of their way that pins and obstacles have gone.
     pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
         let Body { system, x: start, .. } = &mut *self.body;
         if let Some((contact, _)) = system.contact() {
-            contact.begin_step(start, self.dt);
+            contact.begin_step(start);
         }
         let to = std::mem::replace(x, self.body.x.clone());
-        let part = self.certified(x, &to);
+        let certified = self.certified(x, &to);
+        let is_prescribed = |vertex: usize| self.body.system.dofs().place(vertex).is_none();
+        let is_driven = (0..x.len()).any(|vertex| is_prescribed(vertex) && self.body.v[vertex] != [0.0; 3]);
+        let part = if is_driven { shared(certified) } else { certified };
         blend(x, &to, part);
-        part
+        if is_driven { part } else { 1.0 }
     }
 
     /// Returns the part of the straight move that has no crossing.
@@ -88,17 +94,22 @@ impl IncrementalPotential<'_> {
         contacts
     }
 
-    /// Moves pins that contact has stopped further towards their places at the end of the step. Returns the part of
-    /// the rest of their way that they went.
+    /// Moves pins and obstacles that contact has stopped further towards their places at the end of the step. Returns
+    /// the part of the rest of their way that they went.
     pub(super) fn move_pins(&mut self, x: &mut [Vector3<f64>]) -> f64 {
         let mut to = x.to_vec();
         for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().place(vertex).is_none()) {
             to[vertex] = self.inertial(vertex);
         }
-        let part = self.certified(x, &to);
+        let part = shared(self.certified(x, &to));
         blend(x, &to, part);
         part
     }
+}
+
+/// The part of the way that pins and obstacles go, of the certified part.
+fn shared(certified: f64) -> f64 {
+    if certified == 1.0 { 1.0 } else { PIN_SHARE * certified }
 }
 
 /// x ← x + s (y − x); exactly y for s = 1.

@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{Contact, Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
+use energy_solve::{Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
 
 use super::super::projection::Projection;
 use super::super::trial::Trial;
@@ -172,20 +172,24 @@ impl<'a> Iterate<'a> {
         let contacts = self.potential.contacts(&self.x);
         let Memory { matrix, solver } = &mut *self.memory;
         let started = Instant::now();
-        let prepared = solver.prepare(matrix, &contacts, self.trial);
+        let contacts = matrix.add_contacts(contacts);
+        let prepared = solver.prepare(matrix, &contacts.others, self.trial);
         self.potential.report.phases.factorisation += started.elapsed();
 
         let started = Instant::now();
         let mut direction = vec![[0.0; 3]; downhill.len()];
         let mut solved = SolveReport::indefinite();
-        if curvature != Curvature::Exact || prepared.is_ok() {
-            prepared?;
+        if prepared.is_ok() {
             let (report, solved_by) = solver.solve(matrix, downhill, &mut direction, &options, self.trial);
             solved = report;
             self.potential.report.solved_by += solved_by;
         }
+        matrix.remove_contacts(contacts);
+        if curvature != Curvature::Exact {
+            prepared?;
+        }
         if curvature != Curvature::Exact && !solved.converged() {
-            solved = self.solve_in_double(downhill, (curvature, &contacts), &options, &mut direction)?;
+            solved = self.solve_in_double(downhill, curvature, &options, &mut direction)?;
         }
         if solved.stopped == StopReason::NonFinite {
             direction.fill([0.0; 3]);
@@ -202,14 +206,16 @@ impl<'a> Iterate<'a> {
     fn solve_in_double(
         &mut self,
         downhill: &[Vector3<f64>],
-        (curvature, contacts): (Curvature, &[Contact]),
+        curvature: Curvature,
         options: &SolveOptions,
         direction: &mut [Vector3<f64>],
     ) -> Result<SolveReport, StepError> {
         let mut matrix = self.potential.body.system.matrix();
         self.potential.linearise(&self.x, curvature, &mut matrix)?;
+        let contacts = self.potential.contacts(&self.x);
+        let contacts = matrix.add_contacts(contacts);
         let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), self.potential.body.system.threads());
-        solver.scale_with_contacts(&matrix, contacts)?;
+        solver.scale_with_contacts(&matrix, &contacts.others)?;
         Ok(solver.solve(downhill, direction, options))
     }
 

@@ -1,0 +1,112 @@
+//! Bristles: how far pairs in contact have slid without slipping.
+
+use std::ops::Range;
+
+use energy_dsl::Vector3;
+use energy_solve::ContactMemory;
+
+use crate::collision::{Pair, PairKind};
+use crate::geometry::{add_scaled, dot, norm};
+
+/// The largest deflection, in m. A pair that slides farther slips.
+pub(super) const LENGTH: f64 = 1e-4;
+/// The cosine between the normals of two pairs with one feature in common, above which they are the same contact.
+const SAME_CONTACT: f64 = 0.5;
+
+/// The deflections at the start of a step, by pair.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Bristles {
+    /// Kind and features of each pair, ascending.
+    names: Vec<[u32; 3]>,
+    /// The normal and the deflection (in m) of each pair.
+    vectors: Vec<[Vector3<f64>; 2]>,
+}
+
+/// The name of a pair: its kind and its features.
+fn name(pair: &Pair) -> [u32; 3] {
+    let [first, second] = pair.features;
+    [u32::from(pair.kind == PairKind::EdgeEdge), first, second]
+}
+
+impl Bristles {
+    /// Takes the pairs in order, each with its normal and the way that it has slid, in m.
+    pub fn new(pairs: impl Iterator<Item = (Pair, Vector3<f64>, Vector3<f64>)>) -> Self {
+        let (names, vectors) = pairs.map(|(pair, normal, way)| (name(&pair), [normal, shortened(way)])).unzip();
+        Self { names, vectors }
+    }
+
+    /// Returns the deflection of a pair, in m, across its normal. A point that has moved on to another triangle, or an
+    /// edge to another edge, keeps its deflection.
+    pub fn deflection(&self, pair: &Pair, normal: Vector3<f64>) -> Vector3<f64> {
+        let known = match self.names.binary_search(&name(pair)) {
+            Ok(place) => Some(place),
+            Err(_) => self.similar(pair, normal),
+        };
+        known.map_or([0.0; 3], |place| {
+            let [_, deflection] = self.vectors[place];
+            add_scaled(deflection, -dot(deflection, normal), normal)
+        })
+    }
+
+    /// The pair with the same first feature and the most similar normal, if it is similar at all.
+    fn similar(&self, pair: &Pair, normal: Vector3<f64>) -> Option<usize> {
+        let cosine = |place: &usize| dot(self.vectors[*place][0], normal);
+        let candidates = self.with_first_feature(pair).filter(|place| cosine(place) > SAME_CONTACT);
+        candidates.max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
+    }
+
+    fn with_first_feature(&self, pair: &Pair) -> Range<usize> {
+        let [kind, first, _] = name(pair);
+        let before = |name: &[u32; 3]| name[..2] < [kind, first][..];
+        let until = |name: &[u32; 3]| name[..2] <= [kind, first][..];
+        self.names.partition_point(before)..self.names.partition_point(until)
+    }
+
+    /// Returns the deflections for a checkpoint.
+    pub fn memory(self) -> ContactMemory {
+        ContactMemory { names: self.names, vectors: self.vectors }
+    }
+
+    /// Restores the deflections of a checkpoint.
+    pub fn restored(memory: ContactMemory) -> Self {
+        Self { names: memory.names, vectors: memory.vectors }
+    }
+}
+
+/// Shortens a way to the length of a bristle.
+fn shortened(way: Vector3<f64>) -> Vector3<f64> {
+    let length = norm(way);
+    if length > LENGTH { way.map(|component| LENGTH / length * component) } else { way }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UP: Vector3<f64> = [0.0, 0.0, 1.0];
+
+    fn pair(features: [u32; 2]) -> Pair {
+        Pair { kind: PairKind::PointTriangle, features, vertices: [0; 4] }
+    }
+
+    #[test]
+    fn deflections_are_short_and_lie_across_the_normal() {
+        let ways = [([3, 1], [5e-5, 0.0, 0.0]), ([3, 4], [0.0, 1.0, 0.0])];
+        let bristles = Bristles::new(ways.into_iter().map(|(features, way)| (pair(features), UP, way)));
+        assert_eq!(bristles.deflection(&pair([3, 1]), UP), [5e-5, 0.0, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 4]), UP), [0.0, LENGTH, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 1]), [0.6, 0.0, 0.8])[0], 5e-5 * 0.64);
+    }
+
+    #[test]
+    fn a_point_that_moves_on_keeps_its_deflection() {
+        let turned = [0.6, 0.0, 0.8];
+        let ways = [([3, 1], UP, [0.0, 5e-5, 0.0]), ([3, 4], turned, [0.0, 7e-5, 0.0])];
+        let bristles = Bristles::new(ways.into_iter().map(|(features, normal, way)| (pair(features), normal, way)));
+        assert_eq!(bristles.deflection(&pair([3, 2]), UP), [0.0, 5e-5, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 9]), turned), [0.0, 7e-5, 0.0]);
+        for (features, normal) in [([2, 1], UP), ([4, 1], UP), ([3, 2], [0.0, 0.0, -1.0])] {
+            assert_eq!(bristles.deflection(&pair(features), normal), [0.0; 3]);
+        }
+    }
+}
