@@ -89,8 +89,9 @@ class System(_System):
     """
 
     def linearise(self, x, curvature: str = "exact"):
-        """Returns U, ∂U/∂x of all vertices, and ∂²U/∂x² of the free ones as a scipy.sparse.bsr_array.
+        """Returns U, ∂U/∂x, and ∂²U/∂x² of the free vertices as a scipy.sparse.bsr_array.
 
+        Elements whose vertices are all pinned are left out: they are constant.
         With `curvature` "clamped" or "absolute", element Hessians are made positive semi-definite first. The pattern
         of the matrix stays the same from call to call.
         """

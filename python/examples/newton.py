@@ -1,6 +1,7 @@
 """Newton's method in twenty lines: a chain of springs hangs between two pins."""
 
 import numpy as np
+from scipy.sparse import eye_array
 from scipy.sparse.linalg import spsolve
 
 import energy_dsl as ed
@@ -21,7 +22,9 @@ for iteration in range(100):
     print(f"{iteration:3}  U = {U:.6f} J  |g| = {np.abs(g[free]).max():.1e} N")
     if np.abs(g[free]).max() < 1e-9:
         break
-    step, length = -spsolve(H.tocsc(), g[free].ravel()).reshape(-1, 3), 1.0
+    # A slack chain has no stiffness across; a little keeps the matrix regular.
+    H = H.tocsc() + 1e-4 * eye_array(H.shape[0], format="csc")
+    step, length = -spsolve(H, g[free].ravel()).reshape(-1, 3), 1.0
     trial = x.copy()
     trial[free] += step
     while system.energy(trial) > U and length > 1e-9:

@@ -66,7 +66,11 @@ pub fn outputs<'py>(
     };
     if given.len() != slots.len() {
         let names = slots.iter().map(|slot| slot.name).collect::<Vec<_>>().join(", ");
-        return Err(PyValueError::new_err(format!("out: expected {} arrays ({names}), got {}", slots.len(), given.len())));
+        return Err(PyValueError::new_err(format!(
+            "out: expected {} arrays ({names}), got {}",
+            slots.len(),
+            given.len()
+        )));
     }
     given.into_iter().zip(slots).map(|(array, slot)| output(array, slot)).collect()
 }

@@ -43,7 +43,8 @@ pub struct Element {
 #[pyfunction]
 #[pyo3(signature = (text, file = "<text>"))]
 pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>> {
-    let elements = py.detach(|| Interpreted::from_file(text, file).map_err(|errors| errors.to_string())).map_err(wrong)?;
+    let elements =
+        py.detach(|| Interpreted::from_file(text, file).map_err(|errors| errors.to_string())).map_err(wrong)?;
     Ok(elements.into_iter().map(|inner| Element { inner }).collect())
 }
 
@@ -93,7 +94,12 @@ impl Element {
             let unit = if input.unit.is_empty() { String::new() } else { format!(", in {}", input.unit) };
             format!("  {}: {} of shape {}{unit}\n", input.name, keyword(input.kind), tuple(&input.shape))
         });
-        format!("{}\n\n{}\n\nInputs of one element:\n{}", declaration.docs, declaration.formula, inputs.collect::<String>())
+        format!(
+            "{}\n\n{}\n\nInputs of one element:\n{}",
+            declaration.docs,
+            declaration.formula,
+            inputs.collect::<String>()
+        )
     }
 
     #[getter]
@@ -136,7 +142,13 @@ impl Element {
 
 impl Element {
     pub fn point_count(&self) -> usize {
-        self.inner.inputs().iter().filter(|input| input.kind == InputKind::Point).map(energy_compiler::InputNumbers::size).sum::<usize>() / 3
+        self.inner
+            .inputs()
+            .iter()
+            .filter(|input| input.kind == InputKind::Point)
+            .map(energy_compiler::InputNumbers::size)
+            .sum::<usize>()
+            / 3
     }
 
     pub fn unknown_count(&self) -> usize {

@@ -2,7 +2,12 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-create_exception!(energy_dsl, EnergyError, PyValueError, "A text, a scene or a rest shape that is wrong, with its place.");
+create_exception!(
+    energy_dsl,
+    EnergyError,
+    PyValueError,
+    "A text, a scene or a rest shape that is wrong, with its place."
+);
 
 /// Turns any error into a `ValueError` of the package.
 pub fn wrong(error: impl std::fmt::Display) -> PyErr {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cloth_core::run::{Ending, Event, Run, RunError, RunOptions};
+use cloth_core::run::{Ending, Event, Run, RunOptions};
 use cloth_core::scene::Scene;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
@@ -26,15 +26,30 @@ fn toml_text(text: &str) -> PyResult<String> {
     toml::to_string(&value).map_err(wrong)
 }
 
+/// Adds the line that a message about a text names: of a dictionary, users never see the text.
+fn with_line(text: &str, message: &str) -> String {
+    let number = message.split(':').nth(1).and_then(|number| number.parse::<usize>().ok());
+    match number.and_then(|number| text.lines().nth(number.checked_sub(1)?)) {
+        Some(line) => format!("{message}: {}", line.trim()),
+        None => message.to_owned(),
+    }
+}
+
 #[pymethods]
 impl Simulation {
     /// Reads the text of a scene. Relative paths in it start at the folder of `path`.
     #[new]
     #[pyo3(signature = (text, path = PathBuf::from("scene.toml"), threads = None))]
     fn new(text: &str, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
-        let scene = Scene::parse(&toml_text(text)?, &path).map_err(wrong)?;
+        let text = toml_text(text)?;
+        let scene = Scene::parse(&text, &path).map_err(|error| wrong(with_line(&text, &error.to_string())))?;
         let inner = cloth_core::Simulation::new(&scene).map_err(wrong)?;
-        Ok(Self { inner: match threads { Some(threads) => inner.with_threads(threads), None => inner } })
+        Ok(Self {
+            inner: match threads {
+                Some(threads) => inner.with_threads(threads),
+                None => inner,
+            },
+        })
     }
 
     /// Takes steps of the scene's time grid, at most until its end. Returns the number taken.
@@ -113,14 +128,17 @@ pub fn run(
 ) -> PyResult<u64> {
     let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
     let text = toml_text(text)?;
-    to_the_end(py, threads, || Run::new(text, Path::new(path), Path::new(output), options))
+    to_the_end(py, threads, || {
+        Run::new(text.clone(), Path::new(path), Path::new(output), options)
+            .map_err(|error| with_line(&text, &error.to_string()))
+    })
 }
 
 /// Resumes an interrupted run from the checkpoint in its folder, as `cloth resume` does.
 #[pyfunction]
 #[pyo3(signature = (output, *, accept_edited = false, threads = None))]
 pub fn resume(py: Python<'_>, output: &str, accept_edited: bool, threads: Option<usize>) -> PyResult<u64> {
-    to_the_end(py, threads, || Run::resume(Path::new(output), accept_edited))
+    to_the_end(py, threads, || Run::resume(Path::new(output), accept_edited).map_err(|error| error.to_string()))
 }
 
 /// How a run ended, without the interpreter's lock.
@@ -135,13 +153,13 @@ enum Outcome {
 fn to_the_end(
     py: Python<'_>,
     threads: Option<usize>,
-    start: impl FnOnce() -> Result<Run, RunError> + Send,
+    start: impl FnOnce() -> Result<Run, String> + Send,
 ) -> PyResult<u64> {
     let outcome = py.detach(|| {
         let mut run = match (start(), threads) {
             (Ok(run), Some(threads)) => run.with_threads(threads),
             (Ok(run), None) => run,
-            (Err(error), _) => return Outcome::Refused(error.to_string()),
+            (Err(message), _) => return Outcome::Refused(message),
         };
         let stop = AtomicBool::new(false);
         let ending = run.go(&stop, |event| {

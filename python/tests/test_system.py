@@ -35,8 +35,8 @@ def test_the_matrix_is_the_sum_of_the_elements():
         expected[3 * i : 3 * i + 6, 3 * i : 3 * i + 6] += h[0]
     gradient[:, 2] += 0.1
     np.testing.assert_allclose(H.toarray(), expected[3:15, 3:15], rtol=1e-14, atol=1e-10)
-    np.testing.assert_allclose(g, gradient, rtol=1e-13, atol=1e-12)
-    np.testing.assert_allclose(U, energy + 0.1 * x[:, 2].sum(), rtol=1e-13)
+    np.testing.assert_allclose(g[1:5], gradient[1:5], rtol=1e-13, atol=1e-12)
+    np.testing.assert_allclose(U, energy + 0.1 * x[1:5, 2].sum(), rtol=1e-13)
     assert system.energy(x) == U and system.free == [1, 2, 3, 4]
 
 

@@ -100,7 +100,7 @@ fn declarations_of_a_file_are_evaluated_and_timed() {
     let timed = verify(&["bench", "--file", &file]);
     let table = text(&timed.stdout);
     assert!(timed.status.success(), "{}", text(&timed.stderr));
-    for method in ["central differences", "dual numbers", "compiled routines", "multi-precision"] {
+    for method in ["central differences", "dual numbers", "tape, f64 lanes", "multi-precision"] {
         assert!(table.contains(&format!("| Mine | {method}")), "{table}");
     }
     std::fs::write(&file, "residual Mine(a: Scalar; b: Scalar) { a - b }").unwrap();
