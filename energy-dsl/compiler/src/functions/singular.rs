@@ -13,7 +13,7 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
     usage: "singular_values(F)",
     docs: "Singular values of a 2×2, 3×2 or 3×3 matrix as a vector, the largest first. For a square matrix, the last \
            one has the sign of det F. Expressions of them alone are differentiated as functions of F: those that are \
-           symmetric, such as s[0]^a + s[1]^a + s[2]^a, stay smooth where singular values meet. Others have no \
+           symmetric, such as `s[0]^a + s[1]^a + s[2]^a`, stay smooth where singular values meet. Others have no \
            derivative there and are flagged. So are those at which two sum to 0, or one of a 3×2 matrix is 0, unless \
            the expression is even.",
     shape: |shapes| deformation(shapes).map(Shape::Vector),
