@@ -25,7 +25,7 @@ struct Impact {
     steps: usize,
 }
 
-/// What is hit.
+/// The obstacle that is hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Target {
     /// A solid, from outside.

@@ -48,7 +48,8 @@ pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>
     Ok(elements.into_iter().map(|inner| Element { inner }).collect())
 }
 
-/// Returns the texts of the elements of the library, by name.
+/// Returns the texts of the elements of the library, by name. `energy_catalogue` has them, too, but compiles all their
+/// routines.
 #[pyfunction]
 pub fn catalogue() -> Vec<(&'static str, &'static str)> {
     macro_rules! texts {
@@ -122,7 +123,7 @@ impl Element {
     /// Number of unknowns of a residual.
     #[getter]
     fn unknowns(&self) -> usize {
-        self.unknown_count()
+        count(&self.inner, InputKind::Unknown)
     }
 
     fn __repr__(&self) -> String {
@@ -136,25 +137,19 @@ impl Element {
         let columns = Columns::new(self, count, inputs)?;
         let (rest, parameters) = (columns.of(InputKind::Rest)?, columns.of(InputKind::Parameter)?);
         let elements = self.inner.elements::<f64>(count, &rest, &parameters).map_err(wrong)?;
-        Ok(Elements { inner: elements })
+        Ok(Elements::new(elements))
     }
 }
 
 impl Element {
     pub fn point_count(&self) -> usize {
-        self.inner
-            .inputs()
-            .iter()
-            .filter(|input| input.kind == InputKind::Point)
-            .map(energy_compiler::InputNumbers::size)
-            .sum::<usize>()
-            / 3
+        count(&self.inner, InputKind::Point) / 3
     }
+}
 
-    pub fn unknown_count(&self) -> usize {
-        let unknowns = self.inner.inputs().iter().filter(|input| input.kind == InputKind::Unknown);
-        unknowns.map(energy_compiler::InputNumbers::size).sum()
-    }
+/// Returns the numbers of all inputs of a kind.
+pub fn count(element: &Interpreted, kind: InputKind) -> usize {
+    element.inputs().iter().filter(|input| input.kind == kind).map(energy_compiler::InputNumbers::size).sum()
 }
 
 macro_rules! evaluations {
@@ -231,7 +226,7 @@ fn keyword(kind: InputKind) -> &'static str {
 struct Columns<'a, 'py> {
     element: &'a Interpreted,
     count: usize,
-    /// By the order of the inputs; points have none.
+    /// In the order of the inputs; `None` for points.
     arrays: Vec<Option<PyReadonlyArrayDyn<'py, f64>>>,
 }
 

@@ -1,22 +1,23 @@
 //! Elements with bound inputs, evaluated in batches.
 
-use energy_compiler::Elements as Batch;
+use energy_compiler::{Elements as Batch, InputKind};
 use energy_dsl::Flagged;
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use crate::arrays::{Slot, doubles, numbers, outputs, tuple, writable, wrong_shape};
-use crate::element::Element;
+use crate::element::{Element, count};
 use crate::errors::wrong;
 
 /// Elements with bound rest shapes and parameters.
 #[pyclass(frozen, module = "energy_dsl")]
 pub struct Elements {
     pub inner: Batch<f64>,
+    sizes: Sizes,
 }
 
-/// What to evaluate.
+/// A routine of the elements.
 #[derive(Clone, Copy)]
 pub enum Call {
     Value,
@@ -48,6 +49,11 @@ impl Elements {
 }
 
 impl Elements {
+    pub fn new(inner: Batch<f64>) -> Self {
+        let sizes = Sizes::of(&inner);
+        Self { inner, sizes }
+    }
+
     pub fn evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -57,7 +63,7 @@ impl Elements {
         out: Option<&Bound<'py, PyAny>>,
         flags: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let sizes = Sizes::of(self);
+        let sizes = &self.sizes;
         let name = if matches!(call, Call::Residual | Call::Jacobian) { "u" } else { "x" };
         let expected = sizes.input(call);
         if x.shape() != expected {
@@ -120,10 +126,10 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn of(elements: &Elements) -> Self {
-        let element = Element { inner: elements.inner.element().clone() };
-        let (points, unknowns) = (element.point_count(), element.unknown_count());
-        Self { count: elements.inner.len(), points, rows: element.inner.declaration().rows, unknowns }
+    fn of(elements: &Batch<f64>) -> Self {
+        let element = elements.element();
+        let (points, unknowns) = (count(element, InputKind::Point) / 3, count(element, InputKind::Unknown));
+        Self { count: elements.len(), points, rows: element.declaration().rows, unknowns }
     }
 
     fn input(&self, call: Call) -> Vec<usize> {

@@ -114,7 +114,9 @@ fn vectors<'py>(py: Python<'py>, vectors: &[[f64; 3]]) -> PyResult<Bound<'py, Py
 
 /// Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps taken.
 #[pyfunction]
-#[pyo3(signature = (text, path, output, *, overwrite = false, checkpoint = None, ignore_memory = false, threads = None))]
+#[pyo3(signature = (
+    text, path, output, *, overwrite = false, checkpoint = None, ignore_memory = false, threads = None
+))]
 #[expect(clippy::too_many_arguments, reason = "all but three are keywords")]
 pub fn run(
     py: Python<'_>,

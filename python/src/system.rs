@@ -98,8 +98,8 @@ impl System {
         total(sum, &x)
     }
 
-    /// Returns U, ∂U/∂x, and ∂²U/∂x² of the free vertices as (offsets, columns, blocks). Elements whose vertices are all
-    /// pinned are left out: they are constant. With `curvature`
+    /// Returns U, ∂U/∂x, and ∂²U/∂x² of the free vertices as (offsets, columns, blocks). Elements whose vertices are
+    /// all pinned are left out: they are constant. With `curvature`
     /// "clamped" or "absolute", each element's Hessian is made positive semi-definite first.
     #[pyo3(signature = (x, curvature = "exact"))]
     fn linearise<'py>(&self, py: Python<'py>, x: &Bound<'py, PyAny>, curvature: &str) -> PyResult<Linearised<'py>> {

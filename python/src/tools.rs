@@ -1,4 +1,4 @@
-//! What the command `verify` does, on texts.
+//! The command `verify`, for texts.
 
 use energy_compiler::Listing;
 use pyo3::prelude::*;

@@ -57,7 +57,8 @@ def test_a_sweep_lists_its_runs_and_skips_those_that_are_done(tmp_path):
     assert [run["status"] for run in sweep.runs] == ["done"] * 4 and not sweep.failures
     assert again.runs == sweep.runs and (tmp_path / "index.csv").read_bytes() == index
     rows = list(csv.DictReader((tmp_path / "index.csv").open()))
-    assert {(row["fabric.density"], row["dt"]) for row in rows} == {(d, t) for d in ("0.1", "0.2") for t in ("0.01", "0.02")}
+    choices = {(density, dt) for density in ("0.1", "0.2") for dt in ("0.01", "0.02")}
+    assert {(row["fabric.density"], row["dt"]) for row in rows} == choices
     assert all((tmp_path / row["folder"] / "run.json").exists() for row in rows)
 
 

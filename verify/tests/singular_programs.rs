@@ -256,7 +256,7 @@ fn full(triangle: &[f64]) -> Vec<f64> {
     (0..81).map(|i| entry(i / 9, i % 9)).collect()
 }
 
-/// A number is the larger one where the other is none, but its derivatives are none, either.
+/// `max` returns the other number where one is NaN, but its derivatives are NaN.
 #[test]
 fn derivatives_at_infinite_inputs_are_flagged() {
     let mut x = [0.0; 9];

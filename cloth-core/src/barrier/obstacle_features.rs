@@ -1,4 +1,4 @@
-//! Which pairs of cloth and obstacle act as a contact.
+//! Selects the pairs of cloth and obstacle that act as a contact.
 //!
 //! The rules are those of cloth on cloth, with two differences.
 //! - Cloth lies flat across the edge of a table: its edges are level with their surroundings there, and still carry it.
@@ -20,7 +20,7 @@ impl Meeting<'_> {
         let [a, b, c, d] = pair.vertices;
         let has_triangles = |edge: u32| !mesh.apexes(edge as usize).is_empty();
         if !has_triangles(other) {
-            // Vertices of cloth touch rails by themselves.
+            // Vertices of cloth touch rails, too.
             return !has_triangles(own) || closest.weights.iter().all(|weight| *weight != 0.0);
         }
         let towards = closest.normal.map(|component| -component);

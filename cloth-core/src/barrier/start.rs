@@ -91,7 +91,7 @@ pub enum ContactError {
     },
 }
 
-/// What collides, and how, from the start on.
+/// The pairs that may collide from the start on, and their parameters.
 #[derive(Debug)]
 pub(crate) struct Participants {
     /// The features of cloth and hair, and the cores of obstacles.

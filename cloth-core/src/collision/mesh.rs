@@ -106,7 +106,7 @@ impl CollisionMesh {
         (vertex as usize).checked_sub(self.own).map(|place| self.owners[place] as usize)
     }
 
-    /// The obstacle that takes part in a pair; `None` for two features of cloth and hair.
+    /// The obstacle of a pair; `None` for two features of cloth and hair.
     #[inline]
     pub(crate) fn obstacle_of(&self, pair: &Pair) -> Option<usize> {
         let [first, second] = [pair.vertices[0], pair.vertices[pair.first()]];

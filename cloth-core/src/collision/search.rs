@@ -15,7 +15,7 @@ pub(crate) struct Search {
     rules: Rules,
 }
 
-/// Which features may collide, and how near.
+/// Selects the features that may collide, and their distance.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rules {
     /// Half the reach at each vertex, in m: pairs within the sum of the halves of their features are found.

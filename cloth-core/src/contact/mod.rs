@@ -6,8 +6,8 @@
 //!
 //! On a mesh, the nearest face, edge or corner acts as a plane, a capsule or a sphere of radius 0.
 //!
-//! Only vertices touch solids, not the triangles between them. The integrator `newton` does without these terms: solids
-//! take part in [`crate::barrier`], which knows them by their cores.
+//! Only vertices touch solids, not the triangles between them. The integrator `newton` does not use these terms:
+//! [`crate::barrier`] knows the cores of solids.
 
 mod cores;
 mod friction;

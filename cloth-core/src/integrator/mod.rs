@@ -99,7 +99,7 @@ pub struct StepReport {
     pub halvings: u64,
     /// Steps rejected and retried with a smaller size; see [`Adaptive`].
     pub rejected: u64,
-    /// What certified contact did.
+    /// Work of certified contact.
     pub contact: ContactWork,
     /// Wall time by phase; only [`Newton`] measures it.
     pub phases: Phases,

@@ -1,4 +1,4 @@
-//! Elements that are read at run time: what they report about themselves, and what they refuse.
+//! Elements that are read at run time: their descriptions and their refusals.
 
 use energy_compiler::{InputKind, Interpreted};
 use energy_runtime::tape::{Column, TAPE_BLOCK};

@@ -1,4 +1,5 @@
-//! Functions of singular values equal functions of the matrix that do not mention them, where singular values meet, too.
+//! Functions of singular values equal functions of the matrix that do not mention them, also where singular values
+//! meet.
 
 use energy_compiler::Interpreted;
 use energy_runtime::{Flags, Inputs};

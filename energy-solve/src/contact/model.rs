@@ -52,7 +52,7 @@ pub trait ContactModel: std::fmt::Debug {
     fn restore(&mut self, _memory: ContactMemory) {}
 }
 
-/// What contact keeps from step to step, such as how far sticking pairs have slid.
+/// State that contact keeps from step to step, such as how far sticking pairs have slid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactMemory {
     /// One name for each entry.

@@ -15,7 +15,7 @@ pub(super) struct Schedule<'a> {
     read: Reader<'a>,
     /// The expression of each statement's result: a variable, or an input.
     names: Vec<TokenStream>,
-    /// Number of statements that are no inputs.
+    /// Number of statements without the inputs.
     computed: usize,
     returned: Vec<NodeId>,
 }

@@ -177,8 +177,8 @@ fn rotated(g: &mut Graph, mut columns: Vec<Column>, rounds: usize) -> Vec<Column
     columns
 }
 
-/// Makes V orthogonal again, as V (3 − VᵀV)/2, and computes F V from it with twice the digits. So errors of rotations do
-/// not add up, and small singular values are as accurate as large ones.
+/// Makes V orthogonal again, as V (3 − VᵀV)/2, and computes F V from it with twice the digits. So errors of rotations
+/// do not add up, and small singular values are as accurate as large ones.
 fn polished(g: &mut Graph, columns: Vec<Column>, f: &Lowered, scale: NodeId) -> Vec<Column> {
     let (half, three) = (g.constant(0.5), g.constant(3.0));
     let (rows, count) = f.dimensions();
@@ -217,8 +217,8 @@ fn compensated_dot(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
     g.add(sum, error)
 }
 
-/// Returns cos φ and sin φ of the rotation after which a and b are orthogonal. With γ = a·b and δ = ‖b‖² − ‖a‖², tan φ =
-/// 2γ/(δ ± √(δ² + 4γ²)), where the sign is that of δ.
+/// Returns cos φ and sin φ of the rotation after which a and b are orthogonal. With γ = a·b and δ = ‖b‖² − ‖a‖²,
+/// tan φ = 2γ/(δ ± √(δ² + 4γ²)), where the sign is that of δ.
 fn rotation(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> (NodeId, NodeId) {
     let [zero, one, two] = [0.0, 1.0, 2.0].map(|number| g.constant(number));
     let (along, from, to) = (g.dot(a, b), g.dot(a, a), g.dot(b, b));

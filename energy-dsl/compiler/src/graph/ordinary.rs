@@ -64,7 +64,7 @@ pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeI
 #[derive(Default)]
 pub(super) struct Path {
     assumptions: BTreeMap<NodeId, Assumption>,
-    /// What each node becomes.
+    /// The copy of each node.
     done: BTreeMap<NodeId, NodeId>,
     guards: BTreeSet<NodeId>,
 }

@@ -52,7 +52,7 @@ impl Graph {
         &self.spectra
     }
 
-    /// Extends a list of what each node depends on, by index, to all nodes.
+    /// Extends a list of dependences, by the index of the node, to all nodes.
     pub(crate) fn trace_dependence(&self, known: &mut Vec<Dependence>) {
         for index in known.len()..self.len() {
             let dependence = self.dependence(NodeId(u32::try_from(index).expect("fewer than 2³² nodes")), known);

@@ -76,7 +76,7 @@ impl<S: Float> Elements<S> {
         self.tape.len()
     }
 
-    /// Returns whether there are no elements.
+    /// Returns whether the list is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.tape.is_empty()
@@ -85,7 +85,7 @@ impl<S: Float> Elements<S> {
     /// Writes U of each element.
     ///
     /// # Errors
-    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    /// When the declaration is a force or a residual, or the slices do not fit the range.
     pub fn values(&self, range: Range<usize>, x: &[S], energies: &mut [S]) -> Result<Flagged, EvaluateError> {
         let Layouts { value, .. } = self.layouts();
         self.evaluate("value", range, x, None, &mut [output("energies", value, energies)])
@@ -94,7 +94,7 @@ impl<S: Float> Elements<S> {
     /// Writes U and ∂U/∂x (3 p numbers) of each element.
     ///
     /// # Errors
-    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    /// When the declaration is a force or a residual, or the slices do not fit the range.
     pub fn gradients(
         &self,
         range: Range<usize>,
@@ -110,7 +110,7 @@ impl<S: Float> Elements<S> {
     /// Writes U, ∂U/∂x (3 p numbers) and ∂²U/∂x² (3 p × 3 p numbers, row by row) of each element.
     ///
     /// # Errors
-    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    /// When the declaration is a force or a residual, or the slices do not fit the range.
     pub fn hessians(
         &self,
         range: Range<usize>,
@@ -128,7 +128,7 @@ impl<S: Float> Elements<S> {
     /// Writes (∂²U/∂x²) v (3 p numbers) of each element.
     ///
     /// # Errors
-    /// When the declaration is no energy or constraint, or the slices do not fit the range.
+    /// When the declaration is a force or a residual, or the slices do not fit the range.
     pub fn hessian_vectors(
         &self,
         range: Range<usize>,
@@ -143,7 +143,7 @@ impl<S: Float> Elements<S> {
     /// Writes f(x, v) (3 p numbers) of each element.
     ///
     /// # Errors
-    /// When the declaration is no force or constraint, or the slices do not fit the range.
+    /// When the declaration is an energy or a residual, or the slices do not fit the range.
     pub fn forces(&self, range: Range<usize>, x: &[S], v: &[S], forces: &mut [S]) -> Result<Flagged, EvaluateError> {
         let Layouts { vectors, .. } = self.layouts();
         self.evaluate("force", range, x, Some(v), &mut [output("forces", vectors, forces)])
@@ -152,7 +152,7 @@ impl<S: Float> Elements<S> {
     /// Writes f(x, v) (3 p numbers), ∂f/∂x and ∂f/∂v (3 p × 3 p numbers each, row by row) of each element.
     ///
     /// # Errors
-    /// When the declaration is no force or constraint, or the slices do not fit the range.
+    /// When the declaration is an energy or a residual, or the slices do not fit the range.
     pub fn force_jacobians(
         &self,
         range: Range<usize>,
@@ -172,7 +172,7 @@ impl<S: Float> Elements<S> {
     /// Writes C (one number per row) and ∂C/∂x (3 p numbers per row) of each element.
     ///
     /// # Errors
-    /// When the declaration is no constraint, or the slices do not fit the range.
+    /// When the declaration is of another kind than a constraint, or the slices do not fit the range.
     pub fn constraints(
         &self,
         range: Range<usize>,
@@ -188,7 +188,7 @@ impl<S: Float> Elements<S> {
     /// Writes r (one number per row) of each element. `u` holds all unknowns of each element, in declared order.
     ///
     /// # Errors
-    /// When the declaration is no residual, or the slices do not fit the range.
+    /// When the declaration is of another kind than a residual, or the slices do not fit the range.
     pub fn residuals(&self, range: Range<usize>, u: &[S], residuals: &mut [S]) -> Result<Flagged, EvaluateError> {
         let Layouts { rows, .. } = self.layouts();
         self.evaluate("residual", range, u, None, &mut [output("residuals", rows, residuals)])
@@ -197,7 +197,7 @@ impl<S: Float> Elements<S> {
     /// Writes r (one number per row) and ∂r/∂u (one number per row and unknown) of each element.
     ///
     /// # Errors
-    /// When the declaration is no residual, or the slices do not fit the range.
+    /// When the declaration is of another kind than a residual, or the slices do not fit the range.
     pub fn jacobians(
         &self,
         range: Range<usize>,

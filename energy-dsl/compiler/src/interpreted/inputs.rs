@@ -1,4 +1,4 @@
-//! What an element reads, and the numbers that a caller binds to it.
+//! The inputs of an element, and the numbers that a caller binds to them.
 
 use std::fmt;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use crate::check::{Input, Program};
 use energy_runtime::tape::{Column, TapeElements};
 use energy_runtime::{Float, Kind, RestError};
 
-/// What an input is.
+/// The kind of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum InputKind {
     /// A point: three coordinates that derivatives are taken by.
@@ -27,7 +27,7 @@ pub enum InputKind {
 pub struct InputNumbers {
     /// Name, as declared.
     pub name: String,
-    /// What the input is.
+    /// Kind of the input.
     pub kind: InputKind,
     /// Length of each dimension, the outermost first; empty for a scalar.
     pub shape: Vec<usize>,
@@ -62,7 +62,7 @@ impl InputNumbers {
 /// Numbers that cannot be bound to elements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BindError {
-    /// Not one column for each input.
+    /// More or fewer columns than inputs.
     Columns {
         /// The element.
         element: &'static str,

@@ -1,4 +1,4 @@
-//! Where the numbers of full matrices are among the results of a routine.
+//! Places of the numbers of full matrices among the results of a routine.
 
 use energy_runtime::{Declaration, Kind, triangle_index};
 

@@ -116,7 +116,7 @@ impl Hazards {
             }
             Op::Abs(a) if order >= 1 => self.tie(g, a, zero),
             Op::Min(a, b) | Op::Max(a, b) if order >= 1 => {
-                // Where one is no number, the other one is returned.
+                // If one is NaN, the other one is returned.
                 let sum = g.add(a, b);
                 self.require_finite(g, sum);
                 self.tie(g, a, b);
@@ -134,14 +134,12 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
         for node in operations(g, &[root]) {
             match g.rule(node) {
                 Some(rule) => {
-                    let (flags, arguments) = (rule.flags.clone(), rule.arguments.clone());
                     let saturates = order >= 1 && rule.primitive.saturates();
-                    for flag in flags.into_iter().filter(|flag| flag.order <= order) {
+                    let saturated = if saturates { rule.arguments.clone() } else { Vec::new() };
+                    for flag in rule.flags.clone().into_iter().filter(|flag| flag.order <= order) {
                         found.flag(g, flag.flag, flag.mask);
                     }
-                    for argument in arguments.into_iter().filter(|_| saturates) {
-                        found.require_finite(g, argument);
-                    }
+                    saturated.into_iter().for_each(|argument| found.require_finite(g, argument));
                 }
                 None => found.operation(g, node, order),
             }

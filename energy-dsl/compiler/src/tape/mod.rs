@@ -21,7 +21,7 @@ pub(crate) struct RoutineCode {
     pub(crate) ordinary: Code,
     /// Whether a fault was planted in the ordinary path. The guard then does not share its statements.
     pub(crate) is_broken: bool,
-    /// Where the ordinary path suffices, and the path for other inputs.
+    /// The mask where the ordinary path suffices, and the path for other inputs.
     general: Option<(Code, Code)>,
     /// Whether the first group is of values, not of derivatives.
     values_first: bool,

@@ -37,7 +37,7 @@ pub enum BatchError {
     },
     /// A slice of inputs of another length than the elements need.
     Input {
-        /// What the slice holds.
+        /// Content of the slice.
         of: &'static str,
         /// Numbers that the elements need.
         needed: usize,

@@ -87,7 +87,7 @@ macro_rules! with_operations {
 
 macro_rules! define {
     ($($(#[$docs:meta])* $name:ident($($operand:ident),*) = $meaning:expr;)*) => {
-        /// What an [`Instruction`](super::Instruction) computes from its operands a, b, ….
+        /// The function that an [`Instruction`](super::Instruction) computes from its operands a, b, ….
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
         pub enum Operation {

@@ -133,7 +133,7 @@ impl<S: Float> TapeElements<S> {
         self.count
     }
 
-    /// Returns whether there are no elements.
+    /// Returns whether the list is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
@@ -142,7 +142,7 @@ impl<S: Float> TapeElements<S> {
     /// Returns the parameters and the stored numbers of an element.
     ///
     /// # Panics
-    /// When there is no such element.
+    /// When the index is too large.
     #[must_use]
     pub fn numbers_of(&self, element: usize) -> Vec<S> {
         assert!(element < self.count, "element {element} of {}", self.count);
@@ -152,7 +152,7 @@ impl<S: Float> TapeElements<S> {
     /// Returns the elements at some indices.
     ///
     /// # Panics
-    /// When there is no such element.
+    /// When the index is too large.
     #[must_use]
     pub fn selected(&self, indices: &[usize]) -> Self {
         let blocks = indices.len().div_ceil(TAPE_BLOCK);

@@ -9,7 +9,7 @@ use super::routine::{Input, Routine, TermNumber};
 use super::slots::{Results, Slots};
 use crate::numbers::{Float, Kernel, Lane, Level, dispatch};
 
-/// Where the points (or unknowns) of elements are, or the velocities of these points.
+/// Places of the points (or unknowns) of elements, or of the velocities of these points.
 #[derive(Clone, Copy, Debug)]
 pub enum Places<'a, S> {
     /// All coordinates of each element, one element after the other.

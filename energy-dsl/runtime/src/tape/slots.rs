@@ -107,7 +107,7 @@ impl<'a, S> Results<'a, S> {
         self.at.len()
     }
 
-    /// Returns whether there are no results.
+    /// Returns whether the list is empty.
     #[must_use]
     pub fn is_empty(self) -> bool {
         self.at.is_empty()

@@ -47,6 +47,9 @@ impl Spectral {
 
     /// Replaces all functions of singular values.
     pub(super) fn close(&mut self, g: &mut Graph, nodes: &mut [NodeId]) {
+        if g.spectra().is_empty() {
+            return;
+        }
         g.trace_dependence(&mut self.dependence);
         for node in nodes {
             if let Dependence::Spectral(index) = self.dependence[node.0 as usize]

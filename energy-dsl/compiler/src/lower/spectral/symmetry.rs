@@ -10,7 +10,7 @@ const TOLERANCE: f64 = 1e-9;
 
 /// Returns whether ψ is the same after a reflection, which maps all singular values to images.
 pub(super) fn is_unchanged(g: &mut Graph, psi: NodeId, images: &[(NodeId, NodeId)]) -> bool {
-    // Each singular value becomes an input of its own.
+    // Each singular value becomes an input.
     let inputs: Vec<NodeId> = (0..images.len()).map(|i| g.input(Input::Position(i as u16))).collect();
     let mut plain = Substitution::new(g, images.iter().map(|(value, _)| *value).zip(inputs));
     let mirrored: Vec<(NodeId, NodeId)> = images.iter().map(|&(value, image)| (value, plain.of(g, image))).collect();
