@@ -44,12 +44,12 @@ pub(super) fn rolling(pair: &Pair, closest: &Closest, x: &[Vector3<f64>]) -> imp
 
 /// Returns the sides along which the closest points can move: pairs of corners with both weights.
 fn sides(kind: PairKind, weights: &[f64; 4]) -> impl Iterator<Item = (usize, usize)> {
-    let all = match kind {
-        PairKind::PointTriangle => [(1, 2), (1, 3), (2, 3)],
-        PairKind::EdgeEdge => [(0, 1), (2, 3), (2, 3)],
+    let all: &[(usize, usize)] = match kind {
+        PairKind::PointTriangle => &[(1, 2), (1, 3), (2, 3)],
+        PairKind::EdgeEdge => &[(0, 1), (2, 3)],
     };
     let moves = weights.map(|weight| weight != 0.0);
-    all.into_iter().filter(move |(from, to)| moves[*from] && moves[*to]).take(2)
+    all.iter().copied().filter(move |(from, to)| moves[*from] && moves[*to]).take(2)
 }
 
 #[cfg(test)]

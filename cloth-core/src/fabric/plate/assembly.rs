@@ -139,7 +139,7 @@ fn add_outer_products<T: Precision>(factors: &[[Factors<T>; 3]], places: &PatchP
 struct Factors<T> {
     /// s a, each component three times.
     left: [T; 8],
-    /// a, again and again.
+    /// a, repeated.
     right: [T; 8],
     /// The factors of the last entry.
     last: [T; 2],
