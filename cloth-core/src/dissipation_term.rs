@@ -7,10 +7,10 @@ use energy_solve::{
 };
 
 /// Selects the elements that act during a step. Their parameters are fixed at its start; only velocities vary.
-pub(crate) trait DissipationLaw: std::fmt::Debug {
+pub(crate) trait DissipationLaw: std::fmt::Debug + Send {
     /// The element: a convex Rayleigh dissipation function, declared as an energy of the displacements per unit of
     /// time.
-    type Element: Potential<f64> + std::fmt::Debug;
+    type Element: Potential<f64> + std::fmt::Debug + Send;
     /// Returns the elements that act on stencils with a free vertex, each with the index of its stencil, in ascending
     /// order.
     fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, Self::Element)>;

@@ -4,6 +4,7 @@ mod arrays;
 mod element;
 mod errors;
 mod evaluation;
+mod exclusive;
 mod simulation;
 mod system;
 mod tools;
@@ -20,6 +21,7 @@ fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::Simulation>()?;
     module.add_function(wrap_pyfunction!(element::energies, module)?)?;
     module.add_function(wrap_pyfunction!(element::catalogue, module)?)?;
+    module.add_function(wrap_pyfunction!(element::library_element, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::run, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::resume, module)?)?;
     module.add_function(wrap_pyfunction!(tools::audit, module)?)?;

@@ -4,7 +4,13 @@
 //! the elements and compiles those.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "batches")]
+mod batches;
+
 use energy_dsl::AnyElement;
+
+#[cfg(feature = "batches")]
+pub use batches::{BatchRoutine, CompiledBatch, Scalar, bind};
 
 macro_rules! entries {
     ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<energy_elements::$name<f64>>()),*] };

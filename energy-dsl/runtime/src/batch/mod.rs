@@ -6,6 +6,7 @@
 
 mod error;
 mod forces;
+mod matrices;
 mod packed;
 mod potentials;
 mod residuals;
