@@ -57,8 +57,12 @@ pub trait CompiledBatch<S>: Send + Sync {
 /// assert_eq!(energies, [50.0, 0.0]);
 /// ```
 #[must_use]
-pub fn bind<S: Scalar>(name: &str, count: usize, numbers: impl Fn(usize) -> Vec<S>) -> Option<Box<dyn CompiledBatch<S>>> {
-    let (_, bind) = S::TABLE.iter().find(|(element, _)| *element == name)?;
+pub fn bind<S: Scalar>(
+    name: &str,
+    count: usize,
+    numbers: impl Fn(usize) -> Vec<S>,
+) -> Option<Box<dyn CompiledBatch<S>>> {
+    let (_, bind) = S::table().iter().find(|(element, _)| *element == name)?;
     bind(count, &numbers)
 }
 
@@ -68,24 +72,36 @@ type Bind<S> = fn(usize, &dyn Fn(usize) -> Vec<S>) -> Option<Box<dyn CompiledBat
 /// `f32` or `f64`.
 pub trait Scalar: Float + Send + Sync + 'static {
     #[doc(hidden)]
-    const TABLE: &'static [(&'static str, Bind<Self>)];
+    fn table() -> &'static [(&'static str, Bind<Self>)];
 }
 
+// Not inlined, and not a constant of the trait: a crate that used that would compile all kernels itself.
 macro_rules! table {
     ($($kind:ident $name:ident),*) => {
-        &[$((stringify!($name), $kind::<energy_elements::$name<Self>, Self> as Bind<Self>)),*]
+        &[$((stringify!($name), $kind::<energy_elements::$name<_>, _> as Bind<_>)),*]
     };
 }
 
 impl Scalar for f64 {
-    const TABLE: &'static [(&'static str, Bind<Self>)] = for_each_element!(with kinds table);
+    #[inline(never)]
+    fn table() -> &'static [(&'static str, Bind<Self>)] {
+        const TABLE: &[(&str, Bind<f64>)] = for_each_element!(with kinds table);
+        TABLE
+    }
 }
 
 impl Scalar for f32 {
-    const TABLE: &'static [(&'static str, Bind<Self>)] = for_each_element!(with kinds table);
+    #[inline(never)]
+    fn table() -> &'static [(&'static str, Bind<Self>)] {
+        const TABLE: &[(&str, Bind<f32>)] = for_each_element!(with kinds table);
+        TABLE
+    }
 }
 
-fn potential<E, S: Float + Send + Sync + 'static>(count: usize, numbers: &dyn Fn(usize) -> Vec<S>) -> Option<Box<dyn CompiledBatch<S>>>
+fn potential<E, S: Float + Send + Sync + 'static>(
+    count: usize,
+    numbers: &dyn Fn(usize) -> Vec<S>,
+) -> Option<Box<dyn CompiledBatch<S>>>
 where
     E: PackedPotential<S, Wide<S> = E> + Send + Sync + 'static,
 {
@@ -93,7 +109,10 @@ where
     packed(count, points, |i| E::load::<S>(&padded(numbers(i)), 1)).map(|packed| Box::new(Potentials(packed)) as _)
 }
 
-fn force<E, S: Float + Send + Sync + 'static>(count: usize, numbers: &dyn Fn(usize) -> Vec<S>) -> Option<Box<dyn CompiledBatch<S>>>
+fn force<E, S: Float + Send + Sync + 'static>(
+    count: usize,
+    numbers: &dyn Fn(usize) -> Vec<S>,
+) -> Option<Box<dyn CompiledBatch<S>>>
 where
     E: PackedForce<S, Wide<S> = E> + Send + Sync + 'static,
 {
@@ -101,7 +120,10 @@ where
     packed(count, points, |i| E::load::<S>(&padded(numbers(i)), 1)).map(|packed| Box::new(Forces(packed)) as _)
 }
 
-fn residual<E, S: Float + Send + Sync + 'static>(count: usize, numbers: &dyn Fn(usize) -> Vec<S>) -> Option<Box<dyn CompiledBatch<S>>>
+fn residual<E, S: Float + Send + Sync + 'static>(
+    count: usize,
+    numbers: &dyn Fn(usize) -> Vec<S>,
+) -> Option<Box<dyn CompiledBatch<S>>>
 where
     E: PackedResidual<S, Wide<S> = E> + Send + Sync + 'static,
 {
