@@ -147,9 +147,7 @@ fn output<'py, S: Precision>(array: Bound<'py, PyAny>, slot: &Slot) -> PyResult<
 }
 
 /// Borrows arrays for writing.
-pub fn writable<'py, S: Precision>(
-    arrays: &[Bound<'py, PyArrayDyn<S>>],
-) -> PyResult<Vec<PyReadwriteArrayDyn<'py, S>>> {
+pub fn writable<'py, S: Precision>(arrays: &[Bound<'py, PyArrayDyn<S>>]) -> PyResult<Vec<PyReadwriteArrayDyn<'py, S>>> {
     let borrow = |array: &Bound<'py, PyArrayDyn<S>>| {
         array.try_readwrite().map_err(|_| PyValueError::new_err("out: an array is read-only, or used twice"))
     };

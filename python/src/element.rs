@@ -3,9 +3,7 @@
 use energy_catalogue::BatchRoutine;
 use energy_compiler::{Elements as Tapes, InputKind, Interpreted};
 use energy_dsl::tape::Column;
-use numpy::{
-    PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -66,8 +64,9 @@ pub fn library_element(py: Python<'_>, name: &str) -> PyResult<Option<Element>> 
     let Some(declaration) = energy_elements::DECLARATIONS.iter().find(|declaration| declaration.name == name) else {
         return Ok(None);
     };
-    let mut elements =
-        py.detach(|| Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string())).map_err(wrong)?;
+    let mut elements = py
+        .detach(|| Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string()))
+        .map_err(wrong)?;
     Ok(elements.pop().map(|inner| Element { inner, is_of_library: true }))
 }
 

@@ -211,9 +211,7 @@ impl Sizes {
             BatchRoutine::Hessian => ([energy, gradient, slot("Hessian", matrix)], 3),
             BatchRoutine::HessianVector => ([slot("product", vectors), unused, unused], 1),
             BatchRoutine::Force => ([slot("force", vectors), unused, unused], 1),
-            BatchRoutine::ForceJacobians => {
-                ([slot("force", vectors), slot("∂f/∂x", matrix), slot("∂f/∂v", matrix)], 3)
-            }
+            BatchRoutine::ForceJacobians => ([slot("force", vectors), slot("∂f/∂x", matrix), slot("∂f/∂v", matrix)], 3),
             BatchRoutine::Constraint => {
                 ([slot("C", [n, rows].into()), slot("Jacobian", [n, rows, 3 * p].into()), unused], 2)
             }

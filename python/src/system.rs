@@ -103,7 +103,12 @@ impl System {
     /// all pinned are left out: they are constant. With `curvature`
     /// "clamped" or "absolute", each element's Hessian is made positive semi-definite first.
     #[pyo3(signature = (x, curvature = "exact"))]
-    fn linearise_blocks<'py>(&self, py: Python<'py>, x: &Bound<'py, PyAny>, curvature: &str) -> PyResult<Linearised<'py>> {
+    fn linearise_blocks<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+        curvature: &str,
+    ) -> PyResult<Linearised<'py>> {
         let curvature = match curvature {
             "exact" => Curvature::Exact,
             "clamped" => Curvature::Clamped,
