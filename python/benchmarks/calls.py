@@ -1,6 +1,6 @@
 """Overhead of calls from Python, and throughput of a large batch beside Rust.
 
-    cargo bench -p energy-elements --bench matrices --no-run      # prints the path of the program
+    cargo bench -p energy-catalogue --bench matrices --no-run      # prints the path of the program
     python python/benchmarks/calls.py [--rust PROGRAM]
 
 The overhead of a call is its time less that of the same elements in a large batch. Medians of the fastest rounds are
@@ -16,7 +16,7 @@ import numpy as np
 import energy_dsl as ed
 
 
-def fastest(call, rounds=30, seconds=0.01):
+def fastest(call, rounds=400, seconds=0.001):
     """Returns the microseconds of a call in the fastest of some rounds."""
     count = 1
     while (elapsed := timed(call, count)) < seconds:
@@ -43,7 +43,7 @@ def table(rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rust", help="the program of `cargo bench -p energy-elements --bench matrices`")
+    parser.add_argument("--rust", help="the program of `cargo bench -p energy-catalogue --bench matrices`")
     options = parser.parse_args()
     hinge, draw = ed.element("QuadraticHinge"), np.random.default_rng(1)
     one, x, out = hinge.bind(1, k=1.5, θ0=0.25), draw.normal(size=(1, 4, 3)), outputs(1, 4)
@@ -67,8 +67,8 @@ def main():
         if options.rust:
             run = subprocess.run([options.rust], check=True, capture_output=True, text=True)
             rust.append(float(run.stdout))
-        given.append(1e3 * fastest(lambda: many.hessian(x, out=out), 40) / count)
-        new.append(1e3 * fastest(lambda: many.hessian(x), 40) / count)
+        given.append(1e3 * fastest(lambda: many.hessian(x, out=out), 200) / count)
+        new.append(1e3 * fastest(lambda: many.hessian(x), 200) / count)
     print(f"\n{count} hinge Hessians, ns per hinge: `out=` {min(given):.1f}, new arrays {min(new):.1f}", end="")
     print(f"; Rust {min(rust):.1f}, ratio {min(given) / min(rust):.2f}" if rust else "")
 

@@ -20,7 +20,7 @@ from pathlib import Path as _Path
 from collections.abc import Callable as _Callable, Mapping as _Mapping
 from typing import TYPE_CHECKING, Any as _Any
 
-from ._energy import Element, Elements, EnergyError, Input, Simulation as _Simulation
+from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, Simulation as _Simulation
 from ._energy import System as _System, audit as _audit, catalogue, energies, library_element as _library_element
 from ._energy import resume as _resume, run as _run, show
 from .sweep import Sweep, sweep
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     _Progress = _Callable[[int, int], object]
 
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "Input", "Simulation", "Sweep", "System", "audit",
+    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Simulation", "Sweep", "System", "audit",
     "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
 
@@ -61,8 +61,9 @@ def load(path: str | _os.PathLike[str]) -> list[Element]:
 def element(name: str) -> Element:
     """Returns an element of the library, such as "HingeAngle". `catalogue()` lists their names.
 
-    Its energies, forces and residuals are compiled code, with the bits of the same text in `energy`. Constraints as
-    such, and their forces, run as tapes.
+    Up to 800 operations, its values, gradients, Hessians, forces, residuals and Jacobians are compiled code, with the
+    bits of the same text in `energy`. Larger elements and products with Hessians run as tapes. `bind(...).is_compiled`
+    tells.
     """
     found = _library_element(name)
     if found is None:

@@ -18,6 +18,9 @@ Progress: TypeAlias = Callable[[int, int], object]
 class EnergyError(ValueError):
     """A text, a scene or a rest shape that is wrong, with its place."""
 
+class FolderInUseError(EnergyError):
+    """The output folder belongs to another process that still runs."""
+
 class Input:
     """An input of an element."""
     @property

@@ -172,8 +172,10 @@ def run_one(job: dict[str, Any]) -> dict[str, Any]:
     start = time.perf_counter()
     results, status, message = {}, "done", ""
     try:
-        _run(job, folder, lambda: earlier + time.perf_counter() - start)
+        _run_when_free(job, folder, lambda: earlier + time.perf_counter() - start)
         results = _results(folder)
+    except BlockingIOError:
+        raise
     except (ValueError, RuntimeError, OSError) as error:
         status, message = "failed", str(error)
     seconds = round(earlier + time.perf_counter() - start, 3)
@@ -184,6 +186,20 @@ def run_one(job: dict[str, Any]) -> dict[str, Any]:
     _replace(done, json.dumps(result))
     clock.unlink(missing_ok=True)
     return result
+
+
+def _run_when_free(job: dict[str, Any], folder: Path, seconds: Callable[[], float]) -> None:
+    """Runs a job. Workers of a sweep that was killed may need a moment to end; another sweep in the folder is an error
+    of the caller, not a failed run."""
+    from . import _energy
+
+    for _ in range(100):
+        try:
+            return _run(job, folder, seconds)
+        except _energy.FolderInUseError as error:
+            refused = error
+            time.sleep(0.1)
+    raise BlockingIOError(str(refused))
 
 
 def _run(job: dict[str, Any], folder: Path, seconds: Callable[[], float]) -> None:
@@ -197,6 +213,8 @@ def _run(job: dict[str, Any], folder: Path, seconds: Callable[[], float]) -> Non
         try:
             _energy.resume(str(folder), threads=job["threads"], progress=note_time)
             return
+        except _energy.FolderInUseError:
+            raise
         except _energy.EnergyError:
             # The checkpoint is damaged or of another version.
             pass
@@ -212,7 +230,7 @@ def _results(folder: Path) -> dict[str, Any]:
     summary = record["summary"]
     energies = [term["energy"] for term in summary["terms"] if term["energy"] is not None]
     return {
-        "steps": summary["totals"]["steps"],
+        "steps": summary["steps"],
         "frames": record["frames"],
         "energy": sum(energies),
         "kinetic_energy": summary["kinetic_energy"],

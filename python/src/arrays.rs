@@ -3,7 +3,7 @@
 use std::ops::Deref;
 
 use numpy::{
-    PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArray,
+    PyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods, ndarray::arr0,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -35,16 +35,17 @@ pub fn array<'py, S: Precision>(name: &str, value: &Bound<'py, PyAny>) -> PyResu
         let number = arr0(S::from_f64(value.extract()?));
         return Ok(PyArray::from_owned_array(value.py(), number).to_dyn().readonly());
     }
-    let options = PyDict::new(value.py());
-    options.set_item("dtype", S::DTYPE)?;
-    options.set_item("order", "C")?;
-    let array = value.py().import("numpy")?.call_method("asarray", (value,), Some(&options)).map_err(|_| {
-        let found = match value.cast::<PyUntypedArray>() {
-            Ok(array) => format!("an array of dtype {}", array.dtype()),
-            Err(_) => value.get_type().name().map_or_else(|_| "another type".into(), |name| name.to_string()),
-        };
-        PyTypeError::new_err(format!("{name}: expected an array of numbers, got {found}"))
-    })?;
+    let refused = |found: String| PyTypeError::new_err(format!("{name}: expected an array of numbers, got {found}"));
+    let other = || value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string());
+    let given = value.py().import("numpy")?.call_method1("asarray", (value,)).map_err(|_| refused(other()))?;
+    let dtype = given.cast::<PyUntypedArray>()?.dtype();
+    // Booleans, integers, floating-point numbers.
+    if !b"biuf".contains(&dtype.kind()) {
+        return Err(refused(format!("dtype {dtype}")));
+    }
+    let order = PyDict::new(value.py());
+    order.set_item("order", "C")?;
+    let array = given.call_method("astype", (S::DTYPE,), Some(&order))?;
     Ok(array.cast_into::<PyArrayDyn<S>>()?.readonly())
 }
 

@@ -14,6 +14,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("EnergyError", module.py().get_type::<errors::EnergyError>())?;
+    module.add("FolderInUseError", module.py().get_type::<errors::FolderInUseError>())?;
     module.add_class::<element::Element>()?;
     module.add_class::<element::Input>()?;
     module.add_class::<evaluation::Elements>()?;

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cloth_core::run::{Ending, Event, Run, RunOptions};
+use cloth_core::output::OutputError;
+use cloth_core::run::{Ending, Event, Run, RunError, RunOptions};
 use cloth_core::scene::Scene;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
-use crate::errors::{failed, wrong};
+use crate::errors::{FolderInUseError, failed, wrong};
 use crate::exclusive::Exclusive;
 
 /// A scene that is stepped by hand.
@@ -146,7 +147,7 @@ pub fn run(
     let text = toml_text(text)?;
     to_the_end(py, threads, progress, || {
         Run::new(text.clone(), Path::new(path), Path::new(output), options)
-            .map_err(|error| with_line(&text, &error.to_string()))
+            .map_err(|error| Refusal { message: with_line(&text, &error.to_string()), ..error.into() })
     })
 }
 
@@ -160,13 +161,25 @@ pub fn resume(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<u64> {
-    let start = || Run::resume(Path::new(output), accept_edited).map_err(|error| error.to_string());
-    to_the_end(py, threads, progress, start)
+    to_the_end(py, threads, progress, || Ok(Run::resume(Path::new(output), accept_edited)?))
+}
+
+/// Why a run cannot start.
+struct Refusal {
+    message: String,
+    folder_is_in_use: bool,
+}
+
+impl From<RunError> for Refusal {
+    fn from(error: RunError) -> Self {
+        let folder_is_in_use = matches!(error, RunError::Output(OutputError::InUse { .. }));
+        Self { message: error.to_string(), folder_is_in_use }
+    }
 }
 
 /// How a run ended, without the interpreter's lock.
 enum Outcome {
-    Refused(String),
+    Refused(Refusal),
     Failed(String),
     Done(u64),
 }
@@ -177,14 +190,14 @@ fn to_the_end(
     py: Python<'_>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-    start: impl FnOnce() -> Result<Run, String> + Send,
+    start: impl FnOnce() -> Result<Run, Refusal> + Send,
 ) -> PyResult<u64> {
     let mut raised = None;
     let outcome = py.detach(|| {
         let mut run = match (start(), threads) {
             (Ok(run), Some(threads)) => run.with_threads(threads),
             (Ok(run), None) => run,
-            (Err(message), _) => return Outcome::Refused(message),
+            (Err(refusal), _) => return Outcome::Refused(refusal),
         };
         let stop = AtomicBool::new(false);
         let ending = run.go(&stop, |event| {
@@ -210,7 +223,10 @@ fn to_the_end(
             Err(PyKeyboardInterrupt::new_err("the run was interrupted; its results so far were written"))
         }
         (Some(error), _) => Err(error),
-        (None, Outcome::Refused(message)) => Err(wrong(message)),
+        (None, Outcome::Refused(Refusal { message, folder_is_in_use: true })) => {
+            Err(FolderInUseError::new_err(message))
+        }
+        (None, Outcome::Refused(Refusal { message, .. })) => Err(wrong(message)),
         (None, Outcome::Failed(message)) => Err(PyRuntimeError::new_err(message)),
         (None, Outcome::Done(steps)) => Ok(steps),
     }

@@ -56,7 +56,7 @@ def test_wrong_results_name_the_expected_shape(springs, shape, which):
 def test_arrays_of_other_things_are_refused(springs, dtype):
     things = np.full(SHAPE, None, object) if dtype is object else np.zeros(SHAPE, dtype)
     for elements in springs:
-        with pytest.raises((TypeError, ValueError), match="x: "):
+        with pytest.raises(TypeError, match="x: expected an array of numbers, got dtype"):
             elements.value(things)
 
 
@@ -153,12 +153,12 @@ def test_a_second_thread_in_one_system_is_told_so():
 def test_a_second_thread_in_one_simulation_is_told_so():
     scene = {
         "dt": 0.01, "duration": 1.0, "gravity": [0.0, 0.0, -9.81],
-        "mesh": {"sheet": {"cells": [12, 12], "size": [1.0, 1.0]}},
+        "mesh": {"sheet": {"cells": [24, 24], "size": [1.0, 1.0]}},
         "fabric": {"density": 0.15, "material": {"stvk": {"stretch_stiffness": 50.0, "poisson_ratio": 0.3}}},
         "pins": [{"nearest": [-0.5, 0.5, 0.0]}],
     }
     simulation, alone = ed.Simulation(scene, threads=1), ed.Simulation(scene, threads=1)
-    running = threading.Thread(target=lambda: simulation.step(60))
+    running = threading.Thread(target=lambda: simulation.step(30))
     running.start()
     raised = []
     while running.is_alive():
@@ -168,7 +168,7 @@ def test_a_second_thread_in_one_simulation_is_told_so():
             raised.append(str(error))
     running.join()
     assert raised and "this Simulation is in use by another thread" in raised[0]
-    alone.step(60)
+    alone.step(30)
     assert np.array_equal(simulation.positions, alone.positions)
 
 

@@ -101,7 +101,8 @@ impl Sweep {
             true => Run::resume(&folder, false).or_else(|_| start()),
             false => start(),
         };
-        let ending = run?.with_threads(1).go(interrupts.flag(), |_| ())?;
+        let run = run.map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
+        let ending = run.with_threads(1).go(interrupts.flag(), |_| ())?;
         match ending {
             Ending { failure: Some(failure), .. } => Err(failure.into()),
             Ending { finished: true, abandoned: false, .. } => Ok(std::fs::write(done, "")?),
@@ -154,6 +155,15 @@ const COLUMNS: [&str; 10] = [
     "warnings",
     "message",
 ];
+
+/// Adds the line of the text that a message names. Users never see the text: its values come from two files.
+fn with_line(text: &str, message: &str) -> String {
+    let number = message.split(':').nth(1).and_then(|number| number.parse::<usize>().ok());
+    match number.and_then(|number| text.lines().nth(number.checked_sub(1)?)) {
+        Some(line) => format!("{message}: {}", line.trim()),
+        None => message.to_owned(),
+    }
+}
 
 /// Returns the results of a run for the index, and the seconds of its steps.
 fn results(folder: &Path) -> Result<(Vec<String>, String)> {

@@ -4,12 +4,14 @@
 //! the elements and compiles those.
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "batches")]
 mod batches;
+#[cfg(feature = "batches")]
+mod kernels;
+#[cfg(feature = "batches")]
+mod matrices;
 
 use energy_dsl::AnyElement;
 
-#[cfg(feature = "batches")]
 pub use batches::{BatchRoutine, CompiledBatch, Scalar, bind};
 
 macro_rules! entries {

@@ -6,7 +6,6 @@
 
 mod error;
 mod forces;
-mod matrices;
 mod packed;
 mod potentials;
 mod residuals;

@@ -109,7 +109,7 @@ impl<S: Float, E: PackedPotential<S>, W: BatchWork<E, S>> Kernel for Batches<'_,
     }
 }
 
-pub(super) fn points_of<S: Float, E: PackedPotential<S>>() -> usize {
+fn points_of<S: Float, E: PackedPotential<S>>() -> usize {
     <E::Points as Array<Vector3<S>>>::LEN
 }
 

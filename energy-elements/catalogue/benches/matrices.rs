@@ -1,7 +1,12 @@
 //! Nanoseconds per hinge for value, gradient and full Hessian of 10,000 hinges, row by row, as the Python package
-//! writes them: `cargo bench -p energy-elements --bench matrices`. `python/benchmarks/calls.py` runs it in turns with
+//! writes them: `cargo bench -p energy-catalogue --bench matrices`. `python/benchmarks/calls.py` runs it in turns with
 //! calls from Python.
 #![allow(missing_docs)]
+
+// Only the kernel of hinges is compiled, not those of the feature `batches`.
+#[expect(dead_code, reason = "the part for forces")]
+#[path = "../src/matrices.rs"]
+mod matrices;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -22,14 +27,14 @@ fn main() {
     let hinge: QuadraticHinge = QuadraticHinge::new(1.5, 0.25);
     let hinges = Packed::from_fn(COUNT, POINTS, |_| &hinge, |i, point| (POINTS * i + point) as u32);
     let (mut energies, mut gradients) = (vec![0.0; COUNT], vec![0.0; COUNT * 3 * POINTS]);
-    let mut matrices = vec![0.0; COUNT * 9 * POINTS * POINTS];
+    let mut hessians = vec![0.0; COUNT * 9 * POINTS * POINTS];
     let mut best = f64::INFINITY;
     for _ in 0..200 {
         let start = Instant::now();
-        let flagged = hinges.hessian_matrices(0..COUNT, black_box(&x), &mut energies, &mut gradients, &mut matrices);
+        let flagged = matrices::hessian_matrices(&hinges, black_box(&x), &mut energies, &mut gradients, &mut hessians);
         best = best.min(start.elapsed().as_secs_f64());
         drop(black_box(flagged));
-        black_box((&energies, &gradients, &matrices));
+        black_box((&energies, &gradients, &hessians));
     }
     println!("{:.2}", 1e9 * best / COUNT as f64);
 }
