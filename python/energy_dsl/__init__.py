@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     _Progress = _Callable[[int, int], object]
 
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Simulation", "Sweep", "System", "audit",
-    "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
+    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Simulation", "Sweep", "System",
+    "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
 
 

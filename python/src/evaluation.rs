@@ -41,7 +41,7 @@ impl Elements {
         any!(self, batch => batch.tapes.len())
     }
 
-    /// The declaration.
+    /// Returns the declaration that was bound.
     #[getter]
     fn element(&self) -> Element {
         let inner = any!(self, batch => batch.tapes.element()).clone();

@@ -73,7 +73,8 @@ def test_compiled_code_has_the_bits_of_tapes(name):
         x, v = draw.normal(size=(2, count, *width)).astype(dtype)
         # One element with all points at the same place, which takes the general path.
         x[0] = 0.5
-        a, b = compiled.bind(count, dtype, **given), tape.bind(count, dtype, **{plain(key): value for key, value in given.items()})
+        renamed = {plain(key): value for key, value in given.items()}
+        a, b = compiled.bind(count, dtype, **given), tape.bind(count, dtype, **renamed)
         assert not b.is_compiled and a.dtype == b.dtype == np.dtype(dtype).name
         for routine in routines(compiled):
             arguments = (x, v) if routine in ("hessian_vector", "force", "force_jacobians") else (x,)

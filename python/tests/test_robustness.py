@@ -70,7 +70,11 @@ def test_a_number_that_is_none_is_found(springs, index, dtype):
             elements.gradient(x)
 
 
-@given(axes=st.permutations(range(3)), step=st.sampled_from([-2, -1, 1, 2]), dtype=st.sampled_from(["f8", "f4", "i4", ">f8"]))
+@given(
+    axes=st.permutations(range(3)),
+    step=st.sampled_from([-2, -1, 1, 2]),
+    dtype=st.sampled_from(["f8", "f4", "i4", ">f8"]),
+)
 @settings(max_examples=40, deadline=None)
 def test_any_strides_give_the_same_bits(springs, axes, step, dtype):
     wide = (100 * np.random.default_rng(1).normal(size=(10, POINTS, 3))).astype(dtype)

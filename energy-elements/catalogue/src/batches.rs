@@ -5,7 +5,7 @@ use energy_dsl::{BatchError, Flagged, Float};
 /// A routine of many elements: what is written for each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BatchRoutine {
-    /// U.
+    /// Energies U.
     Value,
     /// U and ∂U/∂x.
     Gradient,
@@ -28,7 +28,7 @@ pub enum BatchRoutine {
 /// Elements of one type with bound parameters. Element i reads the i-th numbers of `x` and `v`: three coordinates for
 /// each point, or its unknowns.
 pub trait CompiledBatch<S>: Send + Sync {
-    /// Writes the results of a routine for all elements. `v` may be empty if the routine reads no velocities or vectors.
+    /// Writes the results of a routine for all elements. `v` may be empty if the routine does not read it.
     /// `None` if the routine is not compiled: products of Hessians and
     /// vectors, and constraints as such with their forces.
     fn evaluate(
@@ -41,12 +41,9 @@ pub trait CompiledBatch<S>: Send + Sync {
 }
 
 /// Binds `count` compiled elements to their numbers: `numbers(i)` returns parameters and stored numbers of element i,
-/// as [`energy_dsl::Stored`] lists them. `None`
-///
-/// - if the library has no element of this name,
-/// - if a routine of the element has more than 800 operations, which takes too long to compile,
-/// - if there are too many elements to index their coordinates by `u32`,
-/// - without the feature `batches`.
+/// as [`energy_dsl::Stored`] lists them. The
+/// result is `None` without the feature `batches`, for an unknown name, and for elements whose largest routine has more
+/// than 800 operations. These take too long to compile. It is also `None` if coordinates cannot be indexed by `u32`.
 ///
 /// ```
 /// # #[cfg(feature = "batches")] {

@@ -25,7 +25,7 @@ const fn is_small(declaration: &Declaration) -> bool {
     true
 }
 
-// Not inlined, and not a constant of the trait: a crate that used that would compile all kernels itself.
+// A function that is not inlined. With a constant of the trait, each crate that uses it would compile all kernels.
 macro_rules! table {
     ($($kind:ident $name:ident),*) => {
         &[$({
@@ -84,7 +84,7 @@ where
     packed(count, unknowns, |i| E::load::<S>(&padded(numbers(i)), 1)).map(|packed| Box::new(Residuals(packed)) as _)
 }
 
-/// Returns numbers that a lane can be loaded from, also if an element has none.
+/// Pads an empty list: a lane needs one number.
 fn padded<S: Float>(numbers: Vec<S>) -> Vec<S> {
     if numbers.is_empty() { vec![S::from_f64(0.0)] } else { numbers }
 }

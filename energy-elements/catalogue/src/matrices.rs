@@ -80,7 +80,7 @@ fn note_flags<V: Real>(flagged: &mut Flagged, first: usize, count: usize, flags:
     }
 }
 
-/// Not inlined: flags are rare.
+/// Adds the flags of a batch. Flags are rare, so this is not inlined.
 #[cold]
 #[inline(never)]
 fn add_flags<M: Mask>(flagged: &mut Flagged, first: usize, count: usize, degenerate: M, kink: M) {
