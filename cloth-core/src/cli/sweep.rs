@@ -1,6 +1,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::slice;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -205,7 +206,7 @@ fn flatten(prefix: &str, table: &Table, grid: &mut Vec<(String, Vec<Value>)>) ->
 fn choices(base: &Table, grid: &[(String, Vec<Value>)]) -> Result<Vec<Choice>> {
     let mut combinations: Vec<Vec<Value>> = vec![Vec::new()];
     for (_, values) in grid {
-        let extend = |head: Vec<Value>| values.iter().map(move |value| [&head[..], &[value.clone()]].concat());
+        let extend = |head: Vec<Value>| values.iter().map(move |value| [&head[..], slice::from_ref(value)].concat());
         combinations = combinations.into_iter().flat_map(extend).collect();
     }
     let choice = |values: Vec<Value>| {

@@ -41,9 +41,11 @@ pub trait CompiledBatch<S>: Send + Sync {
 }
 
 /// Binds `count` compiled elements to their numbers: `numbers(i)` returns parameters and stored numbers of element i,
-/// as [`energy_dsl::Stored`] lists them. The
-/// result is `None` without the feature `batches`, for an unknown name, and for elements whose largest routine has more
-/// than 800 operations. These take too long to compile. It is also `None` if coordinates cannot be indexed by `u32`.
+/// as [`energy_dsl::Stored`] lists them.
+///
+/// The result is `None` without the feature `batches`, for an unknown name, and for elements whose largest routine has
+/// more than 800 operations. These take too long to compile. It is also `None` if coordinates cannot be indexed by
+/// `u32`.
 ///
 /// ```
 /// # #[cfg(feature = "batches")] {
