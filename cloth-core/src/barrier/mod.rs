@@ -27,6 +27,7 @@ mod friction;
 mod joined;
 mod obstacle_features;
 mod resistance;
+mod rolling;
 mod spacing;
 mod start;
 
@@ -42,6 +43,7 @@ use feasible::Meeting;
 use friction::Friction;
 use joined::{Joined, Law};
 use resistance::Resistance;
+use rolling::rolling;
 use spacing::{Spacing, Spacings};
 
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
@@ -258,16 +260,19 @@ impl ContactModel for BarrierContact {
 
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
         let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
-        let mut contacts = Vec::new();
+        let (mut contacts, mut active) = (Vec::new(), 0);
         self.joined.for_each_active(x, |pair, law, closest| {
-            let (curvature, n) = (law.curvature(law.apart(closest)), closest.normal);
-            contacts.push(Contact {
-                rows: pair.vertices.each_ref().map(row),
-                weights: closest.weights,
-                block: std::array::from_fn(|i| std::array::from_fn(|j| curvature * n[i] * n[j])),
-            });
+            let (apart, n) = (law.apart(closest), closest.normal);
+            let rows = pair.vertices.each_ref().map(row);
+            let along_normal = |stiffness: f64| n.map(|a| n.map(|b| stiffness * a * b));
+            contacts.push(Contact { rows, weights: closest.weights, block: along_normal(law.curvature(apart)) });
+            if self.mesh.obstacle_of(pair).is_some() {
+                let block = along_normal(law.force(apart) * closest.distance);
+                contacts.extend(rolling(pair, closest, x).map(|weights| Contact { rows, weights, block }));
+            }
+            active += 1;
         });
-        self.counts.active += contacts.len() as u64;
+        self.counts.active += active;
         self.counts.systems += 1;
         self.friction.add_contacts(x, row, &mut contacts);
         contacts
