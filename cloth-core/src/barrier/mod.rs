@@ -18,6 +18,9 @@
 //! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
 //! vertices are against a displacement along the normal. Nothing is left to tune.
 //!
+//! **Stiffness of a contact.** The Hessian keeps β″ along the normal and the resistance to rolling on obstacles
+//! (`rolling.rs`). The other parts of the curvature of the distance are small or negative.
+//!
 //! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
 //! certified states only.
 
@@ -268,7 +271,9 @@ impl ContactModel for BarrierContact {
             contacts.push(Contact { rows, weights: closest.weights, block: along_normal(law.curvature(apart)) });
             if self.mesh.obstacle_of(pair).is_some() {
                 let block = along_normal(law.force(apart) * closest.distance);
-                contacts.extend(rolling(pair, closest, x).map(|weights| Contact { rows, weights, block }));
+                let is_free = |(row, weight): (&u32, &f64)| *row != Contact::FIXED && *weight != 0.0;
+                let tilts = rolling(pair, closest, x).filter(|weights| rows.iter().zip(weights).any(is_free));
+                contacts.extend(tilts.map(|weights| Contact { rows, weights, block }));
             }
             active += 1;
         });

@@ -32,12 +32,11 @@ impl Projection {
         *self = Self { curvature: Curvature::Clamped, left: self.next, next: self.next.saturating_mul(2) };
     }
 
-    /// Records an iteration that lowered the energy.
-    pub(super) fn proceed(&mut self) {
-        self.left = self.left.saturating_sub(1);
-        if self.left == 0 {
-            self.curvature = Curvature::Exact;
-        }
+    /// Records an iteration that lowered the energy. If contact shortened its step, the next Hessian is projected: the
+    /// barriers that stopped the step are far from quadratic.
+    pub(super) fn proceed(&mut self, is_free: bool) {
+        self.left = self.left.saturating_sub(1).max(u32::from(!is_free));
+        self.curvature = if self.left == 0 { Curvature::Exact } else { Curvature::Clamped };
     }
 }
 
@@ -52,12 +51,23 @@ mod tests {
             projection.demand();
             let mut count = 0;
             while !projection.is_exact() {
-                projection.proceed();
+                projection.proceed(true);
                 count += 1;
             }
             assert_eq!(count, waits);
-            projection.proceed();
+            projection.proceed(true);
             assert!(projection.is_exact());
         }
+    }
+
+    #[test]
+    fn one_projected_iteration_follows_a_step_that_contact_shortened() {
+        let mut projection = Projection::on_demand();
+        projection.proceed(false);
+        assert!(!projection.is_exact());
+        projection.proceed(false);
+        assert!(!projection.is_exact());
+        projection.proceed(true);
+        assert!(projection.is_exact());
     }
 }

@@ -90,15 +90,19 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
     #[inline(always)]
     fn run<L: Level>(self) {
         let Self { of, angles, s, matrix } = self;
-        let (mut rows, mut factors): (Vec<Row>, Vec<[Factors<T>; 3]>) = (Vec::new(), Vec::new());
+        let s = T::from_f64(s);
+        let (mut rows, mut factors): (Vec<Row<T>>, Vec<[Factors<T>; 3]>) = (Vec::new(), Vec::new());
         for (patches, places) in of.active.chunks(GROUP).zip(of.places.chunks(GROUP)) {
             rows.clear();
             for &patch in patches {
                 of.patches[patch].append_gradients(&angles.gradients, &mut rows);
             }
-            factors.clear();
-            for [a, b, c] in &rows {
-                factors.push([Factors::new(s, a), Factors::new(s, b), Factors::new(s, c)]);
+            // Written in place: pushes would spill the registers.
+            factors.resize(rows.len(), [Factors::new(s, &[T::from_f64(0.0); 4]); 3]);
+            for (factors, row) in factors.iter_mut().zip(&rows) {
+                for k in 0..3 {
+                    factors[k] = Factors::new(s, &row[k]);
+                }
             }
             let mut left = &factors[..];
             for places in places {
@@ -143,15 +147,10 @@ struct Factors<T> {
 
 impl<T: Precision> Factors<T> {
     #[inline(always)]
-    fn new(s: f64, vector: &[f64; 4]) -> Self {
-        let zero = T::from_f64(0.0);
-        let mut factors = Self { left: [zero; 8], right: [zero; 8], last: [zero; 2] };
-        for entry in 0..8 {
-            factors.left[entry] = T::from_f64(s * vector[entry / 3]);
-            factors.right[entry] = T::from_f64(vector[entry % 3]);
-        }
-        factors.last = [T::from_f64(s * vector[2]), T::from_f64(vector[2])];
-        factors
+    fn new(s: T, vector: &[T; 4]) -> Self {
+        let [a, b, c, _] = *vector;
+        let (x, y, z) = (s * a, s * b, s * c);
+        Self { left: [x, x, x, y, y, y, z, z], right: [a, b, c, a, b, c, a, b], last: [z, c] }
     }
 }
 

@@ -44,7 +44,7 @@ pub struct PlateTerm {
 }
 
 /// Three vectors, each padded to four components.
-pub(super) type Row = [[f64; 4]; 3];
+pub(super) type Row<T> = [[T; 4]; 3];
 
 /// A triangle and the hinges that its curvature depends on.
 #[derive(Clone, Debug)]
@@ -306,17 +306,18 @@ impl Patch {
 
     /// Appends ∇r: three vectors per vertex.
     #[inline(always)]
-    pub(super) fn append_gradients(&self, gradients: &[[[f64; 4]; 4]], all: &mut Vec<Row>) {
+    pub(super) fn append_gradients<T: Precision>(&self, gradients: &[[[f64; 4]; 4]], all: &mut Vec<Row<T>>) {
         let first = all.len();
-        all.resize(first + self.vertices.len(), [[0.0; 4]; 3]);
+        all.resize(first + self.vertices.len(), [[T::from_f64(0.0); 4]; 3]);
         let rows = &mut all[first..];
         for angle in &self.angles {
             let gradient = &gradients[angle.hinge];
             for point in 0..4 {
                 let row = &mut rows[angle.local[point] as usize];
                 for k in 0..3 {
+                    let b = T::from_f64(angle.b[k]);
                     for axis in 0..4 {
-                        row[k][axis] += angle.b[k] * gradient[point][axis];
+                        row[k][axis] = row[k][axis] + b * T::from_f64(gradient[point][axis]);
                     }
                 }
             }
@@ -448,7 +449,7 @@ impl PlateTerm {
             rows.clear();
             patch.append_gradients(&angles.gradients, &mut rows);
             for k in 0..3 {
-                let along = |(&i, row): (&usize, &Row)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
+                let along = |(&i, row): (&usize, &Row<f64>)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
                 let rate: f64 = patch.vertices.iter().zip(&rows).map(along).sum();
                 for (&i, row) in patch.vertices.iter().zip(&rows) {
                     (0..3).for_each(|axis| product[i][axis] -= rate * row[k][axis]);

@@ -264,6 +264,6 @@ impl<'a> Iterate<'a> {
         let is_whole = step.allowed == 1.0 && self.pins == 1.0;
         let is_solution = direction.is_projected || direction.solved.converged();
         self.converged = is_solution && is_whole && self.change < self.options.velocity_tolerance;
-        self.projection.proceed();
+        self.projection.proceed(step.allowed == 1.0);
     }
 }
