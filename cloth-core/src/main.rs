@@ -25,6 +25,8 @@ enum Command {
     Run(cli::run::RunScene),
     /// Resume an interrupted run from its last checkpoint; bit-identical to an uninterrupted run.
     Resume(cli::resume::Resume),
+    /// Run a scene with all combinations of some values; one folder for each run, one index of all.
+    Sweep(cli::sweep::Sweep),
     /// Write report.html of a finished run: picture, energies, times, evaluation counts, audit of its elements.
     Report(cli::report::Report),
     /// Show a scene while it is simulated, or play a run, in a window (needs a build with `--features view`);
@@ -56,6 +58,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Demo(demo) => return demo.run(),
         Command::Run(scene) => return scene.run(),
         Command::Resume(resume) => return resume.run(),
+        Command::Sweep(sweep) => return sweep.run(),
         Command::Report(report) => report.run(),
         Command::View(view) => view.run(),
         Command::Schema => cli::schema::run(),

@@ -442,3 +442,55 @@ fn a_material_from_a_file_moves_like_the_built_in_one() {
         &["F is a force; a material consists of energies"],
     );
 }
+
+#[test]
+fn a_sweep_runs_all_combinations_and_continues_where_it_was_killed() {
+    let folder = with_scene(&SCENE.replace("duration = 0.3", "duration = 0.1"));
+    let parameters = "obstacles.0.friction = [0.1, 0.3]\ngarment.0.fabric.density = [0.2, -1.0]\n";
+    std::fs::write(folder.path().join("values.toml"), parameters).unwrap();
+    let sweep = |output: &str| {
+        let arguments = ["sweep", "scene.toml", "values.toml", "-o", output, "--jobs", "2", "--checkpoint", "2"];
+        cloth(&arguments, folder.path())
+    };
+    let told = sweep("whole");
+    assert!(!told.status.success(), "two of the runs have a negative density");
+    assert!(String::from_utf8_lossy(&told.stdout).contains("4 runs, 2 failed"), "{told:?}");
+    let index = String::from_utf8(read(&folder.path().join("whole"), "index.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = index.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(
+        rows[0][..6],
+        ["garment.0.fabric.density", "obstacles.0.friction", "folder", "status", "steps", "frames"]
+    );
+    let found: Vec<_> = rows[1..].iter().map(|row| (row[0], row[1], row[3], row[4])).collect();
+    let done = [("0.2", "0.1", "done", "10"), ("0.2", "0.3", "done", "10")];
+    assert_eq!(found, [&done[..], &[("-1.0", "0.1", "failed", ""), ("-1.0", "0.3", "failed", "")]].concat());
+    assert!(index.contains("expected a finite number greater than 0, got -1: density = -1.0"), "{index}");
+
+    // One run that was killed after its first checkpoint, one that never began.
+    let name = rows[1][2];
+    let run = folder.path().join("again").join(name);
+    let text = read(&folder.path().join("whole").join(name), "run.json");
+    let record: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    std::fs::write(folder.path().join("one.toml"), record["scene"].as_str().unwrap()).unwrap();
+    std::fs::create_dir(folder.path().join("again")).unwrap();
+    let arguments = ["run", "one.toml", "-o", run.to_str().unwrap(), "--checkpoint", "2"];
+    let mut process = started(&arguments, folder.path());
+    while !run.join("checkpoint").exists() && process.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let _ = process.kill();
+    process.wait().unwrap();
+    assert!(!sweep("again").status.success());
+    assert_eq!(read(&folder.path().join("again"), "index.csv"), index.as_bytes());
+    for row in &rows[1..3] {
+        let of = |output: &str| read(&folder.path().join(output).join(row[2]), "cloth.usda");
+        assert_eq!(of("again"), of("whole"));
+    }
+
+    std::fs::write(folder.path().join("values.toml"), "obstacles.1.friction = [0.1]").unwrap();
+    let message = refused(&["sweep", "scene.toml", "values.toml", "-o", "wrong"], folder.path());
+    assert!(message.contains("obstacles.1.friction: expected one of the 1 places of `obstacles`"), "{message}");
+    std::fs::write(folder.path().join("values.toml"), "dt = 0.1").unwrap();
+    let message = refused(&["sweep", "scene.toml", "values.toml", "-o", "wrong"], folder.path());
+    assert!(message.contains("dt: expected a list of values"), "{message}");
+}

@@ -26,7 +26,7 @@ pub struct Assembled {
 /// Places the elements of `samples` on a shared set of vertices.
 pub(crate) fn assembled<E, const N: usize>(samples: &[Sample]) -> Assembled
 where
-    E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + Sync + 'static,
+    E: PackedPotential<f64, Wide<f64> = E> + std::fmt::Debug + Send + Sync + 'static,
 {
     let elements: Vec<E> = samples.iter().map(|sample| E::load::<f64>(&sample.generated, 1)).collect();
     // A strip: consecutive elements share all but one of their vertices. It has about as many vertices as elements,
@@ -50,14 +50,14 @@ where
 
 fn system<E>(list: ElementList<E>, vertices: usize) -> System
 where
-    E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
+    E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
 {
     System::new(vec![Box::new(PotentialTerm::new(list))], &vec![false; vertices]).expect("the vertices exist")
 }
 
 fn linearise<E>(list: ElementList<E>, positions: Vec<Vector3<f64>>, curvature: Curvature) -> Work
 where
-    E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
+    E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
 {
     let mut system = system(list, positions.len());
     let mut matrix: BlockMatrix = system.matrix();

@@ -1,83 +1,100 @@
 use energy_dsl::{Declaration, Element};
 
-/// Calls a macro with the names of all elements of this crate, in alphabetical order.
+/// Calls a macro with the names of all elements of this crate, in alphabetical order. With `with kinds`, the name of
+/// what their lanes evaluate comes first: `potential` (energies, and constraints as energies), `force` or `residual`.
 ///
 /// ```
 /// macro_rules! count {
 ///     ($($name:ident),* $(,)?) => { [$(stringify!($name)),*].len() };
 /// }
+/// macro_rules! forces {
+///     ($($kind:ident $name:ident),* $(,)?) => { [$((stringify!($kind), stringify!($name))),*] };
+/// }
 /// assert_eq!(energy_elements::for_each_element!(count), energy_elements::DECLARATIONS.len());
+/// assert!(energy_elements::for_each_element!(with kinds forces).contains(&("force", "ViscousDrag")));
 /// ```
 #[macro_export]
 macro_rules! for_each_element {
     ($callback:ident) => {
-        $callback! {
-            ArcAngle,
-            AsRigidAsPossible,
-            BaraffWitkinShear,
-            BaraffWitkinStretch,
-            Binding,
-            BlendedMotion4,
-            BlendedPoint1,
-            BlendedPoint4,
-            BlendedPoint8,
-            BoneBinding,
-            BoxContact,
-            BridsonBending,
-            BridsonForce,
-            BridsonForceDamped,
-            CapsuleContact,
-            Distance,
-            DistanceBarrier,
-            DistanceSquared,
-            EdgeEdgeDistance,
-            FlatBending,
-            FrozenPlane1,
-            FrozenPlane4,
-            FrozenPlane8,
-            GraphEdge,
-            Gravity,
-            HairBend,
-            HingeAngle,
-            HingeCos,
-            HingeCosHalf,
-            HingeDamping,
-            HingeSinHalf,
-            HookeSpring,
-            HuberLoss,
-            NeoHookean,
-            NonrigidPlane1,
-            NonrigidPlane4,
-            NonrigidPlane8,
-            OrthotropicStVK,
-            ParallelEdges,
-            PlaneContact,
-            PlateBending,
-            PointEdgeDistance,
-            PointToPlane,
-            PointTriangleDistance,
-            PowerLaw,
-            QuadraticHinge,
-            SkeletonPlane,
-            SkeletonPoint,
-            SlidingFriction,
-            SphereContact,
-            Spring,
-            SquaredDistanceBarrier,
-            StVK,
-            StableNeoHookean,
-            StableNeoHookeanLog,
-            StrainRateDamping,
-            TetAsRigidAsPossible,
-            TetCorotational,
-            TetStVK,
-            TetStableNeoHookean,
-            ThreadLimit,
-            TukeyLoss,
-            TwistMotion,
-            ViscousDrag,
-            WindDrag,
-            ZeroLengthSpring,
+        $crate::for_each_element! { @list names $callback }
+    };
+    (with kinds $callback:ident) => {
+        $crate::for_each_element! { @list kinds $callback }
+    };
+    (@names $callback:ident $($kind:ident $name:ident,)*) => {
+        $callback! { $($name),* }
+    };
+    (@kinds $callback:ident $($kind:ident $name:ident,)*) => {
+        $callback! { $($kind $name),* }
+    };
+    (@list $pass:ident $callback:ident) => {
+        $crate::for_each_element! { @$pass $callback
+            potential ArcAngle,
+            potential AsRigidAsPossible,
+            potential BaraffWitkinShear,
+            potential BaraffWitkinStretch,
+            residual Binding,
+            residual BlendedMotion4,
+            residual BlendedPoint1,
+            residual BlendedPoint4,
+            residual BlendedPoint8,
+            residual BoneBinding,
+            potential BoxContact,
+            potential BridsonBending,
+            force BridsonForce,
+            force BridsonForceDamped,
+            potential CapsuleContact,
+            potential Distance,
+            potential DistanceBarrier,
+            potential DistanceSquared,
+            potential EdgeEdgeDistance,
+            potential FlatBending,
+            residual FrozenPlane1,
+            residual FrozenPlane4,
+            residual FrozenPlane8,
+            residual GraphEdge,
+            potential Gravity,
+            potential HairBend,
+            potential HingeAngle,
+            potential HingeCos,
+            potential HingeCosHalf,
+            force HingeDamping,
+            potential HingeSinHalf,
+            potential HookeSpring,
+            residual HuberLoss,
+            potential NeoHookean,
+            residual NonrigidPlane1,
+            residual NonrigidPlane4,
+            residual NonrigidPlane8,
+            potential OrthotropicStVK,
+            potential ParallelEdges,
+            potential PlaneContact,
+            potential PlateBending,
+            potential PointEdgeDistance,
+            residual PointToPlane,
+            potential PointTriangleDistance,
+            potential PowerLaw,
+            potential QuadraticHinge,
+            residual SkeletonPlane,
+            residual SkeletonPoint,
+            potential SlidingFriction,
+            potential SphereContact,
+            potential Spring,
+            potential SquaredDistanceBarrier,
+            potential StVK,
+            potential StableNeoHookean,
+            potential StableNeoHookeanLog,
+            force StrainRateDamping,
+            potential TetAsRigidAsPossible,
+            potential TetCorotational,
+            potential TetStVK,
+            potential TetStableNeoHookean,
+            potential ThreadLimit,
+            residual TukeyLoss,
+            residual TwistMotion,
+            force ViscousDrag,
+            potential WindDrag,
+            potential ZeroLengthSpring,
         }
     };
 }

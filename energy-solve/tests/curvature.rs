@@ -21,7 +21,7 @@ fn hessians<E, const N: usize>(
     curvature: Curvature,
 ) -> (Vec<DMatrix<f64>>, Counts)
 where
-    E: PackedPotential<f64> + Clone + Debug + 'static + Sync,
+    E: PackedPotential<f64> + Clone + Debug + 'static + Send + Sync,
 {
     let stencils: Vec<[usize; N]> = (0..x.len()).map(|i| std::array::from_fn(|p| N * i + p)).collect();
     let list = ElementList::new("elements", elements.to_vec(), &stencils).unwrap();
@@ -51,7 +51,7 @@ fn with_eigenvalues(of: &DMatrix<f64>, change: impl Fn(f64) -> f64) -> DMatrix<f
 /// Compares all three treatments of negative eigenvalues on the same elements.
 fn check<E, const N: usize>(elements: &[E], x: &[[Vector3<f64>; N]]) -> Result<(), TestCaseError>
 where
-    E: PackedPotential<f64> + Clone + Debug + 'static + Sync,
+    E: PackedPotential<f64> + Clone + Debug + 'static + Send + Sync,
 {
     let (exact, none) = hessians(elements, x, Curvature::Exact);
     prop_assert_eq!(none.hessian.projected, 0);

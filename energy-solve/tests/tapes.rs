@@ -21,7 +21,7 @@ struct List<E, const N: usize> {
     parameters: Vec<Vec<f64>>,
 }
 
-impl<E: PackedPotential<f64> + Element + std::fmt::Debug + Sync + 'static, const N: usize> List<E, N> {
+impl<E: PackedPotential<f64> + Element + std::fmt::Debug + Send + Sync + 'static, const N: usize> List<E, N> {
     fn compiled(self) -> Box<dyn Term> {
         Box::new(PotentialTerm::<E>::new(ElementList::new(self.name, self.elements, &self.stencils).unwrap()))
     }

@@ -12,18 +12,31 @@ Arrays hold one element per row: positions have the shape (n, points, 3), gradie
 
 from __future__ import annotations
 
+import functools as _functools
 import json as _json
 import os as _os
 from pathlib import Path as _Path
 
-from ._energy import Element, Elements, EnergyError, Input, Simulation as _Simulation
-from ._energy import System as _System, audit as _audit, catalogue as _catalogue, energies
+from collections.abc import Callable as _Callable, Mapping as _Mapping
+from typing import TYPE_CHECKING, Any as _Any
+
+from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, Simulation as _Simulation
+from ._energy import System as _System, audit as _audit, catalogue, energies, library_element as _library_element
 from ._energy import resume as _resume, run as _run, show
 from .sweep import Sweep, sweep
 
+if TYPE_CHECKING:
+    import numpy as _np
+    from numpy.typing import ArrayLike as _ArrayLike, NDArray as _NDArray
+    from typing_extensions import Self as _Self
+
+    _Scene = str | _os.PathLike[str] | _Mapping[str, _Any]
+    #: Called with the number of steps done and of all steps.
+    _Progress = _Callable[[int, int], object]
+
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "Input", "Simulation", "Sweep", "System", "audit",
-    "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
+    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Simulation", "Sweep", "System",
+    "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
 
 
@@ -44,23 +57,24 @@ def load(path: str | _os.PathLike[str]) -> list[Element]:
     return energies(path.read_text(encoding="utf-8"), str(path))
 
 
-def catalogue() -> list[str]:
-    """Returns the names of the elements of the library."""
-    return sorted(name for name, _ in _catalogue())
-
-
+@_functools.cache
 def element(name: str) -> Element:
-    """Returns an element of the library."""
-    texts = dict(_catalogue())
-    if name not in texts:
+    """Returns an element of the library, such as "HingeAngle". `catalogue()` lists their names.
+
+    Up to 800 operations, its values, gradients, Hessians, forces, residuals and Jacobians are compiled code, with the
+    bits of the same text in `energy`. Larger elements and products with Hessians run as tapes. `bind(...).is_compiled`
+    tells.
+    """
+    found = _library_element(name)
+    if found is None:
         raise KeyError(f"no element {name!r} in the library; catalogue() lists its names")
-    return energy(texts[name], name)
+    return found
 
 
 class AuditReport:
     """What an audit found. It is true if all checks passed."""
 
-    def __init__(self, passed: bool, report: dict, failures: list[str]):
+    def __init__(self, passed: bool, report: dict[str, _Any], failures: list[str]) -> None:
         self.passed = passed
         #: All findings, as `verify audit --json` writes them.
         self.report = report
@@ -88,8 +102,8 @@ class System(_System):
     an element for each row of stencils.
     """
 
-    def linearise(self, x, curvature: str = "exact"):
-        """Returns U, ∂U/∂x, and ∂²U/∂x² of the free vertices as a scipy.sparse.bsr_array.
+    def linearise(self, x: _ArrayLike, curvature: str = "exact") -> tuple[float, _NDArray[_np.float64], _Any]:
+        """Returns U (J), ∂U/∂x, and ∂²U/∂x² of the free vertices as a scipy.sparse.bsr_array.
 
         Elements whose vertices are all pinned are left out: they are constant.
         With `curvature` "clamped" or "absolute", element Hessians are made positive semi-definite first. The pattern
@@ -97,30 +111,35 @@ class System(_System):
         """
         from scipy.sparse import bsr_array
 
-        U, gradient, (offsets, columns, blocks) = super().linearise(x, curvature)
+        U, gradient, (offsets, columns, blocks) = self.linearise_blocks(x, curvature)
         size = 3 * len(self.free)
         return U, gradient, bsr_array((blocks, columns, offsets), shape=(size, size))
 
 
-def _scene(scene) -> tuple[str, str]:
+def _scene(scene: _Scene) -> tuple[str, str]:
     """Returns the text of a scene, and the path at which relative paths start."""
-    if isinstance(scene, dict):
+    if isinstance(scene, _Mapping):
         return _json.dumps(scene), "scene.toml"
     path = _Path(scene)
     return path.read_text(encoding="utf-8"), str(path)
 
 
 class Simulation(_Simulation):
-    """A scene of cloth, stepped by hand: a path of a TOML file, or a dictionary with the same keys."""
+    """A scene of cloth, stepped by hand: a path of a TOML file, or a dictionary with the same keys.
 
-    def __new__(cls, scene, threads: int | None = None):
+    `step` releases the interpreter's lock. A second thread that uses the same object meanwhile gets a RuntimeError.
+    """
+
+    def __new__(cls, scene: _Scene, threads: int | None = None) -> _Self:
         text, path = _scene(scene)
         return super().__new__(cls, text, path, threads)
 
 
-def simulate(scene, *, every: int = 1, threads: int | None = None):
-    """Simulates a scene to its end. Returns the positions of every `every`-th step, (frames, vertices, 3), and the
-    first ones."""
+def simulate(
+    scene: _Scene, *, every: int = 1, threads: int | None = None, progress: _Progress | None = None
+) -> _NDArray[_np.float64]:
+    """Simulates a scene to its end. Returns the positions (m) of every `every`-th step, (frames, vertices, 3), and the
+    first ones. `progress(done, steps)` is called after each of these."""
     import numpy as np
 
     if every < 1:
@@ -130,18 +149,39 @@ def simulate(scene, *, every: int = 1, threads: int | None = None):
     while not simulation.is_finished:
         simulation.step(every)
         frames.append(simulation.positions)
+        if progress is not None:
+            progress(simulation.steps_done, simulation.steps)
     return np.stack(frames)
 
 
-def run(scene, output, *, overwrite=False, checkpoint: int | None = None, ignore_memory=False, threads=None) -> int:
-    """Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps."""
+def run(
+    scene: _Scene,
+    output: str | _os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    checkpoint: int | None = None,
+    ignore_memory: bool = False,
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> int:
+    """Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps.
+
+    `progress(done, steps)` is called after each step. Ctrl-C, or an exception of `progress`, ends the run after the
+    current step; the results so far are written, and with `checkpoint`, `resume` continues.
+    """
     text, path = _scene(scene)
     return _run(
         text, path, str(output), overwrite=overwrite, checkpoint=checkpoint, ignore_memory=ignore_memory,
-        threads=threads,
+        threads=threads, progress=progress,
     )
 
 
-def resume(output, *, accept_edited=False, threads=None) -> int:
+def resume(
+    output: str | _os.PathLike[str],
+    *,
+    accept_edited: bool = False,
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> int:
     """Resumes an interrupted run from the checkpoint in its folder, as `cloth resume` does."""
-    return _resume(str(output), accept_edited=accept_edited, threads=threads)
+    return _resume(str(output), accept_edited=accept_edited, threads=threads, progress=progress)

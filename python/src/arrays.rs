@@ -1,35 +1,68 @@
 //! Arrays in and out: conversions, and messages that say what was expected.
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
+use std::ops::Deref;
+
+use numpy::{
+    PyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods, ndarray::arr0,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyFloat, PyInt, PyTuple};
 
-/// A contiguous array of doubles. Other arrays and lists are copied.
-pub fn doubles<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
+/// A precision that elements are evaluated in.
+pub trait Precision: energy_catalogue::Scalar + numpy::Element + PartialOrd {
+    /// Name of the dtype.
+    const DTYPE: &'static str;
+}
+
+impl Precision for f64 {
+    const DTYPE: &'static str = "float64";
+}
+
+impl Precision for f32 {
+    const DTYPE: &'static str = "float32";
+}
+
+/// Returns a contiguous array of a precision. Other arrays, numbers and lists are converted.
+pub fn array<'py, S: Precision>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, S>> {
+    if let Ok(array) = value.cast::<PyArrayDyn<S>>()
         && array.is_c_contiguous()
     {
         return array.try_readonly().map_err(|_| PyValueError::new_err(format!("{name} is being written to")));
     }
-    let options = PyDict::new(value.py());
-    options.set_item("dtype", "f8")?;
-    options.set_item("order", "C")?;
-    let array = value.py().import("numpy")?.call_method("asarray", (value,), Some(&options)).map_err(|_| {
-        let found = value.get_type().name().map_or_else(|_| "another type".into(), |name| name.to_string());
-        PyTypeError::new_err(format!("{name}: expected an array of numbers, got {found}"))
-    })?;
-    let array = array.cast_into::<PyArrayDyn<f64>>()?;
-    Ok(array.readonly())
+    if value.cast::<PyFloat>().is_ok() || value.cast::<PyInt>().is_ok() {
+        let number = arr0(S::from_f64(value.extract()?));
+        return Ok(PyArray::from_owned_array(value.py(), number).to_dyn().readonly());
+    }
+    let refused = |found: String| PyTypeError::new_err(format!("{name}: expected an array of numbers, got {found}"));
+    let other = || value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string());
+    let given = value.py().import("numpy")?.call_method1("asarray", (value,)).map_err(|_| refused(other()))?;
+    let dtype = given.cast::<PyUntypedArray>()?.dtype();
+    // Booleans, integers, floating-point numbers.
+    if !b"biuf".contains(&dtype.kind()) {
+        return Err(refused(format!("dtype {dtype}")));
+    }
+    let order = PyDict::new(value.py());
+    order.set_item("order", "C")?;
+    let array = given.call_method("astype", (S::DTYPE,), Some(&order))?;
+    Ok(array.cast_into::<PyArrayDyn<S>>()?.readonly())
 }
 
-/// The numbers of an array, without NaN.
-pub fn numbers<'a>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<&'a [f64]> {
+/// Returns the numbers of an array; refuses NaN.
+pub fn numbers<'a, S: Precision>(name: &str, array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<&'a [S]> {
     let numbers = array.as_slice().expect("contiguous arrays only");
-    match numbers.iter().position(|number| number.is_nan()) {
+    match first_nan(numbers) {
         Some(index) => Err(PyValueError::new_err(format!("{name}: entry {index} (flattened) is NaN"))),
         None => Ok(numbers),
     }
+}
+
+/// Returns the index of the first NaN. Whole chunks are tested without branches, which compilers turn into SIMD code.
+fn first_nan<S: Precision>(numbers: &[S]) -> Option<usize> {
+    let is_nan = |number: &S| number.partial_cmp(number).is_none();
+    let chunk = numbers.chunks(64).position(|chunk| chunk.iter().fold(false, |found, x| found | is_nan(x)))?;
+    numbers[64 * chunk..].iter().position(is_nan).map(|index| 64 * chunk + index)
 }
 
 /// Returns the message for an array of the wrong shape.
@@ -45,53 +78,78 @@ pub fn tuple(shape: &[usize]) -> String {
     }
 }
 
+/// A shape of at most three dimensions, without an allocation.
+#[derive(Clone, Copy)]
+pub struct Shape {
+    lengths: [usize; 3],
+    rank: usize,
+}
+
+impl<const N: usize> From<[usize; N]> for Shape {
+    fn from(lengths: [usize; N]) -> Self {
+        Self { lengths: std::array::from_fn(|i| lengths.get(i).copied().unwrap_or(0)), rank: N }
+    }
+}
+
+impl Deref for Shape {
+    type Target = [usize];
+
+    fn deref(&self) -> &[usize] {
+        &self.lengths[..self.rank]
+    }
+}
+
 /// A result: its name for messages, and its shape.
+#[derive(Clone, Copy)]
 pub struct Slot {
     pub name: &'static str,
-    pub shape: Vec<usize>,
+    pub shape: Shape,
 }
 
 /// Returns the arrays to write to: those of `out`, or new ones.
-pub fn outputs<'py>(
+pub fn outputs<'py, S: Precision>(
     py: Python<'py>,
     slots: &[Slot],
     out: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Vec<Bound<'py, PyArrayDyn<f64>>>> {
+) -> PyResult<Vec<Bound<'py, PyArrayDyn<S>>>> {
     let Some(out) = out else {
         return Ok(slots.iter().map(|slot| PyArrayDyn::zeros(py, &slot.shape[..], false)).collect());
     };
-    let given: Vec<Bound<'py, PyAny>> = match out.cast::<PyTuple>() {
-        Ok(tuple) => tuple.iter().collect(),
-        Err(_) => vec![out.clone()],
-    };
-    if given.len() != slots.len() {
+    let wrong_count = |given: usize| {
         let names = slots.iter().map(|slot| slot.name).collect::<Vec<_>>().join(", ");
-        return Err(PyValueError::new_err(format!(
-            "out: expected {} arrays ({names}), got {}",
-            slots.len(),
-            given.len()
-        )));
+        PyValueError::new_err(format!("out: expected {} arrays ({names}), got {given}", slots.len()))
+    };
+    match out.cast::<PyTuple>() {
+        Ok(tuple) if tuple.len() == slots.len() => {
+            tuple.iter().zip(slots).map(|(array, slot)| output(array, slot)).collect()
+        }
+        Ok(tuple) => Err(wrong_count(tuple.len())),
+        Err(_) if slots.len() == 1 => Ok(vec![output(out.clone(), &slots[0])?]),
+        Err(_) => Err(wrong_count(1)),
     }
-    given.into_iter().zip(slots).map(|(array, slot)| output(array, slot)).collect()
 }
 
-fn output<'py>(array: Bound<'py, PyAny>, slot: &Slot) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let name = format!("out, {}", slot.name);
-    let array = array
-        .cast_into::<PyArrayDyn<f64>>()
-        .map_err(|_| PyTypeError::new_err(format!("{name}: expected an array of dtype float64")))?;
-    if array.shape() != slot.shape {
-        return Err(wrong_shape(&name, &tuple(&slot.shape), array.shape()));
+fn output<'py, S: Precision>(array: Bound<'py, PyAny>, slot: &Slot) -> PyResult<Bound<'py, PyArrayDyn<S>>> {
+    let name = slot.name;
+    let array = array.cast_into::<PyArrayDyn<S>>().map_err(|error| {
+        let found = match error.into_inner().cast::<PyUntypedArray>() {
+            Ok(array) => format!("dtype {}", array.dtype()),
+            Err(_) => "another type".to_owned(),
+        };
+        PyTypeError::new_err(format!("out, {name}: expected an array of dtype {}, got {found}", S::DTYPE))
+    })?;
+    if array.shape() != &slot.shape[..] {
+        return Err(wrong_shape(&format!("out, {name}"), &tuple(&slot.shape), array.shape()));
     }
     if !array.is_c_contiguous() {
-        return Err(PyValueError::new_err(format!("{name}: expected a C-contiguous array")));
+        return Err(PyValueError::new_err(format!("out, {name}: expected a C-contiguous array")));
     }
     Ok(array)
 }
 
 /// Borrows arrays for writing.
-pub fn writable<'py>(arrays: &[Bound<'py, PyArrayDyn<f64>>]) -> PyResult<Vec<PyReadwriteArrayDyn<'py, f64>>> {
-    let borrow = |array: &Bound<'py, PyArrayDyn<f64>>| {
+pub fn writable<'py, S: Precision>(arrays: &[Bound<'py, PyArrayDyn<S>>]) -> PyResult<Vec<PyReadwriteArrayDyn<'py, S>>> {
+    let borrow = |array: &Bound<'py, PyArrayDyn<S>>| {
         array.try_readwrite().map_err(|_| PyValueError::new_err("out: an array is read-only, or used twice"))
     };
     arrays.iter().map(borrow).collect()

@@ -1,15 +1,16 @@
 //! Declarations, and their inputs.
 
-use energy_compiler::{InputKind, Interpreted};
+use energy_catalogue::BatchRoutine;
+use energy_compiler::{Elements as Tapes, InputKind, Interpreted};
 use energy_dsl::tape::Column;
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{doubles, numbers, tuple, wrong_shape};
+use crate::arrays::{Precision, array, numbers, tuple, wrong_shape};
 use crate::errors::wrong;
-use crate::evaluation::{Call, Elements};
+use crate::evaluation::{Batch, Elements, Request};
 
 /// An input of an element.
 #[pyclass(frozen, get_all, module = "energy_dsl")]
@@ -37,6 +38,8 @@ impl Input {
 #[derive(Clone)]
 pub struct Element {
     pub inner: Interpreted,
+    /// Whether the element is one of the library, which has compiled code for it.
+    pub is_of_library: bool,
 }
 
 /// Compiles all declarations of a text.
@@ -45,22 +48,26 @@ pub struct Element {
 pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>> {
     let elements =
         py.detach(|| Interpreted::from_file(text, file).map_err(|errors| errors.to_string())).map_err(wrong)?;
-    Ok(elements.into_iter().map(|inner| Element { inner }).collect())
+    Ok(elements.into_iter().map(|inner| Element { inner, is_of_library: false }).collect())
 }
 
-/// Returns the texts of the elements of the library, by name. `energy_catalogue` has them, too, but compiles all their
-/// routines.
+/// Returns the names of the elements of the library, in alphabetical order.
 #[pyfunction]
-pub fn catalogue() -> Vec<(&'static str, &'static str)> {
-    macro_rules! texts {
-        ($($name:ident),* $(,)?) => {
-            vec![$({
-                let declaration = <energy_elements::$name<f64> as energy_dsl::Element>::DECLARATION;
-                (declaration.name, declaration.source)
-            }),*]
-        };
-    }
-    energy_elements::for_each_element!(texts)
+pub fn catalogue() -> Vec<&'static str> {
+    energy_elements::DECLARATIONS.iter().map(|declaration| declaration.name).collect()
+}
+
+/// Returns an element of the library; `None` if it has no such element. Its energies, forces and residuals run as
+/// compiled code.
+#[pyfunction]
+pub fn library_element(py: Python<'_>, name: &str) -> PyResult<Option<Element>> {
+    let Some(declaration) = energy_elements::DECLARATIONS.iter().find(|declaration| declaration.name == name) else {
+        return Ok(None);
+    };
+    let mut elements = py
+        .detach(|| Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string()))
+        .map_err(wrong)?;
+    Ok(elements.pop().map(|inner| Element { inner, is_of_library: true }))
 }
 
 #[pymethods]
@@ -132,18 +139,53 @@ impl Element {
     }
 
     /// Binds rest shapes and parameters of `count` elements: one value for all, or one for each along the first axis.
-    #[pyo3(signature = (count, **inputs))]
-    pub fn bind(&self, count: usize, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Elements> {
-        let columns = Columns::new(self, count, inputs)?;
-        let (rest, parameters) = (columns.of(InputKind::Rest)?, columns.of(InputKind::Parameter)?);
-        let elements = self.inner.elements::<f64>(count, &rest, &parameters).map_err(wrong)?;
-        Ok(Elements::new(elements))
+    /// They are evaluated in `dtype`: float64 (the default) or float32.
+    #[pyo3(signature = (count, dtype = None, **inputs))]
+    fn bind(
+        &self,
+        count: usize,
+        dtype: Option<&Bound<'_, PyAny>>,
+        inputs: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Elements> {
+        let Some(dtype) = dtype else { return self.bound(count, false, inputs) };
+        let py = dtype.py();
+        let found = PyArrayDescr::new(py, dtype)?;
+        match [numpy::dtype::<f64>(py), numpy::dtype::<f32>(py)].map(|wanted| found.is_equiv_to(&wanted)) {
+            [true, _] => self.bound(count, false, inputs),
+            [_, true] => self.bound(count, true, inputs),
+            _ => Err(PyTypeError::new_err(format!("dtype: expected float64 or float32, got {found}"))),
+        }
     }
 }
 
 impl Element {
     pub fn point_count(&self) -> usize {
         count(&self.inner, InputKind::Point) / 3
+    }
+
+    /// Binds inputs as tapes of one precision.
+    pub fn tapes<S: Precision>(&self, count: usize, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Tapes<S>> {
+        let columns = Columns::<S>::new(self, count, inputs)?;
+        let (rest, parameters) = (columns.of(InputKind::Rest)?, columns.of(InputKind::Parameter)?);
+        self.inner.elements(count, &rest, &parameters).map_err(wrong)
+    }
+
+    fn bound(&self, count: usize, single: bool, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Elements> {
+        let library = self.is_of_library;
+        Ok(match single {
+            true => Elements::single(Batch::new(self.tapes(count, inputs)?, library), library),
+            false => Elements::double(Batch::new(self.tapes(count, inputs)?, library), library),
+        })
+    }
+
+    /// Binds inputs for one call: as many elements as the first axis of `x` has, in single precision if `x` is.
+    fn bound_for(&self, x: &Bound<'_, PyAny>, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Elements> {
+        let single = x.cast::<PyArrayDyn<f32>>().is_ok();
+        let count = match x.cast::<PyUntypedArray>() {
+            Ok(x) => x.shape().first().copied().unwrap_or(0),
+            Err(_) => x.len().unwrap_or(0),
+        };
+        self.bound(count, single, inputs)
     }
 }
 
@@ -153,7 +195,7 @@ pub fn count(element: &Interpreted, kind: InputKind) -> usize {
 }
 
 macro_rules! evaluations {
-    ($($(#[$doc:meta])* $name:ident($x:ident $(, $v:ident)?) => $call:ident;)*) => {
+    ($($(#[$doc:meta])* $name:ident($x:ident $(, $v:ident)?) => $routine:ident;)*) => {
         #[pymethods]
         impl Element {
             $($(#[$doc])*
@@ -166,9 +208,8 @@ macro_rules! evaluations {
                 flags: bool,
                 inputs: Option<&Bound<'py, PyDict>>,
             ) -> PyResult<Bound<'py, PyAny>> {
-                let x = doubles(stringify!($x), $x)?;
-                let count = x.shape().first().copied().unwrap_or(0);
-                self.bind(count, inputs)?.evaluate($x.py(), Call::$call, &x, evaluations!(@v $($v)?), out, flags)
+                let (routine, v) = (BatchRoutine::$routine, evaluations!(@v $($v)?));
+                self.bound_for($x, inputs)?.evaluate(&Request { routine, x: $x, v, out, flags })
             })*
         }
 
@@ -183,8 +224,8 @@ macro_rules! evaluations {
                 out: Option<&Bound<'py, PyAny>>,
                 flags: bool,
             ) -> PyResult<Bound<'py, PyAny>> {
-                let x = doubles(stringify!($x), $x)?;
-                self.evaluate($x.py(), Call::$call, &x, evaluations!(@v $($v)?), out, flags)
+                let (routine, v) = (BatchRoutine::$routine, evaluations!(@v $($v)?));
+                self.evaluate(&Request { routine, x: $x, v, out, flags })
             })*
         }
     };
@@ -223,57 +264,60 @@ fn keyword(kind: InputKind) -> &'static str {
 }
 
 /// The numbers of the inputs that elements are bound to.
-struct Columns<'a, 'py> {
+struct Columns<'a, 'py, S: Precision> {
     element: &'a Interpreted,
     count: usize,
     /// In the order of the inputs; `None` for points.
-    arrays: Vec<Option<PyReadonlyArrayDyn<'py, f64>>>,
+    arrays: Vec<Option<PyReadonlyArrayDyn<'py, S>>>,
 }
 
-impl<'a, 'py> Columns<'a, 'py> {
+impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
     fn new(element: &'a Element, count: usize, given: Option<&Bound<'py, PyDict>>) -> PyResult<Self> {
-        let name = element.name();
+        let (name, inputs) = (element.name(), element.inner.inputs());
         let bound = |kind| matches!(kind, InputKind::Rest | InputKind::Parameter);
-        let wanted: Vec<&str> =
-            element.inner.inputs().iter().filter(|i| bound(i.kind)).map(|input| input.name.as_str()).collect();
-        let mut arrays = Vec::new();
-        for input in element.inner.inputs() {
-            let value = given.map(|given| given.get_item(&input.name)).transpose()?.flatten();
-            arrays.push(match (bound(input.kind), value) {
-                (true, Some(value)) => Some(doubles(&input.name, &value)?),
-                (true, None) => {
-                    let kind = keyword(input.kind);
-                    let message = format!("{name}: missing {kind} `{}`; expected {}", input.name, wanted.join(", "));
-                    return Err(PyTypeError::new_err(message));
-                }
-                (false, _) => None,
-            });
-        }
-        for key in given.into_iter().flat_map(|given| given.keys()) {
-            let key: String = key.extract()?;
-            if !wanted.contains(&key.as_str()) {
-                let message = format!("{name}: no input `{key}` to bind; expected {}", wanted.join(", "));
-                return Err(PyTypeError::new_err(message));
+        let wanted = || {
+            let names: Vec<&str> = inputs.iter().filter(|i| bound(i.kind)).map(|input| input.name.as_str()).collect();
+            if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+        };
+        let (mut arrays, mut used) = (Vec::with_capacity(inputs.len()), 0);
+        for input in inputs {
+            if !bound(input.kind) {
+                arrays.push(None);
+                continue;
             }
+            let Some(value) = given.map(|given| given.get_item(&input.name)).transpose()?.flatten() else {
+                let kind = keyword(input.kind);
+                let message = format!("{name}: missing {kind} `{}`; expected {}", input.name, wanted());
+                return Err(PyTypeError::new_err(message));
+            };
+            arrays.push(Some(array(&input.name, &value)?));
+            used += 1;
+        }
+        if let Some(given) = given.filter(|given| given.len() > used) {
+            let known = |key: &str| inputs.iter().any(|input| bound(input.kind) && input.name == key);
+            let keys: Vec<String> = given.keys().extract()?;
+            let unknown = keys.into_iter().find(|key| !known(key)).unwrap_or_default();
+            let message = format!("{name}: no input `{unknown}` to bind; expected {}", wanted());
+            return Err(PyTypeError::new_err(message));
         }
         Ok(Self { element: &element.inner, count, arrays })
     }
 
-    fn of(&self, kind: InputKind) -> PyResult<Vec<Column<'_, f64>>> {
+    fn of(&self, kind: InputKind) -> PyResult<Vec<Column<'_, S>>> {
         let inputs = self.element.inputs().iter().zip(&self.arrays).filter(|(input, _)| input.kind == kind);
         inputs
             .map(|(input, array)| {
                 let array = array.as_ref().expect("checked");
-                let data = numbers(&input.name, array)?;
-                let each = [&[self.count], &input.shape[..]].concat();
-                match array.shape() {
-                    shape if shape == input.shape => Ok(Column::Same(data)),
-                    shape if shape == each => Ok(Column::Each(data)),
-                    shape => {
-                        let expected = format!("{} or {}", tuple(&input.shape), tuple(&each));
-                        Err(wrong_shape(&input.name, &expected, shape))
-                    }
+                let (data, shape) = (numbers(&input.name, array)?, array.shape());
+                if shape == input.shape {
+                    return Ok(Column::Same(data));
                 }
+                if shape.split_first() == Some((&self.count, &input.shape)) {
+                    return Ok(Column::Each(data));
+                }
+                let each = [&[self.count], &input.shape[..]].concat();
+                let expected = format!("{} or {}", tuple(&input.shape), tuple(&each));
+                Err(wrong_shape(&input.name, &expected, shape))
             })
             .collect()
     }

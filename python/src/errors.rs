@@ -9,6 +9,13 @@ create_exception!(
     "A text, a scene or a rest shape that is wrong, with its place."
 );
 
+create_exception!(
+    energy_dsl,
+    FolderInUseError,
+    EnergyError,
+    "The output folder belongs to another process that still runs."
+);
+
 /// Turns any error into a `ValueError` of the package.
 pub fn wrong(error: impl std::fmt::Display) -> PyErr {
     EnergyError::new_err(error.to_string())

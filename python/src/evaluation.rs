@@ -1,91 +1,147 @@
 //! Elements with bound inputs, evaluated in batches.
 
-use energy_compiler::{Elements as Batch, InputKind};
+use energy_catalogue::{BatchRoutine, CompiledBatch};
+use energy_compiler::{Elements as Tapes, EvaluateError, InputKind, Interpreted};
 use energy_dsl::Flagged;
-use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::arrays::{Slot, doubles, numbers, outputs, tuple, writable, wrong_shape};
+use crate::arrays::{Precision, Shape, Slot, array, numbers, outputs, tuple, writable, wrong_shape};
 use crate::element::{Element, count};
 use crate::errors::wrong;
+
+/// Results that are written without releasing the interpreter's lock: releasing it takes longer.
+const FEW: usize = 2000;
 
 /// Elements with bound rest shapes and parameters.
 #[pyclass(frozen, module = "energy_dsl")]
 pub struct Elements {
-    pub inner: Batch<f64>,
-    sizes: Sizes,
+    batch: AnyBatch,
+    is_of_library: bool,
 }
 
-/// A routine of the elements.
-#[derive(Clone, Copy)]
-pub enum Call {
-    Value,
-    Gradient,
-    Hessian,
-    HessianVector,
-    Force,
-    ForceJacobians,
-    Constraint,
-    Residual,
-    Jacobian,
+enum AnyBatch {
+    Double(Batch<f64>),
+    Single(Batch<f32>),
+}
+
+macro_rules! any {
+    ($elements:expr, $batch:ident => $value:expr) => {
+        match &$elements.batch {
+            AnyBatch::Double($batch) => $value,
+            AnyBatch::Single($batch) => $value,
+        }
+    };
 }
 
 #[pymethods]
 impl Elements {
     fn __len__(&self) -> usize {
-        self.inner.len()
+        any!(self, batch => batch.tapes.len())
     }
 
-    /// The declaration.
+    /// Returns the declaration that was bound.
     #[getter]
     fn element(&self) -> Element {
-        Element { inner: self.inner.element().clone() }
+        let inner = any!(self, batch => batch.tapes.element()).clone();
+        Element { inner, is_of_library: self.is_of_library }
+    }
+
+    /// Name of the dtype that elements are evaluated in.
+    #[getter]
+    fn dtype(&self) -> &'static str {
+        any!(self, batch => batch.dtype())
+    }
+
+    /// Whether compiled code evaluates energies, forces and residuals; else they run as tapes. Both return the same
+    /// bits.
+    #[getter]
+    fn is_compiled(&self) -> bool {
+        any!(self, batch => batch.compiled.is_some())
     }
 
     fn __repr__(&self) -> String {
-        format!("<{} elements of {}>", self.inner.len(), self.inner.element().declaration().name)
+        any!(self, batch => format!("<{} elements of {}>", batch.tapes.len(), batch.tapes.element().declaration().name))
     }
 }
 
 impl Elements {
-    pub fn new(inner: Batch<f64>) -> Self {
-        let sizes = Sizes::of(&inner);
-        Self { inner, sizes }
+    pub fn double(batch: Batch<f64>, is_of_library: bool) -> Self {
+        Self { batch: AnyBatch::Double(batch), is_of_library }
     }
 
-    pub fn evaluate<'py>(
-        &self,
-        py: Python<'py>,
-        call: Call,
-        x: &PyReadonlyArrayDyn<'py, f64>,
-        v: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        flags: bool,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let sizes = &self.sizes;
-        let name = if matches!(call, Call::Residual | Call::Jacobian) { "u" } else { "x" };
-        let expected = sizes.input(call);
-        if x.shape() != expected {
-            return Err(wrong_shape(name, &tuple(&expected), x.shape()));
-        }
-        let v = v.map(|v| doubles("v", v)).transpose()?;
-        if let Some(v) = v.as_ref().filter(|v| v.shape() != expected) {
-            return Err(wrong_shape("v", &tuple(&expected), v.shape()));
-        }
-        let x = numbers(name, x)?;
-        let v = v.as_ref().map(|v| numbers("v", v)).transpose()?.unwrap_or(&[]);
-        let slots = sizes.slots(call);
-        let arrays = outputs(py, &slots, out)?;
+    pub fn single(batch: Batch<f32>, is_of_library: bool) -> Self {
+        Self { batch: AnyBatch::Single(batch), is_of_library }
+    }
+
+    pub fn evaluate<'py>(&self, request: &Request<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
+        any!(self, batch => batch.evaluate(request))
+    }
+}
+
+/// A call of a routine from Python.
+pub struct Request<'a, 'py> {
+    pub routine: BatchRoutine,
+    /// Positions or unknowns.
+    pub x: &'a Bound<'py, PyAny>,
+    /// Velocities or vectors, if the routine takes any.
+    pub v: Option<&'a Bound<'py, PyAny>>,
+    pub out: Option<&'a Bound<'py, PyAny>>,
+    /// Whether to return the flags of singular inputs.
+    pub flags: bool,
+}
+
+/// Bound elements of one precision.
+pub struct Batch<S> {
+    tapes: Tapes<S>,
+    compiled: Option<Box<dyn CompiledBatch<S>>>,
+    sizes: Sizes,
+}
+
+impl<S: Precision> Batch<S> {
+    /// Elements of the library are compiled code where it exists for the routine, else tapes.
+    pub fn new(tapes: Tapes<S>, is_of_library: bool) -> Self {
+        let (sizes, name) = (Sizes::of(tapes.element(), tapes.len()), tapes.element().declaration().name);
+        let numbers = |element| tapes.tape().numbers_of(element);
+        let compiled = if is_of_library { energy_catalogue::bind(name, tapes.len(), numbers) } else { None };
+        Self { tapes, compiled, sizes }
+    }
+
+    fn dtype(&self) -> &'static str {
+        S::DTYPE
+    }
+
+    fn evaluate<'py>(&self, request: &Request<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
+        let &Request { routine, x, v, out, flags } = request;
+        let (py, expected) = (x.py(), self.sizes.input(routine));
+        let name = if matches!(routine, BatchRoutine::Residual | BatchRoutine::Jacobian) { "u" } else { "x" };
+        let input = |name, value| {
+            let array = array::<S>(name, value)?;
+            if array.shape() == &expected[..] {
+                Ok(array)
+            } else {
+                Err(wrong_shape(name, &tuple(&expected), array.shape()))
+            }
+        };
+        let (x, v) = (input(name, x)?, v.map(|v| input("v", v)).transpose()?);
+        let (x, v) = (numbers(name, &x)?, v.as_ref().map(|v| numbers("v", v)).transpose()?.unwrap_or(&[]));
+        let (slots, used) = self.sizes.slots(routine);
+        let arrays = outputs::<S>(py, &slots[..used], out)?;
         let flagged = {
             let mut borrowed = writable(&arrays)?;
-            let mut results: Vec<&mut [f64]> =
+            let mut results: Vec<&mut [S]> =
                 borrowed.iter_mut().map(|array| array.as_slice_mut().expect("contiguous")).collect();
-            py.detach(|| self.write(call, x, v, &mut results)).map_err(wrong)?
+            let few = results.iter().map(|numbers| numbers.len()).sum::<usize>() < FEW;
+            let mut write = || self.write(routine, x, v, &mut results);
+            if few { write() } else { py.detach(write) }.map_err(wrong)?
         };
+        if !flags && let Some(out) = out {
+            return Ok(out.clone());
+        }
         let mut list: Vec<Bound<'py, PyAny>> = arrays.into_iter().map(Bound::into_any).collect();
         if flags {
-            let mut marks = vec![0_u8; self.inner.len()];
+            let mut marks = vec![0_u8; self.tapes.len()];
             for (index, flags) in flagged {
                 marks[index] = u8::from(flags.degenerate) + 2 * u8::from(flags.kink);
             }
@@ -96,22 +152,25 @@ impl Elements {
 
     fn write(
         &self,
-        call: Call,
-        x: &[f64],
-        v: &[f64],
-        results: &mut [&mut [f64]],
-    ) -> Result<Flagged, energy_compiler::EvaluateError> {
-        let (all, elements) = (0..self.inner.len(), &self.inner);
-        match (call, results) {
-            (Call::Value, [u]) => elements.values(all, x, u),
-            (Call::Gradient, [u, g]) => elements.gradients(all, x, u, g),
-            (Call::Hessian, [u, g, h]) => elements.hessians(all, x, u, g, h),
-            (Call::HessianVector, [product]) => elements.hessian_vectors(all, x, v, product),
-            (Call::Force, [f]) => elements.forces(all, x, v, f),
-            (Call::ForceJacobians, [f, by_x, by_v]) => elements.force_jacobians(all, x, v, f, by_x, by_v),
-            (Call::Constraint, [c, j]) => elements.constraints(all, x, c, j),
-            (Call::Residual, [r]) => elements.residuals(all, x, r),
-            (Call::Jacobian, [r, j]) => elements.jacobians(all, x, r, j),
+        routine: BatchRoutine,
+        x: &[S],
+        v: &[S],
+        results: &mut [&mut [S]],
+    ) -> Result<Flagged, EvaluateError> {
+        if let Some(result) = self.compiled.as_ref().and_then(|batch| batch.evaluate(routine, x, v, results)) {
+            return Ok(result?);
+        }
+        let (all, tapes) = (0..self.tapes.len(), &self.tapes);
+        match (routine, results) {
+            (BatchRoutine::Value, [u]) => tapes.values(all, x, u),
+            (BatchRoutine::Gradient, [u, g]) => tapes.gradients(all, x, u, g),
+            (BatchRoutine::Hessian, [u, g, h]) => tapes.hessians(all, x, u, g, h),
+            (BatchRoutine::HessianVector, [product]) => tapes.hessian_vectors(all, x, v, product),
+            (BatchRoutine::Force, [f]) => tapes.forces(all, x, v, f),
+            (BatchRoutine::ForceJacobians, [f, by_x, by_v]) => tapes.force_jacobians(all, x, v, f, by_x, by_v),
+            (BatchRoutine::Constraint, [c, j]) => tapes.constraints(all, x, c, j),
+            (BatchRoutine::Residual, [r]) => tapes.residuals(all, x, r),
+            (BatchRoutine::Jacobian, [r, j]) => tapes.jacobians(all, x, r, j),
             _ => unreachable!("as many slots as results"),
         }
     }
@@ -126,33 +185,38 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn of(elements: &Batch<f64>) -> Self {
-        let element = elements.element();
+    fn of(element: &Interpreted, elements: usize) -> Self {
         let (points, unknowns) = (count(element, InputKind::Point) / 3, count(element, InputKind::Unknown));
-        Self { count: elements.len(), points, rows: element.declaration().rows, unknowns }
+        Self { count: elements, points, rows: element.declaration().rows, unknowns }
     }
 
-    fn input(&self, call: Call) -> Vec<usize> {
-        match call {
-            Call::Residual | Call::Jacobian => vec![self.count, self.unknowns],
-            _ => vec![self.count, self.points, 3],
+    fn input(&self, routine: BatchRoutine) -> Shape {
+        match routine {
+            BatchRoutine::Residual | BatchRoutine::Jacobian => [self.count, self.unknowns].into(),
+            _ => [self.count, self.points, 3].into(),
         }
     }
 
-    fn slots(&self, call: Call) -> Vec<Slot> {
+    /// Returns the results of a routine; only the given number of them counts.
+    fn slots(&self, routine: BatchRoutine) -> ([Slot; 3], usize) {
         let (n, p, rows) = (self.count, self.points, self.rows);
-        let slot = |name, shape: &[usize]| Slot { name, shape: shape.to_vec() };
-        let matrix = [n, 3 * p, 3 * p];
-        match call {
-            Call::Value => vec![slot("U", &[n])],
-            Call::Gradient => vec![slot("U", &[n]), slot("gradient", &[n, p, 3])],
-            Call::Hessian => vec![slot("U", &[n]), slot("gradient", &[n, p, 3]), slot("Hessian", &matrix)],
-            Call::HessianVector => vec![slot("product", &[n, p, 3])],
-            Call::Force => vec![slot("force", &[n, p, 3])],
-            Call::ForceJacobians => vec![slot("force", &[n, p, 3]), slot("∂f/∂x", &matrix), slot("∂f/∂v", &matrix)],
-            Call::Constraint => vec![slot("C", &[n, rows]), slot("Jacobian", &[n, rows, 3 * p])],
-            Call::Residual => vec![slot("residual", &[n, rows])],
-            Call::Jacobian => vec![slot("residual", &[n, rows]), slot("Jacobian", &[n, rows, self.unknowns])],
+        let slot = |name, shape: Shape| Slot { name, shape };
+        let (vectors, matrix) = (Shape::from([n, p, 3]), Shape::from([n, 3 * p, 3 * p]));
+        let unused = slot("", [0].into());
+        let (energy, gradient) = (slot("U", [n].into()), slot("gradient", vectors));
+        let residual = slot("residual", [n, rows].into());
+        match routine {
+            BatchRoutine::Value => ([energy, unused, unused], 1),
+            BatchRoutine::Gradient => ([energy, gradient, unused], 2),
+            BatchRoutine::Hessian => ([energy, gradient, slot("Hessian", matrix)], 3),
+            BatchRoutine::HessianVector => ([slot("product", vectors), unused, unused], 1),
+            BatchRoutine::Force => ([slot("force", vectors), unused, unused], 1),
+            BatchRoutine::ForceJacobians => ([slot("force", vectors), slot("∂f/∂x", matrix), slot("∂f/∂v", matrix)], 3),
+            BatchRoutine::Constraint => {
+                ([slot("C", [n, rows].into()), slot("Jacobian", [n, rows, 3 * p].into()), unused], 2)
+            }
+            BatchRoutine::Residual => ([residual, unused, unused], 1),
+            BatchRoutine::Jacobian => ([residual, slot("Jacobian", [n, rows, self.unknowns].into()), unused], 2),
         }
     }
 }

@@ -4,6 +4,7 @@ mod arrays;
 mod element;
 mod errors;
 mod evaluation;
+mod exclusive;
 mod simulation;
 mod system;
 mod tools;
@@ -13,6 +14,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("EnergyError", module.py().get_type::<errors::EnergyError>())?;
+    module.add("FolderInUseError", module.py().get_type::<errors::FolderInUseError>())?;
     module.add_class::<element::Element>()?;
     module.add_class::<element::Input>()?;
     module.add_class::<evaluation::Elements>()?;
@@ -20,6 +22,7 @@ fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::Simulation>()?;
     module.add_function(wrap_pyfunction!(element::energies, module)?)?;
     module.add_function(wrap_pyfunction!(element::catalogue, module)?)?;
+    module.add_function(wrap_pyfunction!(element::library_element, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::run, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::resume, module)?)?;
     module.add_function(wrap_pyfunction!(tools::audit, module)?)?;

@@ -3,18 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cloth_core::run::{Ending, Event, Run, RunOptions};
+use cloth_core::output::OutputError;
+use cloth_core::run::{Ending, Event, Run, RunError, RunOptions};
 use cloth_core::scene::Scene;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
-use crate::errors::{failed, wrong};
+use crate::errors::{FolderInUseError, failed, wrong};
+use crate::exclusive::Exclusive;
 
 /// A scene that is stepped by hand.
-#[pyclass(unsendable, subclass, module = "energy_dsl")]
+#[pyclass(frozen, subclass, module = "energy_dsl")]
 pub struct Simulation {
-    inner: cloth_core::Simulation,
+    inner: Exclusive<cloth_core::Simulation>,
 }
 
 /// A scene's text; JSON objects are written as TOML.
@@ -40,69 +42,80 @@ impl Simulation {
     /// Reads the text of a scene. Relative paths in it start at the folder of `path`.
     #[new]
     #[pyo3(signature = (text, path = PathBuf::from("scene.toml"), threads = None))]
-    fn new(text: &str, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
+    fn new(py: Python<'_>, text: &str, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
         let text = toml_text(text)?;
-        let scene = Scene::parse(&text, &path).map_err(|error| wrong(with_line(&text, &error.to_string())))?;
-        let inner = cloth_core::Simulation::new(&scene).map_err(wrong)?;
-        Ok(Self {
-            inner: match threads {
-                Some(threads) => inner.with_threads(threads),
-                None => inner,
-            },
-        })
+        let inner = py.detach(|| {
+            let scene = Scene::parse(&text, &path).map_err(|error| with_line(&text, &error.to_string()))?;
+            cloth_core::Simulation::new(&scene).map_err(|error| error.to_string())
+        });
+        let inner = match (inner.map_err(wrong)?, threads) {
+            (inner, Some(threads)) => inner.with_threads(threads),
+            (inner, None) => inner,
+        };
+        Ok(Self { inner: Exclusive::new("Simulation", inner) })
     }
 
-    /// Takes steps of the scene's time grid, at most until its end. Returns the number taken.
+    /// Takes steps of the scene's time grid, at most until its end. Returns the number taken. Ctrl-C stops after the
+    /// current step.
     #[pyo3(signature = (steps = 1))]
-    fn step(&mut self, py: Python<'_>, steps: u64) -> PyResult<u64> {
+    fn step(&self, py: Python<'_>, steps: u64) -> PyResult<u64> {
+        let mut guard = self.inner.get()?;
+        let simulation = &mut *guard;
         for done in 0..steps {
-            if self.inner.is_finished() {
+            if simulation.is_finished() {
                 return Ok(done);
             }
             py.check_signals()?;
-            self.inner.step().map_err(failed)?;
+            py.detach(|| simulation.step().map(drop)).map_err(failed)?;
         }
         Ok(steps)
     }
 
     /// Time, in s.
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time()
+    fn time(&self) -> PyResult<f64> {
+        Ok(self.inner.get()?.time())
     }
 
     #[getter]
-    fn is_finished(&self) -> bool {
-        self.inner.is_finished()
+    fn is_finished(&self) -> PyResult<bool> {
+        Ok(self.inner.get()?.is_finished())
     }
 
     /// Steps from start to end.
     #[getter]
-    fn steps(&self) -> u64 {
-        self.inner.steps()
+    fn steps(&self) -> PyResult<u64> {
+        Ok(self.inner.get()?.steps())
+    }
+
+    /// Steps taken so far.
+    #[getter]
+    fn steps_done(&self) -> PyResult<u64> {
+        Ok(self.inner.get()?.steps_done())
     }
 
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.inner.warnings().to_vec()
+    fn warnings(&self) -> PyResult<Vec<String>> {
+        Ok(self.inner.get()?.warnings().to_vec())
     }
 
-    /// Positions of all vertices, in m, as an array of shape (vertices, 3).
+    /// Positions of all vertices, in m, as a new array of shape (vertices, 3).
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, self.inner.positions())
+        vectors(py, self.inner.get()?.positions())
     }
 
     /// Velocities of all vertices, in m/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, self.inner.velocities())
+        vectors(py, self.inner.get()?.velocities())
     }
 
     /// Triangles, as indices of vertices.
     #[getter]
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let numbers: Vec<i64> = self.inner.triangles().iter().flatten().map(|&vertex| vertex as i64).collect();
+        let simulation = self.inner.get()?;
+        let numbers: Vec<i64> = simulation.triangles().iter().flatten().map(|&vertex| vertex as i64).collect();
         let rows = numbers.len() / 3;
         PyArray1::from_vec(py, numbers).reshape([rows, 3])
     }
@@ -113,9 +126,10 @@ fn vectors<'py>(py: Python<'py>, vectors: &[[f64; 3]]) -> PyResult<Bound<'py, Py
 }
 
 /// Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps taken.
+/// `progress(done, steps)` is called after each step.
 #[pyfunction]
 #[pyo3(signature = (
-    text, path, output, *, overwrite = false, checkpoint = None, ignore_memory = false, threads = None
+    text, path, output, *, overwrite = false, checkpoint = None, ignore_memory = false, threads = None, progress = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "all but three are keywords")]
 pub fn run(
@@ -127,61 +141,93 @@ pub fn run(
     checkpoint: Option<u64>,
     ignore_memory: bool,
     threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<u64> {
     let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
     let text = toml_text(text)?;
-    to_the_end(py, threads, || {
+    to_the_end(py, threads, progress, || {
         Run::new(text.clone(), Path::new(path), Path::new(output), options)
-            .map_err(|error| with_line(&text, &error.to_string()))
+            .map_err(|error| Refusal { message: with_line(&text, &error.to_string()), ..error.into() })
     })
 }
 
 /// Resumes an interrupted run from the checkpoint in its folder, as `cloth resume` does.
 #[pyfunction]
-#[pyo3(signature = (output, *, accept_edited = false, threads = None))]
-pub fn resume(py: Python<'_>, output: &str, accept_edited: bool, threads: Option<usize>) -> PyResult<u64> {
-    to_the_end(py, threads, || Run::resume(Path::new(output), accept_edited).map_err(|error| error.to_string()))
+#[pyo3(signature = (output, *, accept_edited = false, threads = None, progress = None))]
+pub fn resume(
+    py: Python<'_>,
+    output: &str,
+    accept_edited: bool,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<u64> {
+    to_the_end(py, threads, progress, || Ok(Run::resume(Path::new(output), accept_edited)?))
+}
+
+/// Why a run cannot start.
+struct Refusal {
+    message: String,
+    folder_is_in_use: bool,
+}
+
+impl From<RunError> for Refusal {
+    fn from(error: RunError) -> Self {
+        let folder_is_in_use = matches!(error, RunError::Output(OutputError::InUse { .. }));
+        Self { message: error.to_string(), folder_is_in_use }
+    }
 }
 
 /// How a run ended, without the interpreter's lock.
 enum Outcome {
-    Refused(String),
+    Refused(Refusal),
     Failed(String),
-    Interrupted,
     Done(u64),
 }
 
-/// Simulates to the end without the interpreter's lock. Ctrl-C completes the current step and keeps the results.
+/// Simulates to the end without the interpreter's lock. Ctrl-C, or an exception of `progress`, completes the current
+/// step and keeps the results.
 fn to_the_end(
     py: Python<'_>,
     threads: Option<usize>,
-    start: impl FnOnce() -> Result<Run, String> + Send,
+    progress: Option<Py<PyAny>>,
+    start: impl FnOnce() -> Result<Run, Refusal> + Send,
 ) -> PyResult<u64> {
+    let mut raised = None;
     let outcome = py.detach(|| {
         let mut run = match (start(), threads) {
             (Ok(run), Some(threads)) => run.with_threads(threads),
             (Ok(run), None) => run,
-            (Err(message), _) => return Outcome::Refused(message),
+            (Err(refusal), _) => return Outcome::Refused(refusal),
         };
         let stop = AtomicBool::new(false);
         let ending = run.go(&stop, |event| {
-            if matches!(event, Event::Step(..)) && Python::attach(|py| py.check_signals()).is_err() {
+            let Event::Step(simulation, _) = event else { return };
+            let (done, steps) = (simulation.steps_done(), simulation.steps());
+            let listen = |py: Python<'_>| {
+                py.check_signals()?;
+                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (done, steps)).map(drop))
+            };
+            if let Err(error) = Python::attach(listen) {
+                raised = Some(error);
                 stop.store(true, Ordering::Relaxed);
             }
         });
         match ending {
             Err(error) => Outcome::Failed(error.to_string()),
             Ok(Ending { failure: Some(failure), .. }) => Outcome::Failed(failure.to_string()),
-            Ok(_) if stop.load(Ordering::Relaxed) => Outcome::Interrupted,
             Ok(_) => Outcome::Done(run.simulation().steps_done()),
         }
     });
-    match outcome {
-        Outcome::Refused(message) => Err(wrong(message)),
-        Outcome::Failed(message) => Err(PyRuntimeError::new_err(message)),
-        Outcome::Interrupted => {
+    match (raised, outcome) {
+        (Some(error), _) if error.is_instance_of::<PyKeyboardInterrupt>(py) => {
             Err(PyKeyboardInterrupt::new_err("the run was interrupted; its results so far were written"))
         }
-        Outcome::Done(steps) => Ok(steps),
+        (Some(error), _) => Err(error),
+        (None, Outcome::Refused(Refusal { message, folder_is_in_use: true })) => {
+            Err(FolderInUseError::new_err(message))
+        }
+        (None, Outcome::Refused(Refusal { message, .. })) => Err(wrong(message)),
+        (None, Outcome::Failed(message)) => Err(PyRuntimeError::new_err(message)),
+        (None, Outcome::Done(steps)) => Ok(steps),
     }
 }

@@ -1,25 +1,27 @@
 //! Sums of elements over the vertices of a mesh.
 
-use std::cell::{RefCell, RefMut};
+use std::sync::MutexGuard;
 
 use energy_dsl::{Kind, Vector3};
 use energy_solve::{
-    BlockMatrix, Curvature, LinearisationOptions, State, Storage, System as Assembled, TapeTerm, Term, Weights,
+    BlockMatrix, Bsr, Curvature, EvaluationError, LinearisationOptions, State, Storage, System as Assembled,
+    SystemError, TapeTerm, Term, Weights,
 };
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{doubles, numbers, tuple, wrong_shape};
+use crate::arrays::{array, numbers, tuple, wrong_shape};
 use crate::element::Element;
 use crate::errors::{failed, wrong};
+use crate::exclusive::Exclusive;
 
 /// A sum of energies over vertices. Some may be pinned: they have no rows in the matrix.
-#[pyclass(unsendable, subclass, module = "energy_dsl._energy")]
+#[pyclass(frozen, subclass, module = "energy_dsl._energy")]
 pub struct System {
     pinned: Vec<bool>,
-    state: RefCell<Assembly>,
+    state: Exclusive<Assembly>,
 }
 
 struct Assembly {
@@ -46,7 +48,7 @@ impl System {
             let message = format!("pinned: there is no vertex {vertex}, only 0 to {}", vertices.saturating_sub(1));
             *mask.get_mut(vertex).ok_or_else(|| PyValueError::new_err(message))? = true;
         }
-        Ok(Self { pinned: mask, state: RefCell::new(Assembly { terms: Vec::new(), sum: None }) })
+        Ok(Self { pinned: mask, state: Exclusive::new("System", Assembly { terms: Vec::new(), sum: None }) })
     }
 
     #[getter]
@@ -82,27 +84,31 @@ impl System {
                 return Err(PyValueError::new_err(message));
             }
         }
-        let bound = element.bind(stencils.len(), inputs)?;
-        let mut state = self.state();
+        let bound = element.tapes::<f64>(stencils.len(), inputs)?;
+        let mut state = self.state()?;
         let name = format!("{} {}", declaration.name, state.terms.len() + 1);
-        state.terms.push(TapeTerm::new(name, declaration, bound.inner.tape().clone(), stencils.into_iter().flatten()));
+        state.terms.push(TapeTerm::new(name, declaration, bound.tape().clone(), stencils.into_iter().flatten()));
         state.sum = None;
         Ok(())
     }
 
     /// Returns U.
     fn energy(&self, x: &Bound<'_, PyAny>) -> PyResult<f64> {
-        let x = self.positions(x)?;
-        let mut state = self.state();
-        let (sum, _) = state.sum(&self.pinned)?;
-        total(sum, &x)
+        let (py, positions, mut state) = (x.py(), self.positions(x)?, self.state()?);
+        let state = &mut *state;
+        py.detach(|| state.energy(&self.pinned, &positions)).map_err(PyErr::from)
     }
 
     /// Returns U, ∂U/∂x, and ∂²U/∂x² of the free vertices as (offsets, columns, blocks). Elements whose vertices are
     /// all pinned are left out: they are constant. With `curvature`
     /// "clamped" or "absolute", each element's Hessian is made positive semi-definite first.
     #[pyo3(signature = (x, curvature = "exact"))]
-    fn linearise<'py>(&self, py: Python<'py>, x: &Bound<'py, PyAny>, curvature: &str) -> PyResult<Linearised<'py>> {
+    fn linearise_blocks<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+        curvature: &str,
+    ) -> PyResult<Linearised<'py>> {
         let curvature = match curvature {
             "exact" => Curvature::Exact,
             "clamped" => Curvature::Clamped,
@@ -112,19 +118,10 @@ impl System {
                 return Err(PyValueError::new_err(message));
             }
         };
-        let positions = self.positions(x)?;
-        let mut state = self.state();
-        let (sum, matrix) = state.sum(&self.pinned)?;
-        let v = vec![[0.0; 3]; positions.len()];
-        let options = LinearisationOptions {
-            weights: Weights { position: -1.0, velocity: 0.0 },
-            curvature,
-            stiffness_times_velocity: false,
-        };
-        let forces = sum.linearise(State { x: &positions, v: &v }, options, matrix).map_err(failed)?;
-        let gradient: Vec<f64> = forces.force.iter().flatten().map(|f| -f).collect();
-        let energy = total(sum, &positions)?;
-        let matrix = matrix.to_bsr(Storage::Whole);
+        let (positions, mut state) = (self.positions(x)?, self.state()?);
+        let state = &mut *state;
+        let linearised = py.detach(|| state.linearise(&self.pinned, &positions, curvature));
+        let (energy, gradient, matrix) = linearised.map_err(PyErr::from)?;
         let gradient = PyArray1::from_vec(py, gradient).reshape([positions.len(), 3])?.to_dyn().clone();
         let indices = |list: Vec<usize>| PyArray1::from_vec(py, list.into_iter().map(|i| i as i64).collect());
         let blocks = matrix.blocks.len();
@@ -135,12 +132,12 @@ impl System {
 }
 
 impl System {
-    fn state(&self) -> RefMut<'_, Assembly> {
-        self.state.borrow_mut()
+    fn state(&self) -> PyResult<MutexGuard<'_, Assembly>> {
+        self.state.get()
     }
 
     fn positions(&self, x: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
-        let array: PyReadonlyArrayDyn<'_, f64> = doubles("x", x)?;
+        let array: PyReadonlyArrayDyn<'_, f64> = array("x", x)?;
         let expected = [self.pinned.len(), 3];
         if array.shape() != expected {
             return Err(wrong_shape("x", &tuple(&expected), array.shape()));
@@ -149,18 +146,61 @@ impl System {
     }
 }
 
-impl Assembly {
-    fn sum(&mut self, pinned: &[bool]) -> PyResult<&mut (Assembled, BlockMatrix)> {
-        if self.sum.is_none() {
-            let terms = self.terms.iter().map(|term| Box::new(term.clone()) as Box<dyn Term>).collect();
-            let sum = Assembled::new(terms, pinned).map_err(wrong)?;
-            let matrix = sum.matrix();
-            self.sum = Some((sum, matrix));
+/// Why a sum cannot be evaluated. It becomes an exception once the interpreter's lock is held.
+enum Failure {
+    System(SystemError),
+    Evaluation(EvaluationError),
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::System(error) => wrong(error),
+            Failure::Evaluation(error) => failed(error),
         }
-        Ok(self.sum.as_mut().expect("made above"))
     }
 }
 
-fn total(sum: &mut Assembled, x: &[Vector3<f64>]) -> PyResult<f64> {
-    Ok(sum.energies(x).map_err(failed)?.iter().filter_map(|term| term.energy).sum())
+impl Assembly {
+    fn sum(&mut self, pinned: &[bool]) -> Result<&mut (Assembled, BlockMatrix), Failure> {
+        let sum = match self.sum.take() {
+            Some(sum) => sum,
+            None => {
+                let terms = self.terms.iter().map(|term| Box::new(term.clone()) as Box<dyn Term>).collect();
+                let sum = Assembled::new(terms, pinned).map_err(Failure::System)?;
+                let matrix = sum.matrix();
+                (sum, matrix)
+            }
+        };
+        Ok(self.sum.insert(sum))
+    }
+
+    fn energy(&mut self, pinned: &[bool], x: &[Vector3<f64>]) -> Result<f64, Failure> {
+        total(&mut self.sum(pinned)?.0, x)
+    }
+
+    /// Returns U, ∂U/∂x and the matrix.
+    fn linearise(
+        &mut self,
+        pinned: &[bool],
+        x: &[Vector3<f64>],
+        curvature: Curvature,
+    ) -> Result<(f64, Vec<f64>, Bsr<f64>), Failure> {
+        let (sum, matrix) = self.sum(pinned)?;
+        let v = vec![[0.0; 3]; x.len()];
+        let options = LinearisationOptions {
+            weights: Weights { position: -1.0, velocity: 0.0 },
+            curvature,
+            stiffness_times_velocity: false,
+        };
+        let forces = sum.linearise(State { x, v: &v }, options, matrix).map_err(Failure::Evaluation)?;
+        let gradient = forces.force.iter().flatten().map(|f| -f).collect();
+        let energy = total(sum, x)?;
+        let (_, matrix) = self.sum(pinned)?;
+        Ok((energy, gradient, matrix.to_bsr(Storage::Whole)))
+    }
+}
+
+fn total(sum: &mut Assembled, x: &[Vector3<f64>]) -> Result<f64, Failure> {
+    Ok(sum.energies(x).map_err(Failure::Evaluation)?.iter().filter_map(|term| term.energy).sum())
 }

@@ -1,7 +1,6 @@
-"""Scenes of cloth, and sweeps."""
+"""Scenes of cloth."""
 
-import csv
-from concurrent.futures import ThreadPoolExecutor
+import signal
 
 import numpy as np
 import pytest
@@ -48,32 +47,29 @@ def test_a_run_writes_its_folder(tmp_path):
         ed.run(SCENE, tmp_path / "out")
 
 
-def test_a_sweep_lists_its_runs_and_skips_those_that_are_done(tmp_path):
-    grid = {"fabric.density": [0.1, 0.2], "dt": [0.01, 0.02]}
-    with ThreadPoolExecutor(2) as pool:
-        sweep = ed.sweep(SCENE, grid, tmp_path, executor=pool)
-        index = (tmp_path / "index.csv").read_bytes()
-        again = ed.sweep(SCENE, grid, tmp_path, executor=pool)
-    assert [run["status"] for run in sweep.runs] == ["done"] * 4 and not sweep.failures
-    assert again.runs == sweep.runs and (tmp_path / "index.csv").read_bytes() == index
-    rows = list(csv.DictReader((tmp_path / "index.csv").open()))
-    choices = {(density, dt) for density in ("0.1", "0.2") for dt in ("0.01", "0.02")}
-    assert {(row["fabric.density"], row["dt"]) for row in rows} == choices
-    assert all((tmp_path / row["folder"] / "run.json").exists() for row in rows)
+def test_progress_is_told_and_may_stop_a_run(tmp_path):
+    told = []
+    assert ed.run(SCENE, tmp_path / "out", progress=lambda *numbers: told.append(numbers)) == 10
+    assert told == [(step, 10) for step in range(1, 11)]
+    frames, told[:] = ed.simulate(SCENE, every=5, progress=lambda *numbers: told.append(numbers)), told[10:]
+    assert len(frames) == 3 and told == [(5, 10), (10, 10)]
+
+    def stop(done, _):
+        if done == 4:
+            raise LookupError("enough")
+
+    with pytest.raises(LookupError, match="enough"):
+        ed.run(SCENE, tmp_path / "stopped", checkpoint=3, progress=stop)
+    assert ed.resume(tmp_path / "stopped") == 10
+    for frame in (tmp_path / "out").glob("*.usd*"):
+        assert frame.read_bytes() == (tmp_path / "stopped" / frame.name).read_bytes()
 
 
-def test_a_run_that_fails_is_listed_and_others_go_on(tmp_path):
-    with ThreadPoolExecutor(1) as pool:
-        sweep = ed.sweep(SCENE, [{"dt": -1.0}, {"dt": 0.01}], tmp_path, executor=pool)
-    assert [run["status"] for run in sweep.runs] == ["failed", "done"]
-    assert "dt" in sweep.failures[0]["message"]
+def test_ctrl_c_ends_a_run_with_its_results(tmp_path):
+    def interrupt(done, _):
+        if done == 2:
+            signal.raise_signal(signal.SIGINT)
 
-
-def test_processes_do_the_same(tmp_path):
-    threads = ed.sweep(SCENE, {"dt": [0.01]}, tmp_path / "a", executor=ThreadPoolExecutor(1))
-    processes = ed.sweep(SCENE, {"dt": [0.01]}, tmp_path / "b")
-    name = threads.runs[0]["folder"]
-    assert name == processes.runs[0]["folder"]
-    frames = sorted(path.name for path in (tmp_path / "a" / name).glob("*.usd*"))
-    for frame in frames:
-        assert (tmp_path / "a" / name / frame).read_bytes() == (tmp_path / "b" / name / frame).read_bytes()
+    with pytest.raises(KeyboardInterrupt, match="results so far"):
+        ed.run(SCENE, tmp_path / "out", checkpoint=5, progress=interrupt)
+    assert (tmp_path / "out" / "run.json").exists() and ed.resume(tmp_path / "out") == 10

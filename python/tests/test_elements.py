@@ -1,7 +1,5 @@
 """Elements: values, derivatives, shapes and messages."""
 
-import threading
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -118,8 +116,6 @@ def test_texts_that_are_wrong_are_refused_with_their_place():
         ed.energy("energy U(p: Point) { nrm(p) }", "u.energy")
     with pytest.raises(ed.EnergyError, match="expected one declaration, got 2"):
         ed.energy(SPRING + SPRING.replace("Spring", "Other"))
-    with pytest.raises(KeyError, match="catalogue"):
-        ed.element("Sprong")
 
 
 def test_degenerate_rest_shapes_are_refused():
@@ -140,32 +136,6 @@ def test_batches_of_any_size_equal_single_elements(count, seed):
     for i in range(0, count, 29):
         single = spring.hessian(x[i : i + 1], k=2.0, L=0.7)
         assert U[i] == single[0][0] and np.array_equal(g[i], single[1][0]) and np.array_equal(H[i], single[2][0])
-
-
-@given(stride=st.integers(2, 4), dtype=st.sampled_from(["f4", "f8", "i8"]))
-@settings(max_examples=20, deadline=None)
-def test_strides_and_types_are_converted(stride, dtype):
-    spring = ed.energy(SPRING)
-    wide = (10 * positions(8 * stride, 2)).astype(dtype)
-    strided = wide[::stride]
-    expected = spring.value(np.ascontiguousarray(strided, dtype="f8"), k=1, L=1)
-    assert np.array_equal(spring.value(strided, k=1, L=1), expected)
-
-
-def test_threads_share_elements(spring):
-    bound = spring.bind(640, k=2.0, L=1.0)
-    x = positions(640, 2)
-    expected = bound.hessian(x)[2]
-    results = [None] * 4
-
-    def work(i):
-        for _ in range(20):
-            results[i] = bound.hessian(x)[2]
-
-    threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
-    [thread.start() for thread in threads]
-    [thread.join() for thread in threads]
-    assert all(np.array_equal(result, expected) for result in results)
 
 
 def test_audits_find_what_is_false():

@@ -225,7 +225,7 @@ impl FabricTerms {
         element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
     ) -> Result<(), FabricError>
     where
-        E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
         if self.leave_out(name, is_zero, cloth.triangles.len()) {
             return Ok(());
@@ -242,7 +242,7 @@ impl FabricTerms {
         element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
     ) -> Result<(f64, f64), FabricError>
     where
-        E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
         self.add_membrane("membrane", mu == 0.0, cloth, |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
         Ok((lambda, mu))
@@ -357,7 +357,7 @@ impl FabricTerms {
         elements: Vec<E>,
     ) -> Result<(), FabricError>
     where
-        E: PackedPotential<f64> + std::fmt::Debug + Sync + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
         self.terms.push(Box::new(PotentialTerm::new(self.list(name, elements, stencils)?)));
         Ok(())
@@ -370,7 +370,7 @@ impl FabricTerms {
         elements: Vec<E>,
     ) -> Result<(), FabricError>
     where
-        E: ForceLaw<f64> + std::fmt::Debug + 'static,
+        E: ForceLaw<f64> + std::fmt::Debug + Send + 'static,
     {
         self.terms.push(Box::new(ForceTerm::new(self.list(name, elements, stencils)?)));
         Ok(())

@@ -43,7 +43,7 @@ use energy_dsl::Vector3;
 use crate::body::Body;
 
 /// An integration scheme for a body.
-pub trait Integrator: std::fmt::Debug {
+pub trait Integrator: std::fmt::Debug + Send {
     /// The scheme's name in scene files.
     fn name(&self) -> &'static str;
 

@@ -1,5 +1,4 @@
-use std::cell::Cell;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use energy_dsl::{Declaration, Element, Potential, Vector3};
 use energy_elements::ZeroLengthSpring;
@@ -14,7 +13,7 @@ use crate::model::{IslandModel, TermLabel};
 /// A soft pin for the mouse: pulls one vertex to a target by the declared [`ZeroLengthSpring`].
 #[derive(Clone, Debug)]
 pub(super) struct Grip {
-    held: Rc<Cell<Option<Held>>>,
+    held: Arc<Mutex<Option<Held>>>,
     spring: ZeroLengthSpring,
 }
 
@@ -31,21 +30,29 @@ impl Grip {
     /// Creates a grip that is stiff enough for these masses, in kg.
     pub(super) fn carrying(masses: &[f64]) -> Self {
         let stiffness = 9.81 * masses.iter().sum::<f64>() / Self::STRETCH;
-        Self { held: Rc::default(), spring: ZeroLengthSpring::new(stiffness, 0.0) }
+        Self { held: Arc::default(), spring: ZeroLengthSpring::new(stiffness, 0.0) }
     }
 
     /// Starts pulling a vertex to a target.
     pub(super) fn hold(&self, vertex: usize, target: Vector3<f64>) {
-        self.held.set(Some(Held { vertex, target }));
+        self.set(Some(Held { vertex, target }));
     }
 
     /// The vertex that is held.
     pub(super) fn vertex(&self) -> Option<usize> {
-        self.held.get().map(|held| held.vertex)
+        self.get().map(|held| held.vertex)
     }
 
     pub(super) fn release(&self) {
-        self.held.set(None);
+        self.set(None);
+    }
+
+    fn get(&self) -> Option<Held> {
+        *self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set(&self, held: Option<Held>) {
+        *self.held.lock().unwrap_or_else(PoisonError::into_inner) = held;
     }
 
     /// Label of the grip's terms.
@@ -80,7 +87,7 @@ impl GripTerm {
     /// Returns the held vertex, as an index within the island, with the slot of its block; `None` if it is pinned or
     /// elsewhere.
     fn held(&self) -> Option<(Held, usize)> {
-        let held = self.grip.held.get()?;
+        let held = self.grip.get()?;
         let vertex = self.vertices.iter().position(|&vertex| vertex == held.vertex)?;
         Some((Held { vertex, ..held }, self.slots[vertex]?))
     }

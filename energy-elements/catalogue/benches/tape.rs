@@ -287,26 +287,15 @@ fn first_number() -> f64 {
 }
 
 macro_rules! table {
-    ($($kind:ident: $($name:ident)*;)*) => {
-        &[$($((stringify!($name), $kind::<$name<f64>> as fn() -> Vec<Line>),)*)*]
+    ($($kind:ident $name:ident),*) => {
+        &[$((stringify!($name), $kind::<$name<f64>> as fn() -> Vec<Line>)),*]
     };
 }
 
 /// Name of an element, and the function that measures it.
 type Entry = (&'static str, fn() -> Vec<Line>);
 
-const ELEMENTS: &[Entry] = table! {
-    potential: ArcAngle AsRigidAsPossible BaraffWitkinShear BaraffWitkinStretch BoxContact BridsonBending
-        CapsuleContact Distance DistanceBarrier DistanceSquared EdgeEdgeDistance FlatBending Gravity HairBend HingeAngle
-        HingeCos HingeCosHalf HingeSinHalf HookeSpring NeoHookean OrthotropicStVK ParallelEdges PlaneContact
-        PlateBending PointEdgeDistance PointTriangleDistance PowerLaw QuadraticHinge SlidingFriction SphereContact
-        Spring SquaredDistanceBarrier StVK StableNeoHookean StableNeoHookeanLog TetAsRigidAsPossible TetCorotational
-        TetStVK TetStableNeoHookean ThreadLimit WindDrag ZeroLengthSpring;
-    force: BridsonForce BridsonForceDamped HingeDamping StrainRateDamping ViscousDrag;
-    residual: Binding BlendedMotion4 BlendedPoint1 BlendedPoint4 BlendedPoint8 BoneBinding FrozenPlane1 FrozenPlane4
-        FrozenPlane8 GraphEdge HuberLoss NonrigidPlane1 NonrigidPlane4 NonrigidPlane8 PointToPlane SkeletonPlane
-        SkeletonPoint TukeyLoss TwistMotion;
-};
+const ELEMENTS: &[Entry] = energy_elements::for_each_element!(with kinds table);
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();

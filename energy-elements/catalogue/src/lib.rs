@@ -4,7 +4,15 @@
 //! the elements and compiles those.
 #![forbid(unsafe_code)]
 
+mod batches;
+#[cfg(feature = "batches")]
+mod kernels;
+#[cfg(feature = "batches")]
+mod matrices;
+
 use energy_dsl::AnyElement;
+
+pub use batches::{BatchRoutine, CompiledBatch, Scalar, bind};
 
 macro_rules! entries {
     ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<energy_elements::$name<f64>>()),*] };

@@ -15,7 +15,7 @@ use crate::matrix::dof_map::DofMap;
 /// 4. [`ContactModel::meet`] is called at each new iterate. Pairs join there and then stay until the step ends, so that
 ///    a line search sees a single function.
 /// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
-pub trait ContactModel: std::fmt::Debug {
+pub trait ContactModel: std::fmt::Debug + Send {
     /// Begins a step at x: forgets all pairs.
     fn begin_step(&mut self, x: &[Vector3<f64>]);
 

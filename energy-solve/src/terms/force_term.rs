@@ -49,7 +49,7 @@ impl<E: ForceLaw<f64> + Debug> Debug for ForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug> TermDescription for ForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send> TermDescription for ForceTerm<E> {
     fn name(&self) -> &str {
         self.list.name()
     }
@@ -68,7 +68,7 @@ impl<E: ForceLaw<f64> + Debug> TermDescription for ForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug + 'static> Term for ForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send + 'static> Term for ForceTerm<E> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let n = self.list.arity();
         let active = Active::new(self.list.stencils(), dofs);
@@ -122,7 +122,7 @@ impl<E: ForceLaw<f64>> PlacedForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug> TermDescription for PlacedForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send> TermDescription for PlacedForceTerm<E> {
     fn name(&self) -> &str {
         self.term.name()
     }
@@ -140,7 +140,7 @@ impl<E: ForceLaw<f64> + Debug> TermDescription for PlacedForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug> PlacedTerm for PlacedForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send> PlacedTerm for PlacedForceTerm<E> {
     fn dissipation(&self, state: State<'_>) -> Option<(f64, Tally)> {
         let evaluated = E::DECLARATION.velocity_dependent.then(|| dispatch(Dissipation { term: self, state }));
         evaluated.map(|(sum, flagged)| (sum, self.tally(flagged)))

@@ -40,7 +40,7 @@ impl std::fmt::Display for Quantity {
 }
 
 /// The properties of a term that do not depend on the vertices' state.
-pub trait TermDescription: std::fmt::Debug {
+pub trait TermDescription: std::fmt::Debug + Send {
     /// The term's name, for people: "structural springs".
     fn name(&self) -> &str;
     /// The declaration of the term's elements.

@@ -18,10 +18,10 @@ use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
 
 /// Selects the elements that act during a step. Their parameters are fixed at its start; only velocities vary.
-pub trait DissipationLaw: Debug + Sync {
+pub trait DissipationLaw: Debug + Send + Sync {
     /// The element: a convex Rayleigh dissipation function, declared as an energy of the displacements per unit of
     /// time.
-    type Element: PackedPotential<f64> + Debug + Sync + 'static;
+    type Element: PackedPotential<f64> + Debug + Send + Sync + 'static;
     /// Returns the elements that act on stencils with a free vertex, each with the index of its stencil, in ascending
     /// order.
     fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, Self::Element)>;

@@ -12,7 +12,7 @@ use super::work::{Expanded, Gradients, Hessians, Values, lanes_in};
 use crate::terms::scatter::Lanes;
 
 /// Elements of one type, packed for lanes. Ranges start at multiples of [`Evaluated::PACK`].
-pub(super) trait Evaluated: Debug + Sync {
+pub(super) trait Evaluated: Debug + Send + Sync {
     /// Elements that are evaluated together.
     const PACK: usize;
 
@@ -30,7 +30,7 @@ pub(super) trait Evaluated: Debug + Sync {
     fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64]));
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync> Evaluated for Packed<E> {
+impl<E: PackedPotential<f64> + Debug + Send + Sync> Evaluated for Packed<E> {
     const PACK: usize = BLOCK;
 
     fn declaration(&self) -> &'static Declaration {

@@ -40,7 +40,7 @@ impl<E: PackedPotential<f64>> PotentialTerm<E> {
     }
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync> TermDescription for PotentialTerm<E> {
+impl<E: PackedPotential<f64> + Debug + Send + Sync> TermDescription for PotentialTerm<E> {
     fn name(&self) -> &str {
         self.list.name()
     }
@@ -58,7 +58,7 @@ impl<E: PackedPotential<f64> + Debug + Sync> TermDescription for PotentialTerm<E
     }
 }
 
-impl<E: PackedPotential<f64> + Debug + Sync + 'static> Term for PotentialTerm<E> {
+impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> Term for PotentialTerm<E> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let list = self.list;
         let (stencils, count) = (list.stencils(), list.elements().len());
