@@ -9,6 +9,7 @@ mod float;
 mod lane;
 mod level;
 mod limits;
+mod narrow;
 mod ray;
 mod real;
 mod unbounded;

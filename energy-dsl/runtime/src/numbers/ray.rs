@@ -23,7 +23,7 @@ const BEYOND: f64 = 1e6;
 
 /// The order of magnitude ε^power · ln(1/ε)^logs.
 #[derive(Clone, Copy, Debug)]
-struct Order {
+pub(super) struct Order {
     power: f64,
     logs: f64,
 }
@@ -58,10 +58,34 @@ impl Order {
     }
 }
 
+/// A term of a series.
 #[derive(Clone, Copy, Debug)]
-struct Term {
+pub(super) struct Term {
     order: Order,
     factor: Factor,
+}
+
+impl Term {
+    /// Returns whether the term is negative.
+    pub(super) fn is_negative(self) -> bool {
+        is_negative(self.factor)
+    }
+
+    /// Compares sizes: first the orders of magnitude, then the factors.
+    pub(super) fn compare_size(self, other: Self) -> Ordering {
+        let by_factor = match (self.factor.abs(), other.factor.abs()) {
+            (a, b) if a.less(b) => Ordering::Less,
+            (a, b) if b.less(a) => Ordering::Greater,
+            _ => Ordering::Equal,
+        };
+        self.order.compare(other.order).reverse().then(by_factor)
+    }
+
+    /// Returns whether two terms are equal up to rounding.
+    pub(super) fn is_near(self, other: Self) -> bool {
+        let (difference, size) = ((self.factor - other.factor).abs(), self.factor.abs().max(other.factor.abs()));
+        self.order.compare(other.order) == Ordering::Equal && difference.less_or_equal(size * factor(CANCELLED))
+    }
 }
 
 /// Known terms, the largest first, and the order of the first unknown term.
@@ -344,6 +368,9 @@ pub(super) enum Limit {
     Unknown,
 }
 
+/// Evaluates a routine along a ray; `None` if the formula itself is degenerate there.
+pub(super) type Along<'a> = &'a dyn Fn(&[Ray]) -> Option<Vec<Ray>>;
+
 /// Terms that a series keeps at first, and if these do not determine a limit.
 const LENGTHS: [usize; 2] = [4, 10];
 
@@ -352,6 +379,22 @@ thread_local! {
     static LENGTH: Cell<usize> = const { Cell::new(LENGTHS[1]) };
     /// The series of all rays that this thread is computing.
     static SERIES: RefCell<Vec<Series>> = const { RefCell::new(Vec::new()) };
+    /// The comparisons of the ray that this thread is computing, in order of evaluation.
+    static COMPARISONS: RefCell<Vec<Comparison>> = const { RefCell::new(Vec::new()) };
+    /// The comparison whose outcome is reversed.
+    static REVERSED: Cell<Option<usize>> = const { Cell::new(None) };
+}
+
+/// A comparison of two numbers along a ray: the largest term of their difference; `None` if that is 0 or undefined.
+pub(super) type Comparison = Option<Term>;
+
+/// What a routine computes along a ray.
+#[derive(Debug)]
+pub(super) struct Found {
+    /// Limits of the results; `None` if the formula is degenerate along the ray.
+    pub limits: Option<Vec<Limit>>,
+    /// All comparisons but tests of equality. Routines do not branch, so all rays have the same ones.
+    pub comparisons: Vec<Comparison>,
 }
 
 /// A number along a ray: a handle of a series. Generated code has thousands of them on its stack.
@@ -359,23 +402,38 @@ thread_local! {
 pub struct Ray(u32);
 
 impl Ray {
-    /// Returns the limits of what a routine computes at x + slope · ε; `None` if it has no result.
-    pub(super) fn limits(
+    /// Returns what a routine computes at x + slope · ε, where `along` evaluates it.
+    pub(super) fn evaluate(x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> Found {
+        let short = Self::evaluate_to(LENGTHS[0], x, slopes, along);
+        let is_known = |limits: &Vec<Limit>| !limits.iter().any(|limit| matches!(limit, Limit::Unknown));
+        if short.limits.as_ref().is_none_or(is_known) { short } else { Self::evaluate_to(LENGTHS[1], x, slopes, along) }
+    }
+
+    /// Returns what the routine would compute if one comparison had the other outcome.
+    pub(super) fn evaluate_reversed(
+        comparison: usize,
         x: &[Unbounded<f64>],
         slopes: &[f64],
-        along: &dyn Fn(&[Self]) -> Option<Vec<Self>>,
-    ) -> Option<Vec<Limit>> {
-        let at = |length: usize| {
-            LENGTH.set(length);
-            let rays: Vec<Self> = x.iter().zip(slopes).map(|(&x, &slope)| Self::from(x, slope)).collect();
-            let limits = along(&rays).map(|found| found.into_iter().map(Self::limit).collect::<Vec<_>>());
-            SERIES.with_borrow_mut(Vec::clear);
-            LENGTH.set(LENGTHS[1]);
-            limits
-        };
-        let short = at(LENGTHS[0])?;
-        let is_known = !short.iter().any(|limit| matches!(limit, Limit::Unknown));
-        if is_known { Some(short) } else { at(LENGTHS[1]) }
+        along: Along<'_>,
+    ) -> Found {
+        REVERSED.set(Some(comparison));
+        let found = Self::evaluate(x, slopes, along);
+        REVERSED.set(None);
+        found
+    }
+
+    /// Returns the comparisons at x + slope · ε.
+    pub(super) fn compare(x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> Vec<Comparison> {
+        Self::evaluate_to(LENGTHS[0], x, slopes, along).comparisons
+    }
+
+    fn evaluate_to(length: usize, x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> Found {
+        LENGTH.set(length);
+        let rays: Vec<Self> = x.iter().zip(slopes).map(|(&x, &slope)| Self::from(x, slope)).collect();
+        let limits = along(&rays).map(|found| found.into_iter().map(Self::limit).collect::<Vec<_>>());
+        SERIES.with_borrow_mut(Vec::clear);
+        LENGTH.set(LENGTHS[1]);
+        Found { limits, comparisons: COMPARISONS.take() }
     }
 
     /// Creates x + slope · ε. An infinite x becomes |slope|/ε with its sign.
@@ -417,9 +475,21 @@ impl Ray {
     fn against(self, other: Self) -> Option<f64> {
         SERIES.with_borrow(|all| {
             let (a, b) = (&all[self.0 as usize], &all[other.0 as usize]);
-            (a.is_defined() && b.is_defined()).then(|| a.minus(b).sign())
+            let difference = (a.is_defined() && b.is_defined()).then(|| a.minus(b));
+            let sign = compared(difference.as_ref());
+            difference.is_some().then_some(sign)
         })
     }
+}
+
+/// Records a comparison of a difference with 0 and returns the sign, or the other sign if the outcome is reversed.
+fn compared(difference: Option<&Series>) -> f64 {
+    let sign = difference.map_or(0.0, Series::sign);
+    let number = COMPARISONS.with_borrow_mut(|all| {
+        all.push(difference.and_then(|difference| difference.terms.first().copied()));
+        all.len() - 1
+    });
+    if REVERSED.get() == Some(number) { -sign } else { sign }
 }
 
 macro_rules! operator {
@@ -462,7 +532,7 @@ impl Number for Ray {
         self.map(|a| a.raised(0.5))
     }
     fn abs(self) -> Self {
-        self.map(Series::abs)
+        self.map(|a| a.scaled(if compared(Some(a)) < 0.0 { -1.0 } else { 1.0 }))
     }
     fn min(self, other: Self) -> Self {
         if other.less(self) { other } else { self }
@@ -511,7 +581,10 @@ impl Number for Ray {
         self.against(other).is_some_and(|sign| sign <= 0.0)
     }
     fn equal(self, other: Self) -> bool {
-        self.against(other).is_some_and(|sign| sign == 0.0)
+        SERIES.with_borrow(|all| {
+            let (a, b) = (&all[self.0 as usize], &all[other.0 as usize]);
+            a.is_defined() && b.is_defined() && a.minus(b).sign() == 0.0
+        })
     }
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
