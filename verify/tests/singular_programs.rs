@@ -323,6 +323,27 @@ fn derivatives_at_infinite_inputs_are_flagged() {
     }
 }
 
+/// No fixed ray meets the narrower branch. A jump of the value, and a kink.
+#[test]
+fn branches_in_narrow_cones_are_noticed() {
+    let mut x = [0.0; 9];
+    for formula in [
+        "if p.x < norm(q - p) { k } else { k^2 }",
+        "if p.x < norm(r - p) { p.y } else { norm_squared(q - p) }",
+        "if 20 * norm(q - p) < p.x { p.y } else { 2 * p.y }",
+        "max(p.x - 20 * norm(r - q), 0)",
+    ] {
+        check(formula, 2.0, &x).unwrap_or_else(|error| panic!("{error}"));
+        let source = format!("energy Narrow({SIGNATURE}) {{ {formula} + {USES} }}");
+        let element = Interpreted::from_source(&source).expect("a valid formula").remove(0);
+        let inputs = Inputs { parameters: &[2.0], rest: &[], positions: &x, velocities: &[] };
+        let (_, flags) = element.routine("gradient", &inputs).expect("no rest shape").expect("an energy");
+        assert!(flags.kink || flags.degenerate, "{formula}");
+    }
+    x[0] = 1e-3;
+    check("if p.x < norm(q - p) { k } else { k^2 }", 2.0, &x).unwrap_or_else(|error| panic!("{error}"));
+}
+
 /// Its limit 0 is approached as slowly as a logarithm grows.
 #[test]
 fn slow_limits_raise_no_alarm() {

@@ -149,9 +149,9 @@ impl<'a> Rays<'a> {
     /// Looks for rays into narrow regions where the formula takes another branch, with other results.
     fn cast_into_narrow_regions(&mut self) {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
-        let found = one_sided(&rays).into_iter().filter(|&comparison| self.matters(comparison)).find_map(|comparison| {
+        let found = one_sided(&rays).into_iter().filter(|comparisons| self.matter(comparisons)).find_map(|comparisons| {
             let (inputs, moves) = (&self.inputs[..], self.roles.moves);
-            let found = Search { inputs, moves, along: self.along, comparison }.run(&rays);
+            let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
             let differs = |slopes: &Vec<f64>| !self.has_results(Ray::evaluate(inputs, slopes, self.along).limits);
             found.iter().any(differs).then_some(found)
         });
@@ -161,20 +161,20 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Returns whether results change if a comparison has the other outcome.
-    fn matters(&self, comparison: usize) -> bool {
-        let reversed = Ray::evaluate_reversed(comparison, &self.inputs, &self.paths[0].slopes, self.along);
+    /// Returns whether results change if comparisons have the other outcome.
+    fn matter(&self, comparisons: &[usize]) -> bool {
+        let reversed = Ray::evaluate_reversed(comparisons, &self.inputs, &self.paths[0].slopes, self.along);
         !self.has_results(reversed.limits)
     }
 
-    /// Returns whether limits are those of the first ray.
+    /// Returns whether limits are those of the first ray, or the formula is degenerate so that there are none.
     fn has_results(&self, limits: Option<Vec<Limit>>) -> bool {
         let scale = self.largest();
         let same = |(a, b): (&Limit, &Limit)| match (a, b) {
             (Limit::Finite(a), Limit::Finite(b)) => is_near(*a, *b, scale),
             _ => false,
         };
-        limits.is_some_and(|limits| limits.iter().zip(&self.paths[0].limits).all(same))
+        limits.is_none_or(|limits| limits.iter().zip(&self.paths[0].limits).all(same))
     }
 
     fn settle<T: Number>(mut self, plain: &[Unbounded<f64>], flags: &mut Flags<T>) -> Vec<Unbounded<f64>> {

@@ -24,28 +24,29 @@ pub(super) struct Evaluated<'a> {
     pub comparisons: &'a [Comparison],
 }
 
-/// Returns comparisons with the same outcome on all rays whose differences depend on the ray. Of several with equal
-/// differences, only the first one counts.
-pub(super) fn one_sided(rays: &[Evaluated<'_>]) -> Vec<usize> {
+/// Returns comparisons with the same outcome on all rays whose differences depend on the ray. Each entry lists all
+/// comparisons of one difference: those of a value and of its derivatives.
+pub(super) fn one_sided(rays: &[Evaluated<'_>]) -> Vec<Vec<usize>> {
     let Some((first, rest)) = rays.split_first() else { return Vec::new() };
     if rest.iter().any(|ray| ray.comparisons.len() != first.comparisons.len()) {
         return Vec::new();
     }
-    let mut found: Vec<usize> = Vec::new();
+    let mut found: Vec<Vec<usize>> = Vec::new();
     for number in 0..first.comparisons.len() {
         let Some(term) = first.comparisons[number] else { continue };
         let others = || rest.iter().map(|ray| ray.comparisons[number]);
         let is_alike = others().all(|other| other.is_some_and(|other| other.is_negative() == term.is_negative()));
         let is_constant = others().all(|other| other.is_some_and(|other| other.is_near(term)));
-        let is_copy = |&earlier: &usize| {
-            let same = |ray: &Evaluated<'_>| match (ray.comparisons[earlier], ray.comparisons[number]) {
-                (Some(a), Some(b)) => a.compare_size(b) == Ordering::Equal,
-                _ => false,
-            };
-            rays.iter().all(same)
+        if !is_alike || is_constant {
+            continue;
+        }
+        let same = |ray: &Evaluated<'_>, a: usize| match (ray.comparisons[a], ray.comparisons[number]) {
+            (Some(a), Some(b)) => a.compare_size(b) == Ordering::Equal,
+            _ => false,
         };
-        if is_alike && !is_constant && !found.iter().any(is_copy) {
-            found.push(number);
+        match found.iter_mut().find(|copies| rays.iter().all(|ray| same(ray, copies[0]))) {
+            Some(copies) => copies.push(number),
+            None => found.push(vec![number]),
         }
     }
     found
@@ -176,5 +177,52 @@ fn is_smaller(a: &Point, b: &Point) -> bool {
     match (a.difference, b.difference) {
         (Some(a), Some(b)) => a.compare_size(b) == Ordering::Less,
         _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::{Flags, Number, Roles, settle};
+
+    /// Returns whether a value with one derivative is marked as a kink at 0, where the derivative is 1.
+    fn is_kink(inputs: usize, formula: impl Fn(&[Ray]) -> Vec<Ray>) -> bool {
+        let mut results = [0.0, 1.0].map(Unbounded::<f64>::of);
+        let mut flags = Flags { degenerate: false, kink: true };
+        let roles = Roles { moves: &vec![true; inputs], groups: &[1, 1], values_first: true };
+        settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, &mut flags, &|x| Some(formula(x)));
+        assert!(!flags.degenerate && results[1].to_scalar() == 1.0);
+        flags.kink
+    }
+
+    fn norm_squared(x: &[Ray]) -> Ray {
+        x.iter().fold(Ray::from_f64(0.0), |sum, &x| sum + x * x)
+    }
+
+    /// Returns a value with the slope 1 or, where the condition holds, with another one.
+    fn bent(x: &[Ray], condition: bool, slope: f64) -> Vec<Ray> {
+        let slope = Ray::select(condition, Ray::from_f64(slope), Ray::from_f64(1.0));
+        vec![slope * x[0], slope]
+    }
+
+    #[test]
+    fn cones_that_no_fixed_ray_meets_are_found() {
+        for width in [1.0, 0.1, 0.01] {
+            let distance = |x: &[Ray]| norm_squared(&[x[3] - x[6], x[4] - x[7], x[5] - x[8]]).sqrt();
+            let cone = |x: &[Ray]| distance(x).less(Ray::from_f64(width) * x[0]);
+            assert!(is_kink(9, |x| bent(x, cone(x), 2.0)), "width {width}");
+            assert!(!is_kink(9, |x| bent(x, cone(x), 1.0)));
+        }
+        // A wedge between two planes.
+        let wedge = |x: &[Ray]| (x[1] - x[2]).abs().less(Ray::from_f64(0.003) * x[0]);
+        assert!(is_kink(3, |x| bent(x, wedge(x), 2.0)));
+    }
+
+    /// Straight rays do not enter a cusp, and a plane has no width.
+    #[test]
+    fn lines_and_cusps_do_not_count() {
+        assert!(!is_kink(2, |x| bent(x, (x[1] * x[1]).less(x[0] * x[0] * x[0]), 2.0)));
+        assert!(!is_kink(3, |x| bent(x, (x[1] * x[1]).less_or_equal(Ray::from_f64(0.0)), 2.0)));
+        assert!(!is_kink(3, |x| bent(x, norm_squared(x).less(Ray::from_f64(0.0)), 2.0)));
     }
 }

@@ -381,8 +381,8 @@ thread_local! {
     static SERIES: RefCell<Vec<Series>> = const { RefCell::new(Vec::new()) };
     /// The comparisons of the ray that this thread is computing, in order of evaluation.
     static COMPARISONS: RefCell<Vec<Comparison>> = const { RefCell::new(Vec::new()) };
-    /// The comparison whose outcome is reversed.
-    static REVERSED: Cell<Option<usize>> = const { Cell::new(None) };
+    /// Comparisons whose outcomes are reversed.
+    static REVERSED: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
 }
 
 /// A comparison of two numbers along a ray: the largest term of their difference; `None` if that is 0 or undefined.
@@ -409,16 +409,16 @@ impl Ray {
         if short.limits.as_ref().is_none_or(is_known) { short } else { Self::evaluate_to(LENGTHS[1], x, slopes, along) }
     }
 
-    /// Returns what the routine would compute if one comparison had the other outcome.
+    /// Returns what the routine would compute if some comparisons had the other outcome.
     pub(super) fn evaluate_reversed(
-        comparison: usize,
+        comparisons: &[usize],
         x: &[Unbounded<f64>],
         slopes: &[f64],
         along: Along<'_>,
     ) -> Found {
-        REVERSED.set(Some(comparison));
+        REVERSED.set(comparisons.to_vec());
         let found = Self::evaluate(x, slopes, along);
-        REVERSED.set(None);
+        REVERSED.take();
         found
     }
 
@@ -489,7 +489,7 @@ fn compared(difference: Option<&Series>) -> f64 {
         all.push(difference.and_then(|difference| difference.terms.first().copied()));
         all.len() - 1
     });
-    if REVERSED.get() == Some(number) { -sign } else { sign }
+    if REVERSED.with_borrow(|reversed| reversed.contains(&number)) { -sign } else { sign }
 }
 
 macro_rules! operator {
