@@ -144,7 +144,8 @@ impl Place<'_> {
     /// Looks for directions on which the formula takes another branch, and some block up to this order another limit.
     /// Narrow regions contain none of [`DIRECTIONS`].
     fn has_other_branch(&self, order: usize, limits: &[Limit]) -> bool {
-        let branches = |direction: &[f64; 9]| self.textbook.branches(&self.sample(direction, 2.0_f64.powi(-20)).inputs());
+        let branches =
+            |direction: &[f64; 9]| self.textbook.branches(&self.sample(direction, 2.0_f64.powi(-20)).inputs());
         let mut seen: Vec<Vec<bool>> = DIRECTIONS.iter().map(branches).collect();
         let mut random = fastrand::Rng::with_seed(1);
         for _ in 0..50_000 {

@@ -49,6 +49,23 @@ fn a_jump_fails_and_a_kink_passes() {
     }
 }
 
+/// Neighbouring doubles beside the kink of a root differ by the root of roundoff.
+#[test]
+fn a_kink_with_infinite_slopes_is_no_jump() {
+    let options = Options { samples: 40, truths: 2, mutations: 0, ..Options::default() };
+    for (jump, expected) in [("0", vec![]), ("1e-6", vec![Check::Continuity])] {
+        let text = format!(
+            "#[audit] energy Root(p, q: Point; k, L: Scalar) {{
+                 let e = norm(p - q) / L - 1;
+                 k * sqrt(abs(e)) + (if e < 0 {{ 0 }} else {{ {jump} }})
+             }}"
+        );
+        let report = report(&text, options);
+        let failed: Vec<Check> = report.failures().map(|line| line.check).collect();
+        assert_eq!(failed, expected, "{jump}: {:?}", failures(&report));
+    }
+}
+
 /// A value that is drawn from everywhere near a kink leaves no side to take differences on.
 #[test]
 fn inputs_without_differences_are_counted_and_too_many_fail() {

@@ -85,11 +85,26 @@ impl Auditor<'_> {
             return;
         }
         let jump = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let is_steep = || self.farther_apart(block, before, after, ends).is_some_and(|wider| 100.0 * jump < wider);
+        let jump = if jump > 1e-9 * scale && is_steep() { 0.0 } else { jump };
         let declaration = self.declaration;
         self.note(Check::Continuity, block, if jump == 0.0 { 0.0 } else { jump / scale }, before, || {
             let sides: Vec<String> = pairs().map(|(a, b)| format!("{a:.17e} and {b:.17e}")).collect();
             format!("  the two sides of a change of branches: {}, at{}", sides.join("; "), before.describe(declaration))
         });
+    }
+
+    /// Returns the difference of values a little farther from the change of branches. A jump stays as large, while the
+    /// difference of continuous values grows, even if slopes are infinite, as those of a root are.
+    fn farther_apart(&self, block: BlockName, before: &Sample, after: &Sample, ends: [&Sample; 2]) -> Option<f64> {
+        let towards = |from: &Sample, to: &Sample| {
+            let positions =
+                from.positions.iter().zip(&to.positions).map(|(from, to)| from + 1e-8 * (to - from)).collect();
+            self.answer(&Sample { positions, ..from.clone() }).ok()
+        };
+        let (left, right) = (towards(before, ends[0])?, towards(after, ends[1])?);
+        let pairs = left.block(block).numbers.iter().zip(&right.block(block).numbers);
+        Some(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
     }
 }
 

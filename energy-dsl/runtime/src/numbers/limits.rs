@@ -149,12 +149,13 @@ impl<'a> Rays<'a> {
     /// Looks for rays into narrow regions where the formula takes another branch, with other results.
     fn cast_into_narrow_regions(&mut self) {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
-        let found = one_sided(&rays).into_iter().filter(|comparisons| self.matter(comparisons)).find_map(|comparisons| {
-            let (inputs, moves) = (&self.inputs[..], self.roles.moves);
-            let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
-            let differs = |slopes: &Vec<f64>| !self.has_results(Ray::evaluate(inputs, slopes, self.along).limits);
-            found.iter().any(differs).then_some(found)
-        });
+        let found =
+            one_sided(&rays).into_iter().filter(|comparisons| self.matter(comparisons)).find_map(|comparisons| {
+                let (inputs, moves) = (&self.inputs[..], self.roles.moves);
+                let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
+                let differs = |slopes: &Vec<f64>| !self.has_results(Ray::evaluate(inputs, slopes, self.along).limits);
+                found.iter().any(differs).then_some(found)
+            });
         if let Some(found) = found {
             self.cast(MANY);
             found.into_iter().for_each(|slopes| self.cast_along(slopes));
