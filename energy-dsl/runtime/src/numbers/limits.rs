@@ -7,8 +7,9 @@ use std::ops::Range;
 
 use super::flags::{Flag, Flags};
 use super::narrow::{Evaluated, Search, one_sided};
-use super::ray::{Along, Comparison, Limit, Ray};
+use super::ray::{Along, Comparison, Ray};
 use super::real::{Mask, Number};
+use super::series::Limit;
 use super::unbounded::Unbounded;
 
 /// What the inputs and outputs of a routine are.

@@ -12,6 +12,7 @@ mod limits;
 mod narrow;
 mod ray;
 mod real;
+mod series;
 mod unbounded;
 
 pub use block_sum::{BLOCK_NUMBERS, BlockSum};

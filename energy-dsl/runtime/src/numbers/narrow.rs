@@ -6,7 +6,8 @@
 
 use std::cmp::Ordering;
 
-use super::ray::{Along, Comparison, Ray, Term};
+use super::ray::{Along, Comparison, Ray};
+use super::series::Term;
 use super::unbounded::Unbounded;
 
 /// Rays that one descent may evaluate. Forty coordinates need about as many.
