@@ -52,12 +52,12 @@ fn a_jump_fails_and_a_kink_passes() {
 /// Neighbouring doubles beside the kink of a root differ by the root of roundoff.
 #[test]
 fn a_kink_with_infinite_slopes_is_no_jump() {
-    let options = Options { samples: 40, truths: 2, mutations: 0, ..Options::default() };
+    let options = Options { samples: 40, truths: 2, mutations: 0, seed: 4, ..Options::default() };
     for (jump, expected) in [("0", vec![]), ("1e-6", vec![Check::Continuity])] {
         let text = format!(
             "#[audit] energy Root(p, q: Point; k, L: Scalar) {{
                  let e = norm(p - q) / L - 1;
-                 k * sqrt(abs(e)) + (if e < 0 {{ 0 }} else {{ {jump} }})
+                 k * sqrt(abs(e)) * tanh(norm(p - q)) + (if e < 0 {{ 0 }} else {{ {jump} }})
              }}"
         );
         let report = report(&text, options);

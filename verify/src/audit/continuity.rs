@@ -85,7 +85,7 @@ impl Auditor<'_> {
             return;
         }
         let jump = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let is_steep = || self.farther_apart(block, before, after, ends).is_some_and(|wider| 100.0 * jump < wider);
+        let is_steep = || self.change_nearby(block, [before, after], ends).is_some_and(|change| 100.0 * jump < change);
         let jump = if jump > 1e-9 * scale && is_steep() { 0.0 } else { jump };
         let declaration = self.declaration;
         self.note(Check::Continuity, block, if jump == 0.0 { 0.0 } else { jump / scale }, before, || {
@@ -94,17 +94,19 @@ impl Auditor<'_> {
         });
     }
 
-    /// Returns the difference of values a little farther from the change of branches. A jump stays as large, while the
-    /// difference of continuous values grows, even if slopes are infinite, as those of a root are.
-    fn farther_apart(&self, block: BlockName, before: &Sample, after: &Sample, ends: [&Sample; 2]) -> Option<f64> {
-        let towards = |from: &Sample, to: &Sample| {
+    /// Returns how much the values change a little farther from the change of branches. Beside a jump they stay about the
+    /// same. Where slopes are infinite, as those of a root are, they change more than between neighbouring doubles.
+    fn change_nearby(&self, block: BlockName, sides: [&Sample; 2], ends: [&Sample; 2]) -> Option<f64> {
+        let mut most = 0.0_f64;
+        for (from, to) in sides.into_iter().zip(ends) {
             let positions =
                 from.positions.iter().zip(&to.positions).map(|(from, to)| from + 1e-8 * (to - from)).collect();
-            self.answer(&Sample { positions, ..from.clone() }).ok()
-        };
-        let (left, right) = (towards(before, ends[0])?, towards(after, ends[1])?);
-        let pairs = left.block(block).numbers.iter().zip(&right.block(block).numbers);
-        Some(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+            let moved = self.answer(&Sample { positions, ..from.clone() }).ok()?;
+            let here = self.answer(from).ok()?;
+            let pairs = here.block(block).numbers.iter().zip(&moved.block(block).numbers);
+            most = pairs.map(|(a, b)| (a - b).abs()).fold(most, f64::max);
+        }
+        Some(most)
     }
 }
 

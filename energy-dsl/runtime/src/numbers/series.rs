@@ -26,7 +26,7 @@ pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> R {
     result
 }
 
-/// A sum this small against its operands is rounding: they cancel.
+/// A sum this small against everything that it was computed from is rounding: its terms cancel.
 const CANCELLED: f64 = 1e-12;
 /// Powers that differ by less are equal.
 const SAME: f64 = 1e-9;
@@ -75,9 +75,16 @@ impl Order {
 pub(super) struct Term {
     order: Order,
     factor: Factor,
+    /// Size of the largest number that was added or subtracted on the way, relative to the factor: its relative error is
+    /// this many roundoffs.
+    doubt: f64,
 }
 
 impl Term {
+    fn exact(order: Order, factor: Factor) -> Self {
+        Self { order, factor, doubt: 1.0 }
+    }
+
     /// Returns whether the term is negative.
     pub(super) fn is_negative(self) -> bool {
         is_negative(self.factor)
@@ -117,7 +124,7 @@ fn is_negative(x: Factor) -> bool {
 
 impl Series {
     fn constant(value: Factor) -> Self {
-        Self::of(vec![Term { order: Order::ONE, factor: value }], Order::NEVER)
+        Self::of(vec![Term::exact(Order::ONE, value)], Order::NEVER)
     }
 
     pub(super) fn number(value: f64) -> Self {
@@ -126,7 +133,7 @@ impl Series {
 
     /// Creates x + slope · ε. An infinite x becomes |slope|/ε with its sign.
     pub(super) fn linear(x: Factor, slope: f64) -> Self {
-        let term = |power: f64, factor| Term { order: Order { power, logs: 0.0 }, factor };
+        let term = |power: f64, factor| Term::exact(Order { power, logs: 0.0 }, factor);
         let plain = x.to_scalar();
         if !x.is_finite() {
             let size = if slope == 0.0 { 1.0 } else { slope.abs() };
@@ -157,10 +164,8 @@ impl Series {
             let same = terms[first..].iter().take_while(|term| term.order.compare(order) == Ordering::Equal).count();
             let group = &terms[first..first + same];
             first += same;
-            let sum = group.iter().fold(factor(0.0), |sum, term| sum + term.factor);
-            let largest = group.iter().fold(factor(0.0), |largest, term| largest.max(term.factor.abs()));
-            if (largest * factor(CANCELLED)).less(sum.abs()) && order.is_larger_than(unknown) {
-                kept.push(Term { order, factor: sum });
+            if let Some(sum) = sum_of(group).filter(|_| order.is_larger_than(unknown)) {
+                kept.push(sum);
             }
         }
         let length = LENGTH.get();
@@ -213,7 +218,11 @@ impl Series {
             return Self::number(0.0);
         }
         let unknown = self.unknown.times(other.leading()).larger(other.unknown.times(self.leading()));
-        let product = |a: &Term, b: &Term| Term { order: a.order.times(b.order), factor: a.factor * b.factor };
+        let product = |a: &Term, b: &Term| Term {
+            order: a.order.times(b.order),
+            factor: a.factor * b.factor,
+            doubt: a.doubt.max(b.doubt),
+        };
         Self::of(self.terms.iter().flat_map(|a| other.terms.iter().map(move |b| product(a, b))).collect(), unknown)
     }
 
@@ -232,8 +241,9 @@ impl Series {
     /// Divides every term by one term.
     fn over(&self, by: Term) -> Self {
         let order = by.order.raised(-1.0);
-        let terms = self.terms.iter();
-        let terms = terms.map(|t| Term { order: t.order.times(order), factor: t.factor / by.factor }).collect();
+        let quotient =
+            |t: &Term| Term { order: t.order.times(order), factor: t.factor / by.factor, doubt: t.doubt.max(by.doubt) };
+        let terms = self.terms.iter().map(quotient).collect();
         Self::sorted(terms, self.unknown.times(order))
     }
 
@@ -297,7 +307,7 @@ impl Series {
         let size = if is_negative(first.factor) && odd { -size } else { size };
         let binomial = |k: usize| (0..k).map(|i| (exponent - i as f64) / (i + 1) as f64).product();
         let order = first.order.raised(-exponent);
-        rest.composed(binomial).over(Term { order, factor: factor(1.0) / size })
+        rest.composed(binomial).over(Term { order, factor: factor(1.0) / size, doubt: first.doubt })
     }
 
     pub(super) fn exp(&self) -> Self {
@@ -310,10 +320,10 @@ impl Series {
         if first.order.compare(Order { power: 0.0, logs: 1.0 }) == Ordering::Equal {
             let order = Order { power: first.factor.to_scalar(), logs: 0.0 };
             let rest = Self { terms: self.terms[1..].to_vec(), ..*self };
-            return rest.exp().over(Term { order, factor: factor(1.0) });
+            return rest.exp().over(Term::exact(order, factor(1.0)));
         }
         let power = if is_negative(first.factor) { BEYOND } else { -BEYOND };
-        Self::of(vec![Term { order: Order { power, logs: 0.0 }, factor: factor(1.0) }], Order::NEVER)
+        Self::of(vec![Term::exact(Order { power, logs: 0.0 }, factor(1.0))], Order::NEVER)
     }
 
     pub(super) fn ln(&self) -> Self {
@@ -322,8 +332,8 @@ impl Series {
         if is_negative(first.factor) || first.order.logs != 0.0 {
             return Self::undefined();
         }
-        let log = Term { order: Order { power: 0.0, logs: 1.0 }, factor: factor(-first.order.power) };
-        let constant = Term { order: Order::ONE, factor: first.factor.ln::<Baseline>() };
+        let log = Term::exact(Order { power: 0.0, logs: 1.0 }, factor(-first.order.power));
+        let constant = Term { order: Order::ONE, factor: first.factor.ln::<Baseline>(), doubt: first.doubt };
         let series =
             rest.composed(|k| if k == 0 { 0.0 } else { (if k.is_multiple_of(2) { -1.0 } else { 1.0 }) / k as f64 });
         Self::of(vec![log, constant], Order::NEVER).plus(&series)
@@ -382,6 +392,19 @@ impl Series {
             Ordering::Greater => Limit::Finite(factor(0.0)),
         }
     }
+}
+
+/// Adds terms of one order; `None` if they cancel.
+fn sum_of(terms: &[Term]) -> Option<Term> {
+    let [first, rest @ ..] = terms else { return None };
+    if rest.is_empty() {
+        return (!first.factor.equal(factor(0.0))).then_some(*first);
+    }
+    let sum = terms.iter().fold(factor(0.0), |sum, term| sum + term.factor);
+    let size = |term: &Term| term.factor.abs() * factor(term.doubt);
+    let largest = terms.iter().fold(factor(0.0), |largest, term| largest.max(size(term)));
+    let is_known = (largest * factor(CANCELLED)).less(sum.abs());
+    is_known.then(|| Term { factor: sum, doubt: (largest / sum.abs()).to_scalar(), ..*first })
 }
 
 fn factorial(k: usize) -> f64 {
