@@ -48,7 +48,6 @@ mod body;
 #[cfg(doctest)]
 mod book;
 mod bounded;
-mod dissipation_term;
 mod input_text;
 
 pub mod barrier;

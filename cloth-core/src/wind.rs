@@ -4,12 +4,12 @@ use std::f64::consts::TAU;
 
 use energy_dsl::Vector3;
 use energy_elements::WindDrag;
-use energy_solve::{StepStart, Term};
+use energy_solve::{DissipationLaw, DissipationTerm, StepStart, Term};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::bounded::{NonNegative, Number, Positive, Real, Reals, Speed};
-use crate::dissipation_term::{DissipationLaw, DissipativeTerm};
+
 use crate::geometry::{cross, norm, subtract};
 
 /// Wind pushes each triangle with ½ ρ C A u² across and along its surface, where u is the relative velocity of the air
@@ -84,7 +84,7 @@ impl Wind {
     #[must_use]
     pub fn term(&self, triangles: &[[usize; 3]]) -> Box<dyn Term> {
         let law = WindLaw { wind: self.clone(), triangles: triangles.to_vec() };
-        Box::new(DissipativeTerm::new("wind".to_owned(), law, triangles))
+        Box::new(DissipationTerm::new("wind".to_owned(), law, triangles))
     }
 }
 

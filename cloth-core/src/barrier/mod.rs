@@ -18,6 +18,9 @@
 //! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
 //! vertices are against a displacement along the normal. Nothing is left to tune.
 //!
+//! **Stiffness of a contact.** The Hessian keeps β″ along the normal and the resistance to rolling on obstacles
+//! (`rolling.rs`). The other parts of the curvature of the distance are small or negative.
+//!
 //! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
 //! certified states only.
 
@@ -27,6 +30,7 @@ mod friction;
 mod joined;
 mod obstacle_features;
 mod resistance;
+mod rolling;
 mod spacing;
 mod start;
 
@@ -42,6 +46,7 @@ use feasible::Meeting;
 use friction::Friction;
 use joined::{Joined, Law};
 use resistance::Resistance;
+use rolling::rolling;
 use spacing::{Spacing, Spacings};
 
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
@@ -258,16 +263,21 @@ impl ContactModel for BarrierContact {
 
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
         let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
-        let mut contacts = Vec::new();
+        let (mut contacts, mut active) = (Vec::new(), 0);
         self.joined.for_each_active(x, |pair, law, closest| {
-            let (curvature, n) = (law.curvature(law.apart(closest)), closest.normal);
-            contacts.push(Contact {
-                rows: pair.vertices.each_ref().map(row),
-                weights: closest.weights,
-                block: std::array::from_fn(|i| std::array::from_fn(|j| curvature * n[i] * n[j])),
-            });
+            let (apart, n) = (law.apart(closest), closest.normal);
+            let rows = pair.vertices.each_ref().map(row);
+            let along_normal = |stiffness: f64| n.map(|a| n.map(|b| stiffness * a * b));
+            contacts.push(Contact { rows, weights: closest.weights, block: along_normal(law.curvature(apart)) });
+            if self.mesh.obstacle_of(pair).is_some() {
+                let block = along_normal(law.force(apart) * closest.distance);
+                let is_free = |(row, weight): (&u32, &f64)| *row != Contact::FIXED && *weight != 0.0;
+                let tilts = rolling(pair, closest, x).filter(|weights| rows.iter().zip(weights).any(is_free));
+                contacts.extend(tilts.map(|weights| Contact { rows, weights, block }));
+            }
+            active += 1;
         });
-        self.counts.active += contacts.len() as u64;
+        self.counts.active += active;
         self.counts.systems += 1;
         self.friction.add_contacts(x, row, &mut contacts);
         contacts

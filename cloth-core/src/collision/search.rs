@@ -107,24 +107,48 @@ impl Search {
     /// Returns all pairs that can come within their reach while each vertex stays in its region, and others whose boxes
     /// meet. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>) -> Vec<Pair> {
-        self.refit(mesh, regions);
-        let Self { own, obstacles, .. } = &*self;
+        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
+        let [own_boxes, obstacle_boxes] = boxes.split(self.obstacles.first);
+        self.obstacles.refit(obstacle_boxes);
         let mut found = Found::default();
         if self.rules.with_itself {
-            own.points.meeting(&own.triangles, |point, triangle| {
-                self.add_point_and_triangle(mesh, point, triangle, &mut found);
-            });
-            own.edges.meeting_itself(|one, other| self.add_edges(mesh, one, other, &mut found));
+            self.own.refit(own_boxes);
+            self.find_own(mesh, &mut found);
+        } else {
+            self.find_near_obstacles(mesh, own_boxes, &mut found);
         }
+        in_order(mesh, found)
+    }
+
+    /// Finds pairs of cloth and hair, with themselves and with obstacles.
+    fn find_own(&self, mesh: &CollisionMesh, found: &mut Found) {
+        let Self { own, obstacles, .. } = self;
+        own.points.meeting(&own.triangles, |point, triangle| {
+            self.add_point_and_triangle(mesh, point, triangle, found);
+        });
+        own.edges.meeting_itself(|one, other| self.add_edges(mesh, one, other, found));
         let [points, triangles, edges] = obstacles.first;
         own.points.meeting(&obstacles.triangles, |point, triangle| {
-            self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
+            self.add_point_and_triangle(mesh, point, triangles + triangle, found);
         });
         obstacles.points.meeting(&own.triangles, |point, triangle| {
-            self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
+            self.add_point_and_triangle(mesh, points + point, triangle, found);
         });
-        own.edges.meeting(&obstacles.edges, |one, other| self.add_edges(mesh, one, edges + other, &mut found));
-        in_order(mesh, found)
+        own.edges.meeting(&obstacles.edges, |one, other| self.add_edges(mesh, one, edges + other, found));
+    }
+
+    /// Finds pairs with obstacles, without the hierarchies of cloth and hair: most features are near no obstacle.
+    fn find_near_obstacles(&self, mesh: &CollisionMesh, own: [&[Bounds]; 3], found: &mut Found) {
+        let Trees { points, triangles, edges, first } = &self.obstacles;
+        for (point, around) in own[0].iter().enumerate() {
+            triangles.near(around, |triangle| self.add_point_and_triangle(mesh, point, first[1] + triangle, found));
+        }
+        for (triangle, around) in own[1].iter().enumerate() {
+            points.near(around, |point| self.add_point_and_triangle(mesh, first[0] + point, triangle, found));
+        }
+        for (edge, around) in own[2].iter().enumerate() {
+            edges.near(around, |other| self.add_edges(mesh, edge, first[2] + other, found));
+        }
     }
 
     /// Those of [`Search::pairs`] that have a changed vertex.

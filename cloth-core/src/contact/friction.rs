@@ -1,10 +1,10 @@
 use energy_dsl::Vector3;
 use energy_elements::SlidingFriction;
-use energy_solve::StepStart;
+use energy_solve::{DissipationLaw, StepStart};
 
 use super::solid::Solid;
 use super::term::{surface_velocity, touches};
-use crate::dissipation_term::DissipationLaw;
+
 use crate::motion::Motion;
 
 /// Coulomb friction on one solid, by [`SlidingFriction`]. Normals and normal forces are lagged: taken at the start of a

@@ -17,7 +17,7 @@ mod solid;
 mod surface;
 mod term;
 
-use energy_solve::Term;
+use energy_solve::{DissipationTerm, Term};
 
 pub use mesh_solid::MeshSolid;
 pub use passage::Passage;
@@ -25,7 +25,7 @@ pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
 pub use surface::{Feature, Nearest, Surface, SurfaceError};
 
 use crate::body::Body;
-use crate::dissipation_term::DissipativeTerm;
+
 use crate::geometry::{Pose, dot};
 use crate::motion::Motion;
 use friction::FrictionLaw;
@@ -165,7 +165,7 @@ impl Obstacle {
             let (coefficient, sticking) = (self.friction, self.sticking);
             let law = FrictionLaw { solid, motion, thickness, stiffness, coefficient, sticking };
             let each: Vec<[usize; 1]> = (0..masses.len()).map(|vertex| [vertex]).collect();
-            terms.push(Box::new(DissipativeTerm::new(format!("{name}: friction"), law, &each)));
+            terms.push(Box::new(DissipationTerm::new(format!("{name}: friction"), law, &each)));
         }
         terms
     }

@@ -6,7 +6,7 @@ use energy_elements::{BoxContact, CapsuleContact, PlaneContact, SphereContact};
 use crate::geometry::{Pose, dot, norm, subtract};
 
 /// A solid that acts on nearby vertices.
-pub(super) trait Solid: Clone + std::fmt::Debug + 'static {
+pub(super) trait Solid: Clone + std::fmt::Debug + Sync + 'static {
     /// The declared element of contact.
     type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
     /// Returns the solid after a rigid motion.
@@ -17,7 +17,7 @@ pub(super) trait Solid: Clone + std::fmt::Debug + 'static {
 }
 
 /// A solid with a closed formula for its signed distance.
-pub(super) trait Shape: Clone + std::fmt::Debug + 'static {
+pub(super) trait Shape: Clone + std::fmt::Debug + Sync + 'static {
     /// The declared element of contact.
     type Contact: Potential<f64, Points = [Vector3<f64>; 1]>;
     /// Returns the shape after a rigid motion.

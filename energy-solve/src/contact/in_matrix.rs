@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use super::Contact;
 use crate::matrix::block_matrix::{BlockMatrix, Contents};
+use crate::matrix::pattern::Pattern;
 use crate::matrix::precision::Precision;
 
 /// Contacts in a matrix whose pattern has all their blocks, such as those of a fixed obstacle with one triangle.
@@ -14,30 +15,53 @@ pub struct ContactsInMatrix<T> {
     pub others: Vec<Contact>,
 }
 
+/// The blocks of four rows in a pattern.
+struct Blocks {
+    rows: [u32; 4],
+    /// Pairs of corners and the indices of their blocks; `None` if the pattern lacks one.
+    places: Option<Vec<(usize, usize, usize)>>,
+}
+
+impl Blocks {
+    fn of(rows: [u32; 4], pattern: &Pattern) -> Self {
+        let free = || rows.iter().enumerate().filter(|(_, row)| **row != Contact::FIXED);
+        let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
+        let place = |((i, row), (j, column)): ((usize, &u32), (usize, &u32))| {
+            pattern.place(*row as usize, *column as usize).map(|(place, flipped)| (i, j, place, flipped))
+        };
+        let places: Option<Vec<_>> = pairs.map(place).collect();
+        // An upper triangle stores each pair of rows once.
+        let stored = |places: Vec<(usize, usize, usize, bool)>| {
+            places.into_iter().filter(|(.., flipped)| !flipped).map(|(i, j, place, _)| (i, j, place)).collect()
+        };
+        Self { rows, places: places.map(stored) }
+    }
+}
+
 impl<T: Precision> BlockMatrix<T> {
     /// Adds the contacts whose blocks are all in the pattern. Solvers then treat them like every other stiffness.
     /// [`BlockMatrix::remove_contacts`] restores the matrix exactly; until then no system may write to it.
     pub fn add_contacts(&mut self, contacts: Vec<Contact>) -> ContactsInMatrix<T> {
         let pattern = Arc::clone(self.pattern());
-        let fits = |contact: &Contact| {
-            contact.free().all(|(row, _)| contact.free().all(|(column, _)| pattern.place(row, column).is_some()))
-        };
-        let (fitting, others): (Vec<_>, Vec<_>) = contacts.into_iter().partition(fits);
         let contents = self.take_contents();
-        let mut replaced = Vec::new();
-        for contact in &fitting {
-            for ((row, c), (column, d)) in contact.free().flat_map(|one| contact.free().map(move |other| (one, other)))
-            {
-                let Some((place, flipped)) = pattern.place(row, column) else { continue };
-                // An upper triangle stores each pair of rows once.
-                if flipped {
-                    continue;
-                }
-                let values = self.values_and_nowhere();
+        let (mut replaced, mut others) = (Vec::new(), Vec::new());
+        // Several contacts of the same vertices follow each other.
+        let mut known = Blocks::of([Contact::FIXED; 4], &pattern);
+        for contact in contacts {
+            if known.rows != contact.rows {
+                known = Blocks::of(contact.rows, &pattern);
+            }
+            let Some(places) = &known.places else {
+                others.push(contact);
+                continue;
+            };
+            for &(i, j, place) in places {
+                let (values, scale) = (self.values_and_nowhere(), contact.weights[i] * contact.weights[j]);
                 replaced.push((place, values[place]));
-                for i in 0..3 {
-                    for j in 0..3 {
-                        values[place][i][j] = values[place][i][j] + T::from_f64(c * d * contact.block[i][j]);
+                for row in 0..3 {
+                    for column in 0..3 {
+                        values[place][row][column] =
+                            values[place][row][column] + T::from_f64(scale * contact.block[row][column]);
                     }
                 }
             }

@@ -211,7 +211,11 @@ impl System {
         let found = |term: &dyn PlacedTerm| if known { term.energy_found() } else { None };
         let found: Vec<Option<f64>> = self.terms.iter().map(|counted| found(&*counted.term)).collect();
         let mut divisible = self.divisible(|_| false);
-        divisible.iter_mut().zip(&found).filter(|(_, found)| found.is_some()).for_each(|(term, _)| *term = None);
+        for ((divisible, found), Counted { term, .. }) in divisible.iter_mut().zip(&found).zip(&self.terms) {
+            if found.is_some() || !term.has_energy() {
+                *divisible = None;
+            }
+        }
         let divided = division::energies(&divisible, self.shares.len(), x);
         let mut energies = Vec::with_capacity(self.terms.len());
         for ((Counted { term, counts }, divided), found) in self.terms.iter_mut().zip(divided).zip(found) {

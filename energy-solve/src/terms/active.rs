@@ -23,6 +23,16 @@ impl Active {
         Self { count, indices }
     }
 
+    /// Every one of `count` elements.
+    pub(crate) fn all(count: usize) -> Self {
+        Self { count, indices: None }
+    }
+
+    /// The elements with these indices.
+    pub(crate) fn some(indices: Vec<u32>) -> Self {
+        Self { count: indices.len(), indices: Some(indices) }
+    }
+
     /// Whether every element is active.
     pub(crate) fn is_all(&self) -> bool {
         self.indices.is_none()

@@ -3,9 +3,43 @@ use std::ops::Range;
 use energy_dsl::BLOCK;
 
 use crate::matrix::dof_map::DofMap;
-use crate::matrix::pattern::{Pattern, index};
+use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::terms::active::Active;
 use crate::terms::stencils::Stencils;
+
+/// Scatter maps of elements whose Hessians are symmetric.
+#[derive(Clone, Debug, Default)]
+pub struct BlockPlaces {
+    /// Places of the blocks (i, j), i ≤ j.
+    pub(crate) upper: Places,
+    /// Places of the blocks (j, i), i < j, if the pattern stores both halves.
+    pub(crate) mirrored: Places,
+}
+
+impl BlockPlaces {
+    /// Looks up the blocks of all elements. Blocks of pinned vertices map to [`Pattern::nowhere`].
+    #[must_use]
+    pub fn of_all(stencils: Stencils<'_>, dofs: &DofMap, pattern: &Pattern) -> Self {
+        Self::new(&Active::all(stencils.len()), stencils, dofs, pattern)
+    }
+
+    /// Looks up the blocks of the active elements.
+    pub(crate) fn new(active: &Active, stencils: Stencils<'_>, dofs: &DofMap, pattern: &Pattern) -> Self {
+        let n = stencils.arity();
+        let places = |pairs: &[_]| Places::new(active, stencils, pairs, dofs, pattern);
+        let upper = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
+        let mirrored = match pattern.storage() {
+            Storage::Upper => Places::default(),
+            Storage::Whole => places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>()),
+        };
+        Self { upper, mirrored }
+    }
+
+    /// Returns the maps of some of the elements.
+    pub(crate) fn of(&self, elements: &[usize]) -> Self {
+        Self { upper: self.upper.selected(elements), mirrored: self.mirrored.selected(elements) }
+    }
+}
 
 /// Scatter map from elements to a matrix: the block index of each pair of an element's points. If the pattern stores
 /// only block (j, i) of a pair, the block (i, j) is transposed first.
@@ -39,6 +73,19 @@ impl Places {
             }
         }
         Self { pairs: pairs.len(), slots, transposed }
+    }
+
+    /// Returns the map of some of the elements.
+    fn selected(&self, elements: &[usize]) -> Self {
+        let mut transposed = vec![0; elements.len().div_ceil(BLOCK) * self.pairs];
+        for (number, &element) in elements.iter().enumerate() {
+            for pair in 0..self.pairs {
+                let flipped = self.transposed(element, pair) & 1;
+                transposed[number / BLOCK * self.pairs + pair] |= u16::from(flipped == 1) << (number % BLOCK);
+            }
+        }
+        let slots = elements.iter().flat_map(|&element| self.of(element..element + 1)).copied().collect();
+        Self { pairs: self.pairs, slots, transposed }
     }
 
     /// Whether the map is empty.

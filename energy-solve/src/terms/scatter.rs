@@ -1,9 +1,10 @@
 //! Adds the results of a batch to the vectors and blocks of its vertices, one element after the other, so that sums do
 //! not depend on the number of lanes.
 
-use energy_dsl::{BLOCK, Block, Lane, Level, Vector3, triangle_index};
+use energy_dsl::{BLOCK, Block, Lane, Level, Mask, Number, Vector3, triangle_index};
 
-use crate::matrix::precision::Precision;
+use crate::matrix::precision::{Blocks, Precision};
+use crate::terms::places::{BlockPlaces, Places};
 
 /// Elements that are evaluated together, one per lane.
 #[derive(Clone, Copy, Debug)]
@@ -69,9 +70,9 @@ impl VectorBuffer {
     }
 }
 
-/// Scratch buffer for the triangles of blocks of a batch's elements.
+/// Scratch buffer for the triangles of blocks of a batch's elements: from lanes to the blocks of a matrix.
 #[derive(Debug)]
-pub(crate) struct TriangleBuffer {
+pub struct TriangleBuffer {
     /// Blocks per triangle.
     pairs: usize,
     /// The first eight entries of each block, which are added in one register; sorted by element, then pair.
@@ -81,15 +82,37 @@ pub(crate) struct TriangleBuffer {
 }
 
 impl TriangleBuffer {
-    pub(crate) fn new(points: usize) -> Self {
+    /// Creates a buffer for elements with this many points.
+    #[must_use]
+    pub fn new(points: usize) -> Self {
         let pairs = points * (points + 1) / 2;
         Self { pairs, eights: vec![[0.0; 8]; BLOCK * pairs], ninths: vec![[0.0; BLOCK]; pairs] }
     }
 
+    /// Adds the triangles of the elements from `first` on, times `scale`, to `matrix`, which holds the blocks from
+    /// `first_block` on. Transposes the blocks (i, j) that are stored as (j, i).
+    #[inline(always)]
+    pub fn scatter<L: Level>(
+        &mut self,
+        places: &BlockPlaces,
+        (first, count): (usize, usize),
+        scale: L::F64,
+        triangle: &mut [[Vector3<L::F64>; 3]],
+        (first_block, matrix): (usize, &mut Blocks<'_>),
+    ) {
+        turn::<L>(&places.upper, first, triangle);
+        self.fill::<L>(scale, triangle);
+        let (pairs, elements) = (triangle.len(), first..first + count);
+        let (slots, mirrored) = (places.upper.of(elements.clone()), places.mirrored.of(elements));
+        match matrix {
+            Blocks::Single(matrix) => self.add_to(pairs, slots, mirrored, first_block, matrix),
+            Blocks::Double(matrix) => self.add_to(pairs, slots, mirrored, first_block, matrix),
+        }
+    }
+
     /// Fills the buffer with the scaled triangles of all lanes.
     #[inline(always)]
-    pub(crate) fn fill<L: Level>(&mut self, scale: f64, triangle: &[[Vector3<L::F64>; 3]]) {
-        let scale = L::F64::splat(scale);
+    fn fill<L: Level>(&mut self, scale: L::F64, triangle: &[[Vector3<L::F64>; 3]]) {
         let (stride, eights) = (8 * self.pairs, self.eights.as_flattened_mut());
         for (pair, (block, ninth)) in triangle.iter().zip(&mut self.ninths).enumerate() {
             let mut entries = [scale; 9];
@@ -104,7 +127,7 @@ impl TriangleBuffer {
     /// Adds the blocks to `matrix`, which holds the blocks from `first_block` on. `pairs`, the blocks per element, is a
     /// constant wherever this is inlined.
     #[inline(always)]
-    pub(crate) fn add_to<T: Precision>(
+    fn add_to<T: Precision>(
         &self,
         pairs: usize,
         slots: &[u32],
@@ -141,6 +164,23 @@ impl TriangleBuffer {
                         block[row][column] = block[row][column] + T::from_f64(*entry);
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Transposes the blocks (i, j) that are stored as (j, i).
+#[inline(always)]
+fn turn<L: Level>(places: &Places, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
+    for pair in 0..triangle.len() {
+        let bits = places.transposed(first, pair);
+        if bits != 0 {
+            let turned = <L::F64 as Number>::Mask::from_bits(bits);
+            let block = &mut triangle[pair];
+            for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+                let (upper, lower) = (block[i][j], block[j][i]);
+                block[i][j] = L::F64::select(turned, lower, upper);
+                block[j][i] = L::F64::select(turned, upper, lower);
             }
         }
     }

@@ -1,10 +1,10 @@
 //! Assembly of the two parts of a plate's Hessian.
 
-use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Number, Potential, Vector3};
+use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Potential, Vector3};
 use energy_elements::ArcAngle;
-use energy_solve::{Linearisation, Precision};
+use energy_solve::{Linearisation, Precision, TriangleBuffer};
 
-use super::term::{Angles, PlateTerm, Row};
+use super::term::{Angles, PatchPlaces, PlateTerm, Row};
 
 /// Number of entries in the upper triangle of ∇²θ.
 const HESSIAN: usize = 90;
@@ -15,18 +15,25 @@ pub(super) struct CurvedPart<'a, 'b> {
     moments: &'a [f64],
     v: &'a [Vector3<f64>],
     sum: &'a mut Linearisation<'b>,
+    triangles: TriangleBuffer,
     rows: [f64; HESSIAN * BLOCK],
 }
 
 impl BatchWork<ArcAngle> for CurvedPart<'_, '_> {
     #[inline(always)]
     fn batch<L: Level>(&mut self, batch: Batch<'_, ArcAngle, L::F64>) {
-        let result = batch.element.hessian_at::<L>(batch.points);
-        let numbers = result.hessian.as_flattened().as_flattened();
-        L::F64::store_transposed(numbers, batch.count, &mut self.rows, HESSIAN);
-        for lane in 0..batch.count {
-            self.add(batch.first + lane, lane);
+        let mut result = batch.element.hessian_at::<L>(batch.points);
+        let hinges = &self.of.needed[batch.first..][..batch.count];
+        if self.sum.stiffness_times_velocity.is_some() {
+            let numbers = result.hessian.as_flattened().as_flattened();
+            L::F64::store_transposed(numbers, batch.count, &mut self.rows, HESSIAN);
+            hinges.iter().enumerate().for_each(|(lane, &hinge)| self.add_product(hinge, lane));
         }
+        let scale = -self.sum.weights.position;
+        let weight = |lane: usize| hinges.get(lane).map_or(0.0, |&hinge| scale * self.moments[hinge]);
+        let (weights, elements) = (L::F64::from_fn(weight), (batch.first, batch.count));
+        let matrix = (0, &mut self.sum.matrix);
+        self.triangles.scatter::<L>(&self.of.hinge_places, elements, weights, &mut result.hessian, matrix);
     }
 }
 
@@ -37,20 +44,16 @@ impl<'a, 'b> CurvedPart<'a, 'b> {
         v: &'a [Vector3<f64>],
         sum: &'a mut Linearisation<'b>,
     ) -> Self {
-        Self { of, moments, v, sum, rows: [0.0; HESSIAN * BLOCK] }
+        Self { of, moments, v, sum, triangles: TriangleBuffer::new(4), rows: [0.0; HESSIAN * BLOCK] }
     }
 
-    /// Adds the contribution of one hinge, whose Hessian is in row `row`.
-    fn add(&mut self, number: usize, row: usize) {
-        let hinge = self.of.needed[number];
-        let weight = -self.moments[hinge];
-        let triangle: [Block<f64>; 10] =
-            std::array::from_fn(|pair| block_of(&self.rows[HESSIAN * row + 9 * pair..][..9]));
-        self.of.hinge_places.add(number, weight * self.sum.weights.position, &triangle, &mut self.sum.matrix);
+    /// Adds the product of one hinge, whose Hessian is in row `row`, with v.
+    fn add_product(&mut self, hinge: usize, row: usize) {
         let Some(product) = &mut self.sum.stiffness_times_velocity else { return };
-        let vertices = self.of.hinges[hinge];
+        let (weight, vertices) = (-self.moments[hinge], self.of.hinges[hinge]);
         let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
-        for ((i, j), block) in pairs.zip(&triangle) {
+        for (pair, (i, j)) in pairs.enumerate() {
+            let block = block_of(&self.rows[HESSIAN * row + 9 * pair..][..9]);
             let block = block.map(|row| row.map(|entry| weight * entry));
             add_times(&mut product[vertices[i]], &block, &self.v[vertices[j]], false);
             if i != j {
@@ -87,46 +90,84 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
     #[inline(always)]
     fn run<L: Level>(self) {
         let Self { of, angles, s, matrix } = self;
-        let mut rows: Vec<Row> = Vec::new();
-        for (&patch, places) in of.active.iter().zip(&of.places) {
-            of.patches[patch].gradients(&angles.gradients, &mut rows);
-            let (mut pair, mut mirrored) = (0, 0);
-            for i in 0..rows.len() {
-                for j in i..rows.len() {
-                    let block = outer_product::<L>(s, &rows[i], &rows[j]);
-                    add_rows(&mut matrix[places.slots[pair] as usize], &block);
-                    if i != j && mirrored < places.mirrored.len() {
-                        let block = outer_product::<L>(s, &rows[j], &rows[i]);
-                        add_rows(&mut matrix[places.mirrored[mirrored] as usize], &block);
-                        mirrored += 1;
-                    }
-                    pair += 1;
+        let s = T::from_f64(s);
+        let (mut rows, mut factors): (Vec<Row<T>>, Vec<[Factors<T>; 3]>) = (Vec::new(), Vec::new());
+        for (patches, places) in of.active.chunks(GROUP).zip(of.places.chunks(GROUP)) {
+            rows.clear();
+            for &patch in patches {
+                of.patches[patch].append_gradients(&angles.gradients, &mut rows);
+            }
+            // Written in place: pushes would spill the registers.
+            factors.resize(rows.len(), [Factors::new(s, &[T::from_f64(0.0); 4]); 3]);
+            for (factors, row) in factors.iter_mut().zip(&rows) {
+                for k in 0..3 {
+                    factors[k] = Factors::new(s, &row[k]);
                 }
             }
-        }
-    }
-}
-
-/// Returns s Σ aₖ bₖᵀ by rows. The last column is padding.
-#[inline(always)]
-fn outer_product<L: Level>(s: f64, a: &Row, b: &Row) -> Row {
-    let mut product = [[0.0; 4]; 3];
-    for k in 0..3 {
-        for row in 0..3 {
-            for column in 0..4 {
-                product[row][column] = Number::mul_add::<L>(s * a[k][row], b[k][column], product[row][column]);
+            let mut left = &factors[..];
+            for places in places {
+                let (own, others) = left.split_at(places.vertices);
+                add_outer_products(own, places, matrix);
+                left = others;
             }
         }
     }
-    product
 }
 
-/// A ← A + B.
+/// Patches whose rows are computed before any is used. A processor cannot forward a recent store to a wider load.
+const GROUP: usize = 8;
+
+/// Adds s ∇r ∇rᵀ of one patch, given the factors of its vertices.
 #[inline(always)]
-fn add_rows<T: Precision>(sum: &mut Block<T>, block: &Row) {
-    for row in 0..3 {
-        for column in 0..3 {
-            sum[row][column] = sum[row][column] + T::from_f64(block[row][column]);
+fn add_outer_products<T: Precision>(factors: &[[Factors<T>; 3]], places: &PatchPlaces, matrix: &mut [Block<T>]) {
+    let (mut slots, mut mirrored) = (places.slots.iter(), places.mirrored.iter());
+    for i in 0..factors.len() {
+        for j in i..factors.len() {
+            let Some(&slot) = slots.next() else { return };
+            add_outer_product(&mut matrix[slot as usize], &factors[i], &factors[j]);
+            if i != j
+                && let Some(&slot) = mirrored.next()
+            {
+                add_outer_product(&mut matrix[slot as usize], &factors[j], &factors[i]);
+            }
         }
     }
+}
+
+/// A vector as the factors of a block, by entries: the first eight are added in one register.
+#[derive(Clone, Copy)]
+struct Factors<T> {
+    /// s a, each component three times.
+    left: [T; 8],
+    /// a, again and again.
+    right: [T; 8],
+    /// The factors of the last entry.
+    last: [T; 2],
+}
+
+impl<T: Precision> Factors<T> {
+    #[inline(always)]
+    fn new(s: T, vector: &[T; 4]) -> Self {
+        let [a, b, c, _] = *vector;
+        let (x, y, z) = (s * a, s * b, s * c);
+        Self { left: [x, x, x, y, y, y, z, z], right: [a, b, c, a, b, c, a, b], last: [z, c] }
+    }
+}
+
+/// A ← A + s Σ aₖ bₖᵀ.
+#[inline(always)]
+fn add_outer_product<T: Precision>(sum: &mut Block<T>, a: &[Factors<T>; 3], b: &[Factors<T>; 3]) {
+    // All products come before the first sum is written: the compiler cannot tell that A is apart from the factors.
+    let (mut eight, mut ninth) = ([T::from_f64(0.0); 8], T::from_f64(0.0));
+    for k in 0..3 {
+        for entry in 0..8 {
+            eight[entry] = eight[entry] + a[k].left[entry] * b[k].right[entry];
+        }
+        ninth = ninth + a[k].last[0] * b[k].last[1];
+    }
+    let sum = sum.as_flattened_mut();
+    for entry in 0..8 {
+        sum[entry] = sum[entry] + eight[entry];
+    }
+    sum[8] = sum[8] + ninth;
 }

@@ -1,11 +1,13 @@
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
 use energy_dsl::{
     BLOCK, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, dispatch,
     for_each_batch,
 };
 use energy_elements::ArcAngle;
 use energy_solve::{
-    Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity,
-    State, Stencils, Storage, Tally, Term, TermDescription, TrianglePlaces, index,
+    BlockPlaces, Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm,
+    Precision, Quantity, State, Stencils, Storage, Tally, Term, TermDescription, index,
 };
 
 use super::assembly::{CurvedPart, OuterProducts};
@@ -21,7 +23,7 @@ use crate::mesh::{Topology, TriangleMesh};
 /// Each dihedral angle is evaluated once, even if several triangles need it. The Gauss–Newton part of the Hessian, Σ ∇r
 /// ∇rᵀ, is positive semi-definite and serves as the projected Hessian. The exact Hessian adds Σ m ∇²θ with the moments
 /// m = ∂U/∂θ, which is smaller by a factor of the angle between neighbours.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct PlateTerm {
     name: String,
     pub(super) hinges: Vec<[usize; 4]>,
@@ -36,11 +38,13 @@ pub struct PlateTerm {
     /// Hinges that active patches need; the same, packed; and the slots of their blocks.
     pub(super) needed: Vec<usize>,
     packed: Packed<ArcAngle>,
-    pub(super) hinge_places: TrianglePlaces,
+    pub(super) hinge_places: BlockPlaces,
+    /// U where forces or Jacobians were last evaluated, as bits.
+    found: AtomicU64,
 }
 
 /// Three vectors, each padded to four components.
-pub(super) type Row = [[f64; 4]; 3];
+pub(super) type Row<T> = [[T; 4]; 3];
 
 /// A triangle and the hinges that its curvature depends on.
 #[derive(Clone, Debug)]
@@ -61,6 +65,8 @@ struct Angle {
 /// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
 #[derive(Clone, Debug)]
 pub(super) struct PatchPlaces {
+    /// The number of vertices of the patch.
+    pub(super) vertices: usize,
     pub(super) slots: Vec<u32>,
     pub(super) mirrored: Vec<u32>,
 }
@@ -113,7 +119,8 @@ impl PlateTerm {
             places: Vec::new(),
             needed: Vec::new(),
             packed: Packed::new::<4>(&[], &[]),
-            hinge_places: TrianglePlaces::default(),
+            hinge_places: BlockPlaces::default(),
+            found: AtomicU64::default(),
         })
     }
 
@@ -145,25 +152,30 @@ impl PlateTerm {
         values
     }
 
-    /// Returns ½ ‖r‖² of each patch with a free vertex.
-    fn half_squares<'a>(&'a self, values: &'a Values<'_>) -> impl Iterator<Item = (usize, f64)> + 'a {
+    /// Returns ½ ‖r‖² of each patch with a free vertex, from the angles θ − θ̄ of all hinges.
+    fn half_squares<'a>(&'a self, angles: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
         let half_square = |patch: usize| {
-            let r = self.patches[patch].residual(&values.angles);
+            let r = self.patches[patch].residual(angles);
             0.5 * dot(r, r)
         };
         self.active.iter().map(move |&patch| (patch, half_square(patch)))
     }
 
-    /// Evaluates θ − θ̄ and ∇θ of all needed hinges.
+    fn sum(&self, angles: &[f64]) -> f64 {
+        self.half_squares(angles).map(|(_, energy)| energy).sum()
+    }
+
+    /// Evaluates θ − θ̄ and ∇θ of all needed hinges, and notes U.
     fn angles(&self, x: &[Vector3<f64>]) -> Angles<'_> {
         let mut angles = Angles {
             needed: &self.needed,
             values: self.rest.iter().map(|rest| -rest).collect(),
-            gradients: vec![[0.0; 12]; self.hinges.len()],
+            gradients: vec![[[0.0; 4]; 4]; self.hinges.len()],
             rows: [0.0; 12 * BLOCK],
             flagged: 0,
         };
         for_each_batch(&self.packed, x, &mut angles);
+        self.found.store(self.sum(&angles.values).to_bits(), Relaxed);
         angles
     }
 
@@ -184,7 +196,7 @@ impl PlateTerm {
         for ((hinge, moment), gradient) in self.hinges.iter().zip(moments).zip(&angles.gradients) {
             for (point, &vertex) in hinge.iter().enumerate() {
                 for axis in 0..3 {
-                    force[vertex][axis] -= moment * gradient[3 * point + axis];
+                    force[vertex][axis] -= moment * gradient[point][axis];
                 }
             }
         }
@@ -219,7 +231,8 @@ impl BatchWork<ArcAngle> for Values<'_> {
 pub(super) struct Angles<'a> {
     needed: &'a [usize],
     values: Vec<f64>,
-    pub(super) gradients: Vec<[f64; 12]>,
+    /// Four vectors, each padded to four components.
+    pub(super) gradients: Vec<[[f64; 4]; 4]>,
     rows: [f64; 12 * BLOCK],
     flagged: u64,
 }
@@ -232,7 +245,9 @@ impl BatchWork<ArcAngle> for Angles<'_> {
         for lane in 0..batch.count {
             let hinge = self.needed[batch.first + lane];
             self.values[hinge] += result.value.extract(lane);
-            self.gradients[hinge].copy_from_slice(&self.rows[12 * lane..][..12]);
+            for (point, gradient) in self.gradients[hinge].iter_mut().enumerate() {
+                gradient[..3].copy_from_slice(&self.rows[12 * lane + 3 * point..][..3]);
+            }
         }
         self.flagged += flagged((result.flags.degenerate | result.flags.kink).bits(), batch.count);
     }
@@ -289,18 +304,20 @@ impl Patch {
         r
     }
 
-    /// Computes ∇r: three vectors per vertex.
+    /// Appends ∇r: three vectors per vertex.
     #[inline(always)]
-    pub(super) fn gradients(&self, gradients: &[[f64; 12]], rows: &mut Vec<Row>) {
-        rows.clear();
-        rows.resize(self.vertices.len(), [[0.0; 4]; 3]);
+    pub(super) fn append_gradients<T: Precision>(&self, gradients: &[[[f64; 4]; 4]], all: &mut Vec<Row<T>>) {
+        let first = all.len();
+        all.resize(first + self.vertices.len(), [[T::from_f64(0.0); 4]; 3]);
+        let rows = &mut all[first..];
         for angle in &self.angles {
             let gradient = &gradients[angle.hinge];
             for point in 0..4 {
                 let row = &mut rows[angle.local[point] as usize];
                 for k in 0..3 {
-                    for axis in 0..3 {
-                        row[k][axis] += angle.b[k] * gradient[3 * point + axis];
+                    let b = T::from_f64(angle.b[k]);
+                    for axis in 0..4 {
+                        row[k][axis] = row[k][axis] + b * T::from_f64(gradient[point][axis]);
                     }
                 }
             }
@@ -345,7 +362,7 @@ impl Term for PlateTerm {
             Packed::from_fn(needed.len(), 4, |_| &element, |number, point| index(self.hinges[needed[number]][point]));
         self.needed = needed;
         let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
-        self.hinge_places = TrianglePlaces::new(Stencils::new(4, &vertices), dofs, pattern);
+        self.hinge_places = BlockPlaces::of_all(Stencils::new(4, &vertices), dofs, pattern);
         let slot = |i: usize, j: usize| {
             let rows = dofs.place(i).zip(dofs.place(j));
             index(rows.and_then(|(row, column)| pattern.place(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
@@ -361,7 +378,7 @@ impl Term for PlateTerm {
                 Storage::Upper => Vec::new(),
                 Storage::Whole => pairs().filter(|(i, j)| i != j).map(|(i, j)| slot(j, i)).collect(),
             };
-            self.places.push(PatchPlaces { slots, mirrored });
+            self.places.push(PatchPlaces { vertices: vertices.len(), slots, mirrored });
         }
         self
     }
@@ -374,11 +391,15 @@ impl PlacedTerm for PlateTerm {
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let values = self.values(x);
-        Some((self.half_squares(&values).map(|(_, energy)| energy).sum(), self.tally(values.flagged)))
+        Some((self.sum(&values.angles), self.tally(values.flagged)))
+    }
+
+    fn energy_found(&self) -> Option<f64> {
+        Some(f64::from_bits(self.found.load(Relaxed)))
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        Some(self.half_squares(&self.values(x)).collect())
+        Some(self.half_squares(&self.values(x).angles).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -407,7 +428,8 @@ impl PlacedTerm for PlateTerm {
     fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
         let angles = self.angles(state.x);
         let is_finite = |patch: &Patch| {
-            let finite = |angle: &Angle| angles.gradients[angle.hinge].iter().all(|number| number.is_finite());
+            let finite =
+                |angle: &Angle| angles.gradients[angle.hinge].as_flattened().iter().all(|number| number.is_finite());
             patch.residual(&angles.values).iter().all(|number| number.is_finite()) && patch.angles.iter().all(finite)
         };
         self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))
@@ -424,9 +446,10 @@ impl PlateTerm {
     fn subtract_products(&self, angles: &Angles<'_>, v: &[Vector3<f64>], product: &mut [Vector3<f64>]) {
         let mut rows = Vec::new();
         for patch in self.active.iter().map(|&patch| &self.patches[patch]) {
-            patch.gradients(&angles.gradients, &mut rows);
+            rows.clear();
+            patch.append_gradients(&angles.gradients, &mut rows);
             for k in 0..3 {
-                let along = |(&i, row): (&usize, &Row)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
+                let along = |(&i, row): (&usize, &Row<f64>)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
                 let rate: f64 = patch.vertices.iter().zip(&rows).map(along).sum();
                 for (&i, row) in patch.vertices.iter().zip(&rows) {
                     (0..3).for_each(|axis| product[i][axis] -= rate * row[k][axis]);

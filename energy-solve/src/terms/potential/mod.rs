@@ -1,5 +1,6 @@
 //! Terms with f = −∇U.
 
+mod dissipation;
 mod evaluated;
 mod pack_energies;
 mod placed;
@@ -11,6 +12,7 @@ use std::fmt::Debug;
 use energy_dsl::tape::TapeElements;
 use energy_dsl::{Declaration, Packed, PackedPotential};
 
+pub use self::dissipation::{DissipationLaw, DissipationTerm};
 use self::placed::PlacedPotentialTerm;
 use self::tapes::TapePacks;
 use crate::matrix::dof_map::DofMap;

@@ -9,12 +9,12 @@ use super::evaluated::Evaluated;
 use super::pack_energies::PackEnergies;
 use super::work::{Gradients, Hessians, Values};
 use crate::matrix::dof_map::DofMap;
-use crate::matrix::pattern::{Pattern, Storage};
+use crate::matrix::pattern::Pattern;
 use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::Orthonormal;
 use crate::terms::linearisation::Linearisation;
-use crate::terms::places::Places;
+use crate::terms::places::BlockPlaces;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
@@ -35,10 +35,7 @@ pub(super) struct PlacedPotentialTerm<E> {
     vertices: Vec<u32>,
     active: Active,
     packed: E,
-    /// Places of the blocks (i, j), i ≤ j.
-    places: Places,
-    /// Places of the blocks (j, i), i < j, if the pattern stores both halves.
-    mirrored: Places,
+    places: BlockPlaces,
     orthonormal: Option<Orthonormal>,
     /// The elements that each share needs, in whole packs.
     shares: Vec<Vec<Range<usize>>>,
@@ -55,26 +52,38 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
         dofs: &DofMap,
         pattern: &Pattern,
     ) -> Self {
-        let declaration = packed.declaration();
-        let has_vertices = E::PACK == BLOCK && active.is_all() && active.len() > 0;
-        let mut term = Self {
-            name,
-            arity: declaration.points.len(),
-            count,
-            vertices: if has_vertices { Vec::new() } else { vertices },
-            energies: (0..active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect(),
-            active,
-            packed,
-            places: Places::default(),
-            mirrored: Places::default(),
-            orthonormal: Orthonormal::new(declaration),
-            shares: Vec::new(),
-        };
+        let mut term = Self::in_places(name, (count, vertices), (active, packed), BlockPlaces::default());
+        if E::PACK == BLOCK && term.active.is_all() && term.active.len() > 0 {
+            // The packs hold them too.
+            term.vertices = Vec::new();
+        }
         // Constant Jacobians are evaluated once: their places are looked up then and freed afterwards.
         if !term.character().quadratic {
             term.place_blocks(dofs, pattern);
         }
         term
+    }
+
+    /// Creates the term from the places of the blocks of its active elements.
+    pub(super) fn in_places(
+        name: String,
+        (count, vertices): (usize, Vec<u32>),
+        (active, packed): (Active, E),
+        places: BlockPlaces,
+    ) -> Self {
+        let declaration = packed.declaration();
+        Self {
+            name,
+            arity: declaration.points.len(),
+            count,
+            vertices,
+            energies: (0..active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect(),
+            active,
+            packed,
+            places,
+            orthonormal: Orthonormal::new(declaration),
+            shares: Vec::new(),
+        }
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -126,8 +135,7 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
         state: State<'_>,
         sum: &mut Linearisation<'_>,
     ) -> (u64, u64) {
-        let places = (&self.places, &self.mirrored);
-        let orthonormal = self.orthonormal.as_ref();
+        let (places, orthonormal) = (&self.places, self.orthonormal.as_ref());
         let mut hessians = Hessians::new(self.arity, sum, first, state.v, places, orthonormal, self.pack_energies());
         self.packed.hessians(packs, state.x, &mut hessians);
         (hessians.flagged, hessians.projected)
@@ -200,20 +208,13 @@ impl<E: Evaluated> TermDescription for PlacedPotentialTerm<E> {
 
 impl<E: Evaluated> PlacedTerm for PlacedPotentialTerm<E> {
     fn place_blocks(&mut self, dofs: &DofMap, pattern: &Pattern) {
-        if !self.character().curved || !self.places.is_empty() {
-            return;
+        if self.character().curved && self.places.upper.is_empty() {
+            self.places = BlockPlaces::new(&self.active, self.stencils(), dofs, pattern);
         }
-        let n = self.arity;
-        let places = |pairs: &[_]| Places::new(&self.active, self.stencils(), pairs, dofs, pattern);
-        let upper = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
-        if pattern.storage() == Storage::Whole {
-            self.mirrored = places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>());
-        }
-        self.places = upper;
     }
 
     fn forget_blocks(&mut self) {
-        (self.places, self.mirrored) = (Places::default(), Places::default());
+        self.places = BlockPlaces::default();
     }
 
     fn divide(&mut self, shares: &[Share]) {

@@ -1,10 +1,9 @@
-use energy_dsl::{BLOCK, Declaration, Lane, Level, Mask, Number, Vector3, triangle_index};
+use energy_dsl::{BLOCK, Declaration, Lane, Level, Mask, Vector3, triangle_index};
 
 use super::pack_energies::PackEnergies;
-use crate::matrix::precision::Blocks;
 use crate::terms::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
-use crate::terms::places::Places;
+use crate::terms::places::BlockPlaces;
 use crate::terms::scatter::{Lanes, TriangleBuffer, VectorBuffer, points_of_triangle};
 
 /// Returns the first `count` lanes of a mask as bits.
@@ -94,8 +93,7 @@ pub(super) struct Hessians<'a, 'b> {
     first_vertex: usize,
     first_block: usize,
     velocities: &'a [Vector3<f64>],
-    places: &'a Places,
-    mirrored: &'a Places,
+    places: &'a BlockPlaces,
     orthonormal: Option<&'a Orthonormal>,
     vectors: VectorBuffer,
     triangles: TriangleBuffer,
@@ -112,7 +110,7 @@ impl<'a, 'b> Hessians<'a, 'b> {
         sum: &'a mut Linearisation<'b>,
         (first_vertex, first_block): (usize, usize),
         velocities: &'a [Vector3<f64>],
-        (places, mirrored): (&'a Places, &'a Places),
+        places: &'a BlockPlaces,
         orthonormal: Option<&'a Orthonormal>,
         energies: PackEnergies<'a>,
     ) -> Self {
@@ -122,7 +120,6 @@ impl<'a, 'b> Hessians<'a, 'b> {
             first_block,
             velocities,
             places,
-            mirrored,
             orthonormal,
             vectors: VectorBuffer::new(arity),
             triangles: TriangleBuffer::new(arity),
@@ -181,8 +178,9 @@ impl Hessians<'_, '_> {
             let first_vertex = self.first_vertex;
             subtract_product::<L>(lanes, triangle, self.velocities, scratch, &mut self.vectors, first_vertex, product);
         }
-        self.turn::<L>(lanes.first, triangle);
-        self.scatter::<L>(lanes.first, lanes.count, triangle);
+        let (scale, elements) = (L::F64::splat(-self.sum.weights.position), (lanes.first, lanes.count));
+        let matrix = (self.first_block, &mut self.sum.matrix);
+        self.triangles.scatter::<L>(self.places, elements, scale, triangle, matrix);
         let (vertices, first, count) = (lanes.vertices(0), self.first_vertex, self.sum.force.len());
         self.flagged += count_owned(flagged, vertices, first, count);
         self.projected += count_owned(projected, vertices, first, count);
@@ -218,35 +216,6 @@ impl Hessians<'_, '_> {
             *number = L::F64::load(stored);
         }
         changed
-    }
-
-    /// Transposes the blocks (i, j) that are stored as (j, i).
-    #[inline(always)]
-    fn turn<L: Level>(&self, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
-        for pair in 0..triangle.len() {
-            let bits = self.places.transposed(first, pair);
-            if bits != 0 {
-                let turned = <L::F64 as Number>::Mask::from_bits(bits);
-                let block = &mut triangle[pair];
-                for (i, j) in [(0, 1), (0, 2), (1, 2)] {
-                    let (upper, lower) = (block[i][j], block[j][i]);
-                    block[i][j] = L::F64::select(turned, lower, upper);
-                    block[j][i] = L::F64::select(turned, upper, lower);
-                }
-            }
-        }
-    }
-
-    /// Adds −α times the blocks to the matrix.
-    #[inline(always)]
-    fn scatter<L: Level>(&mut self, first: usize, count: usize, triangle: &[[Vector3<L::F64>; 3]]) {
-        self.triangles.fill::<L>(-self.sum.weights.position, triangle);
-        let (pairs, elements) = (triangle.len(), first..first + count);
-        let (slots, mirrored) = (self.places.of(elements.clone()), self.mirrored.of(elements));
-        match &mut self.sum.matrix {
-            Blocks::Single(matrix) => self.triangles.add_to(pairs, slots, mirrored, self.first_block, matrix),
-            Blocks::Double(matrix) => self.triangles.add_to(pairs, slots, mirrored, self.first_block, matrix),
-        }
     }
 }
 

@@ -1,0 +1,202 @@
+//! Non-linear damping forces, declared as dissipation functions.
+
+use std::fmt::Debug;
+
+use energy_dsl::{Declaration, Element, Packed, PackedPotential, Vector3};
+
+use super::placed::PlacedPotentialTerm;
+use crate::matrix::dof_map::DofMap;
+use crate::matrix::pattern::{Pattern, index};
+use crate::terms::active::Active;
+use crate::terms::counts::Tally;
+use crate::terms::curvature::Curvature;
+use crate::terms::linearisation::{Linearisation, Weights};
+use crate::terms::places::BlockPlaces;
+use crate::terms::share::{Divisible, Share};
+use crate::terms::state::{State, StepStart};
+use crate::terms::stencils::Stencils;
+use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
+
+/// Selects the elements that act during a step. Their parameters are fixed at its start; only velocities vary.
+pub trait DissipationLaw: Debug + Sync {
+    /// The element: a convex Rayleigh dissipation function, declared as an energy of the displacements per unit of
+    /// time.
+    type Element: PackedPotential<f64> + Debug + Sync + 'static;
+    /// Returns the elements that act on stencils with a free vertex, each with the index of its stencil, in ascending
+    /// order.
+    fn elements(&self, start: &StepStart<'_>, is_free: &[bool]) -> Vec<(usize, Self::Element)>;
+}
+
+/// The forces −∂R/∂v of dissipation functions R.
+///
+/// R is a potential of the velocities, so it is evaluated as a [`PotentialTerm`](crate::PotentialTerm) is: in SIMD
+/// lanes, and by several threads.
+#[derive(Debug)]
+pub struct DissipationTerm<L> {
+    name: String,
+    law: L,
+    vertices: Vec<u32>,
+    arity: usize,
+}
+
+impl<L: DissipationLaw> DissipationTerm<L> {
+    /// Creates a term for a law whose element has N points. No element acts before the first step begins.
+    #[must_use]
+    pub fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
+        let vertices = stencils.as_flattened().iter().copied().map(index).collect();
+        Self { name, law, vertices, arity: N }
+    }
+}
+
+const CHARACTER: Character = Character { symmetric: true, velocity_dependent: true, quadratic: false, curved: true };
+
+impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        <L::Element as Element>::DECLARATION
+    }
+
+    fn character(&self) -> Character {
+        CHARACTER
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils::new(self.arity, &self.vertices)
+    }
+}
+
+impl<L: DissipationLaw + 'static> Term for DissipationTerm<L> {
+    fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
+        let stencils = self.stencils();
+        let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
+        let is_free = stencils.iter().map(|mut stencil| stencil.any(is_free)).collect();
+        let places = BlockPlaces::of_all(stencils, dofs, pattern);
+        let acting = acting::<L>(Vec::new(), &self, &places);
+        Box::new(PlacedDissipationTerm { term: *self, is_free, places, shares: Vec::new(), acting })
+    }
+}
+
+/// A [`DissipationTerm`] within a system.
+#[derive(Debug)]
+struct PlacedDissipationTerm<L: DissipationLaw> {
+    term: DissipationTerm<L>,
+    /// Whether each stencil has a free vertex.
+    is_free: Vec<bool>,
+    /// Places of the blocks of all stencils.
+    places: BlockPlaces,
+    shares: Vec<Share>,
+    /// The elements that act during this step, as a potential of the velocities.
+    acting: PlacedPotentialTerm<Packed<L::Element>>,
+}
+
+/// Packs the elements that act.
+fn acting<L: DissipationLaw>(
+    elements: Vec<(usize, L::Element)>,
+    term: &DissipationTerm<L>,
+    places: &BlockPlaces,
+) -> PlacedPotentialTerm<Packed<L::Element>> {
+    let stencils = term.stencils();
+    let (numbers, elements): (Vec<usize>, Vec<L::Element>) = elements.into_iter().unzip();
+    let vertex = |number: usize, point: usize| stencils.vertex(numbers[number], point);
+    let packed = Packed::from_fn(elements.len(), term.arity, |number| &elements[number], vertex);
+    let places = places.of(&numbers);
+    let active = Active::some(numbers.into_iter().map(index).collect());
+    let all = (stencils.len(), term.vertices.clone());
+    PlacedPotentialTerm::in_places(term.name.clone(), all, (active, packed), places)
+}
+
+/// The state in which velocities take the place of positions.
+fn in_velocities(state: State<'_>) -> State<'_> {
+    State { x: state.v, v: state.v }
+}
+
+impl<L: DissipationLaw> Divisible for PlacedDissipationTerm<L> {
+    fn energy_parts(&self) -> usize {
+        0
+    }
+
+    fn energy_part(&self, _: usize, _: &[Vector3<f64>]) -> (f64, Tally) {
+        (0.0, Tally::default())
+    }
+
+    fn add_force_of(&self, share: &Share, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        self.acting.add_force_of(share, in_velocities(state), force)
+    }
+
+    fn add_linearisation_of(&self, share: &Share, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        self.acting.add_linearisation_of(share, in_velocities(state), &mut in_velocity_weights(sum))
+    }
+}
+
+/// The sums for ∂f/∂v, which is the Jacobian of a potential of the velocities. A convex function needs no projection.
+fn in_velocity_weights<'a>(sum: &'a mut Linearisation<'_>) -> Linearisation<'a> {
+    Linearisation {
+        weights: Weights { position: sum.weights.velocity, velocity: 0.0 },
+        curvature: Curvature::Exact,
+        matrix: sum.matrix.reborrow(),
+        force: sum.force,
+        stiffness_times_velocity: None,
+    }
+}
+
+impl<L: DissipationLaw> TermDescription for PlacedDissipationTerm<L> {
+    fn name(&self) -> &str {
+        self.term.name()
+    }
+
+    fn declaration(&self) -> &'static Declaration {
+        self.term.declaration()
+    }
+
+    fn character(&self) -> Character {
+        CHARACTER
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        self.term.stencils()
+    }
+}
+
+impl<L: DissipationLaw> PlacedTerm for PlacedDissipationTerm<L> {
+    fn begin_step(&mut self, start: StepStart<'_>) {
+        let elements = self.term.law.elements(&start, &self.is_free);
+        self.acting = acting(elements, &self.term, &self.places);
+        self.acting.divide(&self.shares);
+    }
+
+    fn divide(&mut self, shares: &[Share]) {
+        shares.clone_into(&mut self.shares);
+        self.acting.divide(shares);
+    }
+
+    fn divisible(&self) -> Option<&dyn Divisible> {
+        Some(self)
+    }
+
+    fn dissipation(&self, State { v, .. }: State<'_>) -> Option<(f64, Tally)> {
+        self.acting.energy(v)
+    }
+
+    fn has_energy(&self) -> bool {
+        false
+    }
+
+    fn energy(&self, _: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        None
+    }
+
+    fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        self.acting.add_force(in_velocities(state), force)
+    }
+
+    fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        self.acting.add_linearisation(in_velocities(state), &mut in_velocity_weights(sum))
+    }
+
+    fn find_non_finite(&self, quantity: Quantity, state: State<'_>) -> Option<usize> {
+        self.acting.find_non_finite(quantity, in_velocities(state))
+    }
+}
