@@ -55,7 +55,8 @@ proptest! {
     }
 
     /// Scaling space by a power of two keeps angles and scales lengths exactly. Extreme scales take the general path,
-    /// which always has fused operations. Without them on the ordinary path, only scales of one path give the same bits.
+    /// which always has fused operations. Without them on the ordinary path, only scales of one path give the same
+    /// bits.
     #[test]
     fn scaling_by_a_power_of_two_is_exact(x in points(4), exponent in -300_i32..300) {
         let has_fused = Baseline::FUSED || level() > LevelName::Baseline;

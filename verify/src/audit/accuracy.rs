@@ -22,16 +22,17 @@ pub(super) fn in_roundoffs(truth: &TrueBlock, got: &[f64], natural: f64) -> f64 
 }
 
 /// Returns κ of a block: the amplification, in the maximum norm, of relative componentwise perturbations of the inputs.
-/// Edges between points stand for points, also in the rest shape. κ is the maximum over sixteen random sign patterns, and
-/// over eight in which only the parameters are perturbed. Code that computes edges in working precision, or multiples of
-/// angles that it compares with a parameter, cannot in general be more accurate than κ roundoffs.
+/// Edges between points are perturbed in place of points, also in the rest shape. κ is the maximum over sixteen random
+/// sign patterns, and over eight in which only the parameters are perturbed. Code that computes edges in working
+/// precision, or multiples of angles that it compares with a parameter, cannot in general be more accurate than κ
+/// roundoffs.
 pub fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
     let here = answer.block(block);
     let mut random = Rng::with_seed(1);
     let mut most = 0.0_f64;
     let geometry = (0..16).map(|_| Perturbed::Geometry);
     let parameters = (0..8).map(|_| Perturbed::Parameters);
-    // Where points do not enter as edges, parameters are perturbed with them.
+    // If points do not enter as edges, parameters are perturbed with them.
     let by_edges = enters_as_edges(subject.declaration) && !sample.parameters.is_empty();
     for what in geometry.chain(parameters.filter(|_| by_edges)) {
         let moved = perturbed(subject.declaration, sample, what, &mut random);

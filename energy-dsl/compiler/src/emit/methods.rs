@@ -2,7 +2,7 @@
 //!
 //! A routine `f` becomes `f_at::<L>`, which is inlined into a caller at SIMD level L, and `f`, which runs it at the
 //! best level of the machine. If precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general`
-//! by `f_is_ordinary`.
+//! by `f_has_guards` and `f_is_ordinary`.
 //!
 //! For a sum of like terms, these are the routines of one term, and `f_at` is the loop over all.
 

@@ -1,6 +1,6 @@
-//! Narrow regions beside a singular input.
+//! Narrow regions near a singular input.
 //!
-//! Where two sides of a comparison meet at the input, the largest term of their difference decides the outcome along
+//! If both sides of a comparison are equal at the input, the largest term of their difference decides the outcome along
 //! each ray. If it has one sign on all rays that were tried, it may have the other one on a narrow cone of rays, as in
 //! `if 20 norm(q - p) < p.x { … }` at p = q with p.x = 0. A descent on the size of that term leads to the cone.
 
@@ -17,7 +17,7 @@ const STARTS: usize = 2;
 /// Narrower cones, in slopes, are not searched for.
 const NARROWEST: f64 = 1e-4;
 /// Distances to a ray with the other outcome at which it must persist somewhere. Lines and surfaces do not count.
-const BESIDE: [f64; 8] = [0.05, 0.05, 0.05, 0.01, 0.01, 0.001, 0.001, 0.001];
+const NEAR: [f64; 8] = [0.05, 0.05, 0.05, 0.01, 0.01, 0.001, 0.001, 0.001];
 
 /// A ray that was evaluated.
 pub(super) struct Evaluated<'a> {
@@ -87,8 +87,8 @@ impl Search<'_> {
         for start in starts.into_iter().take(STARTS) {
             let found = self.descend(start, &is_other);
             if is_other(&found) {
-                let beside = self.beside(&found.slopes);
-                let rays: Vec<Vec<f64>> = beside.into_iter().filter(is_other).map(|point| point.slopes).collect();
+                let near = self.near(&found.slopes);
+                let rays: Vec<Vec<f64>> = near.into_iter().filter(is_other).map(|point| point.slopes).collect();
                 if !rays.is_empty() {
                     return rays;
                 }
@@ -161,7 +161,7 @@ impl Search<'_> {
     }
 
     /// Returns rays near a ray.
-    fn beside(&self, slopes: &[f64]) -> Vec<Point> {
+    fn near(&self, slopes: &[f64]) -> Vec<Point> {
         let ray = |(number, distance): (usize, &f64)| {
             let moved = slopes.iter().enumerate().map(|(i, &slope)| match self.moves[i] {
                 true => slope + distance * super::limits::slope(1000 + number, i),
@@ -169,7 +169,7 @@ impl Search<'_> {
             });
             self.at(moved.collect())
         };
-        BESIDE.iter().enumerate().map(ray).collect()
+        NEAR.iter().enumerate().map(ray).collect()
     }
 }
 

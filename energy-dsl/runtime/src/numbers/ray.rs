@@ -26,7 +26,7 @@ thread_local! {
 /// A comparison of two numbers along a ray: the largest term of their difference; `None` if that is 0 or undefined.
 pub(super) type Comparison = Option<Term>;
 
-/// What a routine computes along a ray.
+/// Results of a routine along a ray.
 #[derive(Debug)]
 pub(super) struct Found {
     /// Limits of the results; `None` if the formula is degenerate along the ray.

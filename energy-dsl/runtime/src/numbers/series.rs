@@ -1,5 +1,5 @@
-//! Series in an infinitesimal ε > 0: those of a Hahn field. They have real powers of ε and of ln(1/ε), and the order and
-//! the arithmetic of real numbers.
+//! Series in an infinitesimal ε > 0: those of a Hahn field. They have real powers of ε and of ln(1/ε), and the order
+//! and the arithmetic of real numbers.
 
 use std::cell::Cell;
 use std::cmp::Ordering;
@@ -75,8 +75,8 @@ impl Order {
 pub(super) struct Term {
     order: Order,
     factor: Factor,
-    /// Size of the largest number that was added or subtracted on the way, relative to the factor: its relative error is
-    /// this many roundoffs.
+    /// Size of the largest number that was added or subtracted on the way, relative to the factor. The relative error
+    /// of the factor is this many roundoffs.
     doubt: f64,
 }
 
@@ -146,13 +146,13 @@ impl Series {
         Self { terms: Vec::new(), unknown: Order::ALWAYS }
     }
 
-    /// Sorts terms, adds those of one order, and drops what is zero or unknown.
+    /// Sorts terms, adds those of one order, and drops those that are zero or unknown.
     fn of(mut terms: Vec<Term>, unknown: Order) -> Self {
         terms.sort_by(|a, b| a.order.compare(b.order));
         Self::sorted(terms, unknown)
     }
 
-    /// Adds terms of one order, and drops what is zero or unknown.
+    /// Adds terms of one order, and drops those that are zero or unknown.
     fn sorted(terms: Vec<Term>, mut unknown: Order) -> Self {
         if !terms.iter().all(|term| term.factor.is_finite()) {
             return Self::undefined();
@@ -194,7 +194,7 @@ impl Series {
         self.terms.first().map_or(self.unknown, |term| term.order)
     }
 
-    /// Returns −1, 0 or 1. What is not known counts as 0.
+    /// Returns −1, 0 or 1. An unknown sign is 0.
     pub(super) fn sign(&self) -> f64 {
         self.terms.first().map_or(0.0, |term| if is_negative(term.factor) { -1.0 } else { 1.0 })
     }
@@ -328,7 +328,7 @@ impl Series {
 
     pub(super) fn ln(&self) -> Self {
         let Some((first, rest)) = self.split() else { return Self::undefined() };
-        // ln ln(1/ε) is no term of a series.
+        // ln ln(1/ε) is not a term of a series.
         if is_negative(first.factor) || first.order.logs != 0.0 {
             return Self::undefined();
         }
@@ -345,7 +345,7 @@ impl Series {
         let alternating = |k: usize| (if (k / 2).is_multiple_of(2) { 1.0 } else { -1.0 }) / factorial(k);
         let sine = rest.composed(|k| if k % 2 == 1 { alternating(k) } else { 0.0 });
         let cosine = rest.composed(|k| if k % 2 == 0 { alternating(k) } else { 0.0 });
-        // Multiples of π/2 are not doubles: what is left of a sine or cosine there is rounding.
+        // Multiples of π/2 are not doubles: a sine or cosine that should vanish there is rounding.
         let is_rounding = |x: f64| constant.abs() > 1.0 && x.abs() < CANCELLED;
         let (s, c) = constant.sin_cos();
         let [s, c] = [s, c].map(|x| if is_rounding(x) { 0.0 } else { x });
@@ -411,7 +411,7 @@ fn factorial(k: usize) -> f64 {
     (1..=k).map(|i| i as f64).product()
 }
 
-/// What a number tends to as ε → 0.
+/// Limit of a number as ε → 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Limit {
     /// A finite number.
