@@ -210,7 +210,7 @@ fn spread_between(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |largest, (a, b)| largest.max((a - b).abs()))
 }
 
-/// What a block tends to along all directions.
+/// Limit of a block along all directions.
 #[derive(Debug)]
 enum Limit {
     Numbers(Vec<f64>),

@@ -49,7 +49,7 @@ fn a_jump_fails_and_a_kink_passes() {
     }
 }
 
-/// Neighbouring doubles beside the kink of a root differ by the root of roundoff.
+/// Neighbouring doubles at the kink of a root differ by the root of roundoff.
 #[test]
 fn a_kink_with_infinite_slopes_is_no_jump() {
     let options = Options { samples: 40, truths: 2, mutations: 0, seed: 4, ..Options::default() };

@@ -178,7 +178,7 @@ impl<'a> Auditor<'a> {
             .map_or(0.0, |upper| answer.block(upper).largest() * self.length(sample, Stepped::Positions))
     }
 
-    /// Returns the change of a block over a length, by its derivatives of all orders. Where a block vanishes with its
+    /// Returns the change of a block over a length, by its derivatives of all orders. If a block vanishes with its
     /// antiderivative, as at a minimum, this is the size that differences have rounding errors of.
     pub(super) fn size_of_derivatives(&self, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
         let length = self.length(sample, Stepped::Positions);

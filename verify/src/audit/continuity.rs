@@ -94,8 +94,8 @@ impl Auditor<'_> {
         });
     }
 
-    /// Returns how much the values change a little farther from the change of branches. Beside a jump they stay about the
-    /// same. Where slopes are infinite, as those of a root are, they change more than between neighbouring doubles.
+    /// Returns how much the values change a little farther from the change of branches. Next to a jump they stay about
+    /// the same. If slopes are infinite, as those of a root are, they change more than between neighbouring doubles.
     fn change_nearby(&self, block: BlockName, sides: [&Sample; 2], ends: [&Sample; 2]) -> Option<f64> {
         let mut most = 0.0_f64;
         for (from, to) in sides.into_iter().zip(ends) {

@@ -12,7 +12,7 @@ use super::real::{Mask, Number};
 use super::series::Limit;
 use super::unbounded::Unbounded;
 
-/// What the inputs and outputs of a routine are.
+/// Kinds of the inputs and outputs of a routine.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Roles<'a> {
@@ -60,7 +60,7 @@ pub fn settle<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flag
     }
 }
 
-/// A ray and what the routine computes along it.
+/// A ray and the results of the routine along it.
 struct Path {
     slopes: Vec<f64>,
     comparisons: Vec<Comparison>,
@@ -86,7 +86,7 @@ struct Rays<'a> {
     is_outside: bool,
 }
 
-/// What the limits of one result along all rays are.
+/// Limits of one result along all rays.
 enum Agreement {
     Number(Unbounded<f64>),
     /// An infinity with the sign of this number.
@@ -136,7 +136,7 @@ impl<'a> Rays<'a> {
         let values = if values_first { groups[0] } else { 0 };
         let is_inside = |limits: &Vec<Limit>| !limits[..values].iter().any(|value| matches!(value, Limit::Unknown));
         self.is_outside &= found.limits.as_ref().is_some_and(|limits| !is_inside(limits));
-        // Where the value is undefined, so are its derivatives.
+        // If the value is undefined, so are its derivatives.
         let limits = found.limits.filter(is_inside);
         let limits = limits.unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]);
         self.paths.push(Path { slopes, comparisons: found.comparisons, limits });
@@ -169,7 +169,7 @@ impl<'a> Rays<'a> {
         !self.has_results(reversed.limits)
     }
 
-    /// Returns whether limits are those of the first ray, or the formula is degenerate so that there are none.
+    /// Returns whether limits are those of the first ray, or do not exist because the formula is degenerate.
     fn has_results(&self, limits: Option<Vec<Limit>>) -> bool {
         let scale = self.largest();
         let same = |(a, b): (&Limit, &Limit)| match (a, b) {

@@ -1,7 +1,7 @@
 //! Numbers along a ray.
 //!
 //! At a singular input x, a formula is evaluated at x + ε d for some directions d, where ε is an infinitesimal. The
-//! largest term of a result says what it tends to as ε → 0.
+//! largest term of a result gives its limit as ε → 0.
 
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
