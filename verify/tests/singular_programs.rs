@@ -110,6 +110,9 @@ const DIRECTIONS: [[f64; 9]; 10] = [
     [0.71875, -0.3125, 0.96875, -0.5625, 0.28125, 0.5625, 0.40625, 0.875, -0.5625],
 ];
 
+/// Digits of true values.
+const DIGITS: usize = 70;
+
 /// Value, gradient and Hessian.
 type Blocks = [Vec<f64>; 3];
 
@@ -123,21 +126,91 @@ struct Place<'a> {
 impl Place<'_> {
     /// Computes the blocks along all directions at a distance; `None` if the formula has no value somewhere.
     fn around(&self, distance: f64) -> Option<Vec<Blocks>> {
-        DIRECTIONS.iter().map(|direction| self.beside(direction, distance)).collect()
+        DIRECTIONS.iter().map(|direction| self.beside(direction, distance, DIGITS)).collect()
     }
 
-    /// Computes the blocks at x + ε d; `None` if the formula has no value there.
-    fn beside(&self, direction: &[f64; 9], distance: f64) -> Option<Blocks> {
-        let Self { textbook, k, x } = *self;
-        let parameters = [&[k, distance], &direction[..]].concat();
-        let sample = Sample { parameters, rest: vec![], positions: x.into(), velocities: vec![] };
-        let blocks = multiprecision::truth(moved_declaration(), textbook, &sample, 70);
+    /// Returns whether blocks depend on the number of digits: rounding decides a comparison whose sides are equal, such
+    /// as `norm(p)^3 < norm(p) * norm_squared(p)`.
+    fn has_equal_sides(&self, distance: f64) -> bool {
+        DIRECTIONS.iter().any(|direction| {
+            let digits = [DIGITS, DIGITS + 9, DIGITS + 31].map(|digits| self.beside(direction, distance, digits));
+            let Some(blocks) = digits.into_iter().collect::<Option<Vec<Blocks>>>() else { return true };
+            let differs = |block: usize| spread(block, &blocks) > 1e-6 * largest(&blocks[0][block]).max(1e-3);
+            (0..3).any(differs)
+        })
+    }
+
+    /// Computes the blocks at x + ε d with at least this many digits; `None` if the formula has no value there.
+    fn beside(&self, direction: &[f64; 9], distance: f64, digits: usize) -> Option<Blocks> {
+        let blocks =
+            multiprecision::truth(moved_declaration(), self.textbook, &self.sample(direction, distance), digits);
         let numbers = |k: usize| blocks[k].block.numbers.iter().map(Big::to_f64).collect::<Vec<f64>>();
         blocks.iter().all(|block| block.is_defined).then(|| [numbers(0), numbers(1), numbers(2)])
     }
+
+    /// Returns the inputs of [`MOVED`] at x + ε d.
+    fn sample(&self, direction: &[f64; 9], distance: f64) -> Sample {
+        let parameters = [&[self.k, distance], &direction[..]].concat();
+        Sample { parameters, rest: vec![], positions: self.x.into(), velocities: vec![] }
+    }
 }
 
-/// What a block tends to along all directions.
+impl Place<'_> {
+    /// Looks for directions on which some block up to this order has another limit: first any, then those on which the
+    /// formula takes another branch. Narrow regions contain none of [`DIRECTIONS`].
+    fn has_other_limit(&self, order: usize, limits: &[Limit]) -> bool {
+        let differs = |direction: &[f64; 9]| {
+            let Some(found) = self.beside(direction, 2.0_f64.powi(-100), DIGITS) else { return false };
+            (0..=order).any(|block| match &limits[block] {
+                Limit::Numbers(known) => spread_between(known, &found[block]) > 1e-8 * largest(known).max(1e-3),
+                Limit::None | Limit::Unknown => true,
+            })
+        };
+        let mut random = fastrand::Rng::with_seed(1);
+        if (0..60).any(|_| differs(&narrow_direction(&mut random))) {
+            return true;
+        }
+        let branches =
+            |direction: &[f64; 9]| self.textbook.branches(&self.sample(direction, 2.0_f64.powi(-20)).inputs());
+        let mut seen: Vec<Vec<bool>> = DIRECTIONS.iter().map(branches).collect();
+        for _ in 0..50_000 {
+            let direction = narrow_direction(&mut random);
+            let taken = branches(&direction);
+            if !seen.contains(&taken) {
+                seen.push(taken);
+                if differs(&direction) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+/// Returns a direction along which some points nearly move together and some coordinates nearly stay.
+fn narrow_direction(random: &mut fastrand::Rng) -> [f64; 9] {
+    let mut direction = [0.0; 9].map(|_: f64| 2.0 * random.f64() - 1.0);
+    for i in 0..9 {
+        let nearly = 0.1_f64.powf(3.0 * random.f64());
+        match random.u8(0..4) {
+            0 => direction[i] *= nearly,
+            1 if i >= 3 => direction[i] = direction[i - 3] + nearly * direction[i],
+            2 if i >= 6 => direction[i] = direction[i - 6] + nearly * direction[i],
+            _ => {}
+        }
+    }
+    direction
+}
+
+fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |largest, x| largest.max(x.abs()))
+}
+
+fn spread_between(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |largest, (a, b)| largest.max((a - b).abs()))
+}
+
+/// Limit of a block along all directions.
 #[derive(Debug)]
 enum Limit {
     Numbers(Vec<f64>),
@@ -211,6 +284,12 @@ fn check(formula: &str, k: f64, x: &[f64]) -> Result<(), TestCaseError> {
         if exists && flagged && is_flagged_nearby(&element, ["value", "gradient", "hessian"][order], k, x) {
             continue;
         }
+        if exists && flagged && place.has_other_limit(order, &limits) {
+            continue;
+        }
+        if !exists && !flagged && place.has_equal_sides(2.0_f64.powi(-100)) {
+            continue;
+        }
         prop_assert_eq!(
             exists,
             !flagged,
@@ -267,10 +346,45 @@ fn derivatives_at_infinite_inputs_are_flagged() {
     }
 }
 
+/// No fixed ray meets the narrower branch. A jump of the value, and a kink.
+#[test]
+fn branches_in_narrow_cones_are_noticed() {
+    let mut x = [0.0; 9];
+    for formula in [
+        "if p.x < norm(q - p) { k } else { k^2 }",
+        "if p.x < norm(r - p) { p.y } else { norm_squared(q - p) }",
+        "if 20 * norm(q - p) < p.x { p.y } else { 2 * p.y }",
+        "max(p.x - 20 * norm(r - q), 0)",
+    ] {
+        check(formula, 2.0, &x).unwrap_or_else(|error| panic!("{error}"));
+        let source = format!("energy Narrow({SIGNATURE}) {{ {formula} + {USES} }}");
+        let element = Interpreted::from_source(&source).expect("a valid formula").remove(0);
+        let inputs = Inputs { parameters: &[2.0], rest: &[], positions: &x, velocities: &[] };
+        let (_, flags) = element.routine("gradient", &inputs).expect("no rest shape").expect("an energy");
+        assert!(flags.kink || flags.degenerate, "{formula}");
+    }
+    x[0] = 1e-3;
+    check("if p.x < norm(q - p) { k } else { k^2 }", 2.0, &x).unwrap_or_else(|error| panic!("{error}"));
+}
+
 /// Its limit 0 is approached as slowly as a logarithm grows.
 #[test]
 fn slow_limits_raise_no_alarm() {
     check("atan2((k)^3, (log(norm(p)))^2)", 2.0, &[0.0; 9]).expect("no flag is asked for");
+}
+
+/// Programs of long runs at which the test or the code was once wrong.
+#[test]
+fn identities_are_exact() {
+    let x = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 1.0];
+    check("1 + dot(unit(q - p), unit(unit(q - p)))", 1.0, &x).unwrap_or_else(|error| panic!("{error}"));
+    let x = [1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    let tie = "if norm(q - p)^3 < norm(q - p) * norm_squared(q - p) { p.x } else { p.x^2 }";
+    check(tie, 1.0, &x).unwrap_or_else(|error| panic!("{error}"));
+    let x = [0.0, 0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0, -1.0];
+    // Opposite on some directions, along none of the fixed ones.
+    let parallel = "1 - dot(unit(p.x * (r - q)), unit(dot(p, (q - p)) * (r - q)))";
+    check(parallel, 1.0, &x).unwrap_or_else(|error| panic!("{error}"));
 }
 
 /// The same programs each time, or as many others as `PROPTEST_CASES` asks for.

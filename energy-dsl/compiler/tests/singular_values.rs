@@ -96,7 +96,7 @@ fn flags(formula: &str, [a, b, c]: [f64; 3]) -> [bool; 2] {
 }
 
 #[test]
-fn single_values_have_kinks_where_they_meet_and_sums_of_opposites_have_no_rotation() {
+fn single_values_have_no_derivative_where_they_meet_and_sums_of_opposites_no_rotation() {
     assert_eq!(flags("s[0]", [2.0, 1.0, 0.5]), [false, false]);
     assert_eq!(flags("s[0]", [1.0, 1.0, 0.5]), [true, false]);
     assert_eq!(flags("s[2]", [1.0, 1.0, 0.5]), [false, false]);

@@ -21,18 +21,21 @@ pub(super) fn in_roundoffs(truth: &TrueBlock, got: &[f64], natural: f64) -> f64 
     }
 }
 
-/// Returns κ of a block: the amplification, in the maximum norm, of relative componentwise perturbations of the edges
-/// between points and of the rest shape's edges. Inputs that are not points are perturbed themselves. κ is the maximum
-/// over sixteen random sign patterns. Code that computes edges in working precision cannot in general be more accurate
-/// than κ roundoffs.
+/// Returns κ of a block: the amplification, in the maximum norm, of relative componentwise perturbations of the inputs.
+/// Edges between points are perturbed in place of points, also in the rest shape. κ is the maximum over sixteen random
+/// sign patterns, and over eight in which only the parameters are perturbed. Code that computes edges in working
+/// precision, or multiples of angles that it compares with a parameter, cannot in general be more accurate than κ
+/// roundoffs.
 pub fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
-    // Large compared with rounding, small compared with everything else.
-    const PERTURBATION: f64 = 1.0 / (1 << 20) as f64;
     let here = answer.block(block);
     let mut random = Rng::with_seed(1);
     let mut most = 0.0_f64;
-    for _ in 0..16 {
-        let moved = perturbed(subject.declaration, sample, PERTURBATION, &mut random);
+    let geometry = (0..16).map(|_| Perturbed::Geometry);
+    let parameters = (0..8).map(|_| Perturbed::Parameters);
+    // If points do not enter as edges, parameters are perturbed with them.
+    let by_edges = enters_as_edges(subject.declaration) && !sample.parameters.is_empty();
+    for what in geometry.chain(parameters.filter(|_| by_edges)) {
+        let moved = perturbed(subject.declaration, sample, what, &mut random);
         let Ok(there) = subject.answer(&moved) else { continue };
         let change = here.numbers.iter().zip(&there.block(block).numbers).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
         let kappa = change / here.largest() / PERTURBATION;
@@ -43,8 +46,22 @@ pub fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block:
     most
 }
 
-fn perturbed(declaration: &Declaration, sample: &Sample, by: f64, random: &mut Rng) -> Sample {
-    let mut nudge = |x: f64| if random.bool() { x * by } else { -x * by };
+/// Large compared with rounding, small compared with everything else.
+const PERTURBATION: f64 = 1.0 / (1 << 20) as f64;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Perturbed {
+    /// Points, rest shape and velocities; also the parameters if points do not enter as edges.
+    Geometry,
+    Parameters,
+}
+
+fn enters_as_edges(declaration: &Declaration) -> bool {
+    has_points(declaration) && declaration.translation_invariant
+}
+
+fn perturbed(declaration: &Declaration, sample: &Sample, what: Perturbed, random: &mut Rng) -> Sample {
+    let mut nudge = |x: f64| if random.bool() { x * PERTURBATION } else { -x * PERTURBATION };
     let edges = |numbers: &[f64], dimension: usize, nudge: &mut dyn FnMut(f64) -> f64| -> Vec<f64> {
         let origin = &numbers[..dimension];
         numbers.iter().enumerate().map(|(i, &x)| x + nudge(x - origin[i % dimension])).collect()
@@ -52,7 +69,10 @@ fn perturbed(declaration: &Declaration, sample: &Sample, by: f64, random: &mut R
     let all = |numbers: &[f64], nudge: &mut dyn FnMut(f64) -> f64| -> Vec<f64> {
         numbers.iter().map(|&x| x + nudge(x)).collect()
     };
-    let by_edges = has_points(declaration) && declaration.translation_invariant;
+    if what == Perturbed::Parameters {
+        return Sample { parameters: all(&sample.parameters, &mut nudge), ..sample.clone() };
+    }
+    let by_edges = enters_as_edges(declaration);
     let positions = match by_edges {
         true => edges(&sample.positions, 3, &mut nudge),
         false => all(&sample.positions, &mut nudge),

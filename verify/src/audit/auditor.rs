@@ -174,9 +174,22 @@ impl<'a> Auditor<'a> {
             let lower_size = answer.block(lower).largest().max(self.natural_size(sample, answer, lower));
             return lower_size / self.length(sample, stepped);
         }
-        let upper = BlockName::of_kind(kind).iter().copied().find(|&upper| {
+        self.derivative(block)
+            .map_or(0.0, |upper| answer.block(upper).largest() * self.length(sample, Stepped::Positions))
+    }
+
+    /// Returns the change of a block over a length, by its derivatives of all orders. If a block vanishes with its
+    /// antiderivative, as at a minimum, this is the size that differences have rounding errors of.
+    pub(super) fn size_of_derivatives(&self, sample: &Sample, answer: &Answer, block: BlockName) -> f64 {
+        let length = self.length(sample, Stepped::Positions);
+        let Some(upper) = self.derivative(block) else { return 0.0 };
+        length * answer.block(upper).largest().max(self.size_of_derivatives(sample, answer, upper))
+    }
+
+    fn derivative(&self, block: BlockName) -> Option<BlockName> {
+        let kind = self.declaration.kind;
+        BlockName::of_kind(kind).iter().copied().find(|&upper| {
             antiderivative(upper, kind).is_some_and(|(lower, stepped)| lower == block && stepped == Stepped::Positions)
-        });
-        upper.map_or(0.0, |upper| answer.block(upper).largest() * self.length(sample, Stepped::Positions))
+        })
     }
 }

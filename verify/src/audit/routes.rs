@@ -87,6 +87,11 @@ impl Auditor<'_> {
         }
         let scale = routes.iter().map(|route| largest(route.numbers)).fold(0.0, f64::max);
         let scale = scale.max(self.natural_size(&case.sample, answer, block.name));
+        let vanishes = routes.iter().filter(|route| route.check != Some(Check::FiniteDifferences));
+        let scale = match vanishes.map(|route| largest(route.numbers)).fold(0.0, f64::max) {
+            0.0 => scale.max(self.size_of_derivatives(&case.sample, answer, block.name)),
+            _ => scale,
+        };
         let order = differences.and_then(|(_, sweep)| sweep.order);
         for route in &routes[1..] {
             let Some(check) = route.check else { continue };

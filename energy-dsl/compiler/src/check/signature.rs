@@ -121,9 +121,9 @@ impl Signature {
         }
         let is_velocity = input_type.element == ElementType::Velocity;
         let stored = section != Section::Moving && !is_velocity;
-        if stored && is_reserved(&name.text) {
+        if let Some(reason) = reserved(&name.text).filter(|_| stored) {
             diagnostics.push(
-                Diagnostic::new(&name.span, format!("`{}` cannot name an input: generated code uses it", name.text))
+                Diagnostic::new(&name.span, format!("`{}` cannot name an input: {reason}", name.text))
                     .help("rename it"),
             );
         }
@@ -140,7 +140,7 @@ impl Signature {
             let first = list.last().map_or(0, |i: &Input| i.first + i.input_type.size());
             let span = unit.span.as_ref().unwrap_or(&name.span).clone();
             // The stub of a broken declaration must be valid Rust.
-            let suffix = if stored && is_reserved(&name.text) { "_" } else { "" };
+            let suffix = if stored && reserved(&name.text).is_some() { "_" } else { "" };
             let input =
                 Input { name: format!("{}{suffix}", name.text), input_type, unit: unit.text.clone(), span, first };
             match length.filter(|_| section == Section::Moving) {
@@ -186,8 +186,11 @@ fn shape(element: ElementType) -> Shape {
     }
 }
 
-/// Returns whether a name would clash in the generated constructor: a Rust keyword, or the name of a temporary.
-fn is_reserved(name: &str) -> bool {
-    let temporary = name.strip_prefix('t').is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
-    temporary || matches!(name, "precomputed" | "sound" | "number") || syn::parse_str::<syn::Ident>(name).is_err()
+/// Returns why a name would clash in the generated constructor; `None` if it would not.
+fn reserved(name: &str) -> Option<&'static str> {
+    let is_temporary = name.strip_prefix('t').is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    if syn::parse_str::<syn::Ident>(name).is_err() {
+        return Some("it is a word of Rust");
+    }
+    (is_temporary || matches!(name, "precomputed" | "sound" | "number")).then_some("generated code uses it")
 }

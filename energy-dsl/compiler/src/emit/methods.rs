@@ -2,7 +2,7 @@
 //!
 //! A routine `f` becomes `f_at::<L>`, which is inlined into a caller at SIMD level L, and `f`, which runs it at the
 //! best level of the machine. If precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general`
-//! by `f_is_ordinary`.
+//! by `f_has_guards` and `f_is_ordinary`.
 //!
 //! For a sum of like terms, these are the routines of one term, and `f_at` is the loop over all.
 
@@ -107,8 +107,8 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
     let (body, general) = match &routine.general {
         None => (ordinary, TokenStream::new()),
         Some(general) => {
-            let [is_ordinary, if_ordinary, in_general] =
-                ["is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
+            let [has_guards, is_ordinary, if_ordinary, in_general] =
+                ["has_guards", "is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
             // Field by field in reverse order: passed on as a whole, the struct would live in memory on both paths.
             let fields: Vec<_> = ["flags"]
                 .into_iter()
@@ -118,13 +118,14 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
             let field_types = method.field_types.iter().rev();
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
             // Lanes are computed first, while they are in registers of the level; lanes that need the general path are
-            // replaced afterwards. A scalar branches first. Values are passed by copy: a reference would force them
-            // into memory on both paths.
+            // replaced afterwards. A scalar branches on the guards first. It looks at its results after they are
+            // computed: before the branch, they would occupy registers. Values are passed by copy: a reference would
+            // force them into memory on both paths.
             let WithCare { inputs, outputs, reads, returns, summed, code } =
                 with_care(method, owner, program, routines, routine, general);
             let select = quote! {
-                let ordinary = self.#is_ordinary::<L>(#(#names),*);
                 if T::WIDE {
+                    let ordinary = self.#is_ordinary::<L>(#(#names),*);
                     let here = self.#if_ordinary::<L>(#(#names),*);
                     if ::energy_dsl::Mask::all(ordinary) {
                         return here;
@@ -133,15 +134,24 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
                     let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
                     return ::energy_dsl::#result { #(#fields),* };
                 }
-                if ::energy_dsl::Mask::all(ordinary) {
-                    self.#if_ordinary::<L>(#(#names),*)
-                } else {
-                    let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, ::core::option::Option::None);
-                    ::energy_dsl::#result { #(#fields),* }
+                if ::energy_dsl::Mask::all(self.#has_guards::<L>(#(#names),*)) {
+                    let here = self.#if_ordinary::<L>(#(#names),*);
+                    if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
+                        return here;
+                    }
                 }
+                let (ordinary, here) = (::energy_dsl::Mask::none(), ::core::option::Option::None);
+                let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
+                ::energy_dsl::#result { #(#fields),* }
             };
-            let guard = mask(program, routines, general.ordinary);
+            let [guards, guard] = [general.guards, general.ordinary].map(|node| mask(program, routines, node));
             let general = quote! {
+                /// Whether the guards of the ordinary path hold. Its results may still be infinite.
+                #[inline(always)]
+                fn #has_guards<L: ::energy_dsl::Level>(#arguments) -> T::Mask {
+                    #guards
+                }
+
                 /// Whether the ordinary path suffices.
                 #[inline(always)]
                 fn #is_ordinary<L: ::energy_dsl::Level>(#arguments) -> T::Mask {

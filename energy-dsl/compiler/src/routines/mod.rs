@@ -30,6 +30,8 @@ pub struct Routine {
 pub struct General {
     /// Mask where the ordinary path suffices.
     pub ordinary: NodeId,
+    /// The part of that mask that does not depend on results.
+    pub guards: NodeId,
     /// Results on the general path.
     pub groups: Vec<Vec<NodeId>>,
     /// Masks of inputs at which a result may be a convention: degenerate, kink. Rays through the input decide.
@@ -118,14 +120,14 @@ impl Whole {
         let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
         let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).collect();
         let Self { name, reduced, groups, .. } = ordinary;
-        if guards.is_empty() {
+        let Some(guards) = guards.into_iter().reduce(|all, guard| g.and(all, guard)) else {
             // A polynomial: it overflows where its own terms do.
             let degenerate = Some(g.not(finite)).filter(|&mask| g.op(mask) != Op::Truth(false));
             return Routine { name, reduced, groups, flags: [degenerate, None], general: None };
-        }
-        let ordinary = guards.into_iter().fold(finite, |all, guard| g.and(all, guard));
+        };
+        let ordinary = g.and(finite, guards);
         let Self { groups: with_care, hazards, .. } = self.with(g, &cautious);
-        let general = General { ordinary, groups: with_care, flags: hazards.flags };
+        let general = General { ordinary, guards, groups: with_care, flags: hazards.flags };
         Routine { name, reduced, groups, flags: [None, None], general: Some(general) }
     }
 }

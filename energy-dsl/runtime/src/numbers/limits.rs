@@ -6,11 +6,13 @@
 use std::ops::Range;
 
 use super::flags::{Flag, Flags};
-use super::ray::{Limit, Ray};
+use super::narrow::{Evaluated, Search, one_sided};
+use super::ray::{Along, Comparison, Ray};
 use super::real::{Mask, Number};
+use super::series::Limit;
 use super::unbounded::Unbounded;
 
-/// What the inputs and outputs of a routine are.
+/// Kinds of the inputs and outputs of a routine.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Roles<'a> {
@@ -21,9 +23,6 @@ pub struct Roles<'a> {
     /// Whether the first group is of values, not of derivatives.
     pub values_first: bool,
 }
-
-/// Evaluates a routine along a ray; `None` if the formula itself is degenerate there.
-type Along<'a> = &'a dyn Fn(&[Ray]) -> Option<Vec<Ray>>;
 
 /// Rays that are tried first: four opposite pairs.
 const FEW: usize = 8;
@@ -61,18 +60,33 @@ pub fn settle<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flag
     }
 }
 
-/// The limits of all results along each ray.
+/// A ray and the results of the routine along it.
+struct Path {
+    slopes: Vec<f64>,
+    comparisons: Vec<Comparison>,
+    /// Limits of all results.
+    limits: Vec<Limit>,
+}
+
+impl Path {
+    fn evaluated(&self) -> Evaluated<'_> {
+        let Self { slopes, comparisons, .. } = self;
+        Evaluated { slopes, comparisons }
+    }
+}
+
+/// The rays through a singular input.
 struct Rays<'a> {
     inputs: Vec<Unbounded<f64>>,
     roles: Roles<'a>,
     rounding: Rounding,
     along: Along<'a>,
-    limits: Vec<Vec<Limit>>,
+    paths: Vec<Path>,
     /// Whether all values are undefined along all rays, as those of √(−1).
     is_outside: bool,
 }
 
-/// What the limits of one result along all rays are.
+/// Limits of one result along all rays.
 enum Agreement {
     Number(Unbounded<f64>),
     /// An infinity with the sign of this number.
@@ -104,29 +118,72 @@ fn zero() -> Unbounded<f64> {
 
 impl<'a> Rays<'a> {
     fn through(inputs: Vec<Unbounded<f64>>, roles: Roles<'a>, rounding: Rounding, along: Along<'a>) -> Self {
-        Self { inputs, roles, rounding, along, limits: Vec::new(), is_outside: true }
+        Self { inputs, roles, rounding, along, paths: Vec::new(), is_outside: true }
     }
 
     /// Evaluates more rays, up to this number.
     fn cast(&mut self, rays: usize) {
-        let Roles { moves, groups, values_first } = self.roles;
-        for ray in self.limits.len()..rays {
+        let moves = self.roles.moves;
+        for ray in self.paths.len()..rays {
             let slope = |(i, &moves): (usize, &bool)| if moves { slope(ray, i) } else { 0.0 };
-            let slopes: Vec<f64> = moves.iter().enumerate().map(slope).collect();
-            let found = Ray::limits(&self.inputs, &slopes, self.along);
-            let values = if values_first { groups[0] } else { 0 };
-            let is_inside = |found: &Vec<Limit>| !found[..values].iter().any(|value| matches!(value, Limit::Unknown));
-            self.is_outside &= found.as_ref().is_some_and(|found| !is_inside(found));
-            // Where the value is undefined, so are its derivatives.
-            let found = found.filter(is_inside);
-            self.limits.push(found.unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]));
+            self.cast_along(moves.iter().enumerate().map(slope).collect());
         }
+    }
+
+    fn cast_along(&mut self, slopes: Vec<f64>) {
+        let Roles { groups, values_first, .. } = self.roles;
+        let found = Ray::evaluate(&self.inputs, &slopes, self.along);
+        let values = if values_first { groups[0] } else { 0 };
+        let is_inside = |limits: &Vec<Limit>| !limits[..values].iter().any(|value| matches!(value, Limit::Unknown));
+        self.is_outside &= found.limits.as_ref().is_some_and(|limits| !is_inside(limits));
+        // If the value is undefined, so are its derivatives.
+        let limits = found.limits.filter(is_inside);
+        let limits = limits.unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]);
+        self.paths.push(Path { slopes, comparisons: found.comparisons, limits });
+    }
+
+    fn agree(&self) -> bool {
+        let (scale, results) = (self.largest(), self.roles.groups.iter().sum());
+        (0..results).all(|i| matches!(self.agreement(i, scale), Agreement::Number(_)))
+    }
+
+    /// Looks for rays into narrow regions where the formula takes another branch, with other results.
+    fn cast_into_narrow_regions(&mut self) {
+        let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
+        let found =
+            one_sided(&rays).into_iter().filter(|comparisons| self.matter(comparisons)).find_map(|comparisons| {
+                let (inputs, moves) = (&self.inputs[..], self.roles.moves);
+                let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
+                let differs = |slopes: &Vec<f64>| !self.has_results(Ray::evaluate(inputs, slopes, self.along).limits);
+                found.iter().any(differs).then_some(found)
+            });
+        if let Some(found) = found {
+            self.cast(MANY);
+            found.into_iter().for_each(|slopes| self.cast_along(slopes));
+        }
+    }
+
+    /// Returns whether results change if comparisons have the other outcome.
+    fn matter(&self, comparisons: &[usize]) -> bool {
+        let reversed = Ray::evaluate_reversed(comparisons, &self.inputs, &self.paths[0].slopes, self.along);
+        !self.has_results(reversed.limits)
+    }
+
+    /// Returns whether limits are those of the first ray, or do not exist because the formula is degenerate.
+    fn has_results(&self, limits: Option<Vec<Limit>>) -> bool {
+        let scale = self.largest();
+        let same = |(a, b): (&Limit, &Limit)| match (a, b) {
+            (Limit::Finite(a), Limit::Finite(b)) => is_near(*a, *b, scale),
+            _ => false,
+        };
+        limits.is_none_or(|limits| limits.iter().zip(&self.paths[0].limits).all(same))
     }
 
     fn settle<T: Number>(mut self, plain: &[Unbounded<f64>], flags: &mut Flags<T>) -> Vec<Unbounded<f64>> {
         self.cast(FEW);
-        let scale = self.largest();
-        if (0..plain.len()).any(|i| !matches!(self.agreement(i, scale), Agreement::Number(_))) {
+        if self.agree() {
+            self.cast_into_narrow_regions();
+        } else {
             self.cast(MANY);
         }
         let scale = self.largest();
@@ -180,7 +237,7 @@ impl<'a> Rays<'a> {
         if !group.all(|a| matches!(a, Agreement::Number(_) | Agreement::Sides)) {
             return self.conventions(group);
         }
-        let side = &self.limits[self.side(group)];
+        let side = &self.paths[self.side(group)].limits;
         let limit = |(agreement, i): (&Agreement, usize)| match (agreement, side[i]) {
             (&Agreement::Number(limit), _) | (_, Limit::Finite(limit)) => limit,
             _ => zero(),
@@ -192,7 +249,7 @@ impl<'a> Rays<'a> {
     }
 
     fn numbers(&self, result: usize) -> impl Iterator<Item = Unbounded<f64>> {
-        self.limits.iter().filter_map(move |ray| match ray[result] {
+        self.paths.iter().filter_map(move |path| match path.limits[result] {
             Limit::Finite(number) => Some(number),
             _ => None,
         })
@@ -200,14 +257,14 @@ impl<'a> Rays<'a> {
 
     /// Returns the largest finite limit.
     fn largest(&self) -> Unbounded<f64> {
-        let results = self.limits.first().map_or(0, Vec::len);
+        let results = self.roles.groups.iter().sum();
         (0..results).flat_map(|i| self.numbers(i)).fold(zero(), |largest, x| largest.max(x.abs()))
     }
 
     /// Rays on which a result is not defined do not count: they leave its domain.
     fn agreement(&self, result: usize, scale: Unbounded<f64>) -> Agreement {
         let numbers: Vec<_> = self.numbers(result).collect();
-        let infinite = self.limits.iter().filter_map(|ray| match ray[result] {
+        let infinite = self.paths.iter().filter_map(|path| match path.limits[result] {
             Limit::Infinite(sign) => Some(sign),
             _ => None,
         });
@@ -236,9 +293,9 @@ impl<'a> Rays<'a> {
                 Limit::Finite(number) => is_near(*number, *plain, group.scale),
                 _ => false,
             };
-            self.limits[ray][group.range.clone()].iter().zip(group.plain).filter(|pair| same(*pair)).count()
+            self.paths[ray].limits[group.range.clone()].iter().zip(group.plain).filter(|pair| same(*pair)).count()
         };
-        (0..self.limits.len()).rev().max_by_key(|&ray| alike(ray)).unwrap_or(0)
+        (0..self.paths.len()).rev().max_by_key(|&ray| alike(ray)).unwrap_or(0)
     }
 }
 
@@ -266,7 +323,7 @@ fn is_near(a: Unbounded<f64>, b: Unbounded<f64>, scale: Unbounded<f64>) -> bool 
 
 /// Returns the slope of an input along a ray: a fixed number of size ¼ to 1. Only the first rays are opposite: an even
 /// function would have one limit along both, as if these were sides of a kink.
-fn slope(ray: usize, input: usize) -> f64 {
+pub(super) fn slope(ray: usize, input: usize) -> f64 {
     let (pair, sign) = if ray < FEW { (ray / 2, if ray.is_multiple_of(2) { 1.0 } else { -1.0 }) } else { (ray, 1.0) };
     // The finaliser of SplitMix64, with the bits of a counter.
     let mut bits = (pair as u64 * 4099 + input as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);

@@ -9,8 +9,10 @@ mod float;
 mod lane;
 mod level;
 mod limits;
+mod narrow;
 mod ray;
 mod real;
+mod series;
 mod unbounded;
 
 pub use block_sum::{BLOCK_NUMBERS, BlockSum};
