@@ -47,7 +47,7 @@ impl DissipationLaw for Gusts {
 #[test]
 fn acting_elements_are_summed_for_any_number_of_threads() {
     let triangles = triangles();
-    let is_pinned = |vertex: usize| vertex % 13 == 0;
+    let is_pinned = |vertex: usize| vertex.is_multiple_of(13);
     let pinned: Vec<bool> = (0..SIDE * SIDE).map(is_pinned).collect();
     let x = vec![[0.0; 3]; SIDE * SIDE];
     let v: Vec<Vector3<f64>> = (0..x.len()).map(|i| [i as f64, 2.0 * i as f64, 0.3 * i as f64].map(f64::sin)).collect();
