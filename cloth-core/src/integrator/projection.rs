@@ -1,25 +1,23 @@
 use energy_solve::Curvature;
 
-/// Decides whether the next iteration projects the elements' Hessians.
+/// Decides whether the next iteration projects the elements' Hessians: projection on demand (Longva, Löschner,
+/// Fernández-Fernández, Larionov, Ascher and Bender 2023).
 ///
-/// Exact Hessians converge fast where their sum is positive definite. Where it is not, conjugate gradients stop at the
-/// first direction of negative curvature. Up to there they follow a descent direction, which usually lowers the energy:
-/// few vertices are in trouble, all others proceed. Only if a direction leads nowhere, some iterations are projected
-/// before exact Hessians are tried again, twice as many each time (projection on demand: Longva, Löschner,
-/// Fernández-Fernández, Larionov, Ascher and Bender 2023). Projected iterations always converge.
+/// Exact Hessians converge fast while their sum is positive definite. After an indefinite sum, some iterations are
+/// projected before exact Hessians are tried again, twice as many each time: projected ones always converge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projection {
     pub(super) curvature: Curvature,
     /// Projected iterations left until the next exact one.
     left: u32,
-    /// Projected iterations after the next direction that leads nowhere.
+    /// Projected iterations after the next indefinite sum.
     next: u32,
 }
 
 impl Projection {
     /// The state at the start of a step.
     pub(super) fn on_demand() -> Self {
-        Self { curvature: Curvature::Exact, left: 0, next: 2 }
+        Self { curvature: Curvature::Exact, left: 0, next: 1 }
     }
 
     /// Whether the next Hessians are exact.
@@ -27,16 +25,16 @@ impl Projection {
         self.curvature == Curvature::Exact
     }
 
-    /// Records an exact Hessian whose direction does not lower the energy.
+    /// Records an exact sum that was not positive definite.
     pub(super) fn demand(&mut self) {
         *self = Self { curvature: Curvature::Clamped, left: self.next, next: self.next.saturating_mul(2) };
     }
 
-    /// Records an iteration that lowered the energy. If contact shortened its step, the next Hessian is projected: the
-    /// barriers that stopped the step are far from quadratic.
-    pub(super) fn proceed(&mut self, is_free: bool) {
-        self.left = self.left.saturating_sub(1).max(u32::from(!is_free));
-        self.curvature = if self.left == 0 { Curvature::Exact } else { Curvature::Clamped };
+    /// Records a successful iteration. Steps that do not shrink mean that the iterate is far from the minimum; only
+    /// projected Hessians guarantee descent there.
+    pub(super) fn proceed(&mut self, shrinks: bool) {
+        self.curvature = if shrinks && self.left == 0 { Curvature::Exact } else { Curvature::Clamped };
+        self.left = self.left.saturating_sub(u32::from(shrinks));
     }
 }
 
@@ -44,30 +42,32 @@ impl Projection {
 mod tests {
     use super::*;
 
+    /// Counts the projected iterations until the next exact one.
+    fn projected(projection: &mut Projection) -> usize {
+        let mut count = 0;
+        while !projection.is_exact() {
+            projection.proceed(true);
+            count += 1;
+        }
+        count
+    }
+
     #[test]
     fn the_number_of_projected_iterations_doubles() {
         let mut projection = Projection::on_demand();
-        for waits in [2, 4, 8, 16] {
+        assert!(projection.is_exact());
+        for waits in [2, 3, 5, 9] {
             projection.demand();
-            let mut count = 0;
-            while !projection.is_exact() {
-                projection.proceed(true);
-                count += 1;
-            }
-            assert_eq!(count, waits);
-            projection.proceed(true);
-            assert!(projection.is_exact());
+            assert_eq!(projected(&mut projection), waits);
         }
     }
 
     #[test]
-    fn one_projected_iteration_follows_a_step_that_contact_shortened() {
+    fn steps_that_do_not_shrink_are_followed_by_projected_ones() {
         let mut projection = Projection::on_demand();
-        projection.proceed(false);
-        assert!(!projection.is_exact());
-        projection.proceed(false);
-        assert!(!projection.is_exact());
         projection.proceed(true);
         assert!(projection.is_exact());
+        projection.proceed(false);
+        assert_eq!(projected(&mut projection), 1);
     }
 }

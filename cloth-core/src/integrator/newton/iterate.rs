@@ -198,7 +198,7 @@ impl<'a> Iterate<'a> {
         report.phases.solve += started.elapsed();
         report.solves += 1;
         report.iterations += solved.iterations as u64;
-        report.projected |= curvature != Curvature::Exact;
+        report.projected |= curvature == Curvature::Exact && !solved.converged();
         Ok((direction, solved))
     }
 
@@ -259,11 +259,15 @@ impl<'a> Iterate<'a> {
         (self.energy, self.gradient, self.linearised) = (step.energy, step.gradient, step.linearised);
         self.energy.value += self.potential.meet(&self.x);
         self.took_full_step = step.scale >= step.allowed;
-        self.change = step.scale * direction.length / self.potential.dt;
-        // A step that contact shortens, or along a truncated direction, says nothing about the distance to the minimum.
-        let is_whole = step.allowed == 1.0 && self.pins == 1.0;
-        let is_solution = direction.is_projected || direction.solved.converged();
-        self.converged = is_solution && is_whole && self.change < self.options.velocity_tolerance;
-        self.projection.proceed(step.allowed == 1.0);
+        let change = step.scale * direction.length / self.potential.dt;
+        let before = std::mem::replace(&mut self.change, change);
+        if direction.is_projected || direction.solved.converged() {
+            // A step that contact shortens says nothing about the distance to the minimum.
+            let is_whole = step.allowed == 1.0 && self.pins == 1.0;
+            self.converged = is_whole && change < self.options.velocity_tolerance;
+            self.projection.proceed(self.took_full_step && change < before);
+        } else {
+            self.projection.demand();
+        }
     }
 }

@@ -26,10 +26,9 @@ use iterate::Iterate;
 /// First order and dissipative; the energy of a motion never grows.
 ///
 /// - The first iterate extrapolates with the accelerations of the last step.
-/// - Hessians are exact as long as their directions lead downhill. Where the sum is not positive definite, conjugate
-///   gradients stop at the first direction of negative curvature. If that direction leads nowhere, the next iterations
+/// - Hessians are exact as long as their sum is positive definite and steps shrink. Otherwise the next iterations
 ///   project each element's Hessian to positive semi-definite: projection on demand (Longva, Löschner,
-///   Fernández-Fernández, Larionov, Ascher and Bender 2023). So does the iteration after a step that contact shortened.
+///   Fernández-Fernández, Larionov, Ascher and Bender 2023).
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
 ///
