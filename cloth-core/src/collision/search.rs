@@ -113,7 +113,7 @@ impl Search {
         let mut found = Found::default();
         if self.rules.with_itself {
             self.own.refit(own_boxes);
-            self.find_own(mesh, &mut found);
+            self.find_all(mesh, &mut found);
         } else {
             self.find_near_obstacles(mesh, own_boxes, &mut found);
         }
@@ -121,7 +121,7 @@ impl Search {
     }
 
     /// Finds pairs of cloth and hair, with themselves and with obstacles.
-    fn find_own(&self, mesh: &CollisionMesh, found: &mut Found) {
+    fn find_all(&self, mesh: &CollisionMesh, found: &mut Found) {
         let Self { own, obstacles, .. } = self;
         own.points.meeting(&own.triangles, |point, triangle| {
             self.add_point_and_triangle(mesh, point, triangle, found);
