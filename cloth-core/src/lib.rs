@@ -59,7 +59,6 @@ pub mod fabric;
 pub mod geometry;
 pub mod integrator;
 pub mod ledger;
-pub mod materials;
 pub mod mesh;
 pub mod model;
 pub mod motion;
@@ -72,4 +71,5 @@ pub mod view;
 pub mod wind;
 
 pub use body::Body;
+pub use cloth_materials as materials;
 pub use simulation::{Island, Simulation, SimulationError, Summary};

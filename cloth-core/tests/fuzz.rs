@@ -1,6 +1,5 @@
 //! Reading a file terminates with a mesh, a scene or an error, whatever the file contains. Every run replays the corpus
 //! with a few edits. `FUZZ_MINUTES=5 cargo test -p cloth-core --test fuzz -- --ignored` runs for longer.
-#![allow(missing_docs)]
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,7 +1,6 @@
 //! Random drops, pulls and folds of small sheets, also onto obstacles: no state has a crossing or a NaN, and no step
 //! stalls without saying so. `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test random_contact` runs a
 //! hundred thousand steps.
-#![allow(missing_docs)]
 
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;

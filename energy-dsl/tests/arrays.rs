@@ -1,5 +1,4 @@
 //! Declares, compiles and runs elements with arrays, matrices and constants as inputs.
-#![allow(missing_docs)]
 
 use approx::assert_relative_eq;
 use energy_compiler::Textbook;

@@ -1,7 +1,5 @@
 //! Batches of any size give the results of single elements.
 
-#![allow(mixed_script_confusables)]
-
 use energy_dsl::energy;
 use energy_dsl::{
     BLOCK, BatchError, Batches, Float, ForceLaw, Hessians, Packed, PackedPotential, Potential, Real, Residual,

@@ -1,5 +1,4 @@
 //! Constants and fixed parameters fold: the parts that they switch off leave no operations.
-#![allow(missing_docs)]
 
 use energy_compiler::Textbook;
 use energy_dsl::energy;

@@ -1,5 +1,4 @@
 //! `include_energy!` declares the contents of a file.
-#![allow(missing_docs)]
 
 use energy_dsl::include_energy;
 use energy_dsl::{Constraint, Element, Potential};

@@ -1,5 +1,4 @@
 //! Declares, compiles and runs the four kinds of declaration.
-#![allow(missing_docs)]
 
 use approx::assert_relative_eq;
 use energy_compiler::Textbook;

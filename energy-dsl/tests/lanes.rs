@@ -1,7 +1,5 @@
 //! Lanes are bit-identical to scalars, at every level of the machine.
 
-#![allow(mixed_script_confusables)]
-
 use std::fmt::Debug;
 
 use energy_dsl::energy;

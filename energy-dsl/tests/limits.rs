@@ -1,5 +1,4 @@
 //! Functions return their limits where these exist, else a documented value and a flag.
-#![allow(missing_docs)]
 
 use energy_dsl::energy;
 use energy_dsl::{Potential, Residual};

@@ -1,6 +1,5 @@
 //! Sums of like terms: an element with eight quadrature points equals eight elements of one point each, and its terms
 //! are a loop in the generated code.
-#![allow(mixed_script_confusables)]
 
 use energy_compiler::Interpreted;
 use energy_dsl::{Element, Inputs, Outputs, Potential, energy};

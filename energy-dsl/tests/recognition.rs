@@ -1,5 +1,4 @@
 //! Naive and robust spellings compile to the same primitives, the same operations and the same bits.
-#![allow(missing_docs)]
 
 use energy_compiler::compile;
 use energy_dsl::Potential;

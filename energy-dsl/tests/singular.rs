@@ -1,5 +1,4 @@
 //! Results at singular inputs: finite or flagged, and the limit where there is one.
-#![allow(missing_docs, mixed_script_confusables)]
 
 use energy_dsl::{ForceLaw, Hessian, Potential, energy};
 

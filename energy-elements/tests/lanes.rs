@@ -1,6 +1,4 @@
 //! Elements in SIMD lanes are bit-identical to scalars, also if one lane is degenerate and another far out of range.
-#![allow(missing_docs)]
-#![allow(mixed_script_confusables)] // θ0 is what the declaration calls it
 
 use energy_dsl::{
     BLOCK, Hessians, Kernel, Lane, Level, Packed, PackedPotential, PackedResidual, Potential, Residual, Vector3,

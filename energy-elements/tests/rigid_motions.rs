@@ -1,5 +1,4 @@
 //! Twists, their exponential and the blend of four motions, compared with multi-precision values.
-#![allow(missing_docs, confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
 use energy_dsl::energy;
 use energy_dsl::{Element, Residual};

@@ -1,8 +1,6 @@
 //! The assembled matrix is the derivative of the assembled force; pinning removes rows and columns.
 
-mod elements;
-
-use elements::{AnySpring, Damper, Spring};
+use crate::elements::{AnySpring, Damper, Spring};
 use energy_dsl::Vector3;
 use energy_solve::{
     BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, LinearisationOptions, ListError, PotentialTerm,

@@ -1,5 +1,4 @@
 //! Contacts in over-relaxation: the same solution as a factorisation that has them in its pattern.
-#![allow(missing_docs)]
 
 use std::sync::Arc;
 

@@ -1,7 +1,5 @@
 //! Projection in the reduced coordinates of an element, in lanes, against the eigenvalues of the full matrix.
 
-#![allow(mixed_script_confusables)] // θ0 is what the declaration calls it
-
 use std::fmt::Debug;
 
 use energy_dsl::{Block, PackedPotential, Vector3};

@@ -1,5 +1,4 @@
 //! Sums of squared residuals: assembly against finite differences, solvers against each other, and rejected inputs.
-#![allow(missing_docs)]
 
 use std::sync::Arc;
 

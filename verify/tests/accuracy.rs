@@ -1,6 +1,5 @@
 //! Functions of one number, with first and second derivatives, against 600-bit fixed-point series, within the bounds
 //! that the table of functions states.
-#![allow(missing_docs)]
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

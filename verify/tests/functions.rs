@@ -1,5 +1,4 @@
 //! Derivatives of every function of the language, alone and combined.
-#![allow(missing_docs, mixed_script_confusables)]
 
 use energy_dsl::energy;
 

@@ -3,7 +3,6 @@
 //! formula passes the same comparison.
 //!
 //! `cargo test -p verify --test printed_mistakes -- --nocapture` prints the table.
-#![allow(missing_docs, confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
 use energy_dsl::Residual;
 use energy_dsl::energy;

@@ -1,5 +1,4 @@
 //! The sampling of inputs must not fail, or run forever, on correct elements.
-#![allow(missing_docs)]
 
 use energy_dsl::energy;
 use verify::assert_derivatives;

@@ -1,6 +1,5 @@
 //! The cost of `#[uncompensated]`, against multi-precision: near rest, its errors are those of rounding the points
 //! instead of the result.
-#![allow(missing_docs)]
 
 use energy_compiler::{Interpreted, Textbook};
 use verify::multiprecision::truth;

@@ -1,5 +1,4 @@
 //! What the rest shape alone determines is stored, and sums of like terms are loops.
-#![allow(missing_docs)]
 
 use energy_compiler::{Interpreted, Listing};
 use energy_runtime::Inputs;

@@ -1,5 +1,4 @@
 //! The compiler answers any text quickly, with code or errors, and never panics.
-#![allow(missing_docs)]
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,4 @@
 //! Laws that hold exactly, and values known in closed form.
-#![allow(missing_docs)]
 
 use energy_catalogue::{catalogue, find};
 use energy_dsl::{Baseline, ForceLaw, Inputs, Kind, Level, LevelName, Outputs, Potential, level};

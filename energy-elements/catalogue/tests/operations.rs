@@ -1,6 +1,5 @@
 //! Operation counts for energy, gradient and reduced Hessian on the ordinary path. A fused multiply-add counts as two,
 //! an exact rounding-error term as one.
-#![allow(missing_docs, mixed_script_confusables)]
 
 use energy_catalogue::find;
 use energy_dsl::Element;

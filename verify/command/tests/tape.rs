@@ -1,6 +1,5 @@
 //! Elements that are read at run time have the bits of generated code: on every reference record, at every degenerate
 //! input, in blocks and one by one.
-#![allow(missing_docs)]
 
 use std::path::Path;
 
@@ -147,7 +146,7 @@ fn the_baseline_has_the_bits_of_generated_code() {
         return;
     }
     let status = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["generated_code", "--quiet"])
+        .args(["bits_of_generated_code", "--quiet"])
         .env("ENERGY_LEVEL", "baseline")
         .status();
     assert!(status.unwrap().success());

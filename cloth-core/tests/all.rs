@@ -1,0 +1,26 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+#![allow(missing_docs)]
+
+mod command_line;
+mod endings;
+mod exported_garment;
+mod folders;
+mod frame_rates;
+mod fuzz;
+mod known_answers;
+mod limits;
+mod linear_solvers;
+mod mesh_obstacle;
+mod motion;
+mod obstacles;
+mod plate;
+mod random_contact;
+mod random_impacts;
+mod runs;
+mod scenes;
+mod schema;
+mod self_contact;
+mod sleep;
+mod stress;
+mod threads;
+mod view;

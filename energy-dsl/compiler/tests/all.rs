@@ -1,0 +1,9 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+#![allow(missing_docs)]
+
+mod golden;
+mod language;
+mod rest_parts;
+mod run_time;
+mod singular_values;
+mod token_soup;

@@ -1,0 +1,17 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+#![allow(missing_docs, mixed_script_confusables)]
+
+mod arrays;
+mod batch;
+mod constants;
+mod include;
+mod kinds;
+mod lanes;
+mod limits;
+mod matrices;
+mod polar;
+mod quadrature;
+mod recognition;
+mod reference;
+mod singular;
+mod ui;

@@ -1,0 +1,14 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+#![allow(missing_docs, mixed_script_confusables)]
+
+mod assembly;
+mod contacts;
+mod curvature;
+mod dissipation;
+mod elements;
+mod export;
+mod least_squares;
+mod multigrid;
+mod solvers;
+mod tapes;
+mod threads;

@@ -1,0 +1,7 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+
+mod attachments;
+mod bad_input;
+mod command_line;
+mod figure;
+mod real_body;

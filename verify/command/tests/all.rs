@@ -1,0 +1,9 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+#![allow(missing_docs)]
+
+mod command_line;
+mod elements;
+mod errata;
+mod fusion_reference;
+mod multiprecision;
+mod tape;

@@ -1,0 +1,15 @@
+//! The tests of the public interface, one module a subject. One program links once and shares all cores.
+#![allow(confusable_idents, missing_docs, mixed_script_confusables, uncommon_codepoints)]
+
+mod accuracy;
+mod broken_elements;
+mod claims;
+mod elementary_functions;
+mod functions;
+mod printed_mistakes;
+mod random_programs;
+mod sampling;
+mod singular_programs;
+mod structure;
+mod uncompensated;
+mod user_formulas;
