@@ -1,5 +1,5 @@
 //! Reading a file terminates with a mesh, a scene or an error, whatever the file contains. Every run replays the corpus
-//! with a few edits. `FUZZ_MINUTES=5 cargo test -p cloth-core --test fuzz -- --ignored` runs for longer.
+//! with a few edits. `FUZZ_MINUTES=5 cargo test -p cloth-core --test all fuzz:: -- --ignored` runs for longer.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,5 +1,5 @@
 //! Random impacts at up to 100 m/s with a thickness of 1 mm, on obstacles and on cloth: none passes.
-//! `IMPACTS=10000 cargo test --release -p cloth-core --test random_impacts` shoots ten thousand times.
+//! `IMPACTS=10000 cargo test --release -p cloth-core --test all random_impacts::` shoots ten thousand times.
 
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;

@@ -1,5 +1,5 @@
 //! The tests of the public interface, one module a subject. One program links once and shares all cores.
-#![allow(missing_docs, mixed_script_confusables)]
+#![allow(confusable_idents, missing_docs, mixed_script_confusables)]
 
 mod assembly;
 mod contacts;

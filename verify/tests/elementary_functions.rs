@@ -1,7 +1,7 @@
 //! The elementary functions against multi-precision ones: random arguments of every size and hard ones, in both
 //! precisions, at every SIMD level of the machine.
 //!
-//! `cargo test -p verify --test elementary_functions -- --nocapture` prints the worst error of each.
+//! `cargo test -p verify --test all elementary_functions:: -- --nocapture` prints the worst error of each.
 
 use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;

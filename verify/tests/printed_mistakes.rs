@@ -2,7 +2,7 @@
 //! would find. Each is compared with the true derivative, by dual numbers through the declared residuals; the corrected
 //! formula passes the same comparison.
 //!
-//! `cargo test -p verify --test printed_mistakes -- --nocapture` prints the table.
+//! `cargo test -p verify --test all printed_mistakes:: -- --nocapture` prints the table.
 
 use energy_dsl::Residual;
 use energy_dsl::energy;

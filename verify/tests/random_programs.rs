@@ -1,7 +1,7 @@
 //! Random well-typed programs: the compiled routines agree with hyper-dual and multi-precision numbers run through the
 //! text, for every routine and on both paths.
 //!
-//! `PROPTEST_CASES=10000 cargo test --release -p verify --test random_programs` is the long run.
+//! `PROPTEST_CASES=10000 cargo test --release -p verify --test all random_programs::` is the long run.
 
 use energy_compiler::{Interpreted, Listing, Path, Textbook};
 use energy_dsl::Inputs;

@@ -1,7 +1,7 @@
 //! Random programs at random singular inputs: coincident, collinear, flat, folded and infinite points. Results are
 //! finite or flagged, and equal the limit wherever multi-precision finds one.
 //!
-//! `PROPTEST_CASES=10000 cargo test --release -p verify --test singular_programs` is the long run.
+//! `PROPTEST_CASES=10000 cargo test --release -p verify --test all singular_programs::` is the long run.
 
 use std::sync::LazyLock;
 

@@ -1,5 +1,5 @@
 //! The structure of the workspace: no import cycle between the top-level modules of a crate, no dependency cycle
-//! between crates, and no path in `ARCHITECTURE.md` that does not exist.
+//! between crates, no path in `ARCHITECTURE.md` that does not exist, and no file of tests that nothing runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -251,6 +251,34 @@ fn every_path_in_the_architecture_exists() {
     assert!(named.len() > 20, "{named:?}");
     let missing: Vec<_> = named.into_iter().filter(|path| !exists(path, &all)).collect();
     assert!(missing.is_empty(), "ARCHITECTURE.md names paths that do not exist: {missing:?}");
+}
+
+/// The names after `mod` in a file that declares one module a line.
+fn declared_modules(text: &str) -> BTreeSet<String> {
+    let names = text.lines().filter_map(|line| line.strip_prefix("mod ")?.strip_suffix(';'));
+    names.map(str::to_owned).collect()
+}
+
+#[test]
+fn every_test_file_belongs_to_a_test_program() {
+    for (name, folder) in crates() {
+        let tests = folder.join("tests");
+        let Ok(listing) = std::fs::read_to_string(tests.join("all.rs")) else {
+            assert!(!tests.exists(), "{name}: expected tests/all.rs, which lists the other files as modules");
+            continue;
+        };
+        let mut listed = declared_modules(&listing);
+        for program in manifest(&folder)["test"].as_array().expect("a list of test programs") {
+            listed.insert(program["name"].as_str().expect("a name").to_owned());
+        }
+        for file in std::fs::read_dir(&tests).expect("the folder is readable") {
+            let path = file.expect("the folder is readable").path();
+            if path.extension().is_some_and(|extension| extension == "rs") {
+                let module = path.file_stem().expect("a name").to_string_lossy();
+                assert!(listed.contains(&*module), "{name}: add `mod {module};` to tests/all.rs");
+            }
+        }
+    }
 }
 
 #[test]
