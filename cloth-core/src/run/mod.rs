@@ -2,12 +2,14 @@
 
 mod available_memory;
 mod checkpoint;
+mod forecast;
 mod frame_files;
 mod frame_pictures;
 mod frame_store;
 mod input_files;
 mod memory_need;
 mod progress;
+mod progress_lines;
 mod record;
 mod report;
 mod results;
@@ -20,9 +22,10 @@ use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
+pub use forecast::Forecast;
 pub use input_files::InputFile;
 pub use memory_need::MemoryNeed;
-pub use progress::Progress;
+pub use progress::{Log, Progress};
 pub use record::{Record, RecordError};
 pub use report::{ReportError, write_report};
 pub use results::Ending;
