@@ -28,7 +28,6 @@ pub struct Resume {
 impl Resume {
     pub fn run(self) -> Result<ExitCode> {
         let run = Run::resume(&self.folder, self.accept_edited)?;
-        run.notes().iter().for_each(|note| eprintln!("note: {note}"));
         simulate(limit_threads(run, self.threads), self.stats, self.log)
     }
 }

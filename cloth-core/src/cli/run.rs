@@ -133,6 +133,7 @@ pub fn limit_threads(run: Run, threads: Option<u16>) -> Run {
 /// Simulates until the end or a signal, and prints the summary and the files written. The exit code is 128 and the
 /// number of the signal if the run was interrupted.
 pub fn simulate(mut run: Run, with_stats: bool, log: LogChoice) -> Result<ExitCode> {
+    run.notes().iter().for_each(|note| eprintln!("note: {note}"));
     run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let interrupts = Interrupts::listen()?;
     let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done(), log.into());

@@ -104,7 +104,12 @@ impl<'a> Builder<'a> {
         };
         self.pieces.extend(pieces.into_iter().map(|vertices| Piece { part, vertices }));
         let (corners, groups) = (CornerAttributes::default(), BTreeMap::new());
-        self.model.parts.push(Part { name, vertices: first..first + vertices, kind, corners, groups });
+        let colours = &self.scene.output.colours;
+        let colour = match &kind {
+            PartKind::Cloth(_) => colours.get(part).map(|colour| colour.map(|channel| channel as f32)),
+            PartKind::Hair { .. } => None,
+        };
+        self.model.parts.push(Part { name, vertices: first..first + vertices, kind, colour, corners, groups });
     }
 
     fn add_garment(&mut self, number: usize, garment: &Garment) -> Result<(), ModelError> {
@@ -138,7 +143,7 @@ impl<'a> Builder<'a> {
         self.model.friction.extend(vec![0.0; count]);
         self.model.x.extend(vertices);
         let segment = hair.length / hair.segments as f64;
-        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment });
+        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment, width: hair.thickness() });
     }
 
     fn check_names(&self) -> Result<(), ModelError> {

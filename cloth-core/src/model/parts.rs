@@ -24,6 +24,8 @@ pub struct Part {
     pub vertices: Range<usize>,
     /// Cloth or hair.
     pub kind: PartKind,
+    /// RGB colour, from 0 to 1, as screens show it; `None` for that of its kind.
+    pub colour: Option<[f32; 3]>,
     /// Attributes of the corners of its triangles, from an OBJ file.
     pub corners: CornerAttributes,
     /// The vertices of each group of its OBJ file, numbered within the part.
@@ -41,6 +43,8 @@ pub enum PartKind {
         joints: usize,
         /// Length of a segment at rest, in m.
         segment: f64,
+        /// Diameter of a strand, in m.
+        width: f64,
     },
 }
 

@@ -6,23 +6,28 @@ mod frame;
 mod lock;
 mod picture;
 mod ply;
+mod point_cache;
 mod projection;
 mod raster;
 mod scenery;
 mod show;
 mod solid_mesh;
+mod style;
 mod track;
 mod usd;
+mod visibility;
 
 pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
 pub use frame::{last_obj_line, obj_text};
 pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
+pub use point_cache::{mdd_bytes, pc2_bytes};
 pub(crate) use scenery::Framing;
 pub use scenery::Scenery;
 pub use show::Show;
 pub use solid_mesh::SolidMesh;
+pub use style::{Style, Viewpoint};
 pub use track::{Joined, Track};
 pub use usd::usd_text;
 

@@ -26,7 +26,7 @@ pub use contact_choice::ContactChoice;
 pub use error::SceneError;
 pub use garment::{Garment, Inflation, Mesh, Placement, Turn};
 pub use obstacle::{ObstacleDescription, ObstacleError};
-pub use output::OutputChoice;
+pub use output::{CameraChoice, OutputChoice};
 pub use own_material::with_material;
 pub use pins::{Pin, PinBox, PinChoice, SoftPin};
 pub use rest_shape::{RestFile, RestScale, RestShape, RestTexture};

@@ -56,7 +56,7 @@ fn elements(part: &Part, x: &[Vector3<f64>]) -> Vec<MostDeformed> {
             };
             mesh.triangles().iter().enumerate().map(triangle).map(element).collect()
         }
-        PartKind::Hair { joints, segment } => {
+        PartKind::Hair { joints, segment, .. } => {
             let ends = (1..part.vertices.len()).filter(|end| end % joints != 0).enumerate();
             ends.map(|(index, end)| (index, vec![end - 1, end], length(end - 1, end) / segment)).map(element).collect()
         }
