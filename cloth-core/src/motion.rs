@@ -45,10 +45,10 @@ pub enum Interpolation {
     /// At constant velocity.
     #[default]
     Linear,
-    /// By 3 s² − 2 s³ in the elapsed part s of the time between the keys: at rest at every key.
+    /// Follows 3 s² − 2 s³ in the elapsed part s of the time between the keys: at rest at every key.
     Smoothstep,
-    /// By cubic Hermite polynomials with the slopes of Fritsch and Butland (1984), which keep monotone keys monotone.
-    /// At rest at the first and the last key.
+    /// Follows cubic Hermite polynomials with the slopes of Fritsch and Butland (1984), which keep monotone keys
+    /// monotone. At rest at the first and the last key.
     Cubic,
 }
 
@@ -143,8 +143,8 @@ impl Motion {
         Key { time, angle, translate }
     }
 
-    /// The slope of a number at a key, per s: a weighted harmonic mean of those before and after it, or 0 if they differ
-    /// in sign.
+    /// Returns the slope of a number at a key, per s: a weighted harmonic mean of those before and after it, or 0 if
+    /// they differ in sign.
     fn slope(&self, key: usize, of: &dyn Fn(&Key) -> f64) -> f64 {
         if key == 0 || key + 1 == self.keys.len() {
             return 0.0;

@@ -253,5 +253,5 @@ fn completions_and_manual_pages_name_the_subcommands() {
     let pages = std::fs::read_dir(folder.path().join("pages")).unwrap().count();
     assert!(pages > 12, "{pages}");
     let run = std::fs::read_to_string(folder.path().join("pages/cloth-run.1")).unwrap();
-    assert!(run.contains(".TH cloth\\-run 1") && run.contains("dry\\-run"), "{run}");
+    assert!(run.contains(".TH cloth-run 1") && run.contains("dry\\-run"), "{run}");
 }

@@ -28,7 +28,20 @@ linear_solver = "auto"
 adaptive = true
 tolerances = { velocity = 1e-4, linear = 0.01, iterations = 50 }
 sleep = { speed = 0.1, after = 0.5 }
-output = { png = true, ply = false, pc2 = true, mdd = false, velocities = true, apng = false, mp4 = false, size = [640, 480], background = [1.0, 1.0, 0.5], colours = [[0.5, 0.2, 0.1]], camera = { eye = [1.0, 0.0, 0.0], target = [0.0, 0.0, 0.0], angle = 40.0 } }
+
+[output]
+png = true
+ply = false
+pc2 = true
+mdd = false
+velocities = true
+apng = false
+mp4 = false
+size = [640, 480]
+background = [1.0, 1.0, 0.5]
+colours = [[0.5, 0.2, 0.1]]
+camera = { eye = [1.0, 0.0, 0.0], target = [0.0, 0.0, 0.0], angle = 40.0 }
+
 
 [wind]
 velocity = [1.0, 0.0, 0.0]

@@ -142,7 +142,7 @@ mod tests {
             let momentum = |simulation: &crate::Simulation| {
                 simulation.ledger().unwrap().entries().last().unwrap().angular_momentum[2]
             };
-            // Implicit Euler loses angular momentum itself, more of it the more the sheet oscillates.
+            // Implicit Euler loses angular momentum, too, in proportion to the oscillation of the sheet.
             let limit = if integrator == "implicit-midpoint" { 0.01 } else { 0.2 };
             assert!((momentum(&damped) / momentum(&free) - 1.0).abs() < limit, "{integrator}");
             let ledger = damped.ledger().unwrap();

@@ -133,7 +133,7 @@ impl DrivenLaw for PlasticHinges {
     }
 }
 
-/// Moves angles at rest by what the strains exceed the limits. Returns whether any did.
+/// Moves angles at rest by the excess of the strains over the limits. Returns whether any moved.
 pub(super) fn flow(rest: &mut [f64], strains: &[f64], limits: &[f64]) -> bool {
     let mut flows = false;
     for ((rest, strain), limit) in rest.iter_mut().zip(strains).zip(limits).filter(|((_, s), l)| s.abs() > **l) {

@@ -121,8 +121,8 @@ impl Account {
         Ok(after)
     }
 
-    /// Returns the account of a body that begins anew with the same state, because pins let go: what its energy gains by
-    /// vertices that are free now counts as work of the pins.
+    /// Returns the account of a body after pins let go. The energy of vertices that are free now counts as work of the
+    /// pins.
     pub(crate) fn reopened(&self, body: &Body) -> Result<Self, EvaluationError> {
         let energy = |account: &Self| account.kinetic + account.potential.iter().map(|(_, energy)| energy).sum::<f64>();
         let now = self.now(body)?;

@@ -181,7 +181,7 @@ impl Ledger {
         self.entries.push(entry);
     }
 
-    /// Begins anew with the current state of the bodies, after pins let go; see [`Account::reopened`].
+    /// Updates the accounts to bodies whose pins have let go; see [`Account::reopened`].
     ///
     /// # Errors
     /// Returns an error if an energy is not finite.

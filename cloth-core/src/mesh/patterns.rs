@@ -5,8 +5,8 @@ use super::triangle_mesh::has_area;
 use super::{MeshError, TriangleMesh, Warp, dihedral_angle};
 use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 
-/// Rest shapes of single triangles, where they are not those between the vertices: sewing patterns, texture coordinates,
-/// or shrunk groups. Neighbours need not fit together.
+/// Rest shapes of single triangles, where they are not those between the vertices: sewing patterns, texture
+/// coordinates, or shrunk groups. Neighbours need not fit together.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Patterns {
     /// The corners of each triangle, in m.
@@ -96,7 +96,7 @@ impl TriangleMesh {
     #[must_use]
     pub fn hinge_at_rest(&self, hinge: &Hinge) -> [Vector3<f64>; 4] {
         let Some(patterns) = self.patterns() else { return hinge.vertices.map(|vertex| self.vertices()[vertex]) };
-        // Of each triangle: its apex and the ends of the edge.
+        // For each triangle: its apex and the ends of the edge.
         let points = |of: &[[Vector3<f64>; 3]]| -> [[Vector3<f64>; 3]; 2] {
             [0, 1].map(|side| {
                 let triangle = hinge.triangles[side];

@@ -151,7 +151,7 @@ fn check_triangle(triangle: usize, corners: [usize; 3], positions: &[Vector3<f64
     }
 }
 
-/// Whether a triangle has an area. NaN has none.
+/// Whether a triangle has an area; `false` for NaN.
 pub(super) fn has_area([a, b, c]: [Vector3<f64>; 3]) -> bool {
     let longest = norm(subtract(b, a)).max(norm(subtract(c, b))).max(norm(subtract(a, c)));
     // Relative to the size of the triangle: below this, rounding decides the shape.

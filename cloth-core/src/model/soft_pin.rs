@@ -223,8 +223,8 @@ material.stvk = { stretch_stiffness = 400.0, poisson_ratio = 0.3 }
     #[test]
     fn soft_pins_follow_an_obstacle_let_go_and_their_work_is_accounted_for() {
         let ball = "[[obstacles]]\nname = \"hand\"\nsphere = { centre = [5.0, 0.0, 0.0], radius = 0.1 }\n\
-                    motion.keys = [{ time = 0.0, translate = [1.0, 0.0, 0.0] }, { time = 0.5, translate = [1.0, 0.0, 0.2] }]\n\
-                    motion.interpolation = \"smoothstep\"\n";
+                    motion.keys = [{ translate = [1.0, 0.0, 0.0], time = 0.0 },\
+                    { translate = [1.0, 0.0, 0.2], time = 0.5 }]\nmotion.interpolation = \"smoothstep\"\n";
         let pin = "[[pins]]\nall = true\nstiffness = 50.0\nobstacle = \"hand\"\n";
         let held = finished_by("implicit-midpoint", &format!("{ball}{pin}"));
         assert!((mean_height(&held) - 0.2).abs() < 5e-3, "{}", mean_height(&held));

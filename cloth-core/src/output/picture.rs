@@ -11,7 +11,7 @@ use super::raster::{Canvas, Corner};
 use super::solid_mesh::SolidMesh;
 use super::style::Style;
 use super::vertex_normals;
-use super::visibility::{Occluders, Visibility};
+use super::visibility::{Occluders, Visibility, lamp_directions};
 use crate::geometry::{cross, dot, norm, subtract};
 
 /// Dark and bright colours of solids and of hair.
@@ -77,14 +77,14 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     let mut background = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
     let solids = view.solids.iter().flat_map(|solid| &solid.vertices);
     let everything: Vec<Vector3<f64>> = view.positions.iter().chain(solids).copied().collect();
-    let shadow = shadow_points(&everything, view.floor);
+    let floor = floor_below(&everything, view.floor);
     let camera = view.camera.unwrap_or_else(|| {
-        let all: Vec<Vector3<f64>> = everything.iter().chain(&shadow).copied().collect();
+        let all: Vec<Vector3<f64>> = everything.iter().flat_map(|p| [*p, shadow_of(p, floor)]).collect();
         view.style.camera_on(&all)
     });
     draw_background(&mut background, view.style.background);
     let triangles = all_triangles(view);
-    draw_shadow(&mut background, &camera, &shadow, &triangles, view);
+    draw_shadow(&mut background, &camera, (&everything, floor), &triangles, view);
     let mut canvas = Canvas::new(background);
     draw_surfaces(&mut canvas, &camera, &everything, &triangles, view);
     if view.look.wireframe {
@@ -205,8 +205,8 @@ fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {
     std::array::from_fn(|channel| dark[channel] + brightness as f32 * (bright[channel] - dark[channel]))
 }
 
-/// Returns the brightness from the lamp, a weaker light at the eye, the sky, and a sheen at grazing angles. `seen` holds
-/// the visible parts of the lamp and of the surroundings.
+/// Returns the brightness from the lamp, a weaker light at the eye, the sky, and a sheen at grazing angles. The last
+/// argument holds the visible parts of the lamp and of the surroundings.
 fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>, [sunlit, open]: [f64; 2]) -> f64 {
     let facing = dot(normal, eye).clamp(0.0, 1.0);
     let sheen = 0.16 * (1.0 - facing).powi(3);
@@ -236,30 +236,60 @@ fn draw_background(canvas: &mut Pixmap, colour: Option<[f32; 3]>) {
     }
 }
 
-/// Returns the shadows of the points on the floor.
-fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<f64>> {
+/// Returns the height of the floor: that given, or slightly below everything.
+fn floor_below(positions: &[Vector3<f64>], floor: Option<f64>) -> f64 {
     let range = |pick: fn(f64, f64) -> f64, start| positions.iter().map(|p| p[2]).fold(start, pick);
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
-    let floor = floor.unwrap_or(low - 0.08 * (high - low));
-    positions.iter().map(|p| shadow_of(p, floor)).collect()
+    floor.unwrap_or(low - 0.08 * (high - low))
 }
 
 /// Returns the shadow of a point on the floor.
 pub(super) fn shadow_of(p: &Vector3<f64>, floor: f64) -> Vector3<f64> {
-    let offset = (p[2] - floor) / LAMP[2];
-    [p[0] - offset * LAMP[0], p[1] - offset * LAMP[1], floor]
+    shadow_along(p, floor, LAMP)
 }
 
-/// Draws the shadow at low resolution; upscaling softens it.
+/// Returns the shadow of a point on the floor in the light from a direction.
+fn shadow_along(p: &Vector3<f64>, floor: f64, lamp: Vector3<f64>) -> Vector3<f64> {
+    let offset = (p[2] - floor) / lamp[2];
+    [p[0] - offset * lamp[0], p[1] - offset * lamp[1], floor]
+}
+
+/// Opacity of the shadow on the floor, where no part of the lamp is seen.
+const SHADOW: f32 = 0.34;
+
+/// Draws the shadow of each part of the lamp on the floor, whose edges blur with the distance from the floor.
 fn draw_shadow(
     canvas: &mut Pixmap,
+    camera: &Camera,
+    (points, floor): (&[Vector3<f64>], f64),
+    triangles: &[[usize; 3]],
+    view: &View<'_>,
+) {
+    const COARSENESS: u32 = 5;
+    let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
+    let lamps = lamp_directions(LAMP.map(|component| component / norm(LAMP)));
+    // As many layers of this opacity have that of the shadow.
+    let opacity = 1.0 - (1.0 - SHADOW).powf(1.0 / lamps.len() as f32);
+    let ink = Color::from_rgba(0.1, 0.11, 0.14, opacity).unwrap_or(Color::BLACK);
+    let paint = Paint { shader: Shader::SolidColor(ink), ..Paint::default() };
+    let shrink = 1.0 / COARSENESS as f32;
+    for lamp in lamps {
+        let shadow: Vec<Vector3<f64>> = points.iter().map(|p| shadow_along(p, floor, lamp)).collect();
+        let Some(path) = outline(camera, &shadow, triangles, view) else { continue };
+        small.fill_path(&path, &paint, FillRule::Winding, Transform::from_scale(shrink, shrink), None);
+    }
+    let soft = PixmapPaint { quality: FilterQuality::Bicubic, ..PixmapPaint::default() };
+    let enlarge = Transform::from_scale(COARSENESS as f32, COARSENESS as f32);
+    canvas.draw_pixmap(0, 0, small.as_ref(), &soft, enlarge, None);
+}
+
+/// Returns the outline of triangles and hair with these points on the floor; `None` if there are none.
+fn outline(
     camera: &Camera,
     shadow: &[Vector3<f64>],
     triangles: &[[usize; 3]],
     view: &View<'_>,
-) {
-    const COARSENESS: u32 = 20;
-    let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
+) -> Option<tiny_skia::Path> {
     let mut outline = PathBuilder::new();
     for corners in triangles {
         let mut seen = corners.map(|corner| camera.project(shadow[corner]).0);
@@ -275,14 +305,7 @@ fn draw_shadow(
             append_segment(&mut outline, camera, [shadow[end - 1], shadow[end]], *width);
         }
     }
-    let Some(path) = outline.finish() else { return };
-    let ink = Color::from_rgba(0.1, 0.11, 0.14, 0.34).unwrap_or(Color::BLACK);
-    let paint = Paint { shader: Shader::SolidColor(ink), ..Paint::default() };
-    let shrink = 1.0 / COARSENESS as f32;
-    small.fill_path(&path, &paint, FillRule::Winding, Transform::from_scale(shrink, shrink), None);
-    let soft = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
-    let enlarge = Transform::from_scale(COARSENESS as f32, COARSENESS as f32);
-    canvas.draw_pixmap(0, 0, small.as_ref(), &soft, enlarge, None);
+    outline.finish()
 }
 
 /// Adds the shadow of a segment of hair.

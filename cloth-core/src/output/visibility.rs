@@ -20,7 +20,7 @@ const MAP: usize = 320;
 const LIFT: f64 = 2.0;
 const BIAS: f64 = 1.5;
 
-/// What casts shadows.
+/// Surfaces and hair that cast shadows.
 pub(super) struct Occluders<'a> {
     pub points: &'a [Vector3<f64>],
     pub triangles: &'a [[usize; 3]],
@@ -37,7 +37,8 @@ pub(super) struct Visibility {
 impl Visibility {
     /// Computes the visibility of the first vertices, which have these unit normals.
     pub(super) fn of(occluders: &Occluders<'_>, normals: &[Vector3<f64>], lamp: Vector3<f64>) -> Self {
-        let [lamp, sky] = [around(lamp), sphere()].map(|directions| seen_parts(occluders, normals, &directions));
+        let [lamp, sky] =
+            [lamp_directions(lamp), sphere()].map(|directions| seen_parts(occluders, normals, &directions));
         Self { lamp, sky }
     }
 }
@@ -72,8 +73,8 @@ fn sphere() -> Vec<Vector3<f64>> {
     (0..SKY_DIRECTIONS).map(direction).collect()
 }
 
-/// Unit vectors evenly spread over a disc around a direction.
-fn around(direction: Vector3<f64>) -> Vec<Vector3<f64>> {
+/// Unit vectors towards the parts of the lamp, evenly spread over a disc around a direction.
+pub(super) fn lamp_directions(direction: Vector3<f64>) -> Vec<Vector3<f64>> {
     let [right, up] = across(direction);
     let one = |number: usize| {
         let out = LAMP_ANGLE * ((number as f64 + 0.5) / LAMP_DIRECTIONS as f64).sqrt();

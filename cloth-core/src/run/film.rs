@@ -14,9 +14,9 @@ pub enum FilmError {
     /// A picture cannot be read.
     #[error("cannot read the picture {}: {reason}", .path.display())]
     Picture {
-        /// The picture.
+        /// Path of the picture.
         path: PathBuf,
-        /// The reason.
+        /// The error of the file system or of the decoder.
         reason: String,
     },
     /// The animated PNG cannot be encoded.

@@ -1,4 +1,4 @@
-//! What a run will take: the answer to `cloth run --dry-run`.
+//! Forecasts the size, memory and time of a run, for `cloth run --dry-run`.
 
 use std::fmt;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::simulation::{Simulation, SimulationError};
 /// A forecast of a run. It writes no file.
 #[derive(Debug)]
 pub struct Forecast {
-    /// Numbers of vertices, of pinned ones, and of triangles.
+    /// Number of vertices.
     pub vertices: usize,
     /// Number of pinned vertices.
     pub pinned: usize,

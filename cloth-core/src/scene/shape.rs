@@ -73,7 +73,7 @@ pub struct Shape {
     pub welded: Option<usize>,
 }
 
-/// A mesh before its placement, with what its file says of it.
+/// A mesh before its placement, with the attributes in its file.
 struct Source {
     mesh: TriangleMesh,
     corners: CornerAttributes,

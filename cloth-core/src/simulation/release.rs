@@ -10,7 +10,7 @@ use crate::scene::Scene;
 /// Adds what is not in a scene to its model, such as the pull of the mouse.
 pub(crate) type Extension = Arc<dyn Fn(&mut Model) + Send + Sync>;
 
-/// The times at which pins of a scene let go, and what is needed to assemble it again.
+/// The times at which pins of a scene let go, and the means to assemble the scene again.
 pub(super) struct Releases {
     scene: Scene,
     extension: Option<Extension>,
@@ -25,7 +25,7 @@ impl fmt::Debug for Releases {
 }
 
 impl Releases {
-    /// Returns the releases of a scene; `None` if no pin that holds exactly lets go. Soft pins let go by themselves.
+    /// Returns the releases of a scene; `None` if no pin that holds exactly lets go. Soft pins need no new model.
     pub(super) fn of(scene: &Scene, extension: Option<&Extension>) -> Option<Arc<Self>> {
         let exact = scene.pins.iter().filter(|pin| pin.soft.is_none());
         let mut times: Vec<f64> = exact.filter_map(|pin| pin.release).collect();
@@ -108,7 +108,10 @@ size = [0.3, 0.3]
 density = 0.2
 thickness = 1e-3
 plasticity.curvature = 3.0
-material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3, bending.plate.flexural = { rigidity = 1e-4, poisson_ratio = 0.2 } }
+[fabric.material.stvk]
+stretch_stiffness = 40.0
+poisson_ratio = 0.3
+bending.plate.flexural = { rigidity = 1e-4, poisson_ratio = 0.2 }
 [[pins]]
 box = { min = [-0.2, -0.2, -0.1], max = [-0.1, 0.2, 0.1] }
 motion.keys = [{ time = 0.0 }, { time = 0.1, translate = [0.0, 0.0, 0.05] }]

@@ -88,7 +88,7 @@ pub trait PlacedTerm: TermDescription {
     fn varies(&self, _from: f64, _to: f64) -> bool {
         false
     }
-    /// Returns the history, from which [`PlacedTerm::restore_history`] restores the term. Empty if there is none.
+    /// Returns the history, from which [`PlacedTerm::restore_history`] restores the term; empty for a term without one.
     fn history(&self) -> Vec<f64> {
         Vec::new()
     }

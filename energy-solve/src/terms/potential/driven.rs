@@ -30,7 +30,7 @@ pub trait DrivenLaw: Debug + Send + Sync {
     fn advance(&mut self, _stencils: Stencils<'_>, _x: &[Vector3<f64>]) -> bool {
         false
     }
-    /// Returns the history, for a checkpoint. Empty if there is none.
+    /// Returns the history, for a checkpoint; empty for a law without one.
     fn history(&self) -> Vec<f64> {
         Vec::new()
     }
