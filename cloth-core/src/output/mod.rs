@@ -1,6 +1,7 @@
 //! Output files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
 
 mod animation;
+mod floor_shadow;
 mod folder;
 mod frame;
 mod lock;
@@ -49,7 +50,11 @@ pub fn vertex_normals(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> V
     for normal in &mut normals {
         let length = norm(*normal);
         // The normals of folded triangles may cancel; any unit vector is good enough for shading.
-        *normal = if length > 0.0 { normal.map(|component| component / length) } else { [0.0, 0.0, 1.0] };
+        *normal = if length > 0.0 && length.is_finite() {
+            normal.map(|component| component / length)
+        } else {
+            [0.0, 0.0, 1.0]
+        };
     }
     normals
 }

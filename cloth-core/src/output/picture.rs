@@ -1,11 +1,9 @@
 use std::ops::Range;
 
 use energy_dsl::Vector3;
-use tiny_skia::{
-    Color, FillRule, FilterQuality, GradientStop, LinearGradient, Paint, PathBuilder, Pixmap, PixmapPaint, Point, Rect,
-    Shader, SpreadMode, Transform,
-};
+use tiny_skia::Pixmap;
 
+use super::floor_shadow::FloorShadow;
 use super::projection::Camera;
 use super::raster::{Canvas, Corner};
 use super::solid_mesh::SolidMesh;
@@ -215,24 +213,15 @@ fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>, [sunlit, o
     (0.74 * sunlit * dot(normal, lamp).max(0.0) + (0.25 + 0.75 * open) * around).min(1.0)
 }
 
+/// Fills the picture with a colour, or with a grey that darkens downwards.
 fn draw_background(canvas: &mut Pixmap, colour: Option<[f32; 3]>) {
-    if let Some(colour) = colour.and_then(|[red, green, blue]| Color::from_rgba(red, green, blue, 1.0)) {
-        canvas.fill(colour);
-        return;
-    }
-    let (width, height) = (canvas.width() as f32, canvas.height() as f32);
-    let grey = |level: f32| Color::from_rgba(level, level, level + 0.01, 1.0).unwrap_or(Color::WHITE);
-    let stops = vec![GradientStop::new(0.0, grey(0.98)), GradientStop::new(1.0, grey(0.84))];
-    let gradient = LinearGradient::new(
-        Point::from_xy(0.0, 0.0),
-        Point::from_xy(0.0, height),
-        stops,
-        SpreadMode::Pad,
-        Transform::identity(),
-    );
-    let paint = Paint { shader: gradient.unwrap_or(Shader::SolidColor(grey(0.9))), ..Paint::default() };
-    if let Some(all) = Rect::from_xywh(0.0, 0.0, width, height) {
-        canvas.fill_rect(all, &paint, Transform::identity(), None);
+    let (width, height) = (canvas.width() as usize, canvas.height());
+    for (row, pixels) in canvas.data_mut().chunks_exact_mut(4 * width).enumerate() {
+        let level = 0.98 - 0.14 * (row as f32 + 0.5) / height as f32;
+        let colour = colour.unwrap_or([level, level, level + 0.01]).map(|channel| (255.0 * channel).round() as u8);
+        for pixel in pixels.chunks_exact_mut(4) {
+            pixel.copy_from_slice(&[colour[0], colour[1], colour[2], 255]);
+        }
     }
 }
 
@@ -254,10 +243,7 @@ fn shadow_along(p: &Vector3<f64>, floor: f64, lamp: Vector3<f64>) -> Vector3<f64
     [p[0] - offset * lamp[0], p[1] - offset * lamp[1], floor]
 }
 
-/// Opacity of the shadow on the floor, where no part of the lamp is seen.
-const SHADOW: f32 = 0.34;
-
-/// Draws the shadow of each part of the lamp on the floor, whose edges blur with the distance from the floor.
+/// Draws the shadow of each part of the lamp on the floor.
 fn draw_shadow(
     canvas: &mut Pixmap,
     camera: &Camera,
@@ -265,68 +251,18 @@ fn draw_shadow(
     triangles: &[[usize; 3]],
     view: &View<'_>,
 ) {
-    const COARSENESS: u32 = 5;
-    let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
-    let lamps = lamp_directions(LAMP.map(|component| component / norm(LAMP)));
-    // As many layers of this opacity have that of the shadow.
-    let opacity = 1.0 - (1.0 - SHADOW).powf(1.0 / lamps.len() as f32);
-    let ink = Color::from_rgba(0.1, 0.11, 0.14, opacity).unwrap_or(Color::BLACK);
-    let paint = Paint { shader: Shader::SolidColor(ink), ..Paint::default() };
-    let shrink = 1.0 / COARSENESS as f32;
-    for lamp in lamps {
+    let segments: Vec<([usize; 2], f64)> = view
+        .strands
+        .iter()
+        .zip(view.widths)
+        .flat_map(|(strand, width)| strand.clone().skip(1).map(|end| ([end - 1, end], *width)))
+        .collect();
+    let mut all = FloorShadow::new(canvas);
+    for lamp in lamp_directions(LAMP.map(|component| component / norm(LAMP))) {
         let shadow: Vec<Vector3<f64>> = points.iter().map(|p| shadow_along(p, floor, lamp)).collect();
-        let Some(path) = outline(camera, &shadow, triangles, view) else { continue };
-        small.fill_path(&path, &paint, FillRule::Winding, Transform::from_scale(shrink, shrink), None);
+        all.add(camera, &shadow, triangles, &segments);
     }
-    let soft = PixmapPaint { quality: FilterQuality::Bicubic, ..PixmapPaint::default() };
-    let enlarge = Transform::from_scale(COARSENESS as f32, COARSENESS as f32);
-    canvas.draw_pixmap(0, 0, small.as_ref(), &soft, enlarge, None);
-}
-
-/// Returns the outline of triangles and hair with these points on the floor; `None` if there are none.
-fn outline(
-    camera: &Camera,
-    shadow: &[Vector3<f64>],
-    triangles: &[[usize; 3]],
-    view: &View<'_>,
-) -> Option<tiny_skia::Path> {
-    let mut outline = PathBuilder::new();
-    for corners in triangles {
-        let mut seen = corners.map(|corner| camera.project(shadow[corner]).0);
-        let [p, q, r] = seen;
-        // Same orientation for all triangles, so that overlapping folds add up instead of cancelling.
-        if (q[0] - p[0]) * (r[1] - p[1]) < (q[1] - p[1]) * (r[0] - p[0]) {
-            seen.swap(1, 2);
-        }
-        append_polygon(&mut outline, &seen);
-    }
-    for (strand, width) in view.strands.iter().zip(view.widths) {
-        for end in strand.clone().skip(1) {
-            append_segment(&mut outline, camera, [shadow[end - 1], shadow[end]], *width);
-        }
-    }
-    outline.finish()
-}
-
-/// Adds the shadow of a segment of hair.
-fn append_segment(path: &mut PathBuilder, camera: &Camera, ends: [Vector3<f64>; 2], width: f64) {
-    let [(from, depth), (to, _)] = ends.map(|end| camera.project(end));
-    let offset = [to[0] - from[0], to[1] - from[1]];
-    let length = offset[0].hypot(offset[1]);
-    let half = 0.5 * camera.pixels(width, depth).max(THINNEST);
-    if depth > 0.0 && length > 0.0 {
-        let side = [-half * offset[1] / length, half * offset[0] / length];
-        let moved = |[x, y]: [f64; 2], sign: f64| [x + sign * side[0], y + sign * side[1]];
-        append_polygon(path, &[moved(from, -1.0), moved(to, -1.0), moved(to, 1.0), moved(from, 1.0)]);
-    }
-}
-
-fn append_polygon(path: &mut PathBuilder, corners: &[[f64; 2]]) {
-    for (index, corner) in corners.iter().enumerate() {
-        let [x, y] = corner.map(|coordinate| coordinate as f32);
-        if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
-    }
-    path.close();
+    all.draw(canvas);
 }
 
 /// Downsamples to the final size by averaging.
