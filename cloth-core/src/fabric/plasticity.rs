@@ -36,11 +36,11 @@ impl<E> fmt::Debug for PlasticMembrane<E> {
     }
 }
 
-impl<E: PackedPotential<f64> + Clone + fmt::Debug + Send + Sync + 'static> DrivenLaw for PlasticMembrane<E> {
+impl<E: PackedPotential<f64> + fmt::Debug + Send + Sync + 'static> DrivenLaw for PlasticMembrane<E> {
     type Element = E;
 
     fn element(&self, stencil: usize, _: f64) -> E {
-        self.elements[stencil].clone()
+        self.elements[stencil]
     }
 
     fn advance(&mut self, stencils: Stencils<'_>, x: &[Vector3<f64>]) -> bool {

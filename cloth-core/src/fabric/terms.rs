@@ -252,7 +252,7 @@ impl FabricTerms {
         element: impl Fn(MaterialTriangle) -> Result<E, RestError> + Send + Sync + 'static,
     ) -> Result<(), FabricError>
     where
-        E: PackedPotential<f64> + Clone + std::fmt::Debug + Send + Sync + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
         if self.leave_out(name, is_zero, cloth.triangles.len()) {
             return Ok(());
@@ -294,7 +294,7 @@ impl FabricTerms {
         element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError> + Send + Sync + 'static,
     ) -> Result<(f64, f64), FabricError>
     where
-        E: PackedPotential<f64> + Clone + std::fmt::Debug + Send + Sync + 'static,
+        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
         self.add_membrane("membrane", mu == 0.0, cloth, move |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
         Ok((lambda, mu))
