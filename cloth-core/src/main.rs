@@ -7,11 +7,18 @@ mod cli;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+
+const EXIT_STATUS: &str = "\
+Exit status:
+  0    everything was done
+  1    an error: an invalid scene, a step that failed, a file that cannot be written, a missed answer of `validate`
+  2    invalid arguments
+  129, 130, 143    a run was ended by SIGHUP, Ctrl-C or SIGTERM; its results so far are written";
 
 /// Simulates cloth and hair with audited derivatives.
 #[derive(Debug, Parser)]
-#[command(version)]
+#[command(name = "cloth", version, after_help = EXIT_STATUS, after_long_help = EXIT_STATUS)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -42,6 +49,10 @@ enum Command {
     Bench(cli::bench::Bench),
     /// Print measured fabrics as tables for scene files, with their sources.
     Fabrics(cli::fabrics::Fabrics),
+    /// Print a script that completes this command in a shell.
+    Completions(cli::completions::Completions),
+    /// Print the manual page, or write those of all subcommands.
+    Man(cli::manual::Manual),
 }
 
 fn main() -> ExitCode {
@@ -66,6 +77,8 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Validate(validate) => validate.run(),
         Command::Bench(bench) => bench.run(),
         Command::Fabrics(fabrics) => fabrics.run(),
+        Command::Completions(completions) => completions.run(Arguments::command()),
+        Command::Man(manual) => manual.run(Arguments::command()),
     }
     .map(|()| ExitCode::SUCCESS)
 }

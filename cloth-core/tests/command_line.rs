@@ -207,3 +207,51 @@ fn each_run_of_the_benchmark_measures_its_own_memory() {
     let table = String::from_utf8(cloth(&sizes, folder.path()).stdout).unwrap();
     assert!(table.contains("4225") && table.contains("ms/step"), "{table}");
 }
+
+#[test]
+fn a_dry_run_tells_size_memory_and_time_and_writes_nothing() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let output = cloth(&["run", "scene.toml", "--dry-run"], folder.path());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{text}");
+    for part in ["49 vertices (1 pinned), 72 triangles", "10 steps, 6 frames", "memory: about 0.00 GB", "time: about "]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let output = cloth(&["run", "scene.toml", "--dry-run", "--log", "json", "-o", "out"], folder.path());
+    let forecast: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&forecast["vertices"], &forecast["steps"], &forecast["failure"]), (&49.into(), &10.into(), &().into()));
+    assert!(forecast["seconds"].as_f64().unwrap() > 0.0 && !folder.path().join("out").exists());
+    let without = cloth(&["run", "scene.toml"], folder.path());
+    assert_eq!(without.status.code(), Some(2), "only a dry run needs no folder");
+}
+
+#[test]
+fn json_logs_are_objects_line_by_line_and_the_last_tells_how_the_run_ended() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let output = cloth(&["run", "scene.toml", "-o", "out", "--log", "json"], folder.path());
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let events: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let last_step = events.iter().rfind(|event| event["event"] == "step").unwrap();
+    assert_eq!((&last_step["step"], &last_step["steps"]), (&10.into(), &10.into()));
+    let end = events.last().unwrap();
+    assert!(end["event"] == "end" && end["finished"] == true && end["frames"] == 6, "{end}");
+    let usd = end["files"].as_array().unwrap().iter().any(|file| file.as_str().unwrap().ends_with("cloth.usda"));
+    assert!(usd && output.stderr.is_empty(), "{end}");
+}
+
+#[test]
+fn completions_and_manual_pages_name_the_subcommands() {
+    let folder = TempDir::new().unwrap();
+    let script = String::from_utf8(cloth(&["completions", "bash"], folder.path()).stdout).unwrap();
+    assert!(script.contains("--dry-run") && script.contains("complete -F _cloth"), "{script}");
+    let page = String::from_utf8(cloth(&["man"], folder.path()).stdout).unwrap();
+    assert!(page.contains(".TH cloth 1") && page.contains("Exit status"), "{page}");
+    assert!(cloth(&["man", "-o", "pages"], folder.path()).status.success());
+    let pages = std::fs::read_dir(folder.path().join("pages")).unwrap().count();
+    assert!(pages > 12, "{pages}");
+    let run = std::fs::read_to_string(folder.path().join("pages/cloth-run.1")).unwrap();
+    assert!(run.contains(".TH cloth-run 1") && run.contains("dry\\-run"), "{run}");
+}

@@ -56,7 +56,7 @@ fn a_run_that_blows_up_keeps_everything_up_to_its_last_good_step() {
         let (steps, frames) = (record["summary"]["steps"].as_u64().unwrap(), record["frames"].as_u64().unwrap());
         assert!(record["finished"] == false && steps > 2 && frames == steps / 4 + 1, "{steps} {frames}");
         assert!(read(&out, "cloth.glb").starts_with(b"glTF"));
-        let usd = String::from_utf8(read(&out, "cloth.usda")).unwrap();
+        let usd = String::from_utf8(read(&out, "cloth.usda")).unwrap().replace("info:id", "");
         assert!(
             usd.contains(&format!("endTimeCode = {}\n", frames - 1)) && !usd.contains("inf") && !usd.contains("nan")
         );

@@ -4,7 +4,7 @@ use cloth_core::scene::{Scene, schema};
 use serde_json::{Value, json};
 
 /// Fragments of the messages of checks that a schema cannot express. `docs/scenes.md` lists them.
-const BEYOND_SCHEMA: [&str; 7] = [
+const BEYOND_SCHEMA: [&str; 8] = [
     "exceeds `duration`",
     "steps of `dt`",
     "the box is empty",
@@ -12,6 +12,7 @@ const BEYOND_SCHEMA: [&str; 7] = [
     "cannot be rounded",
     "times of keys must increase",
     "unknown fabric",
+    "expected one weight per vertex",
 ];
 
 const SCENE: &str = r#"
@@ -27,7 +28,20 @@ linear_solver = "auto"
 adaptive = true
 tolerances = { velocity = 1e-4, linear = 0.01, iterations = 50 }
 sleep = { speed = 0.1, after = 0.5 }
-output = { png = true, ply = false }
+
+[output]
+png = true
+ply = false
+pc2 = true
+mdd = false
+velocities = true
+apng = false
+mp4 = false
+size = [640, 480]
+background = [1.0, 1.0, 0.5]
+colours = [[0.5, 0.2, 0.1]]
+camera = { eye = [1.0, 0.0, 0.0], target = [0.0, 0.0, 0.0], angle = 40.0 }
+
 
 [wind]
 velocity = [1.0, 0.0, 0.0]
@@ -50,6 +64,7 @@ friction = 0.3
 warp = [1.0, 0.0, 0.0]
 strain_limit = { stretch = 1.1, stiffness = 10.0 }
 rayleigh = { stretching = 0.1, bending = 0.1 }
+plasticity = { stretch = 1.2, curvature = 50.0 }
 [fabric.material.stvk]
 stretch_stiffness = 40.0
 poisson_ratio = 0.3
@@ -73,6 +88,14 @@ fabric.material.mass-spring = { structural = 10.0, shear = 5.0, bending = 1.0, d
 mesh.obj = { path = "shape.obj", groups = ["front"], weld = 1e-5 }
 fabric = "denim"
 warp = "uv"
+rest.obj.path = "patterns.obj"
+rest_scale = [{ group = "cuff", warp = 0.8, weft = 1.0 }, { weft = 1.1 }]
+inflation = { pressure = 50.0, rise = 0.5 }
+
+[[garment]]
+mesh.obj = { path = "shape.obj" }
+fabric = "denim"
+rest.uv.scale = 1.5
 
 [[garment]]
 mesh.disc = { radius = 1.0, rings = 3 }
@@ -97,6 +120,7 @@ garments = ["skirt", "garment 2"]
 pairs = [[0, 1], [2, 3]]
 stiffness = 10.0
 damping = 0.1
+close = { start = 0.1, duration = 0.5 }
 
 [[seams]]
 garments = ["skirt", "garment 2"]
@@ -109,6 +133,14 @@ of = "skirt"
 motion.axis = [0.0, 0.0, 1.0]
 motion.centre = [0.0, 0.0, 0.0]
 motion.keys = [{ time = 0.0, angle = 0.0, translate = [0.0, 0.0, 0.0] }]
+motion.interpolation = "cubic"
+release = 0.5
+
+[[pins]]
+vertices = [1, 2]
+weights = [1.0, 0.5]
+stiffness = 20.0
+obstacle = "floor"
 
 [[pins]]
 box = { min = [-1.0, -1.0, -1.0], max = [1.0, 1.0, 1.0] }

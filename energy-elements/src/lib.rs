@@ -46,6 +46,7 @@ elements! {
     hinge_cos: HingeCos;
     hinge_cos_half: HingeCosHalf;
     hinge_damping: HingeDamping;
+    hinge_rate_dissipation: HingeRateDissipation;
     hinge_sin_half: HingeSinHalf;
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
     ipc_barrier: DistanceBarrier;
@@ -58,12 +59,14 @@ elements! {
     point_edge_distance: PointEdgeDistance;
     point_triangle_distance: PointTriangleDistance;
     power_law: PowerLaw;
+    pressure: Pressure;
     quadratic_hinge: QuadraticHinge;
     sliding_friction: SlidingFriction;
     sphere_contact: SphereContact;
     spring: Spring;
     stable_neo_hookean: StableNeoHookean;
     strain_rate_damping: StrainRateDamping;
+    strain_rate_dissipation: StrainRateDissipation;
     stvk: StVK;
     tetrahedra: TetAsRigidAsPossible, TetCorotational, TetStVK, TetStableNeoHookean;
     thread_limit: ThreadLimit;

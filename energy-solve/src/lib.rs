@@ -70,7 +70,7 @@ pub use linear::{
 pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
-    BlockPlaces, Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, ElementList, ForceTerm,
-    Linearisation, ListError, PlacedTerm, PotentialTerm, Quantity, Share, State, Stencils, StepStart, Tally, TapeTerm,
-    Term, TermDescription, TriangleBuffer, Weights, change_dense,
+    BlockPlaces, Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm,
+    ElementList, ForceTerm, Linearisation, ListError, PlacedTerm, PotentialTerm, Quantity, Share, State, Stencils,
+    StepStart, Tally, TapeTerm, Term, TermDescription, TriangleBuffer, Weights, change_dense,
 };

@@ -11,11 +11,11 @@ mod strict;
 mod whole;
 
 pub(crate) use range::{
-    AboveOne, Fraction, NonNegative, Number, PoissonRatio, Positive, SPEED_OF_LIGHT, Signed, Speed,
+    AboveOne, Angle, Channel, Fraction, NonNegative, Number, PoissonRatio, Positive, SPEED_OF_LIGHT, Signed, Speed,
 };
-pub(crate) use real::{Direction, MaybeReal, MaybeReals, Real, RealMap, Reals};
+pub(crate) use real::{Colours, Direction, MaybeReal, MaybeRealList, MaybeReals, Real, RealMap, Reals};
 pub(crate) use strict::Strict;
-pub(crate) use whole::{Count, Counts, MaybeCount, Pair, Pairs};
+pub(crate) use whole::{Count, Counts, MaybeCount, MaybeVertices, Pair, Pairs};
 
 use serde::de::Error;
 

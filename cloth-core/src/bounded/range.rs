@@ -88,6 +88,10 @@ ranges! {
         "a number strictly between −1 and 1", "numbers strictly between −1 and 1"; "";
     /// Relative tolerances.
     Fraction: (0.0, false), (1.0, false); "a number strictly between 0 and 1", "numbers strictly between 0 and 1"; "";
+    /// Channels of a colour.
+    Channel: (0.0, true), (1.0, true); "a number from 0 to 1", "numbers from 0 to 1"; "";
+    /// Angles of a camera.
+    Angle: (0.1, true), (170.0, true); "an angle from 0.1 to 170", "angles from 0.1 to 170"; "";
     /// Stretches.
     AboveOne: (1.0, false), (LARGEST, true); "a number greater than 1", "numbers greater than 1";
         "no thread stretches that far";

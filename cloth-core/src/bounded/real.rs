@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
 use super::described::{array, described};
 use super::exactly;
-use super::range::{Number, Range};
+use super::range::{Channel, Number, Range};
 
 /// A real number of any size.
 struct AnyReal(f64);
@@ -56,6 +56,12 @@ pub(crate) struct Reals<R, const N: usize>(PhantomData<R>);
 /// N numbers of the range R, or none.
 pub(crate) struct MaybeReals<R, const N: usize>(PhantomData<R>);
 
+/// A list of numbers of the range R, or none.
+pub(crate) struct MaybeRealList<R>(PhantomData<R>);
+
+/// A list of RGB colours.
+pub(crate) struct Colours;
+
 /// Named numbers of the range R.
 pub(crate) struct RealMap<R>(PhantomData<R>);
 
@@ -72,6 +78,26 @@ impl<R: Range> Real<R> {
 impl<R: Range> MaybeReal<R> {
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
         Real::<R>::deserialize(deserializer).map(Some)
+    }
+}
+
+impl<R: Range> MaybeRealList<R> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<f64>>, D::Error> {
+        let numbers: Vec<f64> = Vec::<AnyReal>::deserialize(deserializer)?.into_iter().map(|AnyReal(n)| n).collect();
+        numbers.iter().try_for_each(|&number| R::check(number, &numbers))?;
+        Ok(Some(numbers))
+    }
+}
+
+impl Colours {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 3]>, D::Error> {
+        struct One([f64; 3]);
+        impl<'de> Deserialize<'de> for One {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                reals::<Channel, 3, D>(deserializer).map(One)
+            }
+        }
+        Ok(Vec::<One>::deserialize(deserializer)?.into_iter().map(|One(colour)| colour).collect())
     }
 }
 
@@ -117,6 +143,10 @@ described!([R: Range] Real<R>, f64, R::schema());
 described!([R: Range] MaybeReal<R>, Option<f64>, R::schema());
 described!([R: Range, const N: usize] Reals<R, N>, [f64], array(&R::schema(), N));
 described!([R: Range, const N: usize] MaybeReals<R, N>, Option<[f64; 3]>, array(&R::schema(), N));
+described!([R: Range] MaybeRealList<R>, Option<Vec<f64>>, json_schema!({ "type": "array", "items": R::schema() }));
+described!([] Colours, Vec<[f64; 3]>, json_schema!({
+    "type": "array", "items": array(&Channel::schema(), 3)
+}));
 described!([R: Range] RealMap<R>, BTreeMap<String, f64>, json_schema!({
     "type": "object", "additionalProperties": R::schema()
 }));

@@ -61,6 +61,9 @@ pub(crate) struct MaybeCount<const LEAST: usize, const MOST: usize>;
 /// N numbers of parts.
 pub(crate) struct Counts<const LEAST: usize, const MOST: usize, const N: usize>;
 
+/// A list of at least one vertex, or none.
+pub(crate) struct MaybeVertices;
+
 /// A list of pairs of vertices.
 pub(crate) struct Pairs;
 
@@ -85,6 +88,16 @@ impl<const LEAST: usize, const MOST: usize> MaybeCount<LEAST, MOST> {
 impl<const LEAST: usize, const MOST: usize, const N: usize> Counts<LEAST, MOST, N> {
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[usize; N], D::Error> {
         whole::<LEAST, MOST, N, D>(deserializer)
+    }
+}
+
+impl MaybeVertices {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<usize>>, D::Error> {
+        let numbers = Vec::<AnyWhole>::deserialize(deserializer)?;
+        if numbers.is_empty() {
+            return Err(D::Error::custom("expected at least one vertex, got an empty list"));
+        }
+        numbers.into_iter().map(check::<0, LARGEST_INDEX, _>).collect::<Result<_, _>>().map(Some)
     }
 }
 
@@ -114,6 +127,9 @@ described!([const LEAST: usize, const MOST: usize] Count<LEAST, MOST>, usize, in
 described!([const LEAST: usize, const MOST: usize] MaybeCount<LEAST, MOST>, Option<usize>, integer(LEAST, MOST));
 described!([const LEAST: usize, const MOST: usize, const N: usize] Counts<LEAST, MOST, N>, [usize],
     array(&integer(LEAST, MOST), N));
+described!([] MaybeVertices, Option<Vec<usize>>, json_schema!({
+    "type": "array", "items": integer(0, LARGEST_INDEX), "minItems": 1
+}));
 described!([] Pairs, Option<Vec<[usize; 2]>>, json_schema!({
     "type": "array", "items": array(&integer(0, LARGEST_INDEX), 2)
 }));

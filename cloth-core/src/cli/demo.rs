@@ -7,7 +7,7 @@ use cloth_core::run::{Run, RunOptions};
 use cloth_core::{Simulation, demo};
 
 use super::print;
-use super::run::simulate;
+use super::run::{LogChoice, simulate};
 
 #[derive(Debug, Args)]
 pub struct Demo {
@@ -22,6 +22,6 @@ impl Demo {
         print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
         let options = RunOptions { overwrite: true, ..RunOptions::default() };
         let run = Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &self.output, options)?;
-        simulate(run, false)
+        simulate(run, false, LogChoice::Text)
     }
 }

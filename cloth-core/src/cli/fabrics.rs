@@ -7,7 +7,7 @@ use super::print;
 
 #[derive(Debug, Args)]
 pub struct Fabrics {
-    /// `denim`, `interlock`, `ribbon` or `dots`; default: all.
+    /// Names of fabrics; default: all.
     #[arg(value_parser = PossibleValuesParser::new(MEASURED.map(|fabric| fabric.name)))]
     names: Vec<String>,
 }

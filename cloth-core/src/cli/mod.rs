@@ -1,9 +1,11 @@
 //! The subcommands of `cloth`, one per file.
 
 pub mod bench;
+pub mod completions;
 pub mod demo;
 pub mod fabrics;
 pub mod interrupts;
+pub mod manual;
 pub mod materials;
 pub mod report;
 pub mod resume;

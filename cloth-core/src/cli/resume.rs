@@ -5,7 +5,7 @@ use anyhow::Result;
 use clap::Args;
 use cloth_core::run::Run;
 
-use super::run::{limit_threads, simulate};
+use super::run::{LogChoice, limit_threads, simulate};
 
 #[derive(Debug, Args)]
 pub struct Resume {
@@ -17,6 +17,9 @@ pub struct Resume {
     /// Print the tables of `cloth run --stats`.
     #[arg(long)]
     stats: bool,
+    /// Form of progress and results: `text`, or `json`: one object per line on standard output.
+    #[arg(long, value_enum, default_value_t)]
+    log: LogChoice,
     /// Maximum number of threads; default: one per core.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -25,7 +28,6 @@ pub struct Resume {
 impl Resume {
     pub fn run(self) -> Result<ExitCode> {
         let run = Run::resume(&self.folder, self.accept_edited)?;
-        run.notes().iter().for_each(|note| eprintln!("note: {note}"));
-        simulate(limit_threads(run, self.threads), self.stats)
+        simulate(limit_threads(run, self.threads), self.stats, self.log)
     }
 }

@@ -1,11 +1,12 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use cloth_core::output::OutputFolder;
-use cloth_core::run::{Ending, Event, Progress, Run, RunError, RunOptions, stats};
+use cloth_core::run::{Ending, Event, Forecast, Log, Progress, Run, RunError, RunOptions, stats};
 use cloth_core::scene::{self, Scene};
+use serde_json::{Value, json};
 
 use super::interrupts::Interrupts;
 use super::print;
@@ -15,8 +16,14 @@ pub struct RunScene {
     /// Scene file (TOML).
     scene: PathBuf,
     /// Output folder.
-    #[arg(short, long)]
-    output: PathBuf,
+    #[arg(short, long, required_unless_present = "dry_run")]
+    output: Option<PathBuf>,
+    /// Check the scene, take its first steps, and print vertices, memory and estimated time; write nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Form of progress and results: `text`, or `json`: one object per line on standard output.
+    #[arg(long, value_enum, default_value_t)]
+    log: LogChoice,
     /// Replace the files of an earlier run.
     #[arg(long)]
     overwrite: bool,
@@ -43,18 +50,70 @@ pub struct RunScene {
 
 impl RunScene {
     pub fn run(self) -> Result<ExitCode> {
-        let Self { scene, output, overwrite, checkpoint, ignore_memory, material, parameters, stats, threads } = self;
+        let Self { scene, output, overwrite, checkpoint, ignore_memory, stats, threads, log, .. } = self;
         let mut text = Scene::text(&scene)?;
-        if let Some(file) = material {
-            text = scene::with_material(&text, &file, &parameters);
+        if let Some(file) = self.material {
+            text = scene::with_material(&text, &file, &self.parameters);
         }
+        let Some(output) = output.filter(|_| !self.dry_run) else {
+            return dry_run(&text, &scene, threads, log);
+        };
         let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
         let run = Run::new(text, &scene, &output, options).map_err(|error| match error {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),
         })?;
-        simulate(limit_threads(run, threads), stats)
+        simulate(limit_threads(run, threads), stats, log)
     }
+}
+
+/// The form of progress and results.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum LogChoice {
+    /// Text for people.
+    #[default]
+    Text,
+    /// One JSON object per line on standard output.
+    Json,
+}
+
+impl From<LogChoice> for Log {
+    fn from(choice: LogChoice) -> Self {
+        match choice {
+            LogChoice::Text => Self::Text,
+            LogChoice::Json => Self::Json,
+        }
+    }
+}
+
+/// Prints what a run will take. A scene whose first steps fail gives exit status 1.
+fn dry_run(text: &str, path: &Path, threads: Option<u16>, log: LogChoice) -> Result<ExitCode> {
+    let forecast = Forecast::of(text, path, threads.map(usize::from))?;
+    if log == LogChoice::Json {
+        let memory = forecast.memory.total();
+        print_event(&json!({
+            "event": "forecast",
+            "vertices": forecast.vertices,
+            "pinned": forecast.pinned,
+            "triangles": forecast.triangles,
+            "steps": forecast.steps,
+            "frames": forecast.frames,
+            "memory": memory,
+            "available_memory": forecast.available,
+            "seconds": forecast.time(),
+            "warnings": forecast.warnings,
+            "failure": forecast.failure.as_ref().map(ToString::to_string),
+        }))?;
+    } else {
+        forecast.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        print(&format!("{forecast}\n"))?;
+    }
+    Ok(if forecast.failure.is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Prints a JSON object on a line.
+fn print_event(event: &Value) -> Result<()> {
+    print(&format!("{event}\n"))
 }
 
 fn parameter(text: &str) -> Result<(String, f64), String> {
@@ -73,21 +132,35 @@ pub fn limit_threads(run: Run, threads: Option<u16>) -> Run {
 
 /// Simulates until the end or a signal, and prints the summary and the files written. The exit code is 128 and the
 /// number of the signal if the run was interrupted.
-pub fn simulate(mut run: Run, with_stats: bool) -> Result<ExitCode> {
+pub fn simulate(mut run: Run, with_stats: bool, log: LogChoice) -> Result<ExitCode> {
+    run.notes().iter().for_each(|note| eprintln!("note: {note}"));
     run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let interrupts = Interrupts::listen()?;
-    let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done());
+    let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done(), log.into());
     let ended = run.go(interrupts.flag(), |event| match event {
         Event::Step(simulation, report) => progress.step(simulation.steps_done(), report),
         Event::LastStep => progress.last_step(),
     });
     progress.finish();
     let Ending { summary, files, frames, finished, abandoned, failure } = ended?;
+    if log == LogChoice::Json {
+        print_event(&json!({
+            "event": "end",
+            "finished": finished && !abandoned,
+            "steps": run.simulation().steps_done(),
+            "frames": frames,
+            "files": files,
+            "warnings": summary.warnings,
+            "failure": failure.as_ref().map(ToString::to_string),
+        }))?;
+    }
     let files: String = files.iter().map(|path| format!("wrote {}\n", path.display())).collect();
     let folder = run.folder().path();
     let tables = if with_stats { format!("{}\n", stats::tables(&summary)) } else { String::new() };
     let frame_folder = folder.join(OutputFolder::FRAMES);
-    print(&format!("{summary}\n\n{tables}{files}wrote {frames} frames to {}\n", frame_folder.display()))?;
+    if log == LogChoice::Text {
+        print(&format!("{summary}\n\n{tables}{files}wrote {frames} frames to {}\n", frame_folder.display()))?;
+    }
     if let Some(failure) = failure {
         let kept = format!("the files hold the {} steps before it", run.simulation().steps_done());
         return Err(anyhow::anyhow!("{failure}; {kept}"));

@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn a_fast_obstacle_passes_a_vertex_at_rest() {
         let keys = vec![Key::default(), Key { time: 2.0, angle: 0.0, translate: [0.0, 4.0, 0.0] }];
-        let motion = Motion { axis: [0.0, 0.0, 1.0], centre: [0.0; 3], keys };
+        let motion = Motion { keys, ..Motion::default() };
         let ball = obstacle(AnySolid::Ball(Ball { centre: [0.0, -2.0, 0.0], radius: 0.1 }), Some(motion));
         // Its centre moves from y = 0 to y = 1.
         let x = [0.0, 0.5, 0.0];

@@ -150,6 +150,11 @@ impl Declared {
         }
         let sites = sites(declaration.points.len(), target)
             .ok_or_else(|| unfit(format!("an energy of {} points", declaration.points.len())))?;
+        let has_points_at_rest = declaration.rest.iter().any(|field| field.size == 3);
+        if target.mesh.has_patterns() && (has_points_at_rest || declaration.points.len() == 2) {
+            let lacking = "which a garment with `rest` or `rest_scale` does not have";
+            return Err(unfit(format!("an energy that depends on vertices at rest, {lacking}")));
+        }
         let inputs = sites.iter().map(|site| self.inputs(declaration, site, target, &unfit));
         let inputs: Vec<(Vec<f64>, Vec<f64>)> = inputs.collect::<Result<_, _>>()?;
         let parameters = columns(declaration.parameters, inputs.iter().map(|(parameters, _)| &parameters[..]));

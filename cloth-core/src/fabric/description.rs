@@ -33,6 +33,9 @@ pub struct Fabric {
     /// Stiffness-proportional damping. Default none.
     #[serde(default)]
     pub rayleigh: Option<Rayleigh>,
+    /// Limits beyond which the cloth stays deformed. Default none.
+    #[serde(default)]
+    pub plasticity: Option<Plasticity>,
 }
 
 impl Fabric {
@@ -47,6 +50,7 @@ impl Fabric {
             warp: first_axis(),
             strain_limit: None,
             rayleigh: None,
+            plasticity: None,
         }
     }
 
@@ -76,8 +80,8 @@ pub struct StrainLimit {
     pub stiffness: f64,
 }
 
-/// Stiffness-proportional (Rayleigh) damping, with forces that vanish under rigid motions. Requires the integrator
-/// `implicit-euler` or an explicit one.
+/// Stiffness-proportional (Rayleigh) damping, with forces that vanish under rigid motions. The viscosities are those of
+/// the deformation in the middle of each step.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rayleigh {
@@ -87,6 +91,18 @@ pub struct Rayleigh {
     /// β of bending, in s. Default 0.
     #[serde(default, with = "Real::<NonNegative>")]
     pub bending: f64,
+}
+
+/// Limits of perfect plasticity: at the end of each step, the rest shape follows what is strained beyond them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plasticity {
+    /// The largest principal stretch relative to the rest length; greater than 1. Default unlimited.
+    #[serde(default, with = "MaybeReal::<AboveOne>")]
+    pub stretch: Option<f64>,
+    /// The largest change of a curvature relative to the rest shape, in 1/m. Default unlimited.
+    #[serde(default, with = "MaybeReal::<Positive>")]
+    pub curvature: Option<f64>,
 }
 
 /// Resistance to stretching and bending.

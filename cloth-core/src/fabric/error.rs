@@ -32,6 +32,18 @@ pub enum FabricError {
         /// The limit given.
         stretch: f64,
     },
+    /// Springs have no rest lengths.
+    #[error(
+        "material.mass-spring: springs take their lengths from vertices at rest, which a garment with `rest` or \
+         `rest_scale` does not have; use a material of triangles, such as `stvk`"
+    )]
+    SpringsOfPatterns,
+    /// The membrane has no rest shape that could flow.
+    #[error("plasticity.stretch: this material cannot yield; expected one of triangles, such as `stvk`")]
+    CannotStretch,
+    /// The bending model has no rest angles that could flow.
+    #[error("plasticity.curvature: this bending model cannot yield; expected `plate` or `bridson`")]
+    CannotFold,
     /// Elements and stencils do not match.
     #[error(transparent)]
     List(#[from] ListError),

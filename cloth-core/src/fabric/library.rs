@@ -16,9 +16,15 @@ pub struct MeasuredFabric {
 /// let denim = MEASURED.iter().find(|fabric| fabric.name == "denim").unwrap();
 /// assert!(denim.table.contains("Wang, O'Brien and Ramamoorthi"));
 /// ```
-pub const MEASURED: [MeasuredFabric; 4] = [
+pub const MEASURED: [MeasuredFabric; 10] = [
     MeasuredFabric { name: "denim", table: include_str!("measured/denim.toml") },
     MeasuredFabric { name: "interlock", table: include_str!("measured/interlock.toml") },
     MeasuredFabric { name: "ribbon", table: include_str!("measured/ribbon.toml") },
     MeasuredFabric { name: "dots", table: include_str!("measured/dots.toml") },
+    MeasuredFabric { name: "ponte", table: include_str!("measured/ponte.toml") },
+    MeasuredFabric { name: "rib", table: include_str!("measured/rib.toml") },
+    MeasuredFabric { name: "sweat", table: include_str!("measured/sweat.toml") },
+    MeasuredFabric { name: "swim", table: include_str!("measured/swim.toml") },
+    MeasuredFabric { name: "jacket", table: include_str!("measured/jacket.toml") },
+    MeasuredFabric { name: "target", table: include_str!("measured/target.toml") },
 ];

@@ -1,15 +1,17 @@
 use energy_dsl::{Element, ForceLaw, PackedPotential, RestError, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, BridsonBending, BridsonForce, BridsonForceDamped,
-    FlatBending, Gravity, HingeDamping, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
-    StableNeoHookeanLog, StrainRateDamping, ThreadLimit, ViscousDrag,
+    FlatBending, Gravity, HookeSpring, NeoHookean, OrthotropicStVK, Spring, StVK, StableNeoHookean,
+    StableNeoHookeanLog, ThreadLimit, ViscousDrag,
 };
-use energy_solve::{ElementList, ForceTerm, ListError, PotentialTerm, Term};
+use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ForceTerm, ListError, PotentialTerm, Term};
 
+use super::damping::{HingeDamping, MembraneDamping};
 use super::declared::{Declared, TargetMesh};
 use super::error::FabricError;
+use super::plasticity::{PlasticHinges, PlasticMembrane, angle_of_curvature};
 use super::plate::{PlateTerm, Rigidity, ThreadError};
-use super::{Bending, Fabric, MassSpring, Material, Rayleigh, StrainLimit};
+use super::{Bending, Fabric, MassSpring, Material, Plasticity, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
     Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, Warp, lumped_masses, material_triangle, rest_angle,
@@ -73,7 +75,9 @@ pub fn terms_at(
 ) -> Result<FabricTerms, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
     let mut terms = FabricTerms::new(masses, place);
-    let cloth = MaterialMesh { mesh, triangles: material_triangles(mesh, fabric)?, warp: fabric.warp };
+    let plasticity = fabric.plasticity.unwrap_or_default();
+    let cloth = MaterialMesh { mesh, triangles: material_triangles(mesh, fabric)?, warp: fabric.warp, plasticity };
+    check_plasticity(fabric)?;
     // λ and μ for small strains; damping is proportional to them.
     let (stiffness, bending) = match &fabric.material {
         Material::MassSpring(material) => {
@@ -92,15 +96,17 @@ pub fn terms_at(
         }
         Material::Arap(material) => {
             let mu = material.stretch_stiffness;
-            terms.add_membrane("membrane", mu == 0.0, &cloth, |[u0, u1, u2]| AsRigidAsPossible::new(u0, u1, u2, mu))?;
+            terms.add_membrane("membrane", mu == 0.0, &cloth, move |[u0, u1, u2]| {
+                AsRigidAsPossible::new(u0, u1, u2, mu)
+            })?;
             ((0.0, 0.5 * mu), Some(&material.bending))
         }
         Material::BaraffWitkin(material) => {
             let ([b_u, b_v], stretch, shear) = (material.rest_stretch, material.stretch, material.shear);
-            terms.add_membrane("stretch", stretch == 0.0, &cloth, |[u0, u1, u2]| {
+            terms.add_membrane("stretch", stretch == 0.0, &cloth, move |[u0, u1, u2]| {
                 BaraffWitkinStretch::new(u0, u1, u2, stretch / area([u0, u1, u2]), b_u, b_v)
             })?;
-            terms.add_membrane("shear", shear == 0.0, &cloth, |[u0, u1, u2]| {
+            terms.add_membrane("shear", shear == 0.0, &cloth, move |[u0, u1, u2]| {
                 BaraffWitkinShear::new(u0, u1, u2, shear / area([u0, u1, u2]))
             })?;
             ((0.0, 0.5 * stretch), Some(&material.bending))
@@ -113,7 +119,7 @@ pub fn terms_at(
                 poisson_ratio: material.poisson_ratio,
             };
             let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = strips.matrix()?;
-            terms.add_membrane("membrane", false, &cloth, |[u0, u1, u2]| {
+            terms.add_membrane("membrane", false, &cloth, move |[u0, u1, u2]| {
                 OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
             })?;
             ((c_uv, c_ss), Some(&material.bending))
@@ -141,6 +147,24 @@ struct MaterialMesh<'a> {
     mesh: &'a TriangleMesh,
     triangles: Vec<MaterialTriangle>,
     warp: Warp,
+    plasticity: Plasticity,
+}
+
+/// Returns an error if something would have to yield that cannot.
+fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
+    let Some(Plasticity { stretch, curvature }) = fabric.plasticity else { return Ok(()) };
+    let bending = match &fabric.material {
+        Material::MassSpring(_) | Material::File(_) if stretch.is_some() => return Err(FabricError::CannotStretch),
+        Material::MassSpring(_) => None,
+        Material::Stvk(material) | Material::NeoHookean(material) => Some(&material.bending),
+        Material::StableNeoHookean(material) | Material::StableNeoHookeanLog(material) => Some(&material.bending),
+        Material::Arap(material) => Some(&material.bending),
+        Material::BaraffWitkin(material) => Some(&material.bending),
+        Material::OrthotropicStvk(material) => Some(&material.bending),
+        Material::File(material) => Some(&material.bending),
+    };
+    let can_fold = matches!(bending, Some(Bending::Plate(_) | Bending::Bridson { .. }));
+    if curvature.is_some() && !can_fold { Err(FabricError::CannotFold) } else { Ok(()) }
 }
 
 /// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it.
@@ -193,6 +217,9 @@ impl FabricTerms {
         mesh: &TriangleMesh,
         springs: &SpringNetwork,
     ) -> Result<(), FabricError> {
+        if mesh.has_patterns() {
+            return Err(FabricError::SpringsOfPatterns);
+        }
         let MassSpring { structural, shear, bending, damping } = *material;
         let lengths = |pairs: &[[usize; 2]]| -> Vec<f64> {
             pairs.iter().map(|&[p, q]| norm(subtract(mesh.vertices()[p], mesh.vertices()[q]))).collect()
@@ -222,7 +249,7 @@ impl FabricTerms {
         name: &str,
         is_zero: bool,
         cloth: &MaterialMesh<'_>,
-        element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
+        element: impl Fn(MaterialTriangle) -> Result<E, RestError> + Send + Sync + 'static,
     ) -> Result<(), FabricError>
     where
         E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
@@ -230,8 +257,33 @@ impl FabricTerms {
         if self.leave_out(name, is_zero, cloth.triangles.len()) {
             return Ok(());
         }
-        let elements = elements(cloth, element)?;
-        self.add_potential(name, cloth.mesh.triangles(), elements)
+        let elements = elements(cloth, &element)?;
+        let Some(limit) = cloth.plasticity.stretch else {
+            return self.add_potential(name, cloth.mesh.triangles(), elements);
+        };
+        let law = PlasticMembrane::new(cloth.triangles.clone(), elements, Box::new(element), limit);
+        self.add_driven(name, cloth.mesh.triangles(), law);
+        Ok(())
+    }
+
+    fn add_driven<L: energy_solve::DrivenLaw + 'static, const N: usize>(
+        &mut self,
+        name: &str,
+        stencils: &[[usize; N]],
+        law: L,
+    ) {
+        let (name, stencils) = (self.named(name), self.placed(stencils));
+        self.terms.push(Box::new(DrivenTerm::new(name, law, &stencils)));
+    }
+
+    /// Prefixes the name of a term.
+    fn named(&self, name: &str) -> String {
+        format!("{}{name}", self.place.prefix)
+    }
+
+    /// Numbers vertices as in the system.
+    fn placed<const N: usize>(&self, stencils: &[[usize; N]]) -> Vec<[usize; N]> {
+        stencils.iter().map(|stencil| stencil.map(|vertex| self.place.first + vertex)).collect()
     }
 
     /// Adds a membrane and returns its λ and μ.
@@ -239,12 +291,12 @@ impl FabricTerms {
         &mut self,
         cloth: &MaterialMesh<'_>,
         (lambda, mu): (f64, f64),
-        element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError>,
+        element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError> + Send + Sync + 'static,
     ) -> Result<(f64, f64), FabricError>
     where
         E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
-        self.add_membrane("membrane", mu == 0.0, cloth, |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
+        self.add_membrane("membrane", mu == 0.0, cloth, move |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
         Ok((lambda, mu))
     }
 
@@ -261,7 +313,7 @@ impl FabricTerms {
         if stretch <= 1.0 {
             return Err(FabricError::Limit { stretch });
         }
-        self.add_membrane("strain limit", stiffness == 0.0, cloth, |[u0, u1, u2]| {
+        self.add_membrane("strain limit", stiffness == 0.0, cloth, move |[u0, u1, u2]| {
             ThreadLimit::new(u0, u1, u2, stiffness, stretch)
         })
     }
@@ -273,18 +325,21 @@ impl FabricTerms {
         bending: &Bending,
         cloth: &MaterialMesh<'_>,
     ) -> Result<(), FabricError> {
-        let beta = rayleigh.stretching;
-        if !self.leave_out("membrane damping", beta * mu == 0.0, cloth.triangles.len()) {
-            let element = |[u0, u1, u2]: MaterialTriangle| StrainRateDamping::new(u0, u1, u2, beta * lambda, beta * mu);
-            self.add_force("membrane damping", cloth.mesh.triangles(), elements(cloth, element)?)?;
+        let (beta, triangles) = (rayleigh.stretching, cloth.mesh.triangles());
+        if !self.leave_out("membrane damping", beta * mu == 0.0, triangles.len()) {
+            let (triangles, rest) = (self.placed(triangles), cloth.triangles.clone());
+            let law = MembraneDamping { triangles: triangles.clone(), rest, viscosities: [beta * lambda, beta * mu] };
+            self.terms.push(Box::new(DissipationTerm::new(self.named("membrane damping"), law, &triangles)));
         }
         let (beta, rigidity) = (rayleigh.bending, rigidity_along_grid(bending)?);
         let hinges = Topology::of(cloth.mesh).hinges;
         if !self.leave_out("bending damping", beta * rigidity == 0.0, hinges.len()) {
             let stencils: Vec<[usize; 4]> = hinges.iter().map(|hinge| hinge.vertices).collect();
+            let stencils = self.placed(&stencils);
             // c ‖e‖²/(A₁ + A₂) θ² gives a sheet with regular diagonals the rigidity 2c along its grid.
-            let element = |hinge| HingeDamping::new(2.0 * beta * rigidity * shape_factor(cloth.mesh, hinge));
-            self.add_force("bending damping", &stencils, hinges.iter().map(element).collect())?;
+            let viscosity = |hinge| 2.0 * beta * rigidity * shape_factor(cloth.mesh, hinge);
+            let law = HingeDamping { hinges: stencils.clone(), viscosities: hinges.iter().map(viscosity).collect() };
+            self.terms.push(Box::new(DissipationTerm::new(self.named("bending damping"), law, &stencils)));
         }
         Ok(())
     }
@@ -293,7 +348,11 @@ impl FabricTerms {
         let mesh = cloth.mesh;
         if let Bending::Plate(rigidity) = bending {
             let is_zero = rigidity_along_grid(bending)? == 0.0;
-            let plate = PlateTerm::new(format!("{}bending", self.place.prefix), mesh, rigidity, cloth.warp)?;
+            let plate = PlateTerm::new(self.named("bending"), mesh, rigidity, cloth.warp)?;
+            let plate = match cloth.plasticity.curvature {
+                Some(curvature) => plate.yielding(mesh, curvature),
+                None => plate,
+            };
             if !self.leave_out("bending", is_zero, plate.triangles()) {
                 self.terms.push(Box::new(plate.on_vertices_from(self.place.first)));
             }
@@ -315,12 +374,23 @@ impl FabricTerms {
         match bending {
             Bending::None | Bending::Plate(_) => Ok(()),
             Bending::Bridson { .. } => {
-                let element = |hinge| BridsonBending::new(stiffness * shape_factor(mesh, hinge), angle(hinge));
-                self.add_potential("bending", &stencils, hinges.iter().map(element).collect())
+                let stiffness = |hinge| stiffness * shape_factor(mesh, hinge);
+                let Some(curvature) = cloth.plasticity.curvature else {
+                    let element = |hinge| BridsonBending::new(stiffness(hinge), angle(hinge));
+                    return self.add_potential("bending", &stencils, hinges.iter().map(element).collect());
+                };
+                let limit = |hinge| angle_of_curvature(mesh, hinge, curvature);
+                let law = PlasticHinges {
+                    stiffness: hinges.iter().map(stiffness).collect(),
+                    rest: hinges.iter().map(angle).collect(),
+                    limits: hinges.iter().map(limit).collect(),
+                };
+                self.add_driven("bending", &stencils, law);
+                Ok(())
             }
             Bending::Flat { .. } => {
                 let element = |hinge: &Hinge| {
-                    let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
+                    let [x1, x2, x3, x4] = mesh.hinge_at_rest(hinge);
                     FlatBending::new(x1, x2, x3, x4, stiffness)
                         .map_err(|source| FabricError::RestHinge { vertices: hinge.vertices, source })
                 };
@@ -385,9 +455,7 @@ impl FabricTerms {
     ) -> Result<ElementList<E>, ListError> {
         // The list lives as long as the cloth: release spare capacity.
         elements.shrink_to_fit();
-        let Place { first, prefix } = &self.place;
-        let stencils: Vec<[usize; N]> = stencils.iter().map(|stencil| stencil.map(|vertex| first + vertex)).collect();
-        ElementList::new(format!("{prefix}{name}"), elements, &stencils)
+        ElementList::new(self.named(name), elements, &self.placed(stencils))
     }
 
     /// Records a term to be left out. Returns whether it is: its stiffness is zero, or it has no elements.
@@ -424,7 +492,7 @@ fn elements<E>(
 
 /// Returns ‖Ē‖²/(‖N̄₁‖ + ‖N̄₂‖) of a hinge at rest.
 fn shape_factor(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
-    let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
+    let [x1, x2, x3, x4] = mesh.hinge_at_rest(hinge);
     let edge = subtract(x4, x3);
     let normals = norm(cross(edge, subtract(x1, x3))) + norm(cross(edge, subtract(x2, x3)));
     crate::geometry::dot(edge, edge) / normals

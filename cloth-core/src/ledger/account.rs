@@ -40,7 +40,14 @@ pub(crate) struct Opening {
     obstacles: f64,
     /// Positions, if the body collides.
     x: Option<Vec<Vector3<f64>>>,
+    /// Work that the start of the step did by changing the parameters of each term, in J; see
+    /// [`PlacedTerm::is_driven`].
+    driven: Vec<f64>,
 }
+
+/// Energies of the driven terms, 0 for the others, in J.
+#[derive(Debug)]
+pub(crate) struct DrivenEnergies(Vec<f64>);
 
 impl Account {
     /// Opens an account for a body. `potentials` and `works` hold the ledger columns of its terms.
@@ -63,13 +70,19 @@ impl Account {
 
     /// Starts a step, after the terms were told of it. The first `own` vertices are those of the island, the others
     /// those of obstacles. `obstacles` is the power of moving obstacles that have no vertices, in W.
-    pub(crate) fn begin(body: &Body, own: usize, obstacles: f64) -> Opening {
+    pub(crate) fn begin(&self, body: &Body, own: usize, obstacles: f64) -> Opening {
         let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
         let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
         let forces = potential_forces(body, &moving).into_iter();
         let pins = moving.iter().zip(forces).map(|(&vertex, force)| (vertex, force, body.x[vertex])).collect();
         let x = body.system.has_contact().then(|| body.x.clone());
-        Opening { powers: powers(body), pins, own, obstacles, x }
+        let mut before = self.potential.iter().map(|(_, energy)| *energy);
+        let change = |(term, now): (&dyn PlacedTerm, f64)| {
+            let before = if term.has_energy() { before.next().unwrap_or(0.0) } else { 0.0 };
+            if term.is_driven() { now - before } else { 0.0 }
+        };
+        let driven = body.system.terms().map(|(term, _)| term).zip(DrivenEnergies::of(body).0).map(change).collect();
+        Opening { powers: powers(body), pins, own, obstacles, x, driven }
     }
 
     /// Returns the account after the step.
@@ -77,6 +90,7 @@ impl Account {
         &self,
         body: &Body,
         opening: &Opening,
+        strained: &DrivenEnergies,
         obstacles: f64,
         dt: f64,
     ) -> Result<Self, EvaluationError> {
@@ -84,6 +98,10 @@ impl Account {
         for (((_, work), before), now) in after.work.iter_mut().zip(&opening.powers).zip(powers(body)) {
             *work += 0.5 * dt * (before + now);
         }
+        let flowed = DrivenEnergies::of(body).0.into_iter().zip(&strained.0).map(|(now, before)| now - before);
+        let driven = opening.driven.iter().zip(flowed).map(|(start, end)| start + end);
+        let of_works = body.system.terms().zip(driven).filter(|((term, _), _)| works(*term)).map(|(_, work)| work);
+        after.work.iter_mut().zip(of_works).for_each(|((_, work), driven)| *work += driven);
         // Pairs in contact are known at the end of the step only.
         let mut contact = vec![[0.0; 3]; body.x.len()];
         body.system.add_contact_force(&body.x, &mut contact);
@@ -103,6 +121,15 @@ impl Account {
         Ok(after)
     }
 
+    /// Returns the account of a body after pins let go. The energy of vertices that are free now counts as work of the
+    /// pins.
+    pub(crate) fn reopened(&self, body: &Body) -> Result<Self, EvaluationError> {
+        let energy = |account: &Self| account.kinetic + account.potential.iter().map(|(_, energy)| energy).sum::<f64>();
+        let now = self.now(body)?;
+        let pins = self.pins + energy(&now) - energy(self);
+        Ok(Self { pins, ..now })
+    }
+
     /// Returns the account of the island asleep: its kinetic energy moves to `sleep`.
     pub(crate) fn asleep(self) -> Self {
         let sleep = self.sleep - self.kinetic;
@@ -110,9 +137,20 @@ impl Account {
     }
 }
 
+impl DrivenEnergies {
+    /// Evaluates the driven terms.
+    pub(crate) fn of(body: &Body) -> Self {
+        let energy = |term: &dyn PlacedTerm| {
+            let energy = if term.is_driven() { term.energy(&body.x) } else { None };
+            energy.map_or(0.0, |(energy, _)| energy)
+        };
+        Self(body.system.terms().map(|(term, _)| energy(term)).collect())
+    }
+}
+
 /// Whether a term does work that is not a change of its potential.
 pub(crate) fn works(term: &dyn PlacedTerm) -> bool {
-    !term.has_energy() || term.character().velocity_dependent
+    !term.has_energy() || term.character().velocity_dependent || term.is_driven()
 }
 
 /// Returns the energy of each term that has one, and of contact, if the body collides.
@@ -131,6 +169,9 @@ fn powers(body: &Body) -> Vec<f64> {
     let still = vec![[0.0; 3]; body.v.len()];
     let power = |term: &dyn PlacedTerm| {
         let mut force = still.clone();
+        if !term.character().velocity_dependent && term.has_energy() {
+            return 0.0;
+        }
         term.add_force(body.state(), &mut force);
         let mut power = dot_of_free(body, &force);
         if term.has_energy() {

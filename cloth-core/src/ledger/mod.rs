@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
 pub(crate) use account::Account;
+pub(crate) use account::DrivenEnergies;
 use account::works;
 
 /// Energies, work and momenta at the start and after each step.
@@ -178,6 +179,17 @@ impl Ledger {
         let mut entry = Entry { time, potential, work, ..Entry::default() };
         self.accounts.iter().for_each(|account| entry.add(account));
         self.entries.push(entry);
+    }
+
+    /// Updates the accounts to bodies whose pins have let go; see [`Account::reopened`].
+    ///
+    /// # Errors
+    /// Returns an error if an energy is not finite.
+    pub(crate) fn reopen<'a>(&mut self, bodies: impl Iterator<Item = &'a Body>) -> Result<(), EvaluationError> {
+        for (account, body) in self.accounts.iter_mut().zip(bodies) {
+            *account = account.reopened(body)?;
+        }
+        Ok(())
     }
 
     /// Discards the current step.

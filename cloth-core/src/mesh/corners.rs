@@ -81,7 +81,11 @@ impl SplitMesh {
         }
         let unit = |&set: &usize| {
             let length = norm(sums[set]);
-            if length > 0.0 { sums[set].map(|component| component / length) } else { [0.0, 0.0, 1.0] }
+            if length > 0.0 && length.is_finite() {
+                sums[set].map(|component| component / length)
+            } else {
+                [0.0, 0.0, 1.0]
+            }
         };
         self.smooth.iter().map(unit).collect()
     }

@@ -81,8 +81,10 @@ impl TriangleMesh {
             let inside = self.triangles().iter().zip(warps).filter(|(corners, _)| is_inside(corners));
             inside.map(|(_, warp)| *warp).collect()
         });
+        let numbers = (0..self.triangles().len()).filter(|&triangle| is_inside(&self.triangles()[triangle]));
+        let patterns = self.patterns().map(|patterns| patterns.selected(numbers));
         let mesh = Self::from_valid(vertices.iter().map(|&vertex| self.vertices()[vertex]).collect(), triangles);
-        (mesh.with_warps(warps), springs)
+        (mesh.with_warps(warps).with_valid_patterns(patterns), springs)
     }
 }
 

@@ -67,7 +67,11 @@ pub fn lumped_masses(mesh: &TriangleMesh, density: f64) -> Vec<f64> {
 /// With E = x₄ − x₃, N₁ = E × (x₁ − x₃), N₂ = −E × (x₂ − x₃): cos θ = n₁·n₂, sin θ = (n₁ × n₂)·E/‖E‖.
 #[must_use]
 pub fn rest_angle(mesh: &TriangleMesh, hinge: &Hinge) -> f64 {
-    let [x1, x2, x3, x4] = hinge.vertices.map(|vertex| mesh.vertices()[vertex]);
+    dihedral_angle(mesh.hinge_at_rest(hinge))
+}
+
+/// Returns the angle of [`rest_angle`] for the points of a hinge.
+pub(crate) fn dihedral_angle([x1, x2, x3, x4]: [Vector3<f64>; 4]) -> f64 {
     let edge = subtract(x4, x3);
     let (n1, n2) = (cross(edge, subtract(x1, x3)), cross(subtract(x2, x3), edge));
     (dot(cross(n1, n2), edge) / norm(edge)).atan2(dot(n1, n2))

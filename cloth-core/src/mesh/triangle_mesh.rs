@@ -1,5 +1,6 @@
 use energy_dsl::Vector3;
 
+use super::patterns::Patterns;
 use crate::geometry::{Pose, cross, norm, subtract};
 
 /// Why vertices and triangles do not form a valid mesh. Indices start from 0.
@@ -42,6 +43,8 @@ pub struct TriangleMesh {
     triangles: Vec<[usize; 3]>,
     /// The warp direction of each triangle, from texture coordinates; `None` without them.
     warps: Option<Vec<Vector3<f64>>>,
+    /// Rest shapes of the triangles; `None` if they are those between the vertices.
+    patterns: Option<Patterns>,
 }
 
 impl TriangleMesh {
@@ -62,22 +65,39 @@ impl TriangleMesh {
         }
         check_edges(&triangles)?;
         check_references(vertices.len(), &triangles)?;
-        Ok(Self { vertices, triangles, warps: None })
+        Ok(Self { vertices, triangles, warps: None, patterns: None })
     }
 
     /// Creates a mesh without validation, from parts of a valid one.
     pub(super) fn from_valid(vertices: Vec<Vector3<f64>>, triangles: Vec<[usize; 3]>) -> Self {
-        Self { vertices, triangles, warps: None }
+        Self { vertices, triangles, warps: None, patterns: None }
     }
 
     /// Returns the mesh with a warp direction for each triangle.
-    pub(super) fn with_warps(self, warps: Option<Vec<Vector3<f64>>>) -> Self {
+    pub(crate) fn with_warps(self, warps: Option<Vec<Vector3<f64>>>) -> Self {
         Self { warps, ..self }
     }
 
     /// The warp direction of each triangle, from texture coordinates; `None` without them.
     pub(crate) fn warps(&self) -> Option<&[Vector3<f64>]> {
         self.warps.as_deref()
+    }
+
+    /// Returns the mesh with rest shapes of single triangles, which were validated.
+    pub(super) fn with_valid_patterns(self, patterns: Option<Patterns>) -> Self {
+        Self { patterns, ..self }
+    }
+
+    /// Rest shapes of single triangles; `None` if they are those between the vertices.
+    pub(super) fn patterns(&self) -> Option<&Patterns> {
+        self.patterns.as_ref()
+    }
+
+    /// Whether triangles have rest shapes other than those between the vertices, so that [`TriangleMesh::vertices`] are
+    /// not at rest.
+    #[must_use]
+    pub fn has_patterns(&self) -> bool {
+        self.patterns.is_some()
     }
 
     /// Returns the mesh scaled by a factor.
@@ -87,7 +107,8 @@ impl TriangleMesh {
     pub fn scaled(self, factor: f64) -> Result<Self, MeshError> {
         let larger = |vertex: Vector3<f64>| vertex.map(|coordinate| factor * coordinate);
         let scaled = Self::new(self.vertices.into_iter().map(larger).collect(), self.triangles)?;
-        Ok(scaled.with_warps(self.warps))
+        let patterns = self.patterns.map(|patterns| patterns.scaled(factor));
+        Ok(scaled.with_warps(self.warps).with_valid_patterns(patterns))
     }
 
     /// Returns the mesh after a rigid motion.
@@ -96,7 +117,7 @@ impl TriangleMesh {
         Self { vertices: self.vertices.iter().map(|&vertex| pose.transform(vertex)).collect(), ..self }
     }
 
-    /// Rest positions, in m.
+    /// Rest positions, in m; initial positions if the mesh [has patterns](TriangleMesh::has_patterns).
     #[must_use]
     pub fn vertices(&self) -> &[Vector3<f64>] {
         &self.vertices
@@ -111,6 +132,9 @@ impl TriangleMesh {
     /// Returns the rest positions of a triangle's corners, in m.
     #[must_use]
     pub fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
+        if let Some(patterns) = &self.patterns {
+            return patterns.corners(triangle);
+        }
         self.triangles[triangle].map(|corner| self.vertices[corner])
     }
 }
@@ -120,14 +144,18 @@ fn check_triangle(triangle: usize, corners: [usize; 3], positions: &[Vector3<f64
     if let Some(&vertex) = corners.iter().find(|&&corner| corner >= vertices) {
         return Err(MeshError::VertexOutOfRange { triangle, vertex, vertices });
     }
-    let [a, b, c] = corners.map(|corner| positions[corner]);
+    if has_area(corners.map(|corner| positions[corner])) {
+        Ok(())
+    } else {
+        Err(MeshError::ZeroArea { triangle, corners })
+    }
+}
+
+/// Whether a triangle has an area; `false` for NaN.
+pub(super) fn has_area([a, b, c]: [Vector3<f64>; 3]) -> bool {
     let longest = norm(subtract(b, a)).max(norm(subtract(c, b))).max(norm(subtract(a, c)));
     // Relative to the size of the triangle: below this, rounding decides the shape.
-    let threshold = 1e-14 * longest * longest;
-    if norm(cross(subtract(b, a), subtract(c, a))) <= threshold {
-        return Err(MeshError::ZeroArea { triangle, corners });
-    }
-    Ok(())
+    norm(cross(subtract(b, a), subtract(c, a))) > 1e-14 * longest * longest && longest.is_finite()
 }
 
 fn check_edges(triangles: &[[usize; 3]]) -> Result<(), MeshError> {

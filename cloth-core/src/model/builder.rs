@@ -3,19 +3,27 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use energy_dsl::Vector3;
 use energy_elements::ZeroLengthSpring;
-use energy_solve::{ElementList, ForceTerm, PotentialTerm, Term};
+use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ListError, PotentialTerm, Term};
 
+use super::closing_seam::ClosingSeam;
+use super::inflation::{self, PressureLaw};
 use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 use super::seam::Side;
+use super::soft_pin::{Held, SoftPinTerm};
 use super::{PinError, SeamError, pins, seam};
-use crate::fabric::{self, Hair, Place, Surroundings};
+use crate::fabric::{self, Hair, Place, StitchDamping, Surroundings};
+use crate::geometry::{Pose, add_scaled, norm, subtract};
 use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
-use crate::scene::{ContactChoice, Garment, ObstacleError, Pin, Scene, Seam, Shape};
+use crate::motion::Motion;
+use crate::scene::{ContactChoice, Garment, ObstacleError, Pin, Scene, Seam, Shape, SoftPin};
 
 /// A model under construction.
 pub(super) struct Builder<'a> {
     scene: &'a Scene,
+    /// The time, in s.
+    time: f64,
     model: Model,
     /// Boundary vertices of all garments.
     edge: Vec<usize>,
@@ -43,11 +51,23 @@ struct Home {
 /// Components of a garment with fewer vertices are grouped: the overhead of an island exceeds what its sleep saves.
 const SMALL_PIECE: usize = 64;
 
+/// How a vertex is held.
+#[derive(Clone, Copy)]
+struct Hold {
+    /// An index into [`Model::motions`]; `None` if the vertex is fixed.
+    motion: Option<usize>,
+    /// Whether the motion is that of an obstacle, which the vertex follows from where it is.
+    follows: bool,
+    /// The time at which the vertex becomes free, in s; `None` if it never does.
+    release: Option<f64>,
+}
+
 impl<'a> Builder<'a> {
-    pub(super) fn new(scene: &'a Scene) -> Self {
+    /// Starts a model as it is at a time, in s: without the pins that were released before.
+    pub(super) fn new(scene: &'a Scene, time: f64) -> Self {
         let prefix_names = scene.garments.len() + scene.hair.len() > 1;
         let (model, edge, pieces) = (Model::default(), Vec::new(), Vec::new());
-        Self { scene, model, edge, prefix_names, pieces, springs: Vec::new(), homes: Vec::new() }
+        Self { scene, time, model, edge, prefix_names, pieces, springs: Vec::new(), homes: Vec::new() }
     }
 
     pub(super) fn model(mut self) -> Result<Model, ModelError> {
@@ -63,6 +83,7 @@ impl<'a> Builder<'a> {
         self.apply_fabrics()?;
         self.apply_hair()?;
         self.add_seams(&seams)?;
+        self.inflate()?;
         self.add_wind();
         self.add_obstacles()?;
         self.pin()?;
@@ -83,7 +104,12 @@ impl<'a> Builder<'a> {
         };
         self.pieces.extend(pieces.into_iter().map(|vertices| Piece { part, vertices }));
         let (corners, groups) = (CornerAttributes::default(), BTreeMap::new());
-        self.model.parts.push(Part { name, vertices: first..first + vertices, kind, corners, groups });
+        let colours = &self.scene.output.colours;
+        let colour = match &kind {
+            PartKind::Cloth(_) => colours.get(part).map(|colour| colour.map(|channel| channel as f32)),
+            PartKind::Hair { .. } => None,
+        };
+        self.model.parts.push(Part { name, vertices: first..first + vertices, kind, colour, corners, groups });
     }
 
     fn add_garment(&mut self, number: usize, garment: &Garment) -> Result<(), ModelError> {
@@ -117,7 +143,7 @@ impl<'a> Builder<'a> {
         self.model.friction.extend(vec![0.0; count]);
         self.model.x.extend(vertices);
         let segment = hair.length / hair.segments as f64;
-        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment });
+        self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment, width: hair.thickness() });
     }
 
     fn check_names(&self) -> Result<(), ModelError> {
@@ -277,20 +303,38 @@ impl<'a> Builder<'a> {
     fn add_seams(&mut self, seams: &[Vec<[usize; 2]>]) -> Result<(), ModelError> {
         for (seam, (description, joined)) in self.scene.seams.iter().zip(seams).enumerate() {
             // The pairs of a seam may lie on several islands, if a garment of many pieces is sewn to itself.
-            let mut pairs: BTreeMap<usize, Vec<[usize; 2]>> = BTreeMap::new();
-            for pair in joined.iter().map(|pair| pair.map(|vertex| self.homes[vertex])) {
-                pairs.entry(pair[0].island).or_default().push(pair.map(|home| home.place));
+            let mut pairs: BTreeMap<usize, (Vec<[usize; 2]>, Vec<f64>)> = BTreeMap::new();
+            for &[p, q] in joined {
+                let (pairs, gaps) = pairs.entry(self.homes[p].island).or_default();
+                pairs.push([p, q].map(|vertex| self.homes[vertex].place));
+                gaps.push(norm(subtract(self.model.x[p], self.model.x[q])));
             }
             let since = self.model.labels.len();
-            for (island, pairs) in pairs {
-                let stitches = vec![ZeroLengthSpring::new(description.stiffness, description.damping); pairs.len()];
-                let list = ElementList::new(format!("seam {seam}"), stitches, &pairs)?;
-                let term: Box<dyn Term> = if description.damping == 0.0 {
-                    Box::new(PotentialTerm::new(list))
-                } else {
-                    Box::new(ForceTerm::new(list).with_energy())
-                };
-                self.add_term(island, since, term);
+            for (island, (pairs, gaps)) in pairs {
+                let terms = stitches(seam, description, &pairs, gaps)?;
+                terms.into_iter().for_each(|term| self.add_term(island, since, term));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the overpressure inside closed garments.
+    fn inflate(&mut self) -> Result<(), ModelError> {
+        for (number, garment) in self.scene.garments.iter().enumerate() {
+            let Some(inflation) = garment.inflation else { continue };
+            let part = &self.model.parts[number];
+            let PartKind::Cloth(mesh) = &part.kind else { continue };
+            let (name, first) = (part.name.clone(), part.vertices.start);
+            inflation::check_closed(mesh).map_err(|source| ModelError::Inflation { part: name.clone(), source })?;
+            let mut triangles: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
+            for corners in mesh.triangles().iter().map(|corners| corners.map(|corner| self.homes[first + corner])) {
+                triangles.entry(corners[0].island).or_default().push(corners.map(|home| home.place));
+            }
+            let centre = mean(&self.model.x[part.vertices.clone()]);
+            let (since, label) = (self.model.labels.len(), format!("{name}: pressure"));
+            for (island, triangles) in triangles {
+                let law = PressureLaw { inflation, centre };
+                self.add_term(island, since, Box::new(DrivenTerm::new(label.clone(), law, &triangles)));
             }
         }
         Ok(())
@@ -330,38 +374,95 @@ impl<'a> Builder<'a> {
     }
 
     fn pin(&mut self) -> Result<(), ModelError> {
-        // The motion of each pinned vertex.
-        let mut held: BTreeMap<usize, Option<usize>> = BTreeMap::new();
+        let mut held: BTreeMap<usize, Hold> = BTreeMap::new();
         for (pin, description) in self.scene.pins.iter().enumerate() {
-            let motion = description.motion.as_ref().map(|motion| {
-                self.model.motions.push(motion.clone());
+            let motion = self.motion_of(pin, description)?;
+            let chosen = self.chosen(pin, description)?;
+            if let Some(soft) = &description.soft {
+                self.add_soft_pin(pin, soft, motion, &chosen);
+                continue;
+            }
+            let motion = motion.map(|motion| {
+                self.model.motions.push(motion);
                 self.model.motions.len() - 1
             });
-            for vertex in self.chosen(pin, description)? {
-                let same = |other: Option<usize>| {
-                    let of = |motion: Option<usize>| motion.map(|number| &self.model.motions[number]);
-                    of(other) == of(motion)
-                };
-                if held.get(&vertex).is_some_and(|&other| !same(other)) {
+            let hold = Hold { motion, follows: description.obstacle.is_some(), release: description.release };
+            for vertex in chosen {
+                let known = held.get(&vertex).copied().unwrap_or(hold);
+                if !self.move_alike(known, hold) {
                     return Err(PinError::Twice { pin, vertex }.into());
                 }
-                held.entry(vertex).or_insert(motion);
+                // The last pin to let go frees the vertex.
+                let release = known.release.zip(hold.release).map(|(one, other)| one.max(other));
+                held.insert(vertex, Hold { release, ..known });
             }
         }
         for vertex in self.roots() {
-            held.entry(vertex).or_insert(None);
+            held.entry(vertex).or_insert(Hold { motion: None, follows: false, release: None }).release = None;
         }
-        let model = &mut self.model;
-        model.pinned = (0..model.x.len()).map(|vertex| held.contains_key(&vertex)).collect();
-        for (vertex, motion) in held {
-            model.v[vertex] = [0.0; 3];
-            if let Some(motion) = motion {
-                let initial = model.x[vertex];
-                model.moving.push(MovingPin { vertex, initial, motion });
-                model.x[vertex] = model.motions[motion].pose(0.0).transform(initial);
+        self.hold(held);
+        Ok(())
+    }
+
+    /// Returns the motion of a pin: its own, or that of its obstacle.
+    fn motion_of(&self, pin: usize, description: &Pin) -> Result<Option<Motion>, PinError> {
+        let Some(name) = &description.obstacle else { return Ok(description.motion.clone()) };
+        let obstacles = &self.model.obstacles;
+        match obstacles.iter().find(|obstacle| obstacle.name == *name) {
+            Some(obstacle) => Ok(obstacle.motion.clone()),
+            None => {
+                let known = obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
+                Err(PinError::NoSuchObstacle { pin, name: name.clone(), known })
             }
         }
-        Ok(())
+    }
+
+    /// Whether two holds prescribe the same motion.
+    fn move_alike(&self, one: Hold, other: Hold) -> bool {
+        let of = |hold: Hold| hold.motion.map(|number| (&self.model.motions[number], hold.follows));
+        of(one) == of(other)
+    }
+
+    /// Pins vertices that are not yet released, and moves those with a motion to its start.
+    fn hold(&mut self, held: BTreeMap<usize, Hold>) {
+        let (model, now) = (&mut self.model, self.time);
+        let is_fixed = |hold: &Hold| hold.release.is_none();
+        let is_held = |hold: &Hold| hold.release.is_none_or(|release| release > now);
+        let marked = |is_marked: &dyn Fn(&Hold) -> bool| -> Vec<bool> {
+            (0..model.x.len()).map(|vertex| held.get(&vertex).is_some_and(is_marked)).collect()
+        };
+        let all = [marked(&|_| true), marked(&is_fixed), marked(&is_held)];
+        [model.pinned_at_start, model.pinned_forever, model.pinned] = all;
+        for (vertex, hold) in held {
+            model.v[vertex] = [0.0; 3];
+            if let Some(motion) = hold.motion {
+                let start = model.motions[motion].pose(0.0);
+                // Vertices on an obstacle stay where they are at the start.
+                let initial = if hold.follows { start.inverse_transform(model.x[vertex]) } else { model.x[vertex] };
+                if is_held(&hold) {
+                    model.moving.push(MovingPin { vertex, initial, motion });
+                }
+                model.x[vertex] = start.transform(initial);
+            }
+        }
+    }
+
+    /// Adds springs that hold vertices.
+    fn add_soft_pin(&mut self, pin: usize, soft: &SoftPin, motion: Option<Motion>, chosen: &[usize]) {
+        let Pin { obstacle, release, .. } = &self.scene.pins[pin];
+        let follows = motion.as_ref().filter(|_| obstacle.is_some());
+        let start = follows.map_or(Pose::IDENTITY, |motion| motion.pose(0.0));
+        let mut held: BTreeMap<usize, Vec<Held>> = BTreeMap::new();
+        for (number, &vertex) in chosen.iter().enumerate() {
+            let stiffness = soft.stiffness * soft.weights.get(number).unwrap_or(&1.0);
+            let Home { island, place } = self.homes[vertex];
+            let initial = start.inverse_transform(self.model.x[vertex]);
+            held.entry(island).or_default().push(Held { vertex: place, stiffness, initial });
+        }
+        let since = self.model.labels.len();
+        for (island, held) in held {
+            self.add_term(island, since, Box::new(SoftPinTerm::new(pin, held, motion.clone(), *release)));
+        }
     }
 
     fn chosen(&self, pin: usize, description: &Pin) -> Result<Vec<usize>, PinError> {
@@ -394,6 +495,35 @@ impl<'a> Builder<'a> {
         };
         rooted.flat_map(roots).collect()
     }
+}
+
+/// Creates the terms of the stitches of a seam on some pairs, which are `gaps` apart at the start, in m.
+fn stitches(
+    seam: usize,
+    description: &Seam,
+    pairs: &[[usize; 2]],
+    gaps: Vec<f64>,
+) -> Result<Vec<Box<dyn Term>>, ListError> {
+    let (name, &Seam { stiffness, damping, close, .. }) = (format!("seam {seam}"), description);
+    let springs: Box<dyn Term> = match close {
+        Some(closing) => Box::new(DrivenTerm::new(name, ClosingSeam { stiffness, gaps, closing }, pairs)),
+        None => {
+            let stitches = vec![ZeroLengthSpring::new(stiffness, 0.0); pairs.len()];
+            Box::new(PotentialTerm::new(ElementList::new(name, stitches, pairs)?))
+        }
+    };
+    let mut terms = vec![springs];
+    if damping != 0.0 {
+        let law = StitchDamping { stitches: pairs.len(), damping };
+        terms.push(Box::new(DissipationTerm::new(format!("seam {seam} damping"), law, pairs)));
+    }
+    Ok(terms)
+}
+
+/// Returns the mean of some positions.
+fn mean(x: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum = x.iter().fold([0.0; 3], |sum, x| add_scaled(sum, 1.0, *x));
+    sum.map(|component| component / x.len().max(1) as f64)
 }
 
 /// Describes a garment from a file.

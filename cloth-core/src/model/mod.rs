@@ -1,10 +1,14 @@
 //! Puts a scene together: parts, seams, pins and everything that acts, on one numbering of vertices.
 
 mod builder;
+mod closing_seam;
+mod inflation;
 mod parts;
 mod pins;
 mod seam;
+mod soft_pin;
 
+pub use inflation::NotClosed;
 pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 pub use pins::PinError;
 pub use seam::SeamError;

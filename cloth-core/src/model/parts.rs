@@ -7,6 +7,7 @@ use energy_dsl::Vector3;
 use energy_solve::{ListError, Term};
 
 use super::builder::Builder;
+use super::inflation::NotClosed;
 use super::{PinError, SeamError};
 use crate::contact::Obstacle;
 use crate::fabric::FabricError;
@@ -23,6 +24,8 @@ pub struct Part {
     pub vertices: Range<usize>,
     /// Cloth or hair.
     pub kind: PartKind,
+    /// RGB colour, from 0 to 1, as screens show it; `None` for that of its kind.
+    pub colour: Option<[f32; 3]>,
     /// Attributes of the corners of its triangles, from an OBJ file.
     pub corners: CornerAttributes,
     /// The vertices of each group of its OBJ file, numbered within the part.
@@ -40,6 +43,8 @@ pub enum PartKind {
         joints: usize,
         /// Length of a segment at rest, in m.
         segment: f64,
+        /// Diameter of a strand, in m.
+        width: f64,
     },
 }
 
@@ -89,6 +94,10 @@ pub struct Model {
     pub triangles: Vec<[usize; 3]>,
     /// Whether each vertex is pinned.
     pub pinned: Vec<bool>,
+    /// Whether each vertex is pinned at the start; some may have been released since.
+    pub pinned_at_start: Vec<bool>,
+    /// Whether each vertex is pinned and never released.
+    pub pinned_forever: Vec<bool>,
     /// Pinned vertices that move.
     pub moving: Vec<MovingPin>,
     /// The motions of pins.
@@ -133,6 +142,9 @@ pub enum ModelError {
     /// A fabric does not fit its mesh.
     #[error("{part}: {source}")]
     Fabric { part: String, source: FabricError },
+    /// A garment under pressure is not closed.
+    #[error("{part}: inflation: {source}")]
+    Inflation { part: String, source: NotClosed },
     /// Two parts have the same name.
     #[error("two garments or hairs are called `{name}`")]
     SameName { name: String },
@@ -156,7 +168,15 @@ impl Model {
     /// # Errors
     /// Returns an error if a part is invalid, or a name or vertex does not exist.
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
-        Builder::new(scene).model()
+        Self::at(scene, 0.0)
+    }
+
+    /// Assembles a scene as it starts, but without the pins that are released by a time, in s.
+    ///
+    /// # Errors
+    /// Returns an error if a part is invalid, or a name or vertex does not exist.
+    pub fn at(scene: &Scene, time: f64) -> Result<Self, ModelError> {
+        Builder::new(scene, time).model()
     }
 
     /// Returns the vertex range of each strand of hair.

@@ -47,6 +47,18 @@ pub enum PinError {
         /// The groups of the chosen garments.
         known: Vec<String>,
     },
+    /// The scene has no such obstacle.
+    #[error(
+        "pins[{pin}]: there is no obstacle called `{name}`; {}",
+        if .known.is_empty() { "there are none".to_owned() } else { format!("there are {}", .known.join(", ")) }
+    )]
+    NoSuchObstacle {
+        /// Index of the pin, from 0.
+        pin: usize,
+        name: String,
+        /// The names of the obstacles.
+        known: Vec<String>,
+    },
     /// The part has no boundary.
     #[error("pins[{pin}]: the chosen part has no boundary")]
     NoBoundary {
@@ -78,6 +90,10 @@ pub(super) fn chosen(
     match &description.choice {
         &PinChoice::Vertex(vertex) if vertex < start.len() => Ok(vec![vertex]),
         &PinChoice::Vertex(vertex) => Err(PinError::NoSuchVertex { pin, vertex, vertices: start.len() }),
+        PinChoice::Vertices(vertices) => match vertices.iter().find(|&&vertex| vertex >= start.len()) {
+            Some(&vertex) => Err(PinError::NoSuchVertex { pin, vertex, vertices: start.len() }),
+            None => Ok(vertices.clone()),
+        },
         &PinChoice::Box(PinBox { min, max }) => {
             let inside = |p: &Vector3<f64>| (0..3).all(|axis| (min[axis]..=max[axis]).contains(&p[axis]));
             let chosen: Vec<usize> = (0..start.len()).filter(|&vertex| inside(&start[vertex])).collect();
@@ -114,6 +130,8 @@ mod tests {
         assert_eq!(chosen(PinChoice::Group("collar".to_owned())).unwrap(), [1, 2]);
         let error = chosen(PinChoice::Group("hem".to_owned())).unwrap_err().to_string();
         assert_eq!(error, "pins[1]: there is no group `hem` in the chosen garments; there are collar");
+        assert_eq!(chosen(PinChoice::Vertices(vec![2, 0])).unwrap(), [2, 0]);
+        assert!(chosen(PinChoice::Vertices(vec![2, 3])).is_err());
         let error = chosen(PinChoice::Vertex(3)).unwrap_err();
         assert_eq!(error.to_string(), "pins[1]: there is no vertex 3; the mesh has 3 (0 to 2)");
         let empty = PinBox { min: [5.0; 3], max: [6.0; 3] };

@@ -27,9 +27,14 @@ pub enum AnimationError {
     Json(#[from] gltf_json::Error),
 }
 
+/// The largest number of morph targets of a mesh. Programs keep all targets of a mesh in graphics memory, and visit all
+/// of them for each frame.
+const MOST_TARGETS: usize = 240;
+
 /// Encodes an animation as a binary glTF 2.0 file (`.glb`). The first frame of a moving object is its mesh. Each later
-/// frame is a morph target, and the animation moves the weight from one target to the next.
-/// glTF's y axis points up: (x, y, z) becomes (x, z, −y).
+/// frame is a morph target, and the animation moves the weight from one target to the next. Long animations are divided
+/// into segments of 240 targets, each with a mesh of its own; only the node of the current segment is shown, the others
+/// have the scale 0. glTF's y axis points up: (x, y, z) becomes (x, z, −y).
 ///
 /// # Errors
 /// Returns an error if the file would be too large or its JSON part cannot be written.
@@ -38,22 +43,30 @@ pub fn animation_glb(tracks: &[Track<'_>], frames_per_second: f64) -> Result<Vec
     let mut nodes = Vec::new();
     let mut moving = Vec::new();
     for track in tracks {
-        let Some((&rest, later)) = track.frames.split_first() else { continue };
         let topology = Topology::of(track);
-        let (indices, mode) = file.indices(&topology);
-        let first = topology.shape(rest);
-        let mut attributes = file.attributes(&first);
-        if let Topology::Split(split) = &topology
-            && !split.uvs.is_empty()
-        {
-            attributes.insert(Valid(Semantic::TexCoords(0)), file.uvs(&split.uvs));
+        let (indices, mode) = if track.frames.is_empty() { continue } else { file.indices(&topology) };
+        let starts: Vec<usize> = (0..track.frames.len().max(2) - 1).step_by(MOST_TARGETS).collect();
+        for &start in &starts {
+            let end = (start + MOST_TARGETS + 1).min(track.frames.len());
+            let Some((rest, later)) = track.frames[start..end].split_first() else { continue };
+            let first = topology.shape(rest);
+            let mut attributes = file.attributes(&first);
+            if let Topology::Split(split) = &topology
+                && !split.uvs.is_empty()
+            {
+                attributes.insert(Valid(Semantic::TexCoords(0)), file.uvs(&split.uvs));
+            }
+            let targets = later.iter().map(|frame| file.morph(&topology.shape(frame), &first)).collect();
+            let node = file.object(track, Parts { attributes, indices, mode, targets });
+            if start > 0 {
+                file.root.nodes[node.value()].scale = Some([0.0; 3]);
+            }
+            if !later.is_empty() {
+                let is_last = start + MOST_TARGETS + 1 >= track.frames.len();
+                moving.push(Segment { node, start, targets: later.len(), is_first: start == 0, is_last });
+            }
+            nodes.push(node);
         }
-        let targets: Vec<MorphTarget> = later.iter().map(|frame| file.morph(&topology.shape(frame), &first)).collect();
-        let node = file.object(track, Parts { attributes, indices, mode, targets });
-        if !later.is_empty() {
-            moving.push((node, later.len()));
-        }
-        nodes.push(node);
     }
     let (extensions, extras) = (None, Default::default());
     file.root.scene = Some(file.root.push(Scene { nodes, name: None, extensions, extras }));
@@ -61,6 +74,16 @@ pub fn animation_glb(tracks: &[Track<'_>], frames_per_second: f64) -> Result<Vec
         file.animate(&moving, frames_per_second);
     }
     file.finish()
+}
+
+/// Consecutive frames of a moving object.
+struct Segment {
+    node: Index<Node>,
+    /// Its first frame, which is its mesh.
+    start: usize,
+    targets: usize,
+    is_first: bool,
+    is_last: bool,
 }
 
 /// The accessors of a mesh.
@@ -240,25 +263,32 @@ impl File {
         self.root.push(Node { mesh: Some(mesh), name: Some(track.name.to_owned()), ..Node::default() })
     }
 
-    /// Adds an animation with weight 1 for target f − 1 at frame f, and 0 for the others.
-    fn animate(&mut self, moving: &[(Index<Node>, usize)], frames_per_second: f64) {
+    /// Adds an animation. In each segment, the weight is 1 for target f − 1 at its frame f, and 0 for the others.
+    fn animate(&mut self, segments: &[Segment], frames_per_second: f64) {
         let (mut channels, mut samplers) = (Vec::new(), Vec::new());
-        for &(node, targets) in moving {
-            let times: Vec<f32> = (0..=targets).map(|frame| (frame as f64 / frames_per_second) as f32).collect();
+        let seconds = |frame: usize| (frame as f64 / frames_per_second) as f32;
+        for segment in segments {
+            let targets = segment.targets;
+            let times: Vec<f32> = (0..=targets).map(|frame| seconds(segment.start + frame)).collect();
             let weight = |frame: usize, target: usize| if frame == target + 1 { 1.0 } else { 0.0 };
             let weights: Vec<f32> =
                 (0..=targets).flat_map(|frame| (0..targets).map(move |target| weight(frame, target))).collect();
-            let (extensions, extras) = (None, Default::default());
-            let target = Target { node, path: Valid(Property::MorphTargetWeights), extensions, extras };
-            let sampler = Index::new(u32::try_from(samplers.len()).expect("few things move"));
-            channels.push(Channel { sampler, target, extensions: None, extras: Default::default() });
-            samplers.push(Sampler {
-                input: self.scalars(&times),
-                interpolation: Valid(Interpolation::Linear),
-                output: self.scalars(&weights),
-                extensions: None,
-                extras: Default::default(),
-            });
+            let (input, output) = (self.scalars(&times), self.scalars(&weights));
+            samplers.push(sampler(input, output, Interpolation::Linear));
+            channels.push(channel(segment.node, Property::MorphTargetWeights, samplers.len() - 1));
+            if segment.is_first && segment.is_last {
+                continue;
+            }
+            // When the segment is shown, and when it is hidden again.
+            let (shown, hidden) = (segment.start, segment.start + targets);
+            let mut keys = vec![(0, if segment.is_first { 1.0 } else { 0.0 })];
+            keys.extend((!segment.is_first).then_some((shown, 1.0)));
+            keys.extend((!segment.is_last).then_some((hidden, 0.0)));
+            let times: Vec<f32> = keys.iter().map(|&(frame, _)| seconds(frame)).collect();
+            let scales: Vec<[f32; 3]> = keys.iter().map(|&(_, scale)| [scale; 3]).collect();
+            let (input, output) = (self.scalars(&times), self.vectors(&scales));
+            samplers.push(sampler(input, output, Interpolation::Step));
+            channels.push(channel(segment.node, Property::Scale, samplers.len() - 1));
         }
         let name = Some("motion".into());
         self.root.push(Animation { channels, samplers, name, extensions: None, extras: Default::default() });
@@ -291,5 +321,67 @@ impl File {
         file.extend_from_slice(b"BIN\0");
         file.extend_from_slice(&self.data);
         Ok(file)
+    }
+}
+
+fn sampler(input: Index<Accessor>, output: Index<Accessor>, interpolation: Interpolation) -> Sampler {
+    Sampler { input, output, interpolation: Valid(interpolation), extensions: None, extras: Default::default() }
+}
+
+fn channel(node: Index<Node>, property: Property, sampler: usize) -> Channel {
+    let (extensions, extras) = (None, Default::default());
+    let target = Target { node, path: Valid(property), extensions, extras };
+    let sampler = Index::new(u32::try_from(sampler).expect("few things move"));
+    Channel { sampler, target, extensions: None, extras: Default::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::CornerAttributes;
+
+    /// The nodes, channels and largest number of targets of a triangle that moves for some frames.
+    fn encoded(count: usize) -> (Root, usize) {
+        let triangles = [[0, 1, 2]];
+        let corners = CornerAttributes::default();
+        let frames: Vec<[Vector3<f64>; 3]> =
+            (0..count).map(|n| [[0.0, 0.0, n as f64], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).collect();
+        let track = Track {
+            name: "it",
+            colour: [0.5; 3],
+            joined: Joined::Triangles(&triangles),
+            corners: &corners,
+            frames: frames.iter().map(|frame| &frame[..]).collect(),
+            velocities: Vec::new(),
+            width: 0.0,
+        };
+        let file = animation_glb(&[track], 25.0).unwrap();
+        let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+        let root = Root::from_slice(&file[20..20 + length]).unwrap();
+        let mut problems = Vec::new();
+        use gltf_json::validation::Validate;
+        root.validate(&root, gltf_json::Path::new, &mut |path, error| problems.push(format!("{} {error}", path())));
+        assert!(problems.is_empty(), "{problems:?}");
+        let targets = |mesh: &Mesh| mesh.primitives[0].targets.as_ref().map_or(0, Vec::len);
+        let most = root.meshes.iter().map(targets).max().unwrap_or(0);
+        (root, most)
+    }
+
+    #[test]
+    fn long_animations_are_divided_and_one_segment_is_shown_at_a_time() {
+        for (frames, nodes, channels, most) in [(1, 1, 0, 0), (2, 1, 1, 1), (241, 1, 1, 240), (500, 3, 6, 240)] {
+            let (root, targets) = encoded(frames);
+            let found = root.animations.first().map_or(0, |animation| animation.channels.len());
+            assert_eq!((root.nodes.len(), found, targets), (nodes, channels, most), "{frames} frames");
+        }
+        let (root, _) = encoded(500);
+        let hidden = root.nodes.iter().filter(|node| node.scale == Some([0.0; 3])).count();
+        assert_eq!(hidden, 2, "without an animation only the first segment is seen");
+        // The second segment is shown from frame 240, and hidden from frame 480 on.
+        let animation = &root.animations[0];
+        let scale = animation.channels.iter().filter(|channel| channel.target.path == Valid(Property::Scale)).nth(1);
+        let input = animation.samplers[scale.unwrap().sampler.value()].input;
+        let last = root.accessors[input.value()].max.as_ref().unwrap().as_array().unwrap()[0].as_f64().unwrap();
+        assert!((last - 480.0 / 25.0).abs() < 1e-5, "{last}");
     }
 }

@@ -43,6 +43,10 @@ impl OutputFolder {
     pub const PICTURE: &'static str = "cloth.png";
     /// File name of the glTF animation.
     pub const ANIMATION: &'static str = "cloth.glb";
+    /// File name of the animated PNG.
+    pub const APNG: &'static str = "cloth.apng";
+    /// File name of the film.
+    pub const FILM: &'static str = "cloth.mp4";
     /// File name of the USD animation.
     pub const USD: &'static str = "cloth.usda";
     /// File name of the ledger.
@@ -59,15 +63,19 @@ impl OutputFolder {
     pub const SAVED_FRAMES: &'static str = "checkpoint.frames";
     /// File name of the summary.
     pub const SUMMARY: &'static str = "summary.txt";
+    /// Name of the folder of point caches.
+    pub const CACHES: &'static str = "caches";
     /// Name of the folder of frames.
     pub const FRAMES: &'static str = "frames";
 
     /// All files of a run except the frames.
-    const RESULTS: [&'static str; 10] = [
+    const RESULTS: [&'static str; 12] = [
         Self::PICTURE,
         Self::ANIMATION,
         Self::SUMMARY,
         Self::USD,
+        Self::APNG,
+        Self::FILM,
         Self::LEDGER,
         Self::LEDGER_PLOT,
         Self::RECORD,
@@ -86,7 +94,9 @@ impl OutputFolder {
         let folder = Self::reopen(path)?;
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
         let results = Self::RESULTS.map(|name| path.join(name)).into_iter().filter(|path| path.exists());
-        let old: Vec<PathBuf> = results.chain(folder.existing_frames().map_err(unusable)?).collect();
+        let frames = folder.existing_frames().map_err(unusable)?;
+        let caches = folder.existing_caches().map_err(unusable)?;
+        let old: Vec<PathBuf> = results.chain(frames).chain(caches).collect();
         match old.first() {
             Some(first) if !overwrite => Err(OutputError::Exists { path: first.clone() }),
             _ => {
@@ -143,6 +153,30 @@ impl OutputFolder {
     /// Returns an error if the file cannot be written.
     pub fn write_frame(&self, number: usize, extension: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
         self.write(&Self::frame_name(number, extension), contents)
+    }
+
+    /// Writes a point cache, and returns its path.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn write_cache(&self, name: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
+        let path = self.path.join(Self::CACHES);
+        std::fs::create_dir_all(&path).map_err(|source| OutputError::Folder { path, source })?;
+        self.write(&format!("{}/{name}", Self::CACHES), contents)
+    }
+
+    fn existing_caches(&self) -> std::io::Result<Vec<PathBuf>> {
+        let folder = self.path.join(Self::CACHES);
+        if !folder.exists() {
+            return Ok(Vec::new());
+        }
+        let entries = std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+        let is_cache =
+            |path: &PathBuf| path.extension().is_some_and(|extension| extension == "pc2" || extension == "mdd");
+        let mut caches: Vec<PathBuf> = entries.collect::<std::io::Result<_>>()?;
+        caches.retain(is_cache);
+        caches.sort();
+        Ok(caches)
     }
 
     /// Returns the path of frame `number` in the format of the extension.

@@ -1,28 +1,34 @@
 //! Output files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
 
 mod animation;
+mod floor_shadow;
 mod folder;
 mod frame;
 mod lock;
 mod picture;
 mod ply;
+mod point_cache;
 mod projection;
 mod raster;
 mod scenery;
 mod show;
 mod solid_mesh;
+mod style;
 mod track;
 mod usd;
+mod visibility;
 
 pub use animation::{AnimationError, animation_glb};
 pub use folder::{OutputError, OutputFolder};
 pub use frame::{last_obj_line, obj_text};
 pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
+pub use point_cache::{mdd_bytes, pc2_bytes};
 pub(crate) use scenery::Framing;
 pub use scenery::Scenery;
 pub use show::Show;
 pub use solid_mesh::SolidMesh;
+pub use style::{Style, Viewpoint};
 pub use track::{Joined, Track};
 pub use usd::usd_text;
 
@@ -44,7 +50,11 @@ pub fn vertex_normals(positions: &[Vector3<f64>], triangles: &[[usize; 3]]) -> V
     for normal in &mut normals {
         let length = norm(*normal);
         // The normals of folded triangles may cancel; any unit vector is good enough for shading.
-        *normal = if length > 0.0 { normal.map(|component| component / length) } else { [0.0, 0.0, 1.0] };
+        *normal = if length > 0.0 && length.is_finite() {
+            normal.map(|component| component / length)
+        } else {
+            [0.0, 0.0, 1.0]
+        };
     }
     normals
 }

@@ -1,35 +1,31 @@
 use std::ops::Range;
 
 use energy_dsl::Vector3;
-use tiny_skia::{
-    Color, FillRule, FilterQuality, GradientStop, LinearGradient, Paint, PathBuilder, Pixmap, PixmapPaint, Point, Rect,
-    Shader, SpreadMode, Transform,
-};
+use tiny_skia::Pixmap;
 
+use super::floor_shadow::FloorShadow;
 use super::projection::Camera;
 use super::raster::{Canvas, Corner};
 use super::solid_mesh::SolidMesh;
+use super::style::Style;
 use super::vertex_normals;
+use super::visibility::{Occluders, Visibility, lamp_directions};
 use crate::geometry::{cross, dot, norm, subtract};
 
 /// Dark and bright colours of solids and of hair.
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
 const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
-/// Line width of hair and edges, in pixels before downsampling.
-const STRAND: f64 = 3.0;
+/// Line width of edges, and the least of hair, in pixels before downsampling.
+const LINE: f64 = 3.0;
+const THINNEST: f64 = 1.5;
 
 /// A picture that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw the picture: {0}")]
 pub struct PictureError(String);
 
-const WIDTH: u32 = 1200;
-const HEIGHT: u32 = 1000;
-/// Supersampling factor: anti-aliases without seams between triangles.
-const OVERSAMPLING: u32 = 2;
-/// Directions from the cloth to the eye and to the lamp.
-const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
+/// Direction from the cloth to the lamp.
 const LAMP: Vector3<f64> = [-0.25, -0.45, 1.0];
 /// Dark and bright colours of the front and of the back.
 const FRONT: Colours = [[0.03, 0.10, 0.19], [0.40, 0.66, 0.86]];
@@ -44,6 +40,10 @@ pub struct View<'a> {
     pub triangles: &'a [[usize; 3]],
     /// Vertex range of each strand of hair.
     pub strands: &'a [Range<usize>],
+    /// Width of each strand, in m.
+    pub widths: &'a [f64],
+    /// RGB colour of each vertex of garments with a colour of their own; empty if none has one.
+    pub garment_colours: &'a [Option<[f32; 3]>],
     /// Surfaces of the solids.
     pub solids: &'a [SolidMesh],
     /// Height of the floor, in m; `None` for slightly below everything.
@@ -52,6 +52,8 @@ pub struct View<'a> {
     pub(crate) camera: Option<Camera>,
     /// Appearance of cloth and hair.
     pub look: Look<'a>,
+    /// Size, camera and background.
+    pub style: Style,
 }
 
 /// The appearance of cloth and hair.
@@ -63,53 +65,36 @@ pub struct Look<'a> {
     pub wireframe: bool,
 }
 
-/// Draws cloth, hair and solids as PNG. The two sides of cloth have different colours; the floor receives shadows. z is
-/// up.
+/// Draws cloth, hair and solids as PNG. The two sides of cloth have different colours; cloth, solids and the floor
+/// receive soft shadows. z is up.
 ///
 /// # Errors
 /// Returns an error if the picture cannot be encoded.
 pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
-    let [width, height] = [WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING];
+    let [width, height] = view.style.size.map(|pixels| pixels * Style::OVERSAMPLING);
     let mut background = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
     let solids = view.solids.iter().flat_map(|solid| &solid.vertices);
     let everything: Vec<Vector3<f64>> = view.positions.iter().chain(solids).copied().collect();
-    let shadow = shadow_points(&everything, view.floor);
-    let all = || everything.iter().chain(&shadow).copied().collect::<Vec<_>>();
-    let camera = view.camera.unwrap_or_else(|| camera_on(&all()));
-    draw_background(&mut background);
-    draw_shadow(&mut background, &camera, &shadow, &all_triangles(view));
-    let mut canvas = Canvas::new(background);
-    for solid in view.solids {
-        draw_surface(&mut canvas, &camera, &solid.vertices, &solid.triangles, |front, _| {
-            [SOLID; 2][usize::from(front)]
-        });
-    }
-    let own = |vertex: usize| view.look.colours.and_then(|colours| colours.get(vertex)).map(lit);
-    draw_surface(&mut canvas, &camera, view.positions, view.triangles, |front, vertex| {
-        own(vertex).unwrap_or(if front { FRONT } else { BACK })
+    let floor = floor_below(&everything, view.floor);
+    let camera = view.camera.unwrap_or_else(|| {
+        let all: Vec<Vector3<f64>> = everything.iter().flat_map(|p| [*p, shadow_of(p, floor)]).collect();
+        view.style.camera_on(&all)
     });
+    draw_background(&mut background, view.style.background);
+    let triangles = all_triangles(view);
+    draw_shadow(&mut background, &camera, (&everything, floor), &triangles, view);
+    let mut canvas = Canvas::new(background);
+    draw_surfaces(&mut canvas, &camera, &everything, &triangles, view);
     if view.look.wireframe {
         draw_edges(&mut canvas, &camera, view.positions, view.triangles);
     }
-    for strand in view.strands {
-        draw_strand(&mut canvas, &camera, view.positions, strand.clone(), |vertex| own(vertex).unwrap_or(HAIR));
+    let own = |vertex: usize| view.look.colours.and_then(|colours| colours.get(vertex)).map(lit);
+    for (strand, width) in view.strands.iter().zip(view.widths) {
+        let colours = |vertex| own(vertex).unwrap_or(HAIR);
+        draw_strand(&mut canvas, &camera, view.positions, strand.clone(), *width, colours);
     }
-    let small = averaged(&canvas.pixels).ok_or_else(|| PictureError("no memory".into()))?;
+    let small = averaged(&canvas.pixels, view.style.size).ok_or_else(|| PictureError("no memory".into()))?;
     small.encode_png().map_err(|error| PictureError(error.to_string()))
-}
-
-/// Size of a picture before downsampling, in pixels.
-const SIZE: [f64; 2] = [(WIDTH * OVERSAMPLING) as f64, (HEIGHT * OVERSAMPLING) as f64];
-
-/// Returns a camera that frames the points, with some space around them.
-pub(super) fn camera_on(points: &[Vector3<f64>]) -> Camera {
-    Camera::framing(points, VIEW, SIZE, 0.86)
-}
-
-/// Whether a point lies well within the picture.
-pub(super) fn is_visible(camera: &Camera, point: Vector3<f64>) -> bool {
-    let (place, depth) = camera.project(point);
-    depth > 0.0 && (0..2).all(|axis| (0.02..=0.98).contains(&(place[axis] / SIZE[axis])))
 }
 
 /// Returns the triangles of cloth and solids in one vertex numbering.
@@ -125,24 +110,44 @@ fn all_triangles(view: &View<'_>) -> Vec<[usize; 3]> {
 
 type Colours = [[f32; 3]; 2];
 
-fn draw_surface(
+/// Draws cloth and solids, whose points and triangles share one numbering: those of cloth come first.
+fn draw_surfaces(
     canvas: &mut Canvas,
     camera: &Camera,
-    positions: &[Vector3<f64>],
+    points: &[Vector3<f64>],
     triangles: &[[usize; 3]],
-    colours: impl Fn(bool, usize) -> Colours,
+    view: &View<'_>,
 ) {
-    let normals = vertex_normals(positions, triangles);
+    let normals = vertex_normals(points, triangles);
     let lamp = LAMP.map(|component| component / norm(LAMP));
+    let segments: Vec<[usize; 2]> = view
+        .strands
+        .iter()
+        .flat_map(|strand| strand.clone().zip(strand.clone().skip(1)).map(|(a, b)| [a, b]))
+        .collect();
+    let visibility = Visibility::of(&Occluders { points, triangles, segments: &segments }, &normals, lamp);
+    let colours = |vertex: usize, is_front: bool| {
+        if vertex >= view.positions.len() {
+            return SOLID;
+        }
+        let shown = view.look.colours.and_then(|colours| colours.get(vertex)).map(lit);
+        let own = view.garment_colours.get(vertex).copied().flatten();
+        shown.or(own.map(|colour| sides(&colour)[usize::from(!is_front)])).unwrap_or(if is_front {
+            FRONT
+        } else {
+            BACK
+        })
+    };
     for corners in triangles {
-        let [a, b, c] = corners.map(|corner| positions[corner]);
+        let [a, b, c] = corners.map(|corner| points[corner]);
         let is_front = dot(cross(subtract(b, a), subtract(c, a)), camera.towards_eye(a)) >= 0.0;
-        let side = if is_front { 1.0 } else { -1.0 };
+        let (side, sign) = if is_front { (0, 1.0) } else { (1, -1.0) };
         canvas.triangle(corners.map(|corner| {
-            let normal = normals[corner].map(|component| side * component);
-            let (place, depth) = camera.project(positions[corner]);
-            let brightness = shade(normal, lamp, camera.towards_eye(positions[corner]));
-            Corner { place, depth, colour: mixed(&colours(is_front, corner), brightness) }
+            let normal = normals[corner].map(|component| sign * component);
+            let (place, depth) = camera.project(points[corner]);
+            let seen = [visibility.lamp[corner][side], visibility.sky[corner][side]].map(f64::from);
+            let brightness = shade(normal, lamp, camera.towards_eye(points[corner]), seen);
+            Corner { place, depth, colour: mixed(&colours(corner, is_front), brightness) }
         }));
     }
 }
@@ -153,6 +158,7 @@ fn draw_strand(
     camera: &Camera,
     positions: &[Vector3<f64>],
     strand: Range<usize>,
+    width: f64,
     colours: impl Fn(usize) -> Colours,
 ) {
     let lamp = LAMP.map(|component| component / norm(LAMP));
@@ -164,7 +170,8 @@ fn draw_strand(
             let (place, depth) = camera.project(positions[vertex]);
             Corner { place, depth, colour: mixed(&colours(vertex), brightness) }
         });
-        canvas.line(from, to, STRAND);
+        let pixels = camera.pixels(width, 0.5 * (from.depth + to.depth));
+        canvas.line(from, to, pixels.max(THINNEST));
     }
 }
 
@@ -176,7 +183,7 @@ fn draw_edges(canvas: &mut Canvas, camera: &Camera, positions: &[Vector3<f64>], 
     };
     for &[a, b, c] in triangles {
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            canvas.line(corner(from), corner(to), STRAND);
+            canvas.line(corner(from), corner(to), LINE);
         }
     }
 }
@@ -186,89 +193,86 @@ fn lit(colour: &[f32; 3]) -> Colours {
     [colour.map(|channel| 0.35 * channel), *colour]
 }
 
+/// Returns the colours of the two sides of cloth of a colour; the back is paler.
+fn sides(colour: &[f32; 3]) -> [Colours; 2] {
+    let pale = colour.map(|channel| 0.65 * channel + 0.25);
+    [colour, &pale].map(|colour| [colour.map(|channel| 0.2 * channel), *colour])
+}
+
 fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {
     std::array::from_fn(|channel| dark[channel] + brightness as f32 * (bright[channel] - dark[channel]))
 }
 
-/// Returns the brightness from the lamp, a weaker light at the eye, the sky, and a sheen at grazing angles.
-fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>) -> f64 {
+/// Returns the brightness from the lamp, a weaker light at the eye, the sky, and a sheen at grazing angles. The last
+/// argument holds the visible parts of the lamp and of the surroundings.
+fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>, [sunlit, open]: [f64; 2]) -> f64 {
     let facing = dot(normal, eye).clamp(0.0, 1.0);
     let sheen = 0.16 * (1.0 - facing).powi(3);
-    let sky = 0.12 * (0.5 + 0.5 * normal[2]);
-    (0.06 + 0.72 * dot(normal, lamp).max(0.0) + 0.22 * facing * facing + sky + sheen).min(1.0)
+    let sky = 0.14 * (0.5 + 0.5 * normal[2]);
+    let around = 0.06 + 0.22 * facing * facing + sky + sheen;
+    (0.74 * sunlit * dot(normal, lamp).max(0.0) + (0.25 + 0.75 * open) * around).min(1.0)
 }
 
-fn draw_background(canvas: &mut Pixmap) {
-    let (width, height) = (canvas.width() as f32, canvas.height() as f32);
-    let grey = |level: f32| Color::from_rgba(level, level, level + 0.01, 1.0).unwrap_or(Color::WHITE);
-    let stops = vec![GradientStop::new(0.0, grey(0.98)), GradientStop::new(1.0, grey(0.84))];
-    let gradient = LinearGradient::new(
-        Point::from_xy(0.0, 0.0),
-        Point::from_xy(0.0, height),
-        stops,
-        SpreadMode::Pad,
-        Transform::identity(),
-    );
-    let paint = Paint { shader: gradient.unwrap_or(Shader::SolidColor(grey(0.9))), ..Paint::default() };
-    if let Some(all) = Rect::from_xywh(0.0, 0.0, width, height) {
-        canvas.fill_rect(all, &paint, Transform::identity(), None);
+/// Fills the picture with a colour, or with a grey that darkens downwards.
+fn draw_background(canvas: &mut Pixmap, colour: Option<[f32; 3]>) {
+    let (width, height) = (canvas.width() as usize, canvas.height());
+    for (row, pixels) in canvas.data_mut().chunks_exact_mut(4 * width).enumerate() {
+        let level = 0.98 - 0.14 * (row as f32 + 0.5) / height as f32;
+        let colour = colour.unwrap_or([level, level, level + 0.01]).map(|channel| (255.0 * channel).round() as u8);
+        for pixel in pixels.chunks_exact_mut(4) {
+            pixel.copy_from_slice(&[colour[0], colour[1], colour[2], 255]);
+        }
     }
 }
 
-/// Returns the shadows of the points on the floor.
-fn shadow_points(positions: &[Vector3<f64>], floor: Option<f64>) -> Vec<Vector3<f64>> {
+/// Returns the height of the floor: that given, or slightly below everything.
+fn floor_below(positions: &[Vector3<f64>], floor: Option<f64>) -> f64 {
     let range = |pick: fn(f64, f64) -> f64, start| positions.iter().map(|p| p[2]).fold(start, pick);
     let (low, high) = (range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
-    let floor = floor.unwrap_or(low - 0.08 * (high - low));
-    positions.iter().map(|p| shadow_of(p, floor)).collect()
+    floor.unwrap_or(low - 0.08 * (high - low))
 }
 
 /// Returns the shadow of a point on the floor.
 pub(super) fn shadow_of(p: &Vector3<f64>, floor: f64) -> Vector3<f64> {
-    let offset = (p[2] - floor) / LAMP[2];
-    [p[0] - offset * LAMP[0], p[1] - offset * LAMP[1], floor]
+    shadow_along(p, floor, LAMP)
 }
 
-/// Draws the shadow at low resolution; upscaling softens it.
-fn draw_shadow(canvas: &mut Pixmap, camera: &Camera, shadow: &[Vector3<f64>], triangles: &[[usize; 3]]) {
-    const COARSENESS: u32 = 20;
-    let Some(mut small) = Pixmap::new(canvas.width() / COARSENESS, canvas.height() / COARSENESS) else { return };
-    let mut outline = PathBuilder::new();
-    for corners in triangles {
-        let mut seen = corners.map(|corner| camera.project(shadow[corner]).0);
-        let [p, q, r] = seen;
-        // Same orientation for all triangles, so that overlapping folds add up instead of cancelling.
-        if (q[0] - p[0]) * (r[1] - p[1]) < (q[1] - p[1]) * (r[0] - p[0]) {
-            seen.swap(1, 2);
-        }
-        append_polygon(&mut outline, &seen);
-    }
-    let Some(path) = outline.finish() else { return };
-    let ink = Color::from_rgba(0.1, 0.11, 0.14, 0.34).unwrap_or(Color::BLACK);
-    let paint = Paint { shader: Shader::SolidColor(ink), ..Paint::default() };
-    let shrink = 1.0 / COARSENESS as f32;
-    small.fill_path(&path, &paint, FillRule::Winding, Transform::from_scale(shrink, shrink), None);
-    let soft = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
-    let enlarge = Transform::from_scale(COARSENESS as f32, COARSENESS as f32);
-    canvas.draw_pixmap(0, 0, small.as_ref(), &soft, enlarge, None);
+/// Returns the shadow of a point on the floor in the light from a direction.
+fn shadow_along(p: &Vector3<f64>, floor: f64, lamp: Vector3<f64>) -> Vector3<f64> {
+    let offset = (p[2] - floor) / lamp[2];
+    [p[0] - offset * lamp[0], p[1] - offset * lamp[1], floor]
 }
 
-fn append_polygon(path: &mut PathBuilder, corners: &[[f64; 2]]) {
-    for (index, corner) in corners.iter().enumerate() {
-        let [x, y] = corner.map(|coordinate| coordinate as f32);
-        if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
+/// Draws the shadow of each part of the lamp on the floor.
+fn draw_shadow(
+    canvas: &mut Pixmap,
+    camera: &Camera,
+    (points, floor): (&[Vector3<f64>], f64),
+    triangles: &[[usize; 3]],
+    view: &View<'_>,
+) {
+    let segments: Vec<([usize; 2], f64)> = view
+        .strands
+        .iter()
+        .zip(view.widths)
+        .flat_map(|(strand, width)| strand.clone().skip(1).map(|end| ([end - 1, end], *width)))
+        .collect();
+    let mut all = FloorShadow::new(canvas);
+    for lamp in lamp_directions(LAMP.map(|component| component / norm(LAMP))) {
+        let shadow: Vec<Vector3<f64>> = points.iter().map(|p| shadow_along(p, floor, lamp)).collect();
+        all.add(camera, &shadow, triangles, &segments);
     }
-    path.close();
+    all.draw(canvas);
 }
 
 /// Downsamples to the final size by averaging.
-fn averaged(canvas: &Pixmap) -> Option<Pixmap> {
-    let mut small = Pixmap::new(WIDTH, HEIGHT)?;
+fn averaged(canvas: &Pixmap, [width, height]: [u32; 2]) -> Option<Pixmap> {
+    let mut small = Pixmap::new(width, height)?;
     let (source, row) = (canvas.data(), 4 * canvas.width() as usize);
     for (index, byte) in small.data_mut().iter_mut().enumerate() {
         let (pixel, channel) = (index / 4, index % 4);
-        let (x, y) = (pixel % WIDTH as usize, pixel / WIDTH as usize);
-        let n = OVERSAMPLING as usize;
+        let (x, y) = (pixel % width as usize, pixel / width as usize);
+        let n = Style::OVERSAMPLING as usize;
         let sum: u32 =
             (0..n * n).map(|part| u32::from(source[(n * y + part / n) * row + 4 * (n * x + part % n) + channel])).sum();
         *byte = ((sum + (n * n / 2) as u32) / (n * n) as u32) as u8;

@@ -43,6 +43,25 @@ impl Camera {
         camera
     }
 
+    /// Creates a camera at a place that looks at a point, with this angle between the upper and the lower edge of the
+    /// picture, in degrees.
+    pub(crate) fn looking(eye: Vector3<f64>, target: Vector3<f64>, angle: f64, size: [f64; 2]) -> Self {
+        let backward = subtract(eye, target);
+        let backward = backward.map(|component| component / norm(backward));
+        // Straight up or down, the second axis is upwards in the picture.
+        let up = if backward[2].abs() < 0.9999 { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
+        let right = cross(up, backward);
+        let right = right.map(|component| component / norm(right));
+        let axes = [right, cross(right, backward), backward.map(|component| -component)];
+        let scale = 0.5 * size[1] / (0.5 * angle.to_radians()).tan();
+        Self { eye, axes, centre: size.map(|side| 0.5 * side), scale }
+    }
+
+    /// Returns the size in pixels of a length in m at this depth in m.
+    pub(crate) fn pixels(&self, length: f64, depth: f64) -> f64 {
+        self.scale * length / depth
+    }
+
     /// Returns the position in pixels and the depth in m of a point.
     pub(crate) fn project(&self, point: Vector3<f64>) -> ([f64; 2], f64) {
         let [right, down, depth] = self.axes.map(|axis| dot(axis, subtract(point, self.eye)));

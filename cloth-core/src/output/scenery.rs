@@ -2,11 +2,12 @@ use std::ops::Range;
 
 use energy_dsl::Vector3;
 
-use super::picture::{View, camera_on, is_visible, shadow_of};
+use super::picture::{View, shadow_of};
 use super::projection::Camera;
-use super::{Look, PictureError, SolidMesh, picture_png};
+use super::{Look, PictureError, SolidMesh, Style, picture_png};
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{Bounds, dot};
+use crate::model::PartKind;
 use crate::simulation::Simulation;
 
 /// The content of pictures except positions: triangles, strands and obstacles. Owns its data, so that another thread
@@ -15,7 +16,12 @@ use crate::simulation::Simulation;
 pub struct Scenery {
     triangles: Vec<[usize; 3]>,
     strands: Vec<Range<usize>>,
+    /// Width of each strand, in m.
+    widths: Vec<f64>,
+    /// The colour of each vertex; empty if no garment has one of its own.
+    colours: Vec<Option<[f32; 3]>>,
     obstacles: Vec<Obstacle>,
+    style: Style,
 }
 
 /// The part of space that pictures show.
@@ -23,6 +29,7 @@ pub struct Scenery {
 pub(crate) struct Framing {
     /// A box around the vertices, for the visible part of planes.
     bounds: Bounds,
+    style: Style,
     /// For pictures of a sequence; `None` to frame what is visible in each picture.
     steady: Option<Steady>,
 }
@@ -40,23 +47,25 @@ struct Steady {
 impl Framing {
     /// The camera of each picture frames what is visible in it. Planes are shown around `bounds`.
     pub(crate) fn loose(bounds: Bounds) -> Self {
-        Self { bounds, steady: None }
+        Self { bounds, style: Style::default(), steady: None }
     }
 
     /// The camera frames these points and their shadows, in every picture alike. `floor` is the height of a plane below
     /// them, in m; `None` if there is none.
-    pub(crate) fn steady(points: &[Vector3<f64>], floor: Option<f64>) -> Self {
+    pub(crate) fn steady(points: &[Vector3<f64>], floor: Option<f64>, style: Style) -> Self {
         let bounds = Bounds::of(points);
         let below = bounds.low[2] - 0.08 * (bounds.high[2] - bounds.low[2]);
         let (floor, lowest) = floor.map_or((below, below), |floor| (floor, f64::NEG_INFINITY));
         let with_shadows: Vec<Vector3<f64>> = points.iter().flat_map(|p| [*p, shadow_of(p, floor)]).collect();
-        Self { bounds, steady: Some(Steady { camera: camera_on(&with_shadows), floor, lowest }) }
+        let camera = style.camera_on(&with_shadows);
+        Self { bounds, style, steady: Some(Steady { camera, floor, lowest }) }
     }
 
     /// Whether the pictures of a sequence show all these points.
     pub(crate) fn shows(&self, points: &[Vector3<f64>]) -> bool {
         self.steady.is_some_and(|Steady { camera, floor, lowest }| {
-            let is_shown = |p: &Vector3<f64>| is_visible(&camera, *p) && is_visible(&camera, shadow_of(p, floor));
+            let is_visible = |p: Vector3<f64>| self.style.is_visible(&camera, p);
+            let is_shown = |p: &Vector3<f64>| is_visible(*p) && is_visible(shadow_of(p, floor));
             points.iter().all(|p| p[2] >= lowest && is_shown(p))
         })
     }
@@ -83,12 +92,28 @@ fn floor_height(solid: &AnySolid) -> Option<f64> {
 impl Scenery {
     /// Returns the scenery of a simulation.
     #[must_use]
-    pub fn of(simulation: &Simulation) -> Self {
+    pub fn of(simulation: &Simulation, style: Style) -> Self {
+        let parts = simulation.parts();
+        let widths = parts.iter().flat_map(|part| match part.kind {
+            PartKind::Hair { joints, width, .. } => vec![width; part.vertices.len() / joints],
+            PartKind::Cloth(_) => Vec::new(),
+        });
+        let has_colours = parts.iter().any(|part| part.colour.is_some());
+        let coloured = if has_colours { parts } else { &[] };
+        let colours = coloured.iter().flat_map(|part| vec![part.colour; part.vertices.len()]);
         Self {
             triangles: simulation.triangles().to_vec(),
             strands: simulation.strands().to_vec(),
+            widths: widths.collect(),
+            colours: colours.collect(),
             obstacles: simulation.obstacles().to_vec(),
+            style,
         }
+    }
+
+    /// Size, camera and background of pictures.
+    pub(crate) fn style(&self) -> Style {
+        self.style
     }
 
     /// Returns the outermost points of cloth and bounded obstacles at a time in s, in 26 directions.
@@ -122,10 +147,13 @@ impl Scenery {
             positions,
             triangles: &self.triangles,
             strands: &self.strands,
+            widths: &self.widths,
+            garment_colours: &self.colours,
             solids: &drawn,
             floor: self.floor(time).or(framing.steady.map(|steady| steady.floor)),
             camera: framing.steady.map(|steady| steady.camera),
             look: *look,
+            style: self.style,
         })
     }
 }

@@ -1,7 +1,8 @@
 use energy_dsl::Vector3;
 
+use super::style::linear;
 use super::track::{Joined, Track};
-use super::{Framing, Look, PictureError, Scenery, SolidMesh};
+use super::{Framing, Look, PictureError, Scenery, SolidMesh, Style};
 use crate::geometry::Bounds;
 use crate::mesh::CornerAttributes;
 use crate::model::PartKind;
@@ -21,6 +22,8 @@ const PLAIN: CornerAttributes = CornerAttributes { uvs: None, normals: None };
 pub struct Show<'a> {
     simulation: &'a Simulation,
     frames: Vec<&'a [Vector3<f64>]>,
+    /// Velocities of all vertices in each frame; empty if they are not written.
+    velocities: &'a [Vec<Vector3<f64>>],
     /// For each garment its triangles, numbered within it; for each hair its strands.
     triangles: Vec<Vec<[usize; 3]>>,
     strands: Vec<Vec<std::ops::Range<usize>>>,
@@ -34,12 +37,12 @@ pub struct Show<'a> {
 impl<'a> Show<'a> {
     /// Collects the content of a simulation with these frames, `rate` of them per simulated second.
     #[must_use]
-    pub fn new<F: AsRef<[Vector3<f64>]>>(simulation: &'a Simulation, frames: &'a [F], rate: f64) -> Self {
+    pub fn new<F: AsRef<[Vector3<f64>]>>(simulation: &'a Simulation, frames: &'a [F], rate: f64, style: Style) -> Self {
         let frames: Vec<&[Vector3<f64>]> = frames.iter().map(AsRef::as_ref).collect();
         let bounds = frames.iter().map(|frame| Bounds::of(frame)).fold(Bounds::EMPTY, Bounds::around);
-        let (scenery, framing) = (Scenery::of(simulation), Framing::loose(bounds));
+        let (scenery, framing) = (Scenery::of(simulation, style), Framing::loose(bounds));
         let (triangles, strands, solids) = (Vec::new(), Vec::new(), Vec::new());
-        let mut show = Self { simulation, frames, triangles, strands, solids, scenery, framing };
+        let mut show = Self { simulation, frames, velocities: &[], triangles, strands, solids, scenery, framing };
         for part in simulation.parts() {
             let (triangles, strands) = match &part.kind {
                 PartKind::Cloth(mesh) => (mesh.triangles().to_vec(), Vec::new()),
@@ -65,22 +68,34 @@ impl<'a> Show<'a> {
         show
     }
 
+    /// Adds the velocities of all vertices in each frame, in m/s.
+    #[must_use]
+    pub fn with_velocities(self, velocities: &'a [Vec<Vector3<f64>>]) -> Self {
+        Self { velocities, ..self }
+    }
+
     /// Returns a track for every garment, hair and solid.
     #[must_use]
     pub fn tracks(&self) -> Vec<Track<'_>> {
         let mut tracks = Vec::new();
         for (number, part) in self.simulation.parts().iter().enumerate() {
             let frames = self.frames.iter().map(|frame| &frame[part.vertices.clone()]).collect();
-            let (joined, colour) = match part.kind {
-                PartKind::Cloth(_) => (Joined::Triangles(&self.triangles[number]), COLOURS[number % COLOURS.len()]),
-                PartKind::Hair { .. } => (Joined::Strands(&self.strands[number]), HAIR),
+            let (joined, colour, width) = match part.kind {
+                PartKind::Cloth(_) => {
+                    (Joined::Triangles(&self.triangles[number]), COLOURS[number % COLOURS.len()], 0.0)
+                }
+                PartKind::Hair { width, .. } => (Joined::Strands(&self.strands[number]), HAIR, width),
             };
-            tracks.push(Track { name: &part.name, colour, joined, corners: &part.corners, frames });
+            let colour = part.colour.map_or(colour, linear);
+            let velocities = self.velocities.iter().map(|frame| &frame[part.vertices.clone()]).collect();
+            tracks.push(Track { name: &part.name, colour, joined, corners: &part.corners, frames, velocities, width });
         }
         for (obstacle, meshes) in self.simulation.obstacles().iter().zip(&self.solids) {
             let frames = meshes.iter().map(|mesh| mesh.vertices.as_slice()).collect();
             let joined = Joined::Triangles(&meshes[0].triangles);
-            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, corners: const { &PLAIN }, frames });
+            let corners = const { &PLAIN };
+            let velocities = Vec::new();
+            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, corners, frames, velocities, width: 0.0 });
         }
         tracks
     }

@@ -17,6 +17,10 @@ pub struct Track<'a> {
     pub corners: &'a CornerAttributes,
     /// The points in each frame, in m; a single frame if the object does not move.
     pub frames: Vec<&'a [Vector3<f64>]>,
+    /// Width of strands, in m; 0 for triangles.
+    pub width: f64,
+    /// The velocities of the points in each frame, in m/s; empty if they are not written.
+    pub velocities: Vec<&'a [Vector3<f64>]>,
 }
 
 /// The topology of the points of a track.

@@ -3,9 +3,10 @@ use std::fmt::Write as _;
 use energy_dsl::Vector3;
 
 use super::track::{Joined, Track};
+use super::vertex_normals;
 
 /// Formats an animation as USD text (`.usda`): a mesh for each garment and solid, curves for hair, one time sample per
-/// frame. Lengths are in m, z is up, and frame n has time code n.
+/// frame, and a material for each. Lengths are in m, z is up, and frame n has time code n.
 #[must_use]
 pub fn usd_text(tracks: &[Track<'_>], frames_per_second: f64) -> String {
     let frames = tracks.iter().map(|track| track.frames.len()).max().unwrap_or(1);
@@ -17,6 +18,7 @@ pub fn usd_text(tracks: &[Track<'_>], frames_per_second: f64) -> String {
     ));
     file.line(format_args!("def Xform \"scene\"\n{{"));
     tracks.iter().for_each(|track| file.add(track));
+    file.add_materials(tracks);
     file.line(format_args!("}}"));
     file.text
 }
@@ -35,9 +37,10 @@ impl Usd {
     fn add(&mut self, track: &Track<'_>) {
         let name = self.identifier(track.name);
         let [red, green, blue] = track.colour;
+        let bound = "(\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )";
         match track.joined {
             Joined::Triangles(triangles) => {
-                self.line(format_args!("    def Mesh \"{name}\"\n    {{"));
+                self.line(format_args!("    def Mesh \"{name}\" {bound}\n    {{"));
                 self.line(format_args!(
                     "        uniform token subdivisionScheme = \"none\"\n        uniform bool doubleSided = 1"
                 ));
@@ -46,20 +49,76 @@ impl Usd {
                 let corners: Vec<String> = triangles.iter().flatten().map(usize::to_string).collect();
                 self.line(format_args!("        int[] faceVertexIndices = [{}]", corners.join(", ")));
                 self.corner_attributes(track, triangles);
+                if track.corners.normals.is_none() {
+                    self.vertex_normals(track, triangles);
+                }
             }
             Joined::Strands(strands) => {
-                self.line(format_args!("    def BasisCurves \"{name}\"\n    {{"));
+                self.line(format_args!("    def BasisCurves \"{name}\" {bound}\n    {{"));
                 self.line(format_args!("        uniform token type = \"linear\""));
                 let counts: Vec<String> = strands.iter().map(|strand| strand.len().to_string()).collect();
                 self.line(format_args!("        int[] curveVertexCounts = [{}]", counts.join(", ")));
                 self.line(format_args!(
-                    "        float[] widths = [0.001] (\n            interpolation = \"constant\"\n        )"
+                    "        float[] widths = [{}] (\n            interpolation = \"constant\"\n        )",
+                    track.width as f32
                 ));
             }
         }
         self.line(format_args!("        color3f[] primvars:displayColor = [({red}, {green}, {blue})]"));
+        self.line(format_args!("        rel material:binding = </scene/materials/{name}>"));
         self.points(&track.frames);
+        if !track.velocities.is_empty() {
+            self.samples("vector3f[] velocities", "", &track.velocities, &tuples);
+        }
         self.line(format_args!("    }}"));
+    }
+
+    /// Adds a material for each track, as previews show it.
+    fn add_materials(&mut self, tracks: &[Track<'_>]) {
+        self.line(format_args!("    def Scope \"materials\"\n    {{"));
+        let names = std::mem::take(&mut self.names);
+        for (name, track) in names.iter().zip(tracks) {
+            let [red, green, blue] = track.colour;
+            let surface = format!("/scene/materials/{name}/surface");
+            self.line(format_args!("        def Material \"{name}\"\n        {{"));
+            self.line(format_args!("            token outputs:surface.connect = <{surface}.outputs:surface>\n"));
+            self.line(format_args!("            def Shader \"surface\"\n            {{"));
+            self.line(format_args!("                uniform token info:id = \"UsdPreviewSurface\""));
+            self.line(format_args!("                color3f inputs:diffuseColor = ({red}, {green}, {blue})"));
+            self.line(format_args!(
+                "                float inputs:metallic = 0\n                float inputs:roughness = 0.85"
+            ));
+            self.line(format_args!("                token outputs:surface\n            }}\n        }}"));
+        }
+        self.line(format_args!("    }}"));
+    }
+
+    /// Adds smooth normals at the vertices.
+    fn vertex_normals(&mut self, track: &Track<'_>, triangles: &[[usize; 3]]) {
+        let normals = |frame: &[Vector3<f64>]| tuples(&vertex_normals(frame, triangles));
+        let interpolation = "(\n            interpolation = \"vertex\"\n        )";
+        match &track.frames[..] {
+            [only] => self.line(format_args!("        normal3f[] normals = [{}] {interpolation}", normals(only))),
+            frames => self.samples("normal3f[] normals", interpolation, frames, &normals),
+        }
+    }
+
+    /// Adds an attribute with a value per frame.
+    fn samples(
+        &mut self,
+        attribute: &str,
+        metadata: &str,
+        frames: &[&[Vector3<f64>]],
+        values: &dyn Fn(&[Vector3<f64>]) -> String,
+    ) {
+        if !metadata.is_empty() {
+            self.line(format_args!("        {attribute} {metadata}"));
+        }
+        self.line(format_args!("        {attribute}.timeSamples = {{"));
+        for (number, frame) in frames.iter().enumerate() {
+            self.line(format_args!("            {number}: [{}],", values(frame)));
+        }
+        self.line(format_args!("        }}"));
     }
 
     /// Adds texture coordinates and normals of the corners of triangles, if a file gave them.
@@ -76,12 +135,7 @@ impl Usd {
                 let normals = split.normals(frame);
                 tuples(&split.triangles.iter().flatten().map(|&corner| normals[corner]).collect::<Vec<_>>())
             };
-            self.line(format_args!("        normal3f[] normals {varying}"));
-            self.line(format_args!("        normal3f[] normals.timeSamples = {{"));
-            for (number, frame) in track.frames.iter().enumerate() {
-                self.line(format_args!("            {number}: [{}],", normals(frame)));
-            }
-            self.line(format_args!("        }}"));
+            self.samples("normal3f[] normals", varying, &track.frames, &normals);
         }
     }
 
@@ -100,11 +154,7 @@ impl Usd {
         for (attribute, values) in
             [("float3[] extent", &bounds as &dyn Fn(&[Vector3<f64>]) -> String), ("point3f[] points", &tuples)]
         {
-            self.line(format_args!("        {attribute}.timeSamples = {{"));
-            for (number, frame) in frames.iter().enumerate() {
-                self.line(format_args!("            {number}: [{}],", values(frame)));
-            }
-            self.line(format_args!("        }}"));
+            self.samples(attribute, "", frames, values);
         }
     }
 
@@ -112,7 +162,7 @@ impl Usd {
     fn identifier(&mut self, name: &str) -> String {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let plain = if plain.starts_with(|c: char| c.is_ascii_alphabetic()) { plain } else { format!("_{plain}") };
-        let mut unused = plain.clone();
+        let mut unused = if plain == "materials" { "_materials".to_owned() } else { plain.clone() };
         let mut number = 1;
         while self.names.contains(&unused) {
             number += 1;
@@ -145,6 +195,8 @@ mod tests {
             joined: Joined::Triangles(&triangles),
             corners: &corners,
             frames: vec![&points[..], &points[..]],
+            velocities: vec![&points[..], &points[..]],
+            width: 0.0,
         };
         let text = usd_text(&[track("left sleeve"), track("left-sleeve"), track("1st")], 25.0);
         for part in [
@@ -153,6 +205,10 @@ mod tests {
             "\"_1st\"",
             "endTimeCode = 1",
             "1: [(0, 0, 0), (1, 0, 0), (0, 1, 0.5)],",
+            "vector3f[] velocities.timeSamples = {",
+            "rel material:binding = </scene/materials/left_sleeve_2>",
+            "def Material \"_1st\"",
+            "interpolation = \"vertex\"",
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }

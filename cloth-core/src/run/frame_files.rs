@@ -18,7 +18,7 @@ impl Run {
         v: &[Vector3<f64>],
         only_broken: bool,
     ) -> Result<usize, RunError> {
-        let (simulation, wanted) = (&self.simulation, self.scene.output);
+        let (simulation, wanted) = (&self.simulation, &self.scene.output);
         let mut written = 0;
         if wanted.obj && !(only_broken && self.has_whole_obj(number)) {
             let text = obj_text(x, simulation.triangles(), simulation.strands());

@@ -150,7 +150,7 @@ impl Drawing {
         let is_shown = self.framing.is_some_and(|framing| framing.shows(&outermost));
         self.outermost.extend(outermost);
         if !is_shown {
-            self.framing = Some(Framing::steady(&self.outermost, self.scenery.floor(time)));
+            self.framing = Some(Framing::steady(&self.outermost, self.scenery.floor(time), self.scenery.style()));
             self.drawn.fill(false);
         }
         self.frames.push(frame);

@@ -9,6 +9,7 @@ use energy_dsl::Vector3;
 
 use super::checkpoint::CheckpointError;
 use crate::output::OutputError;
+use crate::scene::OutputChoice;
 
 /// The positions of all vertices in one frame, in m. Pictures are drawn from them on another thread.
 pub(super) type Frame = Arc<[Vector3<f64>]>;
@@ -17,24 +18,29 @@ pub(super) type Frame = Arc<[Vector3<f64>]>;
 pub(super) type Velocities = Vec<Vector3<f64>>;
 
 /// Frames, each with the positions of all vertices. The file holds them one after the other, in little-endian double
-/// precision; if frames are also written as PLY, each is followed by the velocities in single precision.
+/// precision; if files need velocities, each is followed by the velocities in single precision.
 #[derive(Debug)]
 pub(crate) struct FrameStore {
     frames: Vec<Frame>,
+    /// Velocities of each frame; empty unless a file of the whole run needs them.
+    velocities: Vec<Velocities>,
     has_velocities: bool,
+    keeps_velocities: bool,
     file: Option<(PathBuf, File)>,
     checksum: crc32fast::Hasher,
 }
 
 impl FrameStore {
     /// Creates an empty store, backed by a file if a path is given.
-    pub(crate) fn new(path: Option<PathBuf>, has_velocities: bool) -> Result<Self, OutputError> {
+    pub(crate) fn new(path: Option<PathBuf>, wanted: &OutputChoice) -> Result<Self, OutputError> {
         let open = |path: PathBuf| match File::create(&path) {
             Ok(file) => Ok((path, file)),
             Err(source) => Err(OutputError::File { path, source }),
         };
         let (file, checksum) = (path.map(open).transpose()?, crc32fast::Hasher::new());
-        Ok(Self { frames: Vec::new(), has_velocities, file, checksum })
+        let (frames, velocities) = (Vec::new(), Vec::new());
+        let (has_velocities, keeps_velocities) = needs(wanted);
+        Ok(Self { frames, velocities, has_velocities, keeps_velocities, file, checksum })
     }
 
     /// Reads the first frames of a file and truncates it after them: later frames were written after the checkpoint.
@@ -43,11 +49,12 @@ impl FrameStore {
         path: &Path,
         count: usize,
         vertices: usize,
-        has_velocities: bool,
+        wanted: &OutputChoice,
         checksum: u32,
     ) -> Result<(Self, Vec<Velocities>), CheckpointError> {
         let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
         let bytes = std::fs::read(path).map_err(unreadable)?;
+        let (has_velocities, keeps_velocities) = needs(wanted);
         let (of_positions, of_velocities) = (24 * vertices, if has_velocities { 12 * vertices } else { 0 });
         let size = of_positions + of_velocities;
         let damaged = |reason: &str| CheckpointError::Damaged { path: path.to_owned(), reason: reason.to_owned() };
@@ -66,11 +73,19 @@ impl FrameStore {
         }
         let file = OpenOptions::new().append(true).open(path).map_err(unreadable)?;
         file.set_len((count * size) as u64).map_err(unreadable)?;
-        Ok((Self { frames, has_velocities, file: Some((path.to_owned(), file)), checksum: hasher }, velocities))
+        let kept = if keeps_velocities { velocities.clone() } else { Vec::new() };
+        let file = Some((path.to_owned(), file));
+        let store = Self { frames, velocities: kept, has_velocities, keeps_velocities, file, checksum: hasher };
+        Ok((store, velocities))
     }
 
     pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
+    }
+
+    /// Velocities of each frame, in m/s; empty unless a file of the whole run needs them.
+    pub(crate) fn velocities(&self) -> &[Velocities] {
+        &self.velocities
     }
 
     /// CRC-32 of all frames.
@@ -88,6 +103,10 @@ impl FrameStore {
             self.checksum.update(&bytes);
         }
         self.frames.push(frame);
+        if self.keeps_velocities {
+            // As the file holds them, so that a resumed run writes the same.
+            self.velocities.push(velocities.iter().map(|v| v.map(|number| f64::from(number as f32))).collect());
+        }
         Ok(())
     }
 
@@ -96,6 +115,12 @@ impl FrameStore {
         let Some((path, file)) = &self.file else { return Ok(()) };
         file.sync_data().map_err(|source| OutputError::File { path: path.clone(), source })
     }
+}
+
+/// Returns whether frames are stored with velocities, and whether these are kept in memory.
+fn needs(wanted: &OutputChoice) -> (bool, bool) {
+    let in_usd = wanted.usd && wanted.velocities;
+    (wanted.ply || in_usd, in_usd)
 }
 
 fn double_point(bytes: &[u8]) -> Vector3<f64> {

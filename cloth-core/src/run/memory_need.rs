@@ -38,10 +38,10 @@ impl MemoryNeed {
         };
         let steps = scene.steps() as f64;
         let frames = (steps / scene.time_grid().steps_per_frame as f64).floor() + 1.0;
-        let wanted = scene.output;
+        let wanted = &scene.output;
         // Positions are kept. A file with all frames is built in memory, as text or in single precision with normals.
         let per_point = if wanted.usd {
-            24.0 + 45.0
+            24.0 + 80.0 + if wanted.velocities { 24.0 + 40.0 } else { 0.0 }
         } else if wanted.gltf {
             24.0 + 24.0
         } else {

@@ -2,12 +2,15 @@
 
 mod available_memory;
 mod checkpoint;
+mod film;
+mod forecast;
 mod frame_files;
 mod frame_pictures;
 mod frame_store;
 mod input_files;
 mod memory_need;
 mod progress;
+mod progress_lines;
 mod record;
 mod report;
 mod results;
@@ -20,9 +23,11 @@ use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
+pub use film::FilmError;
+pub use forecast::Forecast;
 pub use input_files::InputFile;
 pub use memory_need::MemoryNeed;
-pub use progress::Progress;
+pub use progress::{Log, Progress};
 pub use record::{Record, RecordError};
 pub use report::{ReportError, write_report};
 pub use results::Ending;
@@ -68,6 +73,9 @@ pub enum RunError {
     /// A picture cannot be drawn.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// A film cannot be written.
+    #[error(transparent)]
+    Film(#[from] FilmError),
     /// The ledger cannot be drawn.
     #[error("cannot draw the ledger: {0}")]
     Plot(String),
@@ -152,7 +160,7 @@ impl Run {
             path: path.to_owned(),
             folder,
             simulation,
-            frames: FrameStore::new(saved, scene.output.ply)?,
+            frames: FrameStore::new(saved, &scene.output)?,
             pictures: None,
             threads: available_threads(),
             checkpoint_interval,
@@ -161,6 +169,7 @@ impl Run {
             notes: Vec::new(),
             scene,
         };
+        run.note_missing_ffmpeg();
         run.add_frame()?;
         Ok(run)
     }
@@ -194,7 +203,7 @@ impl Run {
         simulation.restore(saved.state).map_err(CheckpointError::State)?;
         let (path, vertices) = (output.join(OutputFolder::SAVED_FRAMES), simulation.positions().len());
         let (frames, velocities) =
-            FrameStore::reopen(&path, saved.frames, vertices, scene.output.ply, saved.frames_checksum)?;
+            FrameStore::reopen(&path, saved.frames, vertices, &scene.output, saved.frames_checksum)?;
         let mut run = Self {
             text: saved.scene,
             path: saved.path,
@@ -210,6 +219,7 @@ impl Run {
             scene,
         };
         run.note_edited_scene();
+        run.note_missing_ffmpeg();
         run.repair_frames(&velocities)?;
         Ok(run)
     }
@@ -220,6 +230,13 @@ impl Run {
                 "{} was edited since the run began; the run continues with the scene as it was then",
                 file.path.display()
             ));
+        }
+    }
+
+    fn note_missing_ffmpeg(&mut self) {
+        if self.scene.output.mp4 && !film::has_ffmpeg() {
+            self.notes.push(format!("{} will not be written: the program ffmpeg was not found", OutputFolder::FILM));
+            self.scene.output.mp4 = false;
         }
     }
 
@@ -234,7 +251,7 @@ impl Run {
         Ok(())
     }
 
-    /// What the user should know about a resumed run; empty for a new one.
+    /// What the user should know about the start of the run.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -287,11 +304,11 @@ impl Run {
 
     /// Starts to draw the pictures of frames, of which a resumed run has some. They take a thread of the simulation.
     fn start_pictures(&mut self) -> Result<(), RunError> {
-        if !self.scene.output.png {
+        if !self.scene.output.has_frame_pictures() {
             return Ok(());
         }
         let rate = self.scene.time_grid().frames_per_second;
-        let scenery = Scenery::of(&self.simulation);
+        let scenery = Scenery::of(&self.simulation, self.scene.output.style());
         let mut pictures = FramePictures::start(scenery, self.folder.clone(), rate, self.threads);
         self.simulation.set_threads(self.threads.saturating_sub(1).max(1));
         self.frames.frames().iter().try_for_each(|frame| pictures.add(Frame::clone(frame)))?;

@@ -1,18 +1,33 @@
 //! Progress of a run: how far it is, how long it will take, and whether it is stuck.
 
+use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::progress_lines::{LineFormat, ProgressLines};
 use crate::integrator::StepReport;
 
-/// A progress bar on standard error, hidden unless that is a terminal, and a watchdog. The watchdog warns if no step
-/// ends for 20 s and for 20 times the mean step time.
+/// The form of the progress of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Log {
+    /// A bar on standard error if that is a terminal, otherwise a line every 10 s.
+    #[default]
+    Text,
+    /// JSON objects on standard output, one per line.
+    Json,
+}
+
+/// A progress bar or lines, and a watchdog. The watchdog warns if no step ends for 20 s and for 20 times the mean step
+/// time.
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
+    /// `None` if a terminal shows the bar.
+    lines: Option<ProgressLines>,
+    log: Log,
     steps: Option<Sender<u64>>,
     watchdog: Option<JoinHandle<()>>,
     recent: Recent,
@@ -33,16 +48,22 @@ const FACTOR: u32 = 20;
 impl Progress {
     /// Starts the display for `steps` steps, of which `done` are completed.
     #[must_use]
-    pub fn new(steps: u64, done: u64) -> Self {
+    pub fn new(steps: u64, done: u64, log: Log) -> Self {
+        let is_terminal = std::io::stderr().is_terminal();
+        let lines = match log {
+            Log::Json => Some(ProgressLines::new(LineFormat::Json, steps, done)),
+            Log::Text => (!is_terminal).then(|| ProgressLines::new(LineFormat::Text, steps, done)),
+        };
         let style = ProgressStyle::with_template("{wide_bar} step {pos}/{len}, {eta} left{msg}");
-        let bar = ProgressBar::new(steps).with_style(style.expect("the template is valid")).with_position(done);
+        let bar = if lines.is_some() { ProgressBar::hidden() } else { ProgressBar::new(steps) };
+        let bar = bar.with_style(style.expect("the template is valid")).with_position(done);
         bar.reset_eta();
         let (sender, receiver) = channel::<u64>();
         let shown = bar.clone();
         let watchdog = std::thread::spawn(move || {
             watchdog(&receiver, done, PATIENCE, |warning| shown.suspend(|| eprintln!("{warning}")));
         });
-        Self { bar, steps: Some(sender), watchdog: Some(watchdog), recent: Recent::default() }
+        Self { bar, lines, log, steps: Some(sender), watchdog: Some(watchdog), recent: Recent::default() }
     }
 
     /// Records a completed step.
@@ -55,8 +76,20 @@ impl Progress {
             self.bar.set_message(format!(", {solves:.1} solves of {:.0} iterations a step", iterations / solves));
         }
         self.bar.set_position(step);
+        let line = self.lines.as_mut().and_then(|lines| lines.step(step, report, Instant::now()));
+        if let Some(line) = line {
+            self.tell(&line);
+        }
         // The watchdog stops once the sender is dropped, so sending cannot fail before that.
         let _ = self.steps.as_ref().map(|steps| steps.send(step));
+    }
+
+    /// Prints a line. A reader that has gone does not end a run.
+    fn tell(&self, line: &str) {
+        let _ = match self.log {
+            Log::Json => writeln!(std::io::stdout(), "{line}"),
+            Log::Text => writeln!(std::io::stderr(), "{line}"),
+        };
     }
 
     /// Records that no step follows: the watchdog stops.
@@ -112,7 +145,7 @@ mod tests {
         let text = stuck(41, Duration::from_secs(30), Duration::from_millis(250));
         assert!(text.contains("after 41 has taken 30 s so far, others took 0.25 s"), "{text}");
         // Finishing joins the watchdog.
-        let mut progress = Progress::new(10, 3);
+        let mut progress = Progress::new(10, 3, Log::Text);
         progress.step(4, &StepReport::default());
         progress.last_step();
         assert!(progress.watchdog.is_none(), "no step is awaited while files are written");

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{Record, Run, RunError, stats};
-use crate::output::{OutputFolder, Show, animation_glb, usd_text};
+use crate::output::{OutputFolder, Show, animation_glb, mdd_bytes, pc2_bytes, usd_text};
 use crate::simulation::{SimulationError, Summary};
 
 /// The outcome of a run.
@@ -72,6 +72,9 @@ impl Run {
         if let Some(mut pictures) = self.pictures.take() {
             pictures.finish(|| written.is_abandoned()).unwrap_or_else(|error| written.note(error));
         }
+        let (wanted, rate) = (&self.scene.output, self.scene.time_grid().frames_per_second);
+        written.add(wanted.apng, || self.write_apng(rate));
+        written.add(wanted.mp4, || self.write_film(rate));
         let abandoned = written.is_abandoned();
         if abandoned && self.checkpoint_interval.is_some() {
             self.save()?;
@@ -120,14 +123,31 @@ impl Run {
 
     /// Writes the picture and the animations.
     fn write_shows(&self, written: &mut Written<'_>) {
-        let (wanted, frames) = (self.scene.output, self.frames.frames());
+        let (wanted, frames) = (&self.scene.output, self.frames.frames());
         let rate = self.scene.time_grid().frames_per_second;
-        let show = Show::new(&self.simulation, frames, rate);
+        let show = Show::new(&self.simulation, frames, rate, wanted.style());
         let picture = || show.picture(self.simulation.positions(), self.simulation.time());
         written.add(wanted.picture, || self.write(OutputFolder::PICTURE, &picture()?));
+        let show = show.with_velocities(self.frames.velocities());
         let usd = || usd_text(&show.tracks(), rate);
         written.add(wanted.usd, || self.write(OutputFolder::USD, usd().as_bytes()));
         let gltf = || animation_glb(&show.tracks(), rate);
         written.add(wanted.gltf, || self.write(OutputFolder::ANIMATION, &gltf()?));
+        for (number, part) in self.simulation.parts().iter().enumerate() {
+            let frames: Vec<_> = frames.iter().map(|frame| &frame[part.vertices.clone()]).collect();
+            written.add(wanted.pc2, || self.write_cache(number, "pc2", &pc2_bytes(&frames)));
+            written.add(wanted.mdd, || self.write_cache(number, "mdd", &mdd_bytes(&frames, rate)));
+        }
+    }
+
+    /// Writes a point cache of a part, named after it.
+    fn write_cache(&self, part: usize, extension: &str, contents: &[u8]) -> Result<PathBuf, RunError> {
+        let parts = self.simulation.parts();
+        let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_");
+        let name = plain(&parts[part].name);
+        // Names that differ in other characters only get their number.
+        let is_unique = parts.iter().filter(|other| plain(&other.name) == name).count() == 1;
+        let name = if is_unique { name } else { format!("{name}_{part}") };
+        Ok(self.folder.write_cache(&format!("{name}.{extension}"), contents)?)
     }
 }

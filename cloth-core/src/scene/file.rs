@@ -145,7 +145,9 @@ impl TryFrom<File> for Scene {
             (Some(mesh), Some(fabric)) => {
                 let placement = Placement::default();
                 let (velocity, spin) = ([0.0; 3], [0.0; 3]);
-                let only = Garment { name: None, mesh, fabric, warp: None, placement, velocity, spin };
+                let (warp, rest, rest_scale, inflation) = (None, None, Vec::new(), None);
+                let name = None;
+                let only = Garment { name, mesh, fabric, warp, rest, rest_scale, inflation, placement, velocity, spin };
                 garments.insert(0, only);
             }
             (Some(_), None) => return Err("missing field `fabric`, the material of the mesh".to_owned()),

@@ -1,17 +1,13 @@
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use energy_dsl::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::rest_shape::{RestScale, RestShape};
 use crate::bounded::{Direction, MaybeReal, NonNegative, Number, Positive, Real, Reals, Speed};
 use crate::fabric::{Fabric, MaybeWarpChoice};
-use crate::geometry::{Pose, cross, subtract};
-use crate::mesh::{
-    CornerAttributes, Disc, MeshError, ObjError, ObjOptions, PleatsError, Sheet, SpringNetwork, Strip, Topology,
-    TriangleMesh, Warp, read_obj_surface,
-};
+use crate::geometry::Pose;
+use crate::mesh::{Disc, Sheet, Strip, Warp};
 
 /// A piece of cloth.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -30,6 +26,15 @@ pub struct Garment {
     /// that of the fabric.
     #[serde(default, with = "MaybeWarpChoice")]
     pub warp: Option<Warp>,
+    /// Rest shape: the table `obj` or `uv`. Default that of `mesh`.
+    #[serde(default)]
+    pub rest: Option<RestShape>,
+    /// Factors that shrink or stretch the rest shape, by group. Default none.
+    #[serde(default)]
+    pub rest_scale: Vec<RestScale>,
+    /// Overpressure inside, for a closed mesh. Default none.
+    #[serde(default)]
+    pub inflation: Option<Inflation>,
     /// Initial placement. Default as built.
     #[serde(default)]
     pub placement: Placement,
@@ -63,6 +68,26 @@ pub enum Mesh {
         #[serde(default, with = "MaybeReal::<NonNegative>")]
         weld: Option<f64>,
     },
+}
+
+/// Overpressure inside a closed mesh, whose corners run anticlockwise seen from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Inflation {
+    /// Overpressure, in Pa.
+    #[serde(with = "Real::<Number>")]
+    pub pressure: f64,
+    /// Time in which the pressure rises from 0, linearly, in s. Default 0: at once.
+    #[serde(default, with = "Real::<NonNegative>")]
+    pub rise: f64,
+}
+
+impl Inflation {
+    /// Returns the pressure at a time in s, in Pa.
+    #[must_use]
+    pub fn at(&self, time: f64) -> f64 {
+        if time < self.rise { self.pressure * (time / self.rise).max(0.0) } else { self.pressure }
+    }
 }
 
 /// Scales, then rotates, then translates. Scaling also scales the rest shape.
@@ -108,79 +133,5 @@ impl Placement {
     pub fn pose(&self) -> Pose {
         let rotation = self.rotate.map_or(Pose::IDENTITY, |turn| Pose::rotation(turn.axis, turn.angle, [0.0; 3]));
         rotation.translated(self.translate)
-    }
-}
-
-/// A mesh that cannot be built.
-#[derive(Debug, thiserror::Error)]
-pub enum MeshSourceError {
-    /// The OBJ file is invalid.
-    #[error(transparent)]
-    Obj(#[from] ObjError),
-    /// A built-in or scaled mesh is invalid.
-    #[error("mesh: {0}")]
-    Built(#[from] MeshError),
-    /// The pleats of a sheet are too deep.
-    #[error("mesh.sheet.pleats: {0}")]
-    Pleats(#[from] PleatsError),
-}
-
-/// The shape of a garment.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shape {
-    /// The rest mesh.
-    pub mesh: TriangleMesh,
-    /// Initial positions, in m.
-    pub start: Vec<Vector3<f64>>,
-    /// Initial velocities, in m/s.
-    pub velocities: Vec<Vector3<f64>>,
-    /// The vertex pairs that a mass–spring fabric joins.
-    pub springs: SpringNetwork,
-    /// Attributes of the corners, from an OBJ file.
-    pub corners: CornerAttributes,
-    /// The vertices of each group of an OBJ file.
-    pub groups: BTreeMap<String, Vec<usize>>,
-    /// Number of vertices that were merged with another one; `None` unless the garment comes from an OBJ file.
-    pub welded: Option<usize>,
-}
-
-impl Garment {
-    /// Builds the shape. Relative paths refer to `folder`.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be read or the mesh is invalid.
-    pub fn shape(&self, folder: &Path) -> Result<Shape, MeshSourceError> {
-        let sheet = match &self.mesh {
-            Mesh::Sheet(sheet) => Some(*sheet),
-            Mesh::Strip(strip) => Some(strip.sheet()),
-            Mesh::Disc(_) | Mesh::Obj { .. } => None,
-        };
-        let (mut corners, mut groups, mut welded) = (CornerAttributes::default(), BTreeMap::new(), None);
-        let mesh = match &self.mesh {
-            Mesh::Sheet(sheet) => sheet.mesh()?,
-            Mesh::Strip(strip) => strip.sheet().mesh()?,
-            Mesh::Disc(disc) => disc.mesh()?,
-            Mesh::Obj { path, groups: chosen, weld } => {
-                let options = ObjOptions { groups: chosen.as_deref(), weld: *weld };
-                let surface = read_obj_surface(&folder.join(path), options)?;
-                (corners, groups, welded) = (surface.corners, surface.groups, Some(surface.welded));
-                surface.mesh
-            }
-        };
-        let initial = sheet.map_or_else(|| Ok(mesh.vertices().to_vec()), |sheet| sheet.start())?;
-        let springs = match &sheet {
-            Some(sheet) => SpringNetwork::of_sheet(sheet),
-            None => SpringNetwork::of_mesh(&Topology::of(&mesh)),
-        };
-        let Placement { scale, translate, .. } = self.placement;
-        let mesh = if scale == 1.0 { mesh } else { mesh.scaled(scale)? };
-        let pose = self.placement.pose();
-        let start: Vec<Vector3<f64>> = initial.iter().map(|p| pose.transform(p.map(|c| scale * c))).collect();
-        let velocity = |p: &Vector3<f64>| -> Vector3<f64> {
-            let turning = cross(self.spin, subtract(*p, translate));
-            std::array::from_fn(|axis| self.velocity[axis] + turning[axis])
-        };
-        let velocities = start.iter().map(velocity).collect();
-        Ok(Shape { mesh, velocities, start, springs, corners, groups, welded })
     }
 }

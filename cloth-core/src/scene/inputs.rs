@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Mesh, Scene};
+use super::{Mesh, RestShape, Scene};
 use crate::fabric::Material;
 
 impl Scene {
@@ -13,12 +13,16 @@ impl Scene {
             Mesh::Obj { path, .. } => Some(self.folder.join(path)),
             _ => None,
         });
+        let rests = self.garments.iter().filter_map(|garment| match &garment.rest {
+            Some(RestShape::Obj(rest)) => Some(self.folder.join(&rest.path)),
+            _ => None,
+        });
         let materials = self.garments.iter().filter_map(|garment| match &garment.fabric.material {
             Material::File(declared) => Some(declared.path.clone()),
             _ => None,
         });
         let obstacles = self.obstacles.iter().filter_map(|one| one.mesh_path().map(|path| self.folder.join(path)));
-        let mut paths: Vec<PathBuf> = meshes.chain(materials).chain(obstacles).collect();
+        let mut paths: Vec<PathBuf> = meshes.chain(rests).chain(materials).chain(obstacles).collect();
         paths.sort();
         paths.dedup();
         paths

@@ -25,4 +25,28 @@ pub struct Seam {
     /// Damping k_d of a stitch, in N s/m: the force −k_d (v_P − v_Q). Default 0.
     #[serde(default, with = "Real::<NonNegative>")]
     pub damping: f64,
+    /// Closes the seam over time: the rest length of each stitch shrinks linearly from its length at the start to 0.
+    /// Default: the rest length is 0 from the start on.
+    #[serde(default)]
+    pub close: Option<Closing>,
+}
+
+/// When a seam closes.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Closing {
+    /// Time at which the seam begins to close, in s. Default 0.
+    #[serde(default, with = "Real::<NonNegative>")]
+    pub start: f64,
+    /// Time that the seam takes to close, in s.
+    #[serde(with = "Real::<Positive>")]
+    pub duration: f64,
+}
+
+impl Closing {
+    /// Returns the open part of the seam at a time in s: 1 before it begins to close, 0 once it is closed.
+    #[must_use]
+    pub fn open_part(&self, time: f64) -> f64 {
+        (1.0 - (time - self.start) / self.duration).clamp(0.0, 1.0)
+    }
 }

@@ -24,7 +24,7 @@ pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
 /// Returns the pinned vertices that start within reach of an obstacle, or inside. They are held there: their features
 /// do not collide with it.
 pub(super) fn held(model: &Model) -> BTreeSet<(u32, usize)> {
-    let pinned: Vec<usize> = (0..model.x.len()).filter(|&vertex| model.pinned[vertex]).collect();
+    let pinned: Vec<usize> = (0..model.x.len()).filter(|&vertex| model.pinned_at_start[vertex]).collect();
     let near = |(number, obstacle): (usize, &Obstacle)| {
         let solid = obstacle.at(0.0);
         let is_near = |vertex: &&usize| solid.signed_distance(model.x[**vertex]) < obstacle.thickness;
@@ -56,7 +56,7 @@ pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool)
     let held_here =
         |(vertex, obstacle): (u32, usize)| local[vertex as usize].map(|place| (energy_solve::index(place), obstacle));
     let participants = Participants {
-        is_free: (0..x.len()).map(|vertex| island.body().system.dofs().place(vertex).is_some()).collect(),
+        is_free: (0..x.len()).map(|place| vertices.get(place).is_some_and(|&own| !model.pinned_forever[own])).collect(),
         radii: all.map(|thickness| 0.5 * scale * thickness).collect(),
         gap: GAP * scale * thickest,
         obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
@@ -77,7 +77,8 @@ fn check_sides(island: &Island, model: &Model) -> Result<(), ContactError> {
     for obstacle in &model.obstacles {
         let solid: AnySolid = obstacle.at(0.0);
         let depth = |&vertex: &usize| (vertex, -solid.signed_distance(body.x[vertex]));
-        let inside: Vec<_> = body.system.dofs().free().iter().map(depth).filter(|(_, depth)| *depth > 0.0).collect();
+        let free = body.system.dofs().free().iter().filter(|&&place| !model.pinned_at_start[island.vertices()[place]]);
+        let inside: Vec<_> = free.map(depth).filter(|(_, depth)| *depth > 0.0).collect();
         if let Some(&(vertex, depth)) = inside.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
             let (obstacle, vertex) = (obstacle.name.clone(), island.vertices()[vertex]);
             return Err(ContactError::Inside { obstacle, count: inside.len(), vertex, depth });

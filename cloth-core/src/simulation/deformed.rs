@@ -47,14 +47,16 @@ fn elements(part: &Part, x: &[Vector3<f64>]) -> Vec<MostDeformed> {
     };
     match &part.kind {
         PartKind::Cloth(mesh) => {
-            let rest = |a: usize, b: usize| norm(subtract(mesh.vertices()[a], mesh.vertices()[b]));
-            let triangle = |(index, &[a, b, c]): (usize, &[usize; 3])| {
-                let stretches = [(a, b), (b, c), (c, a)].map(|(p, q)| length(p, q) / rest(p, q));
-                (index, vec![a, b, c], stretches.into_iter().fold(0.0, f64::max))
+            let triangle = |(index, corners): (usize, &[usize; 3])| {
+                let rest = mesh.corners(index);
+                let stretch =
+                    |from: usize, to: usize| length(corners[from], corners[to]) / norm(subtract(rest[from], rest[to]));
+                let stretches = [stretch(0, 1), stretch(1, 2), stretch(2, 0)];
+                (index, corners.to_vec(), stretches.into_iter().fold(0.0, f64::max))
             };
             mesh.triangles().iter().enumerate().map(triangle).map(element).collect()
         }
-        PartKind::Hair { joints, segment } => {
+        PartKind::Hair { joints, segment, .. } => {
             let ends = (1..part.vertices.len()).filter(|end| end % joints != 0).enumerate();
             ends.map(|(index, end)| (index, vec![end - 1, end], length(end - 1, end) / segment)).map(element).collect()
         }

@@ -1,6 +1,6 @@
 use energy_dsl::{Element, Vector3};
 use energy_elements::WindDrag;
-use energy_solve::{ContactMemory, EvaluationError, State, StepStart, System, SystemError};
+use energy_solve::{ContactMemory, EvaluationError, PlacedTerm, State, StepStart, System, SystemError};
 use serde::{Deserialize, Serialize};
 
 use super::prescribed::Prescribed;
@@ -9,7 +9,7 @@ use crate::body::Body;
 use crate::bounded::SPEED_OF_LIGHT;
 use crate::contact::Obstacle;
 use crate::integrator::{Integrator, IntegratorMemory, StepError, StepReport};
-use crate::ledger::Account;
+use crate::ledger::{Account, DrivenEnergies};
 use crate::model::{IslandModel, Model, MovingPin};
 use crate::scene::Scene;
 
@@ -32,6 +32,8 @@ pub struct Island {
     /// `None` if islands never sleep.
     stillness: Option<Stillness>,
     sleep: SleepState,
+    /// Histories of the terms at the start of the current step; empty between steps.
+    histories: Vec<Vec<f64>>,
 }
 
 /// The state of an island that its motion depends on, other than positions and velocities.
@@ -43,6 +45,9 @@ pub struct SavedIsland {
     /// The bristles of friction in certified contact: names of pairs, and their vectors.
     #[serde(default)]
     bristles: (Vec<[u32; 3]>, Vec<[Vector3<f64>; 2]>),
+    /// The histories of the terms, such as plastic strains.
+    #[serde(default)]
+    histories: Vec<Vec<f64>>,
 }
 
 impl Island {
@@ -68,7 +73,20 @@ impl Island {
         let in_gusts = in_wind && scene.wind.as_ref().is_some_and(|wind| !wind.gusts.is_empty());
         let (integrator, sleep) = (scene.stepper(), SleepState::AWAKE);
         let (moving, motions) = (Vec::new(), Vec::new());
-        Ok(Self { vertices, labels, body, prescribed, integrator, moving, motions, in_gusts, stillness, sleep })
+        let histories = Vec::new();
+        Ok(Self {
+            vertices,
+            labels,
+            body,
+            prescribed,
+            integrator,
+            moving,
+            motions,
+            in_gusts,
+            stillness,
+            sleep,
+            histories,
+        })
     }
 
     /// Adds a moving pin, whose vertex is an index within the island.
@@ -134,7 +152,11 @@ impl Island {
 
     /// Whether gusts, a moving pin or a nearby moving obstacle act on the island.
     fn is_disturbed(&self, context: &StepContext<'_>, bounds: &BoundingSphere) -> bool {
-        self.in_gusts || context.moves_any_of(&self.motions) || context.may_touch(bounds)
+        let varies = |term: &dyn PlacedTerm| term.varies(context.time, context.end);
+        self.in_gusts
+            || context.moves_any_of(&self.motions)
+            || context.may_touch(bounds)
+            || self.body.system.terms().any(|(term, _)| varies(term))
     }
 
     /// Takes one step. If an account is given, returns the account after the step.
@@ -144,6 +166,7 @@ impl Island {
         account: Option<&Account>,
     ) -> Result<(StepReport, Option<Account>), StepError> {
         let dt = context.dt;
+        self.histories = self.body.system.histories();
         for pin in &self.moving {
             let target = context.motions[pin.motion].pose(context.end).transform(pin.initial);
             let here = self.body.x[pin.vertex];
@@ -152,12 +175,15 @@ impl Island {
         self.move_obstacles([context.time, context.end]);
         self.begin_step(context.time, dt)?;
         let own = self.vertices.len();
-        let opening = account.map(|_| Account::begin(&self.body, own, self.obstacle_power(context, false)));
+        let opening = account.map(|account| account.begin(&self.body, own, self.obstacle_power(context, false)));
         let report = self.integrator.step(&mut self.body, dt)?;
         check_speeds(&self.body.v[..own])?;
-        let after = account
-            .zip(opening)
-            .map(|(account, opening)| account.after(&self.body, &opening, self.obstacle_power(context, true), dt));
+        let strained = account.map(|_| DrivenEnergies::of(&self.body));
+        let Body { x, v, system, .. } = &mut self.body;
+        system.end_step(State { x, v })?;
+        let after = account.zip(opening).zip(strained).map(|((account, opening), strained)| {
+            account.after(&self.body, &opening, &strained, self.obstacle_power(context, true), dt)
+        });
         self.place_obstacles(context.end);
         Ok((report, after.transpose()?))
     }
@@ -221,16 +247,28 @@ impl Island {
     pub(super) fn save(&self) -> SavedIsland {
         let ContactMemory { names, vectors } = self.body.system.contact_memory(&self.body.x);
         let bristles = (names, vectors);
-        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone(), bristles }
+        let histories = self.body.system.histories();
+        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone(), bristles, histories }
     }
 
     pub(super) fn restore(&mut self, saved: SavedIsland) {
         self.integrator.restore(saved.integrator);
         self.sleep = saved.sleep;
+        self.body.system.restore_histories(&saved.histories);
         if let Some((contact, _)) = self.body.system.contact() {
             let (names, vectors) = saved.bristles;
             contact.restore(ContactMemory { names, vectors });
         }
+    }
+
+    /// Keeps the last step, now that it has succeeded everywhere.
+    pub(super) fn keep_step(&mut self) {
+        self.histories.clear();
+    }
+
+    /// Restores the histories of the terms at the start of the last step, which failed elsewhere.
+    pub(super) fn forget_step(&mut self) {
+        self.body.system.restore_histories(&std::mem::take(&mut self.histories));
     }
 
     /// Copies positions and velocities from the scene.

@@ -5,6 +5,7 @@ mod deformed;
 mod island;
 mod obstacle_crossings;
 mod prescribed;
+mod release;
 mod saved;
 mod sleep;
 mod summary;
@@ -12,6 +13,7 @@ mod totals;
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
@@ -35,6 +37,8 @@ use crate::motion::Motion;
 use crate::scene::{ContactChoice, Scene};
 use collision::add_contact;
 use prescribed::Prescribed;
+pub(crate) use release::Extension;
+use release::Releases;
 use sleep::StepContext;
 
 /// A scene that cannot be set up, or a step that failed.
@@ -52,6 +56,17 @@ pub enum SimulationError {
     /// The initial state cannot be evaluated.
     #[error("at the start: {0}")]
     Start(#[from] EvaluationError),
+    /// Pins cannot let go.
+    #[error("cannot release pins at t = {time:.4} s: {source}")]
+    Release {
+        /// The time, in s.
+        time: f64,
+        /// The reason.
+        source: Box<SimulationError>,
+    },
+    /// A state cannot be restored.
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
     /// A step failed.
     #[error(
         "step {step} (t = {time:.4} s){}: {source}",
@@ -101,6 +116,12 @@ pub struct Simulation {
     ledger: Option<Ledger>,
     /// Evaluation counts per label up to the checkpoint that this simulation resumed from.
     earlier: Vec<Counts>,
+    /// The pins that let go during the simulation; `None` if none does.
+    releases: Option<Arc<Releases>>,
+    /// The number of releases so far.
+    released: usize,
+    /// The limit of threads; `None` for one per core.
+    threads: Option<usize>,
 }
 
 impl Simulation {
@@ -109,11 +130,21 @@ impl Simulation {
     /// # Errors
     /// Returns an error if a mesh, a fabric, a pin, a seam or an obstacle of the scene is invalid.
     pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
-        Self::from_model(scene, Model::new(scene)?)
+        Self::extended(scene, None)
+    }
+
+    /// Creates a simulation of a scene with something more in its model.
+    pub(crate) fn extended(scene: &Scene, extension: Option<&Extension>) -> Result<Self, SimulationError> {
+        let mut model = Model::new(scene)?;
+        extension.iter().for_each(|extend| extend(&mut model));
+        let mut simulation = Self::assembled(scene, model)?;
+        simulation.releases = Releases::of(scene, extension);
+        simulation.released = simulation.releases.as_ref().map_or(0, |releases| releases.done_by(0.0));
+        Ok(simulation)
     }
 
     /// Creates a simulation from the assembled model of a scene.
-    pub(crate) fn from_model(scene: &Scene, mut model: Model) -> Result<Self, SimulationError> {
+    fn assembled(scene: &Scene, mut model: Model) -> Result<Self, SimulationError> {
         let strands = model.strands().collect();
         let islands = create_islands(scene, &mut model)?;
         let summary = Summary::at_start(scene, &model, islands.len());
@@ -144,6 +175,9 @@ impl Simulation {
             ledger: None,
             earlier: vec![Counts::default(); labels.len()],
             labels,
+            releases: None,
+            released: 0,
+            threads: None,
         };
         simulation.warn_of_unstable_step()?;
         simulation.warn_of_vertices_inside_obstacles();
@@ -160,6 +194,7 @@ impl Simulation {
 
     /// Limits the number of threads of the next steps; see [`Simulation::with_threads`].
     pub(crate) fn set_threads(&mut self, threads: usize) {
+        self.threads = Some(threads);
         self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
     }
 
@@ -297,6 +332,7 @@ impl Simulation {
     pub fn step(&mut self) -> Result<StepReport, SimulationError> {
         let start = Instant::now();
         let step = self.steps_done() + 1;
+        self.release_pins(self.time())?;
         let (report, slept) = self.step_islands(step).map_err(|source| {
             self.roll_back();
             let deformed = deformed::most_deformed(&self.parts, &self.x, &source).map(Box::new);
@@ -333,6 +369,7 @@ impl Simulation {
                 let passage = obstacle.passages([context.time, context.end], island.moves(x));
                 passage.into_iter().for_each(|passage| summary.totals.note(passage));
             }
+            island.keep_step();
             island.scatter(x, v);
         }
         ledger.iter_mut().for_each(|ledger| ledger.enter(context.end));
@@ -342,7 +379,10 @@ impl Simulation {
     /// Discards the changes of a failed step.
     fn roll_back(&mut self) {
         let Self { islands, x, v, ledger, .. } = self;
-        islands.iter_mut().filter(|island| !island.is_asleep()).for_each(|island| island.gather(x, v));
+        for island in islands.iter_mut().filter(|island| !island.is_asleep()) {
+            island.forget_step();
+            island.gather(x, v);
+        }
         ledger.iter_mut().for_each(Ledger::forget);
     }
 

@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn moving_obstacles_have_a_frame_after_all_cores() {
         let keys = vec![Key::default(), Key { time: 1.0, angle: 90.0, translate: [0.0, 0.0, 3.0] }];
-        let motion = Motion { axis: [0.0, 0.0, 1.0], centre: [0.0; 3], keys };
+        let motion = Motion { keys, ..Motion::default() };
         let ball = |motion| obstacle(AnySolid::Ball(Ball { centre: [1.0, 0.0, 0.0], radius: 0.1 }), motion);
         let obstacles = [ball(Some(motion)), ball(None)];
         let prescribed = Prescribed::new(&obstacles);

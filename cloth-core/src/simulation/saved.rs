@@ -3,7 +3,7 @@ use energy_solve::{Counts, EvaluationError, Tally};
 use serde::{Deserialize, Serialize};
 
 use super::island::{Island, SavedIsland};
-use super::{Simulation, Totals};
+use super::{Simulation, SimulationError, Totals};
 use crate::ledger::Ledger;
 
 /// The complete state of a simulation, from which it can resume bit-identically.
@@ -77,6 +77,12 @@ pub enum RestoreError {
         /// Vertices of the saved state.
         found: usize,
     },
+    /// The scene cannot be assembled without the pins that have let go.
+    #[error("cannot release pins: {source}")]
+    Release {
+        /// The reason.
+        source: Box<SimulationError>,
+    },
     /// A term cannot be evaluated at the saved state.
     #[error("cannot evaluate the saved state: {source}")]
     Unfit {
@@ -107,6 +113,18 @@ impl Simulation {
     /// # Errors
     /// Returns an error if the state belongs to a different scene, or a term cannot be evaluated there.
     pub fn restore(&mut self, saved: SavedState) -> Result<(), RestoreError> {
+        if saved.totals.steps > 0 {
+            // The pins are those of the last step.
+            let time = self.just_after((saved.totals.steps - 1) as f64 * self.dt);
+            if !self.is_assembled_for(time) {
+                self.assemble_for(time).map_err(|source| RestoreError::Release { source: Box::new(source) })?;
+            }
+        }
+        self.restore_state(saved)
+    }
+
+    /// Restores a state of the scene as it is assembled.
+    pub(super) fn restore_state(&mut self, saved: SavedState) -> Result<(), RestoreError> {
         self.check_scene(&saved)?;
         (self.x, self.v) = (saved.x, saved.v);
         self.ledger = saved.ledger;

@@ -183,7 +183,7 @@ mod tests {
         let obstacle = Obstacle {
             name: "ball".to_owned(),
             solid: AnySolid::Ball(Ball { centre: [0.0; 3], radius: 1.0 }),
-            motion: Some(Motion { axis: [0.0, 0.0, 1.0], centre: [0.0; 3], keys }),
+            motion: Some(Motion { keys, ..Motion::default() }),
             thickness: 0.1,
             stiffness: 1.0,
             friction: 0.0,

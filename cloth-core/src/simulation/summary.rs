@@ -87,7 +87,7 @@ impl Summary {
     pub(super) fn at_start(scene: &Scene, model: &Model, islands: usize) -> Self {
         Self {
             vertices: model.pinned.len(),
-            pinned: model.pinned.iter().filter(|&&pinned| pinned).count(),
+            pinned: model.pinned_at_start.iter().filter(|&&pinned| pinned).count(),
             triangles: model.triangles.len(),
             islands,
             integrator: scene.stepper().name().to_owned(),

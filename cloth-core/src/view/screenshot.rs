@@ -34,7 +34,12 @@ pub fn screenshot(
     let colours: Vec<[f32; 3]> = values.iter().map(|&value| colour(value, most)).collect();
     let look = Look { colours: (colouring != Colouring::Plain).then_some(&colours), wireframe };
     let frames = [stage.positions().to_vec()];
-    let show = Show::new(stage.simulation(), &frames, stage.scene().time_grid().frames_per_second);
+    let show = Show::new(
+        stage.simulation(),
+        &frames,
+        stage.scene().time_grid().frames_per_second,
+        stage.scene().output.style(),
+    );
     let png = show.picture_with(stage.positions(), stage.time(), &look)?;
     Ok(Screenshot { png, time: stage.time(), legend: colouring.legend(most) })
 }

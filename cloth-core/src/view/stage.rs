@@ -1,4 +1,5 @@
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
@@ -9,7 +10,7 @@ use crate::model::{Model, ModelError};
 use crate::output::OutputFolder;
 use crate::run::{Record, RecordError};
 use crate::scene::{Scene, SceneError};
-use crate::simulation::{Simulation, SimulationError};
+use crate::simulation::{Extension, Simulation, SimulationError};
 
 /// A scene or run that cannot be viewed.
 #[derive(Debug, thiserror::Error)]
@@ -108,13 +109,16 @@ impl Stage {
     }
 
     fn live(scene: Scene) -> Result<Self, ViewError> {
-        let mut model = Model::new(&scene)?;
-        let grip = Grip::carrying(&model.masses);
-        for island in &mut model.islands {
-            grip.add_to(island, model.labels.len());
-        }
-        model.labels.push(Grip::label());
-        let simulation = Simulation::from_model(&scene, model)?;
+        let grip = Grip::carrying(&Model::new(&scene)?.masses);
+        let extension: Extension = {
+            let grip = grip.clone();
+            Arc::new(move |model: &mut Model| {
+                let label = model.labels.len();
+                model.islands.iter_mut().for_each(|island| grip.add_to(island, label));
+                model.labels.push(Grip::label());
+            })
+        };
+        let simulation = Simulation::extended(&scene, Some(&extension))?;
         let rest = RestShape::of(&simulation);
         Ok(Self { scene, simulation, rest, act: Act::Live { grip }, playing: true, due: 0.0 })
     }

@@ -241,6 +241,33 @@ impl System {
         Ok(())
     }
 
+    /// Notifies every term of the end of a step; see [`PlacedTerm::end_step`].
+    ///
+    /// # Errors
+    /// If the state is incomplete or not finite.
+    pub fn end_step(&mut self, end: State<'_>) -> Result<(), EvaluationError> {
+        self.check(end)?;
+        if self.terms.iter().any(|counted| counted.term.is_driven()) {
+            self.evaluated_at.clear();
+            self.terms.iter_mut().for_each(|counted| counted.term.end_step(end));
+        }
+        Ok(())
+    }
+
+    /// Returns the history of each term; see [`PlacedTerm::history`].
+    #[must_use]
+    pub fn histories(&self) -> Vec<Vec<f64>> {
+        self.terms.iter().map(|counted| counted.term.history()).collect()
+    }
+
+    /// Restores what [`System::histories`] returned for a system with the same terms.
+    pub fn restore_histories(&mut self, histories: &[Vec<f64>]) {
+        self.evaluated_at.clear();
+        for (counted, history) in self.terms.iter_mut().zip(histories).filter(|(_, history)| !history.is_empty()) {
+            counted.term.restore_history(history);
+        }
+    }
+
     /// Returns Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v. For drag proportional to
     /// velocity, R is half the dissipated power. Terms without dissipation are not evaluated.
     ///

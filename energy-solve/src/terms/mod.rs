@@ -20,7 +20,7 @@ pub use element_list::{ElementList, ListError};
 pub use force_term::ForceTerm;
 pub use linearisation::{Linearisation, Weights};
 pub use places::BlockPlaces;
-pub use potential::{DissipationLaw, DissipationTerm, PotentialTerm, TapeTerm};
+pub use potential::{DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, TapeTerm};
 pub use scatter::TriangleBuffer;
 pub use share::{Divisible, Share};
 pub use state::{State, StepStart};

@@ -77,6 +77,23 @@ pub trait PlacedTerm: TermDescription {
     }
     /// Updates what stays fixed over a step, such as the normal force of friction or the pose of an obstacle.
     fn begin_step(&mut self, _start: StepStart<'_>) {}
+    /// Advances the history, such as plastic strains, at the end of a step.
+    fn end_step(&mut self, _end: State<'_>) {}
+    /// Whether the energy at fixed positions may change at the start or the end of a step. That change is work done on
+    /// the body.
+    fn is_driven(&self) -> bool {
+        false
+    }
+    /// Whether the energy at fixed positions changes between two times, in s, without a change of the history.
+    fn varies(&self, _from: f64, _to: f64) -> bool {
+        false
+    }
+    /// Returns the history, from which [`PlacedTerm::restore_history`] restores the term; empty for a term without one.
+    fn history(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    /// Restores a history. It takes effect with the next [`PlacedTerm::begin_step`].
+    fn restore_history(&mut self, _history: &[f64]) {}
     /// Returns Rayleigh's dissipation function R(x, v), in W, with f(x, v) − f(x, 0) = −∂R/∂v. For a force proportional
     /// to velocity, R is half the dissipated power. `None` if the force does not depend on velocity.
     fn dissipation(&self, _state: State<'_>) -> Option<(f64, Tally)> {

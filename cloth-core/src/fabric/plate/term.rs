@@ -13,6 +13,7 @@ use energy_solve::{
 use super::assembly::{CurvedPart, OuterProducts};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
+use crate::fabric::plasticity::{angle_of_curvature, flow};
 use crate::geometry::dot;
 use crate::mesh::Warp;
 use crate::mesh::{Topology, TriangleMesh};
@@ -28,6 +29,8 @@ pub struct PlateTerm {
     name: String,
     pub(super) hinges: Vec<[usize; 4]>,
     rest: Vec<f64>,
+    /// The largest |θ − θ̄| of each hinge; `None` if hinges do not yield.
+    limits: Option<Vec<f64>>,
     pub(super) patches: Vec<Patch>,
     /// Vertices of the patches, padded to the same number by repeating the first.
     stencils: Vec<u32>,
@@ -98,7 +101,7 @@ impl PlateTerm {
         let topology = Topology::of(mesh);
         let hinges: Vec<[usize; 4]> = topology.hinges.iter().map(|hinge| hinge.vertices).collect();
         let angle = ArcAngle::<f64>::new();
-        let rest = hinges.iter().map(|hinge| angle.value(&hinge.map(|vertex| mesh.vertices()[vertex])).value).collect();
+        let rest = topology.hinges.iter().map(|hinge| angle.value(&mesh.hinge_at_rest(hinge)).value).collect();
         let woven = matches!(rigidity, Rigidity::Orthotropic { .. });
         let curvatures = curvatures(mesh, &topology, woven.then(|| warp.into()))?;
         let patches: Vec<Patch> = curvatures.iter().filter_map(|one| Patch::new(one, &factor, &hinges)).collect();
@@ -112,6 +115,7 @@ impl PlateTerm {
             name: name.into(),
             hinges,
             rest,
+            limits: None,
             patches,
             stencils,
             arity,
@@ -122,6 +126,14 @@ impl PlateTerm {
             hinge_places: BlockPlaces::default(),
             found: AtomicU64::default(),
         })
+    }
+
+    /// Lets hinges yield: at the end of each step, angles at rest follow what differs from them by more than a fold of
+    /// this curvature, in 1/m. `mesh` is that of [`PlateTerm::new`].
+    #[must_use]
+    pub fn yielding(self, mesh: &TriangleMesh, curvature: f64) -> Self {
+        let limit = |hinge| angle_of_curvature(mesh, hinge, curvature);
+        Self { limits: Some(Topology::of(mesh).hinges.iter().map(limit).collect()), ..self }
     }
 
     /// Shifts the vertex indices by `first`, for a mesh that is one of several in a system.
@@ -392,6 +404,30 @@ impl PlacedTerm for PlateTerm {
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let values = self.values(x);
         Some((self.sum(&values.angles), self.tally(values.flagged)))
+    }
+
+    fn end_step(&mut self, end: State<'_>) {
+        if let Some(limits) = &self.limits {
+            let strains = self.values(end.x).angles;
+            // Other hinges were not evaluated.
+            for &hinge in &self.needed {
+                flow(&mut self.rest[hinge..=hinge], &strains[hinge..=hinge], &limits[hinge..=hinge]);
+            }
+        }
+    }
+
+    fn is_driven(&self) -> bool {
+        self.limits.is_some()
+    }
+
+    fn history(&self) -> Vec<f64> {
+        if self.limits.is_some() { self.rest.clone() } else { Vec::new() }
+    }
+
+    fn restore_history(&mut self, history: &[f64]) {
+        if history.len() == self.rest.len() {
+            self.rest.copy_from_slice(history);
+        }
     }
 
     fn energy_found(&self) -> Option<f64> {

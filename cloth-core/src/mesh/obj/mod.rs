@@ -72,6 +72,12 @@ pub struct ObjSurface {
     pub corners: CornerAttributes,
     /// The vertices of each group, object and material.
     pub groups: BTreeMap<String, Vec<usize>>,
+    /// The triangles of each group, object and material.
+    pub group_triangles: BTreeMap<String, Vec<usize>>,
+    /// For each triangle its index before welding, which closes small ones.
+    pub kept: Vec<usize>,
+    /// Number of triangles before welding.
+    pub unwelded_triangles: usize,
     /// Number of vertices that were merged with another one.
     pub welded: usize,
 }
@@ -125,6 +131,9 @@ struct Triangulation {
     corners: Vec<[Corner; 3]>,
     lines: Vec<usize>,
     groups: Vec<Vec<usize>>,
+    /// Of each triangle: its index before welding.
+    kept: Vec<usize>,
+    unwelded: usize,
     welded: usize,
 }
 
@@ -145,7 +154,8 @@ impl Triangulation {
         sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex] = place);
         let welded = used.len() - sources.len();
         let (triangles, corners, lines, groups) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut all = Self { sources, triangles, corners, lines, groups, welded };
+        let (kept, unwelded) = (Vec::new(), 0);
+        let mut all = Self { sources, triangles, corners, lines, groups, kept, unwelded, welded };
         for face in faces {
             for end in 2..face.corners.len() {
                 let corners = [face.corners[0], face.corners[end - 1], face.corners[end]];
@@ -157,7 +167,9 @@ impl Triangulation {
                     all.corners.push(corners);
                     all.lines.push(face.line);
                     all.groups.push(face.groups.clone());
+                    all.kept.push(all.unwelded);
                 }
+                all.unwelded += 1;
             }
         }
         all
@@ -167,8 +179,12 @@ impl Triangulation {
         let vertices = self.sources.iter().map(|&vertex| file.vertices[vertex]).collect();
         let corners = self.attributes(file);
         let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (triangle, names) in self.triangles.iter().zip(&self.groups) {
-            names.iter().for_each(|&name| groups.entry(file.names[name].clone()).or_default().extend(triangle));
+        let mut group_triangles: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (number, (triangle, names)) in self.triangles.iter().zip(&self.groups).enumerate() {
+            for name in names.iter().map(|&name| &file.names[name]) {
+                groups.entry(name.clone()).or_default().extend(triangle);
+                group_triangles.entry(name.clone()).or_default().push(number);
+            }
         }
         for vertices in groups.values_mut() {
             vertices.sort_unstable();
@@ -177,7 +193,9 @@ impl Triangulation {
         let mesh = TriangleMesh::new(vertices, self.triangles.clone());
         let mesh = mesh.map_err(|source| self.unfit(file, path, source))?;
         let warps = corners.uvs.as_ref().map(|uvs| mesh.warps_of(uvs));
-        Ok(ObjSurface { mesh: mesh.with_warps(warps), corners, groups, welded: self.welded })
+        let Self { kept, unwelded, welded, .. } = self;
+        let mesh = mesh.with_warps(warps);
+        Ok(ObjSurface { mesh, corners, groups, group_triangles, kept, unwelded_triangles: unwelded, welded })
     }
 
     /// Texture coordinates and normals, each only if all corners have them.

@@ -1,6 +1,7 @@
 //! Terms with f = −∇U.
 
 mod dissipation;
+mod driven;
 mod evaluated;
 mod pack_energies;
 mod placed;
@@ -13,6 +14,7 @@ use energy_dsl::tape::TapeElements;
 use energy_dsl::{Declaration, Packed, PackedPotential};
 
 pub use self::dissipation::{DissipationLaw, DissipationTerm};
+pub use self::driven::{DrivenLaw, DrivenTerm};
 use self::placed::PlacedPotentialTerm;
 use self::tapes::TapePacks;
 use crate::matrix::dof_map::DofMap;

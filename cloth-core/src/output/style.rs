@@ -1,0 +1,65 @@
+use energy_dsl::Vector3;
+
+use super::projection::Camera;
+
+/// The size, camera and background of pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Style {
+    /// Width and height, in pixels.
+    pub size: [u32; 2],
+    /// The camera; `None` to frame everything that is visible.
+    pub viewpoint: Option<Viewpoint>,
+    /// RGB colour of the background, from 0 to 1, as screens show it; `None` for a grey that darkens downwards.
+    pub background: Option<[f32; 3]>,
+}
+
+/// A camera in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// Position, in m.
+    pub eye: Vector3<f64>,
+    /// The point in the middle of the picture, in m.
+    pub target: Vector3<f64>,
+    /// Angle between the upper and the lower edge of the picture, in degrees.
+    pub angle: f64,
+}
+
+/// Direction from the cloth to the eye.
+const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
+
+impl Default for Style {
+    fn default() -> Self {
+        Self { size: [1200, 1000], viewpoint: None, background: None }
+    }
+}
+
+impl Style {
+    /// Supersampling factor: anti-aliases without seams between triangles.
+    pub(super) const OVERSAMPLING: u32 = 2;
+
+    /// Size of a picture before downsampling, in pixels.
+    fn canvas(&self) -> [f64; 2] {
+        self.size.map(|pixels| f64::from(pixels * Self::OVERSAMPLING))
+    }
+
+    /// Returns the chosen camera, or one that frames the points, with some space around them.
+    pub(super) fn camera_on(&self, points: &[Vector3<f64>]) -> Camera {
+        match self.viewpoint {
+            Some(Viewpoint { eye, target, angle }) => Camera::looking(eye, target, angle, self.canvas()),
+            None => Camera::framing(points, VIEW, self.canvas(), 0.86),
+        }
+    }
+
+    /// Whether a point lies well within the picture. A chosen camera decides what it shows.
+    pub(super) fn is_visible(&self, camera: &Camera, point: Vector3<f64>) -> bool {
+        let (place, depth) = camera.project(point);
+        let size = self.canvas();
+        self.viewpoint.is_some()
+            || depth > 0.0 && (0..2).all(|axis| (0.02..=0.98).contains(&(place[axis] / size[axis])))
+    }
+}
+
+/// Returns the linear colour of one as screens show it (sRGB).
+pub(super) fn linear(colour: [f32; 3]) -> [f32; 3] {
+    colour.map(|c| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) })
+}

@@ -1,0 +1,222 @@
+//! Soft shadows and ambient occlusion: how much of the lamp and of the surroundings each vertex sees.
+//!
+//! Depth maps are drawn from many directions, and each vertex is looked up in all of them (Williams 1978). Those around
+//! the lamp give soft shadows, those of the whole sphere the ambient occlusion.
+
+use std::f64::consts::{PI, TAU};
+
+use energy_dsl::Vector3;
+
+use crate::geometry::{Bounds, add_scaled, cross, dot, norm, subtract};
+
+/// Directions towards the lamp, spread over this angle, in radians.
+const LAMP_DIRECTIONS: usize = 12;
+const LAMP_ANGLE: f64 = 0.1;
+/// Directions of the surroundings.
+const SKY_DIRECTIONS: usize = 42;
+/// Pixels along each side of a depth map.
+const MAP: usize = 320;
+/// How far from the surface light is looked for, and how deep a shadow begins, in pixels of a depth map.
+const LIFT: f64 = 2.0;
+const BIAS: f64 = 1.5;
+
+/// Surfaces and hair that cast shadows.
+pub(super) struct Occluders<'a> {
+    pub points: &'a [Vector3<f64>],
+    pub triangles: &'a [[usize; 3]],
+    /// Segments of hair.
+    pub segments: &'a [[usize; 2]],
+}
+
+/// The seen parts of the lamp and of the surroundings, from 0 to 1: for each vertex, on its front and on its back.
+pub(super) struct Visibility {
+    pub lamp: Vec<[f32; 2]>,
+    pub sky: Vec<[f32; 2]>,
+}
+
+impl Visibility {
+    /// Computes the visibility of the first vertices, which have these unit normals.
+    pub(super) fn of(occluders: &Occluders<'_>, normals: &[Vector3<f64>], lamp: Vector3<f64>) -> Self {
+        let [lamp, sky] =
+            [lamp_directions(lamp), sphere()].map(|directions| seen_parts(occluders, normals, &directions));
+        Self { lamp, sky }
+    }
+}
+
+/// Returns the part of the directions that each vertex sees, weighted by the cosine with its normal.
+fn seen_parts(occluders: &Occluders<'_>, normals: &[Vector3<f64>], directions: &[Vector3<f64>]) -> Vec<[f32; 2]> {
+    let mut sums = vec![[[0.0_f64; 2]; 2]; normals.len()];
+    let mut map = DepthMap::over(occluders.points);
+    for &direction in directions {
+        map.draw(occluders, direction);
+        for ((sums, normal), point) in sums.iter_mut().zip(normals).zip(occluders.points) {
+            let cosine = dot(*normal, direction);
+            // The front sees this direction or the back does.
+            let (side, sign) = if cosine >= 0.0 { (0, 1.0) } else { (1, -1.0) };
+            let lifted = add_scaled(*point, sign * LIFT * map.pixel, *normal);
+            sums[side][0] += cosine.abs() * map.seen(lifted);
+            sums[side][1] += cosine.abs();
+        }
+    }
+    let part = |[seen, all]: [f64; 2]| if all > 0.0 { (seen / all) as f32 } else { 1.0 };
+    sums.into_iter().map(|sides| sides.map(part)).collect()
+}
+
+/// Unit vectors evenly spread over the sphere, on a Fibonacci spiral.
+fn sphere() -> Vec<Vector3<f64>> {
+    let direction = |number: usize| {
+        let height = 1.0 - (2 * number + 1) as f64 / SKY_DIRECTIONS as f64;
+        let (sine, cosine) = (number as f64 * PI * (3.0 - 5.0_f64.sqrt())).sin_cos();
+        let out = (1.0 - height * height).sqrt();
+        [out * cosine, out * sine, height]
+    };
+    (0..SKY_DIRECTIONS).map(direction).collect()
+}
+
+/// Unit vectors towards the parts of the lamp, evenly spread over a disc around a direction.
+pub(super) fn lamp_directions(direction: Vector3<f64>) -> Vec<Vector3<f64>> {
+    let [right, up] = across(direction);
+    let one = |number: usize| {
+        let out = LAMP_ANGLE * ((number as f64 + 0.5) / LAMP_DIRECTIONS as f64).sqrt();
+        let (sine, cosine) = (number as f64 * TAU * 0.381_966).sin_cos();
+        let tilted = add_scaled(add_scaled(direction, out * cosine, right), out * sine, up);
+        tilted.map(|component| component / norm(tilted))
+    };
+    (0..LAMP_DIRECTIONS).map(one).collect()
+}
+
+/// Returns two unit vectors perpendicular to a unit vector and to each other.
+fn across(direction: Vector3<f64>) -> [Vector3<f64>; 2] {
+    let helper = if direction[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+    let right = cross(helper, direction);
+    let right = right.map(|component| component / norm(right));
+    [right, cross(direction, right)]
+}
+
+/// The parts nearest to a distant light, seen along a direction.
+struct DepthMap {
+    centre: Vector3<f64>,
+    radius: f64,
+    /// Size of a pixel, in m.
+    pixel: f64,
+    /// To the right, up, and to the light.
+    axes: [Vector3<f64>; 3],
+    /// The largest coordinate towards the light, in m.
+    nearest: Vec<f32>,
+}
+
+impl DepthMap {
+    fn over(points: &[Vector3<f64>]) -> Self {
+        let bounds = Bounds::of(points);
+        let centre = [0, 1, 2].map(|axis| bounds.middle(axis));
+        let radius = points.iter().map(|p| norm(subtract(*p, centre))).fold(f64::MIN_POSITIVE, f64::max);
+        let pixel = 2.0 * radius / (MAP - 4) as f64;
+        Self { centre, radius, pixel, axes: [[0.0; 3]; 3], nearest: vec![f32::NEG_INFINITY; MAP * MAP] }
+    }
+
+    fn draw(&mut self, occluders: &Occluders<'_>, direction: Vector3<f64>) {
+        let [right, up] = across(direction);
+        self.axes = [right, up, direction];
+        self.nearest.fill(f32::NEG_INFINITY);
+        let places: Vec<[f64; 3]> = occluders.points.iter().map(|point| self.place(*point)).collect();
+        occluders.triangles.iter().for_each(|corners| self.triangle(corners.map(|corner| places[corner])));
+        occluders.segments.iter().for_each(|ends| self.segment(ends.map(|end| places[end])));
+    }
+
+    /// Returns the pixel and the coordinate towards the light.
+    fn place(&self, point: Vector3<f64>) -> [f64; 3] {
+        let offset = subtract(point, self.centre);
+        let [x, y, near] = self.axes.map(|axis| dot(axis, offset));
+        [(x + self.radius) / self.pixel + 2.0, (y + self.radius) / self.pixel + 2.0, near]
+    }
+
+    fn mark(&mut self, column: usize, row: usize, near: f64) {
+        if column < MAP && row < MAP {
+            let nearest = &mut self.nearest[MAP * row + column];
+            *nearest = nearest.max(near as f32);
+        }
+    }
+
+    fn triangle(&mut self, [a, b, c]: [[f64; 3]; 3]) {
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        if !area.is_normal() {
+            return;
+        }
+        let range = |axis: usize| {
+            let low = a[axis].min(b[axis]).min(c[axis]);
+            let high = a[axis].max(b[axis]).max(c[axis]);
+            ((low - 0.5).ceil().max(0.0) as usize, ((high + 0.5).ceil().max(0.0) as usize).min(MAP))
+        };
+        let (columns, rows) = (range(0), range(1));
+        for row in rows.0..rows.1 {
+            for column in columns.0..columns.1 {
+                let at = [column as f64 + 0.5, row as f64 + 0.5];
+                let weight =
+                    |p: [f64; 3], q: [f64; 3]| ((q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])) / area;
+                let parts = [weight(b, c), weight(c, a), weight(a, b)];
+                if parts.iter().all(|part| *part >= 0.0) {
+                    self.mark(column, row, parts[0] * a[2] + parts[1] * b[2] + parts[2] * c[2]);
+                }
+            }
+        }
+    }
+
+    fn segment(&mut self, [from, to]: [[f64; 3]; 2]) {
+        let steps = (to[0] - from[0]).abs().max((to[1] - from[1]).abs()).ceil().max(1.0);
+        for step in 0..=steps as usize {
+            let part = step as f64 / steps;
+            let [x, y, near] = [0, 1, 2].map(|axis| from[axis] + part * (to[axis] - from[axis]));
+            self.mark(x.max(0.0) as usize, y.max(0.0) as usize, near);
+        }
+    }
+
+    /// Returns the part of the four pixels around a point that lets the light through.
+    fn seen(&self, point: Vector3<f64>) -> f64 {
+        let [x, y, near] = self.place(point);
+        let (column, row) = ((x - 0.5).max(0.0) as usize, (y - 0.5).max(0.0) as usize);
+        let is_open = |column: usize, row: usize| {
+            let nearest = self.nearest.get(MAP * row + column).copied().unwrap_or(f32::NEG_INFINITY);
+            column >= MAP || f64::from(nearest) <= near + BIAS * self.pixel
+        };
+        let open = [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().filter(|(x, y)| is_open(column + x, row + y)).count();
+        0.25 * open as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::vertex_normals;
+
+    /// A grid of 2 m × 2 m at a height, with 21 × 21 vertices.
+    fn grid(height: f64, points: &mut Vec<Vector3<f64>>, triangles: &mut Vec<[usize; 3]>, half: f64) {
+        let first = points.len();
+        let at = |step: usize| half * (0.1 * step as f64 - 1.0);
+        points.extend((0..441).map(|n| [at(n % 21), at(n / 21), height]));
+        for cell in (0..420).filter(|cell| cell % 21 != 20) {
+            let a = first + cell;
+            triangles.extend([[a, a + 1, a + 22], [a, a + 22, a + 21]]);
+        }
+    }
+
+    #[test]
+    fn what_is_covered_lies_in_shadow_and_sees_less_of_its_surroundings() {
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        grid(0.0, &mut points, &mut triangles, 1.0);
+        grid(0.2, &mut points, &mut triangles, 0.4);
+        let normals = vertex_normals(&points, &triangles);
+        let occluders = Occluders { points: &points, triangles: &triangles, segments: &[] };
+        let Visibility { lamp, sky } = Visibility::of(&occluders, &normals, [0.0, 0.0, 1.0]);
+        let (middle, corner, cover) = (220, 0, 441 + 220);
+        assert!(lamp[middle][0] < 0.01 && lamp[corner][0] > 0.99 && lamp[cover][0] > 0.99);
+        assert!(sky[middle][0] < 0.4 && sky[corner][0] > 0.9 && sky[cover][0] > 0.9, "{:?}", sky[middle]);
+        // The underside of the cover faces the sheet; that of the sheet is free.
+        assert!(sky[cover][1] < 0.5 && sky[middle][1] > 0.9);
+        // Hair casts shadows, too.
+        let hair = [[-1.0, 0.0, 0.3], [1.0, 0.0, 0.3]];
+        let points: Vec<_> = points[..441].iter().copied().chain(hair).collect();
+        let occluders = Occluders { points: &points, triangles: &triangles[..800], segments: &[[441, 442]] };
+        let Visibility { lamp, .. } = Visibility::of(&occluders, &normals[..441], [0.0, 0.0, 1.0]);
+        assert!(lamp[middle][0] < 0.9 && lamp[middle + 3 * 21][0] > 0.99, "{:?}", lamp[middle]);
+    }
+}
