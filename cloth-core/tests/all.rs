@@ -3,6 +3,7 @@
 
 mod command_line;
 mod endings;
+mod exclusions;
 mod exported_garment;
 mod folders;
 mod frame_rates;

@@ -15,7 +15,7 @@ pub(crate) use range::{
 };
 pub(crate) use real::{Colours, Direction, MaybeReal, MaybeRealList, MaybeReals, Real, RealMap, Reals};
 pub(crate) use strict::Strict;
-pub(crate) use whole::{Count, Counts, MaybeCount, MaybeVertices, Pair, Pairs};
+pub(crate) use whole::{Count, Counts, MaybeCount, MaybePair, MaybeVertices, Pair, Pairs};
 
 use serde::de::Error;
 

@@ -70,6 +70,9 @@ pub(crate) struct Pairs;
 /// Two names.
 pub(crate) struct Pair;
 
+/// Two names; `None` if the key is missing.
+pub(crate) struct MaybePair;
+
 /// The largest index of a vertex.
 const LARGEST_INDEX: usize = u32::MAX as usize;
 
@@ -119,6 +122,12 @@ impl Pair {
     }
 }
 
+impl MaybePair {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[String; 2]>, D::Error> {
+        Pair::deserialize(deserializer).map(Some)
+    }
+}
+
 fn integer(least: usize, most: usize) -> Schema {
     json_schema!({ "type": "integer", "minimum": least, "maximum": most })
 }
@@ -134,3 +143,4 @@ described!([] Pairs, Option<Vec<[usize; 2]>>, json_schema!({
     "type": "array", "items": array(&integer(0, LARGEST_INDEX), 2)
 }));
 described!([] Pair, [String], array(&json_schema!({ "type": "string" }), 2));
+described!([] MaybePair, Option<[String; 2]>, array(&json_schema!({ "type": "string" }), 2));

@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 use energy_solve::index;
 
 use super::mesh::CollisionMesh;
-use super::{Pair, PairKind};
+use super::{Exclusions, Pair, PairKind};
 use crate::geometry::{Bounds, Hierarchy};
 
 /// Finds the pairs whose vertices may meet within given regions.
@@ -24,6 +24,8 @@ pub(crate) struct Rules {
     pub is_free: Vec<bool>,
     /// Vertices of cloth and hair that are held in an obstacle. Their features do not collide with it.
     pub held: BTreeSet<(u32, usize)>,
+    /// Pairs that the scene excludes.
+    pub exclusions: Exclusions,
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
     pub with_itself: bool,
 }
@@ -220,13 +222,18 @@ impl Search {
     fn can_collide(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
         !mesh.are_joined(a, b)
             && a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
-            && !self.rules.are_held(mesh, a, b)
+            && !self.rules.ignore(mesh, a, b)
     }
 }
 
 impl Rules {
+    /// Whether two features do not collide: an obstacle holds one of them, or the scene excludes the pair.
+    pub fn ignore(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+        self.are_held(mesh, a, b) || self.exclusions.exclude(mesh, a, b)
+    }
+
     /// Whether one of two features is an obstacle's that holds a vertex of the other.
-    pub fn are_held(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+    fn are_held(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
         if self.held.is_empty() {
             return false;
         }

@@ -8,6 +8,7 @@ use energy_elements::ZeroLengthSpring;
 use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ListError, PotentialTerm, Term};
 
 use super::closing_seam::ClosingSeam;
+use super::exclusions::{ExclusionError, Referents};
 use super::inflation::{self, PressureLaw};
 use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 use super::seam::Side;
@@ -86,6 +87,7 @@ impl<'a> Builder<'a> {
         self.inflate()?;
         self.add_wind();
         self.add_obstacles()?;
+        self.exclude()?;
         self.pin()?;
         Ok(self.model)
     }
@@ -353,6 +355,12 @@ impl<'a> Builder<'a> {
         for (island, triangles) in triangles.iter().enumerate().filter(|(_, triangles)| !triangles.is_empty()) {
             self.add_term(island, since, wind.term(triangles));
         }
+    }
+
+    fn exclude(&mut self) -> Result<(), ExclusionError> {
+        let Model { parts, obstacles, x, sewn, .. } = &self.model;
+        self.model.exclusions = Referents { parts, obstacles, x, sewn }.exclusions(&self.scene.exclusions)?;
+        Ok(())
     }
 
     fn add_obstacles(&mut self) -> Result<(), ObstacleError> {

@@ -2,12 +2,14 @@
 
 mod builder;
 mod closing_seam;
+mod exclusions;
 mod inflation;
 mod parts;
 mod pins;
 mod seam;
 mod soft_pin;
 
+pub use exclusions::ExclusionError;
 pub use inflation::NotClosed;
 pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 pub use pins::PinError;

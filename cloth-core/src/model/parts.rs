@@ -8,7 +8,8 @@ use energy_solve::{ListError, Term};
 
 use super::builder::Builder;
 use super::inflation::NotClosed;
-use super::{PinError, SeamError};
+use super::{ExclusionError, PinError, SeamError};
+use crate::collision::Exclusions;
 use crate::contact::Obstacle;
 use crate::fabric::FabricError;
 use crate::mesh::{CornerAttributes, TriangleMesh};
@@ -120,6 +121,8 @@ pub struct Model {
     pub warnings: Vec<String>,
     /// Obstacles, with their motions.
     pub obstacles: Vec<Obstacle>,
+    /// Pairs of features that do not collide.
+    pub(crate) exclusions: Exclusions,
 }
 
 /// A reference to a garment or hair that does not exist.
@@ -154,6 +157,9 @@ pub enum ModelError {
     /// A seam is invalid.
     #[error(transparent)]
     Seam(#[from] SeamError),
+    /// An exclusion is invalid.
+    #[error(transparent)]
+    Exclusion(#[from] ExclusionError),
     /// The mesh of an obstacle is invalid.
     #[error(transparent)]
     Obstacle(#[from] ObstacleError),

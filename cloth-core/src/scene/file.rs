@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
-use super::{ContactChoice, Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
+use super::{ContactChoice, Exclusion, Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
 use crate::bounded::{Count, MaybeReal, NonNegative, Number, Positive, Real, Reals};
 use crate::fabric::Fabric;
 use crate::integrator::{LinearSolverChoice, Scheme, Tolerances};
@@ -21,7 +21,10 @@ const VERSION: usize = 1;
     { "required": ["garment"], "properties": { "garment": { "minItems": 1 } } },
     { "required": ["hair"], "properties": { "hair": { "minItems": 1 } } },
 ]))]
-#[schemars(extend("if" = { "properties": { "contact": { "const": "on" } }, "required": ["contact"] }))]
+#[schemars(extend("if" = { "anyOf": [
+    { "properties": { "contact": { "const": "on" } }, "required": ["contact"] },
+    { "properties": { "exclude": { "minItems": 1 } }, "required": ["exclude"] },
+] }))]
 #[schemars(extend("then" = { "properties": { "integrator": { "const": "newton" } }, "required": ["integrator"] }))]
 pub(super) struct File {
     /// Version of the format. Default 1.
@@ -70,6 +73,9 @@ pub(super) struct File {
     /// `obstacles`.
     #[serde(default)]
     contact: Option<ContactChoice>,
+    /// Parts that do not collide with each other. Needs the integrator `newton`. Default none.
+    #[serde(default)]
+    exclude: Vec<Exclusion>,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
     /// `multigrid`, `cholesky` or `incomplete-cholesky`.
     #[serde(default)]
@@ -140,6 +146,12 @@ impl TryFrom<File> for Scene {
         if let Some(seam) = file.seams.iter().position(|seam| seam.pairs.is_some() == seam.within.is_some()) {
             return Err(format!("seams[{seam}]: expected either `pairs` or `within`"));
         }
+        if let Some(number) = file.exclude.iter().position(|exclusion| !exclusion.is_one_choice()) {
+            return Err(format!("exclude[{number}]: expected one of `between`, `closer_than` and `near_seams`"));
+        }
+        if !file.exclude.is_empty() && file.integrator != Scheme::Newton {
+            return Err("`exclude` needs `integrator = \"newton\"`, whose contact is between features".to_owned());
+        }
         let mut garments = file.garment;
         match (file.mesh, file.fabric) {
             (Some(mesh), Some(fabric)) => {
@@ -173,6 +185,7 @@ impl TryFrom<File> for Scene {
             integrator: file.integrator,
             tolerances: file.tolerances,
             contact: file.contact.unwrap_or(usual),
+            exclusions: file.exclude,
             linear_solver: file.linear_solver,
             adaptive: file.adaptive,
             sleep: file.sleep,

@@ -2,6 +2,7 @@
 
 mod contact_choice;
 mod error;
+mod exclusion;
 mod fabric_choice;
 mod file;
 mod garment;
@@ -24,6 +25,7 @@ use serde::Deserialize;
 pub use crate::fabric::Hair;
 pub use contact_choice::ContactChoice;
 pub use error::SceneError;
+pub use exclusion::Exclusion;
 pub use garment::{Garment, Inflation, Mesh, Placement, Turn};
 pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::{CameraChoice, OutputChoice};
@@ -71,6 +73,8 @@ pub struct Scene {
     pub tolerances: Tolerances,
     /// What collides.
     pub contact: ContactChoice,
+    /// Parts that do not collide with each other.
+    pub exclusions: Vec<Exclusion>,
     /// The linear solver of implicit integrators.
     pub linear_solver: LinearSolverChoice,
     /// Whether a failed step is retried with smaller sizes; see [`Adaptive`].

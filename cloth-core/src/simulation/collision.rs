@@ -61,6 +61,7 @@ pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool)
         gap: GAP * scale * thickest,
         obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
         held: held(model).into_iter().filter_map(held_here).collect(),
+        exclusions: model.exclusions.restricted(&local, vertices.len()),
         with_itself,
         mesh: own.with_obstacles(&cores),
     };

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError};
+use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError, index};
 
 pub use deformed::MostDeformed;
 pub use island::{Island, SavedIsland};
@@ -27,7 +27,7 @@ pub use totals::Totals;
 
 use crate::barrier::ContactError;
 use crate::body::Body;
-use crate::collision::{CollisionMesh, Crossing, crossings};
+use crate::collision::{CollisionMesh, Crossing, Exclusions, crossings};
 use crate::contact::Obstacle;
 use crate::integrator::{StepError, StepReport};
 use crate::ledger::Ledger;
@@ -103,6 +103,8 @@ pub struct Simulation {
     prescribed: Prescribed,
     /// Pinned vertices that start in an obstacle, with its number.
     held: BTreeSet<(u32, usize)>,
+    /// Pairs that the scene excludes.
+    exclusions: Exclusions,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
     masses: Vec<f64>,
@@ -152,7 +154,7 @@ impl Simulation {
         let prescribed = Prescribed::new(&model.obstacles);
         let obstacle_mesh = collision_mesh.clone().with_obstacles(&prescribed.cores());
         let held = collision::held(&model);
-        let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, .. } = model;
+        let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, exclusions, .. } = model;
         let mut simulation = Self {
             parts,
             triangles,
@@ -163,6 +165,7 @@ impl Simulation {
             obstacle_mesh,
             prescribed,
             held,
+            exclusions,
             x,
             v,
             masses,
@@ -231,10 +234,17 @@ impl Simulation {
         &self.obstacles
     }
 
-    /// Returns all edges of cloth and hair that touch or cross a triangle now, by an exact test.
+    /// Returns all edges of cloth and hair that touch or cross a triangle now, by an exact test. Pairs that the scene
+    /// excludes do not count.
     #[must_use]
     pub fn crossings(&self) -> Vec<Crossing> {
-        crossings(&self.collision_mesh, &self.x)
+        let (mesh, rules) = (&self.collision_mesh, self.rules());
+        let features = |Crossing { edge, triangle }: &Crossing| (edge.map(index), triangle.map(index));
+        let counts = |crossing: &Crossing| {
+            let (edge, triangle) = features(crossing);
+            !rules.ignore(mesh, &edge, &triangle)
+        };
+        crossings(mesh, &self.x).into_iter().filter(counts).collect()
     }
 
     /// The current positions of all vertices, in m.

@@ -182,8 +182,8 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
                     (#(general.#fields),*)
                 }
             };
-            let expanded = is_expanded_on_each_path(routine, routines)
-                .then(|| expanded_on_each_path(&inputs, reads, &fields));
+            let expanded =
+                is_expanded_on_each_path(routine, routines).then(|| expanded_on_each_path(&inputs, reads, &fields));
             (select, quote!(#general #expanded))
         }
     };

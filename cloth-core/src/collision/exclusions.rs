@@ -1,0 +1,114 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use energy_dsl::Vector3;
+use energy_solve::index;
+
+use super::CollisionMesh;
+use crate::geometry::{Bounds, Hierarchy, norm, subtract};
+
+/// Pairs of features that do not collide.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Exclusions {
+    /// The named sets of each vertex of cloth and hair, one bit each. Empty if no set is excluded.
+    own: Vec<u64>,
+    /// The same for each obstacle.
+    obstacles: Vec<u64>,
+    /// Pairs of sets whose features do not collide.
+    sets: Vec<[u64; 2]>,
+    /// Pairs of vertices whose features do not collide, the smaller first.
+    vertices: BTreeSet<[u32; 2]>,
+    /// The bit of each name.
+    names: BTreeMap<String, u64>,
+}
+
+/// Members of a named set.
+pub(crate) enum Members {
+    /// Vertices of cloth or hair.
+    Vertices(Vec<usize>),
+    /// An obstacle, by its index.
+    Obstacle(usize),
+}
+
+impl Exclusions {
+    /// The largest number of names.
+    pub const MOST_NAMES: usize = 64;
+
+    /// Creates the exclusions of a model of so many vertices and obstacles, which excludes nothing yet.
+    pub fn new(vertices: usize, obstacles: usize) -> Self {
+        Self { own: vec![0; vertices], obstacles: vec![0; obstacles], ..Self::default() }
+    }
+
+    /// Excludes pairs of features in which one is of the first set and the other of the second. Returns whether there
+    /// was a place for the names.
+    #[must_use]
+    pub fn add_sets(&mut self, sets: [(&str, Members); 2]) -> bool {
+        let new = sets.iter().filter(|(name, _)| !self.names.contains_key(*name)).count();
+        if self.names.len() + new > Self::MOST_NAMES {
+            return false;
+        }
+        let bits = sets.map(|(name, members)| self.set(name, members));
+        self.sets.push(bits);
+        true
+    }
+
+    /// Returns the bit of a set.
+    fn set(&mut self, name: &str, members: Members) -> u64 {
+        let next = 1 << self.names.len();
+        let bit = *self.names.entry(name.to_owned()).or_insert(next);
+        match members {
+            Members::Vertices(vertices) => vertices.into_iter().for_each(|vertex| self.own[vertex] |= bit),
+            Members::Obstacle(number) => self.obstacles[number] |= bit,
+        }
+        bit
+    }
+
+    /// Excludes pairs of features with vertices of cloth or hair that are closer than `distance` at x, in m, among those
+    /// that `counts` accepts.
+    pub fn add_close(&mut self, x: &[Vector3<f64>], distance: f64, counts: impl Fn(usize) -> bool) {
+        let some: Vec<usize> = (0..x.len()).filter(|&vertex| counts(vertex)).collect();
+        let around: Vec<Bounds> =
+            some.iter().map(|&vertex| Bounds::of(&[x[vertex]]).extended(0.5 * distance)).collect();
+        Hierarchy::new(&around).meeting_itself(|one, other| {
+            let (a, b) = (some[one], some[other]);
+            if norm(subtract(x[a], x[b])) < distance {
+                self.vertices.insert([index(a.min(b)), index(a.max(b))]);
+            }
+        });
+    }
+
+    /// Returns the exclusions among some vertices, with their new numbers.
+    pub fn restricted(&self, local: &[Option<usize>], vertices: usize) -> Self {
+        let mut own = vec![0; vertices];
+        for (sets, place) in self.own.iter().zip(local) {
+            if let Some(place) = place {
+                own[*place] = *sets;
+            }
+        }
+        let place = |vertex: u32| local[vertex as usize].map(index);
+        let renumbered = |&[a, b]: &[u32; 2]| Some([place(a)?, place(b)?]).map(|[a, b]| [a.min(b), a.max(b)]);
+        let vertices = self.vertices.iter().filter_map(renumbered).collect();
+        Self { own, obstacles: self.obstacles.clone(), sets: self.sets.clone(), vertices, names: BTreeMap::new() }
+    }
+
+    /// Whether a pair of features does not collide.
+    pub fn exclude(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+        self.exclude_sets(mesh, a, b) || self.exclude_vertices(a, b)
+    }
+
+    fn exclude_sets(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+        if self.sets.is_empty() {
+            return false;
+        }
+        let sets_at = |&vertex: &u32| match mesh.obstacle(vertex) {
+            Some(obstacle) => self.obstacles[obstacle],
+            None => self.own[vertex as usize],
+        };
+        let [a, b] = [a, b].map(|feature| feature.iter().map(sets_at).fold(u64::MAX, |all, sets| all & sets));
+        self.sets.iter().any(|[one, other]| (a & one != 0 && b & other != 0) || (b & one != 0 && a & other != 0))
+    }
+
+    fn exclude_vertices(&self, a: &[u32], b: &[u32]) -> bool {
+        let is_pair = |&p: &u32, &q: &u32| self.vertices.contains(&[p.min(q), p.max(q)]);
+        !self.vertices.is_empty() && a.iter().any(|p| b.iter().any(|q| is_pair(p, q)))
+    }
+}
