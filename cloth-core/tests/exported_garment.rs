@@ -57,6 +57,13 @@ of = "skirt"
 
 [output]
 picture = false
+velocities = true
+pc2 = true
+mdd = true
+apng = true
+size = [64, 48]
+background = [1.0, 0.0, 0.0]
+colours = [[0.5, 0.5, 1.0]]
 "#;
 
 fn run(scene: &str) -> (TempDir, String, String) {
@@ -81,6 +88,19 @@ fn an_exported_garment_is_welded_pinned_by_group_and_woven_along_its_texture() {
     let uvs = usd.split("texCoord2f[] primvars:st = [").nth(1).unwrap().split(']').next().unwrap();
     assert_eq!(uvs.matches('(').count(), 3 * 2 * AROUND * ROWS);
     assert!(usd.contains("interpolation = \"faceVarying\"") && usd.contains("normal3f[] normals.timeSamples = {"));
+
+    assert!(usd.contains("vector3f[] velocities.timeSamples = {") && usd.contains("rel material:binding = <"));
+    // The colour of the scene, linear.
+    assert!(usd.contains("color3f inputs:diffuseColor = (0.2140"), "{}", &usd[usd.len() - 900..]);
+
+    let read = |name: &str| std::fs::read(folder.path().join("out").join(name)).unwrap();
+    let (frames, size) = (3, 12 * AROUND * (ROWS + 1));
+    assert_eq!(read("caches/skirt.pc2").len(), 32 + frames * size);
+    assert_eq!(read("caches/skirt.mdd").len(), 8 + frames * (4 + size));
+    let film = read("cloth.apng");
+    let has = |part: &[u8]| film.windows(part.len()).any(|window| window == part);
+    assert!(has(b"acTL") && has(b"fdAT"));
+    assert_eq!(film[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
 
     let glb = std::fs::read(folder.path().join("out/cloth.glb")).unwrap();
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;

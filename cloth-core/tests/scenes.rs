@@ -325,7 +325,8 @@ fn contradictory_scenes_are_rejected_with_a_remedy() {
 fn the_scenes_of_the_gallery_are_valid() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
     let mut count = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
+    let folders = [folder.clone(), folder.join("garment")].map(|folder| std::fs::read_dir(folder).unwrap());
+    for entry in folders.into_iter().flatten() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "toml") {
             let scene = Scene::read(&path).unwrap_or_else(|error| panic!("{error}"));
@@ -338,5 +339,5 @@ fn the_scenes_of_the_gallery_are_valid() {
             count += 1;
         }
     }
-    assert!(count >= 9, "{count}");
+    assert!(count >= 10, "{count}");
 }

@@ -127,7 +127,7 @@ impl FloorShadow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::Style;
+    use crate::scene::Style;
 
     #[test]
     fn parts_of_the_lamp_add_up_and_overlapping_triangles_do_not() {

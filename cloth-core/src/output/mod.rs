@@ -28,7 +28,6 @@ pub(crate) use scenery::Framing;
 pub use scenery::Scenery;
 pub use show::Show;
 pub use solid_mesh::SolidMesh;
-pub use style::{Style, Viewpoint};
 pub use track::{Joined, Track};
 pub use usd::usd_text;
 

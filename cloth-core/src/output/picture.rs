@@ -7,10 +7,10 @@ use super::floor_shadow::FloorShadow;
 use super::projection::Camera;
 use super::raster::{Canvas, Corner};
 use super::solid_mesh::SolidMesh;
-use super::style::Style;
 use super::vertex_normals;
 use super::visibility::{Occluders, Visibility, lamp_directions};
 use crate::geometry::{cross, dot, norm, subtract};
+use crate::scene::Style;
 
 /// Dark and bright colours of solids and of hair.
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];

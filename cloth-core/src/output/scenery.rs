@@ -4,10 +4,11 @@ use energy_dsl::Vector3;
 
 use super::picture::{View, shadow_of};
 use super::projection::Camera;
-use super::{Look, PictureError, SolidMesh, Style, picture_png};
+use super::{Look, PictureError, SolidMesh, picture_png};
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{Bounds, dot};
 use crate::model::PartKind;
+use crate::scene::Style;
 use crate::simulation::Simulation;
 
 /// The content of pictures except positions: triangles, strands and obstacles. Owns its data, so that another thread

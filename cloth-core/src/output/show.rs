@@ -2,10 +2,11 @@ use energy_dsl::Vector3;
 
 use super::style::linear;
 use super::track::{Joined, Track};
-use super::{Framing, Look, PictureError, Scenery, SolidMesh, Style};
+use super::{Framing, Look, PictureError, Scenery, SolidMesh};
 use crate::geometry::Bounds;
 use crate::mesh::CornerAttributes;
 use crate::model::PartKind;
+use crate::scene::Style;
 use crate::simulation::Simulation;
 
 /// Colours of garments (cyclic), of hair and of solids.

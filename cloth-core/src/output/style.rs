@@ -1,37 +1,10 @@
 use energy_dsl::Vector3;
 
 use super::projection::Camera;
-
-/// The size, camera and background of pictures.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Style {
-    /// Width and height, in pixels.
-    pub size: [u32; 2],
-    /// The camera; `None` to frame everything that is visible.
-    pub viewpoint: Option<Viewpoint>,
-    /// RGB colour of the background, from 0 to 1, as screens show it; `None` for a grey that darkens downwards.
-    pub background: Option<[f32; 3]>,
-}
-
-/// A camera in space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Viewpoint {
-    /// Position, in m.
-    pub eye: Vector3<f64>,
-    /// The point in the middle of the picture, in m.
-    pub target: Vector3<f64>,
-    /// Angle between the upper and the lower edge of the picture, in degrees.
-    pub angle: f64,
-}
+use crate::scene::{Style, Viewpoint};
 
 /// Direction from the cloth to the eye.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
-
-impl Default for Style {
-    fn default() -> Self {
-        Self { size: [1200, 1000], viewpoint: None, background: None }
-    }
-}
 
 impl Style {
     /// Supersampling factor: anti-aliases without seams between triangles.

@@ -87,8 +87,8 @@ pub(super) fn lamp_directions(direction: Vector3<f64>) -> Vec<Vector3<f64>> {
 
 /// Returns two unit vectors perpendicular to a unit vector and to each other.
 fn across(direction: Vector3<f64>) -> [Vector3<f64>; 2] {
-    let helper = if direction[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
-    let right = cross(helper, direction);
+    let upright = if direction[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+    let right = cross(upright, direction);
     let right = right.map(|component| component / norm(right));
     [right, cross(direction, right)]
 }

@@ -16,6 +16,7 @@ mod schema;
 mod seam;
 mod shape;
 mod sleep;
+mod style;
 mod time_grid;
 
 use std::path::{Path, PathBuf};
@@ -36,6 +37,7 @@ pub use schema::schema;
 pub use seam::{Closing, Seam};
 pub use shape::{MeshSourceError, Shape};
 pub use sleep::Sleep;
+pub use style::{Style, Viewpoint};
 pub use time_grid::TimeGrid;
 
 use crate::bounded::Strict;

@@ -1,8 +1,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::style::{Style, Viewpoint};
 use crate::bounded::{Angle, Channel, Colours, Counts, MaybeReals, Number, Real, Reals};
-use crate::output::{Style, Viewpoint};
 
 /// The files that a run writes. Keys that are not given keep their defaults.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
