@@ -182,9 +182,7 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
                     (#(general.#fields),*)
                 }
             };
-            let expanded =
-                is_expanded_on_each_path(routine, routines).then(|| expanded_on_each_path(&inputs, reads, &fields));
-            (select, quote!(#general #expanded))
+            (select, general)
         }
     };
     let sum = routines.repetition.as_ref().map(|_| {
@@ -211,39 +209,6 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
         }
     };
     Emitted { plain, levelled, general }
-}
-
-/// Whether [`expanded_on_each_path`] applies to a routine.
-pub(super) fn is_expanded_on_each_path(routine: &Routine, routines: &Routines) -> bool {
-    routine.name == "reduced_hessian" && routine.general.is_some() && routines.repetition.is_none()
-}
-
-/// Emits the Hessian of points of a scalar, expanded from reduced coordinates on the ordinary path and on the general
-/// path separately. If one expansion followed both paths, their results would pass to it through memory.
-fn expanded_on_each_path(inputs: &[TokenStream], reads: usize, fields: &[Ident]) -> TokenStream {
-    let potential = quote!(<Self as ::energy_dsl::Potential<T>>);
-    let reduced = quote!(<Self as ::energy_dsl::ReducedPotential<T>>);
-    let hessian = quote!(::energy_dsl::Hessian<T, #potential::Points, #potential::Triangle>);
-    quote! {
-        #[inline(always)]
-        fn expanded_hessian<L: ::energy_dsl::Level>(&self, x: &#potential::Points) -> #hessian {
-            if ::energy_dsl::Mask::all(self.reduced_hessian_has_guards::<L>(x)) {
-                let here = self.reduced_hessian_if_ordinary::<L>(x);
-                if ::energy_dsl::Mask::all(self.reduced_hessian_is_ordinary::<L>(x)) {
-                    return #reduced::expand::<{ u32::MAX }>(&here);
-                }
-            }
-            Self::expanded_hessian_in_general(&[#(#inputs),*])
-        }
-
-        #[cold]
-        #[inline(never)]
-        fn expanded_hessian_in_general(inputs: &[T; #reads]) -> #hessian {
-            let (ordinary, here) = (::energy_dsl::Mask::none(), ::core::option::Option::None);
-            let (#(#fields),*) = Self::reduced_hessian_in_general(inputs, ordinary, here);
-            #reduced::expand::<{ u32::MAX }>(&::energy_dsl::ReducedHessian { #(#fields),* })
-        }
-    }
 }
 
 /// The general path of a routine: inputs, outputs and code.

@@ -3,7 +3,7 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::methods::{BLOCKS, Method, NUMBER, NUMBERS, VECTORS, implementation, is_expanded_on_each_path};
+use super::methods::{BLOCKS, Method, NUMBER, NUMBERS, VECTORS, implementation};
 use super::schedule::Schedule;
 use crate::check::Program;
 use crate::graph::Input;
@@ -66,14 +66,6 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
             arguments: vec![("x", points.clone()), ("v", points.clone())],
         },
     ];
-    let is_expanded_on_each_path = routines.list.iter().any(|routine| is_expanded_on_each_path(routine, routines));
-    let scalar = is_expanded_on_each_path.then(|| {
-        quote! {
-            if !T::WIDE {
-                return self.expanded_hessian::<L>(x);
-            }
-        }
-    });
     let hessian = quote! {
         type Points = #points;
         type Triangle = #triangle;
@@ -85,7 +77,6 @@ fn potential(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
 
         #[inline(always)]
         fn hessian_at<L: ::energy_dsl::Level>(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
-            #scalar
             <Self as ::energy_dsl::ReducedPotential<T>>::expand::<{ u32::MAX }>(
                 &<Self as ::energy_dsl::ReducedPotential<T>>::reduced_hessian_at::<L>(self, x),
             )
