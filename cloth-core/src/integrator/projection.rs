@@ -3,21 +3,39 @@ use energy_solve::Curvature;
 /// Decides whether the next iteration projects the elements' Hessians: projection on demand (Longva, Löschner,
 /// Fernández-Fernández, Larionov, Ascher and Bender 2023).
 ///
-/// Exact Hessians converge fast while their sum is positive definite. After an indefinite sum, some iterations are
-/// projected before exact Hessians are tried again, twice as many each time: projected ones always converge.
+/// Exact Hessians converge fast while their sum is positive definite. After a direction that leads nowhere, some
+/// iterations are projected before exact Hessians are tried again, twice as many each time: projected ones always
+/// converge.
+///
+/// Without contact, so do iterations after an indefinite sum, and after a step that does not shrink. In contact, few
+/// vertices are in trouble and all others proceed: a truncated direction is followed as long as it lowers the energy.
+/// One projected iteration follows a step that contact shortened, because the barriers that stopped it are far from
+/// quadratic.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projection {
     pub(super) curvature: Curvature,
+    in_contact: bool,
     /// Projected iterations left until the next exact one.
     left: u32,
-    /// Projected iterations after the next indefinite sum.
+    /// Projected iterations after the next exact one that fails.
     next: u32,
+}
+
+/// A successful iteration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Progress {
+    /// Whether its direction solves the linear system. Otherwise it was truncated, because the sum was indefinite.
+    pub is_solution: bool,
+    /// Whether contact left its step whole.
+    pub is_whole: bool,
+    /// Whether it was a full step, and shorter than the one before.
+    pub shrinks: bool,
 }
 
 impl Projection {
     /// The state at the start of a step.
-    pub(super) fn on_demand() -> Self {
-        Self { curvature: Curvature::Exact, left: 0, next: 1 }
+    pub(super) fn on_demand(in_contact: bool) -> Self {
+        Self { curvature: Curvature::Exact, in_contact, left: 0, next: if in_contact { 2 } else { 1 } }
     }
 
     /// Whether the next Hessians are exact.
@@ -25,16 +43,27 @@ impl Projection {
         self.curvature == Curvature::Exact
     }
 
-    /// Records an exact sum that was not positive definite.
+    /// Records an exact Hessian that failed.
     pub(super) fn demand(&mut self) {
-        *self = Self { curvature: Curvature::Clamped, left: self.next, next: self.next.saturating_mul(2) };
+        let (left, next) = (self.next, self.next.saturating_mul(2));
+        *self = Self { curvature: Curvature::Clamped, left, next, ..*self };
     }
 
-    /// Records a successful iteration. Steps that do not shrink mean that the iterate is far from the minimum; only
-    /// projected Hessians guarantee descent there.
-    pub(super) fn proceed(&mut self, shrinks: bool) {
-        self.curvature = if shrinks && self.left == 0 { Curvature::Exact } else { Curvature::Clamped };
-        self.left = self.left.saturating_sub(u32::from(shrinks));
+    /// Records an iteration that lowered the energy.
+    pub(super) fn proceed(&mut self, progress: Progress) {
+        if self.in_contact {
+            self.left = self.left.saturating_sub(1).max(u32::from(!progress.is_whole));
+            self.project_if(self.left > 0);
+        } else if progress.is_solution {
+            self.project_if(!progress.shrinks || self.left > 0);
+            self.left = self.left.saturating_sub(u32::from(progress.shrinks));
+        } else {
+            self.demand();
+        }
+    }
+
+    fn project_if(&mut self, is_wanted: bool) {
+        self.curvature = if is_wanted { Curvature::Clamped } else { Curvature::Exact };
     }
 }
 
@@ -42,11 +71,13 @@ impl Projection {
 mod tests {
     use super::*;
 
+    const SHORTER: Progress = Progress { is_solution: true, is_whole: true, shrinks: true };
+
     /// Counts the projected iterations until the next exact one.
     fn projected(projection: &mut Projection) -> usize {
         let mut count = 0;
         while !projection.is_exact() {
-            projection.proceed(true);
+            projection.proceed(SHORTER);
             count += 1;
         }
         count
@@ -54,20 +85,33 @@ mod tests {
 
     #[test]
     fn the_number_of_projected_iterations_doubles() {
-        let mut projection = Projection::on_demand();
-        assert!(projection.is_exact());
-        for waits in [2, 3, 5, 9] {
-            projection.demand();
-            assert_eq!(projected(&mut projection), waits);
+        for (in_contact, counts) in [(false, [2, 3, 5, 9]), (true, [2, 4, 8, 16])] {
+            let mut projection = Projection::on_demand(in_contact);
+            assert!(projection.is_exact());
+            for expected in counts {
+                projection.demand();
+                assert_eq!(projected(&mut projection), expected);
+            }
         }
     }
 
     #[test]
-    fn steps_that_do_not_shrink_are_followed_by_projected_ones() {
-        let mut projection = Projection::on_demand();
-        projection.proceed(true);
+    fn without_contact_steps_that_do_not_shrink_are_followed_by_projected_ones() {
+        let mut projection = Projection::on_demand(false);
+        projection.proceed(SHORTER);
         assert!(projection.is_exact());
-        projection.proceed(false);
+        projection.proceed(Progress { shrinks: false, ..SHORTER });
+        assert_eq!(projected(&mut projection), 1);
+        projection.proceed(Progress { is_solution: false, ..SHORTER });
+        assert_eq!(projected(&mut projection), 2);
+    }
+
+    #[test]
+    fn in_contact_truncated_directions_are_followed_and_shortened_steps_projected_once() {
+        let mut projection = Projection::on_demand(true);
+        projection.proceed(Progress { is_solution: false, shrinks: false, ..SHORTER });
+        assert!(projection.is_exact());
+        projection.proceed(Progress { is_whole: false, ..SHORTER });
         assert_eq!(projected(&mut projection), 1);
     }
 }

@@ -3,7 +3,7 @@ use std::time::Instant;
 use energy_dsl::Vector3;
 use energy_solve::{Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
 
-use super::super::projection::Projection;
+use super::super::projection::{Progress, Projection};
 use super::super::trial::Trial;
 use super::super::{StepError, StepReport};
 use super::forcing::Forcing;
@@ -61,8 +61,8 @@ impl<'a> Iterate<'a> {
         trial: &'a mut Trial,
         mut x: Vec<Vector3<f64>>,
     ) -> Result<Self, EvaluationError> {
-        let projection = Projection::on_demand();
         let in_contact = potential.body.system.has_contact();
+        let projection = Projection::on_demand(in_contact);
         let mut pins = if in_contact { potential.begin_contact(&mut x) } else { 1.0 };
         let mut found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
         if found.is_none() && in_contact {
@@ -198,7 +198,7 @@ impl<'a> Iterate<'a> {
         report.phases.solve += started.elapsed();
         report.solves += 1;
         report.iterations += solved.iterations as u64;
-        report.projected |= curvature == Curvature::Exact && !solved.converged();
+        report.projected |= curvature != Curvature::Exact;
         Ok((direction, solved))
     }
 
@@ -261,13 +261,10 @@ impl<'a> Iterate<'a> {
         self.took_full_step = step.scale >= step.allowed;
         let change = step.scale * direction.length / self.potential.dt;
         let before = std::mem::replace(&mut self.change, change);
-        if direction.is_projected || direction.solved.converged() {
-            // A step that contact shortens says nothing about the distance to the minimum.
-            let is_whole = step.allowed == 1.0 && self.pins == 1.0;
-            self.converged = is_whole && change < self.options.velocity_tolerance;
-            self.projection.proceed(self.took_full_step && change < before);
-        } else {
-            self.projection.demand();
-        }
+        let is_solution = direction.is_projected || direction.solved.converged();
+        let (is_whole, shrinks) = (step.allowed == 1.0, self.took_full_step && change < before);
+        // A step that contact shortens, or along a truncated direction, says nothing about the distance to the minimum.
+        self.converged = is_solution && is_whole && self.pins == 1.0 && change < self.options.velocity_tolerance;
+        self.projection.proceed(Progress { is_solution, is_whole, shrinks });
     }
 }
