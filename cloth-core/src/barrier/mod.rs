@@ -170,6 +170,10 @@ struct Judgement {
 }
 
 impl ContactModel for BarrierContact {
+    fn is_mutual(&self) -> bool {
+        self.search.is_with_itself()
+    }
+
     fn begin_step(&mut self, x: &[Vector3<f64>]) {
         self.friction.begin_step(x);
         self.joined.clear();

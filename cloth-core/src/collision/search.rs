@@ -99,6 +99,11 @@ impl Search {
         Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), rules }
     }
 
+    /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
+    pub fn is_with_itself(&self) -> bool {
+        self.rules.with_itself
+    }
+
     /// The distance within which a pair is found, in m. It exceeds what contact needs by far more than rounding errors.
     #[inline]
     pub fn reach(&self, pair: &Pair) -> f64 {

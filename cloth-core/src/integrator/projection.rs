@@ -7,14 +7,16 @@ use energy_solve::Curvature;
 /// iterations are projected before exact Hessians are tried again, twice as many each time: projected ones always
 /// converge.
 ///
-/// Without contact, so do iterations after an indefinite sum, and after a step that does not shrink. In contact, few
-/// vertices are in trouble and all others proceed: a truncated direction is followed as long as it lowers the energy.
-/// One projected iteration follows a step that contact shortened, because the barriers that stopped it are far from
-/// quadratic.
+/// So they are after an indefinite sum and after a step that does not shrink, unless cloth touches obstacles only. Few
+/// vertices are in trouble then, and all others proceed: a truncated direction is followed as long as it lowers the
+/// energy. One projected iteration follows a step that contact shortened, because the barriers that stopped it are far
+/// from quadratic. This saves a tenth of the iterations. Where cloth meets cloth it costs as many: a truncated direction
+/// pushes layers into each other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projection {
     pub(super) curvature: Curvature,
-    in_contact: bool,
+    /// Whether truncated directions are followed.
+    follows_truncated: bool,
     /// Projected iterations left until the next exact one.
     left: u32,
     /// Projected iterations after the next exact one that fails.
@@ -34,8 +36,8 @@ pub(super) struct Progress {
 
 impl Projection {
     /// The state at the start of a step.
-    pub(super) fn on_demand(in_contact: bool) -> Self {
-        Self { curvature: Curvature::Exact, in_contact, left: 0, next: if in_contact { 2 } else { 1 } }
+    pub(super) fn on_demand(follows_truncated: bool) -> Self {
+        Self { curvature: Curvature::Exact, follows_truncated, left: 0, next: if follows_truncated { 2 } else { 1 } }
     }
 
     /// Whether the next Hessians are exact.
@@ -51,7 +53,7 @@ impl Projection {
 
     /// Records an iteration that lowered the energy.
     pub(super) fn proceed(&mut self, progress: Progress) {
-        if self.in_contact {
+        if self.follows_truncated {
             self.left = self.left.saturating_sub(1).max(u32::from(!progress.is_whole));
             self.project_if(self.left > 0);
         } else if progress.is_solution {
@@ -85,8 +87,8 @@ mod tests {
 
     #[test]
     fn the_number_of_projected_iterations_doubles() {
-        for (in_contact, counts) in [(false, [2, 3, 5, 9]), (true, [2, 4, 8, 16])] {
-            let mut projection = Projection::on_demand(in_contact);
+        for (follows_truncated, counts) in [(false, [2, 3, 5, 9]), (true, [2, 4, 8, 16])] {
+            let mut projection = Projection::on_demand(follows_truncated);
             assert!(projection.is_exact());
             for expected in counts {
                 projection.demand();
@@ -96,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn without_contact_steps_that_do_not_shrink_are_followed_by_projected_ones() {
+    fn steps_that_do_not_shrink_are_followed_by_projected_ones() {
         let mut projection = Projection::on_demand(false);
         projection.proceed(SHORTER);
         assert!(projection.is_exact());
@@ -107,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn in_contact_truncated_directions_are_followed_and_shortened_steps_projected_once() {
+    fn truncated_directions_are_followed_and_shortened_steps_projected_once() {
         let mut projection = Projection::on_demand(true);
         projection.proceed(Progress { is_solution: false, shrinks: false, ..SHORTER });
         assert!(projection.is_exact());

@@ -28,8 +28,8 @@ use iterate::Iterate;
 /// - The first iterate extrapolates with the accelerations of the last step.
 /// - Hessians are exact as long as their sum is positive definite and steps shrink. Otherwise the next iterations
 ///   project each element's Hessian to positive semi-definite: projection on demand (Longva, Löschner,
-///   Fernández-Fernández, Larionov, Ascher and Bender 2023). If the body collides, it does so only after directions
-///   that lead nowhere, and after steps that contact shortened.
+///   Fernández-Fernández, Larionov, Ascher and Bender 2023). A body that touches obstacles only does so after
+///   directions that lead nowhere, and after steps that contact shortened.
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
 ///
