@@ -1,6 +1,7 @@
 //! Random drops, pulls and folds of small sheets, also onto obstacles: no state has a crossing or a NaN, and no step
-//! stalls without saying so. `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test all random_contact::` runs a
-//! hundred thousand steps.
+//! stalls without saying so.
+//!
+//! `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test all random_contact::` runs a hundred thousand steps.
 
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;

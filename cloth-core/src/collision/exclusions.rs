@@ -33,7 +33,7 @@ impl Exclusions {
     /// The largest number of names.
     pub const MOST_NAMES: usize = 64;
 
-    /// Creates the exclusions of a model of so many vertices and obstacles, which excludes nothing yet.
+    /// Creates the exclusions of a model, which exclude nothing yet.
     pub fn new(vertices: usize, obstacles: usize) -> Self {
         Self { own: vec![0; vertices], obstacles: vec![0; obstacles], ..Self::default() }
     }
@@ -62,8 +62,8 @@ impl Exclusions {
         bit
     }
 
-    /// Excludes pairs of features with vertices of cloth or hair that are closer than `distance` at x, in m, among those
-    /// that `counts` accepts.
+    /// Excludes pairs of features with vertices of cloth or hair that are closer than `distance` at x, in m. Only
+    /// vertices that `counts` accepts matter.
     pub fn add_close(&mut self, x: &[Vector3<f64>], distance: f64, counts: impl Fn(usize) -> bool) {
         let some: Vec<usize> = (0..x.len()).filter(|&vertex| counts(vertex)).collect();
         let around: Vec<Bounds> =

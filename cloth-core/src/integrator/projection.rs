@@ -7,11 +7,13 @@ use energy_solve::Curvature;
 /// iterations are projected before exact Hessians are tried again, twice as many each time: projected ones always
 /// converge.
 ///
-/// So they are after an indefinite sum and after a step that does not shrink, unless cloth touches obstacles only. Few
-/// vertices are in trouble then, and all others proceed: a truncated direction is followed as long as it lowers the
-/// energy. One projected iteration follows a step that contact shortened, because the barriers that stopped it are far
-/// from quadratic. This saves a tenth of the iterations. Where cloth meets cloth it costs as many: a truncated direction
-/// pushes layers into each other.
+/// An indefinite sum, or a step that does not shrink, also leads to projected iterations.
+///
+/// Cloth that touches obstacles only is different: few vertices are in trouble, and the others proceed. Conjugate
+/// gradients stop at the first direction of negative curvature, and the truncated direction is followed as long as it
+/// lowers the energy. One projected iteration follows a step that contact shortened, because the barriers that stopped
+/// it are far from quadratic. This saves a tenth of the iterations. Between layers of cloth it costs more than it
+/// saves: truncated directions push layers into each other, and contact shortens more steps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projection {
     pub(super) curvature: Curvature,
