@@ -88,16 +88,22 @@ impl Lowered {
     }
 
     /// Creates a matrix.
+    ///
+    /// # Panics
+    /// If there are not `rows · columns` parts.
     #[must_use]
     pub fn matrix(rows: usize, columns: usize, parts: Vec<NodeId>) -> Self {
-        debug_assert_eq!(parts.len(), rows * columns);
+        assert_eq!(parts.len(), rows * columns);
         Self { shape: Shape::Matrix(rows as u8, columns as u8), parts }
     }
 
     /// Returns the node of a scalar.
+    ///
+    /// # Panics
+    /// If this is not a scalar.
     #[must_use]
     pub fn node(&self) -> NodeId {
-        debug_assert_eq!(self.parts.len(), 1);
+        assert_eq!(self.parts.len(), 1);
         self.parts[0]
     }
 
