@@ -1,7 +1,5 @@
 //! The state in which contact begins.
 
-use std::collections::BTreeSet;
-
 use energy_dsl::Vector3;
 use energy_solve::ContactCounts;
 
@@ -106,9 +104,7 @@ pub(crate) struct Participants {
     pub gap: f64,
     /// The obstacles, in the order of their cores.
     pub obstacles: Vec<ObstacleStart>,
-    /// Vertices that are held in an obstacle. Their features do not collide with it.
-    pub held: BTreeSet<(u32, usize)>,
-    /// Pairs that the scene excludes.
+    /// Pairs that do not collide.
     pub exclusions: Exclusions,
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
     pub with_itself: bool,
@@ -138,8 +134,8 @@ impl BarrierContact {
         radii: Vec<f64>,
         gap: f64,
     ) -> Result<Self, ContactError> {
-        let (obstacles, held, exclusions) = Default::default();
-        Self::among(Participants { mesh, is_free, radii, gap, obstacles, held, exclusions, with_itself: true }, x)
+        let (obstacles, exclusions) = Default::default();
+        Self::among(Participants { mesh, is_free, radii, gap, obstacles, exclusions, with_itself: true }, x)
     }
 
     /// Creates the contact of cloth and hair with themselves and with obstacles, which start at x.
@@ -147,10 +143,10 @@ impl BarrierContact {
     /// # Errors
     /// If something crosses at x, or a pair that can respond is closer than its thickness.
     pub(crate) fn among(participants: Participants, x: &[Vector3<f64>]) -> Result<Self, ContactError> {
-        let Participants { mesh, is_free, radii, gap, obstacles, held, exclusions, with_itself } = participants;
+        let Participants { mesh, is_free, radii, gap, obstacles, exclusions, with_itself } = participants;
         let skin = |start: &ObstacleStart| Skin { radius: start.radius, thickness: 0.0, gap: start.reach };
         let spacings = Spacings { radii, gap, skins: obstacles.iter().map(skin).collect() };
-        let rules = Rules { halves: spacings.halves(&mesh), is_free, held, exclusions, with_itself };
+        let rules = Rules { halves: spacings.halves(&mesh), is_free, exclusions, with_itself };
         check_crossings(&mesh, &rules, &obstacles, x)?;
         let mut contact = Self {
             spacings,
@@ -221,7 +217,7 @@ fn check_crossings(
         let is_mixed = mesh.obstacle(edge[0]).is_some() || mesh.obstacle(triangle[0]).is_some();
         edge.iter().chain(&triangle).any(|&vertex| rules.is_free[vertex as usize])
             && (rules.with_itself || is_mixed)
-            && !rules.ignore(mesh, &edge, &triangle)
+            && !rules.exclusions.exclude(mesh, &edge, &triangle)
     };
     let crossings: Vec<_> = crossings(mesh, x).into_iter().filter(counts).collect();
     let Some(&first) = crossings.first() else { return Ok(()) };

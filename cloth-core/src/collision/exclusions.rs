@@ -6,9 +6,11 @@ use energy_solve::index;
 use super::CollisionMesh;
 use crate::geometry::{Bounds, Hierarchy, norm, subtract};
 
-/// Pairs of features that do not collide.
+/// Pairs of features that do not collide: those that the scene excludes, and parts that are pinned in an obstacle.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Exclusions {
+    /// Vertices that are held in an obstacle, with its index. Their features do not collide with it.
+    held: BTreeSet<(u32, usize)>,
     /// The named sets of each vertex of cloth and hair, one bit each. Empty if no set is excluded.
     own: Vec<u64>,
     /// The same for each obstacle.
@@ -76,6 +78,11 @@ impl Exclusions {
         });
     }
 
+    /// Excludes the features of a vertex that an obstacle holds from collisions with it.
+    pub fn hold(&mut self, vertex: usize, obstacle: usize) {
+        self.held.insert((index(vertex), obstacle));
+    }
+
     /// Returns the exclusions among some vertices, with their new numbers.
     pub fn restricted(&self, local: &[Option<usize>], vertices: usize) -> Self {
         let mut own = vec![0; vertices];
@@ -87,12 +94,25 @@ impl Exclusions {
         let place = |vertex: u32| local[vertex as usize].map(index);
         let renumbered = |&[a, b]: &[u32; 2]| Some([place(a)?, place(b)?]).map(|[a, b]| [a.min(b), a.max(b)]);
         let vertices = self.vertices.iter().filter_map(renumbered).collect();
-        Self { own, obstacles: self.obstacles.clone(), sets: self.sets.clone(), vertices, names: BTreeMap::new() }
+        let held = self.held.iter().filter_map(|&(vertex, obstacle)| Some((place(vertex)?, obstacle))).collect();
+        let (obstacles, sets) = (self.obstacles.clone(), self.sets.clone());
+        Self { held, own, obstacles, sets, vertices, names: BTreeMap::new() }
     }
 
     /// Whether a pair of features does not collide.
     pub fn exclude(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        self.exclude_sets(mesh, a, b) || self.exclude_vertices(a, b)
+        self.are_held(mesh, a, b) || self.exclude_sets(mesh, a, b) || self.exclude_vertices(a, b)
+    }
+
+    /// Whether one of two features is an obstacle's that holds a vertex of the other.
+    fn are_held(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+        if self.held.is_empty() {
+            return false;
+        }
+        let holds = |obstacle: Option<usize>, other: &[u32]| {
+            obstacle.is_some_and(|obstacle| other.iter().any(|vertex| self.held.contains(&(*vertex, obstacle))))
+        };
+        holds(mesh.obstacle(a[0]), b) || holds(mesh.obstacle(b[0]), a)
     }
 
     fn exclude_sets(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {

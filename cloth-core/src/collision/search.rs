@@ -1,5 +1,3 @@
-use std::collections::BTreeSet;
-
 use energy_dsl::Vector3;
 use energy_solve::index;
 
@@ -22,9 +20,7 @@ pub(crate) struct Rules {
     pub halves: Vec<f64>,
     /// Whether each vertex may respond to a contact. Pairs without such a vertex are never found.
     pub is_free: Vec<bool>,
-    /// Vertices of cloth and hair that are held in an obstacle. Their features do not collide with it.
-    pub held: BTreeSet<(u32, usize)>,
-    /// Pairs that the scene excludes.
+    /// Pairs that do not collide.
     pub exclusions: Exclusions,
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
     pub with_itself: bool,
@@ -227,25 +223,7 @@ impl Search {
     fn can_collide(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
         !mesh.are_joined(a, b)
             && a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
-            && !self.rules.ignore(mesh, a, b)
-    }
-}
-
-impl Rules {
-    /// Whether two features do not collide: an obstacle holds one of them, or the scene excludes the pair.
-    pub fn ignore(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        self.are_held(mesh, a, b) || self.exclusions.exclude(mesh, a, b)
-    }
-
-    /// Whether one of two features is an obstacle's that holds a vertex of the other.
-    fn are_held(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        if self.held.is_empty() {
-            return false;
-        }
-        let holds = |obstacle: Option<usize>, other: &[u32]| {
-            obstacle.is_some_and(|obstacle| other.iter().any(|vertex| self.held.contains(&(*vertex, obstacle))))
-        };
-        holds(mesh.obstacle(a[0]), b) || holds(mesh.obstacle(b[0]), a)
+            && !self.rules.exclusions.exclude(mesh, a, b)
     }
 }
 

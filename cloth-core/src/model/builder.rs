@@ -8,7 +8,7 @@ use energy_elements::ZeroLengthSpring;
 use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ListError, PotentialTerm, Term};
 
 use super::closing_seam::ClosingSeam;
-use super::exclusions::{ExclusionError, Referents};
+use super::exclusions::{self, ExclusionError, Referents};
 use super::inflation::{self, PressureLaw};
 use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
 use super::seam::Side;
@@ -87,8 +87,8 @@ impl<'a> Builder<'a> {
         self.inflate()?;
         self.add_wind();
         self.add_obstacles()?;
-        self.exclude()?;
         self.pin()?;
+        self.exclude()?;
         Ok(self.model)
     }
 
@@ -358,8 +358,10 @@ impl<'a> Builder<'a> {
     }
 
     fn exclude(&mut self) -> Result<(), ExclusionError> {
-        let Model { parts, obstacles, x, sewn, .. } = &self.model;
-        self.model.exclusions = Referents { parts, obstacles, x, sewn }.exclusions(&self.scene.exclusions)?;
+        let Model { parts, obstacles, x, sewn, pinned_at_start, .. } = &self.model;
+        let mut exclusions = Referents { parts, obstacles, x, sewn }.exclusions(&self.scene.exclusions)?;
+        exclusions::hold(&mut exclusions, obstacles, x, pinned_at_start);
+        self.model.exclusions = exclusions;
         Ok(())
     }
 

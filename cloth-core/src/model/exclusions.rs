@@ -1,4 +1,4 @@
-//! Resolves the exclusions of a scene.
+//! Resolves the exclusions of a scene, and finds vertices that are pinned in an obstacle.
 
 use energy_dsl::Vector3;
 
@@ -112,5 +112,15 @@ impl Referents<'_> {
         let groups = |part: &Part| part.groups.keys().map(|group| format!("{}/{group}", part.name)).collect::<Vec<_>>();
         let parts = self.parts.iter().flat_map(|part| std::iter::once(part.name.clone()).chain(groups(part)));
         parts.chain(self.obstacles.iter().map(|obstacle| obstacle.name.clone())).collect()
+    }
+}
+
+/// Excludes pinned vertices that start within reach of an obstacle, or inside, from collisions with it.
+pub(super) fn hold(exclusions: &mut Exclusions, obstacles: &[Obstacle], x: &[Vector3<f64>], is_pinned: &[bool]) {
+    for (number, obstacle) in obstacles.iter().enumerate() {
+        let solid = obstacle.at(0.0);
+        let is_near = |vertex: &usize| solid.signed_distance(x[*vertex]) < obstacle.thickness;
+        let held = (0..x.len()).filter(|&vertex| is_pinned[vertex]).filter(is_near);
+        held.for_each(|vertex| exclusions.hold(vertex, number));
     }
 }

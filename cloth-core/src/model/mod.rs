@@ -1,5 +1,6 @@
 //! Puts a scene together: parts, seams, pins and everything that acts, on one numbering of vertices.
 
+mod anchor;
 mod builder;
 mod closing_seam;
 mod exclusions;
@@ -9,6 +10,7 @@ mod pins;
 mod seam;
 mod soft_pin;
 
+pub(crate) use anchor::Anchor;
 pub use exclusions::ExclusionError;
 pub use inflation::NotClosed;
 pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};

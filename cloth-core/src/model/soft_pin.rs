@@ -1,11 +1,11 @@
-use energy_dsl::{Declaration, Element, Potential, Vector3};
+use energy_dsl::{Declaration, Element, Vector3};
 use energy_elements::ZeroLengthSpring;
 use energy_solve::{
     Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, State, Stencils, StepStart, Tally, Term,
     TermDescription, index,
 };
 
-use crate::geometry::dot;
+use super::Anchor;
 use crate::motion::Motion;
 
 /// A vertex that a spring pulls to its place.
@@ -34,16 +34,6 @@ pub(super) struct SoftPinTerm {
     slots: Vec<Option<usize>>,
 }
 
-/// A spring that acts.
-struct Spring {
-    /// Its index among all springs of the pin.
-    number: usize,
-    vertex: usize,
-    place: Vector3<f64>,
-    slot: usize,
-    element: ZeroLengthSpring,
-}
-
 impl SoftPinTerm {
     /// Creates the springs of the pin with an index in the scene. They let go at the time `release`, in s; `None` for
     /// never.
@@ -69,24 +59,18 @@ impl SoftPinTerm {
         }
     }
 
-    /// Iterates over the springs that act: on free vertices, before the release.
-    fn springs(&self) -> impl Iterator<Item = Spring> + '_ {
+    /// Iterates over the springs that act, each with its number: on free vertices, before the release.
+    fn anchors(&self) -> impl Iterator<Item = (usize, Anchor)> + '_ {
         let all = self.held.iter().zip(&self.places).zip(&self.slots).enumerate();
         all.filter_map(|(number, ((held, &place), slot))| {
-            let element = ZeroLengthSpring::new(held.stiffness, 0.0);
-            Some(Spring { number, vertex: held.vertex, place, slot: (*slot)?, element })
+            let spring = ZeroLengthSpring::new(held.stiffness, 0.0);
+            Some((number, Anchor { vertex: held.vertex, slot: (*slot)?, place, spring }))
         })
     }
 
     fn tally(&self) -> Tally {
-        let evaluated = self.springs().count() as u64;
+        let evaluated = self.anchors().count() as u64;
         Tally { evaluated, skipped: self.held.len() as u64 - evaluated, flagged: 0, projected: 0 }
-    }
-}
-
-impl Spring {
-    fn value(&self, x: &[Vector3<f64>]) -> f64 {
-        self.element.value(&[x[self.vertex], self.place]).value
     }
 }
 
@@ -100,7 +84,7 @@ impl TermDescription for SoftPinTerm {
     }
 
     fn character(&self) -> Character {
-        Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true }
+        Anchor::CHARACTER
     }
 
     fn stencils(&self) -> Stencils<'_> {
@@ -135,35 +119,21 @@ impl PlacedTerm for SoftPinTerm {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        Some((self.springs().map(|spring| spring.value(x)).sum(), self.tally()))
+        Some((self.anchors().map(|(_, anchor)| anchor.energy(x)).sum(), self.tally()))
     }
 
     fn add_force(&self, State { x, .. }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
-        for Spring { vertex, place, element, .. } in self.springs() {
-            let gradient = element.gradient(&[x[vertex], place]).gradient[0];
-            (0..3).for_each(|axis| force[vertex][axis] -= gradient[axis]);
-        }
+        self.anchors().for_each(|(_, anchor)| anchor.add_force(x, force));
         self.tally()
     }
 
-    /// The Hessian of a spring with rest length 0 is positive semi-definite, so projection changes nothing.
-    fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
-        for Spring { vertex, place, slot, element, .. } in self.springs() {
-            let result = element.hessian(&[x[vertex], place]);
-            let block = result.hessian.as_ref()[0];
-            sum.matrix.add(slot, -sum.weights.position, &block);
-            for axis in 0..3 {
-                sum.force[vertex][axis] -= result.gradient[0][axis];
-                if let Some(product) = &mut sum.stiffness_times_velocity {
-                    product[vertex][axis] -= dot(block[axis], v[vertex]);
-                }
-            }
-        }
+    fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        self.anchors().for_each(|(_, anchor)| anchor.add_linearisation(state, sum));
         self.tally()
     }
 
     fn find_non_finite(&self, _: Quantity, State { x, .. }: State<'_>) -> Option<usize> {
-        self.springs().find(|spring| !spring.value(x).is_finite()).map(|spring| spring.number)
+        self.anchors().find(|(_, anchor)| !anchor.energy(x).is_finite()).map(|(number, _)| number)
     }
 }
 

@@ -1,7 +1,5 @@
 //! Contact of a scene with itself and with obstacles.
 
-use std::collections::BTreeSet;
-
 use crate::barrier::{BarrierContact, ContactError, ObstacleStart, Participants};
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
@@ -19,18 +17,6 @@ pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
     let segments: Vec<[usize; 2]> =
         model.strands().flat_map(|strand| strand.clone().zip(strand.skip(1)).map(|(a, b)| [a, b])).collect();
     CollisionMesh::new(model.x.len(), &model.triangles, &segments, &model.sewn)
-}
-
-/// Returns the pinned vertices that start within reach of an obstacle, or inside. They are held there: their features
-/// do not collide with it.
-pub(super) fn held(model: &Model) -> BTreeSet<(u32, usize)> {
-    let pinned: Vec<usize> = (0..model.x.len()).filter(|&vertex| model.pinned_at_start[vertex]).collect();
-    let near = |(number, obstacle): (usize, &Obstacle)| {
-        let solid = obstacle.at(0.0);
-        let is_near = |vertex: &&usize| solid.signed_distance(model.x[**vertex]) < obstacle.thickness;
-        pinned.iter().filter(is_near).map(|&vertex| (energy_solve::index(vertex), number)).collect::<Vec<_>>()
-    };
-    model.obstacles.iter().enumerate().flat_map(near).collect()
 }
 
 /// Adds contact to an island: with obstacles, and with itself if it holds all vertices of the model.
@@ -53,14 +39,11 @@ pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool)
     };
     let prescribed = island.prescribed();
     let cores = prescribed.cores();
-    let held_here =
-        |(vertex, obstacle): (u32, usize)| local[vertex as usize].map(|place| (energy_solve::index(place), obstacle));
     let participants = Participants {
         is_free: (0..x.len()).map(|place| vertices.get(place).is_some_and(|&own| !model.pinned_forever[own])).collect(),
         radii: all.map(|thickness| 0.5 * scale * thickness).collect(),
         gap: GAP * scale * thickest,
         obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
-        held: held(model).into_iter().filter_map(held_here).collect(),
         exclusions: model.exclusions.restricted(&local, vertices.len()),
         with_itself,
         mesh: own.with_obstacles(&cores),

@@ -11,7 +11,6 @@ mod sleep;
 mod summary;
 mod totals;
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
@@ -101,9 +100,7 @@ pub struct Simulation {
     /// The same with the cores of obstacles.
     obstacle_mesh: CollisionMesh,
     prescribed: Prescribed,
-    /// Pinned vertices that start in an obstacle, with its number.
-    held: BTreeSet<(u32, usize)>,
-    /// Pairs that the scene excludes.
+    /// Pairs of features that do not collide.
     exclusions: Exclusions,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
@@ -153,7 +150,6 @@ impl Simulation {
         let collision_mesh = collision::mesh_of(&model);
         let prescribed = Prescribed::new(&model.obstacles);
         let obstacle_mesh = collision_mesh.clone().with_obstacles(&prescribed.cores());
-        let held = collision::held(&model);
         let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, exclusions, .. } = model;
         let mut simulation = Self {
             parts,
@@ -164,7 +160,6 @@ impl Simulation {
             collision_mesh,
             obstacle_mesh,
             prescribed,
-            held,
             exclusions,
             x,
             v,
@@ -238,11 +233,9 @@ impl Simulation {
     /// excludes do not count.
     #[must_use]
     pub fn crossings(&self) -> Vec<Crossing> {
-        let (mesh, rules) = (&self.collision_mesh, self.rules());
-        let features = |Crossing { edge, triangle }: &Crossing| (edge.map(index), triangle.map(index));
-        let counts = |crossing: &Crossing| {
-            let (edge, triangle) = features(crossing);
-            !rules.ignore(mesh, &edge, &triangle)
+        let mesh = &self.collision_mesh;
+        let counts = |Crossing { edge, triangle }: &Crossing| {
+            !self.exclusions.exclude(mesh, &edge.map(index), &triangle.map(index))
         };
         crossings(mesh, &self.x).into_iter().filter(counts).collect()
     }

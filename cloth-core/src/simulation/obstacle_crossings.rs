@@ -25,18 +25,12 @@ impl Simulation {
         self.exact_obstacle_crossings(&x) + self.parts_in_rounded_solids(&x)
     }
 
-    /// The pairs that do not collide.
-    pub(super) fn rules(&self) -> Rules {
-        Rules { held: self.held.clone(), exclusions: self.exclusions.clone(), ..Rules::default() }
-    }
-
     fn exact_obstacle_crossings(&self, x: &[Vector3<f64>]) -> usize {
         let mesh = &self.obstacle_mesh;
-        let rules = self.rules();
         let counts = |Crossing { edge, triangle }: &Crossing| {
             let (edge, triangle) = (edge.map(energy_solve::index), triangle.map(energy_solve::index));
             let is_mixed = mesh.obstacle(edge[0]).is_some() || mesh.obstacle(triangle[0]).is_some();
-            is_mixed && !rules.ignore(mesh, &edge, &triangle)
+            is_mixed && !self.exclusions.exclude(mesh, &edge, &triangle)
         };
         crossings(mesh, x).iter().filter(|crossing| counts(crossing)).count()
     }
@@ -47,7 +41,7 @@ impl Simulation {
         let radius = |vertex: u32| mesh.obstacle(vertex).map_or(0.0, |obstacle| cores[obstacle].radius);
         let halves = (0..energy_solve::index(mesh.vertices())).map(radius).collect();
         let is_free = (0..mesh.vertices()).map(|vertex| vertex < self.x.len()).collect();
-        let rules = Rules { halves, is_free, ..self.rules() };
+        let rules = Rules { halves, is_free, exclusions: self.exclusions.clone(), with_itself: false };
         let pairs = Search::new(mesh, x, rules).pairs(mesh, x.iter().map(|x| Bounds::of(&[*x])).collect());
         let is_inside = |pair: &&crate::collision::Pair| {
             let radius = mesh.obstacle_of(pair).map_or(0.0, |obstacle| cores[obstacle].radius);

@@ -1,14 +1,13 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
-use energy_dsl::{Declaration, Element, Potential, Vector3};
+use energy_dsl::{Declaration, Element, Vector3};
 use energy_elements::ZeroLengthSpring;
 use energy_solve::{
     Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, State, Stencils, Tally, Term, TermDescription,
     index,
 };
 
-use crate::geometry::dot;
-use crate::model::{IslandModel, TermLabel};
+use crate::model::{Anchor, IslandModel, TermLabel};
 
 /// A soft pin for the mouse: pulls one vertex to a target by the declared [`ZeroLengthSpring`].
 #[derive(Clone, Debug)]
@@ -84,16 +83,15 @@ struct GripTerm {
 }
 
 impl GripTerm {
-    /// Returns the held vertex, as an index within the island, with the slot of its block; `None` if it is pinned or
-    /// elsewhere.
-    fn held(&self) -> Option<(Held, usize)> {
-        let held = self.grip.get()?;
-        let vertex = self.vertices.iter().position(|&vertex| vertex == held.vertex)?;
-        Some((Held { vertex, ..held }, self.slots[vertex]?))
+    /// Returns the spring to the target; `None` if nothing is held, or the vertex is pinned or elsewhere.
+    fn anchor(&self) -> Option<Anchor> {
+        let Held { vertex, target } = self.grip.get()?;
+        let vertex = self.vertices.iter().position(|&own| own == vertex)?;
+        Some(Anchor { vertex, slot: self.slots[vertex]?, place: target, spring: self.grip.spring })
     }
 
     fn tally(&self) -> Tally {
-        let evaluated = u64::from(self.held().is_some());
+        let evaluated = u64::from(self.anchor().is_some());
         Tally { evaluated, skipped: self.stencils.len() as u64 - evaluated, flagged: 0, projected: 0 }
     }
 }
@@ -108,7 +106,7 @@ impl TermDescription for GripTerm {
     }
 
     fn character(&self) -> Character {
-        Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true }
+        Anchor::CHARACTER
     }
 
     fn stencils(&self) -> Stencils<'_> {
@@ -130,37 +128,20 @@ impl PlacedTerm for GripTerm {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        let value = |(held, _): (Held, usize)| self.grip.spring.value(&[x[held.vertex], held.target]).value;
-        Some((self.held().map_or(0.0, value), self.tally()))
+        Some((self.anchor().map_or(0.0, |anchor| anchor.energy(x)), self.tally()))
     }
 
     fn add_force(&self, State { x, .. }: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
-        if let Some((Held { vertex, target }, _)) = self.held() {
-            let gradient = self.grip.spring.gradient(&[x[vertex], target]).gradient[0];
-            (0..3).for_each(|axis| force[vertex][axis] -= gradient[axis]);
-        }
+        self.anchor().iter().for_each(|anchor| anchor.add_force(x, force));
         self.tally()
     }
 
-    /// The Hessian of a spring with rest length 0 is positive semi-definite, so projection changes nothing.
-    fn add_linearisation(&self, State { x, v }: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
-        if let Some((Held { vertex, target }, slot)) = self.held() {
-            let result = self.grip.spring.hessian(&[x[vertex], target]);
-            let block = result.hessian.as_ref()[0];
-            sum.matrix.add(slot, -sum.weights.position, &block);
-            for i in 0..3 {
-                sum.force[vertex][i] -= result.gradient[0][i];
-                if let Some(product) = &mut sum.stiffness_times_velocity {
-                    product[vertex][i] -= dot(block[i], v[vertex]);
-                }
-            }
-        }
+    fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        self.anchor().iter().for_each(|anchor| anchor.add_linearisation(state, sum));
         self.tally()
     }
 
     fn find_non_finite(&self, _quantity: Quantity, State { x, .. }: State<'_>) -> Option<usize> {
-        let (held, _) = self.held()?;
-        let value = self.grip.spring.value(&[x[held.vertex], held.target]).value;
-        (!value.is_finite()).then_some(held.vertex)
+        self.anchor().filter(|anchor| !anchor.energy(x).is_finite()).map(|anchor| anchor.vertex)
     }
 }

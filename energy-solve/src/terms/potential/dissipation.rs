@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use energy_dsl::{Declaration, Element, Packed, PackedPotential, Vector3};
 
+use super::named_stencils::NamedStencils;
 use super::placed::PlacedPotentialTerm;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, index};
@@ -33,18 +34,15 @@ pub trait DissipationLaw: Debug + Send + Sync {
 /// lanes, and by several threads.
 #[derive(Debug)]
 pub struct DissipationTerm<L> {
-    name: String,
     law: L,
-    vertices: Vec<u32>,
-    arity: usize,
+    on: NamedStencils,
 }
 
 impl<L: DissipationLaw> DissipationTerm<L> {
     /// Creates a term for a law whose element has N points. No element acts before the first step begins.
     #[must_use]
     pub fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
-        let vertices = stencils.as_flattened().iter().copied().map(index).collect();
-        Self { name, law, vertices, arity: N }
+        Self { law, on: NamedStencils::new(name, stencils) }
     }
 }
 
@@ -52,7 +50,7 @@ const CHARACTER: Character = Character { symmetric: true, velocity_dependent: tr
 
 impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
     fn name(&self) -> &str {
-        &self.name
+        &self.on.name
     }
 
     fn declaration(&self) -> &'static Declaration {
@@ -64,7 +62,7 @@ impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils::new(self.arity, &self.vertices)
+        self.on.stencils()
     }
 }
 
@@ -98,14 +96,9 @@ fn acting<L: DissipationLaw>(
     term: &DissipationTerm<L>,
     places: &BlockPlaces,
 ) -> PlacedPotentialTerm<Packed<L::Element>> {
-    let stencils = term.stencils();
     let (numbers, elements): (Vec<usize>, Vec<L::Element>) = elements.into_iter().unzip();
-    let vertex = |number: usize, point: usize| stencils.vertex(numbers[number], point);
-    let packed = Packed::from_fn(elements.len(), term.arity, |number| &elements[number], vertex);
     let places = places.of(&numbers);
-    let active = Active::some(numbers.into_iter().map(index).collect());
-    let all = (stencils.len(), term.vertices.clone());
-    PlacedPotentialTerm::in_places(term.name.clone(), all, (active, packed), places)
+    term.on.pack(&elements, Active::some(numbers.into_iter().map(index).collect()), places)
 }
 
 /// The state in which velocities take the place of positions.

@@ -4,9 +4,10 @@ use std::fmt::Debug;
 
 use energy_dsl::{Declaration, Element, Packed, PackedPotential, Vector3};
 
+use super::named_stencils::NamedStencils;
 use super::placed::PlacedPotentialTerm;
 use crate::matrix::dof_map::DofMap;
-use crate::matrix::pattern::{Pattern, index};
+use crate::matrix::pattern::Pattern;
 use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::linearisation::Linearisation;
@@ -41,18 +42,15 @@ pub trait DrivenLaw: Debug + Send + Sync {
 /// The forces −∇U of potentials whose parameters are fixed during a step and change between steps.
 #[derive(Debug)]
 pub struct DrivenTerm<L> {
-    name: String,
     law: L,
-    vertices: Vec<u32>,
-    arity: usize,
+    on: NamedStencils,
 }
 
 impl<L: DrivenLaw> DrivenTerm<L> {
     /// Creates a term for a law whose element has N points. Before the first step, elements are those of time 0.
     #[must_use]
     pub fn new<const N: usize>(name: String, law: L, stencils: &[[usize; N]]) -> Self {
-        let vertices = stencils.as_flattened().iter().copied().map(index).collect();
-        Self { name, law, vertices, arity: N }
+        Self { law, on: NamedStencils::new(name, stencils) }
     }
 }
 
@@ -60,7 +58,7 @@ const CHARACTER: Character = Character { symmetric: true, velocity_dependent: fa
 
 impl<L: DrivenLaw> TermDescription for DrivenTerm<L> {
     fn name(&self) -> &str {
-        &self.name
+        &self.on.name
     }
 
     fn declaration(&self) -> &'static Declaration {
@@ -72,7 +70,7 @@ impl<L: DrivenLaw> TermDescription for DrivenTerm<L> {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils::new(self.arity, &self.vertices)
+        self.on.stencils()
     }
 }
 
@@ -106,12 +104,8 @@ fn renewed<L: DrivenLaw>(
     places: &BlockPlaces,
     time: f64,
 ) -> PlacedPotentialTerm<Packed<L::Element>> {
-    let stencils = term.stencils();
     let elements: Vec<L::Element> = active.iter().map(|number| term.law.element(number, time)).collect();
-    let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
-    let packed = Packed::from_fn(elements.len(), term.arity, |number| &elements[number], vertex);
-    let all = (stencils.len(), term.vertices.clone());
-    PlacedPotentialTerm::in_places(term.name.clone(), all, (active.clone(), packed), places.clone())
+    term.on.pack(&elements, active.clone(), places.clone())
 }
 
 impl<L: DrivenLaw> PlacedDrivenTerm<L> {
@@ -168,8 +162,7 @@ impl<L: DrivenLaw> PlacedTerm for PlacedDrivenTerm<L> {
     }
 
     fn end_step(&mut self, state: State<'_>) {
-        let stencils = Stencils::new(self.term.arity, &self.term.vertices);
-        if self.term.law.advance(stencils, state.x) {
+        if self.term.law.advance(self.term.on.stencils(), state.x) {
             self.renew(self.time);
         }
     }

@@ -3,6 +3,7 @@
 mod dissipation;
 mod driven;
 mod evaluated;
+mod named_stencils;
 mod pack_energies;
 mod placed;
 mod tapes;
