@@ -52,8 +52,12 @@ use spacing::{Spacing, Spacings};
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
 const JOINING: f64 = 1.25;
-/// Part of the displacement of the last long move that an iterate may stray before the next search.
-const STRAYING: f64 = 0.5;
+/// Part of the displacement of the last move that left the neighbourhood, by which an iterate may stray before the next
+/// search.
+const STRAYING: f64 = 0.25;
+/// The longest move that a neighbourhood covers as a whole, over the largest distance that vertices may move before the
+/// next search. Longer moves have a search of their own, for balls around them would hold too many pairs.
+const LONG: f64 = 4.0;
 
 /// Contact of a body with itself and with obstacles.
 #[derive(Debug)]
@@ -127,7 +131,7 @@ impl BarrierContact {
         if !self.covers(x) {
             let [least, most] = self.slack;
             let radii = self.strides.iter().map(|stride| (least + STRAYING * stride).min(most)).collect();
-            self.neighbourhood.renew(&mut self.search, &self.mesh, x, radii);
+            self.neighbourhood.renew(&mut self.search, &self.mesh, x, x, radii);
             self.counts.searches += 1;
         }
         self.neighbourhood.visit(x);
@@ -138,6 +142,24 @@ impl BarrierContact {
         let (is_covered, searches) = self.neighbourhood.cover(&mut self.search, &self.mesh, x);
         self.counts.searches += searches;
         is_covered
+    }
+
+    /// Whether the neighbourhood covers a move. If it lacks many vertices, it is renewed, unless the move is long.
+    fn covers_move(&mut self, step: &Move<'_>) -> bool {
+        if self.covers(step.from()) && self.covers(step.to()) {
+            return true;
+        }
+        self.strides.copy_from_slice(step.excursions());
+        let [least, most] = self.slack;
+        let longest = self.strides.iter().copied().fold(0.0, f64::max);
+        let mean = self.strides.iter().sum::<f64>() / self.strides.len() as f64;
+        if longest > LONG * most || mean > most {
+            return false;
+        }
+        let radii = self.strides.iter().map(|stride| least + (0.5 + STRAYING) * stride).collect();
+        self.neighbourhood.renew(&mut self.search, &self.mesh, step.from(), &step.middle(), radii);
+        self.counts.searches += 1;
+        true
     }
 
     /// Judges a move by some pairs, measured at its start.
@@ -189,12 +211,11 @@ impl ContactModel for BarrierContact {
             return 0.0;
         }
         let step = Move::new(from, to);
-        let (count, judgement) = if self.covers(from) && self.covers(to) {
+        let (count, judgement) = if self.covers_move(&step) {
             self.neighbourhood.visit(from);
             let pairs = self.neighbourhood.pairs();
             (pairs.len(), self.judge(&step, pairs, self.neighbourhood.measured()))
         } else {
-            self.strides.copy_from_slice(step.excursions());
             self.counts.searches += 1;
             let pairs = self.search.pairs(&self.mesh, swept(from, to));
             let mut measured = Measured::default();

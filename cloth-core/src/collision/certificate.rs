@@ -58,6 +58,21 @@ impl<'a> Move<'a> {
         Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * largest(from).max(largest(to)) }
     }
 
+    /// The positions at the start.
+    pub fn from(&self) -> &'a [Vector3<f64>] {
+        self.from
+    }
+
+    /// The positions at the end.
+    pub fn to(&self) -> &'a [Vector3<f64>] {
+        self.to
+    }
+
+    /// Returns the positions half way.
+    pub fn middle(&self) -> Vec<Vector3<f64>> {
+        self.from.iter().zip(self.to).map(|(from, to)| add_scaled(*from, 0.5, subtract(*to, *from))).collect()
+    }
+
     /// The length of the displacement of each vertex relative to the mean, in m.
     pub fn excursions(&self) -> &[f64] {
         &self.excursions

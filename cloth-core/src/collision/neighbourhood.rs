@@ -48,10 +48,17 @@ impl Neighbourhood {
         self.measured.measure(&self.pairs, x);
     }
 
-    /// Finds the pairs in new balls around x, and measures them there.
-    pub fn renew(&mut self, search: &mut Search, mesh: &CollisionMesh, x: &[Vector3<f64>], radii: Vec<f64>) {
-        let mean = mean(x);
-        self.centres = x.iter().map(|x| subtract(*x, mean)).collect();
+    /// Finds the pairs in new balls around `centres`, and measures them at x, which these balls cover.
+    pub fn renew(
+        &mut self,
+        search: &mut Search,
+        mesh: &CollisionMesh,
+        x: &[Vector3<f64>],
+        centres: &[Vector3<f64>],
+        radii: Vec<f64>,
+    ) {
+        let mean = mean(centres);
+        self.centres = centres.iter().map(|centre| subtract(*centre, mean)).collect();
         self.radii = radii;
         self.pairs = search.pairs(mesh, self.balls());
         self.keep_near(search, x);
