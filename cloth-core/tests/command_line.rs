@@ -255,3 +255,23 @@ fn completions_and_manual_pages_name_the_subcommands() {
     let run = std::fs::read_to_string(folder.path().join("pages/cloth-run.1")).unwrap();
     assert!(run.contains(".TH cloth-run 1") && run.contains("dry\\-run"), "{run}");
 }
+
+#[test]
+fn shallow_crossings_are_named_and_repaired_on_request() {
+    let fabric = "fabric = { density = 0.2, thickness = 1e-3, material.stvk = \
+                  { stretch_stiffness = 40.0, poisson_ratio = 0.3 } }";
+    let sheet = "mesh.sheet = { cells = [5, 5], size = [0.1, 0.1] }";
+    let scene = format!(
+        "dt = 0.01\nduration = 0.02\nintegrator = \"newton\"\n[[garment]]\n{sheet}\n{fabric}\n\
+         [[garment]]\n{sheet}\n{fabric}\nplacement.translate = [0.003, 0.002, 0.0]\n\
+         placement.rotate = {{ axis = [0.0, 1.0, 0.0], angle = 1.0 }}\n"
+    );
+    let message = refused(&scene, &[]);
+    assert!(message.contains("goes through the triangle") && message.contains("`--untangle`"), "{message}");
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let output = cloth(&["run", "scene.toml", "-o", "out", "--untangle"], folder.path());
+    let [report, errors] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(output.status.success(), "{report}{errors}");
+    assert!((report + &errors).contains("vertices moved by up to"), "the moves are reported");
+}

@@ -33,6 +33,7 @@ mod resistance;
 mod rolling;
 mod spacing;
 mod start;
+mod untangle;
 
 use energy_dsl::{Block, Vector3};
 use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
@@ -40,6 +41,7 @@ use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
 pub(crate) use friction::Grip;
 pub use start::ContactError;
 pub(crate) use start::{ObstacleStart, Participants};
+pub(crate) use untangle::Untangling;
 
 use crate::collision::{Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
 use feasible::Meeting;

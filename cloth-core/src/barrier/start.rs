@@ -10,26 +10,25 @@ use crate::collision::{
 };
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
-const SKIN: f64 = 1.0 / 3.0;
+pub(super) const SKIN: f64 = 1.0 / 3.0;
+/// The number of crossings that a message names.
+const NAMED: usize = 3;
 /// The part of an obstacle's reach within which cloth counts as touching at the start.
 const TOUCHING: f64 = 1e-6;
 
 /// A start that contact cannot keep free of crossings, because it is not.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ContactError {
-    /// An edge crosses a triangle.
+    /// Edges cross triangles.
     #[error(
-        "the cloth crosses itself in {count} places at the start: the edge {}–{} goes through the triangle {}–{}–{} at \
-         {:.4?} m. Move the parts apart, or set `contact = \"obstacles\"`",
-        .first.edge[0], .first.edge[1], .first.triangle[0], .first.triangle[1], .first.triangle[2], .at
+        "the cloth crosses itself in {count} places at the start: {}. Move the parts apart, repair shallow crossings \
+         with `--untangle` or `untangle = true`, or set `contact = \"obstacles\"`", described(.first)
     )]
     Crosses {
         /// Number of edges and triangles that cross.
         count: usize,
-        /// The first of them.
-        first: Crossing,
-        /// The middle of the edge, in m.
-        at: Vector3<f64>,
+        /// The first of them, each with its depth, in m.
+        first: Vec<(Crossing, f64)>,
     },
     /// Two features are closer than the thickness.
     #[error(
@@ -205,13 +204,8 @@ impl BarrierContact {
     }
 }
 
-/// Returns an error if something that could respond crosses at the start.
-fn check_crossings(
-    mesh: &CollisionMesh,
-    rules: &Rules,
-    obstacles: &[ObstacleStart],
-    x: &[Vector3<f64>],
-) -> Result<(), ContactError> {
+/// Returns the crossings at x of features that collide, and of which one could respond.
+pub(super) fn crossings_that_count(mesh: &CollisionMesh, rules: &Rules, x: &[Vector3<f64>]) -> Vec<Crossing> {
     let counts = |Crossing { edge, triangle }: &Crossing| {
         let (edge, triangle) = (edge.map(energy_solve::index), triangle.map(energy_solve::index));
         let is_mixed = mesh.obstacle(edge[0]).is_some() || mesh.obstacle(triangle[0]).is_some();
@@ -219,18 +213,31 @@ fn check_crossings(
             && (rules.with_itself || is_mixed)
             && !rules.exclusions.exclude(mesh, &edge, &triangle)
     };
-    let crossings: Vec<_> = crossings(mesh, x).into_iter().filter(counts).collect();
+    crossings(mesh, x).into_iter().filter(counts).collect()
+}
+
+/// Returns an error if something that could respond crosses at the start.
+fn check_crossings(
+    mesh: &CollisionMesh,
+    rules: &Rules,
+    obstacles: &[ObstacleStart],
+    x: &[Vector3<f64>],
+) -> Result<(), ContactError> {
+    let mut crossings = crossings_that_count(mesh, rules, x);
+    let count = crossings.len();
     let Some(&first) = crossings.first() else { return Ok(()) };
-    let [a, b] = first.edge.map(|end| x[end]);
-    let at = std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]));
     let obstacle = |vertex: usize| mesh.obstacle(energy_solve::index(vertex));
     Err(match obstacle(first.edge[0]).or(obstacle(first.triangle[0])) {
         Some(number) => {
             let all = first.edge.into_iter().chain(first.triangle);
             let vertices = all.filter(|&vertex| vertex < mesh.own_vertices()).collect();
-            ContactError::CrossesObstacle { obstacle: obstacles[number].name.clone(), count: crossings.len(), vertices }
+            ContactError::CrossesObstacle { obstacle: obstacles[number].name.clone(), count, vertices }
         }
-        None => ContactError::Crosses { count: crossings.len(), first, at },
+        None => {
+            crossings.truncate(NAMED);
+            let first = crossings.into_iter().map(|crossing| (crossing, crossing.depth(x))).collect();
+            ContactError::Crosses { count, first }
+        }
     })
 }
 
@@ -239,9 +246,11 @@ impl ContactError {
     #[must_use]
     pub(crate) fn on_vertices(self, vertices: &[usize]) -> Self {
         match self {
-            Self::Crosses { count, first: Crossing { edge, triangle }, at } => {
-                let (edge, triangle) = (edge.map(|end| vertices[end]), triangle.map(|corner| vertices[corner]));
-                Self::Crosses { count, first: Crossing { edge, triangle }, at }
+            Self::Crosses { count, mut first } => {
+                for (Crossing { edge, triangle }, _) in &mut first {
+                    edge.iter_mut().chain(triangle).for_each(|vertex| *vertex = vertices[*vertex]);
+                }
+                Self::Crosses { count, first }
             }
             Self::TooClose { count, pair, is_point, distance, thickness } => {
                 Self::TooClose { count, pair: pair.map(|vertex| vertices[vertex]), is_point, distance, thickness }
@@ -257,6 +266,14 @@ impl ContactError {
             other @ Self::Inside { .. } => other,
         }
     }
+}
+
+/// Describes crossings and their depth.
+fn described(crossings: &[(Crossing, f64)]) -> String {
+    let one = |(Crossing { edge: [a, b], triangle: [p, q, r] }, depth): &(Crossing, f64)| {
+        format!("the edge {a}–{b} goes through the triangle {p}–{q}–{r}, {:.3} mm deep", 1e3 * depth)
+    };
+    crossings.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
 /// Lists vertices, such as `3, 4, 9`.

@@ -40,6 +40,9 @@ pub struct RunScene {
     /// Parameters of these elements, such as `k=20,nu=0.3`, in the units of the declaration.
     #[arg(long, requires = "material", value_delimiter = ',', value_parser = parameter)]
     parameters: Vec<(String, f64)>,
+    /// Repair shallow crossings at the start, as `untangle = true` does in the scene.
+    #[arg(long)]
+    untangle: bool,
     /// Print what each term evaluated, skipped and reused, how much slept, and the time of each phase.
     #[arg(long)]
     stats: bool,
@@ -54,6 +57,9 @@ impl RunScene {
         let mut text = Scene::text(&scene)?;
         if let Some(file) = self.material {
             text = scene::with_material(&text, &file, &self.parameters);
+        }
+        if self.untangle {
+            text = scene::with_untangling(&text);
         }
         let Some(output) = output.filter(|_| !self.dry_run) else {
             return dry_run(&text, &scene, threads, log);

@@ -4,7 +4,8 @@ use energy_dsl::Vector3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use super::mesh::{CollisionMesh, bounds};
-use crate::geometry::Hierarchy;
+use super::{Closest, PairKind};
+use crate::geometry::{Hierarchy, cross, dot, norm, subtract};
 
 /// An edge that touches or crosses a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,20 @@ pub struct Crossing {
     pub edge: [usize; 2],
     /// The corners of the triangle.
     pub triangle: [usize; 3],
+}
+
+impl Crossing {
+    /// Returns the shortest displacement that separates the edge from the triangle at x, in m.
+    #[must_use]
+    pub fn depth(&self, x: &[Vector3<f64>]) -> f64 {
+        let [a, b] = self.edge.map(|end| x[end]);
+        let [p, q, r] = self.triangle.map(|corner| x[corner]);
+        let normal = cross(subtract(q, p), subtract(r, p));
+        let out = |end: Vector3<f64>| dot(normal, subtract(end, p)).abs() / norm(normal);
+        let beside = |side: [Vector3<f64>; 2]| Closest::between(PairKind::EdgeEdge, &[a, b, side[0], side[1]]).distance;
+        // NaN, for a triangle without area, is never the smallest.
+        [out(a), out(b), beside([p, q]), beside([q, r]), beside([r, p])].into_iter().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Returns all edges that touch or cross a triangle to which they do not belong, in the order of edges and triangles.

@@ -224,7 +224,7 @@ proptest! {
         prop_assert!(swept.is_sorted() && swept.windows(2).all(|two| two[0] != two[1]));
         let mut neighbourhood = Neighbourhood::default();
         prop_assert!(!neighbourhood.cover(&mut search, &mesh, &from).0);
-        neighbourhood.renew(&mut search, &mesh, &from, vec![1e-3; 25]);
+        neighbourhood.renew(&mut search, &mesh, &from, &from, vec![1e-3; 25]);
         let grown = neighbourhood.cover(&mut search, &mesh, &from).0 && neighbourhood.cover(&mut search, &mesh, &x).0;
         let near = neighbourhood.pairs();
         prop_assert!(near.is_sorted() && near.windows(2).all(|two| two[0] != two[1]));
@@ -250,7 +250,7 @@ proptest! {
         }
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        neighbourhood.renew(&mut search, &mesh, &start, vec![5e-3; 25]);
+        neighbourhood.renew(&mut search, &mesh, &start, &start, vec![5e-3; 25]);
         let (is_covered, _) = neighbourhood.cover(&mut search, &mesh, &x);
         prop_assert!(is_covered);
         for pair in all_pairs(&mesh) {

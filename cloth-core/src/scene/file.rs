@@ -76,6 +76,10 @@ pub(super) struct File {
     /// Parts that do not collide with each other. Needs the integrator `newton`. Default none.
     #[serde(default)]
     exclude: Vec<Exclusion>,
+    /// Repair shallow crossings at the start: move vertices until nothing crosses, by at most three times the thickness
+    /// and gap of contact. Needs certified contact. Default false.
+    #[serde(default)]
+    untangle: bool,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
     /// `multigrid`, `cholesky` or `incomplete-cholesky`.
     #[serde(default)]
@@ -152,6 +156,9 @@ impl TryFrom<File> for Scene {
         if !file.exclude.is_empty() && file.integrator != Scheme::Newton {
             return Err("`exclude` needs `integrator = \"newton\"`, whose contact is between features".to_owned());
         }
+        if file.untangle && (file.integrator != Scheme::Newton || file.contact == Some(ContactChoice::Off)) {
+            return Err("`untangle` needs `integrator = \"newton\"` with contact, which is certified".to_owned());
+        }
         let mut garments = file.garment;
         match (file.mesh, file.fabric) {
             (Some(mesh), Some(fabric)) => {
@@ -186,6 +193,7 @@ impl TryFrom<File> for Scene {
             tolerances: file.tolerances,
             contact: file.contact.unwrap_or(usual),
             exclusions: file.exclude,
+            untangle: file.untangle,
             linear_solver: file.linear_solver,
             adaptive: file.adaptive,
             sleep: file.sleep,

@@ -1,5 +1,6 @@
 //! Scene files in TOML. Each key is a field below, with its unit; unknown keys are errors.
 
+mod changed_text;
 mod contact_choice;
 mod error;
 mod exclusion;
@@ -9,7 +10,6 @@ mod garment;
 mod inputs;
 mod obstacle;
 mod output;
-mod own_material;
 mod pins;
 mod rest_shape;
 mod schema;
@@ -24,13 +24,13 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 pub use crate::fabric::Hair;
+pub use changed_text::{with_material, with_untangling};
 pub use contact_choice::ContactChoice;
 pub use error::SceneError;
 pub use exclusion::Exclusion;
 pub use garment::{Garment, Inflation, Mesh, Placement, Turn};
 pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::{CameraChoice, OutputChoice};
-pub use own_material::with_material;
 pub use pins::{Pin, PinBox, PinChoice, SoftPin};
 pub use rest_shape::{RestFile, RestScale, RestShape, RestTexture};
 pub use schema::schema;
@@ -75,6 +75,8 @@ pub struct Scene {
     pub tolerances: Tolerances,
     /// What collides.
     pub contact: ContactChoice,
+    /// Whether shallow crossings at the start are repaired.
+    pub untangle: bool,
     /// Parts that do not collide with each other.
     pub exclusions: Vec<Exclusion>,
     /// The linear solver of implicit integrators.

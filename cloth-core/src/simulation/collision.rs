@@ -1,8 +1,9 @@
 //! Contact of a scene with itself and with obstacles.
 
-use crate::barrier::{BarrierContact, ContactError, ObstacleStart, Participants};
+use crate::barrier::{BarrierContact, ContactError, ObstacleStart, Participants, Untangling};
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
+use crate::geometry::{norm, subtract};
 use crate::model::Model;
 
 use super::Island;
@@ -19,13 +20,33 @@ pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
     CollisionMesh::new(model.x.len(), &model.triangles, &segments, &model.sewn)
 }
 
-/// Adds contact to an island: with obstacles, and with itself if it holds all vertices of the model.
-pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool) -> Result<(), ContactError> {
+/// Adds contact to an island: with obstacles, and with itself if it holds all vertices of the model. If crossings at
+/// the start are to be repaired, vertices of the island and the model move.
+pub(super) fn add_contact(
+    island: &mut Island,
+    model: &mut Model,
+    with_itself: bool,
+    untangle: bool,
+) -> Result<(), ContactError> {
+    let participants = participants(island, model, with_itself);
+    if untangle {
+        repair(island, model, &participants);
+    }
+    check_sides(island, model)?;
+    let vertices = island.vertices();
+    let contact = BarrierContact::among(participants, &island.body().x).map_err(|error| error.on_vertices(vertices))?;
+    let contact = contact.with_friction(vertices.iter().map(|&vertex| model.friction[vertex]).collect());
+    let contact = contact.with_grips(island.prescribed().grips(&model.obstacles, vertices.len()));
+    island.body_mut().system.set_contact(Box::new(contact));
+    Ok(())
+}
+
+/// Returns what collides in an island.
+fn participants(island: &Island, model: &Model, with_itself: bool) -> Participants {
     let vertices = island.vertices();
     let mut local = vec![None; model.x.len()];
     vertices.iter().enumerate().for_each(|(place, &vertex)| local[vertex] = Some(place));
     let own = mesh_of(model).restricted(&local, vertices.len());
-    check_sides(island, model)?;
     let x = &island.body().x;
     let shortest = own.shortest_edge(x);
     let all = vertices.iter().map(|&vertex| model.thickness[vertex]);
@@ -37,9 +58,8 @@ pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool)
         radius,
         reach: obstacle.thickness,
     };
-    let prescribed = island.prescribed();
-    let cores = prescribed.cores();
-    let participants = Participants {
+    let cores = island.prescribed().cores();
+    Participants {
         is_free: (0..x.len()).map(|place| vertices.get(place).is_some_and(|&own| !model.pinned_forever[own])).collect(),
         radii: all.map(|thickness| 0.5 * scale * thickness).collect(),
         gap: GAP * scale * thickest,
@@ -47,12 +67,26 @@ pub(super) fn add_contact(island: &mut Island, model: &Model, with_itself: bool)
         exclusions: model.exclusions.restricted(&local, vertices.len()),
         with_itself,
         mesh: own.with_obstacles(&cores),
-    };
-    let contact = BarrierContact::among(participants, x).map_err(|error| error.on_vertices(vertices))?;
-    let contact = contact.with_friction(vertices.iter().map(|&vertex| model.friction[vertex]).collect());
-    let contact = contact.with_grips(prescribed.grips(&model.obstacles, vertices.len()));
-    island.body_mut().system.set_contact(Box::new(contact));
-    Ok(())
+    }
+}
+
+/// Moves vertices of an island, and of the model, to where nothing crosses. Crossings that are too deep stay.
+fn repair(island: &mut Island, model: &mut Model, participants: &Participants) {
+    let solids: Vec<AnySolid> = model.obstacles.iter().map(|obstacle| obstacle.at(0.0)).collect();
+    let is_pinned = |place: usize| island.vertices().get(place).is_none_or(|&vertex| model.pinned_at_start[vertex]);
+    let is_movable = (0..island.body().x.len()).map(|place| !is_pinned(place)).collect();
+    let untangling = Untangling { participants, solids: &solids, is_movable };
+    let Some(x) = untangling.repair(&island.body().x) else { return };
+    let moves = || x.iter().zip(&island.body().x).map(|(to, from)| norm(subtract(*to, *from)));
+    let (count, longest) = (moves().filter(|way| *way > 0.0).count(), moves().fold(0.0, f64::max));
+    if count > 0 {
+        let longest = 1e3 * longest;
+        model.notes.push(format!("{count} vertices moved by up to {longest:.3} mm, so that nothing crosses"));
+    }
+    for (&vertex, x) in island.vertices().iter().zip(&x) {
+        model.x[vertex] = *x;
+    }
+    island.body_mut().x = x;
 }
 
 /// Returns an error if a free vertex starts inside an obstacle.

@@ -1,4 +1,4 @@
-//! Replaces the materials of a scene by elements of a file.
+//! Changes the text of a scene, as options of the command line ask.
 
 use std::path::Path;
 
@@ -22,6 +22,14 @@ pub fn with_material(scene: &str, file: &Path, parameters: &[(String, f64)]) -> 
     if let Some(Value::Array(garments)) = table.get_mut("garment") {
         garments.iter_mut().filter_map(Value::as_table_mut).for_each(|garment| replace(garment, &material));
     }
+    table.to_string()
+}
+
+/// Returns the text of a scene that repairs shallow crossings at the start. Text that is not TOML is returned unchanged.
+#[must_use]
+pub fn with_untangling(scene: &str) -> String {
+    let Ok(mut table) = scene.parse::<Table>() else { return scene.to_owned() };
+    table.insert("untangle".to_owned(), Value::Boolean(true));
     table.to_string()
 }
 

@@ -1,0 +1,201 @@
+use std::f64::consts::PI;
+
+use super::*;
+use crate::barrier::BarrierContact;
+use crate::collision::{CollisionMesh, Exclusions, crossings};
+use crate::scene::Scene;
+use crate::simulation::{Simulation, SimulationError};
+
+const THICKNESS: f64 = 1e-3;
+const GAP: f64 = 2e-3;
+
+/// Numbers between 0 and 1 (Steele, Lea and Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) as f64 / u64::MAX as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+#[derive(Default)]
+struct Sheets {
+    x: Vec<Vector3<f64>>,
+    triangles: Vec<[usize; 3]>,
+}
+
+impl Sheets {
+    /// Adds a square of n × n cells of size h, placed by a map from the plane.
+    fn add(&mut self, n: usize, h: f64, place: impl Fn([f64; 2]) -> Vector3<f64>) {
+        let first = self.x.len();
+        let at = |i: usize, j: usize| first + i * (n + 1) + j;
+        for i in 0..=n {
+            for j in 0..=n {
+                self.x.push(place([h * (i as f64 - 0.5 * n as f64), h * (j as f64 - 0.5 * n as f64)]));
+            }
+        }
+        for i in 0..n {
+            for j in 0..n {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+                let halves = if (i + j) % 2 == 0 { [[a, b, d], [a, d, c]] } else { [[a, b, c], [b, d, c]] };
+                self.triangles.extend(halves);
+            }
+        }
+    }
+
+    fn participants(&self) -> Participants {
+        let vertices = self.x.len();
+        Participants {
+            mesh: CollisionMesh::new(vertices, &self.triangles, &[], &[]),
+            is_free: vec![true; vertices],
+            radii: vec![0.5 * THICKNESS; vertices],
+            gap: GAP,
+            obstacles: Vec::new(),
+            exclusions: Exclusions::default(),
+            with_itself: true,
+        }
+    }
+}
+
+/// Starts that cross themselves by up to twice the thickness.
+fn random_start(random: &mut Random) -> Sheets {
+    let mut sheets = Sheets::default();
+    let (h, n) = (random.between(5e-3, 2e-2), 6 + (4.0 * random.next()) as usize);
+    let [a, b, c, turn] = [PI, 2.0 * PI, 2.0 * PI, PI].map(|most| random.between(0.0, most));
+    let (waves, size) = (random.between(0.5, 2.0) * PI / (h * n as f64), h * n as f64);
+    match (4.0 * random.next()) as usize {
+        // Two sheets, one of which sags through the other.
+        0 => {
+            let depth = random.between(0.1, 2.0) * THICKNESS;
+            sheets.add(n, h, |[u, v]| [u, v, 0.0]);
+            let (sine, cosine) = turn.sin_cos();
+            let height = random.between(1.0, 4.0) * THICKNESS;
+            sheets.add(n, 1.1 * h, |[u, v]| {
+                let sag = (waves * u + a).cos() * (waves * v + b).cos();
+                [cosine * u - sine * v, sine * u + cosine * v, height - (height + depth) * sag * sag]
+            });
+        }
+        // Two sheets whose vertices lie on either side of each other, without any order.
+        1 => {
+            let mut heights: Vec<f64> =
+                (0..2 * (n + 1) * (n + 1)).map(|_| random.between(-THICKNESS, THICKNESS)).collect();
+            for shift in [0.0, 0.3 * h] {
+                let own = std::cell::RefCell::new(heights.split_off(heights.len() - (n + 1) * (n + 1)));
+                sheets.add(n, h, |[u, v]| [u + shift, v + 0.7 * shift, own.borrow_mut().pop().unwrap()]);
+            }
+        }
+        // A sheet folded on itself, whose upper layer sags through the lower one.
+        2 => {
+            let radius = random.between(1.0, 3.0) * THICKNESS;
+            let depth = random.between(0.1, 2.0) * THICKNESS;
+            let around = PI * radius;
+            sheets.add(2 * n, h, |[u, v]| {
+                let past = u - 0.5 * around;
+                if u < -0.5 * around {
+                    [u + 0.5 * around, v, 0.0]
+                } else if past < 0.0 {
+                    let angle = (u + 0.5 * around) / radius;
+                    [radius * angle.sin(), v, radius * (1.0 - angle.cos())]
+                } else {
+                    let sag = ((past / (0.8 * size)).min(1.0) * PI).sin().powi(2) * (waves * v + c).cos().powi(2);
+                    [-past, v, 2.0 * radius - (2.0 * radius + depth) * sag]
+                }
+            });
+        }
+        // Three layers.
+        _ => {
+            for layer in 0..3 {
+                let [lift, phase] = [f64::from(layer) * 2.0 * THICKNESS, a * f64::from(layer)];
+                let depth = random.between(1.0, 2.0) * THICKNESS;
+                sheets.add(n, h * (1.0 + 0.07 * f64::from(layer)), |[u, v]| {
+                    [u, v, lift + depth * (waves * u + phase).sin() * (waves * v + b).cos()]
+                });
+            }
+        }
+    }
+    sheets
+}
+
+#[test]
+fn shallow_crossings_are_repaired() {
+    let mut random = Random(7);
+    let (mut repaired, mut crossed) = (0, 0);
+    const STARTS: usize = 100;
+    while crossed < STARTS {
+        let sheets = random_start(&mut random);
+        let participants = sheets.participants();
+        if crossings(&participants.mesh, &sheets.x).is_empty() {
+            continue;
+        }
+        crossed += 1;
+        // Sometimes the first quarter of all vertices is pinned.
+        let pinned = if crossed % 4 == 0 { sheets.x.len() / 4 } else { 0 };
+        let is_movable: Vec<bool> = (0..sheets.x.len()).map(|vertex| vertex >= pinned).collect();
+        let untangling = Untangling { participants: &participants, solids: &[], is_movable };
+        let Some(x) = untangling.repair(&sheets.x) else { continue };
+        assert_eq!(crossings(&participants.mesh, &x), []);
+        assert_eq!(x[..pinned], sheets.x[..pinned]);
+        BarrierContact::among(participants, &x).unwrap_or_else(|error| panic!("{error}"));
+        repaired += 1;
+    }
+    assert!(repaired >= 95 * STARTS / 100, "{repaired} of {STARTS}");
+}
+
+/// A sheet near another or near an obstacle.
+fn scene(untangle: bool, slope: f64, others: &str) -> Result<Simulation, SimulationError> {
+    let text = format!(
+        r#"
+        dt = 0.01
+        duration = 0.2
+        integrator = "newton"
+        adaptive = true
+        untangle = {untangle}
+        {others}
+        [[garment]]
+        mesh.sheet = {{ cells = [7, 7], size = [0.1, 0.1] }}
+        placement.rotate = {{ axis = [0.0, 1.0, 0.0], angle = {slope:?} }}
+        fabric = {FABRIC}
+        "#
+    );
+    Simulation::new(&Scene::parse(&text, "s.toml".as_ref()).unwrap_or_else(|error| panic!("{error}")))
+}
+
+const FABRIC: &str = "{ density = 0.2, thickness = 1e-3, material.stvk = \
+                      { stretch_stiffness = 40.0, poisson_ratio = 0.3, bending.flat.stiffness = 1e-6 } }";
+
+fn ground() -> String {
+    format!(
+        "[[garment]]\nname = \"ground\"\nplacement.translate = [0.003, 0.002, 0.0]\n\
+         mesh.sheet = {{ cells = [9, 9], size = [0.12, 0.12] }}\nfabric = {FABRIC}\n\
+         [[pins]]\nof = \"ground\"\nall = true\n"
+    )
+}
+
+#[test]
+fn scenes_that_start_with_shallow_crossings_run() {
+    let ball = "[[obstacles]]\nsphere = { centre = [0.0, 0.0, -0.1], radius = 0.1005 }\n";
+    let plane = "[[obstacles]]\nplane = {}\n";
+    for (slope, others) in [(1.5, &ground()[..]), (0.0, ball), (1.5, plane)] {
+        let refused = scene(false, slope, others).unwrap_err();
+        assert!(matches!(refused, SimulationError::Contact(_)), "{refused}");
+        let mut simulation = scene(true, slope, others).unwrap_or_else(|error| panic!("{others}: {error}"));
+        for _ in 0..20 {
+            assert_eq!((simulation.crossings(), simulation.obstacle_crossings()), (vec![], 0), "{others}");
+            simulation.step().unwrap_or_else(|error| panic!("{others}: {error}"));
+        }
+    }
+}
+
+#[test]
+fn deep_crossings_are_refused_by_name() {
+    let message = scene(true, 70.0, &ground()).unwrap_err().to_string();
+    assert!(message.contains("goes through the triangle") && message.contains("mm deep"), "{message}");
+}
