@@ -107,3 +107,48 @@ fn an_edited_mesh_is_refused_unless_it_is_accepted() {
     assert!(message.contains("square.obj was edited since the run began") && message.contains("--accept-edited"));
     notes(&["resume", "out", "--accept-edited"], folder.path());
 }
+
+/// A sheet that lies on a floor.
+const LYING: &str = r#"dt = 0.01
+duration = 0.2
+frames_per_second = 25
+integrator = "newton"
+[[garment]]
+placement.translate = [0.0, 0.0, 0.0044]
+mesh.sheet = { cells = [4, 4], size = [0.2, 0.2] }
+[garment.fabric]
+density = 0.2
+material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3 }
+[[obstacles]]
+plane = {}
+[output]
+picture = false
+ply = true
+velocities = true
+contact_forces = true
+"#;
+
+#[test]
+fn files_hold_forces_of_contact_also_after_a_repair() {
+    let folder = with_scene(LYING);
+    let path = folder.path();
+    notes(&["run", "scene.toml", "-o", "out", "--checkpoint", "8"], path);
+    let last = path.join("out/frames/cloth_0005.ply");
+    let ply = std::fs::read(&last).unwrap();
+    let end = ply.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+    assert!(String::from_utf8_lossy(&ply[..end]).contains("property float fz\n"));
+    let number = |at: usize| f64::from(f32::from_le_bytes(ply[end + at..end + at + 4].try_into().unwrap()));
+    // Three vectors of 12 bytes for each vertex, and the third component of the last.
+    let carried: f64 = (0..25).map(|vertex| number(36 * vertex + 32)).sum();
+    assert!((carried / (9.81 * 0.2 * 0.04) - 1.0).abs() < 0.1, "{carried} N");
+    let usd = std::fs::read_to_string(path.join("out/cloth.usda")).unwrap();
+    assert!(usd.contains("vector3f[] primvars:contactForce.timeSamples = {") && usd.contains("velocities.timeSamples"));
+    assert!(path.join("out/contact.svg").exists());
+    std::fs::write(&last, &ply[..50]).unwrap();
+    std::fs::remove_file(path.join("out/cloth.usda")).unwrap();
+    notes(&["resume", "out"], path);
+    assert_eq!(std::fs::read(&last).unwrap(), ply);
+    assert_eq!(std::fs::read_to_string(path.join("out/cloth.usda")).unwrap(), usd);
+    notes(&["report", "out"], path);
+    assert!(std::fs::read_to_string(path.join("out/report.html")).unwrap().contains("<h2>Contact</h2>"));
+}

@@ -209,3 +209,23 @@ fn impossible_contact_is_refused_with_the_cause() {
     let message = Simulation::new(&scene).unwrap_err().to_string();
     assert!(message.contains("closer than the thickness at the start"), "{message}");
 }
+
+/// A sheet at rest on a floor: forces of contact carry its weight, each vertex its own, and the floor feels all of it.
+#[test]
+fn forces_of_contact_carry_the_weight() {
+    let cloth = sheet("cloth", 5, 0.2, [0.0, 0.0, 0.0044], "");
+    let floor = "[[obstacles]]\nplane = {}\n";
+    let mut simulation = simulation(&(head("on", "tolerances.velocity = 1e-7") + &cloth + floor));
+    assert!(simulation.contact_forces().iter().all(|force| *force == [0.0; 3]), "nothing has happened yet");
+    simulation.keep_ledger().unwrap();
+    assert_eq!(crossings(&mut simulation, 60), 0);
+    let weight = 9.81 * simulation.masses().iter().sum::<f64>();
+    let forces = simulation.contact_forces();
+    for (force, mass) in forces.iter().zip(simulation.masses()) {
+        assert!((force[2] / (9.81 * mass) - 1.0).abs() < 1e-3, "{force:?}");
+    }
+    let largest = forces.iter().map(|force| force[2]).fold(0.0, f64::max);
+    let entry = simulation.ledger().unwrap().entries().last().unwrap();
+    assert!((entry.force_on_obstacles[2] / -weight - 1.0).abs() < 1e-4, "{:?}", entry.force_on_obstacles);
+    assert!((entry.contact_force / largest - 1.0).abs() < 1e-6, "{} {largest}", entry.contact_force);
+}

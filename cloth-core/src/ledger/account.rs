@@ -5,6 +5,7 @@ use energy_solve::{EvaluationError, PlacedTerm, State};
 use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
+use crate::geometry::{add_scaled, norm};
 
 /// Energy and momenta of an island, and the work done on it so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,6 +27,12 @@ pub(crate) struct Account {
     pub momentum: Vector3<f64>,
     /// Σ m x × v about the origin, in kg m²/s.
     pub angular_momentum: Vector3<f64>,
+    /// The largest force of contact on a vertex, in N.
+    #[serde(default)]
+    pub contact_force: f64,
+    /// The total force of contact on obstacles, in N.
+    #[serde(default)]
+    pub force_on_obstacles: Vector3<f64>,
 }
 
 /// Quantities at the start of a step, for the trapezoidal rule.
@@ -105,6 +112,9 @@ impl Account {
         // Pairs in contact are known at the end of the step only.
         let mut contact = vec![[0.0; 3]; body.x.len()];
         body.system.add_contact_force(&body.x, &mut contact);
+        let (on_cloth, on_obstacles) = contact.split_at(opening.own);
+        after.contact_force = on_cloth.iter().map(|force| norm(*force)).fold(0.0, f64::max);
+        after.force_on_obstacles = on_obstacles.iter().fold([0.0; 3], |sum, force| add_scaled(sum, 1.0, *force));
         let moving: Vec<usize> = opening.pins.iter().map(|(vertex, ..)| *vertex).collect();
         for ((vertex, before, from), now) in opening.pins.iter().zip(potential_forces(body, &moving)) {
             let force = |axis: usize| 0.5 * (before[axis] + now[axis]) + contact[*vertex][axis];

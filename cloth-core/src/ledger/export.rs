@@ -3,6 +3,7 @@ use std::fmt::Write as _;
 use plotters::prelude::*;
 
 use super::{Entry, Ledger};
+use crate::geometry::norm;
 
 impl Ledger {
     /// Formats the ledger as CSV, one line per entry.
@@ -16,16 +17,40 @@ impl Ledger {
         self.potentials.iter().for_each(|name| line(format_args!(",potential {} [J]", quoted(name))));
         self.works.iter().for_each(|name| line(format_args!(",work {} [J]", quoted(name))));
         line(format_args!(",work pins [J],work obstacles [J],work sleep [J],energy [J],unaccounted [J]"));
-        line(format_args!(",Px [kg m/s],Py [kg m/s],Pz [kg m/s],Lx [kg m^2/s],Ly [kg m^2/s],Lz [kg m^2/s]\n"));
+        line(format_args!(",Px [kg m/s],Py [kg m/s],Pz [kg m/s],Lx [kg m^2/s],Ly [kg m^2/s],Lz [kg m^2/s]"));
+        if self.in_contact {
+            line(format_args!(",contact force [N],on obstacles x [N],on obstacles y [N],on obstacles z [N]"));
+        }
+        line(format_args!("\n"));
         for entry in &self.entries {
             let numbers = [entry.time, entry.kinetic].into_iter().chain(entry.potential.iter().copied());
             let numbers = numbers.chain(entry.work.iter().copied()).chain([entry.pins, entry.obstacles, entry.sleep]);
             let numbers = numbers.chain([entry.energy(), entry.unaccounted(&self.entries[0])]);
             let numbers = numbers.chain(entry.momentum).chain(entry.angular_momentum);
+            let forces = [entry.contact_force].into_iter().chain(entry.force_on_obstacles);
+            let numbers = numbers.chain(forces.filter(|_| self.in_contact));
             let row: Vec<String> = numbers.map(|number| format!("{number:e}")).collect();
             line(format_args!("{}\n", row.join(",")));
         }
         text
+    }
+
+    /// Plots the forces of certified contact over time, as SVG; `None` without such contact.
+    ///
+    /// # Errors
+    /// Returns an error if the plot cannot be drawn.
+    pub fn contact_svg(&self) -> Option<Result<String, String>> {
+        let of = |force: &dyn Fn(&Entry) -> f64| self.entries.iter().map(force).collect::<Vec<f64>>();
+        let curves = [
+            ("largest force on a vertex".to_owned(), of(&|entry| entry.contact_force)),
+            ("total force on obstacles".to_owned(), of(&|entry| norm(entry.force_on_obstacles))),
+        ];
+        let drawn = || plot(&self.times(), &curves, "force of contact, N").map_err(|error| error.to_string());
+        self.in_contact.then(drawn)
+    }
+
+    fn times(&self) -> Vec<f64> {
+        self.entries.iter().map(|entry| entry.time).collect()
     }
 
     /// Plots the ledger over time, as SVG.
@@ -52,13 +77,12 @@ impl Ledger {
         add("work of obstacles", &|entry| entry.obstacles - first.obstacles);
         add("sleep", &|entry| entry.sleep - first.sleep);
         add("unaccounted", &|entry| entry.unaccounted(first));
-        let times: Vec<f64> = self.entries.iter().map(|entry| entry.time).collect();
-        plot(&times, &curves).map_err(|error| error.to_string())
+        plot(&self.times(), &curves, "energy since the start, J").map_err(|error| error.to_string())
     }
 }
 
 /// Plots named curves over time.
-fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn std::error::Error>> {
+fn plot(times: &[f64], curves: &[(String, Vec<f64>)], quantity: &str) -> Result<String, Box<dyn std::error::Error>> {
     let all = || curves.iter().flat_map(|(_, values)| values).copied();
     let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
     let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
@@ -77,7 +101,7 @@ fn plot(times: &[f64], curves: &[(String, Vec<f64>)]) -> Result<String, Box<dyn 
             .max_light_lines(2)
             .light_line_style(BLACK.mix(0.05))
             .x_desc("time, s")
-            .y_desc("energy since the start, J")
+            .y_desc(quantity)
             .y_label_formatter(&|value| format!("{value:.3e}"))
             .draw()?;
         for (number, (name, values)) in curves.iter().enumerate() {

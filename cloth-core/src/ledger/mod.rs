@@ -25,6 +25,9 @@ pub struct Ledger {
     potentials: Vec<String>,
     works: Vec<String>,
     entries: Vec<Entry>,
+    /// Whether contact is certified.
+    #[serde(default)]
+    in_contact: bool,
     /// One account per island.
     accounts: Vec<Account>,
     /// Accounts that changed in the current step.
@@ -52,6 +55,12 @@ pub struct Entry {
     pub momentum: Vector3<f64>,
     /// Σ m x × v about the origin, in kg m²/s.
     pub angular_momentum: Vector3<f64>,
+    /// The largest force of certified contact on a vertex, in N.
+    #[serde(default)]
+    pub contact_force: f64,
+    /// The total force of certified contact on obstacles, in N.
+    #[serde(default)]
+    pub force_on_obstacles: Vector3<f64>,
 }
 
 impl Entry {
@@ -65,7 +74,9 @@ impl Entry {
         for axis in 0..3 {
             self.momentum[axis] += account.momentum[axis];
             self.angular_momentum[axis] += account.angular_momentum[axis];
+            self.force_on_obstacles[axis] += account.force_on_obstacles[axis];
         }
+        self.contact_force = self.contact_force.max(account.contact_force);
     }
 
     /// Kinetic and potential energy, in J.
@@ -115,8 +126,9 @@ impl Ledger {
             let named = names.iter().zip(columns).filter(|(_, column)| column.is_some());
             named.map(|(name, _)| (*name).to_owned()).collect::<Vec<String>>()
         });
-        let in_contact = [potentials.len(), works.len()];
-        if bodies.iter().any(|(body, _)| body.system.has_contact()) {
+        let of_contact = [potentials.len(), works.len()];
+        let in_contact = bodies.iter().any(|(body, _)| body.system.has_contact());
+        if in_contact {
             potentials.push("contact".to_owned());
             works.push("friction and new barriers of contact".to_owned());
         }
@@ -125,13 +137,14 @@ impl Ledger {
                 .each_ref()
                 .map(|columns| labels.iter().filter_map(|&label| columns[label]).collect::<Vec<usize>>());
             if body.system.has_contact() {
-                potentials.push(in_contact[0]);
-                works.push(in_contact[1]);
+                potentials.push(of_contact[0]);
+                works.push(of_contact[1]);
             }
             Account::open(body, potentials, works)
         };
         let accounts = bodies.iter().map(account).collect::<Result<_, _>>()?;
-        let mut ledger = Self { potentials, works, entries: Vec::new(), accounts, changed: Vec::new() };
+        let (entries, changed) = (Vec::new(), Vec::new());
+        let mut ledger = Self { potentials, works, entries, in_contact, accounts, changed };
         ledger.enter(time);
         Ok(ledger)
     }

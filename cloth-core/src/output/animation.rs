@@ -353,6 +353,7 @@ mod tests {
             corners: &corners,
             frames: frames.iter().map(|frame| &frame[..]).collect(),
             velocities: Vec::new(),
+            contact_forces: Vec::new(),
             width: 0.0,
         };
         let file = animation_glb(&[track], 25.0).unwrap();

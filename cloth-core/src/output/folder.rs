@@ -28,7 +28,7 @@ pub enum OutputError {
     File { path: PathBuf, source: std::io::Error },
 }
 
-/// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `summary.txt`,
+/// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `contact.svg`, `summary.txt`,
 /// `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are written atomically.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
@@ -53,6 +53,8 @@ impl OutputFolder {
     pub const LEDGER: &'static str = "ledger.csv";
     /// File name of the plot of the ledger.
     pub const LEDGER_PLOT: &'static str = "ledger.svg";
+    /// Plot of the forces of contact.
+    pub const CONTACT_PLOT: &'static str = "contact.svg";
     /// File name of the machine-readable record.
     pub const RECORD: &'static str = "run.json";
     /// File name of the report.
@@ -69,7 +71,7 @@ impl OutputFolder {
     pub const FRAMES: &'static str = "frames";
 
     /// All files of a run except the frames.
-    const RESULTS: [&'static str; 12] = [
+    const RESULTS: [&'static str; 13] = [
         Self::PICTURE,
         Self::ANIMATION,
         Self::SUMMARY,
@@ -78,6 +80,7 @@ impl OutputFolder {
         Self::FILM,
         Self::LEDGER,
         Self::LEDGER_PLOT,
+        Self::CONTACT_PLOT,
         Self::RECORD,
         Self::REPORT,
         Self::CHECKPOINT,

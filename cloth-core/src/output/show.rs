@@ -24,7 +24,8 @@ pub struct Show<'a> {
     simulation: &'a Simulation,
     frames: Vec<&'a [Vector3<f64>]>,
     /// Velocities of all vertices in each frame; empty if they are not written.
-    velocities: &'a [Vec<Vector3<f64>>],
+    velocities: Vec<&'a [Vector3<f64>]>,
+    contact_forces: Vec<&'a [Vector3<f64>]>,
     /// For each garment its triangles, numbered within it; for each hair its strands.
     triangles: Vec<Vec<[usize; 3]>>,
     strands: Vec<Vec<std::ops::Range<usize>>>,
@@ -43,7 +44,9 @@ impl<'a> Show<'a> {
         let bounds = frames.iter().map(|frame| Bounds::of(frame)).fold(Bounds::EMPTY, Bounds::around);
         let (scenery, framing) = (Scenery::of(simulation, style), Framing::loose(bounds));
         let (triangles, strands, solids) = (Vec::new(), Vec::new(), Vec::new());
-        let mut show = Self { simulation, frames, velocities: &[], triangles, strands, solids, scenery, framing };
+        let (velocities, contact_forces) = (Vec::new(), Vec::new());
+        let mut show =
+            Self { simulation, frames, velocities, contact_forces, triangles, strands, solids, scenery, framing };
         for part in simulation.parts() {
             let (triangles, strands) = match &part.kind {
                 PartKind::Cloth(mesh) => (mesh.triangles().to_vec(), Vec::new()),
@@ -71,8 +74,14 @@ impl<'a> Show<'a> {
 
     /// Adds the velocities of all vertices in each frame, in m/s.
     #[must_use]
-    pub fn with_velocities(self, velocities: &'a [Vec<Vector3<f64>>]) -> Self {
+    pub fn with_velocities(self, velocities: Vec<&'a [Vector3<f64>]>) -> Self {
         Self { velocities, ..self }
+    }
+
+    /// Adds the forces of contact on all vertices in each frame, in N.
+    #[must_use]
+    pub fn with_contact_forces(self, contact_forces: Vec<&'a [Vector3<f64>]>) -> Self {
+        Self { contact_forces, ..self }
     }
 
     /// Returns a track for every garment, hair and solid.
@@ -88,15 +97,18 @@ impl<'a> Show<'a> {
                 PartKind::Hair { width, .. } => (Joined::Strands(&self.strands[number]), HAIR, width),
             };
             let colour = part.colour.map_or(colour, linear);
-            let velocities = self.velocities.iter().map(|frame| &frame[part.vertices.clone()]).collect();
-            tracks.push(Track { name: &part.name, colour, joined, corners: &part.corners, frames, velocities, width });
+            let of_part = |all: &[&'a [Vector3<f64>]]| all.iter().map(|frame| &frame[part.vertices.clone()]).collect();
+            let (velocities, contact_forces) = (of_part(&self.velocities), of_part(&self.contact_forces));
+            let (name, corners) = (&part.name, &part.corners);
+            tracks.push(Track { name, colour, joined, corners, frames, velocities, contact_forces, width });
         }
         for (obstacle, meshes) in self.simulation.obstacles().iter().zip(&self.solids) {
             let frames = meshes.iter().map(|mesh| mesh.vertices.as_slice()).collect();
             let joined = Joined::Triangles(&meshes[0].triangles);
             let corners = const { &PLAIN };
-            let velocities = Vec::new();
-            tracks.push(Track { name: &obstacle.name, colour: SOLID, joined, corners, frames, velocities, width: 0.0 });
+            let (name, colour, width) = (&obstacle.name, SOLID, 0.0);
+            let (velocities, contact_forces) = (Vec::new(), Vec::new());
+            tracks.push(Track { name, colour, joined, corners, frames, velocities, contact_forces, width });
         }
         tracks
     }

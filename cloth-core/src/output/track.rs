@@ -21,6 +21,8 @@ pub struct Track<'a> {
     pub width: f64,
     /// The velocities of the points in each frame, in m/s; empty if they are not written.
     pub velocities: Vec<&'a [Vector3<f64>]>,
+    /// The forces of contact on the points in each frame, in N; empty if they are not written.
+    pub contact_forces: Vec<&'a [Vector3<f64>]>,
 }
 
 /// The topology of the points of a track.

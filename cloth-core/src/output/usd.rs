@@ -70,6 +70,10 @@ impl Usd {
         if !track.velocities.is_empty() {
             self.samples("vector3f[] velocities", "", &track.velocities, &tuples);
         }
+        if !track.contact_forces.is_empty() {
+            let at_vertices = "(\n            interpolation = \"vertex\"\n        )";
+            self.samples("vector3f[] primvars:contactForce", at_vertices, &track.contact_forces, &tuples);
+        }
         self.line(format_args!("    }}"));
     }
 
@@ -196,6 +200,7 @@ mod tests {
             corners: &corners,
             frames: vec![&points[..], &points[..]],
             velocities: vec![&points[..], &points[..]],
+            contact_forces: vec![&points[..], &points[..]],
             width: 0.0,
         };
         let text = usd_text(&[track("left sleeve"), track("left-sleeve"), track("1st")], 25.0);
@@ -206,6 +211,7 @@ mod tests {
             "endTimeCode = 1",
             "1: [(0, 0, 0), (1, 0, 0), (0, 1, 0.5)],",
             "vector3f[] velocities.timeSamples = {",
+            "vector3f[] primvars:contactForce.timeSamples = {",
             "rel material:binding = </scene/materials/left_sleeve_2>",
             "def Material \"_1st\"",
             "interpolation = \"vertex\"",

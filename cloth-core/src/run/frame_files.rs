@@ -6,6 +6,7 @@ use std::path::Path;
 
 use energy_dsl::Vector3;
 
+use super::frame_store::Vectors;
 use super::{Run, RunError};
 use crate::output::{last_obj_line, obj_text, ply_bytes};
 
@@ -15,7 +16,7 @@ impl Run {
         &self,
         number: usize,
         x: &[Vector3<f64>],
-        v: &[Vector3<f64>],
+        vectors: &Vectors,
         only_broken: bool,
     ) -> Result<usize, RunError> {
         let (simulation, wanted) = (&self.simulation, &self.scene.output);
@@ -25,7 +26,7 @@ impl Run {
             self.folder.write_frame(number, "obj", text.as_bytes())?;
             written += 1;
         }
-        let ply = || ply_bytes(x, v, simulation.triangles());
+        let ply = || ply_bytes(x, &vectors.velocities, &vectors.forces, simulation.triangles());
         if wanted.ply && !(only_broken && has_contents(&self.folder.frame_path(number, "ply"), &ply())) {
             self.folder.write_frame(number, "ply", &ply())?;
             written += 1;

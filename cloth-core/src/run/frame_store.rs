@@ -14,18 +14,53 @@ use crate::scene::OutputChoice;
 /// The positions of all vertices in one frame, in m. Pictures are drawn from them on another thread.
 pub(super) type Frame = Arc<[Vector3<f64>]>;
 
-/// The velocities of all vertices in one frame, in m/s; empty if the file has none.
-pub(super) type Velocities = Vec<Vector3<f64>>;
+/// Vectors at all vertices in one frame; empty if they are not stored.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Vectors {
+    /// In m/s.
+    pub velocities: Vec<Vector3<f64>>,
+    /// Forces of contact, in N.
+    pub forces: Vec<Vector3<f64>>,
+}
+
+/// Which vectors are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Wanted {
+    velocities: bool,
+    forces: bool,
+}
+
+impl Wanted {
+    /// Bytes per vertex.
+    fn size(self) -> usize {
+        12 * (usize::from(self.velocities) + usize::from(self.forces))
+    }
+
+    /// Returns the wanted vectors, rounded to single precision.
+    fn of(self, all: &Vectors) -> Vectors {
+        let rounded = |wanted: bool, vectors: &[Vector3<f64>]| {
+            if wanted { vectors.iter().map(|v| v.map(|number| f64::from(number as f32))).collect() } else { Vec::new() }
+        };
+        Vectors { velocities: rounded(self.velocities, &all.velocities), forces: rounded(self.forces, &all.forces) }
+    }
+
+    /// Reads the vectors of a frame.
+    fn read(self, bytes: &[u8]) -> Vectors {
+        let (first, second) = bytes.split_at(if self.velocities { bytes.len() * 12 / self.size() } else { 0 });
+        let points = |bytes: &[u8]| bytes.chunks_exact(12).map(single_point).collect();
+        Vectors { velocities: points(first), forces: points(second) }
+    }
+}
 
 /// Frames, each with the positions of all vertices. The file holds them one after the other, in little-endian double
-/// precision; if files need velocities, each is followed by the velocities in single precision.
+/// precision. Each is followed by the vectors that files need, in single precision.
 #[derive(Debug)]
 pub(crate) struct FrameStore {
     frames: Vec<Frame>,
-    /// Velocities of each frame; empty unless a file of the whole run needs them.
-    velocities: Vec<Velocities>,
-    has_velocities: bool,
-    keeps_velocities: bool,
+    /// The vectors of each frame that a file of the whole run needs.
+    vectors: Vec<Vectors>,
+    stored: Wanted,
+    kept: Wanted,
     file: Option<(PathBuf, File)>,
     checksum: crc32fast::Hasher,
 }
@@ -38,54 +73,53 @@ impl FrameStore {
             Err(source) => Err(OutputError::File { path, source }),
         };
         let (file, checksum) = (path.map(open).transpose()?, crc32fast::Hasher::new());
-        let (frames, velocities) = (Vec::new(), Vec::new());
-        let (has_velocities, keeps_velocities) = needs(wanted);
-        Ok(Self { frames, velocities, has_velocities, keeps_velocities, file, checksum })
+        let (frames, vectors) = (Vec::new(), Vec::new());
+        let (stored, kept) = needs(wanted);
+        Ok(Self { frames, vectors, stored, kept, file, checksum })
     }
 
     /// Reads the first frames of a file and truncates it after them: later frames were written after the checkpoint.
-    /// Also returns the velocities of each frame; empty if the file has none.
+    /// Also returns the vectors of each frame that the file has.
     pub(crate) fn reopen(
         path: &Path,
         count: usize,
         vertices: usize,
         wanted: &OutputChoice,
         checksum: u32,
-    ) -> Result<(Self, Vec<Velocities>), CheckpointError> {
+    ) -> Result<(Self, Vec<Vectors>), CheckpointError> {
         let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        let (has_velocities, keeps_velocities) = needs(wanted);
-        let (of_positions, of_velocities) = (24 * vertices, if has_velocities { 12 * vertices } else { 0 });
-        let size = of_positions + of_velocities;
+        let (stored, kept) = needs(wanted);
+        let of_positions = 24 * vertices;
+        let size = of_positions + stored.size() * vertices;
         let damaged = |reason: &str| CheckpointError::Damaged { path: path.to_owned(), reason: reason.to_owned() };
-        let kept = bytes.get(..count * size).ok_or_else(|| damaged("it is cut short"))?;
+        let whole = bytes.get(..count * size).ok_or_else(|| damaged("it is cut short"))?;
         let mut hasher = crc32fast::Hasher::new();
-        hasher.update(kept);
+        hasher.update(whole);
         if hasher.clone().finalize() != checksum {
             return Err(damaged("its checksum does not match"));
         }
         let mut frames: Vec<Frame> = Vec::new();
-        let mut velocities = Vec::new();
+        let mut vectors = Vec::new();
         for frame in 0..count {
-            let (x, v) = kept[frame * size..][..size].split_at(of_positions);
+            let (x, rest) = whole[frame * size..][..size].split_at(of_positions);
             frames.push(x.chunks_exact(24).map(double_point).collect());
-            velocities.push(v.chunks_exact(12).map(single_point).collect());
+            vectors.push(stored.read(rest));
         }
         let file = OpenOptions::new().append(true).open(path).map_err(unreadable)?;
         file.set_len((count * size) as u64).map_err(unreadable)?;
-        let kept = if keeps_velocities { velocities.clone() } else { Vec::new() };
         let file = Some((path.to_owned(), file));
-        let store = Self { frames, velocities: kept, has_velocities, keeps_velocities, file, checksum: hasher };
-        Ok((store, velocities))
+        let own = vectors.iter().map(|vectors| kept.of(vectors)).collect();
+        Ok((Self { frames, vectors: own, stored, kept, file, checksum: hasher }, vectors))
     }
 
     pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// Velocities of each frame, in m/s; empty unless a file of the whole run needs them.
-    pub(crate) fn velocities(&self) -> &[Velocities] {
-        &self.velocities
+    /// The vectors of each frame that a file of the whole run needs.
+    pub(super) fn vectors(&self) -> &[Vectors] {
+        &self.vectors
     }
 
     /// CRC-32 of all frames.
@@ -93,20 +127,18 @@ impl FrameStore {
         self.checksum.clone().finalize()
     }
 
-    pub(crate) fn add(&mut self, frame: Frame, velocities: &[Vector3<f64>]) -> Result<(), OutputError> {
+    pub(super) fn add(&mut self, frame: Frame, vectors: &Vectors) -> Result<(), OutputError> {
         if let Some((path, file)) = &mut self.file {
             let mut bytes: Vec<u8> = frame.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
-            if self.has_velocities {
-                bytes.extend(velocities.as_flattened().iter().flat_map(|&number| (number as f32).to_le_bytes()));
-            }
+            let stored = self.stored.of(vectors);
+            let numbers = stored.velocities.as_flattened().iter().chain(stored.forces.as_flattened());
+            bytes.extend(numbers.flat_map(|&number| (number as f32).to_le_bytes()));
             file.write_all(&bytes).map_err(|source| OutputError::File { path: path.clone(), source })?;
             self.checksum.update(&bytes);
         }
         self.frames.push(frame);
-        if self.keeps_velocities {
-            // As the file holds them, so that a resumed run writes the same.
-            self.velocities.push(velocities.iter().map(|v| v.map(|number| f64::from(number as f32))).collect());
-        }
+        // As the file holds them, so that a resumed run writes the same.
+        self.vectors.push(self.kept.of(vectors));
         Ok(())
     }
 
@@ -117,10 +149,14 @@ impl FrameStore {
     }
 }
 
-/// Returns whether frames are stored with velocities, and whether these are kept in memory.
-fn needs(wanted: &OutputChoice) -> (bool, bool) {
-    let in_usd = wanted.usd && wanted.velocities;
-    (wanted.ply || in_usd, in_usd)
+/// Returns which vectors are stored, and which are kept in memory.
+fn needs(wanted: &OutputChoice) -> (Wanted, Wanted) {
+    let kept = Wanted { velocities: wanted.usd && wanted.velocities, forces: wanted.usd && wanted.contact_forces };
+    let stored = Wanted {
+        velocities: wanted.ply || kept.velocities,
+        forces: wanted.ply && wanted.contact_forces || kept.forces,
+    };
+    (stored, kept)
 }
 
 fn double_point(bytes: &[u8]) -> Vector3<f64> {

@@ -41,7 +41,8 @@ impl MemoryNeed {
         let wanted = &scene.output;
         // Positions are kept. A file with all frames is built in memory, as text or in single precision with normals.
         let per_point = if wanted.usd {
-            24.0 + 80.0 + if wanted.velocities { 24.0 + 40.0 } else { 0.0 }
+            let vectors = usize::from(wanted.velocities) + usize::from(wanted.contact_forces);
+            24.0 + 80.0 + (24.0 + 40.0) * vectors as f64
         } else if wanted.gltf {
             24.0 + 24.0
         } else {

@@ -19,7 +19,6 @@ pub mod stats;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use energy_dsl::Vector3;
 use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
@@ -38,7 +37,7 @@ use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 use available_memory::available_memory;
 use frame_pictures::FramePictures;
-use frame_store::{Frame, FrameStore};
+use frame_store::{Frame, FrameStore, Vectors};
 use memory_need::Gigabytes;
 
 /// A run that cannot be started or completed.
@@ -202,7 +201,7 @@ impl Run {
         let mut simulation = Simulation::new(&scene)?;
         simulation.restore(saved.state).map_err(CheckpointError::State)?;
         let (path, vertices) = (output.join(OutputFolder::SAVED_FRAMES), simulation.positions().len());
-        let (frames, velocities) =
+        let (frames, vectors) =
             FrameStore::reopen(&path, saved.frames, vertices, &scene.output, saved.frames_checksum)?;
         let mut run = Self {
             text: saved.scene,
@@ -220,7 +219,7 @@ impl Run {
         };
         run.note_edited_scene();
         run.note_missing_ffmpeg();
-        run.repair_frames(&velocities)?;
+        run.repair_frames(&vectors)?;
         Ok(run)
     }
 
@@ -241,9 +240,9 @@ impl Run {
     }
 
     /// Writes frames again that are missing or truncated.
-    fn repair_frames(&mut self, velocities: &[Vec<Vector3<f64>>]) -> Result<(), RunError> {
-        let frames = self.frames.frames().iter().zip(velocities).enumerate();
-        let written = frames.map(|(number, (x, v))| self.write_frame_files(number, x, v, true));
+    fn repair_frames(&mut self, vectors: &[Vectors]) -> Result<(), RunError> {
+        let frames = self.frames.frames().iter().zip(vectors).enumerate();
+        let written = frames.map(|(number, (x, vectors))| self.write_frame_files(number, x, vectors, true));
         let count: usize = written.sum::<Result<usize, RunError>>()?;
         if count > 0 {
             self.notes.push(format!("{count} files of frames were missing or truncated, and were written again"));
@@ -317,13 +316,15 @@ impl Run {
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
-        let (x, v) = (self.simulation.positions(), self.simulation.velocities());
-        self.write_frame_files(self.frames.frames().len(), x, v, false)?;
+        let x = self.simulation.positions();
+        let forces = if self.scene.output.contact_forces { self.simulation.contact_forces() } else { Vec::new() };
+        let vectors = Vectors { velocities: self.simulation.velocities().to_vec(), forces };
+        self.write_frame_files(self.frames.frames().len(), x, &vectors, false)?;
         let frame = Frame::from(x);
         if let Some(pictures) = &mut self.pictures {
             pictures.add(Frame::clone(&frame))?;
         }
-        self.frames.add(frame, v)?;
+        self.frames.add(frame, &vectors)?;
         Ok(())
     }
 

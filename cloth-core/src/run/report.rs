@@ -38,9 +38,12 @@ pub enum ReportError {
 pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
     let record = Record::read(folder)?;
     let picture = optional(&folder.join(OutputFolder::PICTURE))?;
-    let plot = optional(&folder.join(OutputFolder::LEDGER_PLOT))?;
+    let plots = Plots {
+        energy: optional(&folder.join(OutputFolder::LEDGER_PLOT))?,
+        contact: optional(&folder.join(OutputFolder::CONTACT_PLOT))?,
+    };
     let audit = audited(&record);
-    let page = page(&record, picture.as_deref(), plot.as_deref(), &audit);
+    let page = page(&record, picture.as_deref(), &plots, &audit);
     Ok(OutputFolder::unlocked(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
 }
 
@@ -109,7 +112,14 @@ fn own_targets(record: &Record) -> Vec<Target> {
     files.filter_map(|file| Target::of_file(&file).ok()).flatten().collect()
 }
 
-fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[Verdict]) -> String {
+/// The plots of a run, as SVG.
+#[derive(Default)]
+struct Plots {
+    energy: Option<Vec<u8>>,
+    contact: Option<Vec<u8>>,
+}
+
+fn page(record: &Record, picture: Option<&[u8]>, plots: &Plots, audit: &[Verdict]) -> String {
     let mut page = String::new();
     let mut add = |arguments: std::fmt::Arguments<'_>| {
         page.write_fmt(arguments).expect("writing to a string succeeds");
@@ -135,8 +145,10 @@ fn page(record: &Record, picture: Option<&[u8]>, plot: Option<&[u8]>, audit: &[V
         let data = STANDARD.encode(picture);
         add(format_args!("<img alt=\"The last frame\" src=\"data:image/png;base64,{data}\">"));
     }
-    if let Some(plot) = plot {
-        add(format_args!("<h2>Energy</h2>\n{}", String::from_utf8_lossy(plot)));
+    for (title, plot) in [("Energy", &plots.energy), ("Contact", &plots.contact)] {
+        if let Some(plot) = plot {
+            add(format_args!("<h2>{title}</h2>\n{}", String::from_utf8_lossy(plot)));
+        }
     }
     add(format_args!("<h2>Time</h2>\n{}", times(&record.summary)));
     add(format_args!("<h2>Evaluated and skipped</h2>\n{}", evaluated(&record.summary)));

@@ -119,6 +119,9 @@ impl Run {
         let Some(ledger) = self.simulation.ledger() else { return };
         written.add(true, || self.write(OutputFolder::LEDGER, ledger.csv().as_bytes()));
         written.add(true, || self.write(OutputFolder::LEDGER_PLOT, ledger.svg().map_err(RunError::Plot)?.as_bytes()));
+        if let Some(plot) = ledger.contact_svg() {
+            written.add(true, || self.write(OutputFolder::CONTACT_PLOT, plot.map_err(RunError::Plot)?.as_bytes()));
+        }
     }
 
     /// Writes the picture and the animations.
@@ -128,7 +131,17 @@ impl Run {
         let show = Show::new(&self.simulation, frames, rate, wanted.style());
         let picture = || show.picture(self.simulation.positions(), self.simulation.time());
         written.add(wanted.picture, || self.write(OutputFolder::PICTURE, &picture()?));
-        let show = show.with_velocities(self.frames.velocities());
+        let vectors = self.frames.vectors();
+        let show = if wanted.velocities {
+            show.with_velocities(vectors.iter().map(|frame| &frame.velocities[..]).collect())
+        } else {
+            show
+        };
+        let show = if wanted.contact_forces {
+            show.with_contact_forces(vectors.iter().map(|frame| &frame.forces[..]).collect())
+        } else {
+            show
+        };
         let usd = || usd_text(&show.tracks(), rate);
         written.add(wanted.usd, || self.write(OutputFolder::USD, usd().as_bytes()));
         let gltf = || animation_glb(&show.tracks(), rate);

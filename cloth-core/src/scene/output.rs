@@ -26,6 +26,9 @@ pub struct OutputChoice {
     pub mdd: bool,
     /// Velocities in the USD file, for motion blur. Default false.
     pub velocities: bool,
+    /// Forces of certified contact at each vertex in the USD file, as `primvars:contactForce`, and in PLY files, as `fx`,
+    /// `fy`, `fz`. Default false.
+    pub contact_forces: bool,
     /// `ledger.csv` and `ledger.svg`: energies, work and momenta at each step. Default true.
     pub ledger: bool,
     /// `cloth.apng`, an animated PNG of the pictures of frames, which are then written, too. Default false.
@@ -95,6 +98,7 @@ impl Default for OutputChoice {
             pc2: false,
             mdd: false,
             velocities: false,
+            contact_forces: false,
             ledger: true,
             apng: false,
             mp4: false,

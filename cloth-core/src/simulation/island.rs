@@ -286,6 +286,15 @@ impl Island {
     }
 
     /// Copies positions and velocities to the scene.
+    /// Writes the forces of contact on the vertices, in N, to `forces` of the scene.
+    pub(super) fn scatter_contact_forces(&self, forces: &mut [Vector3<f64>]) {
+        let mut own = vec![[0.0; 3]; self.body.x.len()];
+        self.body.system.add_contact_force(&self.body.x, &mut own);
+        for (&vertex, force) in self.vertices.iter().zip(own) {
+            forces[vertex] = force;
+        }
+    }
+
     pub(super) fn scatter(&self, x: &mut [Vector3<f64>], v: &mut [Vector3<f64>]) {
         for (local, &vertex) in self.vertices.iter().enumerate() {
             (x[vertex], v[vertex]) = (self.body.x[local], self.body.v[local]);

@@ -22,6 +22,8 @@ pub enum Colouring {
     Energy,
     /// Speed ‖v‖, in m/s.
     Speed,
+    /// Force of certified contact on each vertex, in N, while a scene is simulated; zero in frames of a run.
+    Contact,
 }
 
 impl Colouring {
@@ -32,7 +34,8 @@ impl Colouring {
             Self::Plain => Self::Strain,
             Self::Strain => Self::Energy,
             Self::Energy => Self::Speed,
-            Self::Speed => Self::Plain,
+            Self::Speed => Self::Contact,
+            Self::Contact => Self::Plain,
         }
     }
 
@@ -44,6 +47,7 @@ impl Colouring {
             Self::Strain => format!("strain from 0 to {:.3} %", 100.0 * most),
             Self::Energy => format!("stored energy from 0 to {most:.3e} J/kg"),
             Self::Speed => format!("speed from 0 to {most:.3} m/s"),
+            Self::Contact => format!("force of contact from 0 to {most:.3e} N"),
         }
     }
 }

@@ -189,6 +189,10 @@ impl Stage {
             Colouring::Plain => vec![0.0; x.len()],
             Colouring::Strain => self.rest.strains(x),
             Colouring::Energy => stored_energies(&self.simulation, x),
+            Colouring::Contact => match &self.act {
+                Act::Recorded { .. } => vec![0.0; x.len()],
+                Act::Live { .. } => self.simulation.contact_forces().into_iter().map(norm).collect(),
+            },
             Colouring::Speed => match &self.act {
                 Act::Recorded { frames, now } if *now > 0 => {
                     let moved = frames[*now - 1].iter().zip(x).map(|(before, after)| norm(subtract(*after, *before)));
