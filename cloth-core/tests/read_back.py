@@ -51,8 +51,20 @@ def from_gltf(path, garment):
     return times.count, numpy.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
 
 
+def complaints(path):
+    """What the validators of OpenUSD find."""
+    try:
+        from pxr import UsdValidation
+    except ImportError:  # before OpenUSD 24.11
+        return []
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    return UsdValidation.ValidationContext(validators).Validate(Usd.Stage.Open(str(path)))
+
+
 def main(folder, garment):
     folder = pathlib.Path(folder)
+    found = complaints(folder / "cloth.usda")
+    assert not found, [error.GetMessage() for error in found]
     frames, points = from_usd(folder / "cloth.usda", garment)
     gltf_frames, gltf_points = from_gltf(folder / "cloth.glb", garment)
     assert frames == gltf_frames, (frames, gltf_frames)

@@ -4,7 +4,7 @@ use std::ops::Range;
 use energy_dsl::Vector3;
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::animation::{Channel, Interpolation, Property, Sampler, Target};
-use gltf_json::buffer::View;
+use gltf_json::buffer::{Target as Use, View};
 use gltf_json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf_json::validation::{Checked::Valid, USize64};
 use gltf_json::{Accessor, Animation, Buffer, Index, Material, Mesh, Node, Root, Scene};
@@ -154,20 +154,22 @@ impl File {
             let start = vectors.first().copied().unwrap_or_default();
             vectors.iter().fold(start, |sum, v| std::array::from_fn(|axis| pick(sum[axis], v[axis]))).to_vec()
         };
-        self.accessor(&bytes, vectors.len(), ComponentType::F32, Type::Vec3, Some((bound(f32::min), bound(f32::max))))
+        let bounds = Some((bound(f32::min), bound(f32::max)));
+        self.accessor(&bytes, vectors.len(), ComponentType::F32, Type::Vec3, bounds, Some(Use::ArrayBuffer))
     }
 
     /// Adds texture coordinates. Their second axis points down in glTF.
     fn uvs(&mut self, uvs: &[[f64; 2]]) -> Index<Accessor> {
         let numbers = uvs.iter().flat_map(|[u, v]| [*u as f32, (1.0 - v) as f32]);
         let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
-        self.accessor(&bytes, uvs.len(), ComponentType::F32, Type::Vec2, None)
+        self.accessor(&bytes, uvs.len(), ComponentType::F32, Type::Vec2, None, Some(Use::ArrayBuffer))
     }
 
     fn scalars(&mut self, numbers: &[f32]) -> Index<Accessor> {
         let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
         let bound = |pick: fn(f32, f32) -> f32| vec![numbers.iter().copied().reduce(pick).unwrap_or_default()];
-        self.accessor(&bytes, numbers.len(), ComponentType::F32, Type::Scalar, Some((bound(f32::min), bound(f32::max))))
+        let bounds = Some((bound(f32::min), bound(f32::max)));
+        self.accessor(&bytes, numbers.len(), ComponentType::F32, Type::Scalar, bounds, None)
     }
 
     fn accessor(
@@ -177,6 +179,7 @@ impl File {
         component: ComponentType,
         type_: Type,
         bounds: Option<(Vec<f32>, Vec<f32>)>,
+        target: Option<Use>,
     ) -> Index<Accessor> {
         // All components have four bytes, so every view has the alignment that glTF requires.
         let view = self.root.push(View {
@@ -185,7 +188,7 @@ impl File {
             byte_offset: Some(USize64::from(self.data.len())),
             byte_stride: None,
             name: None,
-            target: None,
+            target: target.map(Valid),
             extensions: None,
             extras: Default::default(),
         });
@@ -219,7 +222,8 @@ impl File {
             }
         };
         let bytes: Vec<u8> = corners.iter().flat_map(|&corner| (corner as u32).to_le_bytes()).collect();
-        (self.accessor(&bytes, corners.len(), ComponentType::U32, Type::Scalar, None), mode)
+        let target = Some(Use::ElementArrayBuffer);
+        (self.accessor(&bytes, corners.len(), ComponentType::U32, Type::Scalar, None, target), mode)
     }
 
     fn attributes(&mut self, shape: &Shape) -> BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>> {
