@@ -116,6 +116,31 @@ fn an_exported_garment_is_welded_pinned_by_group_and_woven_along_its_texture() {
     assert!(problems.is_empty(), "{problems:?}");
 }
 
+/// Needs `pip install bpy usd-core`; skipped without them.
+#[test]
+fn a_garment_goes_to_blender_and_comes_back() {
+    let (folder, ..) = run(SCENE);
+    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/blender.py");
+    let blender = Command::new("python3").arg(script).arg(folder.path().join("out")).arg("skirt").output();
+    let Ok(told) = blender.map_err(|error| eprintln!("skipped: no python3 ({error})")) else { return };
+    let said = String::from_utf8_lossy(&told.stdout);
+    if told.status.code() == Some(77) {
+        eprintln!("skipped: {said}");
+        return;
+    }
+    assert!(told.status.success(), "{said}{}", String::from_utf8_lossy(&told.stderr));
+    assert!(said.contains("3 frames of 84 vertices to Blender"), "{said}");
+    // What Blender exported is a garment again: deformed, with its texture coordinates.
+    let scene = SCENE
+        .replace("skirt.obj", "out/from_blender.obj")
+        .replace("group = \"Gürtel\"", "box = { min = [-1.0, -1.0, -0.1], max = [1.0, 1.0, 1.0] }");
+    std::fs::write(folder.path().join("again.toml"), scene).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cloth"));
+    let output = command.args(["run", "again.toml", "-o", "again"]).current_dir(folder.path()).output().unwrap();
+    let [told, message] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(output.status.success() && told.contains("84 vertices (24 pinned)"), "{told}{message}");
+}
+
 #[test]
 fn groups_can_be_garments_and_unknown_ones_are_listed() {
     let (_, told, message) =
