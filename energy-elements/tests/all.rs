@@ -1,5 +1,6 @@
 //! The tests of the public interface, one module a subject. One program links once and shares all cores.
 #![allow(confusable_idents, missing_docs, mixed_script_confusables, uncommon_codepoints)]
 
+mod ipctk;
 mod lanes;
 mod rigid_motions;

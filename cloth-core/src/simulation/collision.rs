@@ -107,16 +107,20 @@ fn check_sides(island: &Island, model: &Model) -> Result<(), ContactError> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::fmt::Write as _;
+    use std::io::Write as _;
+    use std::path::Path;
+    use std::process::{Command, Stdio};
     use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Arc, Mutex};
 
     use energy_dsl::{Block, Vector3};
     use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
 
     use super::*;
+    use crate::Simulation;
     use crate::collision::crossings;
     use crate::scene::Scene;
-    use crate::{Island, Simulation};
 
     /// Contact that judges every state and move by the exact test.
     #[derive(Debug)]
@@ -124,6 +128,9 @@ mod tests {
         inner: Box<dyn ContactModel>,
         mesh: CollisionMesh,
         iterates: Arc<AtomicUsize>,
+        /// Start and end of each accepted move, as text.
+        moves: Arc<Mutex<String>>,
+        last: Vec<Vector3<f64>>,
     }
 
     impl Watched {
@@ -132,10 +139,22 @@ mod tests {
             assert!(found.is_empty(), "{found:?}");
             self.iterates.fetch_add(1, Ordering::Relaxed);
         }
+
+        /// Writes down the move from the last accepted state to x.
+        fn accept(&mut self, x: &[Vector3<f64>]) {
+            let mut moves = self.moves.lock().unwrap();
+            if !self.last.is_empty() && self.last != x {
+                let numbers = self.last.as_flattened().iter().chain(x.as_flattened());
+                numbers.for_each(|number| write!(moves, "{number:e} ").unwrap());
+                moves.push('\n');
+            }
+            self.last = x.to_vec();
+        }
     }
 
     impl ContactModel for Watched {
         fn begin_step(&mut self, x: &[Vector3<f64>]) {
+            self.accept(x);
             self.inner.begin_step(x);
         }
 
@@ -157,6 +176,7 @@ mod tests {
 
         fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
             self.check(x);
+            self.accept(x);
             self.inner.meet(x)
         }
 
@@ -208,27 +228,59 @@ mod tests {
         motion.keys = [{ time = 0.0 }, { time = 0.3, translate = [0.0, 0.02, 0.19] }]
         "#;
 
-    #[test]
-    fn no_state_that_is_accepted_or_evaluated_has_a_crossing() {
+    /// Simulates some steps under watch. Returns the number of states that were tested, the mesh, and all moves.
+    fn watched(steps: usize) -> (usize, CollisionMesh, String) {
         let scene = Scene::parse(CRUMPLED, "crumpled.toml".as_ref()).unwrap();
         let mut simulation = Simulation::new(&scene).unwrap();
-        let iterates = Arc::new(AtomicUsize::new(0));
+        let (iterates, moves) = (Arc::new(AtomicUsize::new(0)), Arc::new(Mutex::new(String::new())));
         let mesh = simulation.collision_mesh.clone();
         let [island] = &mut simulation.islands[..] else { panic!("contact joins everything to one island") };
-        watch(island, mesh, &iterates);
-        for _ in 0..40 {
+        assert!(island.vertices().iter().enumerate().all(|(place, &vertex)| place == vertex));
+        let system = &mut island.body_mut().system;
+        let inner = system.take_contact().unwrap();
+        let (own, counted, written) = (mesh.clone(), Arc::clone(&iterates), Arc::clone(&moves));
+        let watched = Watched { inner, mesh: own, iterates: counted, moves: written, last: Vec::new() };
+        system.set_contact(Box::new(watched));
+        for _ in 0..steps {
             simulation.step().unwrap_or_else(|error| panic!("{error}"));
         }
         let work = simulation.summary().unwrap().totals.contact;
         assert!(work.shortened > 0 && work.active > 100, "the sheet meets itself: {work}");
-        let iterates = iterates.load(Ordering::Relaxed);
+        let moves = std::mem::take(&mut *moves.lock().unwrap());
+        (iterates.load(Ordering::Relaxed), mesh, moves)
+    }
+
+    #[test]
+    fn no_state_that_is_accepted_or_evaluated_has_a_crossing() {
+        let (iterates, ..) = watched(40);
         assert!(iterates > 500, "{iterates}");
     }
 
-    fn watch(island: &mut Island, mesh: CollisionMesh, iterates: &Arc<AtomicUsize>) {
-        assert!(island.vertices().iter().enumerate().all(|(place, &vertex)| place == vertex));
-        let system = &mut island.body_mut().system;
-        let inner = system.take_contact().unwrap();
-        system.set_contact(Box::new(Watched { inner, mesh, iterates: Arc::clone(iterates) }));
+    /// Skipped without the Python package ipctk.
+    #[test]
+    fn ipc_toolkit_finds_no_collision_in_any_move() {
+        let (_, mesh, moves) = watched(40);
+        let lines = |rows: &[&[u32]]| {
+            let row = |row: &&[u32]| row.iter().map(u32::to_string).collect::<Vec<_>>().join(" ") + "\n";
+            rows.iter().map(row).collect::<String>()
+        };
+        let triangles: Vec<&[u32]> = mesh.triangles().iter().map(|corners| &corners[..]).collect();
+        let edges: Vec<&[u32]> = mesh.edges().iter().map(|ends| &ends[..]).collect();
+        let counts = format!("{} {} {}\n", mesh.vertices(), triangles.len(), edges.len());
+        let text = counts + &lines(&triangles) + &lines(&edges) + &moves;
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/judge_with_ipctk.py");
+        let python = Command::new("python3").arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+        let Ok(mut python) = python.map_err(|error| eprintln!("skipped: no python3 ({error})")) else { return };
+        // Without the package the script ends before it reads.
+        let _ = python.stdin.take().map(|mut input| input.write_all(text.as_bytes()));
+        let told = python.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&told.stdout);
+        if told.status.code() == Some(77) {
+            eprintln!("skipped: {said}");
+            return;
+        }
+        assert!(told.status.success(), "{said}");
+        let count = moves.lines().count();
+        assert!(count > 100 && said == format!("{count} moves\n"), "{said}");
     }
 }
