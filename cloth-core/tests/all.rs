@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod command_line;
+mod deforming_obstacles;
 mod endings;
 mod exclusions;
 mod exported_garment;

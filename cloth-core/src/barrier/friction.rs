@@ -43,15 +43,17 @@ pub(crate) struct Grip {
     /// The coefficient of friction.
     pub coefficient: f64,
     /// The first of four vertices that move with the obstacle: an origin, and the ends of three orthogonal unit
-    /// vectors from there. `None` if the obstacle is fixed.
+    /// vectors from there. `None` if the obstacle is fixed or deforms.
     pub frame: Option<u32>,
+    /// Whether the obstacle deforms. Its vertices are then material points.
+    pub deforms: bool,
 }
 
 /// A pair in contact at the start of the step.
 #[derive(Debug)]
 struct Sliding {
     pair: Pair,
-    /// The coefficients of the closest points at the start, without those of an obstacle.
+    /// The coefficients of the closest points at the start, without those of a rigid obstacle.
     weights: [f64; 4],
     /// The point of a moving obstacle that slides.
     anchor: Option<Anchor>,
@@ -138,7 +140,9 @@ impl Friction {
 
     /// Returns the coefficients of the closest points on cloth and hair, and the closest point of an obstacle.
     fn sliding_point(&self, mesh: &CollisionMesh, pair: &Pair, closest: &Closest) -> ([f64; 4], Option<Anchor>) {
-        let Some(obstacle) = mesh.obstacle_of(pair) else { return (closest.weights, None) };
+        let Some(obstacle) = mesh.obstacle_of(pair).filter(|obstacle| !self.grips[*obstacle].deforms) else {
+            return (closest.weights, None);
+        };
         let is_own = pair.vertices.map(|vertex| mesh.obstacle(vertex).is_none());
         let weights = std::array::from_fn(|corner| if is_own[corner] { closest.weights[corner] } else { 0.0 });
         let anchor = self.grips[obstacle].frame.map(|frame| {

@@ -24,6 +24,11 @@ impl MeshSolid {
         Self { surface: Arc::new(surface), pose: Pose::IDENTITY }
     }
 
+    /// Returns the solid with its surface in another shape.
+    pub(super) fn with_vertices(&self, vertices: Vec<Vector3<f64>>) -> Self {
+        Self { surface: Arc::new(self.surface.with_vertices(vertices)), pose: self.pose }
+    }
+
     /// The surface before its motion.
     #[must_use]
     pub fn surface(&self) -> &Surface {

@@ -10,6 +10,7 @@
 //! [`crate::barrier`] knows the cores of solids.
 
 mod cores;
+mod deformation;
 mod friction;
 mod mesh_solid;
 mod passage;
@@ -19,6 +20,7 @@ mod term;
 
 use energy_solve::{DissipationTerm, Term};
 
+pub use deformation::Deformation;
 pub use mesh_solid::MeshSolid;
 pub use passage::Passage;
 pub use solid::{Ball, Capsule, HalfSpace, RoundedBox};
@@ -89,6 +91,8 @@ pub struct Obstacle {
     pub solid: AnySolid,
     /// The motion; `None` if the obstacle is fixed.
     pub motion: Option<Motion>,
+    /// How the vertices of a mesh move; `None` for a rigid solid. Needs certified contact.
+    pub deformation: Option<Deformation>,
     /// Contact acts within this distance of the surface, in m. With certified contact, nothing comes nearer than a
     /// third of it.
     pub thickness: f64,
@@ -104,7 +108,20 @@ impl Obstacle {
     /// Returns the solid at a time, in s.
     #[must_use]
     pub fn at(&self, time: f64) -> AnySolid {
-        self.motion.as_ref().map_or_else(|| self.solid.clone(), |motion| self.solid.moved(&motion.pose(time)))
+        let solid = match (&self.solid, &self.deformation) {
+            (AnySolid::Mesh(solid), Some(deformation)) => {
+                AnySolid::Mesh(solid.with_vertices(deformation.vertices(time)))
+            }
+            (solid, _) => solid.clone(),
+        };
+        self.motion.as_ref().map_or_else(|| solid.clone(), |motion| solid.moved(&motion.pose(time)))
+    }
+
+    /// Whether the obstacle may move or deform between two times, in s.
+    #[must_use]
+    pub fn moves(&self, from: f64, to: f64) -> bool {
+        self.motion.as_ref().is_some_and(|motion| motion.moves(from, to))
+            || self.deformation.as_ref().is_some_and(|deformation| deformation.moves(from, to))
     }
 
     /// Returns the terms of contact and friction with vertices of these masses, in kg.

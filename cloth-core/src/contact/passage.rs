@@ -132,7 +132,8 @@ mod tests {
 
     fn obstacle(solid: AnySolid, motion: Option<Motion>) -> Obstacle {
         let name = "ball".to_owned();
-        Obstacle { name, solid, motion, thickness: 0.01, stiffness: 1.0, friction: 0.0, sticking: 1e-3 }
+        let deformation = None;
+        Obstacle { name, solid, motion, deformation, thickness: 0.01, stiffness: 1.0, friction: 0.0, sticking: 1e-3 }
     }
 
     fn passed(obstacle: &Obstacle, from: Vector3<f64>, to: Vector3<f64>) -> Option<Passage> {

@@ -108,6 +108,15 @@ impl Surface {
         if is_closed && volume <= 0.0 {
             return Err(SurfaceError::InsideOut { volume });
         }
+        Ok(Self::with_normals(mesh, radius, is_closed))
+    }
+
+    /// Returns the surface in another shape. Its orientation stays.
+    pub(super) fn with_vertices(&self, vertices: Vec<Vector3<f64>>) -> Self {
+        Self::with_normals(self.mesh.clone().with_vertices(vertices), self.radius, self.is_closed)
+    }
+
+    fn with_normals(mesh: TriangleMesh, radius: f64, is_closed: bool) -> Self {
         let corners = |triangle: usize| mesh.corners(triangle);
         let count = mesh.triangles().len();
         let face_normals: Vec<Vector3<f64>> = (0..count).map(|triangle| unit_normal(corners(triangle))).collect();
@@ -127,7 +136,7 @@ impl Surface {
         let edge_normals = edge_normals.collect();
         let bounds: Vec<Bounds> = (0..count).map(|triangle| Bounds::of(&corners(triangle))).collect();
         let hierarchy = Hierarchy::new(&bounds);
-        Ok(Self { mesh, radius, is_closed, face_normals, vertex_normals, edge_normals, hierarchy })
+        Self { mesh, radius, is_closed, face_normals, vertex_normals, edge_normals, hierarchy }
     }
 
     /// The mesh, without rounding.

@@ -117,6 +117,11 @@ impl TriangleMesh {
         Self { vertices: self.vertices.iter().map(|&vertex| pose.transform(vertex)).collect(), ..self }
     }
 
+    /// Returns the mesh with its vertices at other places, in m.
+    pub(crate) fn with_vertices(self, vertices: Vec<Vector3<f64>>) -> Self {
+        Self { vertices, ..self }
+    }
+
     /// Rest positions, in m; initial positions if the mesh [has patterns](TriangleMesh::has_patterns).
     #[must_use]
     pub fn vertices(&self) -> &[Vector3<f64>] {

@@ -14,6 +14,7 @@ use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, Te
 use super::seam::Side;
 use super::soft_pin::{Held, SoftPinTerm};
 use super::{PinError, SeamError, pins, seam};
+use crate::contact::AnySolid;
 use crate::fabric::{self, Hair, Place, StitchDamping, Surroundings};
 use crate::geometry::{Pose, add_scaled, norm, subtract};
 use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
@@ -392,12 +393,11 @@ impl<'a> Builder<'a> {
                 self.add_soft_pin(pin, soft, motion, &chosen);
                 continue;
             }
-            let motion = motion.map(|motion| {
-                self.model.motions.push(motion);
-                self.model.motions.len() - 1
-            });
-            let hold = Hold { motion, follows: description.obstacle.is_some(), release: description.release };
+            let motion = motion.map(|motion| self.add_motion(motion));
+            let shared = Hold { motion, follows: description.obstacle.is_some(), release: description.release };
             for vertex in chosen {
+                let carried = self.carried(description, vertex).map(|motion| self.add_motion(motion));
+                let hold = Hold { motion: carried.or(motion), ..shared };
                 let known = held.get(&vertex).copied().unwrap_or(hold);
                 if !self.move_alike(known, hold) {
                     return Err(PinError::Twice { pin, vertex }.into());
@@ -414,11 +414,26 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
+    fn add_motion(&mut self, motion: Motion) -> usize {
+        self.model.motions.push(motion);
+        self.model.motions.len() - 1
+    }
+
+    /// Returns the motion of a vertex that is pinned to an obstacle that deforms.
+    fn carried(&self, description: &Pin, vertex: usize) -> Option<Motion> {
+        let obstacle = self.model.obstacles.iter().find(|one| Some(&one.name) == description.obstacle.as_ref())?;
+        let (Some(deformation), AnySolid::Mesh(solid)) = (&obstacle.deformation, &obstacle.solid) else { return None };
+        Some(deformation.carried(self.model.x[vertex], solid.surface().mesh().triangles()))
+    }
+
     /// Returns the motion of a pin: its own, or that of its obstacle.
     fn motion_of(&self, pin: usize, description: &Pin) -> Result<Option<Motion>, PinError> {
         let Some(name) = &description.obstacle else { return Ok(description.motion.clone()) };
         let obstacles = &self.model.obstacles;
         match obstacles.iter().find(|obstacle| obstacle.name == *name) {
+            Some(obstacle) if obstacle.deformation.is_some() && description.soft.is_some() => {
+                Err(PinError::SoftOnDeforming { pin, name: name.clone() })
+            }
             Some(obstacle) => Ok(obstacle.motion.clone()),
             None => {
                 let known = obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();

@@ -47,6 +47,14 @@ pub enum PinError {
         /// The groups of the chosen garments.
         known: Vec<String>,
     },
+    /// Springs cannot follow an obstacle that deforms.
+    #[error("pins[{pin}]: a spring cannot follow {name}, which deforms; leave out `stiffness` or `obstacle`")]
+    SoftOnDeforming {
+        /// Index of the pin, from 0.
+        pin: usize,
+        /// The obstacle.
+        name: String,
+    },
     /// The scene has no such obstacle.
     #[error(
         "pins[{pin}]: there is no obstacle called `{name}`; {}",

@@ -61,7 +61,8 @@ impl<'a> Show<'a> {
         let count = show.frames.len();
         let end = count.saturating_sub(1) as f64 / rate;
         for obstacle in simulation.obstacles() {
-            let moves = obstacle.motion.as_ref().is_some_and(|motion| motion.moves(0.0, end) || motion.keys.len() > 1);
+            let has_keys = obstacle.motion.as_ref().is_some_and(|motion| motion.keys.len() > 1);
+            let moves = has_keys || obstacle.deformation.is_some() || obstacle.moves(0.0, end);
             let count = if moves { count } else { 1 };
             let at = |frame: usize| {
                 let solid = obstacle.at(frame as f64 / rate);

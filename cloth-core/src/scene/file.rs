@@ -159,6 +159,11 @@ impl TryFrom<File> for Scene {
         if file.untangle && (file.integrator != Scheme::Newton || file.contact == Some(ContactChoice::Off)) {
             return Err("`untangle` needs `integrator = \"newton\"` with contact, which is certified".to_owned());
         }
+        let is_certified = file.integrator == Scheme::Newton && file.contact != Some(ContactChoice::Off);
+        if let Some(number) = file.obstacles.iter().position(|one| one.deforms()).filter(|_| !is_certified) {
+            let needed = "needs `integrator = \"newton\"` with contact, which is certified";
+            return Err(format!("obstacles[{number}].mesh: `frames_per_second` {needed}"));
+        }
         let mut garments = file.garment;
         match (file.mesh, file.fabric) {
             (Some(mesh), Some(fabric)) => {

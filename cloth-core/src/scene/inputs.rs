@@ -21,7 +21,7 @@ impl Scene {
             Material::File(declared) => Some(declared.path.clone()),
             _ => None,
         });
-        let obstacles = self.obstacles.iter().filter_map(|one| one.mesh_path().map(|path| self.folder.join(path)));
+        let obstacles = self.obstacles.iter().flat_map(|one| one.mesh_paths(&self.folder));
         let mut paths: Vec<PathBuf> = meshes.chain(rests).chain(materials).chain(obstacles).collect();
         paths.sort();
         paths.dedup();

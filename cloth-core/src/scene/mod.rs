@@ -8,6 +8,7 @@ mod fabric_choice;
 mod file;
 mod garment;
 mod inputs;
+mod numbered_files;
 mod obstacle;
 mod output;
 mod pins;

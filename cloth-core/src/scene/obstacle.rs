@@ -4,10 +4,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Placement, Turn};
-use crate::bounded::{Direction, NonNegative, Number, Positive, Real, Reals};
-use crate::contact::{AnySolid, Ball, Capsule, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError};
+use super::numbered_files::numbered_files;
+use crate::bounded::{Direction, MaybeReal, NonNegative, Number, Positive, Real, Reals};
+use crate::contact::{
+    AnySolid, Ball, Capsule, Deformation, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError,
+};
 use crate::geometry::{Pose, norm};
-use crate::mesh::{MeshError, ObjError, read_obj};
+use crate::mesh::{MeshError, ObjError, TriangleMesh, read_obj};
 use crate::motion::Motion;
 
 /// An obstacle: exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`.
@@ -138,8 +141,13 @@ struct BoxKeys {
 #[serde(deny_unknown_fields)]
 struct MeshKeys {
     /// An OBJ file, with lengths in m, relative to the scene file's folder. Corners run anticlockwise seen from
-    /// outside. An open mesh is a shell.
+    /// outside. An open mesh is a shell. With `frames_per_second`, a pattern with one `*` for the numbers of the frames.
     path: PathBuf,
+    /// The mesh deforms: `path` names one OBJ file per frame, with the same vertices and faces, in the order of their
+    /// numbers, at this rate in 1/s. Vertices move on straight lines from frame to frame. Needs `newton`. Default: the
+    /// mesh is rigid.
+    #[serde(default, with = "MaybeReal::<Positive>")]
+    frames_per_second: Option<f64>,
     /// Initial placement. Default as in the file.
     #[serde(default)]
     placement: Placement,
@@ -158,6 +166,12 @@ pub enum ObstacleError {
     /// The scaled mesh is invalid.
     #[error("{name}: {source}")]
     Scaled { name: String, source: MeshError },
+    /// No file has the name of a frame.
+    #[error("{name}: no file matches {}; name the frames with one `*` for their numbers, such as body_*.obj", .pattern.display())]
+    NoFrames { name: String, pattern: PathBuf },
+    /// A frame has other vertices or faces than the first one.
+    #[error("{name}: {} has other vertices or faces than {}; export the same mesh in every frame", .path.display(), .first.display())]
+    OtherMesh { name: String, path: PathBuf, first: PathBuf },
     /// The mesh does not bound a solid.
     #[error("{name}: {}: {source}", .path.display())]
     Surface { name: String, path: PathBuf, source: SurfaceError },
@@ -204,6 +218,9 @@ impl TryFrom<Keys> for ObstacleDescription {
                     "a box of {size:?} m cannot be rounded by {rounding} m, which is at least half an edge"
                 ));
             }
+            ShapeKeys::Mesh(MeshKeys { frames_per_second: Some(_), .. }) if motion.is_some() => {
+                return Err("a mesh with `frames_per_second` moves by itself; leave out `motion`".to_owned());
+            }
             _ => {}
         }
         Ok(Self { shape, rest: Common { name, friction, sticking, thickness, stiffness, motion } })
@@ -211,10 +228,21 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
-    /// The path of the mesh, relative to the scene file's folder; `None` for other shapes.
+    /// Returns the paths of the mesh, one for each frame if it deforms. Relative paths refer to `folder`. Empty for other
+    /// shapes.
     #[must_use]
-    pub fn mesh_path(&self) -> Option<&Path> {
-        if let ShapeKeys::Mesh(keys) = &self.shape { Some(&keys.path) } else { None }
+    pub fn mesh_paths(&self, folder: &Path) -> Vec<PathBuf> {
+        match &self.shape {
+            ShapeKeys::Mesh(keys) if keys.frames_per_second.is_some() => numbered_files(&folder.join(&keys.path)),
+            ShapeKeys::Mesh(keys) => vec![folder.join(&keys.path)],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Whether the obstacle deforms.
+    #[must_use]
+    pub fn deforms(&self) -> bool {
+        matches!(&self.shape, ShapeKeys::Mesh(MeshKeys { frames_per_second: Some(_), .. }))
     }
 
     /// Builds the obstacle with index `number` in the scene. Relative paths refer to `folder`.
@@ -223,6 +251,7 @@ impl ObstacleDescription {
     /// Returns an error if the file of a mesh cannot be read or does not bound a solid.
     pub fn obstacle(&self, number: usize, folder: &Path) -> Result<Obstacle, ObstacleError> {
         let named = |shape: &str| self.rest.name.clone().unwrap_or_else(|| format!("{shape} {number}"));
+        let mut deformation = None;
         let (shape, solid) = match self.shape.clone() {
             ShapeKeys::Plane(PlaneKeys { point, normal }) => {
                 let normal = normal.map(|component| component / norm(normal));
@@ -238,26 +267,48 @@ impl ObstacleDescription {
                 let half = size.map(|edge| 0.5 * edge - rounding);
                 ("box", AnySolid::Box(RoundedBox { centre, axes, half, radius: rounding }))
             }
-            ShapeKeys::Mesh(keys) => ("mesh", AnySolid::Mesh(keys.solid(&named("mesh"), folder)?)),
+            ShapeKeys::Mesh(keys) => {
+                let (solid, own) = keys.solid(&named("mesh"), &self.mesh_paths(folder), folder)?;
+                deformation = own;
+                ("mesh", AnySolid::Mesh(solid))
+            }
         };
         let Common { friction, sticking, thickness, stiffness, motion, .. } = self.rest.clone();
-        Ok(Obstacle { name: named(shape), solid, motion, thickness, stiffness, friction, sticking })
+        Ok(Obstacle { name: named(shape), solid, motion, deformation, thickness, stiffness, friction, sticking })
     }
 }
 
 impl MeshKeys {
-    fn solid(&self, name: &str, folder: &Path) -> Result<MeshSolid, ObstacleError> {
-        let (name, path) = (name.to_owned(), folder.join(&self.path));
-        let mesh = match read_obj(&path) {
-            Ok(mesh) => mesh,
-            Err(source) => return Err(ObstacleError::Obj { name, source }),
+    /// Reads the mesh at the start, and its deformation if there are frames.
+    fn solid(
+        &self,
+        name: &str,
+        paths: &[PathBuf],
+        folder: &Path,
+    ) -> Result<(MeshSolid, Option<Deformation>), ObstacleError> {
+        let Some((first, others)) = paths.split_first() else {
+            return Err(ObstacleError::NoFrames { name: name.to_owned(), pattern: folder.join(&self.path) });
         };
+        let mesh = self.placed(name, first)?;
+        let mut frames = vec![mesh.vertices().to_vec()];
+        for path in others {
+            let frame = self.placed(name, path)?;
+            if frame.triangles() != mesh.triangles() || frame.vertices().len() != mesh.vertices().len() {
+                let (name, path, first) = (name.to_owned(), path.clone(), first.clone());
+                return Err(ObstacleError::OtherMesh { name, path, first });
+            }
+            frames.push(frame.vertices().to_vec());
+        }
+        let deformation = self.frames_per_second.map(|rate| Deformation::new(frames, rate));
+        let invalid = |source| ObstacleError::Surface { name: name.to_owned(), path: first.clone(), source };
+        let surface = Surface::new(mesh, self.rounding).map_err(invalid)?;
+        Ok((MeshSolid::new(surface), deformation))
+    }
+
+    /// Reads a mesh and places it.
+    fn placed(&self, name: &str, path: &Path) -> Result<TriangleMesh, ObstacleError> {
+        let mesh = read_obj(path).map_err(|source| ObstacleError::Obj { name: name.to_owned(), source })?;
         let placed = mesh.scaled(self.placement.scale).map(|mesh| mesh.moved(&self.placement.pose()));
-        let placed = match placed {
-            Ok(placed) => placed,
-            Err(source) => return Err(ObstacleError::Scaled { name, source }),
-        };
-        let surface = Surface::new(placed, self.rounding);
-        surface.map(MeshSolid::new).map_err(|source| ObstacleError::Surface { name, path, source })
+        placed.map_err(|source| ObstacleError::Scaled { name: name.to_owned(), source })
     }
 }

@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 
 use crate::barrier::Grip;
 use crate::collision::Core;
-use crate::contact::{AnySolid, HalfSpace, Obstacle};
+use crate::contact::{AnySolid, Deformation, HalfSpace, Obstacle};
 use crate::geometry::{Pose, add_scaled, dot, subtract};
 use crate::motion::Motion;
 
@@ -22,6 +22,7 @@ pub(super) struct Prescribed {
 #[derive(Clone, Debug)]
 struct Part {
     motion: Option<Motion>,
+    deformation: Option<Deformation>,
     core: Core,
     /// The plane, if the obstacle is one.
     plane: Option<HalfSpace>,
@@ -35,7 +36,8 @@ impl Prescribed {
     pub fn new(obstacles: &[Obstacle]) -> Self {
         let part = |obstacle: &Obstacle| {
             let plane = if let AnySolid::HalfSpace(plane) = obstacle.solid { Some(plane) } else { None };
-            Part { motion: obstacle.motion.clone(), core: obstacle.solid.core(), plane }
+            let (motion, deformation) = (obstacle.motion.clone(), obstacle.deformation.clone());
+            Part { motion, deformation, core: obstacle.solid.core(), plane }
         };
         Self { obstacles: obstacles.iter().map(part).collect() }
     }
@@ -51,7 +53,7 @@ impl Prescribed {
         let mut grip = |(part, obstacle): (&Part, &Obstacle)| {
             let frame = (!part.frame().is_empty()).then(|| energy_solve::index(next));
             next += part.frame().len();
-            Grip { coefficient: obstacle.friction, frame }
+            Grip { coefficient: obstacle.friction, frame, deforms: part.deformation.is_some() }
         };
         self.obstacles.iter().zip(obstacles).map(&mut grip).collect()
     }
@@ -64,7 +66,8 @@ impl Prescribed {
         std::array::from_fn(|at| {
             let all = || self.obstacles.iter().zip(&poses).zip(&offsets);
             let cores = all().flat_map(|((part, poses), offset)| {
-                part.core.vertices.iter().map(move |x| poses[at].transform(add_scaled(*x, 1.0, *offset)))
+                let vertices = part.vertices(times[at]).into_iter();
+                vertices.map(move |x| poses[at].transform(add_scaled(x, 1.0, *offset)))
             });
             let frames = all().flat_map(|((part, poses), _)| part.frame().iter().map(move |x| poses[at].transform(*x)));
             cores.chain(frames).collect()
@@ -75,6 +78,11 @@ impl Prescribed {
 impl Part {
     fn pose(&self, time: f64) -> Pose {
         self.motion.as_ref().map_or(Pose::IDENTITY, |motion| motion.pose(time))
+    }
+
+    /// The vertices of the core at a time, before the motion.
+    fn vertices(&self, time: f64) -> Vec<Vector3<f64>> {
+        self.deformation.as_ref().map_or_else(|| self.core.vertices.clone(), |deformation| deformation.vertices(time))
     }
 
     fn frame(&self) -> &'static [Vector3<f64>] {
@@ -101,7 +109,8 @@ mod tests {
 
     fn obstacle(solid: AnySolid, motion: Option<Motion>) -> Obstacle {
         let name = "it".to_owned();
-        Obstacle { name, solid, motion, thickness: 5e-3, stiffness: 1.0, friction: 0.3, sticking: 1e-3 }
+        let deformation = None;
+        Obstacle { name, solid, motion, deformation, thickness: 5e-3, stiffness: 1.0, friction: 0.3, sticking: 1e-3 }
     }
 
     #[test]

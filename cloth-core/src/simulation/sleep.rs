@@ -126,7 +126,7 @@ impl<'a> StepContext<'a> {
     /// sleep.
     pub(super) fn new(step: u64, dt: f64, motions: &'a [Motion], obstacles: &'a [Obstacle], may_sleep: bool) -> Self {
         let (time, end) = ((step - 1) as f64 * dt, step as f64 * dt);
-        let moves = |one: &&Obstacle| one.motion.as_ref().is_some_and(|motion| motion.moves(time, end));
+        let moves = |one: &&Obstacle| one.moves(time, end);
         let swept = |one: &Obstacle| ([time, end].map(|time| one.at(time)), one.thickness);
         let moving = if may_sleep { obstacles.iter().filter(moves).map(swept).collect() } else { Vec::new() };
         Self { time, end, dt, motions, obstacles, moving }
