@@ -181,6 +181,7 @@ mod tests {
         let key = |time, far| Key { time, angle: 0.0, translate: [far, 0.0, 0.0] };
         let keys = vec![key(0.0, 0.0), key(1.0, 10.0), key(2.0, 10.0)];
         let obstacle = Obstacle {
+            deformation: None,
             name: "ball".to_owned(),
             solid: AnySolid::Ball(Ball { centre: [0.0; 3], radius: 1.0 }),
             motion: Some(Motion { keys, ..Motion::default() }),
