@@ -24,6 +24,8 @@ enum Command {
     Demo(cli::demo::Demo),
     /// Renders a moving body as a depth camera sees it: images, model, skeleton, truth.
     Render(cli::render::Render),
+    /// Poses a body frame by frame: a mesh for each, as an obstacle of cloth that deforms.
+    Pose(cli::pose::Pose),
     /// Tracks a model through depth images: node motions, moved meshes, a table of frames.
     Track(cli::track::Track),
     /// Compares a track with the truth: table and plot.
@@ -46,6 +48,7 @@ fn obey(command: Command) -> Result<()> {
     match command {
         Command::Demo(demo) => demo.run(),
         Command::Render(render) => render.run(),
+        Command::Pose(pose) => pose.run(),
         Command::Track(track) => track.run(),
         Command::Evaluate(evaluate) => evaluate.run().map(drop),
     }

@@ -52,6 +52,26 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
 }
 
 #[test]
+fn a_body_is_posed_with_the_same_faces_in_every_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = text(folder.path());
+    let output = fusion(&["pose", "--to", "30", "--step", "10", "-o", here]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("wrote 4 meshes of 3638 vertices"));
+    let read = |frame: usize| std::fs::read_to_string(folder.path().join(format!("body/{frame:06}.obj"))).unwrap();
+    let lines = |text: &str, kind: &str| text.lines().filter(|line| line.starts_with(kind)).count();
+    let faces = |text: &str| text.lines().filter(|line| line.starts_with("f ")).map(str::to_owned).collect::<Vec<_>>();
+    let (first, last) = (read(0), read(3));
+    assert!(lines(&first, "v ") == 3638 && faces(&first) == faces(&last) && first != last);
+    // z is up: the figure is 1.74 m tall.
+    let heights = first.lines().filter_map(|line| line.strip_prefix("v ")?.split(' ').nth(2)?.parse::<f64>().ok());
+    let highest = heights.fold(0.0, f64::max);
+    assert!((highest - 1.74).abs() < 0.01, "{highest}");
+    let again = error_of(&fusion(&["pose", "--to", "30", "-o", here]));
+    assert!(again.contains("--overwrite"), "{again}");
+}
+
+#[test]
 fn unusable_input_is_rejected_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let here = text(folder.path());

@@ -1,6 +1,8 @@
 pub mod demo;
 pub mod evaluate;
 mod folder;
+pub mod pose;
+mod posed;
 pub mod render;
 pub mod track;
 

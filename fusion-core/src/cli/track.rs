@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare};
-use super::render::read_any_body;
+use super::posed::read_any_body;
 use super::{print, progress_bar};
 
 /// Options of `fusion track`.
