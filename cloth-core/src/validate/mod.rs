@@ -19,6 +19,7 @@ mod modes;
 mod momentum;
 mod orders;
 mod special;
+mod stack;
 mod strip;
 
 use energy_solve::{EvaluationError, ListError, SystemError};
