@@ -1,12 +1,15 @@
 //! Contact of cloth with itself and with obstacles: friction on an incline by Coulomb's law, cloth that sticks without
 //! creeping, the capstan, and impacts that conserve momentum. Further answers have files of their own.
 
+use std::sync::Arc;
+
 use energy_dsl::Vector3;
 
-use super::{Finding, ValidateError, capstan, stack};
+use super::{Finding, ValidateError, capstan, linking, stack};
 use crate::geometry::norm;
+use crate::model::Model;
 use crate::scene::Scene;
-use crate::simulation::Simulation;
+use crate::simulation::{Extension, Simulation};
 
 pub(super) const GRAVITY: f64 = 9.81;
 
@@ -20,12 +23,27 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
         capstan::ask(*friction, report)?;
     }
     impact(report)?;
-    stack::ask(quick, report)
+    stack::ask(quick, report)?;
+    linking::ask(quick, report)
 }
 
 pub(super) fn simulation(text: &str) -> Result<Simulation, ValidateError> {
     let scene = Scene::parse(text, "validate.toml".as_ref())?;
     Ok(Simulation::new(&scene)?)
+}
+
+/// Creates a simulation that starts at other positions than its scene says. Rest shapes stay.
+pub(super) fn placed(
+    text: &str,
+    place: impl Fn(usize, Vector3<f64>) -> Vector3<f64> + Send + Sync + 'static,
+) -> Result<Simulation, ValidateError> {
+    let scene = Scene::parse(text, "validate.toml".as_ref())?;
+    let extension: Extension = Arc::new(move |model: &mut Model| {
+        model.x.iter_mut().enumerate().for_each(|(vertex, x)| *x = place(vertex, *x));
+        let Model { moving, x, .. } = model;
+        moving.iter_mut().for_each(|pin| pin.initial = x[pin.vertex]);
+    });
+    Ok(Simulation::extended(&scene, Some(&extension))?)
 }
 
 /// Returns the forces of contact on all vertices, in N.
