@@ -13,6 +13,7 @@ mod delaunay;
 mod elastica;
 mod equilibrium;
 mod hanging_strip;
+mod impacts;
 mod knots;
 mod lateral_buckling;
 mod linking;
