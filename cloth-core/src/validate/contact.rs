@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
-use super::{Finding, ValidateError, capstan, impacts, linking, stack};
+use super::{Finding, ValidateError, capstan, impacts, linking, stack, thinner};
 use crate::geometry::norm;
 use crate::model::Model;
 use crate::scene::Scene;
@@ -25,7 +25,8 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
     impact(report)?;
     stack::ask(quick, report)?;
     linking::ask(quick, report)?;
-    impacts::ask(quick, report)
+    impacts::ask(quick, report)?;
+    thinner::ask(quick, report)
 }
 
 pub(super) fn simulation(text: &str) -> Result<Simulation, ValidateError> {

@@ -24,6 +24,7 @@ mod orders;
 mod special;
 mod stack;
 mod strip;
+mod thinner;
 
 use energy_solve::{EvaluationError, ListError, SystemError};
 
