@@ -12,6 +12,7 @@ mod critical_load;
 mod delaunay;
 mod elastica;
 mod equilibrium;
+mod fold;
 mod hanging_strip;
 mod impacts;
 mod knots;
