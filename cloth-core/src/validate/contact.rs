@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
-use super::{Finding, ValidateError, capstan, fold, impacts, linking, stack, thinner};
+use super::{Finding, ValidateError, capstan, fold, impacts, linking, stack, stick_slip, thinner};
 use crate::geometry::norm;
 use crate::model::Model;
 use crate::scene::Scene;
@@ -27,7 +27,8 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
     linking::ask(quick, report)?;
     impacts::ask(quick, report)?;
     thinner::ask(quick, report)?;
-    fold::ask(quick, report)
+    fold::ask(quick, report)?;
+    stick_slip::ask(quick, report)
 }
 
 pub(super) fn simulation(text: &str) -> Result<Simulation, ValidateError> {

@@ -24,6 +24,7 @@ mod momentum;
 mod orders;
 mod special;
 mod stack;
+mod stick_slip;
 mod strip;
 mod thinner;
 
