@@ -325,7 +325,8 @@ fn contradictory_scenes_are_rejected_with_a_remedy() {
 fn the_scenes_of_the_gallery_are_valid() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
     let mut count = 0;
-    let folders = [folder.clone(), folder.join("garment")].map(|folder| std::fs::read_dir(folder).unwrap());
+    let folders = [folder.clone(), folder.join("garment"), folder.join("contact")];
+    let folders = folders.map(|folder| std::fs::read_dir(folder).unwrap());
     for entry in folders.into_iter().flatten() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "toml") {
@@ -339,5 +340,5 @@ fn the_scenes_of_the_gallery_are_valid() {
             count += 1;
         }
     }
-    assert!(count >= 10, "{count}");
+    assert!(count >= 16, "{count}");
 }

@@ -179,14 +179,15 @@ fn threads_and_resumed_runs_change_no_bit() {
     assert!(one.positions() == resumed.positions(), "resumed");
 }
 
-/// The first step of each benchmark scene: nothing crosses, nothing is too close.
+/// The first step of each scene of contact: nothing crosses, nothing is too close.
 #[test]
-fn benchmark_scenes_start() {
-    for name in ["drape", "twist", "sheets"] {
+fn scenes_of_contact_start() {
+    for name in ["drape", "twist", "sheets", "knot", "funnel", "sphere"] {
         let path = format!("{}/../scenes/contact/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let scene = Scene::read(path.as_ref()).unwrap_or_else(|error| panic!("{error}"));
         let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(crossings(&mut simulation, 1), 0, "{name}");
+        assert_eq!(simulation.obstacle_crossings(), 0, "{name}");
     }
 }
 

@@ -8,9 +8,9 @@ use crate::collision::{Closest, Measured, Pair};
 
 /// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
 /// same number of iterations.
-const STIFFNESS_RATIO: f64 = 10.0;
+pub(crate) const STIFFNESS_RATIO: f64 = 10.0;
 /// β″(½).
-const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
+pub(crate) const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
 
 /// The pairs in contact, or close to it, in order.
 #[derive(Debug, Default)]

@@ -39,6 +39,7 @@ use energy_dsl::{Block, Vector3};
 use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
 
 pub(crate) use friction::Grip;
+pub(crate) use joined::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
 pub use start::ContactError;
 pub(crate) use start::{ObstacleStart, Participants};
 pub(crate) use untangle::Untangling;

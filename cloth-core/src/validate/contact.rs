@@ -1,12 +1,17 @@
 //! Contact of cloth with itself and with obstacles: friction on an incline by Coulomb's law, cloth that sticks without
-//! creeping, the capstan, and impacts that conserve momentum.
+//! creeping, the capstan, and impacts that conserve momentum. Further answers have files of their own.
 
-use super::{Finding, ValidateError, capstan};
+use std::sync::Arc;
+
+use energy_dsl::Vector3;
+
+use super::{Finding, ValidateError, capstan, fold, impacts, linking, stack, stick_slip, thinner};
 use crate::geometry::norm;
+use crate::model::Model;
 use crate::scene::Scene;
-use crate::simulation::Simulation;
+use crate::simulation::{Extension, Simulation};
 
-const GRAVITY: f64 = 9.81;
+pub(super) const GRAVITY: f64 = 9.81;
 
 pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), ValidateError> {
     let slides: &[(f64, f64)] = if quick { &[(0.2, 0.5)] } else { &[(0.0, 0.3), (0.15, 0.3), (0.3, 0.5), (0.2, 0.5)] };
@@ -17,12 +22,45 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
     for friction in if quick { &[0.3][..] } else { &[0.2, 0.3, 0.5] } {
         capstan::ask(*friction, report)?;
     }
-    impact(report)
+    impact(report)?;
+    stack::ask(quick, report)?;
+    linking::ask(quick, report)?;
+    impacts::ask(quick, report)?;
+    thinner::ask(quick, report)?;
+    fold::ask(quick, report)?;
+    stick_slip::ask(quick, report)
 }
 
 pub(super) fn simulation(text: &str) -> Result<Simulation, ValidateError> {
     let scene = Scene::parse(text, "validate.toml".as_ref())?;
     Ok(Simulation::new(&scene)?)
+}
+
+/// Creates a simulation that starts at other positions than its scene says. Rest shapes stay.
+pub(super) fn placed(
+    text: &str,
+    place: impl Fn(usize, Vector3<f64>) -> Vector3<f64> + Send + Sync + 'static,
+) -> Result<Simulation, ValidateError> {
+    let scene = Scene::parse(text, "validate.toml".as_ref())?;
+    let extension: Extension = Arc::new(move |model: &mut Model| {
+        model.x.iter_mut().enumerate().for_each(|(vertex, x)| *x = place(vertex, *x));
+        let Model { moving, x, .. } = model;
+        moving.iter_mut().for_each(|pin| pin.initial = x[pin.vertex]);
+    });
+    Ok(Simulation::extended(&scene, Some(&extension))?)
+}
+
+/// Returns the forces of contact on all vertices, in N.
+pub(super) fn contact_forces(simulation: &Simulation) -> Vec<Vector3<f64>> {
+    let mut all = vec![[0.0; 3]; simulation.positions().len()];
+    for island in simulation.islands() {
+        let body = island.body();
+        let mut forces = vec![[0.0; 3]; body.x.len()];
+        body.system.add_contact_force(&body.x, &mut forces);
+        // Vertices of obstacles follow those of the island.
+        island.vertices().iter().zip(forces).for_each(|(&vertex, force)| all[vertex] = force);
+    }
+    all
 }
 
 /// A sheet at a place, with the friction of its fabric and further keys.

@@ -12,14 +12,21 @@ mod critical_load;
 mod delaunay;
 mod elastica;
 mod equilibrium;
+mod fold;
 mod hanging_strip;
+mod impacts;
+mod knots;
 mod lateral_buckling;
+mod linking;
 mod long_run;
 mod modes;
 mod momentum;
 mod orders;
 mod special;
+mod stack;
+mod stick_slip;
 mod strip;
+mod thinner;
 
 use energy_solve::{EvaluationError, ListError, SystemError};
 

@@ -177,7 +177,7 @@ fn perturbed(points: &[Point], by: f64) -> Vec<Point> {
 }
 
 /// Returns a linear congruential generator of numbers in [−½, ½), identical on every machine.
-fn random_numbers(seed: u32) -> impl FnMut() -> f64 {
+pub(super) fn random_numbers(seed: u32) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
