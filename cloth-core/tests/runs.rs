@@ -327,6 +327,20 @@ fn the_gltf_validator_finds_nothing() {
     assert!(found.status.success() && said == "0 errors, 0 warnings, 0 hints\n", "{said}");
 }
 
+/// Skipped without the program ffmpeg.
+#[test]
+fn ffmpeg_makes_a_film() {
+    let folder = with_scene(&format!("{SCENE}[output]\nmp4 = true\nsize = [64, 48]\n"));
+    let told = succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
+    let film = folder.path().join("out/cloth.mp4");
+    if !film.exists() {
+        eprintln!("skipped: no ffmpeg");
+        return;
+    }
+    assert!(told.contains("wrote out/cloth.mp4"), "{told}");
+    assert_eq!(&std::fs::read(film).unwrap()[4..8], b"ftyp");
+}
+
 #[test]
 fn only_the_requested_files_are_written() {
     let none = "[output]\npng = true\npicture = false\ngltf = false\nusd = false\nobj = false\nledger = false\n";
