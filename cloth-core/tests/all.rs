@@ -25,4 +25,5 @@ mod self_contact;
 mod sleep;
 mod stress;
 mod threads;
+mod untangling;
 mod view;

@@ -55,7 +55,7 @@ mod linear;
 mod matrix;
 mod system;
 mod terms;
-mod threads;
+pub mod threads;
 
 pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix};
 pub use least_squares::{

@@ -4,13 +4,13 @@ use std::panic::resume_unwind;
 
 /// Applies `work` to every item on at most `threads` threads, including the calling one. Results are in the order of
 /// the items.
-pub(crate) fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
+pub fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
     let each = |items: Vec<I>| items.into_iter().map(&work).collect::<Vec<R>>();
     in_parts(threads, items, each).into_iter().flatten().collect()
 }
 
 /// Divides the items among at most `threads` threads and applies `work` to each part, all parts at the same time.
-pub(crate) fn in_parts<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(Vec<I>) -> R + Sync) -> Vec<R> {
+pub fn in_parts<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(Vec<I>) -> R + Sync) -> Vec<R> {
     let mut parts = split(items, threads).into_iter();
     let Some(own) = parts.next() else { return Vec::new() };
     std::thread::scope(|scope| {

@@ -56,7 +56,7 @@ impl Joined {
     /// Calls `evaluate` with each pair that has an energy at x, its law and its closest points.
     pub fn for_each_active(&self, x: &[Vector3<f64>], mut evaluate: impl FnMut(&Pair, Law, &Closest)) {
         let mut measured = self.measured.borrow_mut();
-        measured.measure(&self.pairs, x);
+        measured.measure(&self.pairs, x, 1);
         for (number, (pair, law)) in self.pairs.iter().zip(&self.laws).enumerate() {
             let closest = measured.closest(number);
             if law.apart(&closest) < law.gap {

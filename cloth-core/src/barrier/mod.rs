@@ -28,6 +28,7 @@ mod bristle;
 mod feasible;
 mod friction;
 mod joined;
+mod judge;
 mod obstacle_features;
 mod resistance;
 mod rolling;
@@ -48,6 +49,7 @@ use crate::collision::{Closest, CollisionMesh, Measured, Move, Neighbourhood, Pa
 use feasible::Meeting;
 use friction::Friction;
 use joined::{Joined, Law};
+use judge::{Judge, Judgement};
 use resistance::Resistance;
 use rolling::rolling;
 use spacing::{Spacing, Spacings};
@@ -137,7 +139,7 @@ impl BarrierContact {
             self.neighbourhood.renew(&mut self.search, &self.mesh, x, x, radii);
             self.counts.searches += 1;
         }
-        self.neighbourhood.visit(x);
+        self.neighbourhood.visit(x, self.search.threads);
     }
 
     /// Whether the neighbourhood covers x. It grows to do so if it lacks few vertices.
@@ -167,36 +169,18 @@ impl BarrierContact {
 
     /// Judges a move by some pairs, measured at its start.
     fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
-        let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
-        for (number, (pair, separation)) in pairs.iter().zip(measured.separations()).enumerate() {
-            let clearance = self.spacing(pair).clearance(self.mesh.has_plane(pair));
-            if step.stays_beyond(clearance.reach, pair, *separation) {
-                continue;
-            }
-            judgement.tested += 1;
-            let own = step.safe_part(pair, &measured.closest(number), clearance, judgement.part);
-            if own < 1.0 {
-                judgement.blocking.push(*pair);
-            }
-            judgement.part = own.min(judgement.part);
-        }
-        judgement
+        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, measured };
+        judge.on(pairs, self.search.threads)
     }
-}
-
-/// What pairs say of a move.
-struct Judgement {
-    /// The part of the move during which all pairs certainly keep their clearance.
-    part: f64,
-    /// Pairs that were too close to be dismissed by a comparison of distances.
-    tested: u64,
-    /// The pairs that shorten the move.
-    blocking: Vec<Pair>,
 }
 
 impl ContactModel for BarrierContact {
     fn is_mutual(&self) -> bool {
         self.search.is_with_itself()
+    }
+
+    fn set_threads(&mut self, threads: usize) {
+        self.search.threads = threads;
     }
 
     fn begin_step(&mut self, x: &[Vector3<f64>]) {
@@ -215,14 +199,14 @@ impl ContactModel for BarrierContact {
         }
         let step = Move::new(from, to);
         let (count, judgement) = if self.covers_move(&step) {
-            self.neighbourhood.visit(from);
+            self.neighbourhood.visit(from, self.search.threads);
             let pairs = self.neighbourhood.pairs();
             (pairs.len(), self.judge(&step, pairs, self.neighbourhood.measured()))
         } else {
             self.counts.searches += 1;
             let pairs = self.search.pairs(&self.mesh, swept(from, to));
             let mut measured = Measured::default();
-            measured.measure(&pairs, from);
+            measured.measure(&pairs, from, self.search.threads);
             (pairs.len(), self.judge(&step, &pairs, &measured))
         };
         let Judgement { part, tested, blocking } = judgement;

@@ -1,6 +1,10 @@
 use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
+use energy_solve::threads::for_each;
 
 use super::{Closest, Pair, PairKind};
+
+/// Pairs that one thread takes at a time. A multiple of the number of lanes.
+pub(crate) const PART: usize = 4096;
 
 /// The closest points of many pairs at one place.
 #[derive(Clone, Debug, Default)]
@@ -15,7 +19,7 @@ pub(crate) struct Measured {
 impl Measured {
     /// Measures pairs at x, unless they have been measured there. Pairs are in order, so those of one kind are
     /// consecutive.
-    pub fn measure(&mut self, pairs: &[Pair], x: &[Vector3<f64>]) {
+    pub fn measure(&mut self, pairs: &[Pair], x: &[Vector3<f64>], threads: usize) {
         if self.numbers.len() == pairs.len() && self.place == x {
             return;
         }
@@ -23,7 +27,9 @@ impl Measured {
         self.numbers.resize(pairs.len(), [0.0; 8]);
         self.separations.resize(pairs.len(), 0.0);
         let Self { numbers, separations, .. } = self;
-        dispatch(Measure { pairs, x, numbers, separations });
+        let parts = pairs.chunks(PART).zip(numbers.chunks_mut(PART)).zip(separations.chunks_mut(PART));
+        let parts = parts.map(|((pairs, numbers), separations)| Measure { pairs, x, numbers, separations });
+        for_each(threads, parts.collect(), dispatch);
     }
 
     /// Discards everything. Required if pairs change.

@@ -26,7 +26,7 @@ pub(crate) use certificate::{Clearance, Move};
 pub(crate) use closest::Closest;
 pub use crossing::{Crossing, crossings};
 pub(crate) use exclusions::{Exclusions, Members};
-pub(crate) use measured::Measured;
+pub(crate) use measured::{Measured, PART};
 pub use mesh::CollisionMesh;
 pub(crate) use neighbourhood::{Neighbourhood, swept};
 pub(crate) use pair::{Pair, PairKind};

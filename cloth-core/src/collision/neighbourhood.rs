@@ -44,8 +44,8 @@ impl Neighbourhood {
     }
 
     /// Measures the pairs at x.
-    pub fn visit(&mut self, x: &[Vector3<f64>]) {
-        self.measured.measure(&self.pairs, x);
+    pub fn visit(&mut self, x: &[Vector3<f64>], threads: usize) {
+        self.measured.measure(&self.pairs, x, threads);
     }
 
     /// Finds the pairs in new balls around `centres`, and measures them at x, which these balls cover.
@@ -108,7 +108,7 @@ impl Neighbourhood {
     /// before the features do.
     fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>]) {
         self.measured.clear();
-        self.measured.measure(&self.pairs, x);
+        self.measured.measure(&self.pairs, x, search.threads);
         let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
         let is_near = |(pair, separation): (&Pair, &f64)| separation - pair.approach(&farthest) <= search.reach(pair);
         let is_kept: Vec<bool> = self.pairs.iter().zip(self.measured.separations()).map(is_near).collect();

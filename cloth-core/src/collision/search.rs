@@ -1,9 +1,13 @@
 use energy_dsl::Vector3;
 use energy_solve::index;
+use energy_solve::threads::for_each;
 
 use super::mesh::CollisionMesh;
 use super::{Exclusions, Pair, PairKind};
-use crate::geometry::{Bounds, Hierarchy};
+use crate::geometry::{Bounds, Branches, Hierarchy};
+
+/// A mesh with fewer vertices is searched on one thread.
+const FEW: usize = 1000;
 
 /// Finds the pairs whose vertices may meet within given regions.
 #[derive(Clone, Debug)]
@@ -11,6 +15,8 @@ pub(crate) struct Search {
     own: Trees,
     obstacles: Trees,
     rules: Rules,
+    /// The largest number of threads.
+    pub threads: usize,
 }
 
 /// Selects the features that may collide, and their distance.
@@ -86,13 +92,37 @@ struct Found {
     of_edges: Vec<Features>,
 }
 
+impl Found {
+    fn add(&mut self, other: Self) {
+        self.on_triangles.extend(other.on_triangles);
+        self.of_edges.extend(other.of_edges);
+    }
+}
+
+/// A part of a search. Together they find all pairs.
+#[derive(Clone, Copy, Debug)]
+enum Task {
+    PointsOnTriangles,
+    Edges(Branches),
+    Obstacles,
+}
+
+/// All tasks, in an order that gives two threads about the same work.
+const TASKS: [Task; 5] = [
+    Task::Edges(Branches::First),
+    Task::Edges(Branches::Second),
+    Task::PointsOnTriangles,
+    Task::Edges(Branches::Across),
+    Task::Obstacles,
+];
+
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
         let boxes = Boxes::new(mesh, x.iter().map(|x| Bounds::of(&[*x])).collect(), &rules.halves);
         let first = mesh.own_features();
         let [own, obstacles] = boxes.split(first);
-        Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), rules }
+        Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), rules, threads: 1 }
     }
 
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
@@ -116,20 +146,31 @@ impl Search {
         let mut found = Found::default();
         if self.rules.with_itself {
             self.own.refit(own_boxes);
-            self.find_all(mesh, &mut found);
+            let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
+            for_each(threads, TASKS.to_vec(), |task| self.find(task, mesh)).into_iter().for_each(|one| found.add(one));
         } else {
             self.find_near_obstacles(mesh, own_boxes, &mut found);
         }
         in_order(mesh, found)
     }
 
-    /// Finds pairs of cloth and hair, with themselves and with obstacles.
-    fn find_all(&self, mesh: &CollisionMesh, found: &mut Found) {
+    /// Finds a part of the pairs of cloth and hair, with themselves and with obstacles.
+    fn find(&self, task: Task, mesh: &CollisionMesh) -> Found {
+        let (own, mut found) = (&self.own, Found::default());
+        match task {
+            Task::PointsOnTriangles => own.points.meeting(&own.triangles, |point, triangle| {
+                self.add_point_and_triangle(mesh, point, triangle, &mut found);
+            }),
+            Task::Edges(branches) => own.edges.meeting_itself(branches, |one, other| {
+                self.add_edges(mesh, one, other, &mut found);
+            }),
+            Task::Obstacles => self.find_on_obstacles(mesh, &mut found),
+        }
+        found
+    }
+
+    fn find_on_obstacles(&self, mesh: &CollisionMesh, found: &mut Found) {
         let Self { own, obstacles, .. } = self;
-        own.points.meeting(&own.triangles, |point, triangle| {
-            self.add_point_and_triangle(mesh, point, triangle, found);
-        });
-        own.edges.meeting_itself(|one, other| self.add_edges(mesh, one, other, found));
         let [points, triangles, edges] = obstacles.first;
         own.points.meeting(&obstacles.triangles, |point, triangle| {
             self.add_point_and_triangle(mesh, point, triangles + triangle, found);

@@ -98,7 +98,7 @@ proptest! {
     #[test]
     fn lanes_measure_what_single_pairs_are([x, _] in impact()) {
         let mut measured = Measured::default();
-        measured.measure(&pairs(), &x);
+        measured.measure(&pairs(), &x, 2);
         for (number, pair) in pairs().iter().enumerate() {
             prop_assert_eq!(measured.closest(number), Closest::of(pair, &pair.corners(&x)));
         }

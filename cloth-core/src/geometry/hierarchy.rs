@@ -35,6 +35,19 @@ enum Kind {
     Inner(usize),
 }
 
+/// The pairs of a tree with itself, by the branches of the root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Branches {
+    /// All pairs.
+    All,
+    /// Pairs within the first branch.
+    First,
+    /// Pairs within the second branch.
+    Second,
+    /// Pairs of one item in each branch.
+    Across,
+}
+
 /// The largest number of items in a leaf.
 const LEAF: usize = 4;
 
@@ -123,9 +136,17 @@ impl Hierarchy {
         }
     }
 
-    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order.
-    pub fn meeting_itself(&self, mut found: impl FnMut(usize, usize)) {
-        let mut waiting = vec![(0, 0)];
+    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order, of some branches.
+    pub fn meeting_itself(&self, branches: Branches, mut found: impl FnMut(usize, usize)) {
+        let mut waiting = vec![match (branches, &self.nodes[0].kind) {
+            (Branches::All, _) => (0, 0),
+            // The root has no branches.
+            (Branches::First, Kind::Leaf(..)) => (0, 0),
+            (_, Kind::Leaf(..)) => return,
+            (Branches::First, _) => (1, 1),
+            (Branches::Second, &Kind::Inner(second)) => (second, second),
+            (Branches::Across, &Kind::Inner(second)) => (1, second),
+        }];
         while let Some((a, b)) = waiting.pop() {
             let (first, second) = (&self.nodes[a], &self.nodes[b]);
             if !first.bounds.overlaps(&second.bounds) {

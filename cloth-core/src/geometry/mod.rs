@@ -7,7 +7,7 @@ mod pose;
 use energy_dsl::Real;
 
 pub(crate) use bounds::Bounds;
-pub(crate) use hierarchy::Hierarchy;
+pub(crate) use hierarchy::{Branches, Hierarchy};
 pub use pose::Pose;
 
 // Vectors of numbers, or of SIMD lanes of numbers. They are written out by components: closures that build arrays would

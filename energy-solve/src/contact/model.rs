@@ -21,6 +21,9 @@ pub trait ContactModel: std::fmt::Debug + Send {
         true
     }
 
+    /// Sets the largest number of threads. Results must not depend on it.
+    fn set_threads(&mut self, _threads: usize) {}
+
     /// Begins a step at x: forgets all pairs.
     fn begin_step(&mut self, x: &[Vector3<f64>]);
 

@@ -100,6 +100,7 @@ impl System {
         for counted in &mut self.terms {
             counted.term.divide(&self.shares);
         }
+        self.contact.iter_mut().for_each(|contact| contact.set_threads(self.threads));
     }
 
     /// Returns the largest number of threads.
@@ -116,7 +117,8 @@ impl System {
 
     /// Adds contact. The sums of this system do not include it: an integrator adds it with [`System::contact`], because
     /// contact also limits the moves that lead from state to state.
-    pub fn set_contact(&mut self, contact: Box<dyn ContactModel>) {
+    pub fn set_contact(&mut self, mut contact: Box<dyn ContactModel>) {
+        contact.set_threads(self.threads);
         self.contact = Some(contact);
     }
 
