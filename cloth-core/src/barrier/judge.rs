@@ -3,7 +3,7 @@
 use energy_solve::threads::for_each;
 
 use super::spacing::Spacings;
-use crate::collision::{CollisionMesh, Measured, Move, PART, Pair};
+use crate::collision::{Clearance, CollisionMesh, Measured, Move, PART, Pair};
 
 /// Judges a move by pairs that are measured at its start.
 pub(super) struct Judge<'a> {
@@ -24,44 +24,43 @@ pub(super) struct Judgement {
 }
 
 impl Judge<'_> {
-    /// Judges by these pairs, all that were measured. Each thread takes parts of the same size, for any number of
-    /// threads, so that the results are the same.
+    /// Judges by these pairs, all that were measured. Threads find the few pairs that are not safe at first sight; these
+    /// shorten the move one after the other.
     pub fn on(&self, pairs: &[Pair], threads: usize) -> Judgement {
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();
-        let judged = for_each(threads, parts, |(first, part)| self.on_part(first, part));
-        judged.into_iter().fold(Judgement::default(), Judgement::and)
-    }
-
-    /// Judges by consecutive pairs from number `first` on.
-    fn on_part(&self, first: usize, pairs: &[Pair]) -> Judgement {
-        let mut judgement = Judgement::default();
-        for (number, pair) in (first..).zip(pairs) {
-            let clearance = self.spacings.of(self.mesh, pair).clearance(self.mesh.has_plane(pair));
-            if self.step.stays_beyond(clearance.reach, pair, self.measured.separations()[number]) {
-                continue;
+        let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
+        for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part)) {
+            judgement.tested += tested;
+            for number in doubtful {
+                let (pair, start) = (&pairs[number], self.measured.closest(number));
+                let own = self.step.safe_part(pair, &start, self.clearance(pair), judgement.part);
+                if own < 1.0 {
+                    judgement.blocking.push(*pair);
+                }
+                judgement.part = own.min(judgement.part);
             }
-            judgement.tested += 1;
-            let own = self.step.safe_part(pair, &self.measured.closest(number), clearance, judgement.part);
-            if own < 1.0 {
-                judgement.blocking.push(*pair);
-            }
-            judgement.part = own.min(judgement.part);
         }
         judgement
     }
-}
 
-impl Default for Judgement {
-    /// No pair shortens the move.
-    fn default() -> Self {
-        Self { part: 1.0, tested: 0, blocking: Vec::new() }
+    /// The number of pairs that comparisons of distances do not dismiss, and those that are not safe at first sight,
+    /// among consecutive pairs from number `first` on.
+    fn doubtful(&self, first: usize, pairs: &[Pair]) -> (u64, Vec<usize>) {
+        let (mut tested, mut doubtful) = (0, Vec::new());
+        for (number, pair) in (first..).zip(pairs) {
+            let clearance = self.clearance(pair);
+            if self.step.stays_beyond(clearance.reach, pair, self.measured.separations()[number]) {
+                continue;
+            }
+            tested += 1;
+            if !self.step.is_safe(pair, &self.measured.closest(number), clearance) {
+                doubtful.push(number);
+            }
+        }
+        (tested, doubtful)
     }
-}
 
-impl Judgement {
-    /// What both say.
-    fn and(self, other: Self) -> Self {
-        let blocking = [self.blocking, other.blocking].concat();
-        Self { part: self.part.min(other.part), tested: self.tested + other.tested, blocking }
+    fn clearance(&self, pair: &Pair) -> Clearance {
+        self.spacings.of(self.mesh, pair).clearance(self.mesh.has_plane(pair))
     }
 }

@@ -84,21 +84,22 @@ impl<'a> Move<'a> {
         separation - pair.approach(&self.excursions) > reach + self.rounding
     }
 
-    /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. `start`
-    /// has the closest points at the start. The result is exact enough if it is at least `wanted`; the search then
-    /// stops early.
-    pub fn safe_part(&self, pair: &Pair, start: &Closest, clearance: Clearance, wanted: f64) -> f64 {
-        let to = pair.corners(self.to);
-        // Out of reach, nothing needs to be kept.
-        let level = self.level(start.distance, clearance).min(clearance.reach + self.rounding);
+    /// Whether the pair certainly keeps its clearance during the whole move, by the normals of the closest points at the
+    /// start and at the end. `start` has the closest points at the start.
+    pub fn is_safe(&self, pair: &Pair, start: &Closest, clearance: Clearance) -> bool {
+        let (to, level) = (pair.corners(self.to), self.level(start.distance, clearance));
         if start.separation >= level && separation(&start.normal, &to, pair.first()) >= level {
-            return 1.0;
+            return true;
         }
-        let from = pair.corners(self.from);
         let end = Closest::of(pair, &to);
-        if end.separation >= level && separation(&end.normal, &from, pair.first()) >= level {
-            return 1.0;
-        }
+        end.separation >= level && separation(&end.normal, &pair.corners(self.from), pair.first()) >= level
+    }
+
+    /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. The result
+    /// is exact enough if it is at least `wanted`; the search then stops early.
+    pub fn safe_part(&self, pair: &Pair, start: &Closest, clearance: Clearance, wanted: f64) -> f64 {
+        let (from, to) = (pair.corners(self.from), pair.corners(self.to));
+        let level = self.level(start.distance, clearance);
         if clearance.is_plane {
             return plane::safe_part(&from, &to, level);
         }
@@ -107,10 +108,11 @@ impl<'a> Move<'a> {
 
     /// The level ℓ of a pair at a distance, including rounding errors. Pairs within their thickness must not come
     /// closer by more than a tenth.
-    fn level(&self, distance: f64, Clearance { thickness, .. }: Clearance) -> f64 {
+    fn level(&self, distance: f64, Clearance { thickness, reach, .. }: Clearance) -> f64 {
         let kept =
             if distance > thickness { thickness + KEPT * (distance - thickness) } else { (1.0 - KEPT) * distance };
-        kept + self.rounding
+        // Out of reach, nothing needs to be kept.
+        kept.min(reach) + self.rounding
     }
 
     fn advance(&self, pair: &Pair, from: &[Vector3<f64>; 4], to: &[Vector3<f64>; 4], level: f64, wanted: f64) -> f64 {

@@ -32,12 +32,8 @@ fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 
 
 /// The part of a move that is safe for a pair; `from` holds its corners at the start.
 fn safe_part_of(step: &Move<'_>, pair: &Pair, from: &[Vector3<f64>; 4], thickness: f64, wanted: f64) -> f64 {
-    step.safe_part(
-        pair,
-        &Closest::of(pair, from),
-        Clearance { thickness, reach: f64::INFINITY, is_plane: false },
-        wanted,
-    )
+    let (start, clearance) = (Closest::of(pair, from), Clearance { thickness, reach: f64::INFINITY, is_plane: false });
+    if step.is_safe(pair, &start, clearance) { 1.0 } else { step.safe_part(pair, &start, clearance, wanted) }
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
