@@ -130,7 +130,7 @@ fn a_garment_goes_to_blender_and_comes_back() {
     }
     assert!(told.status.success(), "{said}{}", String::from_utf8_lossy(&told.stderr));
     assert!(said.contains("3 frames of 84 vertices to Blender"), "{said}");
-    // What Blender exported is a garment again: deformed, with its texture coordinates.
+    // The exported file is a garment again: deformed, with its texture coordinates.
     let scene = SCENE
         .replace("skirt.obj", "out/from_blender.obj")
         .replace("group = \"Gürtel\"", "box = { min = [-1.0, -1.0, -0.1], max = [1.0, 1.0, 1.0] }");

@@ -1,4 +1,4 @@
-//! What pairs say of a move.
+//! Judges moves by the pairs near them.
 
 use energy_solve::threads::for_each;
 
@@ -13,7 +13,7 @@ pub(super) struct Judge<'a> {
     pub measured: &'a Measured,
 }
 
-/// What pairs say of a move.
+/// The result for a move.
 pub(super) struct Judgement {
     /// The part of the move during which all pairs certainly keep their clearance.
     pub part: f64,
@@ -24,7 +24,7 @@ pub(super) struct Judgement {
 }
 
 impl Judge<'_> {
-    /// Judges by these pairs, all that were measured. Threads find the few pairs that are not safe at first sight; these
+    /// Judges by these pairs, all that were measured. Threads find the few pairs that are not safe at first sight. They
     /// shorten the move one after the other.
     pub fn on(&self, pairs: &[Pair], threads: usize) -> Judgement {
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();

@@ -2,7 +2,7 @@
 //!
 //! A direction n separates two convex features by n·(b − a) ≥ ℓ for all corners a of one and b of the other. Corners
 //! move on straight lines at constant velocity, so n·(b − a) is an affine function of time. If it is at least ℓ at both
-//! ends of a move, it is at least ℓ during the move: the features stay at least ℓ apart. No root is sought, and only
+//! ends of a move, it is at least ℓ during the move: the features stay at least ℓ apart. No root is computed, and only
 //! dot products are rounded.
 //!
 //! The level ℓ = ξ + 0.1 (d − ξ) of a pair at distance d keeps a tenth of its gap beyond the thickness ξ. If the normal
@@ -84,8 +84,8 @@ impl<'a> Move<'a> {
         separation - pair.approach(&self.excursions) > reach + self.rounding
     }
 
-    /// Whether the pair certainly keeps its clearance during the whole move, by the normals of the closest points at the
-    /// start and at the end. `start` has the closest points at the start.
+    /// Whether the pair certainly keeps its clearance during the whole move, by the normals at the start and at the end.
+    /// `start` has the closest points at the start.
     pub fn is_safe(&self, pair: &Pair, start: &Closest, clearance: Clearance) -> bool {
         let (to, level) = (pair.corners(self.to), self.level(start.distance, clearance));
         if start.separation >= level && separation(&start.normal, &to, pair.first()) >= level {

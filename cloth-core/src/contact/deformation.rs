@@ -31,7 +31,7 @@ impl Deformation {
     /// ```
     ///
     /// # Panics
-    /// If there is no frame, or frames have different numbers of vertices.
+    /// Without a frame, or if frames have different numbers of vertices.
     #[must_use]
     pub fn new(frames: Vec<Vec<Vector3<f64>>>, rate: f64) -> Self {
         assert!(frames.windows(2).all(|pair| pair[0].len() == pair[1].len()), "frames of one mesh");

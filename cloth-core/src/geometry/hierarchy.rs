@@ -38,7 +38,7 @@ enum Kind {
 /// The pairs of a tree with itself, by the branches of the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Branches {
-    /// All pairs.
+    /// All pairs of items.
     All,
     /// Pairs within the first branch.
     First,

@@ -52,7 +52,7 @@ pub enum PinError {
     SoftOnDeforming {
         /// Index of the pin, from 0.
         pin: usize,
-        /// The obstacle.
+        /// Name of the obstacle.
         name: String,
     },
     /// The scene has no such obstacle.

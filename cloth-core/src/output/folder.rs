@@ -28,8 +28,8 @@ pub enum OutputError {
     File { path: PathBuf, source: std::io::Error },
 }
 
-/// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `contact.svg`, `summary.txt`,
-/// `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are written atomically.
+/// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `contact.svg`,
+/// `summary.txt`, `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are written atomically.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,

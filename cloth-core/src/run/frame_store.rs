@@ -23,7 +23,7 @@ pub(super) struct Vectors {
     pub forces: Vec<Vector3<f64>>,
 }
 
-/// Which vectors are stored.
+/// The kinds of vectors that are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Wanted {
     velocities: bool,
@@ -137,7 +137,7 @@ impl FrameStore {
             self.checksum.update(&bytes);
         }
         self.frames.push(frame);
-        // As the file holds them, so that a resumed run writes the same.
+        // Rounded as in the file, so that a resumed run writes the same.
         self.vectors.push(self.kept.of(vectors));
         Ok(())
     }

@@ -25,7 +25,7 @@ pub fn with_material(scene: &str, file: &Path, parameters: &[(String, f64)]) -> 
     table.to_string()
 }
 
-/// Returns the text of a scene that repairs shallow crossings at the start. Text that is not TOML is returned unchanged.
+/// Returns the text of a scene with shallow crossings at the start repaired. Text that is not TOML stays unchanged.
 #[must_use]
 pub fn with_untangling(scene: &str) -> String {
     let Ok(mut table) = scene.parse::<Table>() else { return scene.to_owned() };

@@ -141,7 +141,7 @@ struct BoxKeys {
 #[serde(deny_unknown_fields)]
 struct MeshKeys {
     /// An OBJ file, with lengths in m, relative to the scene file's folder. Corners run anticlockwise seen from
-    /// outside. An open mesh is a shell. With `frames_per_second`, a pattern with one `*` for the numbers of the frames.
+    /// outside. An open mesh is a shell. With `frames_per_second`, the name has one `*` for the numbers of the frames.
     path: PathBuf,
     /// The mesh deforms: `path` names one OBJ file per frame, with the same vertices and faces, in the order of their
     /// numbers, at this rate in 1/s. Vertices move on straight lines from frame to frame. Needs `newton`. Default: the
@@ -167,10 +167,16 @@ pub enum ObstacleError {
     #[error("{name}: {source}")]
     Scaled { name: String, source: MeshError },
     /// No file has the name of a frame.
-    #[error("{name}: no file matches {}; name the frames with one `*` for their numbers, such as body_*.obj", .pattern.display())]
+    #[error(
+        "{name}: no file matches {}; name the frames with one `*` for their numbers, such as body_*.obj",
+        .pattern.display()
+    )]
     NoFrames { name: String, pattern: PathBuf },
     /// A frame has other vertices or faces than the first one.
-    #[error("{name}: {} has other vertices or faces than {}; export the same mesh in every frame", .path.display(), .first.display())]
+    #[error(
+        "{name}: {} has other vertices or faces than {}; export the same mesh in every frame",
+        .path.display(), .first.display()
+    )]
     OtherMesh { name: String, path: PathBuf, first: PathBuf },
     /// The mesh does not bound a solid.
     #[error("{name}: {}: {source}", .path.display())]
@@ -228,8 +234,8 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
-    /// Returns the paths of the mesh, one for each frame if it deforms. Relative paths refer to `folder`. Empty for other
-    /// shapes.
+    /// Returns the paths of the mesh, one for each frame if it deforms. Relative paths refer to `folder`. Other shapes
+    /// have none.
     #[must_use]
     pub fn mesh_paths(&self, folder: &Path) -> Vec<PathBuf> {
         match &self.shape {

@@ -26,8 +26,8 @@ pub struct OutputChoice {
     pub mdd: bool,
     /// Velocities in the USD file, for motion blur. Default false.
     pub velocities: bool,
-    /// Forces of certified contact at each vertex in the USD file, as `primvars:contactForce`, and in PLY files, as `fx`,
-    /// `fy`, `fz`. Default false.
+    /// Forces of certified contact at each vertex: `primvars:contactForce` in the USD file, and `fx`, `fy`, `fz` in PLY
+    /// files. Default false.
     pub contact_forces: bool,
     /// `ledger.csv` and `ledger.svg`: energies, work and momenta at each step. Default true.
     pub ledger: bool,

@@ -252,8 +252,8 @@ impl Simulation {
         &self.v
     }
 
-    /// Returns the forces of certified contact on all vertices at the end of the last step, in N: of its barriers and of
-    /// friction. Zero with other integrators and before the first step.
+    /// Returns the forces of certified contact on all vertices at the end of the last step, in N: those of barriers and
+    /// of friction. Zero with other integrators and before the first step.
     #[must_use]
     pub fn contact_forces(&self) -> Vec<Vector3<f64>> {
         let mut forces = vec![[0.0; 3]; self.x.len()];

@@ -42,7 +42,7 @@ struct Impact {
     size: f64,
     /// The turn of the patch about its centre.
     turn: Pose,
-    /// Where the lowest point of the patch is, in m.
+    /// The lowest point of the patch, in m.
     aside: [f64; 2],
     /// The distance of the surfaces at the start, in m.
     gap: f64,
@@ -160,7 +160,7 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
     let mut counts = Counts::default();
     for number in 0..count {
         let mut draw = random_numbers(number);
-        // The first numbers of neighbouring seeds are alike.
+        // The first numbers of neighbouring seeds hardly differ.
         (0..3).for_each(|_| _ = draw());
         counts.run(&Impact::random(KINDS[number as usize % KINDS.len()], draw))?;
     }

@@ -30,7 +30,7 @@ const PROBE: f64 = 1e-3;
 
 /// The start of a repair.
 pub(crate) struct Untangling<'a> {
-    /// What may collide.
+    /// The features that may collide.
     pub participants: &'a Participants,
     /// The obstacles at the start, in the order of [`Participants::obstacles`].
     pub solids: &'a [AnySolid],
@@ -47,7 +47,7 @@ impl Untangling<'_> {
         let skins = obstacles.iter().map(|obstacle| skin(obstacle.reach, obstacle.radius)).collect();
         let spacings = Spacings { radii: radii.clone(), gap: *gap, skins };
         let reach = obstacles.iter().map(|obstacle| obstacle.reach).fold(2.0 * largest(radii) + gap, f64::max);
-        // Features on the wrong side are as far apart as they are deep.
+        // A feature on the wrong side is at a distance equal to its depth.
         let halves = spacings.halves(mesh).iter().map(|half| half + 0.5 * reach).collect();
         let (is_free, exclusions) = (self.participants.is_free.clone(), exclusions.clone());
         let rules = Rules { halves, is_free, exclusions, with_itself: *with_itself };
