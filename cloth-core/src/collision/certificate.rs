@@ -84,7 +84,7 @@ impl<'a> Move<'a> {
         separation - pair.approach(&self.excursions) > reach + self.rounding
     }
 
-    /// Whether the pair certainly keeps its clearance during the whole move, by the normals at the start and at the end.
+    /// Whether the pair certainly keeps its clearance during the whole move, by the normals at its start and its end.
     /// `start` has the closest points at the start.
     pub fn is_safe(&self, pair: &Pair, start: &Closest, clearance: Clearance) -> bool {
         let (to, level) = (pair.corners(self.to), self.level(start.distance, clearance));

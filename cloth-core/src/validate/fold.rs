@@ -1,5 +1,5 @@
 //! A strip folded between two plates. It lies flat beyond the lines of contact, so the curvature begins there at 0.
-//! With θ the angle to the plates, D θ′²/2 = P sin θ, where P is the force per width. So the distance H of the plates is
+//! With θ the angle to the plates, D θ′²/2 = P sin θ, where P is the force per width. The distance H of the plates is
 //! H = 2 ∫ sin θ ds = 2 √(D/2P) ∫₀^{π/2} √(sin θ) dθ, and P H²/D = 2.8711, κ_max H = 2.3963.
 
 use std::f64::consts::PI;
