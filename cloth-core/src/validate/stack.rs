@@ -3,8 +3,8 @@
 //! The energy of a pair is K β(s), with K chosen for each pair and step (see [`crate::barrier`]). Forces at rest do not
 //! depend on K, heights do. In flat sheets with hardly any bending stiffness, only inertia resists a displacement along
 //! the normal: K/g² = 10/β″(½) · m/h² for every pair, with the mass m of a vertex, the gap g and the step h. Drag
-//! adds a little. Vertices on both sides of an interface meet the other side as points on triangles. Together they carry
-//! the weight of the n sheets above, and the mass cancels:
+//! adds a little. Vertices on both sides of an interface meet the other side as points on triangles. They share the
+//! weight of the n sheets above, and the mass cancels:
 //!
 //! 2 · 10/β″(½) · g/h² · (1 − s)(1/s − 1 − 2 ln s) = n · gravity.
 //!
