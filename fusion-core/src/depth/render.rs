@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn the_nearest_surface_wins() {
-        let camera = Camera { fx: 100.0, fy: 100.0, cx: 50.0, cy: 50.0, width: 101, height: 101 };
+        let camera = Camera { fx: 100.0, fy: 100.0, cx: 50.0, cy: 50.0, width: 101, height: 101, distortion: None };
         let image = render(&squares(), &camera);
         assert_eq!(image.at([50, 50]), Some(2.0));
         assert_eq!(image.at([50 + 24, 50]), Some(2.0));
