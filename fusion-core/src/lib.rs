@@ -38,6 +38,7 @@ pub mod correspondence;
 pub mod depth;
 pub mod energy;
 pub mod evaluation;
+pub mod focal_length;
 pub mod model;
 mod option_error;
 pub mod plot;

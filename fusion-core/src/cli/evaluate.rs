@@ -61,7 +61,8 @@ impl Evaluate {
     fn measure(&self) -> Result<Evaluated> {
         let sequence = DepthSequence::open(&self.recording)?;
         let body = read_body(&self.recording.join(MODEL))?;
-        let skeleton = Skeleton::read(&self.recording.join(SKELETON))?;
+        let path = self.recording.join(SKELETON);
+        let skeleton = Skeleton::read(&path)?.for_images(&path, sequence.len(), sequence.times())?;
         let mut evaluated = Evaluated { track: TrackErrors::default(), skeleton: TrackErrors::default() };
         for frame in 1..sequence.len() {
             let truth = read_vertices(&mesh_file(&self.recording, "truth", frame)).context("the truth")?;
