@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use energy_cli::write_file;
 use fusion_core::body::{Bone, SkinnedBody, obj_text};
-use fusion_core::depth::{Camera, DepthSequence, GivenCamera};
+use fusion_core::depth::{Camera, DepthImage, DepthSequence, GivenCamera, SequenceError};
 use fusion_core::energy::BoneMode;
 use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model::{DeformationModel, ModelOptions};
@@ -15,8 +15,9 @@ use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare};
+use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, USD, mesh_file, prepare};
 use super::posed::read_any_body;
+use super::track_output::TrackOutput;
 use super::{print, progress_bar};
 
 /// Options of `fusion track`.
@@ -54,6 +55,12 @@ pub struct Track {
     /// Output folder.
     #[arg(short, long)]
     output: PathBuf,
+    /// Write a picture of depth, model and error for each frame, and a film of them (`track.apng`).
+    #[arg(long)]
+    pictures: bool,
+    /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
+    #[arg(long)]
+    usd: bool,
     /// Print the times of frames.
     #[arg(long)]
     stats: bool,
@@ -126,6 +133,8 @@ impl Track {
             unknown_bones,
             options: None,
             output: output.to_owned(),
+            pictures: false,
+            usd: false,
             stats: false,
             overwrite: true,
         }
@@ -153,22 +162,35 @@ impl Track {
         {
             eprintln!("warning: {}", focal_warning(&camera, &found));
         }
-        prepare(&self.output, &["meshes"], &[FRAMES, NODES], self.overwrite)?;
+        let folders: &[&str] = if self.pictures { &["meshes", "pictures"] } else { &["meshes"] };
+        prepare(&self.output, folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
+        let mut output = TrackOutput::new(&self.output, camera, &body.mesh.triangles, sequence.times());
+        if self.pictures {
+            output = output.with_pictures();
+        }
+        if self.usd {
+            output = output.with_usd(sequence.len())?;
+        }
         let mut lines: Vec<Line> = Vec::new();
         let mut motions = Vec::new();
         let progress = progress_bar(sequence.len(), "tracking");
         for frame in 0..sequence.len() {
-            let line = track_frame(frame, &sequence, skeleton.as_ref(), &mut tracker);
+            let image = sequence.image(frame);
+            let shown = image.as_ref().ok().filter(|_| self.pictures).cloned();
+            let line = track_frame(frame, image, skeleton.as_ref(), &mut tracker);
             if let Some(warning) = change(lines.last(), &line) {
                 progress.suspend(|| eprintln!("warning: {warning}"));
             }
             lines.push(line);
-            let mesh = obj_text(&tracker.vertices(), &tracker.model().mesh.triangles);
+            let vertices = tracker.vertices();
+            output.add(frame, shown.as_ref(), &vertices)?;
+            let mesh = obj_text(&vertices, &body.mesh.triangles);
             write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
             motions.push(tracker.twists().to_vec());
             progress.inc(1);
         }
         progress.finish_and_clear();
+        output.finish()?;
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
         let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
@@ -268,7 +290,7 @@ impl Track {
             origin: model.origin.into(),
             angle: options.energy.angle,
             nodes: model.nodes.iter().map(|&node| node.into()).collect(),
-            frames: motions,
+            frames: &motions.iter().map(|frame| frame.iter().map(rounded).collect()).collect::<Vec<_>>(),
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
@@ -300,6 +322,11 @@ fn ranges(numbers: &[usize]) -> String {
     runs.join(", ")
 }
 
+/// Rounds a twist to nanometres and nanoradians, which halves the size of the file.
+fn rounded(twist: &Twist) -> Twist {
+    twist.map(|x| (1e9 * x).round() / 1e9)
+}
+
 /// Replaces the values that another object has, at any depth.
 fn replace(value: &mut Value, by: Value) {
     match (value, by) {
@@ -314,7 +341,12 @@ fn replace(value: &mut Value, by: Value) {
 
 /// Tracks one frame. If its image cannot be used, the body moves by its bones or its last motion, and the row has the
 /// reason.
-fn track_frame(frame: usize, sequence: &DepthSequence, skeleton: Option<&Skeleton>, tracker: &mut Tracker) -> Line {
+fn track_frame(
+    frame: usize,
+    image: Result<DepthImage, SequenceError>,
+    skeleton: Option<&Skeleton>,
+    tracker: &mut Tracker,
+) -> Line {
     let skipped =
         |error: &anyhow::Error| Line { frame, status: "skipped", reason: format!("{error:#}"), ..Line::default() };
     let bones = skeleton.map_or(Ok(None), |skeleton| skeleton.motions(frame, &tracker.model().bones));
@@ -323,7 +355,7 @@ fn track_frame(frame: usize, sequence: &DepthSequence, skeleton: Option<&Skeleto
         Err(error) => (None, Some(anyhow::Error::new(error))),
     };
     let image = match fault {
-        None => sequence.image(frame).map_err(anyhow::Error::new),
+        None => image.map_err(anyhow::Error::new),
         Some(fault) => Err(fault),
     };
     match image {
