@@ -58,7 +58,7 @@ pub fn correspondences(
     gates: &Gates,
     hidden: &[bool],
 ) -> (Vec<Pair>, MatchCounts) {
-    let (image, camera) = (normals.image, normals.camera);
+    let (image, rays) = (normals.image, normals.rays);
     let (mut pairs, mut counts) = (Vec::new(), MatchCounts::default());
     let least_cosine = gates.angle.cos();
     for (vertex, (place, normal)) in moved.vertices.iter().zip(&moved.normals).enumerate() {
@@ -71,7 +71,7 @@ pub fn correspondences(
             counts.hidden += 1;
             continue;
         }
-        let Some(pixel) = camera.pixel(&seen) else {
+        let Some(pixel) = rays.camera().pixel(&seen) else {
             counts.outside += 1;
             continue;
         };
@@ -79,7 +79,7 @@ pub fn correspondences(
             counts.no_depth += 1;
             continue;
         };
-        let point = camera.unproject(pixel, depth);
+        let point = rays.point(pixel, depth);
         if (seen - point).norm() > gates.distance {
             counts.far += 1;
             continue;

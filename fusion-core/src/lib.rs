@@ -38,13 +38,16 @@ pub mod correspondence;
 pub mod depth;
 pub mod energy;
 pub mod evaluation;
+pub mod focal_length;
 pub mod model;
 mod option_error;
+pub mod picture;
 pub mod plot;
 pub mod protocol;
 mod random;
 pub mod skeleton;
 pub mod tracker;
 pub mod twist;
+pub mod usd;
 
 pub use option_error::OptionError;

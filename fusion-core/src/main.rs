@@ -26,9 +26,9 @@ enum Command {
     Render(cli::render::Render),
     /// Poses a body frame by frame: a mesh for each, as an obstacle of cloth that deforms.
     Pose(cli::pose::Pose),
-    /// Tracks a model through depth images: node motions, moved meshes, a table of frames.
+    /// Tracks a model through depth images: node motions, moved meshes, a table of frames; pictures and USD on request.
     Track(cli::track::Track),
-    /// Compares a track with the truth: table and plot.
+    /// Compares a track with the truth: table, plot, and a page with pictures.
     Evaluate(cli::evaluate::Evaluate),
 }
 

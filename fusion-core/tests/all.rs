@@ -4,4 +4,6 @@ mod attachments;
 mod bad_input;
 mod command_line;
 mod figure;
+mod inputs;
+mod joints;
 mod real_body;

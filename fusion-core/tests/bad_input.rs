@@ -121,6 +121,26 @@ fn lengths_that_are_not_positive() {
 }
 
 #[test]
+fn tolerance_of_one() {
+    option_refused(r#"{"tracker": {"solver_tolerance": 1}}"#, &["`tracker.solver_tolerance`", "got 1"]);
+}
+
+#[test]
+fn prior_without_reach() {
+    option_refused(r#"{"tracker": {"energy": {"prior_reach": 0}}}"#, &["`tracker.energy.prior_reach`", "got 0"]);
+}
+
+#[test]
+fn three_nodes_per_vertex() {
+    option_refused(r#"{"model": {"nodes_per_vertex": 3}}"#, &["1, 4 or 8 nodes per vertex, got 3"]);
+}
+
+#[test]
+fn unknown_word() {
+    option_refused(r#"{"model": {"distance": "straight"}}"#, &["unknown variant `straight`", "`surface`"]);
+}
+
+#[test]
 fn no_graph() {
     option_refused(r#"{"model": {"graph_neighbours": 0}}"#, &["`model.graph_neighbours`", "got 0"]);
 }
@@ -198,4 +218,71 @@ fn malformed_list_of_images() {
     let (_folder, recording) = recording();
     std::fs::write(recording.join("depth.txt"), "# timestamp filename\ndepth/000000.png\n").unwrap();
     refused(&recording, &[], &["depth.txt:2", "expected a timestamp", "depth/000000.png"]);
+}
+
+#[test]
+fn images_out_of_order() {
+    let (_folder, recording) = recording();
+    std::fs::write(recording.join("depth.txt"), "0.1 depth/000000.png\n0.1 depth/000001.png\n").unwrap();
+    refused(&recording, &[], &["depth.txt:2", "expected a timestamp after 0.1 s, got 0.1 s"]);
+}
+
+/// Writes `intrinsics.json` with a distortion, and asserts that it is refused.
+fn distortion_refused(distortion: &str, parts: &[&str]) {
+    let (_folder, recording) = recording();
+    let path = recording.join("intrinsics.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let end = text.rfind('}').unwrap();
+    std::fs::write(&path, format!("{}, \"distortion\": {distortion}}}", &text[..end])).unwrap();
+    refused(&recording, &[], parts);
+}
+
+#[test]
+fn lens_that_folds_the_image() {
+    distortion_refused(r#"{"k1": -1}"#, &["intrinsics.json", "cannot be inverted at pixel (0, 0)"]);
+}
+
+#[test]
+fn unknown_coefficient() {
+    distortion_refused(r#"{"k7": 0.1}"#, &["intrinsics.json", "unknown field `k7`", "`k6`"]);
+}
+
+#[test]
+fn no_camera_or_two() {
+    let (_folder, recording) = recording();
+    refused(&recording, &["--camera", "freiburg1"], &["intrinsics.json exists, and a camera is given"]);
+    std::fs::remove_file(recording.join("intrinsics.json")).unwrap();
+    refused(&recording, &[], &["intrinsics.json does not exist", "fx,fy,cx,cy", "freiburg1"]);
+    refused(&recording, &["--camera", "0,525,319.5,239.5"], &["focal lengths greater than 0"]);
+    let scale = ["--camera", "525,525,319.5,239.5", "--depth-scale", "0"];
+    refused(&recording, &scale, &["`depth_scale` greater than 0"]);
+    let (code, error) = fusion(&["track", recording.to_str().unwrap(), "-o", "x", "--camera", "kinect"]);
+    assert!(code == Some(2) && error.contains("expected `fx,fy,cx,cy`"), "{error}");
+}
+
+/// Writes timestamps into the skeleton, and asserts that they are refused.
+fn timestamps_refused(timestamps: &[f64], parts: &[&str]) {
+    let (_folder, recording) = recording();
+    let path = recording.join("skeleton.json");
+    let mut skeleton = fusion_core::skeleton::Skeleton::read(&path).unwrap();
+    skeleton.timestamps = Some(timestamps.to_vec());
+    skeleton.write(&path).unwrap();
+    refused(&recording, &[], parts);
+}
+
+#[test]
+fn timestamps_that_fit_no_image() {
+    timestamps_refused(&[0.0], &["skeleton.json", "expected 2 timestamps", "got 1"]);
+    timestamps_refused(&[7.0, 7.1], &["skeleton.json", "no timestamp is within half a frame", "from 7 s to 7.1 s"]);
+}
+
+#[test]
+fn timestamps_without_a_list_of_images() {
+    let (_folder, recording) = recording();
+    std::fs::remove_file(recording.join("depth.txt")).unwrap();
+    let path = recording.join("skeleton.json");
+    let mut skeleton = fusion_core::skeleton::Skeleton::read(&path).unwrap();
+    skeleton.timestamps = Some(vec![0.0, 0.1]);
+    skeleton.write(&path).unwrap();
+    refused(&recording, &[], &["skeleton.json", "add depth.txt"]);
 }

@@ -28,7 +28,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
-    let output = fusion(&["track", recording, "--stats", "-o", track]);
+    let output = fusion(&["track", recording, "--stats", "--pictures", "--usd", "-o", track]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(printed.contains("time per frame: mean") && printed.contains("Hz"), "{printed}");
@@ -49,6 +49,42 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     assert!(printed.contains("median, mm") && printed.contains("skeleton alone"), "{printed}");
     let plot = std::fs::read_to_string(Path::new(track).join("errors.svg")).unwrap();
     assert!(plot.starts_with("<svg") && plot.contains("median"));
+    pictures_and_points_are_complete(Path::new(track));
+}
+
+/// Checks the outputs on request of a track of five frames.
+fn pictures_and_points_are_complete(track: &Path) {
+    for frame in 0..5 {
+        let picture = std::fs::File::open(track.join(format!("pictures/{frame:06}.png"))).unwrap();
+        let reader = png::Decoder::new(std::io::BufReader::new(picture)).read_info().unwrap();
+        assert_eq!((reader.info().width, reader.info().height), (3 * 640, 480), "frame {frame}");
+    }
+    let film = std::fs::read(track.join("track.apng")).unwrap();
+    let reader = png::Decoder::new(std::io::Cursor::new(&film)).read_info().unwrap();
+    assert_eq!(reader.info().animation_control.unwrap().num_frames, 5);
+    let usd = std::fs::read_to_string(track.join("track.usda")).unwrap();
+    let samples: Vec<&str> = usd.lines().filter(|line| line.ends_with(")],")).collect();
+    assert!(samples.len() == 5 && samples[4].trim_start().starts_with("4: [("), "{}", samples.len());
+    assert!(samples.iter().all(|points| points.matches('(').count() == 3638));
+    let page = std::fs::read_to_string(track.join("errors.html")).unwrap();
+    assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 3, "two frames and the film");
+    assert!(page.contains("<svg") && page.contains("skeleton alone"));
+    let links = page.matches("http").count() - page.matches("http://www.w3.org/2000/svg").count();
+    assert_eq!(links, 0, "the page needs no other file");
+}
+
+#[test]
+fn the_demonstration_explains_its_rows_and_leaves_little() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = fusion(&["demo", "--frames", "2", "-o", text(folder.path())]);
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && printed.contains("exact bones, skeleton alone"), "{printed}");
+    assert!(printed.contains("The truth is the model skinned by the true bones."), "{printed}");
+    for run in ["exact-bones", "noisy-bones"] {
+        let run = folder.path().join(run);
+        assert!(run.join("track/errors.html").exists() && run.join("track/frames.csv").exists());
+        assert!(!run.join("track/meshes").exists() && !run.join("recording/truth").exists());
+    }
 }
 
 #[test]

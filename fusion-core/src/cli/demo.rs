@@ -1,6 +1,6 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use fusion_core::skeleton::BoneNoise;
 
@@ -35,6 +35,10 @@ impl Demo {
             Render::figure(self.frames, noise, &recording).run()?;
             Track::of(&recording, unknown_bones, &track).run()?;
             rows.push((name, Evaluate::of(&recording, &track).run()?));
+            // Nine tenths of the files, which can be computed again.
+            for meshes in [recording.join("truth"), track.join("meshes")] {
+                remove_meshes(&meshes)?;
+            }
             print("\n")?;
         }
         let table: Vec<(String, &_)> = rows
@@ -44,8 +48,34 @@ impl Demo {
             })
             .collect();
         let table: Vec<(&str, &_)> = table.iter().map(|(name, errors)| (name.as_str(), *errors)).collect();
-        print(&format!("{}\n", summary(&table)))
+        print(&format!("{}\n\n{EXPLANATION}", summary(&table)))
     }
+}
+
+const EXPLANATION: &str = "\
+tracked         the body that follows depth images and bones
+skeleton alone  the model skinned by the reported bones, without depth images
+
+The truth is the model skinned by the true bones. Exact bones alone therefore have no error, and tracking
+can only add some: a fraction of the sensor's noise. Noisy bones are what body trackers report; there,
+tracking corrects the skeleton.
+
+The meshes of truth and track were removed after the evaluation; `fusion render` and `fusion track` write
+them again. Pictures are in errors.html next to each table.
+";
+
+/// Removes the meshes that the demonstration has written, and their folder.
+fn remove_meshes(folder: &Path) -> Result<()> {
+    let here = || format!("cannot remove the meshes of {}", folder.display());
+    for entry in std::fs::read_dir(folder).with_context(here)? {
+        let path = entry.with_context(here)?.path();
+        if path.extension().is_some_and(|extension| extension == "obj") {
+            std::fs::remove_file(&path).with_context(here)?;
+        }
+    }
+    // Files of others remain, and so does their folder.
+    let _ = std::fs::remove_dir(folder);
+    Ok(())
 }
 
 /// Compares the derivatives of every term with dual numbers and finite differences.

@@ -7,12 +7,17 @@ use energy_cli::write_file;
 use fusion_core::body::{Mesh, read_body, read_vertices};
 use fusion_core::depth::{DepthSequence, visible_vertices};
 use fusion_core::evaluation::{ErrorSummary, FrameErrors, TrackErrors};
+use fusion_core::picture::frame_picture;
 use fusion_core::plot::errors_svg;
 use fusion_core::skeleton::Skeleton;
 use serde::Serialize;
 
-use super::folder::{MODEL, SKELETON, mesh_file};
+use super::folder::{FILM, MODEL, SKELETON, mesh_file};
+use super::page::{Shown, page};
 use super::print;
+
+/// Pixels of the image per pixel of a picture, along each axis.
+const REDUCTION: usize = 2;
 
 /// Options of `fusion evaluate`.
 #[derive(Debug, Args)]
@@ -48,20 +53,53 @@ impl Evaluate {
 
     pub fn run(&self) -> Result<Evaluated> {
         let evaluated = self.measure()?;
-        let (table, plot) = (self.track.join("errors.csv"), self.track.join("errors.svg"));
+        let [table, plot, html] = ["errors.csv", "errors.svg", "errors.html"].map(|name| self.track.join(name));
         write_file(&table, &csv(&evaluated.track)?)?;
         let picture = errors_svg(&evaluated.track).map_err(anyhow::Error::msg)?;
         write_file(&plot, picture.as_bytes())?;
         let rows = [("tracked", &evaluated.track), ("skeleton alone", &evaluated.skeleton)];
-        print(&format!("{}\nwrote {} and {}\n", summary(&rows), table.display(), plot.display()))?;
+        let name = format!("Track {}", self.track.display());
+        write_file(&html, page(&name, &rows, &picture, &self.pictures(&evaluated.track)?)?.as_bytes())?;
+        let [table, plot, html] = [table, plot, html].map(|path| path.display().to_string());
+        print(&format!("{}\nwrote {table}, {plot} and {html}\n", summary(&rows)))?;
         Ok(evaluated)
+    }
+
+    /// Draws the frames with the median and with the largest mean error, and shows the film, if the track has one.
+    fn pictures(&self, errors: &TrackErrors) -> Result<Vec<Shown>> {
+        let sequence = DepthSequence::open(&self.recording)?;
+        let body = read_body(&self.recording.join(MODEL))?;
+        let mut means: Vec<(usize, f64)> = errors
+            .frames
+            .iter()
+            .enumerate()
+            .map(|(at, one)| (at + 1, ErrorSummary::of(one.all.clone()).mean))
+            .collect();
+        means.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut shown = Vec::new();
+        for (what, at) in [("median", means.len() / 2), ("largest", means.len() - 1)] {
+            let (frame, mean) = means[at];
+            let vertices = read_vertices(&mesh_file(&self.track, "meshes", frame)).context("the track")?;
+            let mesh = Mesh::new(vertices, body.mesh.triangles.clone());
+            let image = sequence.image(frame).ok();
+            let picture = frame_picture(image.as_ref(), &mesh, &sequence.info.camera, REDUCTION);
+            let caption = format!("frame {frame}, the {what} of the mean errors: {mean:.2} mm");
+            shown.push(Shown { caption, png: picture.png()? });
+        }
+        let film = self.track.join(FILM);
+        if film.exists() {
+            let png = std::fs::read(&film).with_context(|| film.display().to_string())?;
+            shown.push(Shown { caption: "all frames".into(), png });
+        }
+        Ok(shown)
     }
 
     /// Measures every frame except the first, which is the model's rest.
     fn measure(&self) -> Result<Evaluated> {
         let sequence = DepthSequence::open(&self.recording)?;
         let body = read_body(&self.recording.join(MODEL))?;
-        let skeleton = Skeleton::read(&self.recording.join(SKELETON))?;
+        let path = self.recording.join(SKELETON);
+        let skeleton = Skeleton::read(&path)?.for_images(&path, sequence.len(), sequence.times())?;
         let mut evaluated = Evaluated { track: TrackErrors::default(), skeleton: TrackErrors::default() };
         for frame in 1..sequence.len() {
             let truth = read_vertices(&mesh_file(&self.recording, "truth", frame)).context("the truth")?;

@@ -11,6 +11,16 @@ pub const FRAMES: &str = "frames.csv";
 /// Node motions in a track.
 pub const NODES: &str = "nodes.json";
 
+/// Film of the pictures of a track.
+pub const FILM: &str = "track.apng";
+/// Track as Universal Scene Description.
+pub const USD: &str = "track.usda";
+
+/// Path of a frame's picture in a track.
+pub fn picture_file(folder: &Path, frame: usize) -> PathBuf {
+    folder.join("pictures").join(format!("{frame:06}.png"))
+}
+
 /// Path of a frame's mesh in `truth` or `meshes`.
 pub fn mesh_file(folder: &Path, kind: &str, frame: usize) -> PathBuf {
     folder.join(kind).join(format!("{frame:06}.obj"))

@@ -1,10 +1,12 @@
 pub mod demo;
 pub mod evaluate;
 mod folder;
+mod page;
 pub mod pose;
 mod posed;
 pub mod render;
 pub mod track;
+mod track_output;
 
 use std::io::{ErrorKind, Write};
 

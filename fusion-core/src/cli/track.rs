@@ -1,21 +1,23 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use energy_cli::write_file;
 use fusion_core::body::{Bone, SkinnedBody, obj_text};
-use fusion_core::depth::DepthSequence;
+use fusion_core::depth::{Camera, DepthImage, DepthSequence, GivenCamera, SequenceError};
 use fusion_core::energy::BoneMode;
+use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model::{DeformationModel, ModelOptions};
-use fusion_core::skeleton::Skeleton;
+use fusion_core::skeleton::{JointTrack, Skeleton, half_interval};
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::folder::{FRAMES, MODEL, NODES, SKELETON, mesh_file, prepare};
+use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, USD, mesh_file, prepare};
 use super::posed::read_any_body;
+use super::track_output::TrackOutput;
 use super::{print, progress_bar};
 
 /// Options of `fusion track`.
@@ -24,6 +26,13 @@ pub struct Track {
     /// Folder of depth images with `intrinsics.json`, and `depth.txt` or `depth/*.png`. The first image shows the model
     /// at rest.
     recording: PathBuf,
+    /// Camera of a folder without `intrinsics.json`: fx,fy,cx,cy in pixels, or freiburg1, freiburg2 or freiburg3 for
+    /// the calibrated cameras of the TUM's RGB-D sequences.
+    #[arg(long)]
+    camera: Option<GivenCamera>,
+    /// Steps per metre of the images, with --camera [default: 5000, as in the TUM's sequences].
+    #[arg(long, requires = "camera")]
+    depth_scale: Option<f64>,
     /// Model in the camera's coordinates: `.json`, `.glb`, `.obj` without bones, or a folder [default: the recording's
     /// `model.json`].
     #[arg(long)]
@@ -31,8 +40,11 @@ pub struct Track {
     /// Bones of a body tracker [default: the recording's `skeleton.json`, if it exists].
     #[arg(long)]
     skeleton: Option<PathBuf>,
+    /// Joints of a body tracker, in place of bones (`.json`): names, positions, and a mapping to bones.
+    #[arg(long, conflicts_with = "skeleton")]
+    joints: Option<PathBuf>,
     /// Track without bones: nodes start where they were.
-    #[arg(long, conflicts_with_all = ["skeleton", "unknown_bones"])]
+    #[arg(long, conflicts_with_all = ["skeleton", "joints", "unknown_bones"])]
     no_bones: bool,
     /// Treat bones as unknowns near the reported motions.
     #[arg(long)]
@@ -43,6 +55,12 @@ pub struct Track {
     /// Output folder.
     #[arg(short, long)]
     output: PathBuf,
+    /// Write a picture of depth, model and error for each frame, and a film of them (`track.apng`).
+    #[arg(long)]
+    pictures: bool,
+    /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
+    #[arg(long)]
+    usd: bool,
     /// Print the times of frames.
     #[arg(long)]
     stats: bool,
@@ -106,12 +124,17 @@ impl Track {
     pub fn of(recording: &Path, unknown_bones: bool, output: &Path) -> Self {
         Self {
             recording: recording.to_owned(),
+            camera: None,
+            depth_scale: None,
             model: None,
             skeleton: None,
+            joints: None,
             no_bones: false,
             unknown_bones,
             options: None,
             output: output.to_owned(),
+            pictures: false,
+            usd: false,
             stats: false,
             overwrite: true,
         }
@@ -121,7 +144,7 @@ impl Track {
     /// If an input cannot be used, or no image could be tracked. In the latter case the table of frames has the
     /// reasons.
     pub fn run(&self) -> Result<()> {
-        let sequence = DepthSequence::open(&self.recording)?;
+        let sequence = DepthSequence::open_with(&self.recording, self.given_camera())?;
         let model = self.model.clone().unwrap_or_else(|| self.recording.join(MODEL));
         let body = read_any_body(&model).context("the model")?;
         let parameters = self.parameters(&body)?;
@@ -129,24 +152,45 @@ impl Track {
         if !model.fill.left.is_empty() {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
         }
-        let skeleton = self.skeleton(sequence.len(), &model.bones)?;
-        let mut tracker = Tracker::new(model, sequence.info.camera, parameters.tracker)?;
-        prepare(&self.output, &["meshes"], &[FRAMES, NODES], self.overwrite)?;
+        let skeleton = self.skeleton(&sequence, &body.bones)?;
+        let camera = sequence.info.camera;
+        let mut tracker = Tracker::new(model, camera, parameters.tracker)
+            .with_context(|| self.recording.join(DepthSequence::INTRINSICS).display().to_string())?;
+        // The first image shows the model at rest.
+        if let Ok(image) = sequence.image(0)
+            && let Some(found) = check_focal_length(&body, &camera, &image)
+        {
+            eprintln!("warning: {}", focal_warning(&camera, &found));
+        }
+        let folders: &[&str] = if self.pictures { &["meshes", "pictures"] } else { &["meshes"] };
+        prepare(&self.output, folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
+        let mut output = TrackOutput::new(&self.output, camera, &body.mesh.triangles, sequence.times());
+        if self.pictures {
+            output = output.with_pictures();
+        }
+        if self.usd {
+            output = output.with_usd(sequence.len())?;
+        }
         let mut lines: Vec<Line> = Vec::new();
         let mut motions = Vec::new();
         let progress = progress_bar(sequence.len(), "tracking");
         for frame in 0..sequence.len() {
-            let line = track_frame(frame, &sequence, skeleton.as_ref(), &mut tracker);
+            let image = sequence.image(frame);
+            let shown = image.as_ref().ok().filter(|_| self.pictures).cloned();
+            let line = track_frame(frame, image, skeleton.as_ref(), &mut tracker);
             if let Some(warning) = change(lines.last(), &line) {
                 progress.suspend(|| eprintln!("warning: {warning}"));
             }
             lines.push(line);
-            let mesh = obj_text(&tracker.vertices(), &tracker.model().mesh.triangles);
+            let vertices = tracker.vertices();
+            output.add(frame, shown.as_ref(), &vertices)?;
+            let mesh = obj_text(&vertices, &body.mesh.triangles);
             write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
             motions.push(tracker.twists().to_vec());
             progress.inc(1);
         }
         progress.finish_and_clear();
+        output.finish()?;
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
         let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
@@ -162,34 +206,57 @@ impl Track {
         if self.stats { print(&times(&lines)) } else { Ok(()) }
     }
 
-    /// Reads the skeleton, and checks that it fits before anything is tracked.
-    fn skeleton(&self, images: usize, bones: &[Bone]) -> Result<Option<Skeleton>> {
+    fn given_camera(&self) -> Option<GivenCamera> {
+        let mut camera = self.camera?;
+        camera.depth_scale = self.depth_scale.unwrap_or(camera.depth_scale);
+        Some(camera)
+    }
+
+    /// Reads the bones of every image, and checks that they fit before anything is tracked.
+    fn skeleton(&self, sequence: &DepthSequence, bones: &[Bone]) -> Result<Option<Skeleton>> {
+        let (images, times) = (sequence.len(), sequence.times());
+        let Some((path, skeleton)) = self.reported(times, bones)? else { return Ok(None) };
+        let skeleton = skeleton.for_images(&path, images, times)?;
+        let first = skeleton.frames.iter().position(|frame| !frame.is_empty()).unwrap_or(0);
+        skeleton.motions(first, bones).with_context(|| path.display().to_string())?;
+        let without: Vec<usize> = (0..images).filter(|&frame| skeleton.frames[frame].is_empty()).collect();
+        if !without.is_empty() {
+            let reach = times.map_or(0.0, half_interval);
+            eprintln!(
+                "warning: {} has no bones for frames {} (timestamps match within {:.1} ms); these are tracked without \
+                 bones",
+                path.display(),
+                ranges(&without),
+                1e3 * reach
+            );
+        }
+        Ok(Some(skeleton))
+    }
+
+    /// Reads the file of bones or joints; `None` if the body is tracked without bones.
+    fn reported(&self, times: Option<&[f64]>, bones: &[Bone]) -> Result<Option<(PathBuf, Skeleton)>> {
         let default = self.recording.join(SKELETON);
-        let path = match &self.skeleton {
+        let path = match (&self.skeleton, &self.joints) {
             _ if self.no_bones || bones.is_empty() => return Ok(None),
-            Some(path) => path.clone(),
-            None if default.exists() => default,
-            None if self.unknown_bones => {
+            (None, Some(path)) => {
+                let skeleton = JointTrack::read(path)?.skeleton(path, bones, times)?;
+                return Ok(Some((path.clone(), skeleton)));
+            }
+            (Some(path), _) => path.clone(),
+            (None, None) if default.exists() => default,
+            (None, None) if self.unknown_bones => {
                 bail!(
                     "--unknown-bones needs reported bones, but {} does not exist; add it, or name one by --skeleton",
                     default.display()
                 );
             }
-            None => {
+            (None, None) => {
                 eprintln!("warning: {} does not exist; tracking without bones", default.display());
                 return Ok(None);
             }
         };
         let skeleton = Skeleton::read(&path)?;
-        let frames = skeleton.frames.len();
-        ensure!(
-            frames >= images,
-            "{}: expected bones for each of {images} images, got {frames} frames; \
-             complete the skeleton, shorten depth.txt, or track with --no-bones",
-            path.display()
-        );
-        skeleton.motions(0, bones).with_context(|| path.display().to_string())?;
-        Ok(Some(skeleton))
+        Ok(Some((path, skeleton)))
     }
 
     /// Reads the options. Those that the file lacks have the defaults for known, unknown or no bones.
@@ -223,10 +290,41 @@ impl Track {
             origin: model.origin.into(),
             angle: options.energy.angle,
             nodes: model.nodes.iter().map(|&node| node.into()).collect(),
-            frames: motions,
+            frames: &motions.iter().map(|frame| frame.iter().map(rounded).collect()).collect::<Vec<_>>(),
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
+}
+
+fn focal_warning(camera: &Camera, found: &FocalSuggestion) -> String {
+    format!(
+        "the focal lengths seem wrong: the model at rest is {:.1} mm from the first image (median), but {:.1} mm with \
+         fx = {:.0} and fy = {:.0} in place of {:.0} and {:.0}; check the intrinsics",
+        1e3 * found.residual,
+        1e3 * found.explained,
+        found.factor * camera.fx,
+        found.factor * camera.fy,
+        camera.fx,
+        camera.fy
+    )
+}
+
+/// Formats increasing numbers as a list of ranges: `3, 5-9`.
+fn ranges(numbers: &[usize]) -> String {
+    let runs: Vec<String> = numbers
+        .chunk_by(|a, b| a + 1 == *b)
+        .map(|run| match run {
+            [first, .., last] => format!("{first}-{last}"),
+            [one] => one.to_string(),
+            [] => String::new(),
+        })
+        .collect();
+    runs.join(", ")
+}
+
+/// Rounds a twist to nanometres and nanoradians, which halves the size of the file.
+fn rounded(twist: &Twist) -> Twist {
+    twist.map(|x| (1e9 * x).round() / 1e9)
 }
 
 /// Replaces the values that another object has, at any depth.
@@ -243,7 +341,12 @@ fn replace(value: &mut Value, by: Value) {
 
 /// Tracks one frame. If its image cannot be used, the body moves by its bones or its last motion, and the row has the
 /// reason.
-fn track_frame(frame: usize, sequence: &DepthSequence, skeleton: Option<&Skeleton>, tracker: &mut Tracker) -> Line {
+fn track_frame(
+    frame: usize,
+    image: Result<DepthImage, SequenceError>,
+    skeleton: Option<&Skeleton>,
+    tracker: &mut Tracker,
+) -> Line {
     let skipped =
         |error: &anyhow::Error| Line { frame, status: "skipped", reason: format!("{error:#}"), ..Line::default() };
     let bones = skeleton.map_or(Ok(None), |skeleton| skeleton.motions(frame, &tracker.model().bones));
@@ -252,7 +355,7 @@ fn track_frame(frame: usize, sequence: &DepthSequence, skeleton: Option<&Skeleto
         Err(error) => (None, Some(anyhow::Error::new(error))),
     };
     let image = match fault {
-        None => sequence.image(frame).map_err(anyhow::Error::new),
+        None => image.map_err(anyhow::Error::new),
         Some(fault) => Err(fault),
     };
     match image {

@@ -1,7 +1,9 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// A pinhole camera: x to the right, y down, z into the scene. Pixel centres have integer coordinates.
+use super::distortion::Distortion;
+
+/// A camera: x to the right, y down, z into the scene. Pixel centres have integer coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// Horizontal focal length, in pixels.
@@ -16,16 +18,27 @@ pub struct Camera {
     pub width: usize,
     /// Height of the image, in pixels.
     pub height: usize,
+    /// Distortion of the lens; `None` for a pinhole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Distortion>,
 }
 
 impl Camera {
     /// The usual structured-light camera: 640 × 480 pixels, focal length 525 pixels.
-    pub const VGA: Self = Self { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
+    pub const VGA: Self =
+        Self { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, width: 640, height: 480, distortion: None };
 
-    /// Returns the projection of a point, in pixels; `None` behind the camera.
+    /// Returns the projection of a point, in pixels; `None` behind the camera, or where the lens model does not reach.
     #[must_use]
     pub fn project(&self, p: &Vector3<f64>) -> Option<[f64; 2]> {
-        (p.z > 1e-6).then(|| [self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy])
+        if p.z <= 1e-6 {
+            return None;
+        }
+        let Some(lens) = &self.distortion else {
+            return Some([self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy]);
+        };
+        let [x, y] = lens.distort([p.x / p.z, p.y / p.z])?;
+        Some([self.fx * x + self.cx, self.fy * y + self.cy])
     }
 
     /// Returns the pixel of a point; `None` outside the image.
@@ -36,10 +49,9 @@ impl Camera {
         inside.then_some([u as usize, v as usize])
     }
 
-    /// Returns the point that a pixel sees at a depth.
-    #[must_use]
-    pub fn unproject(&self, [u, v]: [usize; 2], depth: f64) -> Vector3<f64> {
-        Vector3::new((u as f64 - self.cx) / self.fx, (v as f64 - self.cy) / self.fy, 1.0) * depth
+    /// Returns x and y at depth 1 of the ray that a pixel of a pinhole sees.
+    pub(super) fn straight_ray(&self, [u, v]: [usize; 2]) -> [f64; 2] {
+        [(u as f64 - self.cx) / self.fx, (v as f64 - self.cy) / self.fy]
     }
 
     /// Returns the camera with one pixel in place of `factor` × `factor`.
@@ -55,6 +67,7 @@ impl Camera {
             cy: centre(self.cy),
             width: self.width.div_ceil(factor.max(1)),
             height: self.height.div_ceil(factor.max(1)),
+            distortion: self.distortion,
         }
     }
 
@@ -67,6 +80,9 @@ impl Camera {
         }
         if !(self.cx.is_finite() && self.cy.is_finite()) {
             return Some("expected a finite principal point");
+        }
+        if self.distortion.is_some_and(|lens| !lens.is_finite()) {
+            return Some("expected finite coefficients of the distortion");
         }
         (self.width == 0 || self.height == 0).then_some("expected an image with at least one pixel")
     }

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Vector3};
 
-use super::camera::Camera;
 use super::image::DepthImage;
+use super::pixel_rays::PixelRays;
 
 /// The normal of a measured surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,10 +25,13 @@ impl DepthImage {
     /// away on each side that belong to the same surface. `None` without a depth, or if the neighbours that exist do
     /// not determine a plane.
     ///
-    /// The inverse depth of a plane is linear in the image, 1/z = a Δu + b Δv + c, so the fit is linear least squares.
+    /// The inverse depth of a plane is linear in the rays, 1/z = a Δu + b Δv + c, so the fit is linear least squares.
+    /// u and v are the ray's coordinates times the focal lengths, which are the pixel's for a pinhole.
     /// A neighbour belongs to another surface if its depth differs more than that of a steep surface would.
     #[must_use]
-    pub fn normal(&self, camera: &Camera, [u, v]: [usize; 2], reach: usize) -> Option<SurfaceNormal> {
+    pub fn normal(&self, rays: &PixelRays, [u, v]: [usize; 2], reach: usize) -> Option<SurfaceNormal> {
+        let camera = rays.camera();
+        let centre = rays.ray([u, v]);
         let here = self.at([u, v])?;
         let (left, right) = (u.saturating_sub(reach), (u + reach).min(self.width - 1));
         let (top, bottom) = (v.saturating_sub(reach), (v + reach).min(self.height - 1));
@@ -41,7 +44,13 @@ impl DepthImage {
                 let (depth, across) = (f64::from(depth), x as f64 - u as f64);
                 let limit = NOISE + slope * across.abs().max(down.abs());
                 if depth > 0.0 && (depth - here).abs() <= limit {
-                    sums.add(across, down, 1.0 / depth);
+                    let offset = if rays.is_pinhole() {
+                        [across, down]
+                    } else {
+                        let ray = rays.ray([x, y]);
+                        [camera.fx * (ray[0] - centre[0]), camera.fy * (ray[1] - centre[1])]
+                    };
+                    sums.add(offset, 1.0 / depth);
                 }
             }
         }
@@ -50,8 +59,8 @@ impl DepthImage {
             return None;
         }
         let [a, b, c] = sums.plane()?;
-        let [across, down] = [u as f64 - camera.cx, v as f64 - camera.cy];
-        let normal = Vector3::new(a * camera.fx, b * camera.fy, c - a * across - b * down);
+        let [x, y] = [a * camera.fx, b * camera.fy];
+        let normal = Vector3::new(x, y, c - x * centre[0] - y * centre[1]);
         // n·p = 1 for a normal that points into the scene.
         (-normal).try_normalize(0.0).map(|normal| SurfaceNormal { normal, confidence: confidence.min(1.0) })
     }
@@ -62,8 +71,8 @@ impl DepthImage {
 pub struct NormalMap<'a> {
     /// The image.
     pub image: &'a DepthImage,
-    /// Its camera.
-    pub camera: &'a Camera,
+    /// The rays of its pixels.
+    pub rays: &'a PixelRays,
     reach: usize,
     /// One more than the index in `fitted` of each pixel's normal; 0 before it is fitted.
     index: Vec<u32>,
@@ -73,15 +82,15 @@ pub struct NormalMap<'a> {
 impl<'a> NormalMap<'a> {
     /// Creates a map of normals fitted up to `reach` pixels on each side; see [`DepthImage::normal`].
     #[must_use]
-    pub fn new(image: &'a DepthImage, camera: &'a Camera, reach: usize) -> Self {
-        Self { image, camera, reach, index: vec![0; image.depth.len()], fitted: Vec::new() }
+    pub fn new(image: &'a DepthImage, rays: &'a PixelRays, reach: usize) -> Self {
+        Self { image, rays, reach, index: vec![0; image.depth.len()], fitted: Vec::new() }
     }
 
     /// Returns the normal at a pixel of the image; `None` if it cannot be determined.
     pub fn at(&mut self, pixel: [usize; 2]) -> Option<SurfaceNormal> {
         let index = &mut self.index[pixel[1] * self.image.width + pixel[0]];
         if *index == 0 {
-            self.fitted.push(self.image.normal(self.camera, pixel, self.reach));
+            self.fitted.push(self.image.normal(self.rays, pixel, self.reach));
             *index = self.fitted.len() as u32;
         }
         self.fitted[*index as usize - 1]
@@ -109,7 +118,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, u: f64, v: f64, w: f64) {
+    fn add(&mut self, [u, v]: [f64; 2], w: f64) {
         self.count += 1.0;
         self.u += u;
         self.v += v;
@@ -139,16 +148,26 @@ impl Sums {
 
 #[cfg(test)]
 mod tests {
+    use super::super::camera::Camera;
+    use super::super::distortion::DistortionCoefficients;
     use super::*;
 
-    const CAMERA: Camera = Camera { fx: 100.0, fy: 100.0, cx: 10.0, cy: 10.0, width: 21, height: 21 };
+    const CAMERA: Camera = Camera { fx: 100.0, fy: 100.0, cx: 10.0, cy: 10.0, width: 21, height: 21, distortion: None };
+
+    fn rays() -> PixelRays {
+        PixelRays::new(CAMERA).unwrap()
+    }
 
     /// An image of the plane n·p = n·(0, 0, 2).
     fn plane(n: Vector3<f64>) -> DepthImage {
+        plane_through(&rays(), n)
+    }
+
+    fn plane_through(rays: &PixelRays, n: Vector3<f64>) -> DepthImage {
         let mut image = DepthImage::empty(21, 21);
         for v in 0..21 {
             for u in 0..21 {
-                let ray = CAMERA.unproject([u, v], 1.0);
+                let ray = rays.point([u, v], 1.0);
                 image.depth[v * 21 + u] = (2.0 * n.z / n.dot(&ray)) as f32;
             }
         }
@@ -163,10 +182,22 @@ mod tests {
     fn normals_of_a_slanted_plane_point_to_the_camera() {
         let image = plane(slanted());
         for pixel in [[7, 12], [0, 12], [20, 20]] {
-            let found = image.normal(&CAMERA, pixel, 2).unwrap();
+            let found = image.normal(&rays(), pixel, 2).unwrap();
             assert!((found.normal - slanted()).norm() < 1e-4, "{pixel:?}: {found:?}");
             let inside = pixel == [7, 12];
             assert_eq!(found.confidence > 0.999, inside, "{pixel:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_distorted_lens_does_not_bend_a_plane() {
+        // The factor q falls from 1 to 0.9 at the corners.
+        let coefficients = DistortionCoefficients { k1: -5.0, ..DistortionCoefficients::default() };
+        let rays = PixelRays::new(Camera { distortion: Some(coefficients.into()), ..CAMERA }).unwrap();
+        let image = plane_through(&rays, slanted());
+        for pixel in [[7, 12], [2, 2], [20, 20]] {
+            let found = image.normal(&rays, pixel, 2).unwrap();
+            assert!((found.normal - slanted()).norm() < 1e-4, "{pixel:?}: {found:?}");
         }
     }
 
@@ -177,7 +208,7 @@ mod tests {
             let mut image = plane(slanted());
             image.depth.iter_mut().filter(|_| random.f64() < missing).for_each(|depth| *depth = 0.0);
             let inside = (2..19).flat_map(|v| (2..19).map(move |u| [u, v]));
-            let found: Vec<SurfaceNormal> = inside.filter_map(|pixel| image.normal(&CAMERA, pixel, 2)).collect();
+            let found: Vec<SurfaceNormal> = inside.filter_map(|pixel| image.normal(&rays(), pixel, 2)).collect();
             assert!(found.iter().all(|one| (one.normal - slanted()).norm() < 1e-4), "{missing}");
             let mean = found.iter().map(|one| one.confidence).sum::<f64>() / found.len() as f64;
             assert!((least..1.0 - missing + 0.05).contains(&mean), "{missing} missing: confidence {mean}");
@@ -190,7 +221,7 @@ mod tests {
         for v in 0..21 {
             image.depth[v * 21..][11..21].fill(3.0);
         }
-        let found = image.normal(&CAMERA, [10, 10], 2).unwrap();
+        let found = image.normal(&rays(), [10, 10], 2).unwrap();
         assert!((found.normal - slanted()).norm() < 1e-4, "{found:?}");
         assert!(found.confidence < 0.6, "{found:?}");
     }
@@ -198,9 +229,10 @@ mod tests {
     #[test]
     fn a_map_repeats_the_normals_of_the_image() {
         let image = plane(slanted());
-        let mut map = NormalMap::new(&image, &CAMERA, 2);
+        let rays = rays();
+        let mut map = NormalMap::new(&image, &rays, 2);
         for pixel in [[3, 4], [20, 0], [3, 4], [4, 3]] {
-            assert_eq!(map.at(pixel), image.normal(&CAMERA, pixel, 2), "{pixel:?}");
+            assert_eq!(map.at(pixel), image.normal(&rays, pixel, 2), "{pixel:?}");
         }
         assert_eq!(map.fitted.len(), 3, "the repeated pixel is fitted once");
     }
@@ -208,12 +240,12 @@ mod tests {
     #[test]
     fn pixels_on_a_line_have_no_normal() {
         let mut image = DepthImage::empty(21, 21);
-        assert_eq!(image.normal(&CAMERA, [10, 10], 2), None);
+        assert_eq!(image.normal(&rays(), [10, 10], 2), None);
         image.depth[10 * 21 + 10] = 2.0;
-        assert_eq!(image.normal(&CAMERA, [10, 10], 2), None);
+        assert_eq!(image.normal(&rays(), [10, 10], 2), None);
         image.depth[10 * 21..][..21].fill(2.0);
-        assert_eq!(image.normal(&CAMERA, [10, 10], 2), None);
+        assert_eq!(image.normal(&rays(), [10, 10], 2), None);
         image.depth[11 * 21 + 9] = f32::NAN;
-        assert_eq!(image.normal(&CAMERA, [10, 10], 2), None);
+        assert_eq!(image.normal(&rays(), [10, 10], 2), None);
     }
 }

@@ -38,19 +38,33 @@ impl SensorNoise {
 #[must_use]
 pub fn render(mesh: &Mesh, camera: &Camera) -> DepthImage {
     let mut image = DepthImage::empty(camera.width, camera.height);
+    rasterise(mesh, camera, &mut image, |_, _| {});
+    image
+}
+
+/// Renders as [`render`] does, and returns the triangle that each pixel sees; `None` without one.
+#[must_use]
+pub fn render_triangles(mesh: &Mesh, camera: &Camera) -> (DepthImage, Vec<Option<u32>>) {
+    let mut image = DepthImage::empty(camera.width, camera.height);
+    let mut seen = vec![None; image.depth.len()];
+    rasterise(mesh, camera, &mut image, |pixel, triangle| seen[pixel] = Some(triangle));
+    (image, seen)
+}
+
+/// Draws every triangle. Calls `drawn` with a pixel and a triangle that is the nearest so far.
+fn rasterise(mesh: &Mesh, camera: &Camera, image: &mut DepthImage, mut drawn: impl FnMut(usize, u32)) {
     let projected: Vec<Option<[f64; 2]>> = mesh.vertices.iter().map(|v| camera.project(v)).collect();
-    for triangle in &mesh.triangles {
+    for (at, triangle) in mesh.triangles.iter().enumerate() {
         let corners = triangle.map(|vertex| projected[vertex as usize]);
         if let [Some(a), Some(b), Some(c)] = corners {
             // Inverse depths are linear in the image.
             let inverse = triangle.map(|vertex| 1.0 / mesh.vertices[vertex as usize].z);
-            fill(&mut image, [a, b, c], inverse);
+            fill(image, [a, b, c], inverse, |pixel| drawn(pixel, at as u32));
         }
     }
-    image
 }
 
-fn fill(image: &mut DepthImage, [a, b, c]: [[f64; 2]; 3], inverse: [f64; 3]) {
+fn fill(image: &mut DepthImage, [a, b, c]: [[f64; 2]; 3], inverse: [f64; 3], mut drawn: impl FnMut(usize)) {
     let edge = |p: [f64; 2], q: [f64; 2], x: f64, y: f64| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
     let area = edge(a, b, c[0], c[1]);
     if area == 0.0 || !area.is_finite() {
@@ -66,9 +80,11 @@ fn fill(image: &mut DepthImage, [a, b, c]: [[f64; 2]; 3], inverse: [f64; 3]) {
             let parts = [edge(b, c, x, y) / area, edge(c, a, x, y) / area, edge(a, b, x, y) / area];
             if parts.iter().all(|&part| part >= 0.0) {
                 let depth = (1.0 / parts.iter().zip(inverse).map(|(part, inverse)| part * inverse).sum::<f64>()) as f32;
-                let place = &mut image.depth[v * image.width + u];
+                let pixel = v * image.width + u;
+                let place = &mut image.depth[pixel];
                 if *place == 0.0 || depth < *place {
                     *place = depth;
+                    drawn(pixel);
                 }
             }
         }
@@ -112,7 +128,7 @@ mod tests {
 
     #[test]
     fn the_nearest_surface_wins() {
-        let camera = Camera { fx: 100.0, fy: 100.0, cx: 50.0, cy: 50.0, width: 101, height: 101 };
+        let camera = Camera { fx: 100.0, fy: 100.0, cx: 50.0, cy: 50.0, width: 101, height: 101, distortion: None };
         let image = render(&squares(), &camera);
         assert_eq!(image.at([50, 50]), Some(2.0));
         assert_eq!(image.at([50 + 24, 50]), Some(2.0));

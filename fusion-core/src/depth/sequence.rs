@@ -1,9 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-use super::camera::Camera;
 use super::image::DepthImage;
+use super::intrinsics::{GivenCamera, SequenceInfo};
 use super::png_file::{DepthFileError, read_depth, read_mask};
 
 /// A folder that is not a sequence of depth images.
@@ -43,6 +41,41 @@ pub enum SequenceError {
         /// The line.
         found: String,
     },
+    /// Timestamps do not increase.
+    #[error("{}:{line}: expected a timestamp after {last} s, got {found} s; sort the list", .path.display())]
+    Order {
+        /// Path of the list.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: usize,
+        /// Timestamp of the previous image.
+        last: f64,
+        /// Timestamp of the line.
+        found: f64,
+    },
+    /// Neither a file nor the caller describes the camera.
+    #[error(
+        "{} does not exist; add it, or give the camera: `fx,fy,cx,cy` in pixels, or freiburg1, freiburg2 or freiburg3",
+        .path.display()
+    )]
+    NoCamera {
+        /// Path of the missing file.
+        path: PathBuf,
+    },
+    /// Both a file and the caller describe the camera.
+    #[error("{} exists, and a camera is given; remove one of them", .path.display())]
+    TwoCameras {
+        /// Path of the file.
+        path: PathBuf,
+    },
+    /// No image can be read, so that the size of the camera's image is unknown.
+    #[error("no image of {} can be read", .path.display())]
+    NoReadableImage {
+        /// Path of the folder.
+        path: PathBuf,
+        /// Error of the first image.
+        source: DepthFileError,
+    },
     /// The folder contains no images.
     #[error("{}: no images; expected depth.txt (`timestamp file` on each line) or depth/*.png", .path.display())]
     Empty {
@@ -64,46 +97,10 @@ pub enum SequenceError {
     },
 }
 
-/// Contents of a sequence's `intrinsics.json`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "StoredInfo")]
-pub struct SequenceInfo {
-    /// The depth camera.
-    #[serde(flatten)]
-    pub camera: Camera,
-    /// Steps of the images per metre.
-    pub depth_scale: f64,
-}
-
-/// The keys of the file. Unknown ones are errors, which `flatten` would hide.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredInfo {
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    width: usize,
-    height: usize,
-    #[serde(default = "millimetres")]
-    depth_scale: f64,
-}
-
-impl From<StoredInfo> for SequenceInfo {
-    fn from(stored: StoredInfo) -> Self {
-        let StoredInfo { fx, fy, cx, cy, width, height, depth_scale } = stored;
-        Self { camera: Camera { fx, fy, cx, cy, width, height }, depth_scale }
-    }
-}
-
-fn millimetres() -> f64 {
-    1000.0
-}
-
 /// A folder of depth images in the layout of the TUM's RGB-D data:
 ///
-/// * `depth.txt` with a timestamp and a file on each line, or `depth/*.png` in order;
-/// * `intrinsics.json`;
+/// * `depth.txt` with a timestamp in s and a file on each line, or `depth/*.png` in order;
+/// * `intrinsics.json`, unless the caller gives the camera;
 /// * optionally `mask/` with an 8-bit image of the same name for each image.
 #[derive(Clone, Debug)]
 pub struct DepthSequence {
@@ -111,6 +108,8 @@ pub struct DepthSequence {
     /// Camera and scale.
     pub info: SequenceInfo,
     images: Vec<PathBuf>,
+    /// Timestamps in s; `None` without a list.
+    times: Option<Vec<f64>>,
 }
 
 impl DepthSequence {
@@ -119,31 +118,56 @@ impl DepthSequence {
     /// File name of the list of images.
     pub const LIST: &'static str = "depth.txt";
 
-    /// Opens a folder.
+    /// Opens a folder with `intrinsics.json`.
     ///
     /// # Errors
-    /// If it lacks intrinsics or images.
+    /// As [`Self::open_with`].
     pub fn open(folder: &Path) -> Result<Self, SequenceError> {
+        Self::open_with(folder, None)
+    }
+
+    /// Opens a folder. A camera is given if, and only if, the folder has no `intrinsics.json`.
+    ///
+    /// # Errors
+    /// If the folder has no images, a list whose timestamps do not increase, or not exactly one valid camera.
+    pub fn open_with(folder: &Path, given: Option<GivenCamera>) -> Result<Self, SequenceError> {
         let path = folder.join(Self::INTRINSICS);
-        let text =
-            std::fs::read_to_string(&path).map_err(|source| SequenceError::File { path: path.clone(), source })?;
-        let info: SequenceInfo =
-            serde_json::from_str(&text).map_err(|source| SequenceError::Json { path: path.clone(), source })?;
-        let scale = (!(info.depth_scale > 0.0 && info.depth_scale.is_finite()))
-            .then_some("expected a `depth_scale` greater than 0");
-        if let Some(fault) = info.camera.fault().or(scale) {
-            return Err(SequenceError::Camera { path, fault });
-        }
+        let stored = match std::fs::read_to_string(&path) {
+            Ok(_) if given.is_some() => return Err(SequenceError::TwoCameras { path }),
+            Ok(text) => {
+                let info = serde_json::from_str::<SequenceInfo>(&text);
+                Some(info.map_err(|source| SequenceError::Json { path: path.clone(), source })?)
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+            Err(source) => return Err(SequenceError::File { path, source }),
+        };
         let list = folder.join(Self::LIST);
-        let images = match std::fs::read_to_string(&list) {
-            Ok(text) => listed(&list, &text)?,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => images_in(folder),
+        let (images, times) = match std::fs::read_to_string(&list) {
+            Ok(text) => {
+                let (times, images) = listed(&list, &text)?.into_iter().unzip();
+                (images, Some(times))
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => (images_in(folder), None),
             Err(source) => return Err(SequenceError::File { path: list, source }),
         };
+        let info = match (stored, given) {
+            (Some(info), _) => info,
+            (None, None) => return Err(SequenceError::NoCamera { path }),
+            (None, Some(given)) => sized(folder, &images, given)?,
+        };
+        if let Some(fault) = info.fault() {
+            return Err(SequenceError::Camera { path, fault });
+        }
         if images.is_empty() {
             return Err(SequenceError::Empty { path: folder.to_owned() });
         }
-        Ok(Self { folder: folder.to_owned(), info, images })
+        Ok(Self { folder: folder.to_owned(), info, images, times })
+    }
+
+    /// Returns the timestamps of the images in s, in increasing order; `None` without a list.
+    #[must_use]
+    pub fn times(&self) -> Option<&[f64]> {
+        self.times.as_deref()
     }
 
     /// Returns the number of frames.
@@ -181,18 +205,39 @@ impl DepthSequence {
     }
 }
 
+/// Returns the camera for images of the size of the first one that can be read.
+fn sized(folder: &Path, images: &[PathBuf], given: GivenCamera) -> Result<SequenceInfo, SequenceError> {
+    let mut first = None;
+    for image in images {
+        match read_depth(&folder.join(image), given.depth_scale) {
+            Ok(image) => return Ok(given.with_size(image.width, image.height)),
+            Err(error) => first = first.or(Some(error)),
+        }
+    }
+    let path = folder.to_owned();
+    Err(first
+        .map_or(SequenceError::Empty { path: path.clone() }, |source| SequenceError::NoReadableImage { path, source }))
+}
+
 /// Parses a list of images. Empty lines and comments after `#` are skipped.
-fn listed(path: &Path, text: &str) -> Result<Vec<PathBuf>, SequenceError> {
-    let lines = text.lines().enumerate().map(|(at, line)| (at, line.trim()));
-    let image = |(at, line): (usize, &str)| {
+fn listed(path: &Path, text: &str) -> Result<Vec<(f64, PathBuf)>, SequenceError> {
+    let mut all: Vec<(f64, PathBuf)> = Vec::new();
+    for (at, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
         let mut words = line.split_whitespace();
         let time = words.next().and_then(|word| word.parse::<f64>().ok()).filter(|time| time.is_finite());
-        match (time, words.next()) {
-            (Some(_), Some(file)) => Ok(PathBuf::from(file)),
-            _ => Err(SequenceError::List { path: path.to_owned(), line: at + 1, found: line.to_owned() }),
+        let (Some(found), Some(file)) = (time, words.next()) else {
+            return Err(SequenceError::List { path: path.to_owned(), line: at + 1, found: line.to_owned() });
+        };
+        if let Some(&(last, _)) = all.last().filter(|(last, _)| *last >= found) {
+            return Err(SequenceError::Order { path: path.to_owned(), line: at + 1, last, found });
         }
-    };
-    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(image).collect()
+        all.push((found, file.into()));
+    }
+    Ok(all)
 }
 
 fn images_in(folder: &Path) -> Vec<PathBuf> {

@@ -4,6 +4,8 @@ mod options;
 mod prediction;
 mod report;
 
+use std::sync::Arc;
+
 use energy_solve::{GaussNewton, GaussNewtonOptions, NormalSolverKind, Outcome};
 use nalgebra::{Isometry3, Vector3};
 
@@ -12,7 +14,7 @@ use self::prediction::Prediction;
 pub use self::report::{FrameError, FrameQuality, FrameReport, TrackerError};
 use crate::body::Mesh;
 use crate::correspondence::{Gates, MatchCounts, correspondences};
-use crate::depth::{Camera, DepthImage, NormalMap, hidden_vertices};
+use crate::depth::{Camera, DepthImage, NormalMap, PixelRays, hidden_vertices};
 use crate::energy::{BoneMode, BoneTargets, FusionEnergy, Moved, skeleton_energy};
 use crate::model::DeformationModel;
 use crate::twist::{Twist, blended};
@@ -21,7 +23,8 @@ use crate::twist::{Twist, blended};
 #[derive(Debug)]
 pub struct Tracker {
     model: DeformationModel,
-    camera: Camera,
+    /// Behind a counted reference: frames borrow it while the twists change.
+    rays: Arc<PixelRays>,
     options: TrackerOptions,
     energy: FusionEnergy,
     solver: GaussNewton<6>,
@@ -50,9 +53,7 @@ impl Tracker {
     /// If an option or the camera cannot be used, bones are unknowns and there are too few, or memory runs out.
     pub fn new(model: DeformationModel, camera: Camera, options: TrackerOptions) -> Result<Self, TrackerError> {
         options.validate()?;
-        if let Some(fault) = camera.fault() {
-            return Err(TrackerError::Camera(fault));
-        }
+        let rays = Arc::new(PixelRays::new(camera)?);
         let energy = FusionEnergy::new(&model, options.energy)?;
         let solver = match options.solver_tolerance {
             Some(relative_tolerance) => {
@@ -67,7 +68,7 @@ impl Tracker {
         let offsets = vec![Isometry3::identity(); model.nodes.len()];
         let node_prediction = Prediction::new(model.nodes.clone());
         let bone_prediction = Prediction::new(model.bones.iter().map(|bone| bone.head.into()).collect());
-        Ok(Self { model, camera, options, energy, solver, twists, offsets, node_prediction, bone_prediction })
+        Ok(Self { model, rays, options, energy, solver, twists, offsets, node_prediction, bone_prediction })
     }
 
     /// Returns the model.
@@ -136,7 +137,8 @@ impl Tracker {
     }
 
     fn check_image(&self, image: &DepthImage) -> Result<(), FrameError> {
-        let (expected, found) = ([self.camera.width, self.camera.height], [image.width, image.height]);
+        let camera = self.rays.camera();
+        let (expected, found) = ([camera.width, camera.height], [image.width, image.height]);
         if expected != found || image.depth.len() != found[0] * found[1] {
             return Err(FrameError::Size { expected, found });
         }
@@ -189,8 +191,8 @@ impl Tracker {
             skeleton_energy: None,
             quality: FrameQuality::default(),
         };
-        let camera = self.camera;
-        let mut normals = NormalMap::new(image, &camera, self.options.gates.normal_reach);
+        let rays = Arc::clone(&self.rays);
+        let mut normals = NormalMap::new(image, &rays, self.options.gates.normal_reach);
         let mut hidden = None;
         for iteration in 0..self.options.iterations {
             let moved = self.energy.moved(&self.twists);
@@ -239,7 +241,7 @@ impl Tracker {
     fn hidden(&self, moved: &Moved) -> Vec<bool> {
         let vertices = moved.vertices.iter().map(|vertex| vertex + self.model.origin).collect();
         let mesh = Mesh { vertices, normals: Vec::new(), triangles: self.model.mesh.triangles.clone() };
-        hidden_vertices(&mesh, &self.camera, HIDDEN)
+        hidden_vertices(&mesh, self.rays.camera(), HIDDEN)
     }
 
     /// Moves nodes and bones to the minimum of the energy without data; without bones, by the last motion.

@@ -1,6 +1,7 @@
 use energy_solve::{GaussNewtonError, IterationReport, SolverError};
 
 use crate::correspondence::MatchCounts;
+use crate::depth::LensError;
 use crate::energy::{EnergyError, Moved, Pair};
 use crate::option_error::OptionError;
 
@@ -10,9 +11,9 @@ pub enum TrackerError {
     /// An option cannot be used.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The camera has an invalid parameter.
-    #[error("the camera: {0}")]
-    Camera(&'static str),
+    /// The camera cannot be used.
+    #[error("the camera")]
+    Camera(#[from] LensError),
     /// The energy cannot be created.
     #[error(transparent)]
     Energy(#[from] EnergyError),

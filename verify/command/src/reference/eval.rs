@@ -6,6 +6,7 @@ use energy_dsl::{Declaration, Flags};
 use serde_json::{Map, Value, json};
 
 use super::file::{Record, RecordError, read};
+use super::fusion::{evaluate_fusion, family_names};
 use super::mapping::{is_undeclared, mapping};
 use verify::audit::{Subject, Target, read_inputs};
 use verify::blocks::{Answer, NoAnswer, evaluate};
@@ -24,7 +25,8 @@ pub enum Source {
     },
 }
 
-/// Evaluates every record of a file (`potref-1` or `potref-policy-1`) and writes the records with `out` and `flags`.
+/// Evaluates every record of a file (`potref-1` or `potref-policy-1`, or the families of body tracking, see
+/// [`evaluate_fusion`]) and writes the records with `out` and `flags`.
 /// `out` contains the blocks by the source. `flags` says whether the generated code marks a block as `degenerate` or a
 /// `kink`. If the rest shape is degenerate, or no element computes the potential yet, `out` is empty and `error` has
 /// the reason.
@@ -37,7 +39,7 @@ pub fn evaluate_file(input: &Path, output: &Path, source: Source) -> Result<usiz
     let mut file: Value = read(input)?;
     let common = file.get("potential").and_then(Value::as_str).map(str::to_owned);
     let Some(records) = file.get_mut("records").and_then(Value::as_array_mut) else {
-        return Err(RecordError::record(input, "(the file)", "expected a list `records`"));
+        return evaluate_families(input, output, source);
     };
     for record in records.iter_mut() {
         let id = record.get("id").and_then(Value::as_str).unwrap_or("without id").to_owned();
@@ -50,6 +52,19 @@ pub fn evaluate_file(input: &Path, output: &Path, source: Source) -> Result<usiz
     let text = serde_json::to_string_pretty(&file).map_err(|e| RecordError::file(output, e.into()))?;
     energy_cli::write_whole(output, text.as_bytes()).map_err(|e| RecordError::file(output, e))?;
     Ok(count)
+}
+
+/// Evaluates a file of body tracking, which has families in place of records.
+fn evaluate_families(input: &Path, output: &Path, source: Source) -> Result<usize, RecordError> {
+    let fail = |message: String| RecordError::record(input, "(the file)", message);
+    if source != Source::GeneratedCode {
+        let message = "expected a list `records`; families of body tracking are evaluated by generated code only: \
+                       leave out --digits";
+        return Err(fail(message.into()));
+    }
+    let names = family_names();
+    evaluate_fusion(input, output)?
+        .ok_or_else(|| fail(format!("expected a list `records`, or families of body tracking: {names}")))
 }
 
 fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result<(), String> {

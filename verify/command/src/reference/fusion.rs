@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 
 use super::exact::Truth;
 use super::file::{RecordError, read};
-use super::fusion_system;
+use super::{fusion_system, smoothing};
 use verify::dual::Hyper;
 
 /// The error of one array of a family over all cases.
@@ -58,7 +58,7 @@ impl Lines {
         found: &[f64],
         truth: &Value,
     ) -> Result<(), String> {
-        self.computed.insert(array.to_owned(), found.iter().map(|x| Value::String(format!("{x:.16e}"))).collect());
+        self.keep(array, found);
         if case.evaluated_only {
             return Ok(());
         }
@@ -72,6 +72,11 @@ impl Lines {
         let relative = if error == 0.0 { 0.0 } else { error / largest };
         self.note(case, array, relative, bound);
         Ok(())
+    }
+
+    /// Keeps the numbers of an array of the case for a file of results.
+    pub(super) fn keep(&mut self, array: &str, found: &[f64]) {
+        self.computed.insert(array.to_owned(), found.iter().map(|x| Value::String(format!("{x:.16e}"))).collect());
     }
 
     /// Records whether a condition holds exactly.
@@ -197,17 +202,18 @@ fn flatten(value: &Value, take: &mut impl FnMut(&str) -> Result<(), String>) -> 
 
 type Check = fn(&Case<'_>, &mut Lines) -> Result<(), String>;
 
-/// Measures the generated code against a `reference.json` of body tracking. Smoothing of attachments (`hsmooth`)
-/// involves no declared residual; `fusion-core` compares it.
+/// Measures the generated code against a `reference.json` of body tracking, and `fusion-core` for the smoothing of
+/// attachments (`hsmooth`), which involves no declared residual.
 ///
 /// # Errors
-/// If the file cannot be read or a case is malformed.
+/// If the file cannot be read, a family is missing or has no cases, or a case is malformed.
 pub fn fusion_reference(path: &Path) -> Result<Vec<FamilyLine>, RecordError> {
     let file: Value = read(path)?;
     let mut lines = Lines::default();
     for (family, check) in FAMILIES {
         let cases = file.get(family).and_then(Value::as_array);
         let cases = cases.ok_or_else(|| RecordError::record(path, family, "the family is missing"))?;
+        not_empty(path, family, cases)?;
         for value in cases {
             let case = Case { family, id: identity(value), value, evaluated_only: false };
             check(&case, &mut lines).map_err(|message| RecordError::record(path, &case.id, message))?;
@@ -227,6 +233,7 @@ pub fn evaluate_fusion(input: &Path, output: &Path) -> Result<Option<usize>, Rec
     let mut count = None;
     for (family, check) in FAMILIES {
         let Some(cases) = file.get_mut(family).and_then(Value::as_array_mut) else { continue };
+        not_empty(input, family, cases)?;
         for value in cases {
             let mut lines = Lines::default();
             let case = Case { family, id: identity(value), value, evaluated_only: true };
@@ -242,7 +249,17 @@ pub fn evaluate_fusion(input: &Path, output: &Path) -> Result<Option<usize>, Rec
     Ok(count)
 }
 
-const FAMILIES: [(&str, Check); 8] = [
+/// Checks that a family has cases: without any, everything would pass.
+fn not_empty(path: &Path, family: &str, cases: &[Value]) -> Result<(), RecordError> {
+    if cases.is_empty() { Err(RecordError::record(path, family, "the family has no cases")) } else { Ok(()) }
+}
+
+/// Names of the families, for messages.
+pub(super) fn family_names() -> String {
+    FAMILIES.map(|(family, _)| family).join(", ")
+}
+
+const FAMILIES: [(&str, Check); 9] = [
     ("exp", exponential),
     ("dqb", blend),
     ("nonrigid", nonrigid),
@@ -250,6 +267,7 @@ const FAMILIES: [(&str, Check); 8] = [
     ("graph", graph),
     ("binding", binding),
     ("huber", huber),
+    ("hsmooth", smoothing::smoothing),
     ("system", fusion_system::system),
 ];
 

@@ -9,6 +9,7 @@ mod fusion_system;
 mod mapping;
 mod policy;
 mod report;
+mod smoothing;
 
 pub use eval::{Source, evaluate_file, evaluate_inputs};
 pub use exact::Truth;
