@@ -8,7 +8,8 @@ use super::targets::targets;
 /// Evaluates the records of a file and writes them with the results of the generated code (17 digits) and flags.
 #[derive(Args)]
 pub struct Eval {
-    /// A `potref-1` or `potref-policy-1` file, or families of body tracking; with `--file`, inputs in the form that `verify audit --at` reads.
+    /// A `potref-1` or `potref-policy-1` file, or families of body tracking; with `--file`, inputs in the form that
+    /// `verify audit --at` reads.
     records: PathBuf,
     /// Evaluate the declarations of this file (`.energy`).
     #[arg(long, value_name = "FILE")]
