@@ -15,6 +15,7 @@ mod linear_solvers;
 mod mesh_obstacle;
 mod motion;
 mod obstacles;
+mod other_programs;
 mod plate;
 mod random_contact;
 mod random_impacts;

@@ -8,6 +8,8 @@ use gltf_json::mesh::Semantic;
 use gltf_json::validation::Checked::Valid;
 use tempfile::TempDir;
 
+use super::other_programs::ask;
+
 /// Columns of a tube, of which the last doubles the first, and its rows.
 const AROUND: usize = 12;
 const ROWS: usize = 6;
@@ -120,15 +122,7 @@ fn an_exported_garment_is_welded_pinned_by_group_and_woven_along_its_texture() {
 #[test]
 fn a_garment_goes_to_blender_and_comes_back() {
     let (folder, ..) = run(SCENE);
-    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/blender.py");
-    let blender = Command::new("python3").arg(script).arg(folder.path().join("out")).arg("skirt").output();
-    let Ok(told) = blender.map_err(|error| eprintln!("skipped: no python3 ({error})")) else { return };
-    let said = String::from_utf8_lossy(&told.stdout);
-    if told.status.code() == Some(77) {
-        eprintln!("skipped: {said}");
-        return;
-    }
-    assert!(told.status.success(), "{said}{}", String::from_utf8_lossy(&told.stderr));
+    let Some(said) = ask("python3", "blender.py", &[&folder.path().join("out"), "skirt".as_ref()]) else { return };
     assert!(said.contains("3 frames of 84 vertices to Blender"), "{said}");
     // The exported file is a garment again: deformed, with its texture coordinates.
     let scene = SCENE

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
+use super::other_programs::ask;
+
 const SCENE: &str = r#"dt = 0.01
 duration = 0.3
 frames_per_second = 50
@@ -297,34 +299,19 @@ fn usd_ply_and_obj_hold_the_same_frames() {
 /// Needs `pip install usd-core pygltflib trimesh`; skipped without them.
 #[test]
 fn other_libraries_read_the_same_from_all_files() {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_back.py");
     let folder = with_scene(&format!("{SCENE}[output]\nply = true\n"));
     succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
-    let reader = Command::new("python3").arg(script).arg(folder.path().join("out")).arg("cloth").output();
-    let Ok(read) = reader.map_err(|error| eprintln!("skipped: no python3 ({error})")) else { return };
-    let said = String::from_utf8_lossy(&read.stdout);
-    if read.status.code() == Some(77) {
-        eprintln!("skipped: {said}");
-        return;
-    }
-    assert!(read.status.success(), "{said}{}", String::from_utf8_lossy(&read.stderr));
+    let Some(said) = ask("python3", "read_back.py", &[&folder.path().join("out"), "cloth".as_ref()]) else { return };
     assert_eq!(said, "16 frames of 81 vertices, alike in USD, glTF, OBJ and PLY\n");
 }
 
 /// Needs node and its package gltf-validator, found through `NODE_PATH`; skipped without them.
 #[test]
 fn the_gltf_validator_finds_nothing() {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/validate_gltf.cjs");
     let folder = with_scene(SCENE);
     succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
-    let validator = Command::new("node").arg(script).arg(folder.path().join("out/cloth.glb")).output();
-    let Ok(found) = validator.map_err(|error| eprintln!("skipped: no node ({error})")) else { return };
-    let said = String::from_utf8_lossy(&found.stdout);
-    if found.status.code() == Some(77) {
-        eprintln!("skipped: {said}");
-        return;
-    }
-    assert!(found.status.success() && said == "0 errors, 0 warnings, 0 hints\n", "{said}");
+    let Some(said) = ask("node", "validate_gltf.cjs", &[&folder.path().join("out/cloth.glb")]) else { return };
+    assert_eq!(said, "0 errors, 0 warnings, 0 hints\n");
 }
 
 /// Skipped without the program ffmpeg.

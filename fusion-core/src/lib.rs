@@ -39,6 +39,7 @@ pub mod depth;
 pub mod energy;
 pub mod evaluation;
 pub mod focal_length;
+mod json_file;
 pub mod model;
 mod option_error;
 pub mod picture;
@@ -50,4 +51,5 @@ pub mod tracker;
 pub mod twist;
 pub mod usd;
 
+pub use json_file::JsonFileError;
 pub use option_error::OptionError;

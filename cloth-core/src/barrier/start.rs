@@ -14,7 +14,7 @@ pub(super) const SKIN: f64 = 1.0 / 3.0;
 /// The number of crossings that a message names.
 const NAMED: usize = 3;
 /// The part of an obstacle's reach within which cloth counts as touching at the start.
-const TOUCHING: f64 = 1e-6;
+pub(super) const TOUCHING: f64 = 1e-6;
 
 /// A start that contact cannot keep free of crossings, because it is not.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -73,16 +73,15 @@ impl<'a> Show<'a> {
         show
     }
 
-    /// Adds the velocities of all vertices in each frame, in m/s.
+    /// Adds the velocities of all vertices in each frame, in m/s, and the forces of contact on them, in N. Empty vectors
+    /// are not written.
     #[must_use]
-    pub fn with_velocities(self, velocities: Vec<&'a [Vector3<f64>]>) -> Self {
-        Self { velocities, ..self }
-    }
-
-    /// Adds the forces of contact on all vertices in each frame, in N.
-    #[must_use]
-    pub fn with_contact_forces(self, contact_forces: Vec<&'a [Vector3<f64>]>) -> Self {
-        Self { contact_forces, ..self }
+    pub fn with_vectors(mut self, frames: impl Iterator<Item = [&'a [Vector3<f64>]; 2]>) -> Self {
+        for [velocities, forces] in frames {
+            self.velocities.extend((!velocities.is_empty()).then_some(velocities));
+            self.contact_forces.extend((!forces.is_empty()).then_some(forces));
+        }
+        self
     }
 
     /// Returns a track for every garment, hair and solid.

@@ -131,17 +131,7 @@ impl Run {
         let show = Show::new(&self.simulation, frames, rate, wanted.style());
         let picture = || show.picture(self.simulation.positions(), self.simulation.time());
         written.add(wanted.picture, || self.write(OutputFolder::PICTURE, &picture()?));
-        let vectors = self.frames.vectors();
-        let show = if wanted.velocities {
-            show.with_velocities(vectors.iter().map(|frame| &frame.velocities[..]).collect())
-        } else {
-            show
-        };
-        let show = if wanted.contact_forces {
-            show.with_contact_forces(vectors.iter().map(|frame| &frame.forces[..]).collect())
-        } else {
-            show
-        };
+        let show = show.with_vectors(self.frames.vectors().iter().map(|frame| [&frame.velocities[..], &frame.forces]));
         let usd = || usd_text(&show.tracks(), rate);
         written.add(wanted.usd, || self.write(OutputFolder::USD, usd().as_bytes()));
         let gltf = || animation_glb(&show.tracks(), rate);

@@ -8,11 +8,12 @@ use serde::Deserialize;
 
 use super::mesh::Mesh;
 use super::skinned::{BodyError, Bone, SkinnedBody};
+use crate::json_file::{JsonFileError, read_json};
 
 /// Files that do not describe a body.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeHumanError {
-    /// A file cannot be read.
+    /// The mesh cannot be read.
     #[error("cannot read {}", .path.display())]
     Unreadable {
         /// Path of the file.
@@ -28,14 +29,9 @@ pub enum MakeHumanError {
         /// Error of the parser.
         message: String,
     },
-    /// The rig or the weights are malformed.
-    #[error("{}", .path.display())]
-    Json {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser, with its position.
-        source: serde_json::Error,
-    },
+    /// The rig or the weights cannot be read or are malformed.
+    #[error(transparent)]
+    Json(#[from] JsonFileError),
     /// The mesh lacks a required group.
     #[error("{}: the mesh has no group `{group}`, which {needed_by} needs", .path.display())]
     MissingGroup {
@@ -225,10 +221,4 @@ fn distinct(polygons: &[Vec<usize>]) -> Vec<usize> {
     vertices.sort_unstable();
     vertices.dedup();
     vertices
-}
-
-fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, MakeHumanError> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| MakeHumanError::Unreadable { path: path.to_owned(), source })?;
-    serde_json::from_str(&text).map_err(|source| MakeHumanError::Json { path: path.to_owned(), source })
 }

@@ -7,25 +7,21 @@ use serde::{Deserialize, Serialize};
 
 use super::mesh::Mesh;
 use super::skinned::{BodyError, Bone, SkinnedBody};
+use crate::json_file::{JsonFileError, read_json, write_json};
 
 /// A file of a body or mesh that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum BodyFileError {
-    /// The file cannot be read or written.
+    /// A stored body cannot be read or written, or is malformed.
+    #[error(transparent)]
+    Json(#[from] JsonFileError),
+    /// The OBJ file cannot be read.
     #[error("{}", .path.display())]
     File {
         /// Path of the file.
         path: PathBuf,
         /// Error of the operating system.
         source: std::io::Error,
-    },
-    /// The file is malformed.
-    #[error("{}", .path.display())]
-    Json {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser, with its position.
-        source: serde_json::Error,
     },
     /// The mesh is malformed.
     #[error("{}: not a Wavefront OBJ: {message}", .path.display())]
@@ -59,9 +55,7 @@ struct Stored {
 /// # Errors
 /// If the file is malformed or its parts do not fit.
 pub fn read_body(path: &Path) -> Result<SkinnedBody, BodyFileError> {
-    let text = std::fs::read_to_string(path).map_err(|source| BodyFileError::File { path: path.into(), source })?;
-    let stored: Stored =
-        serde_json::from_str(&text).map_err(|source| BodyFileError::Json { path: path.into(), source })?;
+    let stored: Stored = read_json(path)?;
     let vertices: Vec<Vector3<f64>> = stored.vertices.into_iter().map(Vector3::from).collect();
     let mesh = checked(vertices, stored.triangles);
     SkinnedBody::new(mesh, stored.bones, stored.weights)
@@ -79,8 +73,7 @@ pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> 
         bones: body.bones.clone(),
         weights: body.weights.clone(),
     };
-    let text = serde_json::to_vec(&stored).map_err(|source| BodyFileError::Json { path: path.into(), source })?;
-    energy_cli::write_whole(path, &text).map_err(|source| BodyFileError::File { path: path.into(), source })
+    Ok(write_json(path, &stored)?)
 }
 
 /// Reads the vertices of an OBJ file.

@@ -3,11 +3,12 @@ use std::path::{Path, PathBuf};
 use super::image::DepthImage;
 use super::intrinsics::{GivenCamera, SequenceInfo};
 use super::png_file::{DepthFileError, read_depth, read_mask};
+use crate::json_file::{JsonFileError, read_json};
 
 /// A folder that is not a sequence of depth images.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
-    /// A file cannot be read or written.
+    /// The list of images cannot be read.
     #[error("{}", .path.display())]
     File {
         /// Path of the file.
@@ -15,14 +16,9 @@ pub enum SequenceError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The intrinsics are malformed.
-    #[error("{}", .path.display())]
-    Json {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser, with its position.
-        source: serde_json::Error,
-    },
+    /// The intrinsics cannot be read or are malformed.
+    #[error(transparent)]
+    Json(#[from] JsonFileError),
     /// The intrinsics are invalid.
     #[error("{}: {fault}", .path.display())]
     Camera {
@@ -132,15 +128,10 @@ impl DepthSequence {
     /// If the folder has no images, a list whose timestamps do not increase, or not exactly one valid camera.
     pub fn open_with(folder: &Path, given: Option<GivenCamera>) -> Result<Self, SequenceError> {
         let path = folder.join(Self::INTRINSICS);
-        let stored = match std::fs::read_to_string(&path) {
-            Ok(_) if given.is_some() => return Err(SequenceError::TwoCameras { path }),
-            Ok(text) => {
-                let info = serde_json::from_str::<SequenceInfo>(&text);
-                Some(info.map_err(|source| SequenceError::Json { path: path.clone(), source })?)
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
-            Err(source) => return Err(SequenceError::File { path, source }),
-        };
+        let stored = path.exists().then(|| read_json::<SequenceInfo>(&path)).transpose()?;
+        if stored.is_some() && given.is_some() {
+            return Err(SequenceError::TwoCameras { path });
+        }
         let list = folder.join(Self::LIST);
         let (images, times) = match std::fs::read_to_string(&list) {
             Ok(text) => {

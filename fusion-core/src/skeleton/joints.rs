@@ -9,26 +9,14 @@ use super::joint_mapping::{BodyTracker, JointMapping};
 use super::matching::matched;
 use super::stored::Skeleton;
 use crate::body::Bone;
+use crate::json_file::{JsonFileError, read_json};
 
 /// A file of joints that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum JointTrackError {
-    /// The file cannot be read.
-    #[error("{}", .path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The file is malformed.
-    #[error("{}", .path.display())]
-    Json {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser, with its position.
-        source: serde_json::Error,
-    },
+    /// The file cannot be read or is malformed.
+    #[error(transparent)]
+    Json(#[from] JsonFileError),
     /// The contents do not fit together, or do not fit the model.
     #[error("{}: {fault}", .path.display())]
     Fault {
@@ -89,10 +77,7 @@ impl JointTrack {
     /// # Errors
     /// If the file cannot be read or is malformed, or its parts do not fit together.
     pub fn read(path: &Path) -> Result<Self, JointTrackError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| JointTrackError::File { path: path.into(), source })?;
-        let track: Self =
-            serde_json::from_str(&text).map_err(|source| JointTrackError::Json { path: path.into(), source })?;
+        let track: Self = read_json(path)?;
         track.check().map_err(|fault| JointTrackError::Fault { path: path.into(), fault })?;
         Ok(track)
     }

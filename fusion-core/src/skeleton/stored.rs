@@ -5,26 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use super::matching::matched;
 use crate::body::Bone;
+use crate::json_file::{JsonFileError, read_json, write_json};
 
 /// A file of a skeleton that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SkeletonError {
-    /// The file cannot be read or written.
-    #[error("{}", .path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The file is malformed.
-    #[error("{}", .path.display())]
-    Json {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser, with its position.
-        source: serde_json::Error,
-    },
+    /// The file cannot be read or written, or is malformed.
+    #[error(transparent)]
+    Json(#[from] JsonFileError),
     /// The skeleton lacks a bone that the model's weights use.
     #[error("the skeleton has no bone `{bone}`, which the model's weights refer to; it has {known}")]
     MissingBone {
@@ -161,8 +149,7 @@ impl Skeleton {
     /// # Errors
     /// If the file cannot be read or is malformed.
     pub fn read(path: &Path) -> Result<Self, SkeletonError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SkeletonError::File { path: path.into(), source })?;
-        serde_json::from_str(&text).map_err(|source| SkeletonError::Json { path: path.into(), source })
+        Ok(read_json(path)?)
     }
 
     /// Writes a file completely or not at all.
@@ -170,7 +157,6 @@ impl Skeleton {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), SkeletonError> {
-        let text = serde_json::to_vec(self).map_err(|source| SkeletonError::Json { path: path.into(), source })?;
-        energy_cli::write_whole(path, &text).map_err(|source| SkeletonError::File { path: path.into(), source })
+        Ok(write_json(path, self)?)
     }
 }

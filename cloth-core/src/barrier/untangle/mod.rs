@@ -11,7 +11,7 @@ mod sides;
 use energy_dsl::Vector3;
 
 use super::spacing::{Skin, Spacing, Spacings};
-use super::start::{Participants, SKIN, crossings_that_count};
+use super::start::{Participants, SKIN, TOUCHING, crossings_that_count};
 use crate::collision::{Closest, Pair, Rules, Search};
 use crate::contact::AnySolid;
 use crate::geometry::{Bounds, add_scaled, dot, norm, subtract};
@@ -54,14 +54,14 @@ impl Untangling<'_> {
         let mut search = Search::new(mesh, x, rules.clone());
         let mut now = x.to_vec();
         for _ in 0..SWEEPS {
-            self.leave_obstacles(&mut now);
             let pairs = search.pairs(mesh, now.iter().map(|x| Bounds::of(&[*x])).collect());
             let close: Vec<_> = pairs.iter().map(|pair| (*pair, Closest::of(pair, &pair.corners(&now)))).collect();
             let crossings = crossings_that_count(mesh, &rules, &now);
-            let is_apart = |(pair, closest): &(Pair, Closest)| closest.distance > spacings.of(mesh, pair).thickness;
-            if crossings.is_empty() && close.iter().all(is_apart) {
+            let is_apart = |(pair, closest): &(Pair, Closest)| closest.distance > self.least(&spacings, pair);
+            if crossings.is_empty() && close.iter().all(is_apart) && !self.is_inside(&now) {
                 return Some(now);
             }
+            self.leave_obstacles(&mut now);
             let facings = sides(mesh, &now, &close, &crossings);
             self.part(&spacings, &close, &facings, &mut now);
             let is_far = |(from, to): (&Vector3<f64>, &Vector3<f64>)| norm(subtract(*from, *to)) > SHALLOW * reach;
@@ -70,6 +70,20 @@ impl Untangling<'_> {
             }
         }
         None
+    }
+
+    /// The distance above which a pair needs no repair, in m. Obstacles fit their skins to what starts near them.
+    fn least(&self, spacings: &Spacings, pair: &Pair) -> f64 {
+        match self.participants.mesh.obstacle_of(pair).map(|number| &self.participants.obstacles[number]) {
+            Some(obstacle) => obstacle.radius + TOUCHING * obstacle.reach,
+            None => spacings.of(&self.participants.mesh, pair).thickness,
+        }
+    }
+
+    /// Whether a vertex that may be moved is inside an obstacle.
+    fn is_inside(&self, x: &[Vector3<f64>]) -> bool {
+        let movable = || x.iter().zip(&self.is_movable).filter(|(_, is_movable)| **is_movable);
+        self.solids.iter().any(|solid| movable().any(|(x, _)| solid.signed_distance(*x) <= 0.0))
     }
 
     /// Moves vertices that are inside obstacles to their surface, and a little beyond.
@@ -112,12 +126,8 @@ impl Untangling<'_> {
 
     /// Moves the vertices of a pair apart by a distance along a unit vector, those that take a larger part in it more.
     fn push(&self, pair: &Pair, weights: &[f64; 4], across: &Vector3<f64>, by: f64, x: &mut [Vector3<f64>]) {
-        let weights: [f64; 4] =
-            std::array::from_fn(
-                |corner| {
-                    if self.is_movable[pair.vertices[corner] as usize] { weights[corner] } else { 0.0 }
-                },
-            );
+        let is_movable = pair.of(&self.is_movable);
+        let weights: [f64; 4] = std::array::from_fn(|corner| f64::from(u8::from(is_movable[corner])) * weights[corner]);
         let square: f64 = weights.iter().map(|weight| weight * weight).sum();
         if by > 0.0 && square > 0.0 {
             pair.add(weights, across.map(|component| RELAXATION * by / square * component), x);
