@@ -73,8 +73,8 @@ impl<'a> Show<'a> {
         show
     }
 
-    /// Adds the velocities of all vertices in each frame, in m/s, and the forces of contact on them, in N. Vectors that are
-    /// empty are not written.
+    /// Adds the velocities of all vertices in each frame, in m/s, and the forces of contact on them, in N. Files omit
+    /// empty vectors.
     #[must_use]
     pub fn with_vectors(mut self, frames: impl Iterator<Item = [&'a [Vector3<f64>]; 2]>) -> Self {
         for [velocities, forces] in frames {
