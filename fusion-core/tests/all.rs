@@ -7,3 +7,4 @@ mod figure;
 mod inputs;
 mod joints;
 mod real_body;
+mod surface_distance;

@@ -9,6 +9,7 @@ use fusion_core::depth::{Camera, DepthImage, DepthSequence, GivenCamera, Sequenc
 use fusion_core::energy::BoneMode;
 use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model::{DeformationModel, ModelOptions};
+use fusion_core::model_size::{SizeFit, fit_size};
 use fusion_core::skeleton::{JointTrack, Skeleton, half_interval};
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
@@ -61,6 +62,9 @@ pub struct Track {
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
+    /// Keep the model's size, even if another size agrees better with the first image.
+    #[arg(long)]
+    keep_size: bool,
     /// Print the times of frames.
     #[arg(long)]
     stats: bool,
@@ -135,6 +139,7 @@ impl Track {
             output: output.to_owned(),
             pictures: false,
             usd: false,
+            keep_size: false,
             stats: false,
             overwrite: true,
         }
@@ -147,21 +152,20 @@ impl Track {
         let sequence = DepthSequence::open_with(&self.recording, self.given_camera())?;
         let model = self.model.clone().unwrap_or_else(|| self.recording.join(MODEL));
         let body = read_any_body(&model).context("the model")?;
+        let camera = sequence.info.camera;
+        // The first image shows the model at rest.
+        let body = match sequence.image(0) {
+            Ok(image) => self.compared(body, &camera, &image),
+            Err(_) => body,
+        };
         let parameters = self.parameters(&body)?;
         let model = DeformationModel::new(&body, parameters.model)?;
         if !model.fill.left.is_empty() {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
         }
         let skeleton = self.skeleton(&sequence, &body.bones)?;
-        let camera = sequence.info.camera;
         let mut tracker = Tracker::new(model, camera, parameters.tracker)
             .with_context(|| self.recording.join(DepthSequence::INTRINSICS).display().to_string())?;
-        // The first image shows the model at rest.
-        if let Ok(image) = sequence.image(0)
-            && let Some(found) = check_focal_length(&body, &camera, &image)
-        {
-            eprintln!("warning: {}", focal_warning(&camera, &found));
-        }
         let folders: &[&str] = if self.pictures { &["meshes", "pictures"] } else { &["meshes"] };
         prepare(&self.output, folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
         let mut output = TrackOutput::new(&self.output, camera, &body.mesh.triangles, sequence.times());
@@ -204,6 +208,25 @@ impl Track {
             self.output.display()
         ))?;
         if self.stats { print(&times(&lines)) } else { Ok(()) }
+    }
+
+    /// Compares the model at rest with the first image. Warns if another focal length explains it, and fits the model's
+    /// size if that explains it better.
+    fn compared(&self, body: SkinnedBody, camera: &Camera, image: &DepthImage) -> SkinnedBody {
+        let focal = check_focal_length(&body, camera, image);
+        let size = fit_size(&body, camera, image);
+        let focal = focal.filter(|focal| size.is_none_or(|size| focal.explained <= size.explained));
+        match (focal, size) {
+            (Some(found), _) => {
+                eprintln!("warning: {}", focal_warning(camera, &found));
+                body
+            }
+            (None, Some(found)) => {
+                eprintln!("warning: {}", size_warning(&found, self.keep_size));
+                if self.keep_size { body } else { found.applied(&body) }
+            }
+            (None, None) => body,
+        }
     }
 
     fn given_camera(&self) -> Option<GivenCamera> {
@@ -294,6 +317,17 @@ impl Track {
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
+}
+
+fn size_warning(found: &SizeFit, kept: bool) -> String {
+    let SizeFit { factor, residual, explained, .. } = found;
+    let remedy = if kept { "omit --keep-size to scale it" } else { "it was scaled; --keep-size keeps it" };
+    format!(
+        "the model's size seems wrong: at rest it is {:.1} mm from the first image (median), but {:.1} mm if scaled by \
+         {factor:.3}; {remedy}",
+        1e3 * residual,
+        1e3 * explained,
+    )
 }
 
 fn focal_warning(camera: &Camera, found: &FocalSuggestion) -> String {

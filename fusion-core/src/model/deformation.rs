@@ -101,6 +101,8 @@ pub struct DeformationModel {
     pub bones: Vec<Bone>,
     /// Positions of the nodes at rest.
     pub nodes: Vec<Vector3<f64>>,
+    /// Unit normals of the surface at the nodes, at rest.
+    pub node_normals: Vec<Vector3<f64>>,
     /// Neighbours of each node, without itself.
     pub graph: Vec<Vec<usize>>,
     /// Weights of the bones for each node.
@@ -140,6 +142,7 @@ impl DeformationModel {
 
         let space = NodeSpace::new(body, &mesh.vertices, options.distance, node_radius);
         let nodes: Vec<Vector3<f64>> = space.nodes.iter().map(|&vertex| mesh.vertices[vertex]).collect();
+        let node_normals = space.nodes.iter().map(|&vertex| mesh.normals[vertex]).collect();
         for (needed, what) in
             [(nodes_per_vertex, "to move a vertex"), (graph_neighbours + 1, "for a node's neighbours")]
         {
@@ -177,6 +180,7 @@ impl DeformationModel {
             mesh,
             bones,
             nodes,
+            node_normals,
             graph,
             attachments,
             vertex_nodes,
