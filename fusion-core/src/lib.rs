@@ -49,6 +49,7 @@ pub mod protocol;
 mod random;
 pub mod silhouette;
 pub mod skeleton;
+pub mod surface;
 pub mod tracker;
 pub mod twist;
 pub mod usd;

@@ -42,6 +42,13 @@ impl BodyView {
         pixel.map(|at| at * Self::REDUCTION + Self::REDUCTION / 2)
     }
 
+    /// Returns the triangle that a pixel of the full camera sees; `None` without one.
+    #[must_use]
+    pub fn triangle(&self, [u, v]: [usize; 2]) -> Option<u32> {
+        let (x, y) = (u / Self::REDUCTION, v / Self::REDUCTION);
+        self.triangles[y * self.camera.width + x]
+    }
+
     /// Returns which vertices lie more than `tolerance` m behind the surface that the camera sees, such as the trunk
     /// behind an arm.
     #[must_use]

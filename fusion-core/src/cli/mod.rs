@@ -5,6 +5,7 @@ mod page;
 pub mod pose;
 mod posed;
 pub mod render;
+mod surface_output;
 pub mod track;
 mod track_output;
 

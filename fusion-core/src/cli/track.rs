@@ -11,13 +11,15 @@ use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::model_size::{SizeFit, fit_size};
 use fusion_core::skeleton::{JointTrack, Skeleton, half_interval};
+use fusion_core::surface::SurfaceOptions;
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, USD, mesh_file, prepare};
+use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, SURFACE, USD, mesh_file, prepare};
 use super::posed::read_any_body;
+use super::surface_output::SurfaceOutput;
 use super::track_output::TrackOutput;
 use super::{print, progress_bar};
 
@@ -50,7 +52,7 @@ pub struct Track {
     /// Treat bones as unknowns near the reported motions.
     #[arg(long)]
     unknown_bones: bool,
-    /// Options of model and tracker (`.json`): `{"model": {…}, "tracker": {…}}`.
+    /// Options of model, tracker and surface (`.json`): `{"model": {…}, "tracker": {…}, "surface": {…}}`.
     #[arg(long)]
     options: Option<PathBuf>,
     /// Output folder.
@@ -62,6 +64,10 @@ pub struct Track {
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
+    /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then, so
+    /// that details stay in the surface.
+    #[arg(long)]
+    surface: bool,
     /// Keep the model's size, even if another size agrees better with the first image.
     #[arg(long)]
     keep_size: bool,
@@ -79,6 +85,7 @@ pub struct Track {
 struct Parameters {
     model: ModelOptions,
     tracker: TrackerOptions,
+    surface: SurfaceOptions,
 }
 
 /// A row of the table of frames.
@@ -139,6 +146,7 @@ impl Track {
             output: output.to_owned(),
             pictures: false,
             usd: false,
+            surface: false,
             keep_size: false,
             stats: false,
             overwrite: true,
@@ -166,8 +174,14 @@ impl Track {
         let skeleton = self.skeleton(&sequence, &body.bones)?;
         let mut tracker = Tracker::new(model, camera, parameters.tracker)
             .with_context(|| self.recording.join(DepthSequence::INTRINSICS).display().to_string())?;
-        let folders: &[&str] = if self.pictures { &["meshes", "pictures"] } else { &["meshes"] };
-        prepare(&self.output, folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
+        let mut surface = self
+            .surface
+            .then(|| SurfaceOutput::new(tracker.model(), parameters.surface, parameters.tracker))
+            .transpose()?;
+        let optional = [(self.pictures, "pictures"), (self.surface, SURFACE)];
+        let wanted = optional.iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| *folder);
+        let folders: Vec<&str> = std::iter::once("meshes").chain(wanted).collect();
+        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
         let mut output = TrackOutput::new(&self.output, camera, &body.mesh.triangles, sequence.times());
         if self.pictures {
             output = output.with_pictures();
@@ -180,14 +194,17 @@ impl Track {
         let progress = progress_bar(sequence.len(), "tracking");
         for frame in 0..sequence.len() {
             let image = sequence.image(frame);
-            let shown = image.as_ref().ok().filter(|_| self.pictures).cloned();
+            let kept = image.as_ref().ok().filter(|_| self.pictures || self.surface).cloned();
             let line = track_frame(frame, image, skeleton.as_ref(), &mut tracker);
             if let Some(warning) = change(lines.last(), &line) {
                 progress.suspend(|| eprintln!("warning: {warning}"));
             }
+            if let (Some(surface), Some(image)) = (&mut surface, kept.as_ref().filter(|_| line.is_tracked())) {
+                surface.add(&tracker, image);
+            }
             lines.push(line);
             let vertices = tracker.vertices();
-            output.add(frame, shown.as_ref(), &vertices)?;
+            output.add(frame, kept.as_ref().filter(|_| self.pictures), &vertices)?;
             let mesh = obj_text(&vertices, &body.mesh.triangles);
             write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
             motions.push(tracker.twists().to_vec());
@@ -196,6 +213,7 @@ impl Track {
         progress.finish_and_clear();
         output.finish()?;
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
+        let fused = surface.map(|surface| surface.write(&self.output, tracker.model(), &motions)).transpose()?;
         let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
         if let (0, Some(first)) = (tracked, lines.first()) {
@@ -207,6 +225,9 @@ impl Track {
             tracker.model().nodes.len(),
             self.output.display()
         ))?;
+        if let Some(vertices) = fused {
+            print(&format!("fused a surface of {vertices} vertices: {}\n", self.output.join(SURFACE).display()))?;
+        }
         if self.stats { print(&times(&lines)) } else { Ok(()) }
     }
 
@@ -290,6 +311,9 @@ impl Track {
             (false, true) => TrackerOptions::without_bones(),
             (false, false) => defaults.tracker,
         };
+        if self.surface {
+            defaults.tracker = defaults.tracker.stiffened();
+        }
         let Some(path) = &self.options else { return Ok(defaults) };
         let here = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(here)?;

@@ -6,6 +6,7 @@ use super::neighbours::Near;
 use super::node_space::{NodeDistance, NodeSpace};
 use crate::body::{Bone, Mesh, SkinnedBody};
 use crate::option_error::OptionError;
+use crate::twist::{AngleConvention, Twist, blended};
 
 /// Options of a [`DeformationModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -189,6 +190,16 @@ impl DeformationModel {
             fill,
             options,
         })
+    }
+
+    /// Returns the motion of each vertex from rest, in the model's coordinates: the dual quaternion blend of its nodes.
+    #[must_use]
+    pub fn vertex_motions(&self, twists: &[Twist], angle: AngleConvention) -> Vec<Isometry3<f64>> {
+        let nodes: Vec<Isometry3<f64>> = twists.iter().map(|twist| angle.motion(twist)).collect();
+        let of_vertex = |(ids, weights): (&Vec<u32>, &Vec<f64>)| {
+            blended(weights.iter().zip(ids).map(|(weight, &node)| (*weight, &nodes[node as usize])))
+        };
+        self.vertex_nodes.iter().zip(&self.vertex_weights).map(of_vertex).collect()
     }
 
     /// Converts a motion from the world to the model's coordinates: (R, t) becomes (R, t + R o − o).

@@ -82,6 +82,12 @@ impl Tracker {
         &self.model
     }
 
+    /// Returns the rays of the camera's pixels.
+    #[must_use]
+    pub fn rays(&self) -> &PixelRays {
+        &self.rays
+    }
+
     /// Returns the twists of the nodes, in the model's coordinates.
     #[must_use]
     pub fn twists(&self) -> &[Twist] {
@@ -92,6 +98,12 @@ impl Tracker {
     #[must_use]
     pub fn vertices(&self) -> Vec<Vector3<f64>> {
         self.energy.moved(&self.twists).vertices.iter().map(|vertex| vertex + self.model.origin).collect()
+    }
+
+    /// Returns the motion of each vertex from rest; see [`DeformationModel::vertex_motions`].
+    #[must_use]
+    pub fn vertex_motions(&self) -> Vec<Isometry3<f64>> {
+        self.model.vertex_motions(self.twists(), self.options.energy.angle)
     }
 
     /// Returns the tracked vertices and normals, in the model's coordinates.

@@ -83,6 +83,16 @@ impl TrackerOptions {
         options
     }
 
+    /// Stiffens the graph and the ties to bones, for the fusion of a surface: what the model lacks then stays in the
+    /// surface at rest. Soft nodes would follow it as a motion.
+    #[must_use]
+    pub fn stiffened(mut self) -> Self {
+        self.energy.weights.graph = 10.0;
+        self.energy.weights.binding = 50.0;
+        self.energy.normal_slack = 0.0;
+        self
+    }
+
     /// Options for tracking without bones: a stiffer graph takes the place of the bones.
     #[must_use]
     pub fn without_bones() -> Self {
