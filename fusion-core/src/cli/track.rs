@@ -167,6 +167,7 @@ impl Track {
             Err(_) => body,
         };
         let parameters = self.parameters(&body)?;
+        parameters.surface.validate()?;
         let model = DeformationModel::new(&body, parameters.model)?;
         if !model.fill.left.is_empty() {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
