@@ -1,5 +1,6 @@
 pub mod demo;
 pub mod evaluate;
+mod first_image;
 mod folder;
 mod page;
 pub mod pose;

@@ -5,11 +5,9 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use energy_cli::write_file;
 use fusion_core::body::{Bone, SkinnedBody, obj_text};
-use fusion_core::depth::{Camera, DepthImage, DepthSequence, GivenCamera, SequenceError};
+use fusion_core::depth::{DepthImage, DepthSequence, GivenCamera, SequenceError};
 use fusion_core::energy::BoneMode;
-use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model::{DeformationModel, ModelOptions};
-use fusion_core::model_size::{SizeFit, fit_size};
 use fusion_core::skeleton::{JointTrack, Skeleton, half_interval};
 use fusion_core::surface::SurfaceOptions;
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
@@ -17,6 +15,7 @@ use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::first_image::compared;
 use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, SURFACE, USD, mesh_file, prepare};
 use super::posed::read_any_body;
 use super::surface_output::SurfaceOutput;
@@ -163,7 +162,7 @@ impl Track {
         let camera = sequence.info.camera;
         // The first image shows the model at rest.
         let body = match sequence.image(0) {
-            Ok(image) => self.compared(body, &camera, &image),
+            Ok(image) => compared(body, &camera, &image, self.keep_size),
             Err(_) => body,
         };
         let parameters = self.parameters(&body)?;
@@ -179,17 +178,7 @@ impl Track {
             .surface
             .then(|| SurfaceOutput::new(tracker.model(), parameters.surface, parameters.tracker))
             .transpose()?;
-        let optional = [(self.pictures, "pictures"), (self.surface, SURFACE)];
-        let wanted = optional.iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| *folder);
-        let folders: Vec<&str> = std::iter::once("meshes").chain(wanted).collect();
-        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
-        let mut output = TrackOutput::new(&self.output, camera, &body.mesh.triangles, sequence.times());
-        if self.pictures {
-            output = output.with_pictures();
-        }
-        if self.usd {
-            output = output.with_usd(sequence.len())?;
-        }
+        let mut output = self.track_output(&sequence, &body)?;
         let mut lines: Vec<Line> = Vec::new();
         let mut motions = Vec::new();
         let progress = progress_bar(sequence.len(), "tracking");
@@ -232,23 +221,20 @@ impl Track {
         if self.stats { print(&times(&lines)) } else { Ok(()) }
     }
 
-    /// Compares the model at rest with the first image. Warns if another focal length explains it, and fits the model's
-    /// size if that explains it better.
-    fn compared(&self, body: SkinnedBody, camera: &Camera, image: &DepthImage) -> SkinnedBody {
-        let focal = check_focal_length(&body, camera, image);
-        let size = fit_size(&body, camera, image);
-        let focal = focal.filter(|focal| size.is_none_or(|size| focal.explained <= size.explained));
-        match (focal, size) {
-            (Some(found), _) => {
-                eprintln!("warning: {}", focal_warning(camera, &found));
-                body
-            }
-            (None, Some(found)) => {
-                eprintln!("warning: {}", size_warning(&found, self.keep_size));
-                if self.keep_size { body } else { found.applied(&body) }
-            }
-            (None, None) => body,
+    /// Prepares the output folder.
+    fn track_output(&self, sequence: &DepthSequence, body: &SkinnedBody) -> Result<TrackOutput> {
+        let optional = [(self.pictures, "pictures"), (self.surface, SURFACE)];
+        let wanted = optional.iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| *folder);
+        let folders: Vec<&str> = std::iter::once("meshes").chain(wanted).collect();
+        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
+        let mut output = TrackOutput::new(&self.output, sequence.info.camera, &body.mesh.triangles, sequence.times());
+        if self.pictures {
+            output = output.with_pictures();
         }
+        if self.usd {
+            output = output.with_usd(sequence.len())?;
+        }
+        Ok(output)
     }
 
     fn given_camera(&self) -> Option<GivenCamera> {
@@ -342,30 +328,6 @@ impl Track {
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
-}
-
-fn size_warning(found: &SizeFit, kept: bool) -> String {
-    let SizeFit { factor, residual, explained, .. } = found;
-    let remedy = if kept { "omit --keep-size to scale it" } else { "it was scaled; --keep-size keeps it" };
-    format!(
-        "the model's size seems wrong: at rest it is {:.1} mm from the first image (median), but {:.1} mm if scaled by \
-         {factor:.3}; {remedy}",
-        1e3 * residual,
-        1e3 * explained,
-    )
-}
-
-fn focal_warning(camera: &Camera, found: &FocalSuggestion) -> String {
-    format!(
-        "the focal lengths seem wrong: the model at rest is {:.1} mm from the first image (median), but {:.1} mm with \
-         fx = {:.0} and fy = {:.0} in place of {:.0} and {:.0}; check the intrinsics",
-        1e3 * found.residual,
-        1e3 * found.explained,
-        found.factor * camera.fx,
-        found.factor * camera.fy,
-        camera.fx,
-        camera.fy
-    )
 }
 
 /// Formats increasing numbers as a list of ranges: `3, 5-9`.
