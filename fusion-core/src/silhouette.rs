@@ -30,8 +30,8 @@ impl BodyView {
         Self { camera, depth, triangles }
     }
 
-    /// Returns a camera whose pixel (u, v) sees exactly what one pixel of the full camera sees, [`Self::full_pixel`]. An
-    /// offset of half a pixel would count the points on one side of every limb as uncovered.
+    /// Returns a camera whose pixel (u, v) sees exactly what one pixel of the full camera sees, [`Self::full_pixel`].
+    /// An offset of half a pixel would count the points on one side of every limb as uncovered.
     fn camera(full: &Camera) -> Camera {
         let (by, [x, y]) = (Self::REDUCTION as f64, Self::full_pixel([0, 0]).map(|at| at as f64));
         Camera { cx: (full.cx - x) / by, cy: (full.cy - y) / by, ..full.reduced(Self::REDUCTION) }

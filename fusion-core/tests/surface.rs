@@ -24,8 +24,8 @@ fn with_bump(body: &SkinnedBody) -> (SkinnedBody, Vec<f64>) {
     (bumped, part)
 }
 
-/// Summarises the distances in mm of the true mesh's visible vertices from a found mesh, over those with a large part in
-/// the bump.
+/// Summarises the distances in mm of the true mesh's visible vertices from a found mesh, over those with a large part
+/// in the bump.
 fn distances(truth: &Mesh, camera: &Camera, part: &[f64], least: f64, found: &Mesh) -> ErrorSummary {
     let seen = visible_vertices(truth, camera);
     let distance = SurfaceDistance::new(found);

@@ -5,8 +5,8 @@ use fusion_core::depth::{Camera, DepthImage};
 use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model_size::{SizeFit, fit_size};
 
-/// Compares the model at rest with the first image. Warns if another focal length explains it, and fits the model's size
-/// if that explains it better; `keep_size` only warns.
+/// Compares the model at rest with the first image. Warns if another focal length explains it, and fits the model's
+/// size if that explains it better; `keep_size` only warns.
 pub fn compared(body: SkinnedBody, camera: &Camera, image: &DepthImage, keep_size: bool) -> SkinnedBody {
     let focal = check_focal_length(&body, camera, image);
     let size = fit_size(&body, camera, image);

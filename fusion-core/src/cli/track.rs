@@ -63,8 +63,8 @@ pub struct Track {
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
-    /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then, so
-    /// that details stay in the surface.
+    /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then,
+    /// so that details stay in the surface.
     #[arg(long)]
     surface: bool,
     /// Keep the model's size, even if another size agrees better with the first image.

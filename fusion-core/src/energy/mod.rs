@@ -142,8 +142,8 @@ impl FusionEnergy {
         self.bind(model, motions, None);
     }
 
-    /// Binds nodes to known bones, in the model's coordinates. With the twists `x`, targets follow the nodes along their
-    /// normals by the part κ of [`EnergyOptions::normal_slack`]: x̃ + κ ñ ñ·(T x − x̃), so that a node far from its bones
+    /// Binds nodes to known bones, in the model's coordinates. With the twists `x`, targets follow the nodes along
+    /// their normals by the part κ of [`EnergyOptions::normal_slack`]: x̃ + κ ñ ñ·(T x − x̃). A node far from its bones
     /// is only pulled with (1 − κ) λ_b along the normal, but with λ_b along the surface.
     pub fn bind(&mut self, model: &DeformationModel, motions: &[Isometry3<f64>], x: Option<&[Twist]>) {
         let EnergyOptions { angle, normal_slack, .. } = self.options;
