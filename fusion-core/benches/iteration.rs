@@ -80,7 +80,7 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
     let model = model(vertices, nodes, k);
     let mut energy = FusionEnergy::new(&model, EnergyOptions::default()).expect("the energy can be made");
     let rest = [Isometry3::identity(); 4];
-    energy.set_bones(&model, &BoneTargets { reported: Some(&rest), expected: &rest });
+    energy.set_bones(&model, &BoneTargets { reported: Some(&rest), expected: &rest, trust: 1.0 });
     let mut random = fastrand::Rng::with_seed(1);
     let mut near = |size: f64| size * (2.0 * random.f64() - 1.0);
     let x: Vec<Twist> =

@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
-use crate::body::SkinnedBody;
+use crate::body::{Mesh, SkinnedBody};
 use crate::correspondence::{Gates, MatchCounts, correspondences};
-use crate::depth::{Camera, DepthImage, NormalMap, PixelRays, hidden_vertices};
+use crate::depth::{Camera, DepthImage, NormalMap, PixelRays};
 use crate::energy::Moved;
+use crate::silhouette::BodyView;
 
 /// A focal length that explains the first image much better than the camera's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,11 +38,12 @@ const STEPS: i32 = 12;
 /// best factor is the sensor's noise.
 #[must_use]
 pub fn check_focal_length(body: &SkinnedBody, camera: &Camera, image: &DepthImage) -> Option<FocalSuggestion> {
-    let residual = median_distance(body, camera, image)?;
+    let distance = |camera: &Camera| median_distance(&body.mesh, &PixelRays::new(*camera).ok()?, image);
+    let residual = distance(camera)?;
     let candidate = |step: i32| {
         let factor = 1.02_f64.powi(step);
         let scaled = Camera { fx: factor * camera.fx, fy: factor * camera.fy, ..*camera };
-        median_distance(body, &scaled, image).map(|distance| (factor, distance))
+        distance(&scaled).map(|distance| (factor, distance))
     };
     let (factor, explained) =
         (-STEPS..=STEPS).filter_map(candidate).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1.0, residual));
@@ -49,16 +51,16 @@ pub fn check_focal_length(body: &SkinnedBody, camera: &Camera, image: &DepthImag
     stands_out.then_some(FocalSuggestion { factor, residual, explained })
 }
 
-/// Returns the median distance of the model's visible vertices from the image, along normals.
-fn median_distance(body: &SkinnedBody, camera: &Camera, image: &DepthImage) -> Option<f64> {
-    let rays = PixelRays::new(*camera).ok()?;
+/// Returns the median distance of a mesh's visible vertices from an image, along normals; unmatched ones count as
+/// [`GATE`]. `None` if no vertex is visible.
+pub(crate) fn median_distance(mesh: &Mesh, rays: &PixelRays, image: &DepthImage) -> Option<f64> {
     let gates = Gates { distance: GATE, ..Gates::default() };
-    let mut normals = NormalMap::new(image, &rays, gates.normal_reach);
-    let hidden = hidden_vertices(&body.mesh, camera, 0.03);
-    let stride = body.mesh.vertices.len().div_ceil(MOST_VERTICES).max(1);
+    let mut normals = NormalMap::new(image, rays, gates.normal_reach);
+    let hidden = BodyView::new(mesh, rays.camera()).hidden(&mesh.vertices, 0.03);
+    let stride = mesh.vertices.len().div_ceil(MOST_VERTICES).max(1);
     let moved = Moved {
-        vertices: body.mesh.vertices.iter().step_by(stride).copied().collect(),
-        normals: body.mesh.normals.iter().step_by(stride).copied().collect(),
+        vertices: mesh.vertices.iter().step_by(stride).copied().collect(),
+        normals: mesh.normals.iter().step_by(stride).copied().collect(),
     };
     let hidden: Vec<bool> = hidden.into_iter().step_by(stride).collect();
     let (pairs, counts) = correspondences(&moved, &Vector3::zeros(), &mut normals, &gates, &hidden);

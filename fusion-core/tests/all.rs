@@ -7,3 +7,5 @@ mod figure;
 mod inputs;
 mod joints;
 mod real_body;
+mod surface;
+mod surface_distance;

@@ -109,6 +109,19 @@ fn zero_limits_of_robust_losses() {
 }
 
 #[test]
+fn nodes_without_ties_along_normals() {
+    let options = r#"{"tracker": {"energy": {"normal_slack": 1}}}"#;
+    option_refused(options, &["`tracker.energy.normal_slack`", "less than 1, got 1"]);
+}
+
+#[test]
+fn surfaces_without_voxels() {
+    option_refused(r#"{"surface": {"voxel": 0}}"#, &["`surface.voxel`", "greater than 0, got 0"]);
+    option_refused(r#"{"surface": {"truncation": -1}}"#, &["`surface.truncation`", "got -1"]);
+    option_refused(r#"{"surface": {"reach": 0.001}}"#, &["`surface.reach`", "got 0.001"]);
+}
+
+#[test]
 fn endless_relaxations() {
     option_refused(r#"{"model": {"relaxations": 1000000000}}"#, &["`model.relaxations`", "at most 100"]);
 }

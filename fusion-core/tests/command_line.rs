@@ -28,7 +28,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
-    let output = fusion(&["track", recording, "--stats", "--pictures", "--usd", "-o", track]);
+    let output = fusion(&["track", recording, "--stats", "--pictures", "--usd", "--surface", "-o", track]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(printed.contains("time per frame: mean") && printed.contains("Hz"), "{printed}");
@@ -50,6 +50,9 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     let plot = std::fs::read_to_string(Path::new(track).join("errors.svg")).unwrap();
     assert!(plot.starts_with("<svg") && plot.contains("median"));
     pictures_and_points_are_complete(Path::new(track));
+    assert!(Path::new(track).join("surface/rest.obj").exists());
+    let surface = std::fs::read_to_string(Path::new(track).join("surface/000004.obj")).unwrap();
+    assert!(surface.lines().filter(|line| line.starts_with("v ")).count() > 10_000);
 }
 
 /// Checks the outputs on request of a track of five frames.

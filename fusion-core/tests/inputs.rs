@@ -97,7 +97,7 @@ fn a_distorted_lens_is_tracked_through() {
     let recording = Recording::new(&figure(), &motions, camera, 1.9);
     let median = |camera: Camera| {
         let model = DeformationModel::new(&recording.body, ModelOptions::default()).unwrap();
-        let mut tracker = Tracker::new(model, camera, TrackerOptions::default()).unwrap();
+        let mut tracker = Tracker::new(model, camera, TrackerOptions::without_bones()).unwrap();
         let images: Vec<DepthImage> = (1..3).map(|frame| recording.image(frame, SensorNoise::default())).collect();
         images.iter().for_each(|image| drop(tracker.track(image, None).unwrap()));
         let truth = recording.truth(2).vertices;
@@ -119,4 +119,36 @@ fn a_wrong_focal_length_is_reported() {
     let suggestion = messages.split("with fx = ").nth(1).and_then(|rest| rest.split(' ').next());
     let suggested: f64 = suggestion.unwrap_or_else(|| panic!("{messages}")).parse().unwrap();
     assert!((suggested - 525.0).abs() < 10.0 && messages.contains("in place of 578"), "{messages}");
+}
+
+/// Multiplies the positions in a stored model by a factor, about a point on the camera's axis.
+fn scale_model(path: &Path, factor: f64) {
+    let mut model: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    let scale = |point: &mut serde_json::Value| {
+        for (axis, centre) in [0.0, 0.0, 2.6].into_iter().enumerate() {
+            let x = point[axis].as_f64().unwrap();
+            point[axis] = (centre + factor * (x - centre)).into();
+        }
+    };
+    model["vertices"].as_array_mut().unwrap().iter_mut().for_each(scale);
+    for bone in model["bones"].as_array_mut().unwrap() {
+        ["head", "tail"].iter().for_each(|end| scale(&mut bone[end]));
+    }
+    std::fs::write(path, serde_json::to_vec(&model).unwrap()).unwrap();
+}
+
+#[test]
+fn a_model_of_the_wrong_size_is_scaled() {
+    let (_folder, recording, track) = rendered(1);
+    let messages = fusion(&["track", &recording, "-o", &track]);
+    assert!(!messages.contains("size"), "{messages}");
+    scale_model(&Path::new(&recording).join("model.json"), 1.06);
+    let messages = fusion(&["track", &recording, "--overwrite", "-o", &track]);
+    assert!(messages.contains("size seems wrong") && messages.contains("--keep-size keeps it"), "{messages}");
+    assert!(!messages.contains("focal"), "{messages}");
+    let residual = |track: &str| column(track, "residual_mm")[1].parse::<f64>().unwrap();
+    let scaled = residual(&track);
+    let messages = fusion(&["track", &recording, "--keep-size", "--overwrite", "-o", &track]);
+    assert!(messages.contains("omit --keep-size"), "{messages}");
+    assert!(scaled < 0.7 * residual(&track), "{scaled} mm, {} mm with the wrong size", residual(&track));
 }

@@ -16,12 +16,17 @@ pub const FILM: &str = "track.apng";
 /// Track as Universal Scene Description.
 pub const USD: &str = "track.usda";
 
+/// Folder of the fused surface, in a track.
+pub const SURFACE: &str = "surface";
+/// The fused surface at rest, in its folder.
+pub const REST: &str = "rest.obj";
+
 /// Path of a frame's picture in a track.
 pub fn picture_file(folder: &Path, frame: usize) -> PathBuf {
     folder.join("pictures").join(format!("{frame:06}.png"))
 }
 
-/// Path of a frame's mesh in `truth` or `meshes`.
+/// Path of a frame's mesh in `truth`, `meshes` or `surface`.
 pub fn mesh_file(folder: &Path, kind: &str, frame: usize) -> PathBuf {
     folder.join(kind).join(format!("{frame:06}.obj"))
 }

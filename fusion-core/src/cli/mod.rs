@@ -1,10 +1,12 @@
 pub mod demo;
 pub mod evaluate;
+mod first_image;
 mod folder;
 mod page;
 pub mod pose;
 mod posed;
 pub mod render;
+mod surface_output;
 pub mod track;
 mod track_output;
 

@@ -5,18 +5,20 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use energy_cli::write_file;
 use fusion_core::body::{Bone, SkinnedBody, obj_text};
-use fusion_core::depth::{Camera, DepthImage, DepthSequence, GivenCamera, SequenceError};
+use fusion_core::depth::{DepthImage, DepthSequence, GivenCamera, SequenceError};
 use fusion_core::energy::BoneMode;
-use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::skeleton::{JointTrack, Skeleton, half_interval};
+use fusion_core::surface::SurfaceOptions;
 use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
 use fusion_core::twist::Twist;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, USD, mesh_file, prepare};
+use super::first_image::compared;
+use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, SURFACE, USD, mesh_file, prepare};
 use super::posed::read_any_body;
+use super::surface_output::SurfaceOutput;
 use super::track_output::TrackOutput;
 use super::{print, progress_bar};
 
@@ -49,7 +51,7 @@ pub struct Track {
     /// Treat bones as unknowns near the reported motions.
     #[arg(long)]
     unknown_bones: bool,
-    /// Options of model and tracker (`.json`): `{"model": {…}, "tracker": {…}}`.
+    /// Options of model, tracker and surface (`.json`): `{"model": {…}, "tracker": {…}, "surface": {…}}`.
     #[arg(long)]
     options: Option<PathBuf>,
     /// Output folder.
@@ -61,6 +63,13 @@ pub struct Track {
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
+    /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then,
+    /// so that details stay in the surface.
+    #[arg(long)]
+    surface: bool,
+    /// Keep the model's size, even if another size agrees better with the first image.
+    #[arg(long)]
+    keep_size: bool,
     /// Print the times of frames.
     #[arg(long)]
     stats: bool,
@@ -75,6 +84,7 @@ pub struct Track {
 struct Parameters {
     model: ModelOptions,
     tracker: TrackerOptions,
+    surface: SurfaceOptions,
 }
 
 /// A row of the table of frames.
@@ -135,6 +145,8 @@ impl Track {
             output: output.to_owned(),
             pictures: false,
             usd: false,
+            surface: false,
+            keep_size: false,
             stats: false,
             overwrite: true,
         }
@@ -147,43 +159,42 @@ impl Track {
         let sequence = DepthSequence::open_with(&self.recording, self.given_camera())?;
         let model = self.model.clone().unwrap_or_else(|| self.recording.join(MODEL));
         let body = read_any_body(&model).context("the model")?;
+        let camera = sequence.info.camera;
+        // The first image shows the model at rest.
+        let body = match sequence.image(0) {
+            Ok(image) => compared(body, &camera, &image, self.keep_size),
+            Err(_) => body,
+        };
         let parameters = self.parameters(&body)?;
+        parameters.surface.validate()?;
         let model = DeformationModel::new(&body, parameters.model)?;
         if !model.fill.left.is_empty() {
             eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
         }
         let skeleton = self.skeleton(&sequence, &body.bones)?;
-        let camera = sequence.info.camera;
         let mut tracker = Tracker::new(model, camera, parameters.tracker)
             .with_context(|| self.recording.join(DepthSequence::INTRINSICS).display().to_string())?;
-        // The first image shows the model at rest.
-        if let Ok(image) = sequence.image(0)
-            && let Some(found) = check_focal_length(&body, &camera, &image)
-        {
-            eprintln!("warning: {}", focal_warning(&camera, &found));
-        }
-        let folders: &[&str] = if self.pictures { &["meshes", "pictures"] } else { &["meshes"] };
-        prepare(&self.output, folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
-        let mut output = TrackOutput::new(&self.output, camera, &body.mesh.triangles, sequence.times());
-        if self.pictures {
-            output = output.with_pictures();
-        }
-        if self.usd {
-            output = output.with_usd(sequence.len())?;
-        }
+        let mut surface = self
+            .surface
+            .then(|| SurfaceOutput::new(tracker.model(), parameters.surface, parameters.tracker))
+            .transpose()?;
+        let mut output = self.track_output(&sequence, &body)?;
         let mut lines: Vec<Line> = Vec::new();
         let mut motions = Vec::new();
         let progress = progress_bar(sequence.len(), "tracking");
         for frame in 0..sequence.len() {
             let image = sequence.image(frame);
-            let shown = image.as_ref().ok().filter(|_| self.pictures).cloned();
+            let kept = image.as_ref().ok().filter(|_| self.pictures || self.surface).cloned();
             let line = track_frame(frame, image, skeleton.as_ref(), &mut tracker);
             if let Some(warning) = change(lines.last(), &line) {
                 progress.suspend(|| eprintln!("warning: {warning}"));
             }
+            if let (Some(surface), Some(image)) = (&mut surface, kept.as_ref().filter(|_| line.is_tracked())) {
+                surface.add(&tracker, image);
+            }
             lines.push(line);
             let vertices = tracker.vertices();
-            output.add(frame, shown.as_ref(), &vertices)?;
+            output.add(frame, kept.as_ref().filter(|_| self.pictures), &vertices)?;
             let mesh = obj_text(&vertices, &body.mesh.triangles);
             write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
             motions.push(tracker.twists().to_vec());
@@ -192,6 +203,7 @@ impl Track {
         progress.finish_and_clear();
         output.finish()?;
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
+        let fused = surface.map(|surface| surface.write(&self.output, tracker.model(), &motions)).transpose()?;
         let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
         if let (0, Some(first)) = (tracked, lines.first()) {
@@ -203,7 +215,26 @@ impl Track {
             tracker.model().nodes.len(),
             self.output.display()
         ))?;
+        if let Some(vertices) = fused {
+            print(&format!("fused a surface of {vertices} vertices: {}\n", self.output.join(SURFACE).display()))?;
+        }
         if self.stats { print(&times(&lines)) } else { Ok(()) }
+    }
+
+    /// Prepares the output folder.
+    fn track_output(&self, sequence: &DepthSequence, body: &SkinnedBody) -> Result<TrackOutput> {
+        let optional = [(self.pictures, "pictures"), (self.surface, SURFACE)];
+        let wanted = optional.iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| *folder);
+        let folders: Vec<&str> = std::iter::once("meshes").chain(wanted).collect();
+        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
+        let mut output = TrackOutput::new(&self.output, sequence.info.camera, &body.mesh.triangles, sequence.times());
+        if self.pictures {
+            output = output.with_pictures();
+        }
+        if self.usd {
+            output = output.with_usd(sequence.len())?;
+        }
+        Ok(output)
     }
 
     fn given_camera(&self) -> Option<GivenCamera> {
@@ -267,6 +298,9 @@ impl Track {
             (false, true) => TrackerOptions::without_bones(),
             (false, false) => defaults.tracker,
         };
+        if self.surface {
+            defaults.tracker = defaults.tracker.stiffened();
+        }
         let Some(path) = &self.options else { return Ok(defaults) };
         let here = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(here)?;
@@ -294,19 +328,6 @@ impl Track {
         };
         write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
-}
-
-fn focal_warning(camera: &Camera, found: &FocalSuggestion) -> String {
-    format!(
-        "the focal lengths seem wrong: the model at rest is {:.1} mm from the first image (median), but {:.1} mm with \
-         fx = {:.0} and fy = {:.0} in place of {:.0} and {:.0}; check the intrinsics",
-        1e3 * found.residual,
-        1e3 * found.explained,
-        found.factor * camera.fx,
-        found.factor * camera.fy,
-        camera.fx,
-        camera.fy
-    )
 }
 
 /// Formats increasing numbers as a list of ranges: `3, 5-9`.

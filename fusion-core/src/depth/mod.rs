@@ -17,5 +17,5 @@ pub use intrinsics::{CameraNameError, GivenCamera, SequenceInfo};
 pub use normal::{NormalMap, SurfaceNormal};
 pub use pixel_rays::{LensError, PixelRays};
 pub use png_file::{DepthFileError, read_depth, read_mask, write_depth};
-pub use render::{SensorNoise, hidden_vertices, render, render_triangles, visible_vertices};
+pub use render::{SensorNoise, render, render_triangles, visible_vertices};
 pub use sequence::{DepthSequence, SequenceError};

@@ -102,19 +102,6 @@ pub fn visible_vertices(mesh: &Mesh, camera: &Camera) -> Vec<bool> {
     mesh.vertices.iter().zip(&mesh.normals).map(seen).collect()
 }
 
-/// Returns which vertices lie more than `tolerance` m behind the surface that the camera sees of the mesh itself,
-/// such as the trunk behind an arm. Renders with a quarter of the camera's resolution, which takes less than 1 ms.
-#[must_use]
-pub fn hidden_vertices(mesh: &Mesh, camera: &Camera, tolerance: f64) -> Vec<bool> {
-    let camera = camera.reduced(4);
-    let image = render(mesh, &camera);
-    let behind = |vertex: &Vector3<f64>| {
-        let depth = camera.pixel(vertex).and_then(|pixel| image.at(pixel));
-        depth.is_some_and(|depth| vertex.z > depth + tolerance)
-    };
-    mesh.vertices.iter().map(behind).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use energy_elements::{Binding, BoneBinding, GraphEdge, SkeletonPlane};
 use energy_solve::{CouplingError, Couplings, Loss, NormalPattern, Placed, ResidualTerm};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use super::BoneTargets;
 use super::options::{EnergyOptions, TermWeights};
@@ -28,7 +28,8 @@ impl BoneTerms {
     /// with the weight λ_motion.
     pub(super) fn set_targets(&mut self, model: &DeformationModel, options: &EnergyOptions, targets: &BoneTargets<'_>) {
         let (turn, TermWeights { prior, motion, .. }) = (options.angle.turn(), options.weights);
-        let sources = [targets.reported.map(|motions| (prior, motions)), Some((motion, targets.expected))];
+        let sources =
+            [targets.reported.map(|motions| (targets.trust * prior, motions)), Some((motion, targets.expected))];
         let elements = sources.into_iter().flatten().flat_map(|(weight, motions)| {
             model.bones.iter().enumerate().flat_map(move |(bone, at)| {
                 prior_places(at, options.prior_reach).map(move |x| {
@@ -38,6 +39,21 @@ impl BoneTerms {
             })
         });
         self.prior.set_elements(elements.filter(|placed| placed.weight > 0.0));
+    }
+
+    /// Returns the mean square distance between two motions of the bones, in m², at the points where the prior compares
+    /// them.
+    pub(super) fn square_difference(
+        bones: &[Bone],
+        reach: f64,
+        first: &[Isometry3<f64>],
+        second: &[Isometry3<f64>],
+    ) -> f64 {
+        let one = |((bone, first), second): ((&Bone, &Isometry3<f64>), &Isometry3<f64>)| {
+            let places = prior_places(bone, reach).map(nalgebra::Point3::from);
+            places.map(|x| (first.transform_point(&x) - second.transform_point(&x)).norm_squared()).iter().sum::<f64>()
+        };
+        bones.iter().zip(first).zip(second).map(one).sum::<f64>() / (4 * bones.len()) as f64
     }
 
     pub(super) fn evaluate_jacobians(&self, x: &[Twist]) -> f64 {

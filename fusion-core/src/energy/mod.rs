@@ -15,6 +15,7 @@ use self::bones::{BoneStencils, BoneTerms};
 use self::data_term::{DataTerm, data_term};
 pub use self::data_term::{Moved, Pair};
 pub use self::options::{BoneMode, EdgeWeight, EnergyOptions, NormalDerivative, TermWeights};
+use crate::body::Bone;
 use crate::model::DeformationModel;
 use crate::option_error::OptionError;
 use crate::twist::{Twist, blended};
@@ -40,6 +41,8 @@ pub struct BoneTargets<'a> {
     pub reported: Option<&'a [Isometry3<f64>]>,
     /// Motions predicted from the last frames.
     pub expected: &'a [Isometry3<f64>],
+    /// Factor of λ_prior: 1 for reported bones with the errors for which λ_prior was chosen, less for larger errors.
+    pub trust: f64,
 }
 
 /// The energy of a model. The data change with each search for correspondences, the other terms do not.
@@ -98,7 +101,8 @@ impl FusionEnergy {
             }
         }));
         let own: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
-        let binding = ResidualTerm::new("binding", Arc::new(Couplings::new(&pattern, &own)?), options.weights.binding);
+        let couplings = Arc::new(Couplings::new(&pattern, &own)?);
+        let binding = ResidualTerm::new("binding", couplings, options.weights.binding);
         let bones = skinning.map(|stencils| stencils.terms(model, &options, &pattern)).transpose()?;
         Ok(Self { options, pattern, data, graph, binding, bones })
     }
@@ -127,7 +131,6 @@ impl FusionEnergy {
     /// Replaces the targets of bones, in the model's coordinates. Without reported motions, known bones release their
     /// nodes, and unknown ones stay near the expected motions.
     pub fn set_bones(&mut self, model: &DeformationModel, targets: &BoneTargets<'_>) {
-        let turn = self.options.angle.turn();
         if let Some(bones) = &mut self.bones {
             bones.set_targets(model, &self.options, targets);
             return;
@@ -136,9 +139,24 @@ impl FusionEnergy {
             self.binding.set_elements([]);
             return;
         };
-        self.binding.set_elements(model.nodes.iter().enumerate().map(|(node, x)| {
-            let target = bound_place(x, &model.attachments.rows[node], motions);
-            Placed { element: Binding::new(turn, (*x).into(), target.into()), stencil: node as u32, weight: 1.0 }
+        self.bind(model, motions, None);
+    }
+
+    /// Binds nodes to known bones, in the model's coordinates. With the twists `x`, targets follow the nodes along
+    /// their normals by the part κ of [`EnergyOptions::normal_slack`]: x̃ + κ ñ ñ·(T x − x̃). A node far from its bones
+    /// is only pulled with (1 − κ) λ_b along the normal, but with λ_b along the surface.
+    pub fn bind(&mut self, model: &DeformationModel, motions: &[Isometry3<f64>], x: Option<&[Twist]>) {
+        let EnergyOptions { angle, normal_slack, .. } = self.options;
+        let turn = angle.turn();
+        self.binding.set_elements(model.nodes.iter().enumerate().map(|(node, place)| {
+            let row = &model.attachments.rows[node];
+            let mut target = bound_place(place, row, motions);
+            if let Some(x) = x {
+                let moved = angle.motion(&x[node]).transform_point(&(*place).into()).coords;
+                let normal = bound_normal(&model.node_normals[node], row, motions);
+                target += normal_slack * normal.dot(&(moved - target)) * normal;
+            }
+            Placed { element: Binding::new(turn, (*place).into(), target.into()), stencil: node as u32, weight: 1.0 }
         }));
     }
 
@@ -147,9 +165,17 @@ impl FusionEnergy {
     #[must_use]
     pub fn bone_start(&self, targets: &BoneTargets<'_>) -> Vec<Isometry3<f64>> {
         let TermWeights { prior, motion, .. } = self.options.weights;
+        let prior = targets.trust * prior;
         let Some(reported) = targets.reported.filter(|_| prior > 0.0) else { return targets.expected.to_vec() };
         let both = reported.iter().zip(targets.expected);
         both.map(|(reported, expected)| blended([(prior, reported), (motion, expected)].into_iter())).collect()
+    }
+
+    /// Returns the mean square distance in m² between two motions of unknown bones, at the points where the prior
+    /// compares them: at [`EnergyOptions::prior_reach`] from the joints.
+    #[must_use]
+    pub fn bone_difference(&self, bones: &[Bone], first: &[Isometry3<f64>], second: &[Isometry3<f64>]) -> f64 {
+        BoneTerms::square_difference(bones, self.options.prior_reach, first, second)
     }
 
     /// Returns the terms that depend on the unknowns.
@@ -192,6 +218,13 @@ impl FusionEnergy {
 fn bound_place(x: &Vector3<f64>, row: &[f64], motions: &[Isometry3<f64>]) -> Vector3<f64> {
     let followed = row.iter().zip(motions).filter(|(share, _)| **share > 0.0);
     followed.map(|(share, motion)| *share * motion.transform_point(&(*x).into()).coords).sum()
+}
+
+/// Returns ñ = Σ η_j R_bj n with unit length; zero if the sum vanishes.
+fn bound_normal(n: &Vector3<f64>, row: &[f64], motions: &[Isometry3<f64>]) -> Vector3<f64> {
+    let followed = row.iter().zip(motions).filter(|(share, _)| **share > 0.0);
+    let sum: Vector3<f64> = followed.map(|(share, motion)| *share * (motion.rotation * n)).sum();
+    sum.try_normalize(1e-9).unwrap_or_default()
 }
 
 /// Returns λ_s E_skeleton of known bones, Σ (ñ·(ṽ − u))² over the pairs. It does not depend on the unknowns.

@@ -25,7 +25,7 @@ pub struct TermWeights {
 
 impl Default for TermWeights {
     fn default() -> Self {
-        Self { nonrigid: 1.0, skeleton: 1.0, graph: 0.3, binding: 1.0, prior: 0.5, motion: 0.1, joints: 1000.0 }
+        Self { nonrigid: 1.0, skeleton: 1.0, graph: 0.25, binding: 5.0, prior: 0.5, motion: 0.1, joints: 1000.0 }
     }
 }
 
@@ -106,6 +106,10 @@ pub struct EnergyOptions {
     pub data_tukey: Option<f64>,
     /// Huber's limit of the graph, in m; `None` for least squares.
     pub graph_huber: Option<f64>,
+    /// Part κ of a node's distance from known bones, along its normal, that E_binding does not resist; at least 0 and
+    /// below 1. Depth determines the motion along normals, and hardly the motion along the surface. Without effect on
+    /// unknown bones.
+    pub normal_slack: f64,
 }
 
 impl Default for EnergyOptions {
@@ -119,6 +123,7 @@ impl Default for EnergyOptions {
             prior_reach: 0.4,
             data_tukey: None,
             graph_huber: None,
+            normal_slack: 0.9,
         }
     }
 }
@@ -143,6 +148,9 @@ impl EnergyOptions {
             BoneMode::Unknown => OptionError::ensure_positive("tracker.energy.weights.prior", prior)?,
         }
         OptionError::ensure_positive("tracker.energy.prior_reach", self.prior_reach)?;
+        let slack = (0.0..1.0).contains(&self.normal_slack);
+        let range = "a number from 0 to less than 1";
+        OptionError::ensure(slack, "tracker.energy.normal_slack", range, self.normal_slack)?;
         for (name, limit) in
             [("tracker.energy.data_tukey", self.data_tukey), ("tracker.energy.graph_huber", self.graph_huber)]
         {

@@ -6,6 +6,7 @@ use super::neighbours::Near;
 use super::node_space::{NodeDistance, NodeSpace};
 use crate::body::{Bone, Mesh, SkinnedBody};
 use crate::option_error::OptionError;
+use crate::twist::{AngleConvention, Twist, blended};
 
 /// Options of a [`DeformationModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,6 +102,8 @@ pub struct DeformationModel {
     pub bones: Vec<Bone>,
     /// Positions of the nodes at rest.
     pub nodes: Vec<Vector3<f64>>,
+    /// Unit normals of the surface at the nodes, at rest.
+    pub node_normals: Vec<Vector3<f64>>,
     /// Neighbours of each node, without itself.
     pub graph: Vec<Vec<usize>>,
     /// Weights of the bones for each node.
@@ -140,6 +143,7 @@ impl DeformationModel {
 
         let space = NodeSpace::new(body, &mesh.vertices, options.distance, node_radius);
         let nodes: Vec<Vector3<f64>> = space.nodes.iter().map(|&vertex| mesh.vertices[vertex]).collect();
+        let node_normals = space.nodes.iter().map(|&vertex| mesh.normals[vertex]).collect();
         for (needed, what) in
             [(nodes_per_vertex, "to move a vertex"), (graph_neighbours + 1, "for a node's neighbours")]
         {
@@ -177,6 +181,7 @@ impl DeformationModel {
             mesh,
             bones,
             nodes,
+            node_normals,
             graph,
             attachments,
             vertex_nodes,
@@ -185,6 +190,16 @@ impl DeformationModel {
             fill,
             options,
         })
+    }
+
+    /// Returns the motion of each vertex from rest, in the model's coordinates: the dual quaternion blend of its nodes.
+    #[must_use]
+    pub fn vertex_motions(&self, twists: &[Twist], angle: AngleConvention) -> Vec<Isometry3<f64>> {
+        let nodes: Vec<Isometry3<f64>> = twists.iter().map(|twist| angle.motion(twist)).collect();
+        let of_vertex = |(ids, weights): (&Vec<u32>, &Vec<f64>)| {
+            blended(weights.iter().zip(ids).map(|(weight, &node)| (*weight, &nodes[node as usize])))
+        };
+        self.vertex_nodes.iter().zip(&self.vertex_weights).map(of_vertex).collect()
     }
 
     /// Converts a motion from the world to the model's coordinates: (R, t) becomes (R, t + R o − o).

@@ -1,5 +1,6 @@
 //! Tracking from one depth image to the next.
 
+mod bone_trust;
 mod options;
 mod prediction;
 mod report;
@@ -9,14 +10,16 @@ use std::sync::Arc;
 use energy_solve::{GaussNewton, GaussNewtonOptions, NormalSolverKind, Outcome};
 use nalgebra::{Isometry3, Vector3};
 
+use self::bone_trust::BoneTrust;
 pub use self::options::TrackerOptions;
 use self::prediction::Prediction;
 pub use self::report::{FrameError, FrameQuality, FrameReport, TrackerError};
 use crate::body::Mesh;
 use crate::correspondence::{Gates, MatchCounts, correspondences};
-use crate::depth::{Camera, DepthImage, NormalMap, PixelRays, hidden_vertices};
+use crate::depth::{Camera, DepthImage, NormalMap, PixelRays};
 use crate::energy::{BoneMode, BoneTargets, FusionEnergy, Moved, skeleton_energy};
 use crate::model::DeformationModel;
+use crate::silhouette::BodyView;
 use crate::twist::{Twist, blended};
 
 /// Tracks a model through depth images.
@@ -34,6 +37,7 @@ pub struct Tracker {
     offsets: Vec<Isometry3<f64>>,
     node_prediction: Prediction,
     bone_prediction: Prediction,
+    bone_trust: BoneTrust,
 }
 
 /// Motions from which a frame starts.
@@ -68,13 +72,20 @@ impl Tracker {
         let offsets = vec![Isometry3::identity(); model.nodes.len()];
         let node_prediction = Prediction::new(model.nodes.clone());
         let bone_prediction = Prediction::new(model.bones.iter().map(|bone| bone.head.into()).collect());
-        Ok(Self { model, rays, options, energy, solver, twists, offsets, node_prediction, bone_prediction })
+        let bone_trust = BoneTrust::default();
+        Ok(Self { model, rays, options, energy, solver, twists, offsets, node_prediction, bone_prediction, bone_trust })
     }
 
     /// Returns the model.
     #[must_use]
     pub fn model(&self) -> &DeformationModel {
         &self.model
+    }
+
+    /// Returns the rays of the camera's pixels.
+    #[must_use]
+    pub fn rays(&self) -> &PixelRays {
+        &self.rays
     }
 
     /// Returns the twists of the nodes, in the model's coordinates.
@@ -87,6 +98,12 @@ impl Tracker {
     #[must_use]
     pub fn vertices(&self) -> Vec<Vector3<f64>> {
         self.energy.moved(&self.twists).vertices.iter().map(|vertex| vertex + self.model.origin).collect()
+    }
+
+    /// Returns the motion of each vertex from rest; see [`DeformationModel::vertex_motions`].
+    #[must_use]
+    pub fn vertex_motions(&self) -> Vec<Isometry3<f64>> {
+        self.model.vertex_motions(self.twists(), self.options.energy.angle)
     }
 
     /// Returns the tracked vertices and normals, in the model's coordinates.
@@ -161,7 +178,8 @@ impl Tracker {
 
     /// Sets the targets of bones and nodes, and moves the unknowns to the start.
     fn place(&mut self, start: &Start) {
-        let targets = BoneTargets { reported: start.reported.as_deref(), expected: &start.expected_bones };
+        let trust = if self.options.adapt_prior { self.bone_trust.factor() } else { 1.0 };
+        let targets = BoneTargets { reported: start.reported.as_deref(), expected: &start.expected_bones, trust };
         self.energy.set_bones(&self.model, &targets);
         let (angle, nodes) = (self.options.energy.angle, self.model.nodes.len());
         let bones = match (self.options.energy.bones, &start.reported) {
@@ -196,14 +214,26 @@ impl Tracker {
         let mut hidden = None;
         for iteration in 0..self.options.iterations {
             let moved = self.energy.moved(&self.twists);
-            let hidden = hidden.get_or_insert_with(|| self.hidden(&moved));
+            let mesh = self.mesh(&moved);
+            let view = (self.options.silhouette || hidden.is_none()).then(|| BodyView::new(&mesh, rays.camera()));
+            if let (None, Some(view)) = (&hidden, &view) {
+                hidden = Some(view.hidden(&mesh.vertices, HIDDEN));
+            }
             let gates = Gates { distance: self.distance(iteration), ..self.options.gates };
-            let (pairs, counts) = correspondences(&moved, &self.model.origin, &mut normals, &gates, hidden);
+            let origin = &self.model.origin;
+            let hidden = hidden.as_deref().unwrap_or_default();
+            let (mut pairs, counts) = correspondences(&moved, origin, &mut normals, &gates, hidden);
+            if let Some(view) = view.filter(|_| self.options.silhouette) {
+                pairs.extend(view.uncovered(&mesh, image, &rays, origin, gates.distance));
+            }
             report.counts = counts;
             if counts.matched < self.options.least_matches {
                 return Err(FrameError::TooFewMatches { counts, least: self.options.least_matches });
             }
             self.energy.set_pairs(&self.model, &pairs, &moved);
+            if let (BoneMode::Known, Some(reported)) = (self.options.energy.bones, &start.reported) {
+                self.energy.bind(&self.model, reported, Some(&self.twists));
+            }
             let step = self.solver.iterate(&self.energy.terms(), &mut self.twists)?;
             let done = step.outcome != Outcome::Decreased;
             report.iterations.push(step);
@@ -232,16 +262,16 @@ impl Tracker {
     /// Compares the tracked body with the image.
     fn quality(&self, normals: &mut NormalMap<'_>) -> FrameQuality {
         let moved = self.energy.moved(&self.twists);
-        let hidden = self.hidden(&moved);
+        let mesh = self.mesh(&moved);
+        let hidden = BodyView::new(&mesh, self.rays.camera()).hidden(&mesh.vertices, HIDDEN);
         let (pairs, counts) = correspondences(&moved, &self.model.origin, normals, &self.options.gates, &hidden);
         FrameQuality::new(&moved, &pairs, &counts)
     }
 
-    /// Returns which vertices the body itself hides from the camera.
-    fn hidden(&self, moved: &Moved) -> Vec<bool> {
+    /// Returns the moved mesh without normals, in the camera's coordinates.
+    fn mesh(&self, moved: &Moved) -> Mesh {
         let vertices = moved.vertices.iter().map(|vertex| vertex + self.model.origin).collect();
-        let mesh = Mesh { vertices, normals: Vec::new(), triangles: self.model.mesh.triangles.clone() };
-        hidden_vertices(&mesh, self.rays.camera(), HIDDEN)
+        Mesh { vertices, normals: Vec::new(), triangles: self.model.mesh.triangles.clone() }
     }
 
     /// Moves nodes and bones to the minimum of the energy without data; without bones, by the last motion.
@@ -275,6 +305,9 @@ impl Tracker {
             (BoneMode::Known, Some(reported)) => reported,
             (BoneMode::Known, None) => return,
         };
+        if let (BoneMode::Unknown, Some(reported)) = (self.options.energy.bones, &start.reported) {
+            self.bone_trust.update(self.energy.bone_difference(&self.model.bones, bones, reported));
+        }
         self.bone_prediction.update(&start.expected_bones, bones);
         for (i, row) in self.model.attachments.rows.iter().enumerate() {
             self.offsets[i] = blended(row.iter().copied().zip(bones)).inverse() * nodes[i];

@@ -24,6 +24,10 @@ pub struct TrackerOptions {
     pub solver_tolerance: Option<f64>,
     /// Frames with fewer matches are skipped.
     pub least_matches: usize,
+    /// Also match measured points that the body does not cover with its silhouette.
+    pub silhouette: bool,
+    /// Estimate the errors of reported bones from the track, and weigh unknown bones accordingly.
+    pub adapt_prior: bool,
 }
 
 impl Default for TrackerOptions {
@@ -36,6 +40,8 @@ impl Default for TrackerOptions {
             damping: 1e-3,
             solver_tolerance: Some(0.01),
             least_matches: 50,
+            silhouette: true,
+            adapt_prior: true,
         }
     }
 }
@@ -49,7 +55,7 @@ impl TrackerOptions {
     /// # Errors
     /// Names the first option that cannot be used.
     pub fn validate(&self) -> Result<(), OptionError> {
-        let Self { energy, iterations, gates, first_distance, damping, solver_tolerance, least_matches } = self;
+        let Self { energy, iterations, gates, first_distance, damping, solver_tolerance, least_matches, .. } = self;
         energy.validate()?;
         let some = (1..=Self::MOST_ITERATIONS).contains(iterations);
         OptionError::ensure(some, "tracker.iterations", "a number from 1 to 1000", iterations)?;
@@ -75,6 +81,16 @@ impl TrackerOptions {
         options.energy.bones = BoneMode::Unknown;
         options.energy.weights = TermWeights { graph: 2.0, binding: 5.0, ..options.energy.weights };
         options
+    }
+
+    /// Stiffens the graph and the ties to bones, for the fusion of a surface: what the model lacks then stays in the
+    /// surface at rest. Soft nodes would follow it as a motion.
+    #[must_use]
+    pub fn stiffened(mut self) -> Self {
+        self.energy.weights.graph = 10.0;
+        self.energy.weights.binding = 50.0;
+        self.energy.normal_slack = 0.0;
+        self
     }
 
     /// Options for tracking without bones: a stiffer graph takes the place of the bones.
