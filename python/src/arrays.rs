@@ -3,8 +3,8 @@
 use std::ops::Deref;
 
 use numpy::{
-    PyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods, ndarray::arr0,
+    PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -31,10 +31,6 @@ pub fn array<'py, S: Precision>(name: &str, value: &Bound<'py, PyAny>) -> PyResu
     {
         return array.try_readonly().map_err(|_| PyValueError::new_err(format!("{name} is being written to")));
     }
-    if value.cast::<PyFloat>().is_ok() || value.cast::<PyInt>().is_ok() {
-        let number = arr0(S::from_f64(value.extract()?));
-        return Ok(PyArray::from_owned_array(value.py(), number).to_dyn().readonly());
-    }
     let refused = |found: String| PyTypeError::new_err(format!("{name}: expected an array of numbers, got {found}"));
     let other = || value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string());
     let given = value.py().import("numpy")?.call_method1("asarray", (value,)).map_err(|_| refused(other()))?;
@@ -51,10 +47,44 @@ pub fn array<'py, S: Precision>(name: &str, value: &Bound<'py, PyAny>) -> PyResu
 
 /// Returns the numbers of an array; refuses NaN.
 pub fn numbers<'a, S: Precision>(name: &str, array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<&'a [S]> {
-    let numbers = array.as_slice().expect("contiguous arrays only");
+    without_nan(name, array.as_slice().expect("contiguous arrays only"))
+}
+
+fn without_nan<'a, S: Precision>(name: &str, numbers: &'a [S]) -> PyResult<&'a [S]> {
     match first_nan(numbers) {
         Some(index) => Err(PyValueError::new_err(format!("{name}: entry {index} (flattened) is NaN"))),
         None => Ok(numbers),
+    }
+}
+
+/// The numbers that an input is bound to.
+pub enum Given<'py, S: Precision> {
+    /// A number of Python. As an array it would take longer than an evaluation.
+    Number([S; 1]),
+    Array(PyReadonlyArrayDyn<'py, S>),
+}
+
+impl<'py, S: Precision> Given<'py, S> {
+    pub fn new(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if value.cast::<PyFloat>().is_ok() || value.cast::<PyInt>().is_ok() {
+            return Ok(Self::Number([S::from_f64(value.extract()?)]));
+        }
+        array(name, value).map(Self::Array)
+    }
+
+    /// Returns the numbers; refuses NaN.
+    pub fn numbers(&self, name: &str) -> PyResult<&[S]> {
+        match self {
+            Self::Number(number) => without_nan(name, number),
+            Self::Array(array) => numbers(name, array),
+        }
+    }
+
+    pub fn shape(&self) -> &[usize] {
+        match self {
+            Self::Number(_) => &[],
+            Self::Array(array) => array.shape(),
+        }
     }
 }
 

@@ -1,14 +1,16 @@
 //! Declarations, and their inputs.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use energy_catalogue::BatchRoutine;
-use energy_compiler::{Elements as Tapes, InputKind, Interpreted};
+use energy_compiler::{Elements as Tapes, InputKind, InputNumbers, Interpreted};
 use energy_dsl::tape::Column;
-use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyFloat, PyString};
 
-use crate::arrays::{Precision, array, numbers, tuple, wrong_shape};
+use crate::arrays::{Given, Precision, tuple, wrong_shape};
 use crate::errors::wrong;
 use crate::evaluation::{Batch, Elements, Request};
 
@@ -40,6 +42,22 @@ pub struct Element {
     pub inner: Interpreted,
     /// Whether the element is one of the library, which has compiled code for it.
     pub is_of_library: bool,
+    last_call: Arc<Mutex<Option<BoundCall>>>,
+}
+
+/// A call whose inputs were numbers of Python, with its elements. Newton's method repeats such calls, and binding takes
+/// longer than evaluating a few elements.
+struct BoundCall {
+    count: usize,
+    single: bool,
+    /// Rest shapes and parameters, in declared order.
+    numbers: Vec<f64>,
+    elements: Arc<Elements>,
+}
+
+impl BoundCall {
+    /// Elements of one kept call.
+    const MOST: usize = 64;
 }
 
 /// Compiles all declarations of a text.
@@ -48,7 +66,7 @@ pub struct Element {
 pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>> {
     let elements =
         py.detach(|| Interpreted::from_file(text, file).map_err(|errors| errors.to_string())).map_err(wrong)?;
-    Ok(elements.into_iter().map(|inner| Element { inner, is_of_library: false }).collect())
+    Ok(elements.into_iter().map(|inner| Element::new(inner, false)).collect())
 }
 
 /// Returns the names of the elements of the library, in alphabetical order.
@@ -67,7 +85,7 @@ pub fn library_element(py: Python<'_>, name: &str) -> PyResult<Option<Element>> 
     let mut elements = py
         .detach(|| Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string()))
         .map_err(wrong)?;
-    Ok(elements.pop().map(|inner| Element { inner, is_of_library: true }))
+    Ok(elements.pop().map(|inner| Element::new(inner, true)))
 }
 
 #[pymethods]
@@ -112,7 +130,7 @@ impl Element {
 
     #[getter]
     fn inputs(&self) -> Vec<Input> {
-        let input = |input: &energy_compiler::InputNumbers| Input {
+        let input = |input: &InputNumbers| Input {
             name: input.name.clone(),
             kind: keyword(input.kind),
             shape: input.shape.clone(),
@@ -159,6 +177,10 @@ impl Element {
 }
 
 impl Element {
+    pub fn new(inner: Interpreted, is_of_library: bool) -> Self {
+        Self { inner, is_of_library, last_call: Arc::default() }
+    }
+
     pub fn point_count(&self) -> usize {
         count(&self.inner, InputKind::Point) / 3
     }
@@ -179,19 +201,42 @@ impl Element {
     }
 
     /// Binds inputs for one call: as many elements as the first axis of `x` has, in single precision if `x` is.
-    fn bound_for(&self, x: &Bound<'_, PyAny>, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Elements> {
+    fn bound_for(&self, x: &Bound<'_, PyAny>, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Arc<Elements>> {
         let single = x.cast::<PyArrayDyn<f32>>().is_ok();
         let count = match x.cast::<PyUntypedArray>() {
             Ok(x) => x.shape().first().copied().unwrap_or(0),
             Err(_) => x.len().unwrap_or(0),
         };
-        self.bound(count, single, inputs)
+        let bind = || Ok(Arc::new(self.bound(count, single, inputs)?));
+        let Some(numbers) = self.numbers(inputs).filter(|_| count <= BoundCall::MOST) else { return bind() };
+        let mut last = self.last_call.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(call) = last.as_ref()
+            && (call.count, call.single) == (count, single)
+            && call.numbers.iter().map(|x| x.to_bits()).eq(numbers.iter().map(|x| x.to_bits()))
+        {
+            return Ok(Arc::clone(&call.elements));
+        }
+        let elements = bind()?;
+        *last = Some(BoundCall { count, single, numbers, elements: Arc::clone(&elements) });
+        Ok(elements)
+    }
+
+    /// Returns the rest shapes and parameters; `None` unless they are complete, in declared order, and each is a `float`.
+    fn numbers(&self, given: Option<&Bound<'_, PyDict>>) -> Option<Vec<f64>> {
+        let bound = |input: &&InputNumbers| matches!(input.kind, InputKind::Rest | InputKind::Parameter);
+        let mut inputs = self.inner.inputs().iter().filter(bound);
+        let mut numbers = Vec::with_capacity(given.map_or(0, |given| given.len()));
+        for (name, value) in given.into_iter().flatten() {
+            let is_next = name.cast::<PyString>().ok()?.to_str().ok()? == inputs.next()?.name;
+            numbers.push(value.cast::<PyFloat>().ok().filter(|_| is_next)?.value());
+        }
+        inputs.next().is_none().then_some(numbers)
     }
 }
 
 /// Returns the numbers of all inputs of a kind.
 pub fn count(element: &Interpreted, kind: InputKind) -> usize {
-    element.inputs().iter().filter(|input| input.kind == kind).map(energy_compiler::InputNumbers::size).sum()
+    element.inputs().iter().filter(|input| input.kind == kind).map(InputNumbers::size).sum()
 }
 
 macro_rules! evaluations {
@@ -268,7 +313,7 @@ struct Columns<'a, 'py, S: Precision> {
     element: &'a Interpreted,
     count: usize,
     /// In the order of the inputs; `None` for points.
-    arrays: Vec<Option<PyReadonlyArrayDyn<'py, S>>>,
+    given: Vec<Option<Given<'py, S>>>,
 }
 
 impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
@@ -279,10 +324,10 @@ impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
             let names: Vec<&str> = inputs.iter().filter(|i| bound(i.kind)).map(|input| input.name.as_str()).collect();
             if names.is_empty() { "none".to_owned() } else { names.join(", ") }
         };
-        let (mut arrays, mut used) = (Vec::with_capacity(inputs.len()), 0);
+        let (mut columns, mut used) = (Vec::with_capacity(inputs.len()), 0);
         for input in inputs {
             if !bound(input.kind) {
-                arrays.push(None);
+                columns.push(None);
                 continue;
             }
             let Some(value) = given.map(|given| given.get_item(&input.name)).transpose()?.flatten() else {
@@ -290,7 +335,7 @@ impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
                 let message = format!("{name}: missing {kind} `{}`; expected {}", input.name, wanted());
                 return Err(PyTypeError::new_err(message));
             };
-            arrays.push(Some(array(&input.name, &value)?));
+            columns.push(Some(Given::new(&input.name, &value)?));
             used += 1;
         }
         if let Some(given) = given.filter(|given| given.len() > used) {
@@ -300,15 +345,15 @@ impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
             let message = format!("{name}: no input `{unknown}` to bind; expected {}", wanted());
             return Err(PyTypeError::new_err(message));
         }
-        Ok(Self { element: &element.inner, count, arrays })
+        Ok(Self { element: &element.inner, count, given: columns })
     }
 
     fn of(&self, kind: InputKind) -> PyResult<Vec<Column<'_, S>>> {
-        let inputs = self.element.inputs().iter().zip(&self.arrays).filter(|(input, _)| input.kind == kind);
+        let inputs = self.element.inputs().iter().zip(&self.given).filter(|(input, _)| input.kind == kind);
         inputs
-            .map(|(input, array)| {
-                let array = array.as_ref().expect("checked");
-                let (data, shape) = (numbers(&input.name, array)?, array.shape());
+            .map(|(input, given)| {
+                let given = given.as_ref().expect("checked");
+                let (data, shape) = (given.numbers(&input.name)?, given.shape());
                 if shape == input.shape {
                     return Ok(Column::Same(data));
                 }

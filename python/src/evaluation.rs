@@ -45,7 +45,7 @@ impl Elements {
     #[getter]
     fn element(&self) -> Element {
         let inner = any!(self, batch => batch.tapes.element()).clone();
-        Element { inner, is_of_library: self.is_of_library }
+        Element::new(inner, self.is_of_library)
     }
 
     /// Name of the dtype that elements are evaluated in.

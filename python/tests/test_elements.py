@@ -143,3 +143,18 @@ def test_audits_find_what_is_false():
     false = ed.audit("#[invariant(rotation)] energy Weight(p, q: Point; k: Scalar) { k * (p - q).z }", quick=True)
     assert not false and "rotation" in " ".join(false.failures)
     assert "fn gradient" in ed.show(SPRING)
+
+
+def test_repeated_calls_follow_their_parameters():
+    spring = ed.element("HookeSpring")
+    x = np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]])
+    first = spring.value(x, K=1.0, L=1.0)
+    assert spring.value(x, K=3.0, L=1.0) == 3 * first
+    assert spring.value(x, L=1.0, K=1.0) == first
+    assert spring.value(x, K=1.0, L=2.0) == 0.0
+    assert spring.value(np.concatenate([x, x]), K=1.0, L=1.0).tolist() == 2 * first.tolist()
+    assert spring.value(x.astype(np.float32), K=1.0, L=1.0).dtype == np.float32
+    with pytest.raises(TypeError, match="missing parameter"):
+        spring.value(x, K=1.0)
+    with pytest.raises(ValueError, match="NaN"):
+        spring.value(x, K=float("nan"), L=1.0)

@@ -7,3 +7,4 @@ mod errata;
 mod fusion_reference;
 mod multiprecision;
 mod tape;
+mod tracked_skirt;
