@@ -77,7 +77,9 @@ impl System {
                 return Err(PyValueError::new_err(message));
             }
             if let Some(vertex) = stencil.iter().find(|&&vertex| vertex >= self.pinned.len()) {
-                return Err(PyValueError::new_err(format!("stencils: row {row} names vertex {vertex}, which is none")));
+                let count = self.pinned.len();
+                let message = format!("stencils: row {row} names vertex {vertex}, but there are only {count} vertices");
+                return Err(PyValueError::new_err(message));
             }
             if let Some(vertex) = (1..points).map(|i| stencil[i]).zip(0..).find(|(v, i)| stencil[..=*i].contains(v)) {
                 let message = format!("stencils: row {row} names vertex {} twice", vertex.0);
