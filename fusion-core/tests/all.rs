@@ -8,4 +8,3 @@ mod inputs;
 mod joints;
 mod real_body;
 mod surface;
-mod surface_distance;

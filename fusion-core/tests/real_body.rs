@@ -7,14 +7,12 @@ use std::path::{Path, PathBuf};
 
 use fusion_core::body::{Mesh, SkinnedBody, read_makehuman};
 use fusion_core::depth::{Camera, DepthImage, SensorNoise, render, visible_vertices};
-use fusion_core::evaluation::{ErrorSummary, FrameErrors, TrackErrors};
+use fusion_core::evaluation::{ErrorSummary, FrameErrors, SurfaceDistance, TrackErrors};
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::model_size::fit_size;
 use fusion_core::protocol::{Recording, reported_bones, skeleton_alone};
 use fusion_core::skeleton::{BoneNoise, Bvh, Retarget};
 use fusion_core::tracker::{Tracker, TrackerOptions};
-
-use crate::surface_distance::SurfaceDistance;
 
 const WINDOWS: [usize; 9] = [20, 420, 700, 1000, 1300, 1540, 1800, 2100, 2400];
 const TUNED: usize = 420;

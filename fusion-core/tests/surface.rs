@@ -2,14 +2,12 @@
 
 use fusion_core::body::{Mesh, SkinnedBody, figure, figure_motion};
 use fusion_core::depth::{Camera, SensorNoise, visible_vertices};
-use fusion_core::evaluation::ErrorSummary;
+use fusion_core::evaluation::{ErrorSummary, SurfaceDistance};
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::protocol::Recording;
 use fusion_core::surface::{SurfaceOptions, SurfaceVolume};
 use fusion_core::tracker::{Tracker, TrackerOptions};
 use nalgebra::Vector3;
-
-use crate::surface_distance::SurfaceDistance;
 
 /// Returns the figure at rest with a bump of 30 mm on its chest, and the part of the bump at each vertex.
 fn with_bump(body: &SkinnedBody) -> (SkinnedBody, Vec<f64>) {

@@ -221,10 +221,9 @@ impl Element {
         Ok(elements)
     }
 
-    /// Returns the rest shapes and parameters; `None` unless they are complete, in declared order, and each is a `float`.
+    /// Returns the rest shapes and parameters; `None` unless they are complete, in declared order, and all `float`.
     fn numbers(&self, given: Option<&Bound<'_, PyDict>>) -> Option<Vec<f64>> {
-        let bound = |input: &&InputNumbers| matches!(input.kind, InputKind::Rest | InputKind::Parameter);
-        let mut inputs = self.inner.inputs().iter().filter(bound);
+        let mut inputs = self.inner.inputs().iter().filter(|input| is_bound(input.kind));
         let mut numbers = Vec::with_capacity(given.map_or(0, |given| given.len()));
         for (name, value) in given.into_iter().flatten() {
             let is_next = name.cast::<PyString>().ok()?.to_str().ok()? == inputs.next()?.name;
@@ -299,6 +298,11 @@ evaluations! {
     jacobian(u) => Jacobian;
 }
 
+/// Returns whether inputs of this kind are bound before elements are evaluated.
+fn is_bound(kind: InputKind) -> bool {
+    matches!(kind, InputKind::Rest | InputKind::Parameter)
+}
+
 fn keyword(kind: InputKind) -> &'static str {
     match kind {
         InputKind::Point => "point",
@@ -319,14 +323,14 @@ struct Columns<'a, 'py, S: Precision> {
 impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
     fn new(element: &'a Element, count: usize, given: Option<&Bound<'py, PyDict>>) -> PyResult<Self> {
         let (name, inputs) = (element.name(), element.inner.inputs());
-        let bound = |kind| matches!(kind, InputKind::Rest | InputKind::Parameter);
         let wanted = || {
-            let names: Vec<&str> = inputs.iter().filter(|i| bound(i.kind)).map(|input| input.name.as_str()).collect();
+            let names: Vec<&str> =
+                inputs.iter().filter(|i| is_bound(i.kind)).map(|input| input.name.as_str()).collect();
             if names.is_empty() { "none".to_owned() } else { names.join(", ") }
         };
         let (mut columns, mut used) = (Vec::with_capacity(inputs.len()), 0);
         for input in inputs {
-            if !bound(input.kind) {
+            if !is_bound(input.kind) {
                 columns.push(None);
                 continue;
             }
@@ -339,7 +343,7 @@ impl<'a, 'py, S: Precision> Columns<'a, 'py, S> {
             used += 1;
         }
         if let Some(given) = given.filter(|given| given.len() > used) {
-            let known = |key: &str| inputs.iter().any(|input| bound(input.kind) && input.name == key);
+            let known = |key: &str| inputs.iter().any(|input| is_bound(input.kind) && input.name == key);
             let keys: Vec<String> = given.keys().extract()?;
             let unknown = keys.into_iter().find(|key| !known(key)).unwrap_or_default();
             let message = format!("{name}: no input `{unknown}` to bind; expected {}", wanted());

@@ -202,6 +202,13 @@ impl DeformationModel {
         self.vertex_nodes.iter().zip(&self.vertex_weights).map(of_vertex).collect()
     }
 
+    /// Returns the mesh with moved vertices, given in the model's coordinates, as the camera sees it: in the camera's
+    /// coordinates, without normals.
+    pub(crate) fn seen(&self, vertices: impl Iterator<Item = Vector3<f64>>) -> Mesh {
+        let vertices = vertices.map(|vertex| vertex + self.origin).collect();
+        Mesh { vertices, normals: Vec::new(), triangles: self.mesh.triangles.clone() }
+    }
+
     /// Converts a motion from the world to the model's coordinates: (R, t) becomes (R, t + R o − o).
     #[must_use]
     pub fn centred(&self, motion: &Isometry3<f64>) -> Isometry3<f64> {

@@ -128,7 +128,9 @@ impl SurfaceVolume {
         normal_reach: usize,
     ) {
         let mut normals = NormalMap::new(image, rays, normal_reach);
-        let view = BodyView::new(&moved_mesh(model, motions), rays.camera());
+        let vertices = model.mesh.vertices.iter().zip(motions);
+        let moved_vertices = vertices.map(|(at, motion)| motion.transform_point(&(*at).into()).coords);
+        let view = BodyView::new(&model.seen(moved_vertices), rays.camera());
         let SurfaceOptions { truncation, reach, .. } = self.options;
         for voxel in &mut self.voxels {
             let place = self.grid.place(self.grid.voxel(voxel.index));
@@ -223,13 +225,6 @@ fn near_voxels(grid: &Grid, mesh: &Mesh, options: &SurfaceOptions) -> Vec<(usize
     let softening = (options.voxel * options.voxel) as f32;
     let found = nearest.iter().enumerate().filter(|(_, list)| list[0].1 != u32::MAX);
     found.map(|(index, list)| (index, shares(list, softening))).collect()
-}
-
-/// Returns the moved model without normals, in the camera's coordinates.
-fn moved_mesh(model: &DeformationModel, motions: &[Isometry3<f64>]) -> Mesh {
-    let both = model.mesh.vertices.iter().zip(motions);
-    let vertices = both.map(|(at, motion)| motion.transform_point(&(*at).into()).coords + model.origin).collect();
-    Mesh { vertices, normals: Vec::new(), triangles: model.mesh.triangles.clone() }
 }
 
 /// Returns the moved normal of the nearest vertex.

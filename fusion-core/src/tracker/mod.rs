@@ -14,7 +14,6 @@ use self::bone_trust::BoneTrust;
 pub use self::options::TrackerOptions;
 use self::prediction::Prediction;
 pub use self::report::{FrameError, FrameQuality, FrameReport, TrackerError};
-use crate::body::Mesh;
 use crate::correspondence::{Gates, MatchCounts, correspondences};
 use crate::depth::{Camera, DepthImage, NormalMap, PixelRays};
 use crate::energy::{BoneMode, BoneTargets, FusionEnergy, Moved, skeleton_energy};
@@ -214,7 +213,7 @@ impl Tracker {
         let mut hidden = None;
         for iteration in 0..self.options.iterations {
             let moved = self.energy.moved(&self.twists);
-            let mesh = self.mesh(&moved);
+            let mesh = self.model.seen(moved.vertices.iter().copied());
             let view = (self.options.silhouette || hidden.is_none()).then(|| BodyView::new(&mesh, rays.camera()));
             if let (None, Some(view)) = (&hidden, &view) {
                 hidden = Some(view.hidden(&mesh.vertices, HIDDEN));
@@ -262,16 +261,10 @@ impl Tracker {
     /// Compares the tracked body with the image.
     fn quality(&self, normals: &mut NormalMap<'_>) -> FrameQuality {
         let moved = self.energy.moved(&self.twists);
-        let mesh = self.mesh(&moved);
+        let mesh = self.model.seen(moved.vertices.iter().copied());
         let hidden = BodyView::new(&mesh, self.rays.camera()).hidden(&mesh.vertices, HIDDEN);
         let (pairs, counts) = correspondences(&moved, &self.model.origin, normals, &self.options.gates, &hidden);
         FrameQuality::new(&moved, &pairs, &counts)
-    }
-
-    /// Returns the moved mesh without normals, in the camera's coordinates.
-    fn mesh(&self, moved: &Moved) -> Mesh {
-        let vertices = moved.vertices.iter().map(|vertex| vertex + self.model.origin).collect();
-        Mesh { vertices, normals: Vec::new(), triangles: self.model.mesh.triangles.clone() }
     }
 
     /// Moves nodes and bones to the minimum of the energy without data; without bones, by the last motion.

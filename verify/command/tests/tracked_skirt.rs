@@ -6,16 +6,10 @@ use std::fmt::Write as _;
 use cloth_core::{Simulation, scene::Scene};
 use fusion_core::body::{Bone, Mesh, SkinnedBody};
 use fusion_core::depth::{Camera, SensorNoise, render, visible_vertices};
-use fusion_core::evaluation::ErrorSummary;
+use fusion_core::evaluation::{ErrorSummary, SurfaceDistance};
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::tracker::{Tracker, TrackerOptions};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-
-/// As in the tracker's own tests.
-#[path = "../../../fusion-core/tests/surface_distance.rs"]
-mod surface_distance;
-
-use surface_distance::SurfaceDistance;
 
 const AROUND: usize = 72;
 const DOWN: usize = 24;
@@ -23,8 +17,8 @@ const DOWN: usize = 24;
 const STEPS: u64 = 3;
 const FRAMES: u64 = 20;
 
-/// Returns an A-line with its waist at a height of 0.5 m, as OBJ text. Wider skirts fall into deep folds, because no legs
-/// are below.
+/// Returns an A-line with its waist at a height of 0.5 m, as OBJ text. Wider skirts fall into deep folds, because there
+/// are no legs below.
 fn skirt() -> String {
     let mut text = String::new();
     for ring in 0..=DOWN {
@@ -84,10 +78,10 @@ fn frame(simulation: &Simulation) -> Frame {
     let to_camera = to_camera();
     let places: Vec<Vector3<f64>> = simulation.positions().iter().map(|&place| place.into()).collect();
     let centre = places[..AROUND].iter().sum::<Vector3<f64>>() / AROUND as f64;
-    let turn =
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), (places[0] - centre).y.atan2((places[0] - centre).x));
+    let forwards = places[0] - centre;
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), forwards.y.atan2(forwards.x));
     let waist = Isometry3::from_parts((centre - turn * Vector3::new(0.0, 0.0, 0.5)).into(), turn);
-    let vertices = places.iter().map(|place| to_camera * nalgebra::Point3::from(*place)).map(|p| p.coords).collect();
+    let vertices = places.iter().map(|&place| to_camera.transform_point(&place.into()).coords).collect();
     Frame { vertices, waist: to_camera * waist * to_camera.inverse() }
 }
 

@@ -1,7 +1,11 @@
 //! Errors of a track against the truth.
 
+mod surface_distance;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+
+pub use self::surface_distance::SurfaceDistance;
 
 /// Statistics of end-point errors, in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,20 +1,23 @@
-//! Distances of points from a mesh.
-
 use std::collections::HashMap;
 
-use fusion_core::body::Mesh;
 use nalgebra::Vector3;
 
-/// The triangles of a mesh, by cells of a grid.
+use crate::body::Mesh;
+use crate::model::bone_distance;
+
+/// Distances of points from a mesh. Its triangles are kept by cells of a grid.
+#[derive(Clone, Debug)]
 pub struct SurfaceDistance<'a> {
     mesh: &'a Mesh,
     cells: HashMap<[i32; 3], Vec<u32>>,
 }
 
-/// Width of a cell, and the largest distance, in m.
-const REACH: f64 = 0.06;
-
 impl<'a> SurfaceDistance<'a> {
+    /// Largest distance, in m, and width of a cell.
+    pub const REACH: f64 = 0.06;
+
+    /// Prepares a mesh.
+    #[must_use]
     pub fn new(mesh: &'a Mesh) -> Self {
         let mut cells: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
         for (at, triangle) in mesh.triangles.iter().enumerate() {
@@ -32,7 +35,8 @@ impl<'a> SurfaceDistance<'a> {
         Self { mesh, cells }
     }
 
-    /// Returns the distance of a point from the nearest triangle, at most [`REACH`], in m.
+    /// Returns the distance of a point from the nearest triangle, at most [`Self::REACH`], in m.
+    #[must_use]
     pub fn of(&self, point: &Vector3<f64>) -> f64 {
         let [x, y, z] = cell(point);
         let offsets = (0..27).map(|i| [x + i / 9 - 1, y + i / 3 % 3 - 1, z + i % 3 - 1]);
@@ -41,12 +45,12 @@ impl<'a> SurfaceDistance<'a> {
             let corners = self.mesh.triangles[at as usize].map(|vertex| self.mesh.vertices[vertex as usize]);
             distance_from_triangle(point, corners)
         };
-        near.map(distance).fold(REACH, f64::min)
+        near.map(distance).fold(Self::REACH, f64::min)
     }
 }
 
 fn cell(point: &Vector3<f64>) -> [i32; 3] {
-    point.map(|x| (x / REACH).floor() as i32).into()
+    point.map(|x| (x / SurfaceDistance::REACH).floor() as i32).into()
 }
 
 /// Returns the distance from the plane if the point is above the triangle, else from the nearest edge.
@@ -58,19 +62,28 @@ fn distance_from_triangle(point: &Vector3<f64>, corners: [Vector3<f64>; 3]) -> f
         return normal.normalize().dot(&(point - a)).abs();
     }
     let edges = [[a, b], [b, c], [c, a]];
-    edges.iter().map(|edge| fusion_core::model::bone_distance(point, edge)).fold(f64::INFINITY, f64::min)
+    edges.iter().map(|edge| bone_distance(point, edge)).fold(f64::INFINITY, f64::min)
 }
 
-#[test]
-fn distances_from_a_triangle() {
-    let vertices = vec![Vector3::zeros(), Vector3::x(), Vector3::y()];
-    let mesh = Mesh::new(vertices, vec![[0, 1, 2]]);
-    let distance = SurfaceDistance::new(&mesh);
-    let far = std::f64::consts::FRAC_1_SQRT_2 * 0.02;
-    let cases =
-        [([0.2, 0.3, 0.05], 0.05), ([-0.03, 0.5, 0.04], 0.05), ([0.51, 0.51, 0.0], far), ([0.2, 0.2, 1.0], REACH)];
-    for (point, expected) in cases {
-        let found = distance.of(&Vector3::from(point));
-        assert!((found - expected).abs() < 1e-12, "{point:?}: {found}, expected {expected}");
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_from_a_triangle() {
+        let vertices = vec![Vector3::zeros(), Vector3::x(), Vector3::y()];
+        let mesh = Mesh::new(vertices, vec![[0, 1, 2]]);
+        let distance = SurfaceDistance::new(&mesh);
+        let far = std::f64::consts::FRAC_1_SQRT_2 * 0.02;
+        let cases = [
+            ([0.2, 0.3, 0.05], 0.05),
+            ([-0.03, 0.5, 0.04], 0.05),
+            ([0.51, 0.51, 0.0], far),
+            ([0.2, 0.2, 1.0], SurfaceDistance::REACH),
+        ];
+        for (point, expected) in cases {
+            let found = distance.of(&Vector3::from(point));
+            assert!((found - expected).abs() < 1e-12, "{point:?}: {found}, expected {expected}");
+        }
     }
 }
