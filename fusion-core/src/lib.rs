@@ -33,6 +33,7 @@
 // The declared residuals keep the symbols of their sources.
 #![allow(confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
+pub mod animation;
 pub mod body;
 pub mod correspondence;
 pub mod depth;

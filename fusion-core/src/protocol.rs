@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use crate::body::{Mesh, SkinnedBody};
+use crate::body::{Bone, Mesh, SkinnedBody};
 use crate::depth::{Camera, DepthImage, SensorNoise, render, visible_vertices};
 use crate::evaluation::{FrameErrors, TrackErrors};
 use crate::skeleton::{BoneNoise, noisy};
@@ -76,6 +76,28 @@ impl Recording {
     }
 }
 
+/// Returns a pose moved to the place of another one: the root turns about the vertical to the other's heading, and moves
+/// horizontally to the other's position. Motions are from the body's own rest, with y up; the root's z axis points to the
+/// front. Heights stay, so that a standing pose stays on the floor.
+///
+/// # Panics
+/// If a pose lacks the root's motion.
+#[must_use]
+pub fn at_place_of(bones: &[Bone], pose: &[Isometry3<f64>], other: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
+    let Some(root) = bones.iter().position(|bone| bone.parent.is_none()) else { return pose.to_vec() };
+    let head = bones[root].head.into();
+    let [here, there] = [pose, other].map(|motions| motions[root].transform_point(&head).coords);
+    let [from, to] = [pose, other].map(|motions| {
+        let forwards = motions[root].rotation * Vector3::z();
+        forwards.x.atan2(forwards.z)
+    });
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), to - from);
+    let turned = turn * here;
+    let shift = Translation3::new(there.x - turned.x, 0.0, there.z - turned.z);
+    let place = Isometry3::from_parts(shift, turn);
+    pose.iter().map(|motion| place * motion).collect()
+}
+
 /// Returns the bones that a body tracker reports: the true motions with errors, which are reproducible for a frame.
 #[must_use]
 pub fn reported_bones(recording: &Recording, frame: usize, noise: BoneNoise) -> Vec<Isometry3<f64>> {
@@ -123,4 +145,24 @@ fn view(place: Vector3<f64>, along: Vector3<f64>) -> Isometry3<f64> {
     let rows = Matrix3::from_rows(&[right.transpose(), down.transpose(), along.transpose()]);
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
     Isometry3::from_parts(Translation3::from(-(rotation * place)), rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{figure, figure_motion};
+
+    #[test]
+    fn a_pose_moves_to_the_place_of_another() {
+        let bones = figure().bones;
+        let away = Isometry3::new(Vector3::new(0.5, 0.2, -1.5), Vector3::y() * 2.0);
+        let other: Vec<_> = figure_motion(1.0).iter().map(|motion| away * motion).collect();
+        let moved = at_place_of(&bones, &figure_motion(0.0), &other);
+        let head = |motions: &[Isometry3<f64>]| motions[0].transform_point(&bones[0].head.into());
+        let (found, wanted) = (head(&moved), head(&other));
+        assert!((found.x - wanted.x).abs() < 1e-12 && (found.z - wanted.z).abs() < 1e-12, "{found}, {wanted}");
+        assert!((found.y - bones[0].head[1]).abs() < 1e-12, "{found}: the height stays");
+        let [a, b] = [&moved, &other].map(|motions| motions[0].rotation * Vector3::z());
+        assert!((a.x * b.z - a.z * b.x).abs() < 1e-12 && a.x * b.x + a.z * b.z > 0.0, "{a}, {b}");
+    }
 }

@@ -28,7 +28,7 @@ fn a_recording_is_rendered_tracked_and_evaluated() {
     // A damaged and a missing image are skipped with a reason; the others are tracked.
     std::fs::write(Path::new(recording).join("depth/000002.png"), b"no image").unwrap();
     std::fs::remove_file(Path::new(recording).join("depth/000003.png")).unwrap();
-    let output = fusion(&["track", recording, "--stats", "--pictures", "--usd", "--surface", "-o", track]);
+    let output = fusion(&["track", recording, "--stats", "--pictures", "--usd", "--gltf", "--surface", "-o", track]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(printed.contains("time per frame: mean") && printed.contains("Hz"), "{printed}");
@@ -69,11 +69,40 @@ fn pictures_and_points_are_complete(track: &Path) {
     let samples: Vec<&str> = usd.lines().filter(|line| line.ends_with(")],")).collect();
     assert!(samples.len() == 5 && samples[4].trim_start().starts_with("4: [("), "{}", samples.len());
     assert!(samples.iter().all(|points| points.matches('(').count() == 3638));
+    animation_is_complete(track);
+    assert!(!track.join("track.glb.part").exists() && !track.join("track.usda.part").exists());
     let page = std::fs::read_to_string(track.join("errors.html")).unwrap();
     assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 3, "two frames and the film");
     assert!(page.contains("<svg") && page.contains("skeleton alone"));
     let links = page.matches("http").count() - page.matches("http://www.w3.org/2000/svg").count();
     assert_eq!(links, 0, "the page needs no other file");
+}
+
+/// Checks the binary glTF of a track of five frames at 30 Hz: its times, vertices and moves.
+fn animation_is_complete(track: &Path) {
+    let mut file = gltf::Gltf::open(track.join("track.glb")).unwrap();
+    let data = file.blob.take().unwrap();
+    let primitive = file.meshes().next().unwrap().primitives().next().unwrap();
+    let reader = primitive.reader(|_| Some(&data));
+    let first: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+    assert_eq!(first.len(), 3638);
+    assert_eq!(reader.read_normals().unwrap().len(), 3638);
+    let moves: Vec<Vec<[f32; 3]>> = reader.read_morph_targets().map(|target| target.0.unwrap().collect()).collect();
+    assert_eq!(moves.iter().map(Vec::len).collect::<Vec<_>>(), [3638; 4]);
+    let animation = file.animations().next().unwrap();
+    let channel = animation.channels().next().unwrap();
+    let times: Vec<f32> = channel.reader(|_| Some(&data)).read_inputs().unwrap().collect();
+    assert_eq!(times.len(), 5);
+    assert!((0..5).all(|frame| (times[frame] - frame as f32 / 30.0).abs() < 1e-4), "{times:?}");
+    // The last frame is the last mesh, with y up.
+    let mesh = std::fs::read_to_string(track.join("meshes/000004.obj")).unwrap();
+    let vertices = mesh.lines().filter_map(|line| line.strip_prefix("v "));
+    for (at, line) in vertices.enumerate() {
+        let [x, y, z] = [0, 1, 2].map(|axis| line.split(' ').nth(axis).unwrap().parse::<f32>().unwrap());
+        let found: [f32; 3] = std::array::from_fn(|axis| first[at][axis] + moves[3][at][axis]);
+        let errors = [found[0] - x, found[1] + y, found[2] + z];
+        assert!(errors.iter().all(|error| error.abs() < 2e-6), "vertex {at}: {found:?}, {line}");
+    }
 }
 
 #[test]

@@ -18,9 +18,10 @@ mod track;
 mod usd;
 mod visibility;
 
-pub use animation::{AnimationError, animation_glb};
+pub use animation::animation_glb;
 pub use folder::{OutputError, OutputFolder};
 pub use frame::{last_obj_line, obj_text};
+pub use mesh_animation::AnimationError;
 pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
 pub use point_cache::{mdd_bytes, pc2_bytes};

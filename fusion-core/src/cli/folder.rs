@@ -15,6 +15,8 @@ pub const NODES: &str = "nodes.json";
 pub const FILM: &str = "track.apng";
 /// Track as Universal Scene Description.
 pub const USD: &str = "track.usda";
+/// Track as binary glTF.
+pub const GLTF: &str = "track.glb";
 
 /// Folder of the fused surface, in a track.
 pub const SURFACE: &str = "surface";

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use fusion_core::body::{SkinnedBody, figure, figure_motion, read_body, read_gltf, read_makehuman, read_obj};
+use fusion_core::protocol::at_place_of;
 use fusion_core::skeleton::{Bvh, Retarget};
 use nalgebra::Isometry3;
 
@@ -37,12 +38,25 @@ impl Source {
 
     /// Returns the body and the motions of its bones from its own rest.
     pub fn posed(&self) -> Result<(SkinnedBody, Vec<Vec<Isometry3<f64>>>)> {
+        self.motions(&[])
+    }
+
+    /// Returns the same after a T pose: the motion's first frame, at the place of the frame `from`.
+    pub fn posed_after_t_pose(&self) -> Result<(SkinnedBody, Vec<Vec<Isometry3<f64>>>)> {
+        let (body, mut motions) = self.motions(&[0])?;
+        if let [t_pose, first, ..] = motions.as_slice() {
+            motions[0] = at_place_of(&body.bones, t_pose, first);
+        }
+        Ok((body, motions))
+    }
+
+    /// Returns the body and the motions of its bones in some frames, then in those of the options.
+    fn motions(&self, before: &[usize]) -> Result<(SkinnedBody, Vec<Vec<Isometry3<f64>>>)> {
         ensure!(self.step > 0, "--step: expected at least 1, got {}", self.step);
         if self.body == "figure" {
             ensure!(self.motion.is_none(), "the figure has its own motion; remove --motion");
             let last = self.to.unwrap_or(self.from + 120);
-            let motions =
-                (self.from..=last).step_by(self.step).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
+            let motions = self.frames(before, last).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
             return Ok((figure(), motions));
         }
         let body = read_any_body(Path::new(&self.body))?;
@@ -59,10 +73,13 @@ impl Source {
         }
         let last = self.to.unwrap_or(motion.frames() - 1);
         ensure!(last < motion.frames(), "--to {last}: {} has {} frames", path.display(), motion.frames());
-        let motions: Result<_, _> =
-            (self.from..=last).step_by(self.step).map(|frame| retarget.motions(frame)).collect();
+        let motions: Result<_, _> = self.frames(before, last).map(|frame| retarget.motions(frame)).collect();
         let motions = motions?;
         Ok((body, motions))
+    }
+
+    fn frames(&self, before: &[usize], last: usize) -> impl Iterator<Item = usize> {
+        before.iter().copied().chain((self.from..=last).step_by(self.step))
     }
 }
 

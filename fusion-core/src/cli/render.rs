@@ -33,6 +33,9 @@ pub struct Render {
     /// Standard deviation of the translations of bones along each axis, in mm.
     #[arg(long, default_value_t = 0.0)]
     bone_shift: f64,
+    /// Begin with the first frame of the motion, a T pose, at the place of the frame --from. It becomes the model's rest.
+    #[arg(long)]
+    t_pose: bool,
     /// Output folder.
     #[arg(short, long)]
     output: PathBuf,
@@ -50,6 +53,7 @@ impl Render {
             noise: SensorNoise::default().factor,
             bone_turn: noise.turn.to_degrees(),
             bone_shift: 1e3 * noise.shift,
+            t_pose: false,
             output: output.to_owned(),
             overwrite: true,
         }
@@ -66,7 +70,7 @@ impl Render {
         {
             ensure!(value >= 0.0 && value.is_finite(), "{name}: expected a finite number of at least 0, got {value}");
         }
-        let (body, motions) = self.source.posed()?;
+        let (body, motions) = if self.t_pose { self.source.posed_after_t_pose() } else { self.source.posed() }?;
         ensure!(motions.len() > 1, "expected at least two frames between --from and --to");
         let recording = Recording::new(&body, &motions, Camera::VGA, self.distance);
         let files = [MODEL, SKELETON, DepthSequence::INTRINSICS, DepthSequence::LIST];

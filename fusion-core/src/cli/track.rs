@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::first_image::compared;
-use super::folder::{FILM, FRAMES, MODEL, NODES, SKELETON, SURFACE, USD, mesh_file, prepare};
+use super::folder::{FILM, FRAMES, GLTF, MODEL, NODES, SKELETON, SURFACE, USD, mesh_file, prepare};
 use super::posed::read_any_body;
 use super::surface_output::SurfaceOutput;
 use super::track_output::TrackOutput;
@@ -63,6 +63,10 @@ pub struct Track {
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
+    /// Write the moved mesh as binary glTF (`track.glb`), with a morph target per frame. The frames stay in memory until
+    /// the end: 72 bytes per vertex and frame.
+    #[arg(long)]
+    gltf: bool,
     /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then,
     /// so that details stay in the surface.
     #[arg(long)]
@@ -145,6 +149,7 @@ impl Track {
             output: output.to_owned(),
             pictures: false,
             usd: false,
+            gltf: false,
             surface: false,
             keep_size: false,
             stats: false,
@@ -201,8 +206,8 @@ impl Track {
             progress.inc(1);
         }
         progress.finish_and_clear();
-        output.finish()?;
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
+        output.finish()?;
         let fused = surface.map(|surface| surface.write(&self.output, tracker.model(), &motions)).transpose()?;
         let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
@@ -226,10 +231,13 @@ impl Track {
         let optional = [(self.pictures, "pictures"), (self.surface, SURFACE)];
         let wanted = optional.iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| *folder);
         let folders: Vec<&str> = std::iter::once("meshes").chain(wanted).collect();
-        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD], self.overwrite)?;
+        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD, GLTF], self.overwrite)?;
         let mut output = TrackOutput::new(&self.output, sequence.info.camera, &body.mesh.triangles, sequence.times());
         if self.pictures {
             output = output.with_pictures();
+        }
+        if self.gltf {
+            output = output.with_gltf();
         }
         if self.usd {
             output = output.with_usd(sequence.len())?;

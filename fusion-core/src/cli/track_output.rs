@@ -1,8 +1,10 @@
-//! Pictures, film and USD of a track, on request.
+//! Pictures, film, USD and glTF of a track, on request.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use energy_cli::write_file;
+use fusion_core::animation::track_glb;
 use fusion_core::body::Mesh;
 use fusion_core::depth::{Camera, DepthImage};
 use fusion_core::picture::{Picture, film, frame_picture, write_picture};
@@ -10,7 +12,7 @@ use fusion_core::skeleton::half_interval;
 use fusion_core::usd::UsdWriter;
 use nalgebra::Vector3;
 
-use super::folder::{FILM, USD, picture_file};
+use super::folder::{FILM, GLTF, USD, picture_file};
 
 /// Pixels of the image per pixel of the film, along each axis.
 const REDUCTION: usize = 2;
@@ -28,6 +30,8 @@ pub struct TrackOutput {
     /// Pictures of the film; `None` without pictures.
     pictures: Option<Vec<Picture>>,
     usd: Option<UsdWriter>,
+    /// Vertices of each frame so far, for glTF; `None` without glTF.
+    frames: Option<Vec<Vec<Vector3<f64>>>>,
 }
 
 impl TrackOutput {
@@ -44,6 +48,7 @@ impl TrackOutput {
             times: times.map(<[f64]>::to_vec),
             pictures: None,
             usd: None,
+            frames: None,
         }
     }
 
@@ -62,11 +67,20 @@ impl TrackOutput {
         Ok(self)
     }
 
+    /// Asks for glTF.
+    pub fn with_gltf(mut self) -> Self {
+        self.frames = Some(Vec::new());
+        self
+    }
+
     /// Adds a frame. `image` is `None` if it could not be read.
     pub fn add(&mut self, frame: usize, image: Option<&DepthImage>, vertices: &[Vector3<f64>]) -> Result<()> {
         let time = self.time(frame);
         if let Some(usd) = &mut self.usd {
             usd.frame(time, vertices).context(USD)?;
+        }
+        if let Some(frames) = &mut self.frames {
+            frames.push(vertices.to_vec());
         }
         let Some(pictures) = &mut self.pictures else { return Ok(()) };
         let mesh = Mesh { vertices: vertices.to_vec(), normals: Vec::new(), triangles: self.triangles.clone() };
@@ -76,8 +90,13 @@ impl TrackOutput {
         Ok(())
     }
 
-    /// Completes the film and the USD file.
+    /// Completes the film, and the files of USD and glTF.
     pub fn finish(self) -> Result<()> {
+        if let Some(frames) = &self.frames {
+            let times: Vec<f64> = (0..frames.len()).map(|frame| self.time(frame) / self.frames_per_second).collect();
+            let glb = track_glb(frames, &self.triangles, &times).context(GLTF)?;
+            write_file(&self.folder.join(GLTF), glb)?;
+        }
         if let Some(pictures) = self.pictures {
             write_picture(&self.folder.join(FILM), film(&pictures, self.frames_per_second as u16))?;
         }
