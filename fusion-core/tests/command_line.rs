@@ -120,6 +120,23 @@ fn the_demonstration_explains_its_rows_and_leaves_little() {
 }
 
 #[test]
+fn a_recording_may_begin_with_a_t_pose() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = text(folder.path());
+    let output = fusion(&["render", "--from", "30", "--to", "31", "--t-pose", "-o", here]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("wrote 3 frames"));
+    // Outstretched arms span 1.4 m; in the next frame they are lower.
+    let span = |frame: usize| {
+        let mesh = std::fs::read_to_string(folder.path().join(format!("truth/{frame:06}.obj"))).unwrap();
+        let across = mesh.lines().filter_map(|line| line.strip_prefix("v ")?.split(' ').next()?.parse::<f64>().ok());
+        let (least, most) = across.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        most - least
+    };
+    assert!(span(0) > 1.4 && span(1) < span(0) - 0.05, "{} m, {} m", span(0), span(1));
+}
+
+#[test]
 fn a_body_is_posed_with_the_same_faces_in_every_frame() {
     let folder = tempfile::tempdir().unwrap();
     let here = text(folder.path());
