@@ -35,7 +35,9 @@
 
 mod animation;
 mod document;
+mod error;
 mod mesh;
 
-pub use animation::{AnimationError, animation_glb};
+pub use animation::animation_glb;
+pub use error::AnimationError;
 pub use mesh::{AnimatedMesh, Axes, Elements, Shape};

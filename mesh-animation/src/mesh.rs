@@ -8,7 +8,7 @@ pub struct AnimatedMesh<'a> {
     pub colour: [f32; 3],
     /// The connections between the vertices.
     pub elements: Elements,
-    /// Texture coordinates of the vertices, with the second axis up; empty if there are none.
+    /// Texture coordinates of the vertices, with the second axis up; empty without texture.
     pub uvs: Vec<[f64; 2]>,
     /// Number of frames; 1 if the object does not move. An object without frames is left out.
     pub frames: usize,
