@@ -76,9 +76,10 @@ impl Recording {
     }
 }
 
-/// Returns a pose moved to the place of another one: the root turns about the vertical to the other's heading, and moves
-/// horizontally to the other's position. Motions are from the body's own rest, with y up; the root's z axis points to the
-/// front. Heights stay, so that a standing pose stays on the floor.
+/// Returns a pose moved to the place of another one: the root turns about the vertical to the other's heading, and
+/// moves horizontally to the other's position. Heights stay, so that a standing pose stays on the floor.
+///
+/// Motions are from the body's own rest, with y up. The root's z axis points to the front.
 ///
 /// # Panics
 /// If a pose lacks the root's motion.

@@ -1,7 +1,8 @@
 //! Meshes whose vertices move over time, written as binary glTF 2.0 (`.glb`).
 //!
-//! [`animation_glb`] encodes any number of [`AnimatedMesh`]es. The vertices v⁰ of the first frame are a mesh. Each later
-//! frame f is a morph target with the differences vᶠ − v⁰, and an animation moves the weights w: at time t the mesh is
+//! [`animation_glb`] encodes any number of [`AnimatedMesh`]es. The vertices v⁰ of the first frame are a mesh. Each
+//! later frame f is a morph target with the differences vᶠ − v⁰. An animation moves the weights w. At time t the mesh
+//! is
 //!
 //! v(t) = v⁰ + Σ_f w_f(t) (vᶠ − v⁰),
 //!

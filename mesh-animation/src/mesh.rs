@@ -12,7 +12,8 @@ pub struct AnimatedMesh<'a> {
     pub uvs: Vec<[f64; 2]>,
     /// Number of frames; 1 if the object does not move. An object without frames is left out.
     pub frames: usize,
-    /// Returns the shape in a frame, from 0 to `frames` − 1. All frames have as many positions and normals as the first.
+    /// Returns the shape in a frame, from 0 to `frames` − 1. Every frame has as many positions and normals as the
+    /// first.
     pub shape: Box<dyn Fn(usize) -> Shape + 'a>,
 }
 

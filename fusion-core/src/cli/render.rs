@@ -33,7 +33,8 @@ pub struct Render {
     /// Standard deviation of the translations of bones along each axis, in mm.
     #[arg(long, default_value_t = 0.0)]
     bone_shift: f64,
-    /// Begin with the first frame of the motion, a T pose, at the place of the frame --from. It becomes the model's rest.
+    /// Begin with the first frame of the motion, a T pose, at the place of the frame --from. It becomes the model's
+    /// rest.
     #[arg(long)]
     t_pose: bool,
     /// Output folder.

@@ -63,8 +63,8 @@ pub struct Track {
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
-    /// Write the moved mesh as binary glTF (`track.glb`), with a morph target per frame. The frames stay in memory until
-    /// the end: 72 bytes per vertex and frame.
+    /// Write the moved mesh as binary glTF (`track.glb`), with a morph target per frame. The frames stay in memory
+    /// until the end: 72 bytes per vertex and frame.
     #[arg(long)]
     gltf: bool,
     /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then,
