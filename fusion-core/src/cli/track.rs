@@ -207,8 +207,9 @@ impl Track {
         }
         progress.finish_and_clear();
         self.write(&lines, &motions, &tracker, parameters.tracker)?;
-        output.finish()?;
         let fused = surface.map(|surface| surface.write(&self.output, tracker.model(), &motions)).transpose()?;
+        // Last, because the size of a glTF file has a limit.
+        output.finish()?;
         let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
         let tracked = lines.len() - skipped;
         if let (0, Some(first)) = (tracked, lines.first()) {
