@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use super::Contact;
 use crate::matrix::block_matrix::{BlockMatrix, Contents};
-use crate::matrix::pattern::Pattern;
+use crate::matrix::pattern::{Pattern, Storage};
 use crate::matrix::precision::Precision;
 
 /// Contacts in a matrix whose pattern has all their blocks, such as those of a fixed obstacle with one triangle.
@@ -15,26 +15,29 @@ pub struct ContactsInMatrix<T> {
     pub others: Vec<Contact>,
 }
 
-/// The blocks of four rows in a pattern.
+/// The stored blocks of four rows in a pattern.
 struct Blocks {
     rows: [u32; 4],
-    /// Pairs of corners and the indices of their blocks; `None` if the pattern lacks one.
-    places: Option<Vec<(usize, usize, usize)>>,
+    /// Whether the pattern has all blocks of the rows.
+    fit: bool,
+    /// Pairs of corners and the indices of their blocks.
+    places: Vec<(usize, usize, usize)>,
 }
 
 impl Blocks {
-    fn of(rows: [u32; 4], pattern: &Pattern) -> Self {
-        let free = || rows.iter().enumerate().filter(|(_, row)| **row != Contact::FIXED);
-        let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
-        let place = |((i, row), (j, column)): ((usize, &u32), (usize, &u32))| {
-            pattern.place(*row as usize, *column as usize).map(|(place, flipped)| (i, j, place, flipped))
-        };
-        let places: Option<Vec<_>> = pairs.map(place).collect();
+    /// Looks up the blocks of other rows.
+    fn find(&mut self, rows: [u32; 4], pattern: &Pattern) {
+        self.rows = rows;
+        self.places.clear();
+        let free = || rows.into_iter().enumerate().filter(|(_, row)| *row != Contact::FIXED);
         // An upper triangle stores each pair of rows once.
-        let stored = |places: Vec<(usize, usize, usize, bool)>| {
-            places.into_iter().filter(|(.., flipped)| !flipped).map(|(i, j, place, _)| (i, j, place)).collect()
-        };
-        Self { rows, places: places.map(stored) }
+        let is_stored = |row: u32, column: u32| pattern.storage() == Storage::Whole || row <= column;
+        let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
+        self.fit = pairs.filter(|((_, row), (_, column))| is_stored(*row, *column)).all(|((i, row), (j, column))| {
+            let place = pattern.place(row as usize, column as usize);
+            self.places.extend(place.map(|(place, _)| (i, j, place)));
+            place.is_some()
+        });
     }
 }
 
@@ -46,17 +49,18 @@ impl<T: Precision> BlockMatrix<T> {
         let contents = self.take_contents();
         let (mut replaced, mut others) = (Vec::new(), Vec::new());
         // Several contacts of the same vertices follow each other.
-        let mut known = Blocks::of([Contact::FIXED; 4], &pattern);
+        let mut known = Blocks { rows: [Contact::FIXED; 4], fit: true, places: Vec::new() };
+        let values = self.values_and_nowhere();
         for contact in contacts {
             if known.rows != contact.rows {
-                known = Blocks::of(contact.rows, &pattern);
+                known.find(contact.rows, &pattern);
             }
-            let Some(places) = &known.places else {
+            if !known.fit {
                 others.push(contact);
                 continue;
-            };
-            for &(i, j, place) in places {
-                let (values, scale) = (self.values_and_nowhere(), contact.weights[i] * contact.weights[j]);
+            }
+            for &(i, j, place) in &known.places {
+                let scale = contact.weights[i] * contact.weights[j];
                 replaced.push((place, values[place]));
                 for row in 0..3 {
                     for column in 0..3 {
@@ -82,7 +86,6 @@ impl<T: Precision> BlockMatrix<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::matrix::pattern::{Pattern, Storage};
 
     #[test]
     fn contacts_in_the_pattern_are_added_and_removed_without_a_trace() {
