@@ -10,17 +10,19 @@
 //!
 //! On an obstacle, the closest point is a material point of its surface, which moves with it.
 
-use energy_dsl::{Potential, Vector3};
+use energy_dsl::{Block, Packed, Vector3};
 use energy_elements::SlidingFriction;
 use energy_solve::{Contact, ContactMemory};
 
 use super::bristle::{Bristles, LENGTH};
-use super::joined::Law;
+use super::law::Law;
 use crate::collision::{Closest, CollisionMesh, Pair};
 use crate::geometry::{add_scaled, dot, subtract};
 
 /// The deflection ε of a bristle at which friction is μ/√2 times the normal force, in m.
 const SOFTNESS: f64 = 0.1 * LENGTH;
+/// Why an evaluation cannot fail.
+const ONE_WAY: &str = "each pair has one way";
 
 /// The friction of a step.
 #[derive(Debug, Default)]
@@ -34,7 +36,7 @@ pub(super) struct Friction {
     /// The deflections at the start.
     bristles: Bristles,
     /// The pairs in contact at the start; `None` before they are known.
-    sliding: Option<Vec<Sliding>>,
+    sliding: Option<Slidings>,
 }
 
 /// The friction of an obstacle.
@@ -49,6 +51,14 @@ pub(crate) struct Grip {
     pub deforms: bool,
 }
 
+/// All pairs in contact at the start of the step.
+#[derive(Debug)]
+struct Slidings {
+    pairs: Vec<Sliding>,
+    /// The potentials. Element i acts on the vector between the sliding points of pair i.
+    elements: Packed<SlidingFriction>,
+}
+
 /// A pair in contact at the start of the step.
 #[derive(Debug)]
 struct Sliding {
@@ -60,7 +70,6 @@ struct Sliding {
     normal: Vector3<f64>,
     /// The vector between the sliding points while the bristle is straight, up to a multiple of the normal.
     straight: Vector3<f64>,
-    element: SlidingFriction,
 }
 
 /// A material point of a moving obstacle.
@@ -90,7 +99,7 @@ impl Friction {
             let way = subtract(one.between(x), one.straight);
             (one.pair, one.normal, add_scaled(way, -dot(way, one.normal), one.normal))
         };
-        Bristles::new(sliding.iter().map(way))
+        Bristles::new(sliding.pairs.iter().map(way))
     }
 
     /// Returns the bristles at x, where the last step ended, for a checkpoint.
@@ -101,10 +110,6 @@ impl Friction {
     /// Restores the bristles of a checkpoint.
     pub fn restore(&mut self, memory: ContactMemory) {
         (self.bristles, self.sliding) = (Bristles::restored(memory), None);
-    }
-
-    fn slidings(&self) -> &[Sliding] {
-        self.sliding.as_deref().unwrap_or_default()
     }
 
     /// Whether anything has friction.
@@ -123,6 +128,7 @@ impl Friction {
 
     /// Takes the pairs in contact at the start, in order, with their laws and closest points.
     pub fn take(&mut self, mesh: &CollisionMesh, touching: Vec<(Pair, Law, Closest)>) {
+        let mut elements = Vec::new();
         let of = |(pair, law, closest): (Pair, Law, Closest)| {
             let limit = self.coefficient(mesh, &pair) * law.force(law.apart(&closest));
             if limit <= 0.0 {
@@ -132,10 +138,12 @@ impl Friction {
             let normal = closest.normal;
             let between = sliding(&pair, &weights, anchor, &self.start);
             let straight = subtract(between, self.bristles.deflection(&pair, normal));
-            let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
-            Some(Sliding { pair, weights, anchor, normal, straight, element })
+            elements.push(SlidingFriction::new(normal, straight, limit, SOFTNESS));
+            Some(Sliding { pair, weights, anchor, normal, straight })
         };
-        self.sliding = Some(touching.into_iter().filter_map(of).collect());
+        let pairs = touching.into_iter().filter_map(of).collect();
+        let stencils: Vec<[u32; 1]> = (0..elements.len()).map(|number| [energy_solve::index(number)]).collect();
+        self.sliding = Some(Slidings { pairs, elements: Packed::new(&elements, &stencils) });
     }
 
     /// Returns the coefficients of the closest points on cloth and hair, and the closest point of an obstacle.
@@ -161,13 +169,14 @@ impl Friction {
 
     /// Returns Σ μ λ (√(‖t‖² + ε²) − ε), in J.
     pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-        self.slidings().iter().map(|one| one.element.value(&[one.between(x)]).value).sum()
+        let energies = self.sliding.as_ref().map(|sliding| sliding.energies(x));
+        energies.iter().flatten().fold(0.0, |sum, energy| sum + energy)
     }
 
     /// Adds the forces of friction, in N.
     pub fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        for one in self.slidings() {
-            let [slope] = one.element.gradient(&[one.between(x)]).gradient;
+        let Some(sliding) = &self.sliding else { return };
+        for (one, slope) in sliding.pairs.iter().zip(sliding.slopes(x)) {
             let drag = slope.map(|component| -component);
             one.pair.add(one.weights, drag, force);
             for (vertex, weight) in one.anchor.iter().flat_map(Anchor::terms) {
@@ -178,11 +187,45 @@ impl Friction {
 
     /// Adds the stiffness of friction. `row` is the row of a vertex in the matrix.
     pub fn add_contacts(&self, x: &[Vector3<f64>], row: impl Fn(&u32) -> u32, contacts: &mut Vec<Contact>) {
-        contacts.extend(self.slidings().iter().map(|one| Contact {
+        let Some(sliding) = &self.sliding else { return };
+        contacts.extend(sliding.pairs.iter().zip(sliding.blocks(x)).map(|(one, block)| Contact {
             rows: one.pair.vertices.each_ref().map(&row),
             weights: one.weights,
-            block: one.element.hessian(&[one.between(x)]).hessian.as_ref()[0],
+            block,
         }));
+    }
+}
+
+impl Slidings {
+    /// The vector between the sliding points of each pair.
+    fn ways(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        self.pairs.iter().map(|one| one.between(x)).collect()
+    }
+
+    /// The energy of each pair, in J.
+    fn energies(&self, x: &[Vector3<f64>]) -> Vec<f64> {
+        let ways = self.ways(x);
+        let mut energies = vec![0.0; ways.len()];
+        self.elements.values(0..ways.len(), &ways, &mut energies).expect(ONE_WAY);
+        energies
+    }
+
+    /// The gradient of each pair's energy, in N.
+    fn slopes(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let ways = self.ways(x);
+        let (mut energies, mut slopes) = (vec![0.0; ways.len()], vec![[0.0; 3]; ways.len()]);
+        self.elements.gradients(0..ways.len(), &ways, &mut energies, slopes.as_flattened_mut()).expect(ONE_WAY);
+        slopes
+    }
+
+    /// The Hessian of each pair's energy, in N/m.
+    fn blocks(&self, x: &[Vector3<f64>]) -> Vec<Block<f64>> {
+        let ways = self.ways(x);
+        let (mut energies, mut slopes) = (vec![0.0; ways.len()], vec![0.0; 3 * ways.len()]);
+        let mut blocks = vec![[[0.0; 3]; 3]; ways.len()];
+        let numbers = blocks.as_flattened_mut().as_flattened_mut();
+        self.elements.hessians(0..ways.len(), &ways, &mut energies, &mut slopes, numbers).expect(ONE_WAY);
+        blocks
     }
 }
 

@@ -1,16 +1,9 @@
 use std::cell::RefCell;
 
-use energy_dsl::{Potential, Vector3};
-use energy_elements::DistanceBarrier;
+use energy_dsl::Vector3;
 
-use super::spacing::Spacing;
+use super::law::{Barrier, Law, Order, evaluate};
 use crate::collision::{Closest, Measured, Pair};
-
-/// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
-/// same number of iterations.
-pub(crate) const STIFFNESS_RATIO: f64 = 10.0;
-/// β″(½).
-pub(crate) const CURVATURE_AT_HALF: f64 = 6.386_294_361_119_89;
 
 /// The pairs in contact, or close to it, in order.
 #[derive(Debug, Default)]
@@ -19,17 +12,6 @@ pub(super) struct Joined {
     pub laws: Vec<Law>,
     /// The pairs where they were last evaluated.
     measured: RefCell<Measured>,
-}
-
-/// The barrier of a pair.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Law {
-    /// ξ, in m.
-    thickness: f64,
-    /// The activation gap g, in m.
-    gap: f64,
-    /// K/g², in N/m.
-    pub stiffness: f64,
 }
 
 impl Joined {
@@ -53,58 +35,14 @@ impl Joined {
         self.pairs.binary_search(pair).is_ok()
     }
 
-    /// Calls `evaluate` with each pair that has an energy at x, its law and its closest points.
-    pub fn for_each_active(&self, x: &[Vector3<f64>], mut evaluate: impl FnMut(&Pair, Law, &Closest)) {
+    /// Calls `found` with each pair that has an energy at x, its closest points and its barrier.
+    pub fn for_each_active(&self, x: &[Vector3<f64>], order: Order, mut found: impl FnMut(&Pair, &Closest, Barrier)) {
         let mut measured = self.measured.borrow_mut();
         measured.measure(&self.pairs, x, 1);
-        for (number, (pair, law)) in self.pairs.iter().zip(&self.laws).enumerate() {
-            let closest = measured.closest(number);
-            if law.apart(&closest) < law.gap {
-                evaluate(pair, *law, &closest);
-            }
+        let is_active = |&number: &usize| self.laws[number].is_active(measured.distance(number));
+        let active: Vec<usize> = (0..self.pairs.len()).filter(is_active).collect();
+        for (&number, barrier) in active.iter().zip(evaluate(order, &self.laws, &measured, &active)) {
+            found(&self.pairs[number], &measured.closest(number), barrier);
         }
     }
-}
-
-impl Law {
-    /// The law of a pair with this spacing, and this resistance to a displacement along its normal, in N/m.
-    pub fn new(Spacing { thickness, gap }: Spacing, resistance: f64) -> Self {
-        Self { thickness, gap, stiffness: STIFFNESS_RATIO / CURVATURE_AT_HALF * resistance }
-    }
-
-    /// The distance of the surfaces, in m.
-    pub fn apart(self, closest: &Closest) -> f64 {
-        closest.distance - self.thickness
-    }
-
-    /// The energy at a distance of the surfaces, in J.
-    pub fn energy(self, apart: f64) -> f64 {
-        if apart >= self.gap {
-            0.0
-        } else if apart > 0.0 {
-            self.barrier().value(&between(apart)).value
-        } else {
-            f64::INFINITY
-        }
-    }
-
-    /// The normal force at a distance of the surfaces, in N.
-    pub fn force(self, apart: f64) -> f64 {
-        if apart < self.gap { -self.barrier().gradient(&between(apart)).gradient[0][0] } else { 0.0 }
-    }
-
-    /// The stiffness along the normal at a distance of the surfaces, in N/m.
-    pub fn curvature(self, apart: f64) -> f64 {
-        self.barrier().hessian(&between(apart)).hessian.as_ref()[0][0][0]
-    }
-
-    /// The barrier as a function of the vector between the surfaces.
-    fn barrier(self) -> DistanceBarrier {
-        DistanceBarrier::new(self.stiffness, self.gap)
-    }
-}
-
-/// Two points at this distance.
-fn between(apart: f64) -> [Vector3<f64>; 2] {
-    [[apart, 0.0, 0.0], [0.0; 3]]
 }

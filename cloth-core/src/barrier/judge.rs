@@ -3,13 +3,15 @@
 use energy_solve::threads::for_each;
 
 use super::spacing::Spacings;
-use crate::collision::{Clearance, CollisionMesh, Measured, Move, PART, Pair};
+use crate::collision::{Clearance, CollisionMesh, Doubts, Measured, Move, PART, Pair};
 
 /// Judges a move by pairs that are measured at its start.
 pub(super) struct Judge<'a> {
     pub mesh: &'a CollisionMesh,
     pub spacings: &'a Spacings,
     pub step: &'a Move<'a>,
+    /// The pairs, in order.
+    pub pairs: &'a [Pair],
     pub measured: &'a Measured,
 }
 
@@ -24,9 +26,9 @@ pub(super) struct Judgement {
 }
 
 impl Judge<'_> {
-    /// Judges by these pairs, all that were measured. Threads find the few pairs that are not safe at first sight. They
-    /// shorten the move one after the other.
-    pub fn on(&self, pairs: &[Pair], threads: usize) -> Judgement {
+    /// Threads find the few pairs that are not safe at first sight. These shorten the move one after the other.
+    pub fn judge(&self, threads: usize) -> Judgement {
+        let pairs = self.pairs;
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();
         let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
         for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part)) {
@@ -46,18 +48,25 @@ impl Judge<'_> {
     /// The number of pairs that comparisons of distances do not dismiss, and those that are not safe at first sight,
     /// among consecutive pairs from number `first` on.
     fn doubtful(&self, first: usize, pairs: &[Pair]) -> (u64, Vec<usize>) {
-        let (mut tested, mut doubtful) = (0, Vec::new());
-        for (number, pair) in (first..).zip(pairs) {
-            let clearance = self.clearance(pair);
-            if self.step.stays_beyond(clearance.reach, pair, self.measured.separations()[number]) {
+        let Self { step, measured, .. } = *self;
+        let farthest = self.farthest();
+        let mut close = Vec::new();
+        for (number, pair) in pairs.iter().enumerate() {
+            if measured.separations()[first + number] > farthest {
                 continue;
             }
-            tested += 1;
-            if !self.step.is_safe(pair, &self.measured.closest(number), clearance) {
-                doubtful.push(number);
+            let clearance = self.clearance(pair);
+            if !step.stays_beyond(clearance.reach, pair, measured.separations()[first + number]) {
+                close.push((first + number, step.level(measured.distance(first + number), clearance)));
             }
         }
-        (tested, doubtful)
+        (close.len() as u64, Doubts { step, pairs: self.pairs, measured }.of(&close))
+    }
+
+    /// Pairs beyond this distance certainly stay out of reach, in m.
+    fn farthest(&self) -> f64 {
+        let longest = self.step.excursions().iter().copied().fold(0.0, f64::max);
+        self.step.beyond(self.spacings.largest_reach(), 2.0 * longest)
     }
 
     fn clearance(&self, pair: &Pair) -> Clearance {

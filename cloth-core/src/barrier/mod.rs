@@ -29,6 +29,7 @@ mod feasible;
 mod friction;
 mod joined;
 mod judge;
+mod law;
 mod obstacle_features;
 mod resistance;
 mod rolling;
@@ -40,7 +41,7 @@ use energy_dsl::{Block, Vector3};
 use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
 
 pub(crate) use friction::Grip;
-pub(crate) use joined::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
+pub(crate) use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
 pub use start::ContactError;
 pub(crate) use start::{ObstacleStart, Participants};
 pub(crate) use untangle::Untangling;
@@ -48,8 +49,9 @@ pub(crate) use untangle::Untangling;
 use crate::collision::{Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
 use feasible::Meeting;
 use friction::Friction;
-use joined::{Joined, Law};
+use joined::Joined;
 use judge::{Judge, Judgement};
+use law::{Law, Order};
 use resistance::Resistance;
 use rolling::rolling;
 use spacing::{Spacing, Spacings};
@@ -169,8 +171,8 @@ impl BarrierContact {
 
     /// Judges a move by some pairs, measured at its start.
     fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
-        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, measured };
-        judge.on(pairs, self.search.threads)
+        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, pairs, measured };
+        judge.judge(self.search.threads)
     }
 }
 
@@ -261,14 +263,13 @@ impl ContactModel for BarrierContact {
 
     fn energy(&self, x: &[Vector3<f64>]) -> f64 {
         let mut sum = self.friction.energy(x);
-        self.joined.for_each_active(x, |_, law, closest| sum += law.energy(law.apart(closest)));
+        self.joined.for_each_active(x, Order::Energy, |_, _, barrier| sum += barrier.energy);
         sum
     }
 
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        self.joined.for_each_active(x, |pair, law, closest| {
-            let push = law.force(law.apart(closest));
-            pair.add(closest.weights, closest.normal.map(|component| push * component), force);
+        self.joined.for_each_active(x, Order::Force, |pair, closest, barrier| {
+            pair.add(closest.weights, closest.normal.map(|component| barrier.force * component), force);
         });
         self.friction.add_force(x, force);
     }
@@ -276,13 +277,13 @@ impl ContactModel for BarrierContact {
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
         let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
         let (mut contacts, mut active) = (Vec::new(), 0);
-        self.joined.for_each_active(x, |pair, law, closest| {
-            let (apart, n) = (law.apart(closest), closest.normal);
+        self.joined.for_each_active(x, Order::Curvature, |pair, closest, barrier| {
+            let n = closest.normal;
             let rows = pair.vertices.each_ref().map(row);
             let along_normal = |stiffness: f64| n.map(|a| n.map(|b| stiffness * a * b));
-            contacts.push(Contact { rows, weights: closest.weights, block: along_normal(law.curvature(apart)) });
+            contacts.push(Contact { rows, weights: closest.weights, block: along_normal(barrier.curvature) });
             if self.mesh.obstacle_of(pair).is_some() {
-                let block = along_normal(law.force(apart) * closest.distance);
+                let block = along_normal(barrier.force * closest.distance);
                 let is_free = |(row, weight): (&u32, &f64)| *row != Contact::FIXED && *weight != 0.0;
                 let tilts = rolling(pair, closest, x).filter(|weights| rows.iter().zip(weights).any(is_free));
                 contacts.extend(tilts.map(|weights| Contact { rows, weights, block }));

@@ -60,6 +60,12 @@ impl Spacings {
         Spacing { thickness: self.radii[first] + self.radii[second], gap: self.gap }
     }
 
+    /// The largest distance at which contact begins, in m.
+    pub fn largest_reach(&self) -> f64 {
+        let thickest = self.radii.iter().copied().fold(0.0, f64::max);
+        self.skins.iter().map(Skin::reach).fold(2.0 * thickest + self.gap, f64::max)
+    }
+
     /// The distance within which a pair joins, in m: beyond the reach by a part of it.
     #[inline]
     pub fn joining(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {

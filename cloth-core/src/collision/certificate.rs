@@ -16,7 +16,6 @@
 
 use energy_dsl::Vector3;
 
-use super::closest::separation;
 use super::displacement::excursions;
 use super::{Closest, Pair, plane};
 use crate::geometry::{add_scaled, dot, subtract};
@@ -84,15 +83,10 @@ impl<'a> Move<'a> {
         separation - pair.approach(&self.excursions) > reach + self.rounding
     }
 
-    /// Whether the pair certainly keeps its clearance during the whole move, by the normals at its start and its end.
-    /// `start` has the closest points at the start.
-    pub fn is_safe(&self, pair: &Pair, start: &Closest, clearance: Clearance) -> bool {
-        let (to, level) = (pair.corners(self.to), self.level(start.distance, clearance));
-        if start.separation >= level && separation(&start.normal, &to, pair.first()) >= level {
-            return true;
-        }
-        let end = Closest::of(pair, &to);
-        end.separation >= level && separation(&end.normal, &pair.corners(self.from), pair.first()) >= level
+    /// A separation at the start beyond which no pair that approaches by this much comes within reach.
+    pub fn beyond(&self, reach: f64, approach: f64) -> f64 {
+        // The rounding of a sum and a difference.
+        reach + approach + 2.0 * self.rounding
     }
 
     /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. The result
@@ -108,7 +102,7 @@ impl<'a> Move<'a> {
 
     /// The level ℓ of a pair at a distance, including rounding errors. Pairs within their thickness must not come
     /// closer by more than a tenth.
-    fn level(&self, distance: f64, Clearance { thickness, reach, .. }: Clearance) -> f64 {
+    pub fn level(&self, distance: f64, Clearance { thickness, reach, .. }: Clearance) -> f64 {
         let kept =
             if distance > thickness { thickness + KEPT * (distance - thickness) } else { (1.0 - KEPT) * distance };
         // Out of reach, nothing needs to be kept.

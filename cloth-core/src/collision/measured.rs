@@ -44,6 +44,12 @@ impl Measured {
         &self.separations
     }
 
+    /// The distance of a pair, in m.
+    #[inline]
+    pub fn distance(&self, number: usize) -> f64 {
+        self.numbers[number][7]
+    }
+
     /// The closest points of a pair.
     #[inline]
     pub fn closest(&self, number: usize) -> Closest {

@@ -19,6 +19,7 @@ mod mesh;
 mod neighbourhood;
 mod pair;
 mod plane;
+mod safe_pairs;
 mod search;
 mod solid_core;
 
@@ -30,6 +31,7 @@ pub(crate) use measured::{Measured, PART};
 pub use mesh::CollisionMesh;
 pub(crate) use neighbourhood::{Neighbourhood, swept};
 pub(crate) use pair::{Pair, PairKind};
+pub(crate) use safe_pairs::Doubts;
 pub(crate) use search::{Rules, Search};
 pub(crate) use solid_core::Core;
 

@@ -27,13 +27,24 @@ fn at(from: &[Vector3<f64>], to: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>
 /// The part of a move that is safe for all pairs.
 fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 {
     let step = Move::new(from, to);
-    pairs().iter().fold(1.0, |part, pair| safe_part_of(&step, pair, &pair.corners(from), thickness, part).min(part))
+    let pairs = pairs();
+    let mut measured = Measured::default();
+    measured.measure(&pairs, from, 1);
+    (0..pairs.len()).fold(1.0, |part, number| safe_part_of(&step, &pairs, &measured, number, thickness, part).min(part))
 }
 
-/// The part of a move that is safe for a pair; `from` holds its corners at the start.
-fn safe_part_of(step: &Move<'_>, pair: &Pair, from: &[Vector3<f64>; 4], thickness: f64, wanted: f64) -> f64 {
-    let (start, clearance) = (Closest::of(pair, from), Clearance { thickness, reach: f64::INFINITY, is_plane: false });
-    if step.is_safe(pair, &start, clearance) { 1.0 } else { step.safe_part(pair, &start, clearance, wanted) }
+/// The part of a move that is safe for one of the pairs that are measured at the start.
+fn safe_part_of(
+    step: &Move<'_>,
+    pairs: &[Pair],
+    measured: &Measured,
+    number: usize,
+    thickness: f64,
+    wanted: f64,
+) -> f64 {
+    let (start, clearance) = (measured.closest(number), Clearance { thickness, reach: f64::INFINITY, is_plane: false });
+    let doubts = Doubts { step, pairs, measured }.of(&[(number, step.level(start.distance, clearance))]);
+    if doubts.is_empty() { 1.0 } else { step.safe_part(&pairs[number], &start, clearance, wanted) }
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -126,9 +137,10 @@ fn moves_are_cut_only_near_a_contact() {
     let (mut cut, mut early) = (0, 0);
     for _ in 0..10_000 {
         let [from, to] = impact().new_tree(&mut runner).unwrap().current();
-        let step = Move::new(&from, &to);
-        for pair in pairs() {
-            let part = safe_part_of(&step, &pair, &pair.corners(&from), THICKNESS, 1.0);
+        let (step, pairs, mut measured) = (Move::new(&from, &to), pairs(), Measured::default());
+        measured.measure(&pairs, &from, 1);
+        for (number, pair) in pairs.iter().enumerate() {
+            let part = safe_part_of(&step, &pairs, &measured, number, THICKNESS, 1.0);
             let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
             if part < 1.0 && gap(0.0) > 0.0 {
                 cut += 1;
