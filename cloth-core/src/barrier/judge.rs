@@ -3,16 +3,17 @@
 use energy_solve::threads::for_each;
 
 use super::spacing::Spacings;
-use crate::collision::{Clearance, CollisionMesh, Doubts, Measured, Move, PART, Pair};
+use crate::collision::{Clearance, CollisionMesh, Doubts, Move, PART, Pair};
 
-/// Judges a move by pairs that are measured at its start.
+/// Judges a move by the pairs near it.
 pub(super) struct Judge<'a> {
     pub mesh: &'a CollisionMesh,
     pub spacings: &'a Spacings,
     pub step: &'a Move<'a>,
     /// The pairs, in order.
     pub pairs: &'a [Pair],
-    pub measured: &'a Measured,
+    /// A lower bound of the distance of each at the start of the move, in m.
+    pub separations: &'a [f64],
 }
 
 /// The result for a move.
@@ -34,8 +35,8 @@ impl Judge<'_> {
         for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part)) {
             judgement.tested += tested;
             for number in doubtful {
-                let (pair, start) = (&pairs[number], self.measured.closest(number));
-                let own = self.step.safe_part(pair, &start, self.clearance(pair), judgement.part);
+                let pair = &pairs[number];
+                let own = self.step.safe_part(pair, self.clearance(pair), judgement.part);
                 if own < 1.0 {
                     judgement.blocking.push(*pair);
                 }
@@ -48,19 +49,18 @@ impl Judge<'_> {
     /// The number of pairs that comparisons of distances do not dismiss, and those that are not safe at first sight,
     /// among consecutive pairs from number `first` on.
     fn doubtful(&self, first: usize, pairs: &[Pair]) -> (u64, Vec<usize>) {
-        let Self { step, measured, .. } = *self;
         let farthest = self.farthest();
         let mut close = Vec::new();
-        for (number, pair) in pairs.iter().enumerate() {
-            if measured.separations()[first + number] > farthest {
+        for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.separations[first..])) {
+            if *separation > farthest {
                 continue;
             }
             let clearance = self.clearance(pair);
-            if !step.stays_beyond(clearance.reach, pair, measured.separations()[first + number]) {
-                close.push((first + number, step.level(measured.distance(first + number), clearance)));
+            if !self.step.stays_beyond(clearance.reach, pair, *separation) {
+                close.push((number, clearance));
             }
         }
-        (close.len() as u64, Doubts { step, pairs: self.pairs, measured }.of(&close))
+        (close.len() as u64, Doubts { step: self.step, pairs: self.pairs }.of(&close))
     }
 
     /// Pairs beyond this distance certainly stay out of reach, in m.

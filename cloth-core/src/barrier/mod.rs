@@ -46,7 +46,7 @@ pub use start::ContactError;
 pub(crate) use start::{ObstacleStart, Participants};
 pub(crate) use untangle::Untangling;
 
-use crate::collision::{Closest, CollisionMesh, Measured, Move, Neighbourhood, Pair, Search, swept};
+use crate::collision::{Closest, CollisionMesh, Move, Near, Neighbourhood, Pair, Search, Separations, swept};
 use feasible::Meeting;
 use friction::Friction;
 use joined::Joined;
@@ -113,11 +113,10 @@ impl BarrierContact {
         }
         let start = std::mem::take(&mut self.friction.start);
         self.visit(&start);
-        let measured = self.neighbourhood.measured();
         let mut meeting = Meeting::new(&self.mesh, &start);
         let mut touching = Vec::new();
-        for (number, pair) in self.neighbourhood.pairs().iter().enumerate() {
-            let closest = measured.closest(number);
+        for &Near { number, closest } in self.neighbourhood.separations().near() {
+            let pair = &self.neighbourhood.pairs()[number];
             let Spacing { thickness, gap } = self.spacing(pair);
             let is_active = closest.distance - thickness < gap;
             if is_active && meeting.may_join(pair, &closest) {
@@ -141,7 +140,7 @@ impl BarrierContact {
             self.neighbourhood.renew(&mut self.search, &self.mesh, x, x, radii);
             self.counts.searches += 1;
         }
-        self.neighbourhood.visit(x, self.search.threads);
+        self.neighbourhood.visit(&self.search, x);
     }
 
     /// Whether the neighbourhood covers x. It grows to do so if it lacks few vertices.
@@ -170,8 +169,8 @@ impl BarrierContact {
     }
 
     /// Judges a move by some pairs, measured at its start.
-    fn judge(&self, step: &Move<'_>, pairs: &[Pair], measured: &Measured) -> Judgement {
-        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, pairs, measured };
+    fn judge(&self, step: &Move<'_>, pairs: &[Pair], separations: &Separations) -> Judgement {
+        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, pairs, separations: separations.all() };
         judge.judge(self.search.threads)
     }
 }
@@ -201,15 +200,15 @@ impl ContactModel for BarrierContact {
         }
         let step = Move::new(from, to);
         let (count, judgement) = if self.covers_move(&step) {
-            self.neighbourhood.visit(from, self.search.threads);
+            self.neighbourhood.visit(&self.search, from);
             let pairs = self.neighbourhood.pairs();
-            (pairs.len(), self.judge(&step, pairs, self.neighbourhood.measured()))
+            (pairs.len(), self.judge(&step, pairs, self.neighbourhood.separations()))
         } else {
             self.counts.searches += 1;
             let pairs = self.search.pairs(&self.mesh, swept(from, to));
-            let mut measured = Measured::default();
-            measured.measure(&pairs, from, self.search.threads);
-            (pairs.len(), self.judge(&step, &pairs, &measured))
+            let mut separations = Separations::default();
+            separations.measure(&pairs, from, self.search.halves(), self.search.threads);
+            (pairs.len(), self.judge(&step, &pairs, &separations))
         };
         let Judgement { part, tested, blocking } = judgement;
         self.blocking.extend(blocking);
@@ -234,17 +233,17 @@ impl ContactModel for BarrierContact {
 
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
         self.visit(x);
-        let measured = self.neighbourhood.measured();
         let mut known = self.joined.pairs.iter().peekable();
         let mut meeting = Meeting::new(&self.mesh, x);
         let mut added = Vec::new();
-        for (number, (pair, separation)) in self.neighbourhood.pairs().iter().zip(measured.separations()).enumerate() {
-            if *separation > self.spacings.joining(&self.mesh, pair) {
+        for Near { number, closest } in self.neighbourhood.separations().near() {
+            let pair = &self.neighbourhood.pairs()[*number];
+            if closest.separation > self.spacings.joining(&self.mesh, pair) {
                 continue;
             }
             while known.next_if(|other| *other < pair).is_some() {}
-            if known.peek() != Some(&pair) && meeting.may_join(pair, &measured.closest(number)) {
-                added.push((*pair, measured.closest(number)));
+            if known.peek() != Some(&pair) && meeting.may_join(pair, closest) {
+                added.push((*pair, *closest));
             }
         }
         let mut blocking = std::mem::take(&mut self.blocking);

@@ -14,7 +14,7 @@
 //! sum of all rounding errors: 2 ε for each of the two corners, 1 ε for their difference, 3 ε for the dot product with
 //! a vector of length 1 + 4 ε, each times the largest coordinate and the three components.
 
-use energy_dsl::Vector3;
+use energy_dsl::{Real, Vector3};
 
 use super::displacement::excursions;
 use super::{Closest, Pair, plane};
@@ -91,22 +91,24 @@ impl<'a> Move<'a> {
 
     /// Returns a part of the move during which the pair certainly keeps its clearance: 1 for the whole move. The result
     /// is exact enough if it is at least `wanted`; the search then stops early.
-    pub fn safe_part(&self, pair: &Pair, start: &Closest, clearance: Clearance, wanted: f64) -> f64 {
+    pub fn safe_part(&self, pair: &Pair, clearance: Clearance, wanted: f64) -> f64 {
         let (from, to) = (pair.corners(self.from), pair.corners(self.to));
-        let level = self.level(start.distance, clearance);
+        let level = self.level(Closest::of(pair, &from).distance, clearance.thickness, clearance.reach);
         if clearance.is_plane {
             return plane::safe_part(&from, &to, level);
         }
         self.advance(pair, &from, &to, level, wanted)
     }
 
-    /// The level ℓ of a pair at a distance, including rounding errors. Pairs within their thickness must not come
-    /// closer by more than a tenth.
-    pub fn level(&self, distance: f64, Clearance { thickness, reach, .. }: Clearance) -> f64 {
-        let kept =
-            if distance > thickness { thickness + KEPT * (distance - thickness) } else { (1.0 - KEPT) * distance };
+    /// The level ℓ of pairs at a distance, including rounding errors. Pairs within their thickness must not come closer
+    /// by more than a tenth.
+    #[inline(always)]
+    pub fn level<V: Real>(&self, distance: V, thickness: V, reach: V) -> V {
+        let number = V::from_f64;
+        let beyond = thickness + number(KEPT) * (distance - thickness);
+        let kept = V::select(thickness.less(distance), beyond, number(1.0 - KEPT) * distance);
         // Out of reach, nothing needs to be kept.
-        kept.min(reach) + self.rounding
+        kept.min(reach) + number(self.rounding)
     }
 
     fn advance(&self, pair: &Pair, from: &[Vector3<f64>; 4], to: &[Vector3<f64>; 4], level: f64, wanted: f64) -> f64 {

@@ -1,10 +1,8 @@
 use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
 use energy_solve::threads::for_each;
 
+use super::separations::PART;
 use super::{Closest, Pair, PairKind};
-
-/// Pairs that one thread takes at a time. A multiple of the number of lanes.
-pub(crate) const PART: usize = 4096;
 
 /// The closest points of many pairs at one place.
 #[derive(Clone, Debug, Default)]
@@ -39,11 +37,6 @@ impl Measured {
         self.separations.clear();
     }
 
-    /// A lower bound of the distance of each pair; see [`Closest::separation`].
-    pub fn separations(&self) -> &[f64] {
-        &self.separations
-    }
-
     /// The distance of a pair, in m.
     #[inline]
     pub fn distance(&self, number: usize) -> f64 {
@@ -56,14 +49,6 @@ impl Measured {
         let [c0, c1, c2, c3, nx, ny, nz, distance] = self.numbers[number];
         let separation = self.separations[number];
         Closest { weights: [c0, c1, c2, c3], normal: [nx, ny, nz], distance, separation }
-    }
-
-    /// Keeps some of the pairs.
-    pub fn retain(&mut self, is_kept: &[bool]) {
-        let mut kept = is_kept.iter();
-        self.numbers.retain(|_| *kept.next().expect("one for each pair"));
-        let mut kept = is_kept.iter();
-        self.separations.retain(|_| *kept.next().expect("one for each pair"));
     }
 }
 

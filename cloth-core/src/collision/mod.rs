@@ -21,18 +21,20 @@ mod pair;
 mod plane;
 mod safe_pairs;
 mod search;
+mod separations;
 mod solid_core;
 
 pub(crate) use certificate::{Clearance, Move};
 pub(crate) use closest::Closest;
 pub use crossing::{Crossing, crossings};
 pub(crate) use exclusions::{Exclusions, Members};
-pub(crate) use measured::{Measured, PART};
+pub(crate) use measured::Measured;
 pub use mesh::CollisionMesh;
 pub(crate) use neighbourhood::{Neighbourhood, swept};
 pub(crate) use pair::{Pair, PairKind};
 pub(crate) use safe_pairs::Doubts;
 pub(crate) use search::{Rules, Search};
+pub(crate) use separations::{Near, PART, Separations};
 pub(crate) use solid_core::Core;
 
 #[cfg(test)]

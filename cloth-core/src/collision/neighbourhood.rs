@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 
 use super::displacement::{mean, mean_displacement};
-use super::{CollisionMesh, Measured, Pair, Search};
+use super::{CollisionMesh, Pair, Search, Separations};
 use crate::geometry::{Bounds, norm, subtract};
 
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current
@@ -17,7 +17,7 @@ pub(crate) struct Neighbourhood {
     /// The radius of each ball, in m. Empty before the first search.
     radii: Vec<f64>,
     pairs: Vec<Pair>,
-    measured: Measured,
+    separations: Separations,
 }
 
 /// Balls that grow do so by this factor beyond the vertex.
@@ -32,20 +32,20 @@ impl Neighbourhood {
     }
 
     /// The pairs at the place where they were last measured.
-    pub fn measured(&self) -> &Measured {
-        &self.measured
+    pub fn separations(&self) -> &Separations {
+        &self.separations
     }
 
     /// Forgets all pairs, so that the next ones depend on the state alone.
     pub fn clear(&mut self) {
         self.radii.clear();
         self.pairs.clear();
-        self.measured.clear();
+        self.separations.clear();
     }
 
     /// Measures the pairs at x.
-    pub fn visit(&mut self, x: &[Vector3<f64>], threads: usize) {
-        self.measured.measure(&self.pairs, x, threads);
+    pub fn visit(&mut self, search: &Search, x: &[Vector3<f64>]) {
+        self.separations.measure(&self.pairs, x, search.halves(), search.threads);
     }
 
     /// Finds the pairs in new balls around `centres`, and measures them at x, which these balls cover.
@@ -89,7 +89,7 @@ impl Neighbourhood {
         // Two runs in order are merged in linear time.
         self.pairs.sort();
         self.pairs.dedup();
-        self.measured.clear();
+        self.separations.clear();
         (true, 1)
     }
 
@@ -107,12 +107,12 @@ impl Neighbourhood {
     /// Measures the pairs at x, and drops those that cannot come within reach: boxes of tilted features meet long
     /// before the features do.
     fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>]) {
-        self.measured.clear();
-        self.measured.measure(&self.pairs, x, search.threads);
+        self.separations.clear();
+        self.visit(search, x);
         let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
         let is_near = |(pair, separation): (&Pair, &f64)| separation - pair.approach(&farthest) <= search.reach(pair);
-        let is_kept: Vec<bool> = self.pairs.iter().zip(self.measured.separations()).map(is_near).collect();
-        self.measured.retain(&is_kept);
+        let is_kept: Vec<bool> = self.pairs.iter().zip(self.separations.all()).map(is_near).collect();
+        self.separations.retain(&is_kept);
         let mut kept = is_kept.into_iter();
         self.pairs.retain(|_| kept.next().expect("one for each pair"));
     }

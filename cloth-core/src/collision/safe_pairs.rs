@@ -1,23 +1,21 @@
 //! The first test of the certificate, for many pairs in lanes.
 
-use energy_dsl::{Kernel, Lane, Level, Mask, Number, dispatch};
+use energy_dsl::{Kernel, Lane, Level, Mask, Number, Vector3, dispatch};
 
 use super::closest::separation;
-use super::{Closest, Measured, Move, Pair, PairKind};
+use super::{Clearance, Closest, Move, Pair, PairKind};
 
-/// Pairs of a move that may come close, with the distance that each must keep.
+/// Pairs that a move may bring too close.
 pub(crate) struct Doubts<'a> {
     pub step: &'a Move<'a>,
     /// All pairs, in order.
     pub pairs: &'a [Pair],
-    /// All pairs at the start of the move.
-    pub measured: &'a Measured,
 }
 
 impl Doubts<'_> {
-    /// Returns which of some pairs, given with their levels, neither the normal at the start nor that at the end keeps
-    /// apart. All others certainly keep their level during the whole move. The pairs are in order.
-    pub fn of(&self, numbers: &[(usize, f64)]) -> Vec<usize> {
+    /// Returns which of some pairs, given with their clearance, neither the normal at the start nor that at the end
+    /// keeps apart. All others certainly keep their clearance during the whole move. The pairs are in order.
+    pub fn of(&self, numbers: &[(usize, Clearance)]) -> Vec<usize> {
         let points = numbers.partition_point(|(number, _)| self.pairs[*number].kind == PairKind::PointTriangle);
         let (on_triangles, of_edges) = numbers.split_at(points);
         let mut doubtful = Vec::new();
@@ -31,7 +29,7 @@ impl Doubts<'_> {
 struct Test<'a> {
     doubts: &'a Doubts<'a>,
     kind: PairKind,
-    numbers: &'a [(usize, f64)],
+    numbers: &'a [(usize, Clearance)],
     doubtful: &'a mut Vec<usize>,
 }
 
@@ -40,39 +38,27 @@ impl Kernel for Test<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { doubts: Doubts { step, pairs, measured }, kind, numbers, doubtful } = self;
+        let Self { doubts: Doubts { step, pairs }, kind, numbers, doubtful } = self;
         let lanes = L::F64::LANES;
         for numbers in numbers.chunks(lanes) {
-            let (mut vertices, mut start) = ([[0; 16]; 4], [[0.0; 16]; 5]);
+            let (mut vertices, mut thickness, mut reach) = ([[0; 16]; 4], [0.0; 16], [0.0; 16]);
             for lane in 0..lanes {
                 // Lanes beyond the end repeat the last pair.
-                let (number, level) = numbers[lane.min(numbers.len() - 1)];
+                let (number, clearance) = numbers[lane.min(numbers.len() - 1)];
                 for corner in 0..4 {
                     vertices[corner][lane] = pairs[number].vertices[corner];
                 }
-                let Closest { normal: [x, y, z], separation, .. } = measured.closest(number);
-                for (row, value) in start.iter_mut().zip([x, y, z, separation, level]) {
-                    row[lane] = value;
-                }
+                (thickness[lane], reach[lane]) = (clearance.thickness, clearance.reach);
             }
-            let [p, q, r, s] = &vertices;
-            let [x, y, z, apart, level] = &start;
-            let normal = [L::F64::load(x), L::F64::load(y), L::F64::load(z)];
-            let (apart, level) = (L::F64::load(apart), L::F64::load(level));
-            let to = step.to();
-            let to = [L::F64::gather(to, p), L::F64::gather(to, q), L::F64::gather(to, r), L::F64::gather(to, s)];
-            let at_end = separation(&normal, &to, kind.first());
+            let (thickness, reach) = (L::F64::load(&thickness), L::F64::load(&reach));
+            let [from, to] = [corners::<L>(step.from(), &vertices), corners::<L>(step.to(), &vertices)];
+            let start = Closest::between(kind, &from);
+            let level = step.level(start.distance, thickness, reach);
+            let at_end = separation(&start.normal, &to, kind.first());
             // False for NaN.
-            let mut is_safe = level.less_or_equal(apart) & level.less_or_equal(at_end);
+            let mut is_safe = level.less_or_equal(start.separation) & level.less_or_equal(at_end);
             if !is_safe.all() {
                 let end = Closest::between(kind, &to);
-                let from = step.from();
-                let from = [
-                    L::F64::gather(from, p),
-                    L::F64::gather(from, q),
-                    L::F64::gather(from, r),
-                    L::F64::gather(from, s),
-                ];
                 let at_start = separation(&end.normal, &from, kind.first());
                 is_safe = is_safe | (level.less_or_equal(end.separation) & level.less_or_equal(at_start));
             }
@@ -80,4 +66,10 @@ impl Kernel for Test<'_> {
             doubtful.extend((0..numbers.len()).filter(|lane| bits >> lane & 1 == 0).map(|lane| numbers[lane].0));
         }
     }
+}
+
+/// Gathers the corners of pairs.
+#[inline(always)]
+fn corners<L: Level>(x: &[Vector3<f64>], [p, q, r, s]: &[[u32; 16]; 4]) -> [Vector3<L::F64>; 4] {
+    [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)]
 }

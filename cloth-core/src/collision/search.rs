@@ -130,6 +130,11 @@ impl Search {
         self.rules.with_itself
     }
 
+    /// Half the reach at each vertex, in m.
+    pub fn halves(&self) -> &[f64] {
+        &self.rules.halves
+    }
+
     /// The distance within which a pair is found, in m. It exceeds what contact needs by far more than rounding errors.
     #[inline]
     pub fn reach(&self, pair: &Pair) -> f64 {

@@ -28,23 +28,14 @@ fn at(from: &[Vector3<f64>], to: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>
 fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 {
     let step = Move::new(from, to);
     let pairs = pairs();
-    let mut measured = Measured::default();
-    measured.measure(&pairs, from, 1);
-    (0..pairs.len()).fold(1.0, |part, number| safe_part_of(&step, &pairs, &measured, number, thickness, part).min(part))
+    (0..pairs.len()).fold(1.0, |part, number| safe_part_of(&step, &pairs, number, thickness, part).min(part))
 }
 
-/// The part of a move that is safe for one of the pairs that are measured at the start.
-fn safe_part_of(
-    step: &Move<'_>,
-    pairs: &[Pair],
-    measured: &Measured,
-    number: usize,
-    thickness: f64,
-    wanted: f64,
-) -> f64 {
-    let (start, clearance) = (measured.closest(number), Clearance { thickness, reach: f64::INFINITY, is_plane: false });
-    let doubts = Doubts { step, pairs, measured }.of(&[(number, step.level(start.distance, clearance))]);
-    if doubts.is_empty() { 1.0 } else { step.safe_part(&pairs[number], &start, clearance, wanted) }
+/// The part of a move that is safe for one of some pairs.
+fn safe_part_of(step: &Move<'_>, pairs: &[Pair], number: usize, thickness: f64, wanted: f64) -> f64 {
+    let clearance = Clearance { thickness, reach: f64::INFINITY, is_plane: false };
+    let doubtful = Doubts { step, pairs }.of(&[(number, clearance)]);
+    if doubtful.is_empty() { 1.0 } else { step.safe_part(&pairs[number], clearance, wanted) }
 }
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -103,11 +94,17 @@ proptest! {
 
     /// Lanes give the bits of single pairs.
     #[test]
-    fn lanes_measure_what_single_pairs_are([x, _] in impact()) {
-        let mut measured = Measured::default();
-        measured.measure(&pairs(), &x, 2);
-        for (number, pair) in pairs().iter().enumerate() {
-            prop_assert_eq!(measured.closest(number), Closest::of(pair, &pair.corners(&x)));
+    fn lanes_measure_what_single_pairs_are([x, _] in impact(), half in 0.0..0.02) {
+        let (pairs, mut measured, mut separations) = (pairs(), Measured::default(), Separations::default());
+        measured.measure(&pairs, &x, 2);
+        separations.measure(&pairs, &x, &[half; 6], 2);
+        let mut near = separations.near().iter().peekable();
+        for (number, pair) in pairs.iter().enumerate() {
+            let closest = Closest::of(pair, &pair.corners(&x));
+            prop_assert_eq!(measured.closest(number), closest);
+            prop_assert_eq!(separations.all()[number], closest.separation);
+            let is_near = near.next_if(|near| near.number == number);
+            prop_assert_eq!(is_near.map(|near| near.closest), (closest.separation <= 2.0 * half).then_some(closest));
         }
     }
 
@@ -137,10 +134,9 @@ fn moves_are_cut_only_near_a_contact() {
     let (mut cut, mut early) = (0, 0);
     for _ in 0..10_000 {
         let [from, to] = impact().new_tree(&mut runner).unwrap().current();
-        let (step, pairs, mut measured) = (Move::new(&from, &to), pairs(), Measured::default());
-        measured.measure(&pairs, &from, 1);
+        let (step, pairs) = (Move::new(&from, &to), pairs());
         for (number, pair) in pairs.iter().enumerate() {
-            let part = safe_part_of(&step, &pairs, &measured, number, THICKNESS, 1.0);
+            let part = safe_part_of(&step, &pairs, number, THICKNESS, 1.0);
             let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
             if part < 1.0 && gap(0.0) > 0.0 {
                 cut += 1;
