@@ -3,7 +3,7 @@
 use energy_solve::threads::for_each;
 
 use super::spacing::Spacings;
-use crate::collision::{Clearance, CollisionMesh, Doubts, Move, PART, Pair};
+use crate::collision::{Clearance, CollisionMesh, Move, PART, Pair};
 
 /// Judges a move by the pairs near it.
 pub(super) struct Judge<'a> {
@@ -60,7 +60,7 @@ impl Judge<'_> {
                 close.push((number, clearance));
             }
         }
-        (close.len() as u64, Doubts { step: self.step, pairs: self.pairs }.of(&close))
+        (close.len() as u64, self.step.doubtful(self.pairs, &close))
     }
 
     /// Pairs beyond this distance certainly stay out of reach, in m.

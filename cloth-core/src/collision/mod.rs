@@ -32,7 +32,6 @@ pub(crate) use measured::Measured;
 pub use mesh::CollisionMesh;
 pub(crate) use neighbourhood::{Neighbourhood, swept};
 pub(crate) use pair::{Pair, PairKind};
-pub(crate) use safe_pairs::Doubts;
 pub(crate) use search::{Rules, Search};
 pub(crate) use separations::{Near, PART, Separations};
 pub(crate) use solid_core::Core;

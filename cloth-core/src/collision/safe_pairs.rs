@@ -5,29 +5,25 @@ use energy_dsl::{Kernel, Lane, Level, Mask, Number, Vector3, dispatch};
 use super::closest::separation;
 use super::{Clearance, Closest, Move, Pair, PairKind};
 
-/// Pairs that a move may bring too close.
-pub(crate) struct Doubts<'a> {
-    pub step: &'a Move<'a>,
-    /// All pairs, in order.
-    pub pairs: &'a [Pair],
-}
-
-impl Doubts<'_> {
-    /// Returns which of some pairs, given with their clearance, neither the normal at the start nor that at the end
-    /// keeps apart. All others certainly keep their clearance during the whole move. The pairs are in order.
-    pub fn of(&self, numbers: &[(usize, Clearance)]) -> Vec<usize> {
-        let points = numbers.partition_point(|(number, _)| self.pairs[*number].kind == PairKind::PointTriangle);
+impl Move<'_> {
+    /// Returns which of some pairs, given by number and clearance, neither the normal at the start nor that at the end
+    /// keeps apart. All others certainly keep their clearance during the whole move. `pairs` are in order, as are the
+    /// numbers.
+    pub fn doubtful(&self, pairs: &[Pair], numbers: &[(usize, Clearance)]) -> Vec<usize> {
+        let points = numbers.partition_point(|(number, _)| pairs[*number].kind == PairKind::PointTriangle);
         let (on_triangles, of_edges) = numbers.split_at(points);
         let mut doubtful = Vec::new();
         for (kind, numbers) in [(PairKind::PointTriangle, on_triangles), (PairKind::EdgeEdge, of_edges)] {
-            dispatch(Test { doubts: self, kind, numbers, doubtful: &mut doubtful });
+            dispatch(Test { step: self, pairs, kind, numbers, doubtful: &mut doubtful });
         }
         doubtful
     }
 }
 
+/// Tests pairs of one kind.
 struct Test<'a> {
-    doubts: &'a Doubts<'a>,
+    step: &'a Move<'a>,
+    pairs: &'a [Pair],
     kind: PairKind,
     numbers: &'a [(usize, Clearance)],
     doubtful: &'a mut Vec<usize>,
@@ -38,7 +34,7 @@ impl Kernel for Test<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { doubts: Doubts { step, pairs }, kind, numbers, doubtful } = self;
+        let Self { step, pairs, kind, numbers, doubtful } = self;
         let lanes = L::F64::LANES;
         for numbers in numbers.chunks(lanes) {
             let (mut vertices, mut thickness, mut reach) = ([[0; 16]; 4], [0.0; 16], [0.0; 16]);

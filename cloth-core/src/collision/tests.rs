@@ -34,7 +34,7 @@ fn safe_part(from: &[Vector3<f64>], to: &[Vector3<f64>], thickness: f64) -> f64 
 /// The part of a move that is safe for one of some pairs.
 fn safe_part_of(step: &Move<'_>, pairs: &[Pair], number: usize, thickness: f64, wanted: f64) -> f64 {
     let clearance = Clearance { thickness, reach: f64::INFINITY, is_plane: false };
-    let doubtful = Doubts { step, pairs }.of(&[(number, clearance)]);
+    let doubtful = step.doubtful(pairs, &[(number, clearance)]);
     if doubtful.is_empty() { 1.0 } else { step.safe_part(&pairs[number], clearance, wanted) }
 }
 
