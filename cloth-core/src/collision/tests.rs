@@ -137,7 +137,7 @@ fn moves_are_cut_only_near_a_contact() {
         let (step, pairs) = (Move::new(&from, &to), pairs());
         for (number, pair) in pairs.iter().enumerate() {
             let part = safe_part_of(&step, &pairs, number, THICKNESS, 1.0);
-            let gap = |time| Closest::of(&pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
+            let gap = |time| Closest::of(pair, &pair.corners(&at(&from, &to, time))).distance - THICKNESS;
             if part < 1.0 && gap(0.0) > 0.0 {
                 cut += 1;
                 early += u32::from(gap(part) > 0.2 * gap(0.0));
