@@ -32,7 +32,8 @@ impl Judge<'_> {
         let pairs = self.pairs;
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();
         let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
-        for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part)) {
+        let farthest = self.farthest();
+        for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part, farthest)) {
             judgement.tested += tested;
             for number in doubtful {
                 let pair = &pairs[number];
@@ -48,8 +49,7 @@ impl Judge<'_> {
 
     /// The number of pairs that comparisons of distances do not dismiss, and those that are not safe at first sight,
     /// among consecutive pairs from number `first` on.
-    fn doubtful(&self, first: usize, pairs: &[Pair]) -> (u64, Vec<usize>) {
-        let farthest = self.farthest();
+    fn doubtful(&self, first: usize, pairs: &[Pair], farthest: f64) -> (u64, Vec<usize>) {
         let mut close = Vec::new();
         for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.separations[first..])) {
             if *separation > farthest {

@@ -3,7 +3,7 @@
 //! The formulas have no branches, so that SIMD lanes evaluate many pairs at a time. They use plain sums and products:
 //! results have the same bits in any number of lanes.
 
-use energy_dsl::{Real, Vector3};
+use energy_dsl::{Lane, Level, Real, Vector3};
 
 use super::{Pair, PairKind};
 use crate::geometry::{add_scaled, cross, dot, norm, subtract};
@@ -57,6 +57,12 @@ impl<V: Real> Closest<V> {
         let normal = select(is_apart, &[x / distance, y / distance, z / distance], &[zero; 3]);
         Self { weights, distance, normal, separation: separation(&normal, corners, kind.first()) }
     }
+}
+
+/// Gathers the corners of pairs with these vertices.
+#[inline(always)]
+pub(super) fn corners<L: Level>(x: &[Vector3<f64>], [p, q, r, s]: &[[u32; 16]; 4]) -> [Vector3<L::F64>; 4] {
+    [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)]
 }
 
 /// The smallest n·(a − b) over corners a of the first and b of the second feature. For a unit vector n, a lower bound

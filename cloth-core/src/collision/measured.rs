@@ -1,6 +1,7 @@
 use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
 use energy_solve::threads::for_each;
 
+use super::closest::corners;
 use super::separations::PART;
 use super::{Closest, Pair, PairKind};
 
@@ -92,10 +93,8 @@ fn measure<L: Level>(
                 vertices[corner][lane] = pair.vertices[corner];
             }
         }
-        let [p, q, r, s] = &vertices;
-        let corners = [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)];
         let Closest { weights: [a, b, c, d], normal: [nx, ny, nz], distance, separation } =
-            Closest::between(kind, &corners);
+            Closest::between(kind, &corners::<L>(x, &vertices));
         let rows = numbers[start..][..pairs.len()].as_flattened_mut();
         L::F64::store_transposed(&[a, b, c, d, nx, ny, nz, distance], pairs.len(), rows, 8);
         separation.store_ragged(&mut separations[start..][..pairs.len()]);

@@ -1,8 +1,8 @@
 //! The first test of the certificate, for many pairs in lanes.
 
-use energy_dsl::{Kernel, Lane, Level, Mask, Number, Vector3, dispatch};
+use energy_dsl::{Kernel, Lane, Level, Mask, Number, dispatch};
 
-use super::closest::separation;
+use super::closest::{corners, separation};
 use super::{Clearance, Closest, Move, Pair, PairKind};
 
 impl Move<'_> {
@@ -62,10 +62,4 @@ impl Kernel for Test<'_> {
             doubtful.extend((0..numbers.len()).filter(|lane| bits >> lane & 1 == 0).map(|lane| numbers[lane].0));
         }
     }
-}
-
-/// Gathers the corners of pairs.
-#[inline(always)]
-fn corners<L: Level>(x: &[Vector3<f64>], [p, q, r, s]: &[[u32; 16]; 4]) -> [Vector3<L::F64>; 4] {
-    [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)]
 }

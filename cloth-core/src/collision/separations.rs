@@ -1,6 +1,7 @@
 use energy_dsl::{Kernel, Lane, Level, Mask, Number, Vector3, dispatch};
 use energy_solve::threads::for_each;
 
+use super::closest::corners;
 use super::{Closest, Pair, PairKind};
 
 /// Pairs that one thread takes at a time. A multiple of the number of lanes.
@@ -123,9 +124,7 @@ impl Kernel for Measure<'_> {
                 }
                 reach[lane] = halves[pair.vertices[0] as usize] + halves[pair.vertices[kind.first()] as usize];
             }
-            let [p, q, r, s] = &vertices;
-            let corners = [L::F64::gather(x, p), L::F64::gather(x, q), L::F64::gather(x, r), L::F64::gather(x, s)];
-            let closest = Closest::between(kind, &corners);
+            let closest = Closest::between(kind, &corners::<L>(x, &vertices));
             closest.separation.store_ragged(separations);
             let mut within = closest.separation.less_or_equal(L::F64::load(&reach)).bits();
             within &= u32::MAX >> (32 - pairs.len());
