@@ -4,12 +4,14 @@
 //!
 //! Modules, from the bottom up; each uses only those above it:
 //!
-//! - [`geometry`], [`mesh`], [`motion`]: vectors, rigid motions, triangle meshes, keyframes
-//! - [`collision`]: pairs of features, certificates of moves, the exact test for crossings
-//! - [`fabric`], [`contact`], [`wind`]: the forces, as terms of declared elements
-//! - [`barrier`]: contact of cloth with itself
-//! - [`integrator`], [`ledger`]: time integration and the energy balance of a body
-//! - [`scene`], [`model`]: the file format, and its assembly into islands
+//! - of the crate [`cloth_physics`]:
+//!   - [`geometry`], [`mesh`], [`motion`]: vectors, rigid motions, triangle meshes, keyframes
+//!   - [`collision`]: pairs of features, certificates of moves, the exact test for crossings
+//!   - [`barrier`]: contact of cloth with itself
+//!   - [`fabric`], [`contact`], [`wind`]: the other forces, as terms of declared elements
+//!   - [`integrator`]: time integration of a [`Body`]
+//! - [`scene`], the crate [`cloth_scene`]: the file format
+//! - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
 //! - [`simulation`], [`output`], [`run`]: stepping, output files, runs with checkpoints and reports
 //! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
 //!
@@ -44,32 +46,20 @@
 
 #![forbid(unsafe_code)]
 
-mod body;
 #[cfg(doctest)]
 mod book;
-mod bounded;
-mod input_text;
 
-pub mod barrier;
 pub mod bench;
-pub mod collision;
-pub mod contact;
 pub mod demo;
-pub mod fabric;
-pub mod geometry;
-pub mod integrator;
 pub mod ledger;
-pub mod mesh;
 pub mod model;
-pub mod motion;
 pub mod output;
 pub mod run;
-pub mod scene;
 pub mod simulation;
 pub mod validate;
 pub mod view;
-pub mod wind;
 
-pub use body::Body;
 pub use cloth_materials as materials;
+pub use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};
+pub use cloth_scene as scene;
 pub use simulation::{Island, Simulation, SimulationError, Summary};

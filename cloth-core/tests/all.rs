@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod command_line;
+mod damping;
 mod deforming_obstacles;
 mod endings;
 mod exclusions;

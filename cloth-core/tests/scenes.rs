@@ -1,6 +1,7 @@
 //! Scenes with several parts: contact, friction, wind, moving pins, seams, hair, and the energy ledger.
 
 use cloth_core::Simulation;
+use cloth_core::fabric::MEASURED;
 use cloth_core::materials::element;
 use cloth_core::scene::Scene;
 
@@ -341,4 +342,15 @@ fn the_scenes_of_the_gallery_are_valid() {
         }
     }
     assert!(count >= 16, "{count}");
+}
+
+#[test]
+fn every_measured_fabric_makes_a_simulation() {
+    for fabric in MEASURED {
+        let text =
+            format!("dt = 0.01\nduration = 0.1\n[mesh.sheet]\ncells = [2, 2]\nsize = [1.0, 1.0]\n{}", fabric.table);
+        let scene = Scene::parse(&text, "scene.toml".as_ref()).unwrap();
+        // Strips that contradict each other are refused when the fabric is applied.
+        Simulation::new(&scene).unwrap_or_else(|error| panic!("{}: {error}", fabric.name));
+    }
 }

@@ -2,7 +2,7 @@ use energy_elements::ZeroLengthSpring;
 use energy_solve::{ElementList, ListError, PotentialTerm, System, SystemError};
 use serde::{Deserialize, Serialize};
 
-use crate::body::Body;
+use crate::Body;
 use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
 use crate::integrator::StepError;
 use crate::mesh::{Diagonals, MeshError, Plane, Sheet, SpringNetwork};

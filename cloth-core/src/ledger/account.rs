@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 use energy_solve::{EvaluationError, PlacedTerm, State};
 use serde::{Deserialize, Serialize};
 
-use crate::body::Body;
+use crate::Body;
 use crate::geometry::{add_scaled, norm};
 
 /// Energy and momenta of an island, and the work done on it so far.

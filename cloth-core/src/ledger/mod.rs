@@ -7,7 +7,7 @@ use energy_dsl::Vector3;
 use energy_solve::{EvaluationError, PlacedTerm};
 use serde::{Deserialize, Serialize};
 
-use crate::body::Body;
+use crate::Body;
 pub(crate) use account::Account;
 pub(crate) use account::DrivenEnergies;
 use account::works;

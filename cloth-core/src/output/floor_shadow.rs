@@ -126,6 +126,7 @@ impl FloorShadow {
 
 #[cfg(test)]
 mod tests {
+    use super::super::style::camera_on;
     use super::*;
     use crate::scene::Style;
 
@@ -135,7 +136,7 @@ mod tests {
         canvas.fill(tiny_skia::Color::WHITE);
         let floor = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
         let style = Style { size: [250, 250], ..Style::default() };
-        let camera = style.camera_on(&floor);
+        let camera = camera_on(&style, &floor);
         let mut shadow = FloorShadow::new(&canvas);
         shadow.add(&camera, &floor, &[[0, 1, 2], [0, 1, 2], [0, 2, 3]], &[]);
         shadow.add(&camera, &floor, &[[0, 1, 2]], &[]);

@@ -7,6 +7,7 @@ use super::floor_shadow::FloorShadow;
 use super::projection::Camera;
 use super::raster::{Canvas, Corner};
 use super::solid_mesh::SolidMesh;
+use super::style::{OVERSAMPLING, camera_on};
 use super::vertex_normals;
 use super::visibility::{Occluders, Visibility, lamp_directions};
 use crate::geometry::{cross, dot, norm, subtract};
@@ -71,14 +72,14 @@ pub struct Look<'a> {
 /// # Errors
 /// Returns an error if the picture cannot be encoded.
 pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
-    let [width, height] = view.style.size.map(|pixels| pixels * Style::OVERSAMPLING);
+    let [width, height] = view.style.size.map(|pixels| pixels * OVERSAMPLING);
     let mut background = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
     let solids = view.solids.iter().flat_map(|solid| &solid.vertices);
     let everything: Vec<Vector3<f64>> = view.positions.iter().chain(solids).copied().collect();
     let floor = floor_below(&everything, view.floor);
     let camera = view.camera.unwrap_or_else(|| {
         let all: Vec<Vector3<f64>> = everything.iter().flat_map(|p| [*p, shadow_of(p, floor)]).collect();
-        view.style.camera_on(&all)
+        camera_on(&view.style, &all)
     });
     draw_background(&mut background, view.style.background);
     let triangles = all_triangles(view);
@@ -272,7 +273,7 @@ fn averaged(canvas: &Pixmap, [width, height]: [u32; 2]) -> Option<Pixmap> {
     for (index, byte) in small.data_mut().iter_mut().enumerate() {
         let (pixel, channel) = (index / 4, index % 4);
         let (x, y) = (pixel % width as usize, pixel / width as usize);
-        let n = Style::OVERSAMPLING as usize;
+        let n = OVERSAMPLING as usize;
         let sum: u32 =
             (0..n * n).map(|part| u32::from(source[(n * y + part / n) * row + 4 * (n * x + part % n) + channel])).sum();
         *byte = ((sum + (n * n / 2) as u32) / (n * n) as u32) as u8;

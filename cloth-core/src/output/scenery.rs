@@ -4,6 +4,7 @@ use energy_dsl::Vector3;
 
 use super::picture::{View, shadow_of};
 use super::projection::Camera;
+use super::style::{camera_on, is_visible};
 use super::{Look, PictureError, SolidMesh, picture_png};
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{Bounds, dot};
@@ -58,15 +59,15 @@ impl Framing {
         let below = bounds.low[2] - 0.08 * (bounds.high[2] - bounds.low[2]);
         let (floor, lowest) = floor.map_or((below, below), |floor| (floor, f64::NEG_INFINITY));
         let with_shadows: Vec<Vector3<f64>> = points.iter().flat_map(|p| [*p, shadow_of(p, floor)]).collect();
-        let camera = style.camera_on(&with_shadows);
+        let camera = camera_on(&style, &with_shadows);
         Self { bounds, style, steady: Some(Steady { camera, floor, lowest }) }
     }
 
     /// Whether the pictures of a sequence show all these points.
     pub(crate) fn shows(&self, points: &[Vector3<f64>]) -> bool {
         self.steady.is_some_and(|Steady { camera, floor, lowest }| {
-            let is_visible = |p: Vector3<f64>| self.style.is_visible(&camera, p);
-            let is_shown = |p: &Vector3<f64>| is_visible(*p) && is_visible(shadow_of(p, floor));
+            let is_within = |p: Vector3<f64>| is_visible(&self.style, &camera, p);
+            let is_shown = |p: &Vector3<f64>| is_within(*p) && is_within(shadow_of(p, floor));
             points.iter().all(|p| p[2] >= lowest && is_shown(p))
         })
     }

@@ -1,3 +1,5 @@
+//! What a scene's choice of style means for its pictures.
+
 use energy_dsl::Vector3;
 
 use super::projection::Camera;
@@ -6,30 +8,27 @@ use crate::scene::{Style, Viewpoint};
 /// Direction from the cloth to the eye.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
 
-impl Style {
-    /// Supersampling factor: anti-aliases without seams between triangles.
-    pub(super) const OVERSAMPLING: u32 = 2;
+/// Supersampling factor: anti-aliases without seams between triangles.
+pub(super) const OVERSAMPLING: u32 = 2;
 
-    /// Size of a picture before downsampling, in pixels.
-    fn canvas(&self) -> [f64; 2] {
-        self.size.map(|pixels| f64::from(pixels * Self::OVERSAMPLING))
-    }
+/// Size of a picture before downsampling, in pixels.
+fn canvas(style: &Style) -> [f64; 2] {
+    style.size.map(|pixels| f64::from(pixels * OVERSAMPLING))
+}
 
-    /// Returns the chosen camera, or one that frames the points, with some space around them.
-    pub(super) fn camera_on(&self, points: &[Vector3<f64>]) -> Camera {
-        match self.viewpoint {
-            Some(Viewpoint { eye, target, angle }) => Camera::looking(eye, target, angle, self.canvas()),
-            None => Camera::framing(points, VIEW, self.canvas(), 0.86),
-        }
+/// Returns the chosen camera, or one that frames the points, with some space around them.
+pub(super) fn camera_on(style: &Style, points: &[Vector3<f64>]) -> Camera {
+    match style.viewpoint {
+        Some(Viewpoint { eye, target, angle }) => Camera::looking(eye, target, angle, canvas(style)),
+        None => Camera::framing(points, VIEW, canvas(style), 0.86),
     }
+}
 
-    /// Whether a point lies well within the picture. A chosen camera decides what it shows.
-    pub(super) fn is_visible(&self, camera: &Camera, point: Vector3<f64>) -> bool {
-        let (place, depth) = camera.project(point);
-        let size = self.canvas();
-        self.viewpoint.is_some()
-            || depth > 0.0 && (0..2).all(|axis| (0.02..=0.98).contains(&(place[axis] / size[axis])))
-    }
+/// Whether a point lies well within the picture. A chosen camera decides what it shows.
+pub(super) fn is_visible(style: &Style, camera: &Camera, point: Vector3<f64>) -> bool {
+    let (place, depth) = camera.project(point);
+    let size = canvas(style);
+    style.viewpoint.is_some() || depth > 0.0 && (0..2).all(|axis| (0.02..=0.98).contains(&(place[axis] / size[axis])))
 }
 
 /// Returns the linear colour of one as screens show it (sRGB).

@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 
 use super::prescribed::Prescribed;
 use super::sleep::{BoundingSphere, SleepState, StepContext, Stillness};
-use crate::body::Body;
-use crate::bounded::SPEED_OF_LIGHT;
+use crate::Body;
 use crate::contact::Obstacle;
 use crate::integrator::{Integrator, IntegratorMemory, StepError, StepReport};
 use crate::ledger::{Account, DrivenEnergies};
 use crate::model::{IslandModel, Model, MovingPin};
 use crate::scene::Scene;
+use cloth_physics::bounded::SPEED_OF_LIGHT;
 
 /// A set of vertices that no force couples to the others. It moves on its own, and can sleep while others move.
 #[derive(Debug)]

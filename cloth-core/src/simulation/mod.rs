@@ -24,8 +24,8 @@ pub use saved::{RestoreError, SavedCounts, SavedState};
 pub use summary::{Summary, TermSummary};
 pub use totals::Totals;
 
+use crate::Body;
 use crate::barrier::ContactError;
-use crate::body::Body;
 use crate::collision::{CollisionMesh, Crossing, Exclusions, crossings};
 use crate::contact::Obstacle;
 use crate::integrator::{StepError, StepReport};

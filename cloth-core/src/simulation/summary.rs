@@ -7,7 +7,7 @@ use energy_solve::{Counts, EvaluationError, State, Tally};
 use serde::{Deserialize, Serialize};
 
 use super::{Simulation, Totals};
-use crate::body::Body;
+use crate::Body;
 use crate::integrator::{Phases, SolvedBy};
 use crate::model::{Model, TermLabel};
 use crate::scene::Scene;

@@ -5,7 +5,7 @@ use energy_solve::System;
 
 use super::equilibrium::Equilibrium;
 use super::{Finding, ValidateError};
-use crate::body::Body;
+use crate::Body;
 use crate::fabric::{self, Bending, Fabric, Material, Membrane, Surroundings};
 use crate::integrator::{ImplicitMidpoint, Integrator, Newton, NewtonOptions, SymplecticEuler, Verlet};
 use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork};

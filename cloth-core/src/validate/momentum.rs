@@ -2,7 +2,7 @@ use energy_dsl::Vector3;
 use energy_solve::System;
 
 use super::{Finding, ValidateError};
-use crate::body::Body;
+use crate::Body;
 use crate::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroundings};
 use crate::geometry::{norm, subtract};
 use crate::integrator::{

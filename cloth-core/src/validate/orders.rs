@@ -3,7 +3,7 @@ use energy_elements::{Gravity, HookeSpring};
 use energy_solve::{ElementList, PotentialTerm, State, System};
 
 use super::{Finding, ValidateError};
-use crate::body::Body;
+use crate::Body;
 use crate::integrator::{
     Bdf2, ExplicitEuler, ImplicitEuler, ImplicitMidpoint, Integrator, Newton, NewtonOptions, SymplecticEuler,
     Trapezoid, Verlet,

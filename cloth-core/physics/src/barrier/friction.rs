@@ -1,0 +1,256 @@
+//! Friction of cloth with itself and with obstacles.
+//!
+//! A pair in contact has the potential μ λ (√(‖t‖² + ε²) − ε) ([`SlidingFriction`]) of the way t that it has slid
+//! from where it sticks. This way is a bristle: it bends by up to a tenth of a millimetre, then the pair slips and the
+//! bristle follows. A bristle at rest stays at rest, so a pair that sticks does not creep. With ε a tenth of the length
+//! of a bristle, a pair that slips has 0.995 of the friction μ λ.
+//!
+//! Closest points, normal and normal force λ are lagged: taken at the start of the step, so that friction has a
+//! potential (Li et al. 2020, "Incremental potential contact", §5.5).
+//!
+//! On an obstacle, the closest point is a material point of its surface, which moves with it.
+
+use energy_dsl::{Block, Packed, Vector3};
+use energy_elements::SlidingFriction;
+use energy_solve::{Contact, ContactMemory};
+
+use super::bristle::{Bristles, LENGTH};
+use super::law::Law;
+use crate::collision::{Closest, CollisionMesh, Pair};
+use crate::geometry::{add_scaled, dot, subtract};
+
+/// The deflection ε of a bristle at which friction is μ/√2 times the normal force, in m.
+const SOFTNESS: f64 = 0.1 * LENGTH;
+/// Why an evaluation cannot fail.
+const ONE_WAY: &str = "each pair has one way";
+
+/// The friction of a step.
+#[derive(Debug, Default)]
+pub(super) struct Friction {
+    /// μ at each vertex of cloth and hair; empty without friction between them.
+    pub coefficients: Vec<f64>,
+    /// The grip of each obstacle.
+    pub grips: Vec<Grip>,
+    /// Positions at the start of the step.
+    pub start: Vec<Vector3<f64>>,
+    /// The deflections at the start.
+    bristles: Bristles,
+    /// The pairs in contact at the start; `None` before they are known.
+    sliding: Option<Slidings>,
+}
+
+/// The friction of an obstacle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Grip {
+    /// The coefficient of friction.
+    pub coefficient: f64,
+    /// The first of four vertices that move with the obstacle: an origin, and the ends of three orthogonal unit
+    /// vectors from there. `None` if the obstacle is fixed or deforms.
+    pub frame: Option<u32>,
+    /// Whether the obstacle deforms. Its vertices are then material points.
+    pub deforms: bool,
+}
+
+/// All pairs in contact at the start of the step.
+#[derive(Debug)]
+struct Slidings {
+    pairs: Vec<Sliding>,
+    /// The potentials. Element i acts on the vector between the sliding points of pair i.
+    elements: Packed<SlidingFriction>,
+}
+
+/// A pair in contact at the start of the step.
+#[derive(Debug)]
+struct Sliding {
+    pair: Pair,
+    /// The coefficients of the closest points at the start, without those of a rigid obstacle.
+    weights: [f64; 4],
+    /// The point of a moving obstacle that slides.
+    anchor: Option<Anchor>,
+    normal: Vector3<f64>,
+    /// The vector between the sliding points while the bristle is straight, up to a multiple of the normal.
+    straight: Vector3<f64>,
+}
+
+/// A material point of a moving obstacle.
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    /// The first vertex of the obstacle's frame.
+    frame: u32,
+    /// The coefficients of the frame's vertices in the sliding. Their sum is 1 or −1.
+    weights: [f64; 4],
+}
+
+impl Friction {
+    /// Begins a step at x, where the last step ended. After a step that failed, x is where that step began, and the
+    /// bristles are as before.
+    pub fn begin_step(&mut self, x: &[Vector3<f64>]) {
+        self.bristles = self.bristles_at(x);
+        self.sliding = None;
+        if self.is_rough() {
+            x.clone_into(&mut self.start);
+        }
+    }
+
+    /// Returns the bristles at the end of a step.
+    fn bristles_at(&self, x: &[Vector3<f64>]) -> Bristles {
+        let Some(sliding) = &self.sliding else { return self.bristles.clone() };
+        let way = |one: &Sliding| {
+            let way = subtract(one.between(x), one.straight);
+            (one.pair, one.normal, add_scaled(way, -dot(way, one.normal), one.normal))
+        };
+        Bristles::new(sliding.pairs.iter().map(way))
+    }
+
+    /// Returns the bristles at x, where the last step ended, for a checkpoint.
+    pub fn memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
+        self.bristles_at(x).memory()
+    }
+
+    /// Restores the bristles of a checkpoint.
+    pub fn restore(&mut self, memory: ContactMemory) {
+        (self.bristles, self.sliding) = (Bristles::restored(memory), None);
+    }
+
+    /// Whether anything has friction.
+    pub fn is_rough(&self) -> bool {
+        !self.coefficients.is_empty() || self.grips.iter().any(|grip| grip.coefficient > 0.0)
+    }
+
+    /// The coefficient of friction of a pair.
+    fn coefficient(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {
+        if let Some(obstacle) = mesh.obstacle_of(pair) {
+            return self.grips[obstacle].coefficient;
+        }
+        let of = |vertex: u32| self.coefficients.get(vertex as usize).copied().unwrap_or(0.0);
+        0.5 * (of(pair.vertices[0]) + of(pair.vertices[pair.first()]))
+    }
+
+    /// Takes the pairs in contact at the start, in order, with their laws and closest points.
+    pub fn take(&mut self, mesh: &CollisionMesh, touching: Vec<(Pair, Law, Closest)>) {
+        let mut elements = Vec::new();
+        let of = |(pair, law, closest): (Pair, Law, Closest)| {
+            let limit = self.coefficient(mesh, &pair) * law.force(law.apart(&closest));
+            if limit <= 0.0 {
+                return None;
+            }
+            let (weights, anchor) = self.sliding_point(mesh, &pair, &closest);
+            let normal = closest.normal;
+            let between = sliding(&pair, &weights, anchor, &self.start);
+            let straight = subtract(between, self.bristles.deflection(&pair, normal));
+            elements.push(SlidingFriction::new(normal, straight, limit, SOFTNESS));
+            Some(Sliding { pair, weights, anchor, normal, straight })
+        };
+        let pairs = touching.into_iter().filter_map(of).collect();
+        let stencils: Vec<[u32; 1]> = (0..elements.len()).map(|number| [energy_solve::index(number)]).collect();
+        self.sliding = Some(Slidings { pairs, elements: Packed::new(&elements, &stencils) });
+    }
+
+    /// Returns the coefficients of the closest points on cloth and hair, and the closest point of an obstacle.
+    fn sliding_point(&self, mesh: &CollisionMesh, pair: &Pair, closest: &Closest) -> ([f64; 4], Option<Anchor>) {
+        let Some(obstacle) = mesh.obstacle_of(pair).filter(|obstacle| !self.grips[*obstacle].deforms) else {
+            return (closest.weights, None);
+        };
+        let is_own = pair.vertices.map(|vertex| mesh.obstacle(vertex).is_none());
+        let weights = std::array::from_fn(|corner| if is_own[corner] { closest.weights[corner] } else { 0.0 });
+        let anchor = self.grips[obstacle].frame.map(|frame| {
+            let at = pair.corners(&self.start);
+            let own = (0..4).fold([0.0; 3], |sum, corner| add_scaled(sum, weights[corner], at[corner]));
+            // With the cloth first, its closest point is the sum; otherwise minus the sum.
+            let sign = if is_own[0] { 1.0 } else { -1.0 };
+            let point = own.map(|component| sign * component);
+            let [origin, ends @ ..] = [0, 1, 2, 3].map(|corner| self.start[(frame + corner) as usize]);
+            let along = ends.map(|end| dot(subtract(point, origin), subtract(end, origin)));
+            let rest = 1.0 - along.iter().sum::<f64>();
+            Anchor { frame, weights: [rest, along[0], along[1], along[2]].map(|weight| -sign * weight) }
+        });
+        (weights, anchor)
+    }
+
+    /// Returns Σ μ λ (√(‖t‖² + ε²) − ε), in J.
+    pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
+        let energies = self.sliding.as_ref().map(|sliding| sliding.energies(x));
+        energies.iter().flatten().fold(0.0, |sum, energy| sum + energy)
+    }
+
+    /// Adds the forces of friction, in N.
+    pub fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
+        let Some(sliding) = &self.sliding else { return };
+        for (one, slope) in sliding.pairs.iter().zip(sliding.slopes(x)) {
+            let drag = slope.map(|component| -component);
+            one.pair.add(one.weights, drag, force);
+            for (vertex, weight) in one.anchor.iter().flat_map(Anchor::terms) {
+                force[vertex] = add_scaled(force[vertex], weight, drag);
+            }
+        }
+    }
+
+    /// Adds the stiffness of friction. `row` is the row of a vertex in the matrix.
+    pub fn add_contacts(&self, x: &[Vector3<f64>], row: impl Fn(&u32) -> u32, contacts: &mut Vec<Contact>) {
+        let Some(sliding) = &self.sliding else { return };
+        contacts.extend(sliding.pairs.iter().zip(sliding.blocks(x)).map(|(one, block)| Contact {
+            rows: one.pair.vertices.each_ref().map(&row),
+            weights: one.weights,
+            block,
+        }));
+    }
+}
+
+impl Slidings {
+    /// The vector between the sliding points of each pair.
+    fn ways(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        self.pairs.iter().map(|one| one.between(x)).collect()
+    }
+
+    /// The energy of each pair, in J.
+    fn energies(&self, x: &[Vector3<f64>]) -> Vec<f64> {
+        let ways = self.ways(x);
+        let mut energies = vec![0.0; ways.len()];
+        self.elements.values(0..ways.len(), &ways, &mut energies).expect(ONE_WAY);
+        energies
+    }
+
+    /// The gradient of each pair's energy, in N.
+    fn slopes(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let ways = self.ways(x);
+        let (mut energies, mut slopes) = (vec![0.0; ways.len()], vec![[0.0; 3]; ways.len()]);
+        self.elements.gradients(0..ways.len(), &ways, &mut energies, slopes.as_flattened_mut()).expect(ONE_WAY);
+        slopes
+    }
+
+    /// The Hessian of each pair's energy, in N/m.
+    fn blocks(&self, x: &[Vector3<f64>]) -> Vec<Block<f64>> {
+        let ways = self.ways(x);
+        let (mut energies, mut slopes) = (vec![0.0; ways.len()], vec![0.0; 3 * ways.len()]);
+        let mut blocks = vec![[[0.0; 3]; 3]; ways.len()];
+        let numbers = blocks.as_flattened_mut().as_flattened_mut();
+        self.elements.hessians(0..ways.len(), &ways, &mut energies, &mut slopes, numbers).expect(ONE_WAY);
+        blocks
+    }
+}
+
+impl Sliding {
+    /// The vector between the points that were closest at the start.
+    fn between(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        sliding(&self.pair, &self.weights, self.anchor, x)
+    }
+}
+
+impl Anchor {
+    /// Iterates over the vertices of the frame, with their coefficients.
+    fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
+        (self.frame as usize..).zip(self.weights)
+    }
+}
+
+/// The vector between the points that slide, up to a constant: Σ cᵢ xᵢ. Differences to one corner lose fewer digits.
+fn sliding(pair: &Pair, weights: &[f64; 4], anchor: Option<Anchor>, x: &[Vector3<f64>]) -> Vector3<f64> {
+    let corners = pair.corners(x);
+    let all = weights.iter().copied().zip(corners);
+    let origin = anchor.map_or(corners[0], |anchor| x[anchor.frame as usize]);
+    let on_obstacle = anchor.iter().flat_map(Anchor::terms).map(|(vertex, weight)| (weight, x[vertex]));
+    // On a fixed obstacle the coefficients do not add up to 0.
+    let is_balanced = anchor.is_some() || weights.iter().sum::<f64>().abs() < 0.5;
+    let origin = if is_balanced { origin } else { [0.0; 3] };
+    all.chain(on_obstacle).fold([0.0; 3], |sum, (weight, x)| add_scaled(sum, weight, subtract(x, origin)))
+}

@@ -1,0 +1,311 @@
+//! Contact of cloth and hair with themselves and with obstacles: a barrier on the gap of each pair of features, and a
+//! certificate of every move.
+//!
+//! **Energy.** A pair at distance d, with thickness ξ and activation gap g, has the energy K β(s), β(s) =
+//! −(1 − s)² ln s, s = (d − ξ)/g, below s = 1, and none above. It is the element
+//! [`DistanceBarrier`](energy_elements::DistanceBarrier) of the gap. d is the distance of two closed features: a point
+//! and a triangle, or two edges. Its gradient is c ⊗ n for the unit normal n and the coefficients c of the closest
+//! points, so forces and torques of a contact cancel to rounding. Friction is in `friction.rs`.
+//!
+//! **Obstacles.** The vertices of an obstacle's core follow those of the cloth. They are not free: each step moves them
+//! on straight lines from pose to pose, as far as the certificate allows. The distance of a pair with an obstacle is
+//! that of its core, so its thickness includes the radius of the solid.
+//!
+//! **Which pairs act.** Two surfaces meet in many pairs. A pair joins at an iterate if its closest points are a local
+//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a single
+//! function, which a filter in every trial would not be. A pair that shortens a move joins in any case.
+//!
+//! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
+//! vertices are against a displacement along the normal. Nothing is left to tune.
+//!
+//! **Stiffness of a contact.** The Hessian keeps β″ along the normal and the resistance to rolling on obstacles
+//! (`rolling.rs`). The other parts of the curvature of the distance are small or negative.
+//!
+//! **Guarantee.** [`crate::collision`] proves that an accepted move has no crossing. Energies are evaluated at
+//! certified states only.
+
+mod bristle;
+mod feasible;
+mod friction;
+mod joined;
+mod judge;
+mod law;
+mod obstacle_features;
+mod resistance;
+mod rolling;
+mod spacing;
+mod start;
+mod untangle;
+
+use energy_dsl::{Block, Vector3};
+use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
+
+pub use friction::Grip;
+pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
+pub use start::{ContactError, ObstacleStart, Participants};
+pub use untangle::Untangling;
+
+use crate::collision::{Closest, CollisionMesh, Move, Near, Neighbourhood, Pair, Search, Separations, swept};
+use feasible::Meeting;
+use friction::Friction;
+use joined::Joined;
+use judge::{Judge, Judgement};
+use law::{Law, Order};
+use resistance::Resistance;
+use rolling::rolling;
+use spacing::{Spacing, Spacings};
+
+/// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
+/// the line search in which they first act.
+const JOINING: f64 = 1.25;
+/// Part of the displacement of the last move that left the neighbourhood, by which an iterate may stray before the next
+/// search.
+const STRAYING: f64 = 0.25;
+/// The longest move that a neighbourhood covers as a whole, over the largest distance that vertices may move before the
+/// next search. Longer moves have a search of their own, for balls around them would hold too many pairs.
+const LONG: f64 = 4.0;
+
+/// Contact of a body with itself and with obstacles.
+#[derive(Debug)]
+pub struct BarrierContact {
+    mesh: CollisionMesh,
+    spacings: Spacings,
+    /// The least and the largest distance that vertices may move before the next search, in m.
+    slack: [f64; 2],
+    search: Search,
+    /// The pairs near the current iterate.
+    neighbourhood: Neighbourhood,
+    /// The displacement of each vertex in the last move that left the neighbourhood, in m.
+    strides: Vec<f64>,
+    joined: Joined,
+    friction: Friction,
+    /// Pairs that shortened a move since the last iterate.
+    blocking: Vec<Pair>,
+    resistance: Resistance,
+    counts: ContactCounts,
+}
+
+impl BarrierContact {
+    fn spacing(&self, pair: &Pair) -> Spacing {
+        self.spacings.of(&self.mesh, pair)
+    }
+
+    /// Sets the coefficient of friction μ at each vertex. That of a pair is the mean of its two features.
+    #[must_use]
+    pub fn with_friction(mut self, coefficients: Vec<f64>) -> Self {
+        let is_rough = coefficients.iter().any(|coefficient| *coefficient > 0.0);
+        self.friction.coefficients = if is_rough { coefficients } else { Vec::new() };
+        self
+    }
+
+    /// Sets the friction of each obstacle.
+    #[must_use]
+    pub fn with_grips(mut self, grips: Vec<Grip>) -> Self {
+        self.friction.grips = grips;
+        self
+    }
+
+    /// Finds the pairs in contact at the start of the step, on which friction acts.
+    fn begin_friction(&mut self) {
+        if !self.friction.is_rough() {
+            return;
+        }
+        let start = std::mem::take(&mut self.friction.start);
+        self.visit(&start);
+        let mut meeting = Meeting::new(&self.mesh, &start);
+        let mut touching = Vec::new();
+        for &Near { number, closest } in self.neighbourhood.separations().near() {
+            let pair = &self.neighbourhood.pairs()[number];
+            let Spacing { thickness, gap } = self.spacing(pair);
+            let is_active = closest.distance - thickness < gap;
+            if is_active && meeting.may_join(pair, &closest) {
+                touching.push((*pair, self.law(pair, &closest), closest));
+            }
+        }
+        self.friction.start = start;
+        self.friction.take(&self.mesh, touching);
+    }
+
+    /// The law of a pair that joins with these closest points.
+    fn law(&self, pair: &Pair, closest: &Closest) -> Law {
+        Law::new(self.spacing(pair), self.resistance.of(pair, closest))
+    }
+
+    /// Makes all pairs near an iterate known, and measures them there.
+    fn visit(&mut self, x: &[Vector3<f64>]) {
+        if !self.covers(x) {
+            let [least, most] = self.slack;
+            let radii = self.strides.iter().map(|stride| (least + STRAYING * stride).min(most)).collect();
+            self.neighbourhood.renew(&mut self.search, &self.mesh, x, x, radii);
+            self.counts.searches += 1;
+        }
+        self.neighbourhood.visit(&self.search, x);
+    }
+
+    /// Whether the neighbourhood covers x. It grows to do so if it lacks few vertices.
+    fn covers(&mut self, x: &[Vector3<f64>]) -> bool {
+        let (is_covered, searches) = self.neighbourhood.cover(&mut self.search, &self.mesh, x);
+        self.counts.searches += searches;
+        is_covered
+    }
+
+    /// Whether the neighbourhood covers a move. If it lacks many vertices, it is renewed, unless the move is long.
+    fn covers_move(&mut self, step: &Move<'_>) -> bool {
+        if self.covers(step.from()) && self.covers(step.to()) {
+            return true;
+        }
+        self.strides.copy_from_slice(step.excursions());
+        let [least, most] = self.slack;
+        let longest = self.strides.iter().copied().fold(0.0, f64::max);
+        let mean = self.strides.iter().sum::<f64>() / self.strides.len() as f64;
+        if longest > LONG * most || mean > most {
+            return false;
+        }
+        let radii = self.strides.iter().map(|stride| least + (0.5 + STRAYING) * stride).collect();
+        self.neighbourhood.renew(&mut self.search, &self.mesh, step.from(), &step.middle(), radii);
+        self.counts.searches += 1;
+        true
+    }
+
+    /// Judges a move by some pairs, measured at its start.
+    fn judge(&self, step: &Move<'_>, pairs: &[Pair], separations: &Separations) -> Judgement {
+        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, pairs, separations: separations.all() };
+        judge.judge(self.search.threads)
+    }
+}
+
+impl ContactModel for BarrierContact {
+    fn is_mutual(&self) -> bool {
+        self.search.is_with_itself()
+    }
+
+    fn set_threads(&mut self, threads: usize) {
+        self.search.threads = threads;
+    }
+
+    fn begin_step(&mut self, x: &[Vector3<f64>]) {
+        self.friction.begin_step(x);
+        self.joined.clear();
+        self.blocking.clear();
+        // A run that resumes from a checkpoint must find the same pairs in the same order.
+        self.neighbourhood.clear();
+        self.strides.fill(0.0);
+    }
+
+    fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
+        // NaN is in no region.
+        if !to.iter().flatten().all(|coordinate| coordinate.is_finite()) {
+            return 0.0;
+        }
+        let step = Move::new(from, to);
+        let (count, judgement) = if self.covers_move(&step) {
+            self.neighbourhood.visit(&self.search, from);
+            let pairs = self.neighbourhood.pairs();
+            (pairs.len(), self.judge(&step, pairs, self.neighbourhood.separations()))
+        } else {
+            self.counts.searches += 1;
+            let pairs = self.search.pairs(&self.mesh, swept(from, to));
+            let mut separations = Separations::default();
+            separations.measure(&pairs, from, self.search.halves(), self.search.threads);
+            (pairs.len(), self.judge(&step, &pairs, &separations))
+        };
+        let Judgement { part, tested, blocking } = judgement;
+        self.blocking.extend(blocking);
+        self.counts.moves += 1;
+        self.counts.candidates += count as u64;
+        self.counts.tested += tested;
+        if part < 1.0 {
+            self.counts.shortened += 1;
+            self.counts.left += part;
+        }
+        part
+    }
+
+    fn set_resistance(&mut self, dofs: &DofMap, diagonal: Vec<Block<f64>>, inertia: Vec<f64>) {
+        let mut blocks = vec![None; dofs.vertex_count()];
+        for (&vertex, block) in dofs.free().iter().zip(diagonal) {
+            blocks[vertex] = Some(block);
+        }
+        self.resistance = Resistance { blocks, inertia };
+        self.begin_friction();
+    }
+
+    fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
+        self.visit(x);
+        let mut known = self.joined.pairs.iter().peekable();
+        let mut meeting = Meeting::new(&self.mesh, x);
+        let mut added = Vec::new();
+        for Near { number, closest } in self.neighbourhood.separations().near() {
+            let pair = &self.neighbourhood.pairs()[*number];
+            if closest.separation > self.spacings.joining(&self.mesh, pair) {
+                continue;
+            }
+            while known.next_if(|other| *other < pair).is_some() {}
+            if known.peek() != Some(&pair) && meeting.may_join(pair, closest) {
+                added.push((*pair, *closest));
+            }
+        }
+        let mut blocking = std::mem::take(&mut self.blocking);
+        blocking.sort_unstable();
+        blocking.dedup();
+        blocking.retain(|pair| !self.joined.contains(pair) && added.binary_search_by_key(pair, |one| one.0).is_err());
+        added.extend(blocking.into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)))));
+        let laws: Vec<Law> = added.iter().map(|(pair, closest)| self.law(pair, closest)).collect();
+        let energy = |((_, closest), law): (&(Pair, Closest), &Law)| law.energy(law.apart(closest));
+        let change = added.iter().zip(&laws).map(energy).sum();
+        if !added.is_empty() {
+            self.joined.extend(added.into_iter().map(|(pair, _)| pair).zip(laws));
+        }
+        change
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> f64 {
+        let mut sum = self.friction.energy(x);
+        self.joined.for_each_active(x, Order::Energy, |_, _, barrier| sum += barrier.energy);
+        sum
+    }
+
+    fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
+        self.joined.for_each_active(x, Order::Force, |pair, closest, barrier| {
+            pair.add(closest.weights, closest.normal.map(|component| barrier.force * component), force);
+        });
+        self.friction.add_force(x, force);
+    }
+
+    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
+        let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
+        let (mut contacts, mut active) = (Vec::new(), 0);
+        self.joined.for_each_active(x, Order::Curvature, |pair, closest, barrier| {
+            let n = closest.normal;
+            let rows = pair.vertices.each_ref().map(row);
+            let along_normal = |stiffness: f64| n.map(|a| n.map(|b| stiffness * a * b));
+            contacts.push(Contact { rows, weights: closest.weights, block: along_normal(barrier.curvature) });
+            if self.mesh.obstacle_of(pair).is_some() {
+                let block = along_normal(barrier.force * closest.distance);
+                let is_free = |(row, weight): (&u32, &f64)| *row != Contact::FIXED && *weight != 0.0;
+                let tilts = rolling(pair, closest, x).filter(|weights| rows.iter().zip(weights).any(is_free));
+                contacts.extend(tilts.map(|weights| Contact { rows, weights, block }));
+            }
+            active += 1;
+        });
+        self.counts.active += active;
+        self.counts.systems += 1;
+        self.friction.add_contacts(x, row, &mut contacts);
+        contacts
+    }
+
+    fn counts(&self) -> ContactCounts {
+        self.counts
+    }
+
+    fn memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
+        self.friction.memory(x)
+    }
+
+    fn restore(&mut self, memory: ContactMemory) {
+        self.friction.restore(memory);
+    }
+}
+
+#[cfg(test)]
+mod tests;

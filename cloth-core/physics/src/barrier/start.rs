@@ -1,0 +1,293 @@
+//! The state in which contact begins.
+
+use energy_dsl::Vector3;
+use energy_solve::ContactCounts;
+
+use super::spacing::{Skin, Spacings};
+use super::{BarrierContact, Friction, Joined, Resistance};
+use crate::collision::{
+    CollisionMesh, Crossing, Exclusions, Near, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
+};
+
+/// The part of an obstacle's reach that is its thickness, which nothing enters.
+pub(super) const SKIN: f64 = 1.0 / 3.0;
+/// The number of crossings that a message names.
+const NAMED: usize = 3;
+/// The part of an obstacle's reach within which cloth counts as touching at the start.
+pub(super) const TOUCHING: f64 = 1e-6;
+
+/// A start that contact cannot keep free of crossings, because it is not.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ContactError {
+    /// Edges cross triangles.
+    #[error(
+        "the cloth crosses itself in {count} places at the start: {}. Move the parts apart, repair shallow crossings \
+         with `--untangle` or `untangle = true`, or set `contact = \"obstacles\"`", described(.first)
+    )]
+    Crosses {
+        /// Number of edges and triangles that cross.
+        count: usize,
+        /// The first of them, each with its depth, in m.
+        first: Vec<(Crossing, f64)>,
+    },
+    /// Two features are closer than the thickness.
+    #[error(
+        "{count} pairs of features are closer than the thickness at the start: {} are {distance:.3e} m apart, \
+         {thickness:.3e} m thick. Move them apart, or reduce the `thickness` of the fabric", named(*.pair, *.is_point)
+    )]
+    TooClose {
+        /// Number of such pairs.
+        count: usize,
+        /// The vertices of the closest pair.
+        pair: [usize; 4],
+        /// Whether it is a point and a triangle, or two edges.
+        is_point: bool,
+        /// Its distance, in m.
+        distance: f64,
+        /// Its thickness, in m.
+        thickness: f64,
+    },
+    /// Free vertices are inside an obstacle.
+    #[error(
+        "{count} vertices start inside {obstacle}, the deepest is vertex {vertex}, {:.3} mm below the surface. Move \
+         the cloth out of {obstacle}, or pin what belongs inside", 1e3 * .depth
+    )]
+    Inside {
+        /// The name of the obstacle.
+        obstacle: String,
+        /// Number of such vertices.
+        count: usize,
+        /// The deepest of them.
+        vertex: usize,
+        /// Its depth, in m.
+        depth: f64,
+    },
+    /// An edge or a triangle of the cloth crosses an obstacle.
+    #[error(
+        "the cloth crosses {obstacle} in {count} places at the start, first between the vertices {}. Move the cloth \
+         out of {obstacle}, or refine its mesh there", listed(.vertices)
+    )]
+    CrossesObstacle {
+        /// The name of the obstacle.
+        obstacle: String,
+        /// Number of crossings of all kinds.
+        count: usize,
+        /// The vertices of the cloth's edge or triangle.
+        vertices: Vec<usize>,
+    },
+    /// An edge or a triangle of the cloth touches an obstacle.
+    #[error(
+        "the cloth touches {obstacle} at the start: the vertices {} span a part {:.3e} mm from its surface. Leave a \
+         distance", listed(.vertices), 1e3 * .distance
+    )]
+    Touches {
+        /// The name of the obstacle.
+        obstacle: String,
+        /// The vertices of the part.
+        vertices: Vec<usize>,
+        /// Its distance from the surface, in m; negative inside.
+        distance: f64,
+    },
+}
+
+/// The pairs that may collide from the start on, and their parameters.
+#[derive(Debug)]
+pub struct Participants {
+    /// The features of cloth and hair, and the cores of obstacles.
+    pub mesh: CollisionMesh,
+    /// Whether each vertex may respond to a contact.
+    pub is_free: Vec<bool>,
+    /// Half of the thickness of cloth and hair at each vertex, in m.
+    pub radii: Vec<f64>,
+    /// The activation gap between parts of cloth and hair, in m.
+    pub gap: f64,
+    /// The obstacles, in the order of their cores.
+    pub obstacles: Vec<ObstacleStart>,
+    /// Pairs that do not collide.
+    pub exclusions: Exclusions,
+    /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
+    pub with_itself: bool,
+}
+
+/// An obstacle at the start.
+#[derive(Clone, Debug)]
+pub struct ObstacleStart {
+    /// The name in messages.
+    pub name: String,
+    /// The radius of the solid about its core, in m.
+    pub radius: f64,
+    /// The distance from the solid at which contact begins, in m.
+    pub reach: f64,
+}
+
+impl BarrierContact {
+    /// Creates the contact of a mesh that starts at x. `radii` holds half of the thickness at each vertex, in m; pairs
+    /// act within the activation gap `gap` of their thickness, in m. Pairs without a free vertex are ignored.
+    ///
+    /// # Errors
+    /// If the mesh crosses itself at x, or a pair that can respond is closer than its thickness.
+    pub fn new(
+        mesh: CollisionMesh,
+        x: &[Vector3<f64>],
+        is_free: Vec<bool>,
+        radii: Vec<f64>,
+        gap: f64,
+    ) -> Result<Self, ContactError> {
+        let (obstacles, exclusions) = Default::default();
+        Self::among(Participants { mesh, is_free, radii, gap, obstacles, exclusions, with_itself: true }, x)
+    }
+
+    /// Creates the contact of cloth and hair with themselves and with obstacles, which start at x.
+    ///
+    /// # Errors
+    /// If something crosses at x, or a pair that can respond is closer than its thickness.
+    pub fn among(participants: Participants, x: &[Vector3<f64>]) -> Result<Self, ContactError> {
+        let Participants { mesh, is_free, radii, gap, obstacles, exclusions, with_itself } = participants;
+        let skin = |start: &ObstacleStart| Skin { radius: start.radius, thickness: 0.0, gap: start.reach };
+        let spacings = Spacings { radii, gap, skins: obstacles.iter().map(skin).collect() };
+        let rules = Rules { halves: spacings.halves(&mesh), is_free, exclusions, with_itself };
+        check_crossings(&mesh, &rules, &obstacles, x)?;
+        let mut contact = Self {
+            spacings,
+            slack: [0.5 * gap, gap.max(0.15 * mesh.mean_edge(x))],
+            search: Search::new(&mesh, x, rules),
+            neighbourhood: Neighbourhood::default(),
+            strides: vec![0.0; x.len()],
+            joined: Joined::default(),
+            friction: Friction::default(),
+            blocking: Vec::new(),
+            resistance: Resistance::default(),
+            counts: ContactCounts::default(),
+            mesh,
+        };
+        contact.fit_skins(&obstacles, x)?;
+        contact.check_distances(x)?;
+        Ok(contact)
+    }
+
+    /// Gives obstacles their skins, so thin that nothing starts within them.
+    fn fit_skins(&mut self, obstacles: &[ObstacleStart], x: &[Vector3<f64>]) -> Result<(), ContactError> {
+        self.visit(x);
+        let mut nearest: Vec<Option<(f64, Pair)>> = vec![None; obstacles.len()];
+        for Near { number, closest } in self.neighbourhood.separations().near() {
+            let pair = &self.neighbourhood.pairs()[*number];
+            let Some(obstacle) = self.mesh.obstacle_of(pair) else { continue };
+            let distance = closest.distance - obstacles[obstacle].radius;
+            if nearest[obstacle].is_none_or(|(known, _)| distance < known) {
+                nearest[obstacle] = Some((distance, *pair));
+            }
+        }
+        for ((start, nearest), skin) in obstacles.iter().zip(nearest).zip(&mut self.spacings.skins) {
+            let mut thickness = SKIN * start.reach;
+            if let Some((distance, pair)) = nearest {
+                if distance <= TOUCHING * start.reach {
+                    let vertices: Vec<usize> = pair.vertices.iter().map(|&vertex| vertex as usize).collect();
+                    let own = vertices.into_iter().filter(|&vertex| vertex < self.mesh.own_vertices()).collect();
+                    return Err(ContactError::Touches { obstacle: start.name.clone(), vertices: own, distance });
+                }
+                thickness = thickness.min(0.5 * distance);
+            }
+            *skin = Skin { thickness, gap: start.reach - thickness, ..*skin };
+        }
+        Ok(())
+    }
+
+    fn check_distances(&mut self, x: &[Vector3<f64>]) -> Result<(), ContactError> {
+        self.visit(x);
+        let all = self.neighbourhood.separations().near().iter();
+        let all = all.map(|near| (near.closest.distance, &self.neighbourhood.pairs()[near.number]));
+        let all = all.map(|(distance, pair)| (distance, self.spacing(pair).thickness, pair));
+        let close: Vec<_> = all.filter(|(distance, thickness, _)| distance <= thickness).collect();
+        let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        closest.map_or(Ok(()), |&(distance, thickness, pair)| {
+            let (is_point, pair) = (pair.kind == PairKind::PointTriangle, pair.vertices.map(|vertex| vertex as usize));
+            Err(ContactError::TooClose { count: close.len(), pair, is_point, distance, thickness })
+        })
+    }
+}
+
+/// Returns the crossings at x of features that collide, and of which one could respond.
+pub(super) fn crossings_that_count(mesh: &CollisionMesh, rules: &Rules, x: &[Vector3<f64>]) -> Vec<Crossing> {
+    let counts = |Crossing { edge, triangle }: &Crossing| {
+        let (edge, triangle) = (edge.map(energy_solve::index), triangle.map(energy_solve::index));
+        let is_mixed = mesh.obstacle(edge[0]).is_some() || mesh.obstacle(triangle[0]).is_some();
+        edge.iter().chain(&triangle).any(|&vertex| rules.is_free[vertex as usize])
+            && (rules.with_itself || is_mixed)
+            && !rules.exclusions.exclude(mesh, &edge, &triangle)
+    };
+    crossings(mesh, x).into_iter().filter(counts).collect()
+}
+
+/// Returns an error if something that could respond crosses at the start.
+fn check_crossings(
+    mesh: &CollisionMesh,
+    rules: &Rules,
+    obstacles: &[ObstacleStart],
+    x: &[Vector3<f64>],
+) -> Result<(), ContactError> {
+    let mut crossings = crossings_that_count(mesh, rules, x);
+    let count = crossings.len();
+    let Some(&first) = crossings.first() else { return Ok(()) };
+    let obstacle = |vertex: usize| mesh.obstacle(energy_solve::index(vertex));
+    Err(match obstacle(first.edge[0]).or(obstacle(first.triangle[0])) {
+        Some(number) => {
+            let all = first.edge.into_iter().chain(first.triangle);
+            let vertices = all.filter(|&vertex| vertex < mesh.own_vertices()).collect();
+            ContactError::CrossesObstacle { obstacle: obstacles[number].name.clone(), count, vertices }
+        }
+        None => {
+            crossings.truncate(NAMED);
+            let first = crossings.into_iter().map(|crossing| (crossing, crossing.depth(x))).collect();
+            ContactError::Crosses { count, first }
+        }
+    })
+}
+
+impl ContactError {
+    /// Renumbers the vertices, from the numbering of a body to `vertices[…]` of the scene.
+    #[must_use]
+    pub fn on_vertices(self, vertices: &[usize]) -> Self {
+        match self {
+            Self::Crosses { count, mut first } => {
+                for (Crossing { edge, triangle }, _) in &mut first {
+                    edge.iter_mut().chain(triangle).for_each(|vertex| *vertex = vertices[*vertex]);
+                }
+                Self::Crosses { count, first }
+            }
+            Self::TooClose { count, pair, is_point, distance, thickness } => {
+                Self::TooClose { count, pair: pair.map(|vertex| vertices[vertex]), is_point, distance, thickness }
+            }
+            Self::CrossesObstacle { obstacle, count, vertices: own } => {
+                let own = own.into_iter().map(|vertex| vertices[vertex]).collect();
+                Self::CrossesObstacle { obstacle, count, vertices: own }
+            }
+            Self::Touches { obstacle, vertices: own, distance } => {
+                let own = own.into_iter().map(|vertex| vertices[vertex]).collect();
+                Self::Touches { obstacle, vertices: own, distance }
+            }
+            other @ Self::Inside { .. } => other,
+        }
+    }
+}
+
+/// Describes crossings and their depth.
+fn described(crossings: &[(Crossing, f64)]) -> String {
+    let one = |(Crossing { edge: [a, b], triangle: [p, q, r] }, depth): &(Crossing, f64)| {
+        format!("the edge {a}–{b} goes through the triangle {p}–{q}–{r}, {:.3} mm deep", 1e3 * depth)
+    };
+    crossings.iter().map(one).collect::<Vec<_>>().join("; ")
+}
+
+/// Lists vertices, such as `3, 4, 9`.
+fn listed(vertices: &[usize]) -> String {
+    vertices.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// Names the features of a pair.
+fn named([a, b, c, d]: [usize; 4], is_point: bool) -> String {
+    if is_point {
+        format!("vertex {a} and the triangle {b}–{c}–{d}")
+    } else {
+        format!("the edges {a}–{b} and {c}–{d}")
+    }
+}

@@ -1,0 +1,102 @@
+use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
+use energy_solve::threads::for_each;
+
+use super::closest::corners;
+use super::separations::PART;
+use super::{Closest, Pair, PairKind};
+
+/// The closest points of many pairs at one place.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// The place; empty if nothing has been measured.
+    place: Vec<Vector3<f64>>,
+    /// Weights, normal and distance of each pair.
+    numbers: Vec<[f64; 8]>,
+    separations: Vec<f64>,
+}
+
+impl Measured {
+    /// Measures pairs at x, unless they have been measured there. Pairs are in order, so those of one kind are
+    /// consecutive.
+    pub fn measure(&mut self, pairs: &[Pair], x: &[Vector3<f64>], threads: usize) {
+        if self.numbers.len() == pairs.len() && self.place == x {
+            return;
+        }
+        x.clone_into(&mut self.place);
+        self.numbers.resize(pairs.len(), [0.0; 8]);
+        self.separations.resize(pairs.len(), 0.0);
+        let Self { numbers, separations, .. } = self;
+        let parts = pairs.chunks(PART).zip(numbers.chunks_mut(PART)).zip(separations.chunks_mut(PART));
+        let parts = parts.map(|((pairs, numbers), separations)| Measure { pairs, x, numbers, separations });
+        for_each(threads, parts.collect(), dispatch);
+    }
+
+    /// Discards everything. Required if pairs change.
+    pub fn clear(&mut self) {
+        self.place.clear();
+        self.numbers.clear();
+        self.separations.clear();
+    }
+
+    /// The distance of a pair, in m.
+    #[inline]
+    pub fn distance(&self, number: usize) -> f64 {
+        self.numbers[number][7]
+    }
+
+    /// The closest points of a pair.
+    #[inline]
+    pub fn closest(&self, number: usize) -> Closest {
+        let [c0, c1, c2, c3, nx, ny, nz, distance] = self.numbers[number];
+        let separation = self.separations[number];
+        Closest { weights: [c0, c1, c2, c3], normal: [nx, ny, nz], distance, separation }
+    }
+}
+
+struct Measure<'a> {
+    pairs: &'a [Pair],
+    x: &'a [Vector3<f64>],
+    numbers: &'a mut [[f64; 8]],
+    separations: &'a mut [f64],
+}
+
+impl Kernel for Measure<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { pairs, x, numbers, separations } = self;
+        let points = pairs.partition_point(|pair| pair.kind == PairKind::PointTriangle);
+        let (of_points, of_edges) = numbers.split_at_mut(points);
+        let (apart_of_points, apart_of_edges) = separations.split_at_mut(points);
+        measure::<L>(PairKind::PointTriangle, &pairs[..points], x, of_points, apart_of_points);
+        measure::<L>(PairKind::EdgeEdge, &pairs[points..], x, of_edges, apart_of_edges);
+    }
+}
+
+/// Measures pairs of one kind.
+#[inline(always)]
+fn measure<L: Level>(
+    kind: PairKind,
+    pairs: &[Pair],
+    x: &[Vector3<f64>],
+    numbers: &mut [[f64; 8]],
+    separations: &mut [f64],
+) {
+    let lanes = L::F64::LANES;
+    for (start, pairs) in pairs.chunks(lanes).enumerate().map(|(chunk, pairs)| (chunk * lanes, pairs)) {
+        // Lanes beyond the end repeat the last pair.
+        let mut vertices = [[0; 16]; 4];
+        for lane in 0..lanes {
+            let pair = &pairs[lane.min(pairs.len() - 1)];
+            for corner in 0..4 {
+                vertices[corner][lane] = pair.vertices[corner];
+            }
+        }
+        let Closest { weights: [a, b, c, d], normal: [nx, ny, nz], distance, separation } =
+            Closest::between(kind, &corners::<L>(x, &vertices));
+        let rows = numbers[start..][..pairs.len()].as_flattened_mut();
+        L::F64::store_transposed(&[a, b, c, d, nx, ny, nz, distance], pairs.len(), rows, 8);
+        separation.store_ragged(&mut separations[start..][..pairs.len()]);
+    }
+}

@@ -1,0 +1,24 @@
+//! Fabrics: which declared elements act on which vertices of a mesh, and with what parameters.
+
+mod damping;
+mod declared;
+mod description;
+mod error;
+mod hair;
+mod library;
+mod plasticity;
+pub mod plate;
+mod terms;
+mod warp_choice;
+
+pub use damping::StitchDamping;
+pub use declared::{Declared, DeclaredError};
+pub use description::{
+    Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Plasticity, Rayleigh, StrainLimit, Woven,
+};
+pub use error::FabricError;
+pub use hair::{Hair, hair_terms};
+pub use library::{MEASURED, MeasuredFabric};
+pub use plate::{PlateTerm, Rigidity};
+pub use terms::{FabricTerms, Place, Surroundings, terms, terms_at};
+pub use warp_choice::MaybeWarpChoice;
