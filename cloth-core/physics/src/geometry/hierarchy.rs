@@ -5,7 +5,7 @@ use energy_dsl::Vector3;
 use super::Bounds;
 
 /// A binary tree of boxes, split at the median along the longest axis. The children of node n are n + 1 and the index
-/// in [`Kind::Inner`].
+/// in `Kind::Inner`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hierarchy {
     nodes: Vec<Node>,
