@@ -70,6 +70,11 @@ def test_ctrl_c_ends_a_run_with_its_results(tmp_path):
         if done == 2:
             signal.raise_signal(signal.SIGINT)
 
-    with pytest.raises(KeyboardInterrupt, match="results so far"):
-        ed.run(SCENE, tmp_path / "out", checkpoint=5, progress=interrupt)
+    # A process in the background may ignore the signal.
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt, match="results so far"):
+            ed.run(SCENE, tmp_path / "out", checkpoint=5, progress=interrupt)
+    finally:
+        signal.signal(signal.SIGINT, handler)
     assert (tmp_path / "out" / "run.json").exists() and ed.resume(tmp_path / "out") == 10
