@@ -1,3 +1,5 @@
+//! Damping of strains, with every kind of integrator.
+
 use cloth_core::{Simulation, scene::Scene};
 
 /// A sheet that spins and oscillates.
