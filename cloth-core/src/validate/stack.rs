@@ -3,12 +3,16 @@
 //! The energy of a pair is K β(s), with K chosen for each pair and step (see [`crate::barrier`]). Forces at rest do not
 //! depend on K, heights do. In flat sheets with hardly any bending stiffness, only inertia resists a displacement along
 //! the normal: K/g² = 10/β″(½) · m/h² for every pair, with the mass m of a vertex, the gap g and the step h. Drag
-//! adds a little. Vertices on both sides of an interface meet the other side as points on triangles. They share the
-//! weight of the n sheets above, and the mass cancels:
+//! adds a little.
 //!
-//! 2 · 10/β″(½) · g/h² · (1 − s)(1/s − 1 − 2 ln s) = n · gravity.
+//! Pairs share the weight of the n sheets above. For each cell of a grid there are eight. The vertices of both sides
+//! meet the other side as points on triangles: 2. Edges along x cross those along y of the other side: 2. Edges along x
+//! and y cross diagonals: 4, for a line of the length l crosses lines at the distance d and the angle θ l sin θ/d times.
+//! The mass cancels:
 //!
-//! This holds for every mesh, aligned or shifted, but not where vertices lie exactly on vertices: there more pairs act.
+//! 8 · 10/β″(½) · g/h² · (1 − s)(1/s − 1 − 2 ln s) = n · gravity.
+//!
+//! This holds for all grids, aligned or shifted, but not where vertices lie exactly on vertices: there more pairs act.
 //! Each sheet is a little smaller than that below. Without friction, edges exactly above edges roll off each other.
 
 use super::contact::{GRAVITY, advance, contact_forces, simulation};
@@ -27,6 +31,8 @@ const THICKNESS: f64 = 1e-3;
 const GAP: f64 = 2e-3;
 /// Time step, in s.
 const DT: f64 = 5e-3;
+/// Pairs of points and triangles, and of edges, for each cell of two grids that face each other.
+const PAIRS: f64 = 8.0;
 /// Steps until the sheets are at rest, and steps over which forces are averaged.
 const STEPS: u64 = 100;
 /// Drag per mass, in 1/s. Without it, sheets that lie on each other without friction slide for ever.
@@ -102,7 +108,7 @@ fn height(simulation: &Simulation) -> f64 {
 
 /// Returns Σ (ξ + s g) over all interfaces, in m.
 fn exact_height() -> f64 {
-    let scale = 2.0 * STIFFNESS_RATIO / CURVATURE_AT_HALF * GAP * (1.0 + DRAG * DT) / (DT * DT);
+    let scale = PAIRS * STIFFNESS_RATIO / CURVATURE_AT_HALF * GAP * (1.0 + DRAG * DT) / (DT * DT);
     let part = |above: usize| {
         let excess = |s: f64| scale * (1.0 - s) * (1.0 / s - 1.0 - 2.0 * s.ln()) - above as f64 * GRAVITY;
         zero_between(1e-3, 1.0, excess)

@@ -1,40 +1,40 @@
 //! Which pairs of close features act as a contact.
 //!
-//! Two layers of cloth lie close in many pairs of features. Only local minima of the distance count: the closest points
-//! of a pair must lie in the feasible region of both features (Offset geometric contact: Chen, Hsu, Liu, Macklin, Yang
-//! and Yuksel 2025). Each minimum counts once.
+//! Two layers of cloth lie close in many pairs of features. A point counts where it is nearest to a triangle, an edge of
+//! it or a corner, as a local minimum of the distance: once, although several triangles meet there (Offset geometric
+//! contact: Chen, Hsu, Liu, Macklin, Yang and Yuksel 2025).
+//!
+//! Two edges count where their insides are nearest to each other, unless one of them lies in a valley. Edges of flat or
+//! gently curved layers are no strict minima: which of them is nearest changes with every small motion. A pair that is
+//! missing at one iterate would stop the next move.
+//!
+//! Cloth on a ball or a rail is nearest to its core almost everywhere, so all of its features count there.
 
 use energy_dsl::Vector3;
 
 use crate::collision::{Closest, CollisionMesh, Pair, PairKind};
 use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 
-/// Sine of the angle by which both edges must be ridges towards each other. Flat layers lie on the boundary of the
-/// feasible region of all their edges; their points and triangles suffice.
-const RIDGE: f64 = 0.1;
+/// Sine of the angle by which the triangles of an edge may rise towards the other edge. Beyond, the edge is a valley:
+/// other features are nearer.
+const VALLEY: f64 = 0.3;
 /// Squared sine of the angle below which edges count as parallel. The direction of their distance is not defined; their
 /// ends and the triangles suffice.
 const PARALLEL: f64 = 0.01;
 
 /// Decides which pairs become contacts at x.
 pub(super) struct Meeting<'a> {
-    pub(super) mesh: &'a CollisionMesh,
-    pub(super) x: &'a [Vector3<f64>],
-    /// The edge that was last looked at, and whether it is a ridge in some direction.
-    last: Option<(u32, bool)>,
+    pub mesh: &'a CollisionMesh,
+    pub x: &'a [Vector3<f64>],
 }
 
-impl<'a> Meeting<'a> {
-    pub fn new(mesh: &'a CollisionMesh, x: &'a [Vector3<f64>]) -> Self {
-        Self { mesh, x, last: None }
-    }
-
-    /// Whether a pair with these closest points becomes a contact. Fastest if pairs come in order.
-    pub fn may_join(&mut self, pair: &Pair, closest: &Closest) -> bool {
+impl Meeting<'_> {
+    /// Whether a pair with these closest points becomes a contact.
+    pub fn may_join(&self, pair: &Pair, closest: &Closest) -> bool {
         match pair.kind {
             PairKind::PointTriangle => self.is_feasible_on_triangle(pair, closest),
-            PairKind::EdgeEdge if self.mesh.obstacle_of(pair).is_some() => self.edges_meet_obstacle(pair, closest),
-            PairKind::EdgeEdge => self.may_be_ridge(pair.features[0]) && self.are_ridges(pair, closest),
+            PairKind::EdgeEdge if self.has_rail(pair) => self.meets_rail(pair, closest),
+            PairKind::EdgeEdge => self.edges_meet(pair, closest),
         }
     }
 
@@ -55,56 +55,43 @@ impl<'a> Meeting<'a> {
         }
     }
 
-    fn are_ridges(&self, pair: &Pair, closest: &Closest) -> bool {
-        let Self { mesh, x, .. } = *self;
-        let [a, b, c, d] = pair.vertices;
+    fn edges_meet(&self, pair: &Pair, closest: &Closest) -> bool {
         let [first, second] = pair.features;
         let towards = closest.normal;
         let away = towards.map(|component| -component);
-        closest.weights.iter().all(|weight| *weight != 0.0)
-            && is_ridge(mesh, x, first, away)
-            && is_ridge(mesh, x, second, towards)
-            && !are_parallel(x, [a, b], [c, d])
+        are_inside(closest)
+            && !self.is_valley(first, away)
+            && !self.is_valley(second, towards)
+            && !self.are_parallel(pair.vertices)
     }
 
-    /// Whether an edge is a ridge in some direction. Most edges of smooth cloth are not.
-    fn may_be_ridge(&mut self, edge: u32) -> bool {
-        if let Some((last, may_be)) = self.last
-            && last == edge
-        {
-            return may_be;
-        }
+    /// Whether a pair of edges has the edge of a rail, which is the second.
+    fn has_rail(&self, pair: &Pair) -> bool {
+        self.mesh.obstacle_of(pair).is_some() && self.mesh.apexes(pair.features[1] as usize).is_empty()
+    }
+
+    /// Whether an edge of cloth or hair meets a rail. Vertices of cloth do so, too.
+    fn meets_rail(&self, pair: &Pair, closest: &Closest) -> bool {
+        self.mesh.apexes(pair.features[0] as usize).is_empty() || are_inside(closest)
+    }
+
+    /// Whether a triangle of an edge rises in a direction.
+    fn is_valley(&self, edge: u32, direction: Vector3<f64>) -> bool {
         let ends = self.mesh.edges()[edge as usize];
-        let heights = self.mesh.apexes(edge as usize).iter().map(|&apex| across(self.x, ends, apex));
-        // If n unit vectors all fall away from a direction by the sine, the length of their sum is at least n times it.
-        let (sum, count) = heights.fold(([0.0; 3], 0.0), |(sum, n), height| (add_scaled(sum, 1.0, height), n + 1.0));
-        let may_be = norm(sum) >= RIDGE * count;
-        self.last = Some((edge, may_be));
-        may_be
+        let rises = |&apex: &u32| dot(across(self.x, ends, apex), direction) > VALLEY;
+        self.mesh.apexes(edge as usize).iter().any(rises)
+    }
+
+    fn are_parallel(&self, [a, b, c, d]: [u32; 4]) -> bool {
+        let [u, v] = [[a, b], [c, d]].map(|[a, b]| subtract(self.x[b as usize], self.x[a as usize]));
+        let area = cross(u, v);
+        dot(area, area) <= PARALLEL * dot(u, u) * dot(v, v)
     }
 }
 
-pub(super) fn are_parallel(x: &[Vector3<f64>], first: [u32; 2], second: [u32; 2]) -> bool {
-    let [u, v] = [first, second].map(|[a, b]| subtract(x[b as usize], x[a as usize]));
-    let area = cross(u, v);
-    dot(area, area) <= PARALLEL * dot(u, u) * dot(v, v)
-}
-
-/// Whether the triangles of an edge all fall away from a direction.
-pub(super) fn is_ridge(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: u32, direction: Vector3<f64>) -> bool {
-    falls_away(mesh, x, edge, direction, -RIDGE)
-}
-
-/// Whether no triangle of an edge rises in a direction by more than an angle, given its sine.
-pub(super) fn falls_away(
-    mesh: &CollisionMesh,
-    x: &[Vector3<f64>],
-    edge: u32,
-    direction: Vector3<f64>,
-    sine: f64,
-) -> bool {
-    let ends = mesh.edges()[edge as usize];
-    mesh.apexes(edge as usize).iter().all(|&apex| dot(across(x, ends, apex), direction) <= sine)
+/// Whether the closest points of two edges are inside of both.
+fn are_inside(closest: &Closest) -> bool {
+    closest.weights.iter().all(|weight| *weight != 0.0)
 }
 
 /// Whether a point nearest to the inside of an edge, in this direction, is nearest to it among the edge's triangles.
@@ -142,4 +129,32 @@ fn across(x: &[Vector3<f64>], [a, b]: [u32; 2], apex: u32) -> Vector3<f64> {
     let height = add_scaled(to, -part, along);
     let size = norm(height);
     if size > 0.0 { height.map(|component| component / size) } else { [0.0; 3] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether the middle edges of two pairs of triangles become a contact. The edge above crosses the one below, which
+    /// is along x, at an angle. The outer corners above fall by a height, those below rise by one.
+    fn edges_join(angle: f64, falls: f64, rises: f64) -> bool {
+        let mesh = CollisionMesh::new(8, &[[0, 1, 2], [1, 0, 3], [4, 5, 6], [5, 4, 7]], &[], &[]);
+        let ([c, s], up) = ([angle.cos(), angle.sin()], 0.002);
+        let above = [[c, s, 0.0], [-c, -s, 0.0], [-s, c, -falls], [s, -c, -falls]].map(|[x, y, z]| [x, y, z + up]);
+        let below = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, rises], [0.0, -1.0, rises]];
+        let x = [below, above].concat();
+        let edge = |ends: [u32; 2]| (0..).zip(mesh.edges()).find(|(_, other)| **other == ends).map(|(edge, _)| edge);
+        let features = [edge([0, 1]).unwrap(), edge([4, 5]).unwrap()];
+        let pair = Pair { kind: PairKind::EdgeEdge, features, vertices: [0, 1, 4, 5] };
+        Meeting { mesh: &mesh, x: &x }.may_join(&pair, &Closest::of(&pair, &pair.corners(&x)))
+    }
+
+    #[test]
+    fn edges_join_unless_one_is_a_valley_or_they_are_parallel() {
+        // Flat layers, ridges, and gentle valleys.
+        assert!(edges_join(1.5, 0.0, 0.0) && edges_join(0.2, 0.0, 0.0));
+        assert!(edges_join(1.5, -0.5, -0.5) && edges_join(1.5, 0.25, 0.25));
+        assert!(!edges_join(1.5, 0.4, 0.0) && !edges_join(1.5, 0.0, 0.4));
+        assert!(!edges_join(0.05, 0.0, 0.0));
+    }
 }

@@ -11,9 +11,9 @@
 //! on straight lines from pose to pose, as far as the certificate allows. The distance of a pair with an obstacle is
 //! that of its core, so its thickness includes the radius of the solid.
 //!
-//! **Which pairs act.** Two surfaces meet in many pairs. A pair joins at an iterate if its closest points are a local
-//! minimum of the distance of the surfaces, and then stays until the step ends. So a line search sees a single
-//! function, which a filter in every trial would not be. A pair that shortens a move joins in any case.
+//! **Which pairs act.** Two surfaces meet in many pairs. Some of them join at an iterate (`feasible.rs`) and then stay
+//! until the step ends. So a line search sees a single function, which a filter in every trial would not be. A pair that
+//! shortens a move joins in any case.
 //!
 //! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
 //! vertices are against a displacement along the normal. Nothing is left to tune.
@@ -30,7 +30,6 @@ mod friction;
 mod joined;
 mod judge;
 mod law;
-mod obstacle_features;
 mod resistance;
 mod rolling;
 mod spacing;
@@ -112,7 +111,7 @@ impl BarrierContact {
         }
         let start = std::mem::take(&mut self.friction.start);
         self.visit(&start);
-        let mut meeting = Meeting::new(&self.mesh, &start);
+        let meeting = Meeting { mesh: &self.mesh, x: &start };
         let mut touching = Vec::new();
         for &Near { number, closest } in self.neighbourhood.separations().near() {
             let pair = &self.neighbourhood.pairs()[number];
@@ -233,7 +232,7 @@ impl ContactModel for BarrierContact {
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
         self.visit(x);
         let mut known = self.joined.pairs.iter().peekable();
-        let mut meeting = Meeting::new(&self.mesh, x);
+        let meeting = Meeting { mesh: &self.mesh, x };
         let mut added = Vec::new();
         for Near { number, closest } in self.neighbourhood.separations().near() {
             let pair = &self.neighbourhood.pairs()[*number];
