@@ -274,11 +274,10 @@ impl Search {
 }
 
 /// Returns the pairs of these features once and in order.
-fn in_order(mesh: &CollisionMesh, Found { mut on_triangles, mut of_edges }: Found) -> Vec<Pair> {
-    for features in [&mut on_triangles, &mut of_edges] {
-        features.sort_unstable_by_key(|[a, b]| u64::from(*a) << 32 | u64::from(*b));
-        features.dedup();
-    }
+fn in_order(mesh: &CollisionMesh, found: Found) -> Vec<Pair> {
+    let [points, triangles, edges] = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
+    let on_triangles = sorted(found.on_triangles, [points, triangles]);
+    let of_edges = sorted(found.of_edges, [edges, edges]);
     let on_triangle = |features: Features| {
         let (point, [a, b, c]) = (mesh.points()[features[0] as usize], mesh.triangles()[features[1] as usize]);
         Pair { kind: PairKind::PointTriangle, features, vertices: [point, a, b, c] }
@@ -288,4 +287,25 @@ fn in_order(mesh: &CollisionMesh, Found { mut on_triangles, mut of_edges }: Foun
         Pair { kind: PairKind::EdgeEdge, features, vertices: [a, b, c, d] }
     });
     on_triangles.into_iter().map(on_triangle).chain(of_edges).collect()
+}
+
+/// Sorts features whose numbers are below some counts, and drops repeated ones. Time is linear: they are counted by
+/// their second number, then by the first.
+fn sorted(mut features: Vec<Features>, counts: [usize; 2]) -> Vec<Features> {
+    let mut sorted = vec![[0; 2]; features.len()];
+    for key in [1, 0] {
+        let mut places = vec![0; counts[key] + 1];
+        features.iter().for_each(|one| places[one[key] as usize + 1] += 1);
+        for number in 1..places.len() {
+            places[number] += places[number - 1];
+        }
+        for one in &features {
+            let place = &mut places[one[key] as usize];
+            sorted[*place] = *one;
+            *place += 1;
+        }
+        std::mem::swap(&mut features, &mut sorted);
+    }
+    features.dedup();
+    features
 }

@@ -2,12 +2,15 @@
 
 mod bounds;
 mod hierarchy;
+mod meeting;
 mod pose;
+mod rounded_boxes;
 
 use energy_dsl::Real;
 
 pub use bounds::Bounds;
-pub use hierarchy::{Branches, Hierarchy};
+pub use hierarchy::Hierarchy;
+pub use meeting::Branches;
 pub use pose::Pose;
 
 // Vectors of numbers, or of SIMD lanes of numbers. They are written out by components: closures that build arrays would

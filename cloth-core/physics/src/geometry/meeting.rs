@@ -1,0 +1,92 @@
+//! Pairs of items whose boxes overlap, in one tree or two.
+
+use energy_dsl::{Kernel, Level, dispatch};
+
+use super::Hierarchy;
+use super::hierarchy::Node;
+use super::rounded_boxes::LANES;
+
+/// The pairs of a tree with itself, by the branches of the root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Branches {
+    /// All pairs of items.
+    All,
+    /// Pairs within the first branch.
+    First,
+    /// Pairs within the second branch.
+    Second,
+    /// Pairs of one item in each branch.
+    Across,
+}
+
+impl Hierarchy {
+    /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order. Boxes are rounded outwards
+    /// to single precision.
+    pub fn meeting(&self, other: &Self, found: impl FnMut(usize, usize)) {
+        dispatch(Meeting { first: self, second: other, is_one_tree: false, start: (0, 0), found });
+    }
+
+    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order, of some branches.
+    /// Boxes are rounded outwards to single precision.
+    pub fn meeting_itself(&self, branches: Branches, found: impl FnMut(usize, usize)) {
+        let start = match (branches, self.nodes[0].branches(LANES)) {
+            (Branches::All, _) => (0, 0),
+            // The root has no branches.
+            (Branches::First, None) => (0, 0),
+            (_, None) => return,
+            (Branches::First, _) => (1, 1),
+            (Branches::Second, Some(second)) => (second, second),
+            (Branches::Across, Some(second)) => (1, second),
+        };
+        dispatch(Meeting { first: self, second: self, is_one_tree: true, start, found });
+    }
+}
+
+/// Finds all pairs below two nodes.
+struct Meeting<'a, F> {
+    first: &'a Hierarchy,
+    second: &'a Hierarchy,
+    is_one_tree: bool,
+    start: (usize, usize),
+    found: F,
+}
+
+impl<F: FnMut(usize, usize)> Kernel for Meeting<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(mut self) {
+        let mut waiting = vec![self.start];
+        while let Some((a, b)) = waiting.pop() {
+            let (one, other) = (&self.first.nodes[a], &self.second.nodes[b]);
+            let is_same = self.is_one_tree && a == b;
+            if !is_same && !one.bounds.overlaps(&other.bounds) {
+                continue;
+            }
+            // Nodes whose items fit the lanes are not divided further.
+            match (one.branches(LANES), other.branches(LANES)) {
+                (None, None) => self.compare::<L>(one, other, is_same),
+                (Some(right), _) if is_same => waiting.extend([(a + 1, a + 1), (a + 1, right), (right, right)]),
+                (Some(right), None) => waiting.extend([(a + 1, b), (right, b)]),
+                (Some(right), Some(_)) if one.bounds.is_longer_than(&other.bounds) => {
+                    waiting.extend([(a + 1, b), (right, b)]);
+                }
+                (_, Some(right)) => waiting.extend([(a, b + 1), (a, right)]),
+            }
+        }
+    }
+}
+
+impl<F: FnMut(usize, usize)> Meeting<'_, F> {
+    /// Compares each box of one node with all of another, or with those after it in the same node.
+    #[inline(always)]
+    fn compare<L: Level>(&mut self, one: &Node, other: &Node, is_same: bool) {
+        let Self { first, second, found, .. } = self;
+        for place in (one.from..one.to).filter(|place| first.boxes[*place].overlaps(&other.bounds)) {
+            let from = if is_same { place + 1 } else { other.from };
+            second.rounded.overlapping::<L>(from, other.to, (&first.rounded, place), |with| {
+                found(first.items[place], second.items[with]);
+            });
+        }
+    }
+}
