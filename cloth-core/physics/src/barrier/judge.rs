@@ -65,8 +65,7 @@ impl Judge<'_> {
 
     /// Pairs beyond this distance certainly stay out of reach, in m.
     fn farthest(&self) -> f64 {
-        let longest = self.step.excursions().iter().copied().fold(0.0, f64::max);
-        self.step.beyond(self.spacings.largest_reach(), 2.0 * longest)
+        self.step.beyond(self.spacings.largest_reach(), 2.0 * self.step.longest())
     }
 
     fn clearance(&self, pair: &Pair) -> Clearance {

@@ -72,6 +72,11 @@ pub struct BarrierContact {
     /// The least and the largest distance that vertices may move before the next search, in m.
     slack: [f64; 2],
     search: Search,
+    /// The longest move in this step that is certified as a whole, in m; `None` before its first move. Directions of
+    /// indefinite Hessians may be hundreds of times too long, and would meet millions of pairs.
+    limit: Option<f64>,
+    /// The least limit, in m.
+    least_limit: f64,
     /// The pairs near the current iterate.
     neighbourhood: Neighbourhood,
     /// The displacement of each vertex in the last move that left the neighbourhood, in m.
@@ -155,15 +160,34 @@ impl BarrierContact {
         }
         self.strides.copy_from_slice(step.excursions());
         let [least, most] = self.slack;
-        let longest = self.strides.iter().copied().fold(0.0, f64::max);
         let mean = self.strides.iter().sum::<f64>() / self.strides.len() as f64;
-        if longest > LONG * most || mean > most {
+        if step.longest() > LONG * most || mean > most {
             return false;
         }
         let radii = self.strides.iter().map(|stride| least + (0.5 + STRAYING) * stride).collect();
-        self.neighbourhood.renew(&mut self.search, &self.mesh, step.from(), &step.middle(), radii);
+        self.neighbourhood.renew(&mut self.search, &self.mesh, step.from(), &step.after(0.5), radii);
         self.counts.searches += 1;
         true
+    }
+
+    /// Returns the part of a move that certainly has no crossing.
+    fn safe_part(&mut self, step: &Move<'_>) -> f64 {
+        let (count, judgement) = if self.covers_move(step) {
+            self.neighbourhood.visit(&self.search, step.from());
+            let pairs = self.neighbourhood.pairs();
+            (pairs.len(), self.judge(step, pairs, self.neighbourhood.separations()))
+        } else {
+            self.counts.searches += 1;
+            let pairs = self.search.pairs(&self.mesh, swept(step.from(), step.to()));
+            let mut separations = Separations::default();
+            separations.measure(&pairs, step.from(), self.search.halves(), self.search.threads);
+            (pairs.len(), self.judge(step, &pairs, &separations))
+        };
+        let Judgement { part, tested, blocking } = judgement;
+        self.blocking.extend(blocking);
+        self.counts.candidates += count as u64;
+        self.counts.tested += tested;
+        part
     }
 
     /// Judges a move by some pairs, measured at its start.
@@ -184,6 +208,7 @@ impl ContactModel for BarrierContact {
 
     fn begin_step(&mut self, x: &[Vector3<f64>]) {
         self.friction.begin_step(x);
+        self.limit = None;
         self.joined.clear();
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
@@ -197,22 +222,15 @@ impl ContactModel for BarrierContact {
             return 0.0;
         }
         let step = Move::new(from, to);
-        let (count, judgement) = if self.covers_move(&step) {
-            self.neighbourhood.visit(&self.search, from);
-            let pairs = self.neighbourhood.pairs();
-            (pairs.len(), self.judge(&step, pairs, self.neighbourhood.separations()))
+        // The first move of a step is the warm start.
+        let limit = *self.limit.get_or_insert(step.longest().max(self.least_limit));
+        let part = if step.longest() > limit {
+            let near = limit / step.longest();
+            near * self.safe_part(&Move::new(from, &step.after(near)))
         } else {
-            self.counts.searches += 1;
-            let pairs = self.search.pairs(&self.mesh, swept(from, to));
-            let mut separations = Separations::default();
-            separations.measure(&pairs, from, self.search.halves(), self.search.threads);
-            (pairs.len(), self.judge(&step, &pairs, &separations))
+            self.safe_part(&step)
         };
-        let Judgement { part, tested, blocking } = judgement;
-        self.blocking.extend(blocking);
         self.counts.moves += 1;
-        self.counts.candidates += count as u64;
-        self.counts.tested += tested;
         if part < 1.0 {
             self.counts.shortened += 1;
             self.counts.left += part;

@@ -11,6 +11,8 @@ use crate::collision::{
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
 pub(super) const SKIN: f64 = 1.0 / 3.0;
+/// The least limit on a move that is certified as a whole, over the mean length of an edge.
+const EDGES: f64 = 4.0;
 /// The number of crossings that a message names.
 const NAMED: usize = 3;
 /// The part of an obstacle's reach within which cloth counts as touching at the start.
@@ -150,6 +152,8 @@ impl BarrierContact {
         let mut contact = Self {
             spacings,
             slack: [0.5 * gap, gap.max(0.15 * mesh.mean_edge(x))],
+            limit: None,
+            least_limit: EDGES * mesh.mean_edge(x),
             search: Search::new(&mesh, x, rules),
             neighbourhood: Neighbourhood::default(),
             strides: vec![0.0; x.len()],

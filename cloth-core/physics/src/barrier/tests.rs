@@ -220,6 +220,25 @@ fn moves_are_certified_and_pairs_that_block_join() {
     assert!((counts.left - part).abs() < 1e-15);
 }
 
+/// Only the beginning of a move that is far longer than the first move of the step is looked at.
+#[test]
+fn a_part_of_a_long_move_is_certified() {
+    let x = states()[0].clone();
+    let mut contact = contact(&x);
+    let lifted = |height: f64| {
+        let mut to = x.clone();
+        to[3..].iter_mut().for_each(|corner| corner[2] += height);
+        to
+    };
+    // Half of the vertices move, so each moves by half the height relative to the mean.
+    assert_eq!(contact.certify(&x, &lifted(2.0)), 1.0);
+    let part = contact.certify(&x, &lifted(100.0));
+    assert!((part - 0.02).abs() < 1e-12, "{part}");
+    contact.begin_step(&x);
+    assert_eq!(contact.certify(&x, &lifted(100.0)), 1.0);
+    assert_eq!(contact.counts().shortened, 1);
+}
+
 /// Two layers of 4 × 4 squares of 1 cm, above each other.
 fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
     let corner = |layer: usize, i: usize, j: usize| 25 * layer + 5 * i + j;

@@ -68,14 +68,19 @@ impl<'a> Move<'a> {
         self.to
     }
 
-    /// Returns the positions half way.
-    pub fn middle(&self) -> Vec<Vector3<f64>> {
-        self.from.iter().zip(self.to).map(|(from, to)| add_scaled(*from, 0.5, subtract(*to, *from))).collect()
+    /// Returns the positions after a part of the way.
+    pub fn after(&self, part: f64) -> Vec<Vector3<f64>> {
+        self.from.iter().zip(self.to).map(|(from, to)| add_scaled(*from, part, subtract(*to, *from))).collect()
     }
 
     /// The length of the displacement of each vertex relative to the mean, in m.
     pub fn excursions(&self) -> &[f64] {
         &self.excursions
+    }
+
+    /// The largest of [`Move::excursions`].
+    pub fn longest(&self) -> f64 {
+        self.excursions.iter().copied().fold(0.0, f64::max)
     }
 
     /// Whether a pair with this separation at the start certainly stays out of reach.
