@@ -11,8 +11,10 @@
 //!   - [`fabric`], [`contact`], [`wind`]: the other forces, as terms of declared elements
 //!   - [`integrator`]: time integration of a [`Body`]
 //! - [`scene`], the crate [`cloth_scene`]: the file format
-//! - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
-//! - [`simulation`], [`output`], [`run`]: stepping, output files, runs with checkpoints and reports
+//! - of the crate [`cloth_simulation`]:
+//!   - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
+//!   - [`simulation`], [`output`]: stepping, and output files
+//! - [`run`]: runs with checkpoints and reports
 //! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
 //!
 //! ```
@@ -51,15 +53,11 @@ mod book;
 
 pub mod bench;
 pub mod demo;
-pub mod ledger;
-pub mod model;
-pub mod output;
 pub mod run;
-pub mod simulation;
 pub mod validate;
 pub mod view;
 
 pub use cloth_materials as materials;
 pub use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};
 pub use cloth_scene as scene;
-pub use simulation::{Island, Simulation, SimulationError, Summary};
+pub use cloth_simulation::{Island, Simulation, SimulationError, Summary, ledger, model, output, simulation};

@@ -10,7 +10,7 @@ mod pins;
 mod seam;
 mod soft_pin;
 
-pub(crate) use anchor::Anchor;
+pub use anchor::Anchor;
 pub use exclusions::ExclusionError;
 pub use inflation::NotClosed;
 pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};

@@ -28,7 +28,7 @@ pub struct Scenery {
 
 /// The part of space that pictures show.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Framing {
+pub struct Framing {
     /// A box around the vertices, for the visible part of planes.
     bounds: Bounds,
     style: Style,
@@ -52,9 +52,10 @@ impl Framing {
         Self { bounds, style: Style::default(), steady: None }
     }
 
-    /// The camera frames these points and their shadows, in every picture alike. `floor` is the height of a plane below
-    /// them, in m; `None` if there is none.
-    pub(crate) fn steady(points: &[Vector3<f64>], floor: Option<f64>, style: Style) -> Self {
+    /// Frames these points and their shadows, with one camera for all pictures of a sequence. `floor` is the height of a
+    /// plane below them, in m; `None` if there is none.
+    #[must_use]
+    pub fn steady(points: &[Vector3<f64>], floor: Option<f64>, style: Style) -> Self {
         let bounds = Bounds::of(points);
         let below = bounds.low[2] - 0.08 * (bounds.high[2] - bounds.low[2]);
         let (floor, lowest) = floor.map_or((below, below), |floor| (floor, f64::NEG_INFINITY));
@@ -64,7 +65,8 @@ impl Framing {
     }
 
     /// Whether the pictures of a sequence show all these points.
-    pub(crate) fn shows(&self, points: &[Vector3<f64>]) -> bool {
+    #[must_use]
+    pub fn shows(&self, points: &[Vector3<f64>]) -> bool {
         self.steady.is_some_and(|Steady { camera, floor, lowest }| {
             let is_within = |p: Vector3<f64>| is_visible(&self.style, &camera, p);
             let is_shown = |p: &Vector3<f64>| is_within(*p) && is_within(shadow_of(p, floor));
@@ -114,12 +116,14 @@ impl Scenery {
     }
 
     /// Size, camera and background of pictures.
-    pub(crate) fn style(&self) -> Style {
+    #[must_use]
+    pub fn style(&self) -> Style {
         self.style
     }
 
     /// Returns the outermost points of cloth and bounded obstacles at a time in s, in 26 directions.
-    pub(crate) fn outermost(&self, positions: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>> {
+    #[must_use]
+    pub fn outermost(&self, positions: &[Vector3<f64>], time: f64) -> Vec<Vector3<f64>> {
         let solids = self.obstacles.iter().map(|obstacle| obstacle.at(time));
         let bounded = solids.filter(|solid| !matches!(solid, AnySolid::HalfSpace(_)));
         let surfaces: Vec<SolidMesh> = bounded.map(|solid| SolidMesh::of(&solid, [0.0; 3], 1.0)).collect();
@@ -130,12 +134,16 @@ impl Scenery {
     }
 
     /// The height of the highest horizontal plane at a time in s; `None` if there is none.
-    pub(crate) fn floor(&self, time: f64) -> Option<f64> {
+    #[must_use]
+    pub fn floor(&self, time: f64) -> Option<f64> {
         self.obstacles.iter().filter_map(|obstacle| floor_height(&obstacle.at(time))).reduce(f64::max)
     }
 
-    /// Draws the vertices at a time, in s. A horizontal plane serves as the floor that receives shadows.
-    pub(crate) fn picture(
+    /// Draws the vertices at a time, in s, as PNG. A horizontal plane serves as the floor that receives shadows.
+    ///
+    /// # Errors
+    /// Returns an error if the picture cannot be encoded.
+    pub fn picture(
         &self,
         positions: &[Vector3<f64>],
         time: f64,

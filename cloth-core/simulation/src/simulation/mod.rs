@@ -36,7 +36,7 @@ use crate::motion::Motion;
 use crate::scene::{ContactChoice, Scene};
 use collision::add_contact;
 use prescribed::Prescribed;
-pub(crate) use release::Extension;
+pub use release::Extension;
 use release::Releases;
 use sleep::StepContext;
 
@@ -132,8 +132,11 @@ impl Simulation {
         Self::extended(scene, None)
     }
 
-    /// Creates a simulation of a scene with something more in its model.
-    pub(crate) fn extended(scene: &Scene, extension: Option<&Extension>) -> Result<Self, SimulationError> {
+    /// Creates a simulation of a scene, at time 0, whose model the extension has changed.
+    ///
+    /// # Errors
+    /// Returns an error if [`Simulation::new`] would, or if the extended model is invalid.
+    pub fn extended(scene: &Scene, extension: Option<&Extension>) -> Result<Self, SimulationError> {
         let mut model = Model::new(scene)?;
         extension.iter().for_each(|extend| extend(&mut model));
         let mut simulation = Self::assembled(scene, model)?;
@@ -191,7 +194,7 @@ impl Simulation {
     }
 
     /// Limits the number of threads of the next steps; see [`Simulation::with_threads`].
-    pub(crate) fn set_threads(&mut self, threads: usize) {
+    pub fn set_threads(&mut self, threads: usize) {
         self.threads = Some(threads);
         self.islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
     }

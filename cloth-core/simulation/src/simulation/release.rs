@@ -7,8 +7,8 @@ use super::{Island, Simulation, SimulationError};
 use crate::model::{Model, ModelError};
 use crate::scene::Scene;
 
-/// Adds what is not in a scene to its model, such as the pull of the mouse.
-pub(crate) type Extension = Arc<dyn Fn(&mut Model) + Send + Sync>;
+/// Adds to a model something that its scene does not have, such as the pull of the mouse.
+pub type Extension = Arc<dyn Fn(&mut Model) + Send + Sync>;
 
 /// The times at which pins of a scene let go, and the means to assemble the scene again.
 pub(super) struct Releases {

@@ -7,13 +7,14 @@ use crate::geometry::dot;
 /// A spring of rest length 0 between a vertex and a place that no force moves. It changes only the diagonal block of
 /// its vertex.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Anchor {
+pub struct Anchor {
     /// Index of the vertex within the island.
     pub vertex: usize,
     /// Slot of the diagonal block of the vertex.
     pub slot: usize,
     /// The place, in m.
     pub place: Vector3<f64>,
+    /// The spring, with its stiffness.
     pub spring: ZeroLengthSpring,
 }
 
@@ -23,10 +24,12 @@ impl Anchor {
         Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true };
 
     /// Returns the energy, in J.
+    #[must_use]
     pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
         self.spring.value(&[x[self.vertex], self.place]).value
     }
 
+    /// Adds the force on the vertex, in N.
     pub fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
         let gradient = self.spring.gradient(&[x[self.vertex], self.place]).gradient[0];
         (0..3).for_each(|axis| force[self.vertex][axis] -= gradient[axis]);
