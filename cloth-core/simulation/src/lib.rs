@@ -1,7 +1,7 @@
 //! The simulation of cloth: assembles scenes, steps them through time, and draws and encodes their states.
 //!
-//! It is a crate of its own so that it is built with full optimisation, and `cloth-core`, whose code runs once per
-//! command, without. Modules, from the bottom up; each uses only those above it:
+//! It is a crate of its own so that it is built with full optimisation, and the commands of `cloth-core` with little.
+//! Modules, from the bottom up; each uses only those above it:
 //!
 //! - [`ledger`]: the energy balance
 //! - [`model`]: the assembly of a scene into islands
