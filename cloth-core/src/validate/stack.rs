@@ -7,7 +7,7 @@
 //!
 //! Pairs share the weight of the n sheets above. For each cell of a grid there are eight. The vertices of both sides
 //! meet the other side as points on triangles: 2. Edges along x cross those along y of the other side: 2. Edges along x
-//! and y cross diagonals: 4, for a line of the length l crosses lines at the distance d and the angle θ l sin θ/d times.
+//! and y cross diagonals: 4, for a line of length l crosses lines at the distance d and the angle θ l sin θ/d times.
 //! The mass cancels:
 //!
 //! 8 · 10/β″(½) · g/h² · (1 − s)(1/s − 1 − 2 ln s) = n · gravity.

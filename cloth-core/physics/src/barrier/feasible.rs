@@ -1,7 +1,7 @@
 //! Which pairs of close features act as a contact.
 //!
-//! Two layers of cloth lie close in many pairs of features. A point counts where it is nearest to a triangle, an edge of
-//! it or a corner, as a local minimum of the distance: once, although several triangles meet there (Offset geometric
+//! Two layers of cloth lie close in many pairs of features. A point counts where it is nearest to a triangle, one of its
+//! edges or corners, as a local minimum of the distance: once, although several triangles meet there (Offset geometric
 //! contact: Chen, Hsu, Liu, Macklin, Yang and Yuksel 2025).
 //!
 //! Two edges count where their insides are nearest to each other, unless one of them lies in a valley. Edges of flat or

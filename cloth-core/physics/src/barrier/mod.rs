@@ -12,8 +12,8 @@
 //! that of its core, so its thickness includes the radius of the solid.
 //!
 //! **Which pairs act.** Two surfaces meet in many pairs. Some of them join at an iterate (`feasible.rs`) and then stay
-//! until the step ends. So a line search sees a single function, which a filter in every trial would not be. A pair that
-//! shortens a move joins in any case.
+//! until the step ends. So a line search sees a single function, which a filter in every trial would not be. A pair
+//! that shortens a move joins in any case.
 //!
 //! **Stiffness.** K is chosen once for each pair and step: at half the gap, the barrier is ten times as stiff as the
 //! vertices are against a displacement along the normal. Nothing is left to tune.

@@ -52,8 +52,8 @@ impl Framing {
         Self { bounds, style: Style::default(), steady: None }
     }
 
-    /// Frames these points and their shadows, with one camera for all pictures of a sequence. `floor` is the height of a
-    /// plane below them, in m; `None` if there is none.
+    /// Frames these points and their shadows, with one camera for all pictures of a sequence. `floor` is the height of
+    /// a plane below them, in m; `None` if there is none.
     #[must_use]
     pub fn steady(points: &[Vector3<f64>], floor: Option<f64>, style: Style) -> Self {
         let bounds = Bounds::of(points);
