@@ -1,6 +1,6 @@
 //! Which pairs of close features act as a contact.
 //!
-//! Two layers of cloth lie close in many pairs of features. A point counts where it is nearest to a triangle, one of its
+//! Two layers of cloth lie close in many pairs of features. A point counts where it is nearest to a triangle, its
 //! edges or corners, as a local minimum of the distance: once, although several triangles meet there (Offset geometric
 //! contact: Chen, Hsu, Liu, Macklin, Yang and Yuksel 2025).
 //!

@@ -12,7 +12,7 @@ use crate::collision::{
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
 pub(super) const SKIN: f64 = 1.0 / 3.0;
 /// The least limit on a move that is certified as a whole, over the mean length of an edge.
-const EDGES: f64 = 4.0;
+const EDGES: f64 = 2.0;
 /// The number of crossings that a message names.
 const NAMED: usize = 3;
 /// The part of an obstacle's reach within which cloth counts as touching at the start.
