@@ -12,8 +12,8 @@
 //!
 //! 8 · 10/β″(½) · g/h² · (1 − s)(1/s − 1 − 2 ln s) = n · gravity.
 //!
-//! This holds for all grids, aligned or shifted, but not where vertices lie exactly on vertices: there more pairs act.
-//! Each sheet is a little smaller than that below. Without friction, edges exactly above edges roll off each other.
+//! This holds for all grids, aligned or shifted. Each sheet is a little smaller than that below: without friction, edges
+//! exactly above edges roll off each other.
 
 use super::contact::{GRAVITY, advance, contact_forces, simulation};
 use super::special::zero_between;
@@ -78,7 +78,7 @@ fn stack(cells: usize, shift: f64) -> Result<Simulation, ValidateError> {
 }
 
 /// Returns the force across the interface with the largest relative error, and the weight above it, in N. Pairs come
-/// and go from step to step, which shakes flat layers by about 2 % of their weight. So forces are means over time.
+/// and go from step to step, which shakes flat layers by about 0.5 % of their weight. So forces are means over time.
 fn worst_force(simulation: &mut Simulation) -> Result<(f64, f64), ValidateError> {
     let mut across = [0.0; SHEETS];
     for _ in 0..STEPS {
