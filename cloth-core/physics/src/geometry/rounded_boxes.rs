@@ -59,7 +59,7 @@ impl RoundedBoxes {
 /// A number just below x. The subtraction exceeds the error of rounding, and has no branches.
 #[inline]
 fn below(x: f64) -> f32 {
-    let near = x as f32;
+    let near = (x as f32).min(f32::MAX);
     near - near.abs() * f32::EPSILON - f32::MIN_POSITIVE
 }
 
@@ -75,5 +75,11 @@ mod tests {
             let rounded = f64::from(below(x));
             prop_assert!(rounded < x && x - rounded <= 4e-7 * x.abs() + 1e-37, "{x:e} {rounded:e}");
         }
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_rounded_too() {
+        assert!(below(1e300) >= 3e38 && below(1e300).is_finite());
+        assert_eq!(below(-1e300), f32::NEG_INFINITY);
     }
 }
