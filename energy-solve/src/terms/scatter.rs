@@ -1,7 +1,7 @@
 //! Adds the results of a batch to the vectors and blocks of its vertices, one element after the other, so that sums do
 //! not depend on the number of lanes.
 
-use energy_dsl::{BLOCK, Block, Lane, Level, Mask, Number, Vector3, triangle_index};
+use energy_dsl::{BLOCK, Block, Lane, Mask, Vector3, triangle_index};
 
 use crate::matrix::precision::{Blocks, Precision};
 use crate::terms::places::{BlockPlaces, Places};
@@ -46,10 +46,10 @@ impl VectorBuffer {
 
     /// Subtracts the vectors at the elements' points from `sums`, which holds the vertices from `first_vertex` on.
     #[inline(always)]
-    pub(crate) fn subtract<L: Level>(
+    pub(crate) fn subtract<V: Lane<f64>>(
         &mut self,
         lanes: &Lanes<'_>,
-        vectors: &[Vector3<L::F64>],
+        vectors: &[Vector3<V>],
         first_vertex: usize,
         sums: &mut [Vector3<f64>],
     ) {
@@ -92,16 +92,16 @@ impl TriangleBuffer {
     /// Adds the triangles of the elements from `first` on, times `scale`, to `matrix`, which holds the blocks from
     /// `first_block` on. Transposes the blocks (i, j) that are stored as (j, i).
     #[inline(always)]
-    pub fn scatter<L: Level>(
+    pub fn scatter<V: Lane<f64>>(
         &mut self,
         places: &BlockPlaces,
         (first, count): (usize, usize),
-        scale: L::F64,
-        triangle: &mut [[Vector3<L::F64>; 3]],
+        scale: V,
+        triangle: &mut [[Vector3<V>; 3]],
         (first_block, matrix): (usize, &mut Blocks<'_>),
     ) {
-        turn::<L>(&places.upper, first, triangle);
-        self.fill::<L>(scale, triangle);
+        turn(&places.upper, first, triangle);
+        self.fill(scale, triangle);
         let (pairs, elements) = (triangle.len(), first..first + count);
         let (slots, mirrored) = (places.upper.of(elements.clone()), places.mirrored.of(elements));
         match matrix {
@@ -112,14 +112,14 @@ impl TriangleBuffer {
 
     /// Fills the buffer with the scaled triangles of all lanes.
     #[inline(always)]
-    fn fill<L: Level>(&mut self, scale: L::F64, triangle: &[[Vector3<L::F64>; 3]]) {
+    fn fill<V: Lane<f64>>(&mut self, scale: V, triangle: &[[Vector3<V>; 3]]) {
         let (stride, eights) = (8 * self.pairs, self.eights.as_flattened_mut());
         for (pair, (block, ninth)) in triangle.iter().zip(&mut self.ninths).enumerate() {
             let mut entries = [scale; 9];
             for (entry, number) in entries.iter_mut().zip(block.as_flattened()) {
                 *entry = *number * scale;
             }
-            L::F64::store_transposed(&entries[..8], <L::F64 as Lane<f64>>::LANES, &mut eights[8 * pair..], stride);
+            V::store_transposed(&entries[..8], V::LANES, &mut eights[8 * pair..], stride);
             entries[8].store(ninth);
         }
     }
@@ -171,16 +171,16 @@ impl TriangleBuffer {
 
 /// Transposes the blocks (i, j) that are stored as (j, i).
 #[inline(always)]
-fn turn<L: Level>(places: &Places, first: usize, triangle: &mut [[Vector3<L::F64>; 3]]) {
+fn turn<V: Lane<f64>>(places: &Places, first: usize, triangle: &mut [[Vector3<V>; 3]]) {
     for pair in 0..triangle.len() {
         let bits = places.transposed(first, pair);
         if bits != 0 {
-            let turned = <L::F64 as Number>::Mask::from_bits(bits);
+            let turned = V::Mask::from_bits(bits);
             let block = &mut triangle[pair];
             for (i, j) in [(0, 1), (0, 2), (1, 2)] {
                 let (upper, lower) = (block[i][j], block[j][i]);
-                block[i][j] = L::F64::select(turned, lower, upper);
-                block[j][i] = L::F64::select(turned, upper, lower);
+                block[i][j] = V::select(turned, lower, upper);
+                block[j][i] = V::select(turned, upper, lower);
             }
         }
     }

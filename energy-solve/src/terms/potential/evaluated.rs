@@ -4,8 +4,8 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 use energy_dsl::{
-    Array, BLOCK, Batch, BatchWork, Declaration, Lane, Level, Packed, PackedPotential, Potential, ReducedPotential,
-    Vector3, WidePoints, for_each_batch_in,
+    Array, BLOCK, Batch, BatchWork, Block, Declaration, Kernel, Lane, Level, Number, Packed, PackedPotential,
+    Potential, ReducedPotential, Vector3, WidePoints, for_each_batch_in,
 };
 
 use super::work::{Expanded, Gradients, Hessians, Values, lanes_in};
@@ -75,7 +75,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Values<'_> {
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let result = batch.element.value_at::<L>(batch.points);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        self.add::<L>(&lanes(&batch), result.value, flagged);
+        self.add(&lanes(&batch), result.value, flagged);
     }
 }
 
@@ -84,7 +84,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Gradients<'_> {
     fn batch<L: Level>(&mut self, batch: Batch<'_, E, L::F64>) {
         let result = batch.element.gradient_at::<L>(batch.points);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        self.add::<L>(&lanes(&batch), result.value, result.gradient.as_ref(), flagged);
+        self.add(&lanes(&batch), result.value, result.gradient.as_ref(), flagged);
     }
 }
 
@@ -97,9 +97,38 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let projected = self.project::<L>(E::DECLARATION, &lanes, reduced.hessian.as_mut(), n, batch.points.as_ref());
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        let (mut v, mut sums) = (*batch.points, *batch.points);
-        let (gradient, triangle) = (result.gradient.as_ref(), result.hessian.as_mut());
-        let numbers = Expanded { value: result.value, gradient, triangle };
-        self.add::<L>(&lanes, numbers, (flagged, projected), [v.as_mut(), sums.as_mut()]);
+        let bits = (flagged, projected);
+        L::F64::dispatch(Addition {
+            to: self,
+            lanes,
+            value: result.value,
+            gradient: &result.gradient,
+            triangle: &mut result.hessian,
+            bits,
+        });
+    }
+}
+
+/// Adds the results of a batch to a linearisation. Elements with equally many points share this code: a [`Kernel`] of
+/// its own is compiled for the SIMD level without being inlined.
+struct Addition<'k, 'a, 'b, V, P, T> {
+    to: &'k mut Hessians<'a, 'b>,
+    lanes: Lanes<'k>,
+    value: V,
+    gradient: &'k P,
+    triangle: &'k mut T,
+    /// Flagged and projected lanes.
+    bits: (u32, u32),
+}
+
+impl<V: Lane<f64>, P: Array<Vector3<V>>, T: Array<Block<V>>> Kernel for Addition<'_, '_, '_, V, P, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { to, lanes, value, gradient, triangle, bits } = self;
+        let (mut v, mut sums) = (*gradient, *gradient);
+        let numbers = Expanded { value, gradient: gradient.as_ref(), triangle: triangle.as_mut() };
+        to.add(&lanes, numbers, bits, [v.as_mut(), sums.as_mut()]);
     }
 }

@@ -1,6 +1,6 @@
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use energy_dsl::{BLOCK, Lane, Level};
+use energy_dsl::{BLOCK, Lane};
 
 use crate::terms::scatter::Lanes;
 
@@ -20,10 +20,10 @@ impl<'a> PackEnergies<'a> {
     }
 
     #[inline(always)]
-    pub(super) fn note<L: Level>(&mut self, batch: &Lanes<'_>, values: L::F64) {
+    pub(super) fn note<V: Lane<f64>>(&mut self, batch: &Lanes<'_>, values: V) {
         let place = batch.first % BLOCK;
         values.store(&mut self.values[place..]);
-        let next = place + <L::F64 as Lane<f64>>::LANES;
+        let next = place + V::LANES;
         if next == BLOCK || batch.first + batch.count == self.elements {
             // Lanes past the last element hold values of an earlier pack.
             self.values[place + batch.count..].fill(0.0);

@@ -144,7 +144,7 @@ impl Kernel for AddValues<'_, '_> {
         let mut at = 0;
         while at < count {
             let lanes = lanes::<L>(first, count, at, self.stencils);
-            self.work.add::<L>(&lanes, L::F64::load(&results.number(0)[at..]), flagged(flags, &lanes, at));
+            self.work.add(&lanes, L::F64::load(&results.number(0)[at..]), flagged(flags, &lanes, at));
             at += <L::F64 as Lane<f64>>::LANES;
         }
     }
@@ -168,7 +168,7 @@ impl Kernel for AddGradients<'_, '_> {
             let lanes = lanes::<L>(first, count, at, self.stencils);
             read::<L>(results, 1, at, &mut gradient);
             let value = L::F64::load(&results.number(0)[at..]);
-            self.work.add::<L>(&lanes, value, &gradient, flagged(flags, &lanes, at));
+            self.work.add(&lanes, value, &gradient, flagged(flags, &lanes, at));
             at += <L::F64 as Lane<f64>>::LANES;
         }
     }
@@ -245,7 +245,7 @@ impl Kernel for AddHessians<'_, '_, '_> {
             let bits = (flagged(flags, &lanes, at), self.projected[at]);
             let (v, sums) = scratch.split_at_mut(points);
             let numbers = Expanded { value, gradient, triangle: &mut triangle };
-            self.work.add::<L>(&lanes, numbers, bits, [v, sums]);
+            self.work.add(&lanes, numbers, bits, [v, sums]);
             at += <L::F64 as Lane<f64>>::LANES;
         }
     }

@@ -38,8 +38,8 @@ impl<'a> Values<'a> {
 impl Values<'_> {
     /// Notes U of each lane.
     #[inline(always)]
-    pub(super) fn add<L: Level>(&mut self, lanes: &Lanes<'_>, value: L::F64, flagged: u32) {
-        self.energies.note::<L>(lanes, value);
+    pub(super) fn add<V: Lane<f64>>(&mut self, lanes: &Lanes<'_>, value: V, flagged: u32) {
+        self.energies.note(lanes, value);
         self.flagged += u64::from(flagged.count_ones());
     }
 }
@@ -67,15 +67,9 @@ impl<'a> Gradients<'a> {
 impl Gradients<'_> {
     /// Subtracts the gradients of all lanes from the forces.
     #[inline(always)]
-    pub(super) fn add<L: Level>(
-        &mut self,
-        lanes: &Lanes<'_>,
-        value: L::F64,
-        gradient: &[Vector3<L::F64>],
-        flagged: u32,
-    ) {
-        self.energies.note::<L>(lanes, value);
-        self.buffer.subtract::<L>(lanes, gradient, self.first_vertex, self.force);
+    pub(super) fn add<V: Lane<f64>>(&mut self, lanes: &Lanes<'_>, value: V, gradient: &[Vector3<V>], flagged: u32) {
+        self.energies.note(lanes, value);
+        self.buffer.subtract(lanes, gradient, self.first_vertex, self.force);
         self.flagged += count_owned(flagged, lanes.vertices(0), self.first_vertex, self.force.len());
     }
 }
@@ -162,25 +156,25 @@ impl Hessians<'_, '_> {
     /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two
     /// vectors per point.
     #[inline(always)]
-    pub(super) fn add<L: Level>(
+    pub(super) fn add<V: Lane<f64>>(
         &mut self,
         lanes: &Lanes<'_>,
-        Expanded { value, gradient, triangle }: Expanded<'_, L::F64>,
+        Expanded { value, gradient, triangle }: Expanded<'_, V>,
         (flagged, mut projected): (u32, u32),
-        scratch: [&mut [Vector3<L::F64>]; 2],
+        scratch: [&mut [Vector3<V>]; 2],
     ) {
         if self.orthonormal.is_none() && self.sum.curvature != Curvature::Exact {
             projected = change_one_by_one(triangle, lanes.count, self.sum.curvature);
         }
-        self.energies.note::<L>(lanes, value);
-        self.vectors.subtract::<L>(lanes, gradient, self.first_vertex, self.sum.force);
+        self.energies.note(lanes, value);
+        self.vectors.subtract(lanes, gradient, self.first_vertex, self.sum.force);
         if let Some(product) = &mut self.sum.stiffness_times_velocity {
             let first_vertex = self.first_vertex;
-            subtract_product::<L>(lanes, triangle, self.velocities, scratch, &mut self.vectors, first_vertex, product);
+            subtract_product(lanes, triangle, self.velocities, scratch, &mut self.vectors, first_vertex, product);
         }
-        let (scale, elements) = (L::F64::splat(-self.sum.weights.position), (lanes.first, lanes.count));
+        let (scale, elements) = (V::splat(-self.sum.weights.position), (lanes.first, lanes.count));
         let matrix = (self.first_block, &mut self.sum.matrix);
-        self.triangles.scatter::<L>(self.places, elements, scale, triangle, matrix);
+        self.triangles.scatter(self.places, elements, scale, triangle, matrix);
         let (vertices, first, count) = (lanes.vertices(0), self.first_vertex, self.sum.force.len());
         self.flagged += count_owned(flagged, vertices, first, count);
         self.projected += count_owned(projected, vertices, first, count);
@@ -236,19 +230,19 @@ fn difference_vectors<L: Level>(declaration: &Declaration, points: &[Vector3<L::
 
 /// Subtracts ∇²U v.
 #[inline(always)]
-fn subtract_product<L: Level>(
+fn subtract_product<V: Lane<f64>>(
     lanes: &Lanes<'_>,
-    triangle: &[[Vector3<L::F64>; 3]],
+    triangle: &[[Vector3<V>; 3]],
     velocities: &[Vector3<f64>],
-    [v, sums]: [&mut [Vector3<L::F64>]; 2],
+    [v, sums]: [&mut [Vector3<V>]; 2],
     buffer: &mut VectorBuffer,
     first_vertex: usize,
     product: &mut [Vector3<f64>],
 ) {
     let n = v.len();
-    let zero = [L::F64::splat(0.0); 3];
+    let zero = [V::splat(0.0); 3];
     for point in 0..n {
-        v[point] = L::F64::gather(velocities, lanes.all_vertices(point));
+        v[point] = V::gather(velocities, lanes.all_vertices(point));
         sums[point] = zero;
     }
     for i in 0..n {
@@ -264,7 +258,7 @@ fn subtract_product<L: Level>(
             }
         }
     }
-    buffer.subtract::<L>(lanes, sums, first_vertex, product);
+    buffer.subtract(lanes, sums, first_vertex, product);
 }
 
 /// Fallback for elements with more coordinates than lanes support. Returns a bit mask of the changed lanes.

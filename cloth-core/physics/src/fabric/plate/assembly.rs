@@ -33,7 +33,7 @@ impl BatchWork<ArcAngle> for CurvedPart<'_, '_> {
         let weight = |lane: usize| hinges.get(lane).map_or(0.0, |&hinge| scale * self.moments[hinge]);
         let (weights, elements) = (L::F64::from_fn(weight), (batch.first, batch.count));
         let matrix = (0, &mut self.sum.matrix);
-        self.triangles.scatter::<L>(&self.of.hinge_places, elements, weights, &mut result.hessian, matrix);
+        self.triangles.scatter(&self.of.hinge_places, elements, weights, &mut result.hessian, matrix);
     }
 }
 

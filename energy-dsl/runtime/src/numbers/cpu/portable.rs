@@ -72,7 +72,8 @@ macro_rules! array_register {
             type Mask = $mask;
             const LANES: usize = $lanes;
 
-            #[inline(always)]
+            /// Not inlined, as at the other levels.
+            #[inline(never)]
             fn dispatch<K: Kernel>(kernel: K) -> K::Output {
                 kernel.run::<Baseline>()
             }
