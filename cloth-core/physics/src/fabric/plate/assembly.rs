@@ -100,6 +100,8 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
             // Written in place: pushes would spill the registers.
             factors.resize(rows.len(), [Factors::new(s, &[T::from_f64(0.0); 4]); 3]);
             for (factors, row) in factors.iter_mut().zip(&rows) {
+                // `black_box` keeps LLVM from vectorising this loop with scatters, which take longer than all the rest.
+                let factors = std::hint::black_box(factors);
                 for k in 0..3 {
                     factors[k] = Factors::new(s, &row[k]);
                 }
@@ -158,13 +160,13 @@ impl<T: Precision> Factors<T> {
 #[inline(always)]
 fn add_outer_product<T: Precision>(sum: &mut Block<T>, a: &[Factors<T>; 3], b: &[Factors<T>; 3]) {
     // All products come before the first sum is written: the compiler cannot tell that A is apart from the factors.
-    let (mut eight, mut ninth) = ([T::from_f64(0.0); 8], T::from_f64(0.0));
-    for k in 0..3 {
-        for entry in 0..8 {
-            eight[entry] = eight[entry] + a[k].left[entry] * b[k].right[entry];
-        }
-        ninth = ninth + a[k].last[0] * b[k].last[1];
+    let product = |k: usize, entry: usize| a[k].left[entry] * b[k].right[entry];
+    let last = |k: usize| a[k].last[0] * b[k].last[1];
+    let mut eight = [T::from_f64(0.0); 8];
+    for entry in 0..8 {
+        eight[entry] = product(0, entry) + product(1, entry) + product(2, entry);
     }
+    let ninth = last(0) + last(1) + last(2);
     let sum = sum.as_flattened_mut();
     for entry in 0..8 {
         sum[entry] = sum[entry] + eight[entry];
