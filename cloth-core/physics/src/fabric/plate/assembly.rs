@@ -100,7 +100,7 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
             // Written in place: pushes would spill the registers.
             factors.resize(rows.len(), [Factors::new(s, &[T::from_f64(0.0); 4]); 3]);
             for (factors, row) in factors.iter_mut().zip(&rows) {
-                // `black_box` keeps LLVM from vectorising this loop with scatters, which take longer than all the rest.
+                // `black_box` keeps LLVM from vectorising this loop with scatters, which take longer than the rest.
                 let factors = std::hint::black_box(factors);
                 for k in 0..3 {
                     factors[k] = Factors::new(s, &row[k]);
