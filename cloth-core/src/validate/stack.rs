@@ -12,8 +12,8 @@
 //!
 //! 8 · 10/β″(½) · g/h² · (1 − s)(1/s − 1 − 2 ln s) = n · gravity.
 //!
-//! This holds for all grids, aligned or shifted. Each sheet is a little smaller than that below: without friction, edges
-//! exactly above edges roll off each other.
+//! This holds for all grids, aligned or shifted. Each sheet is a little smaller than that below: without friction,
+//! edges exactly above edges roll off each other.
 
 use super::contact::{GRAVITY, advance, contact_forces, simulation};
 use super::special::zero_between;
