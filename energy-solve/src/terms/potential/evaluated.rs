@@ -97,14 +97,13 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let projected = self.project::<L>(E::DECLARATION, &lanes, reduced.hessian.as_mut(), n, batch.points.as_ref());
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        let bits = (flagged, projected);
         L::F64::dispatch(Addition {
             to: self,
             lanes,
             value: result.value,
             gradient: &result.gradient,
             triangle: &mut result.hessian,
-            bits,
+            bits: (flagged, projected),
         });
     }
 }
