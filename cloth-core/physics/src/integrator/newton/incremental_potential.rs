@@ -47,6 +47,12 @@ impl<'a> IncrementalPotential<'a> {
 
     /// Evaluates E.
     pub(super) fn energy(&mut self, x: &[Vector3<f64>]) -> Result<Energy, EvaluationError> {
+        let without = self.energy_without_contact(x)?;
+        Ok(self.with_contact(without, x))
+    }
+
+    /// Evaluates E without contact: a lower bound, for contact only adds to it.
+    pub(super) fn energy_without_contact(&mut self, x: &[Vector3<f64>]) -> Result<Energy, EvaluationError> {
         let started = Instant::now();
         let (mut value, mut magnitude) = (0.0, 0.0);
         for &vertex in self.body.system.dofs().free() {
@@ -68,11 +74,16 @@ impl<'a> IncrementalPotential<'a> {
             value += self.dt.powi(3) * dissipation;
             magnitude += self.dt.powi(3) * dissipation.abs();
         }
-        let contact = self.contact_energy(x);
-        value += contact;
-        magnitude += contact;
         self.report.phases.line_search += started.elapsed();
         Ok(Energy { value, magnitude })
+    }
+
+    /// Adds contact to E without it. x must be certified.
+    pub(super) fn with_contact(&mut self, Energy { value, magnitude }: Energy, x: &[Vector3<f64>]) -> Energy {
+        let started = Instant::now();
+        let contact = self.contact_energy(x);
+        self.report.phases.line_search += started.elapsed();
+        Energy { value: value + contact, magnitude: magnitude + contact }
     }
 
     /// Assembles the Hessian M − h² ∂f/∂x − h ∂f/∂v and returns −∇E = M (x̂ − x) + h² f of the free vertices, both

@@ -93,11 +93,13 @@ impl IncrementalPotential<'_> {
     ) -> Result<AcceptedStep, EvaluationError> {
         while accepted.scale < LONGEST {
             let scale = 2.0 * accepted.scale;
-            if self.allowed(x, scale, direction) < scale {
+            let moved = self.moved(x, scale, &direction.vectors);
+            // A certificate costs more than an energy.
+            let without_contact = self.energy_without_contact(&moved)?;
+            if without_contact.value >= accepted.energy.value || self.certified(x, &moved) < 1.0 {
                 break;
             }
-            let moved = self.moved(x, scale, &direction.vectors);
-            let energy = self.energy(&moved)?;
+            let energy = self.with_contact(without_contact, &moved);
             if energy.value >= accepted.energy.value {
                 break;
             }
