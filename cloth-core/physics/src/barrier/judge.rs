@@ -3,23 +3,23 @@
 use energy_solve::threads::for_each;
 
 use super::spacing::Spacings;
-use crate::collision::{Clearance, CollisionMesh, Move, PART, Pair};
+use crate::collision::{Clearance, CollisionMesh, Move, Nearby, PART, Pair};
 
 /// Judges a move by the pairs near it.
 pub(super) struct Judge<'a> {
     pub mesh: &'a CollisionMesh,
     pub spacings: &'a Spacings,
     pub step: &'a Move<'a>,
-    /// The pairs, in order.
-    pub pairs: &'a [Pair],
-    /// A lower bound of the distance of each at the start of the move, in m.
-    pub separations: &'a [f64],
+    /// The pairs, measured at the start of the move.
+    pub nearby: &'a Nearby,
 }
 
 /// The result for a move.
 pub(super) struct Judgement {
     /// The part of the move during which all pairs certainly keep their clearance.
     pub part: f64,
+    /// The number of pairs.
+    pub pairs: u64,
     /// Pairs that were too close to be dismissed by a comparison of distances.
     pub tested: u64,
     /// The pairs that shorten the move.
@@ -29,9 +29,9 @@ pub(super) struct Judgement {
 impl Judge<'_> {
     /// Threads find the few pairs that are not safe at first sight. These shorten the move one after the other.
     pub fn judge(&self, threads: usize) -> Judgement {
-        let pairs = self.pairs;
+        let pairs = self.nearby.pairs();
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();
-        let mut judgement = Judgement { part: 1.0, tested: 0, blocking: Vec::new() };
+        let mut judgement = Judgement { part: 1.0, pairs: pairs.len() as u64, tested: 0, blocking: Vec::new() };
         let farthest = self.farthest();
         for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part, farthest)) {
             judgement.tested += tested;
@@ -51,7 +51,7 @@ impl Judge<'_> {
     /// among consecutive pairs from number `first` on.
     fn doubtful(&self, first: usize, pairs: &[Pair], farthest: f64) -> (u64, Vec<usize>) {
         let mut close = Vec::new();
-        for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.separations[first..])) {
+        for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.nearby.separations()[first..])) {
             if *separation > farthest {
                 continue;
             }
@@ -60,7 +60,7 @@ impl Judge<'_> {
                 close.push((number, clearance));
             }
         }
-        (close.len() as u64, self.step.doubtful(self.pairs, &close))
+        (close.len() as u64, self.step.doubtful(self.nearby.pairs(), &close))
     }
 
     /// Pairs beyond this distance certainly stay out of reach, in m.

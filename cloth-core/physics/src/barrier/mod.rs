@@ -44,7 +44,7 @@ pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
 pub use start::{ContactError, ObstacleStart, Participants};
 pub use untangle::Untangling;
 
-use crate::collision::{Closest, CollisionMesh, Move, Near, Neighbourhood, Pair, Search, Separations, swept};
+use crate::collision::{Closest, CollisionMesh, Move, Nearby, Neighbourhood, Pair, Search, excursions};
 use feasible::Meeting;
 use friction::Friction;
 use joined::Joined;
@@ -57,12 +57,9 @@ use spacing::{Spacing, Spacings};
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
 const JOINING: f64 = 1.25;
-/// Part of the displacement of the last move that left the neighbourhood, by which an iterate may stray before the next
+/// Part of the displacement of a move that leaves the neighbourhood, by which an iterate may stray before the next
 /// search.
 const STRAYING: f64 = 0.25;
-/// The longest move that a neighbourhood covers as a whole, over the largest distance that vertices may move before the
-/// next search. Longer moves have a search of their own, for balls around them would hold too many pairs.
-const LONG: f64 = 4.0;
 
 /// Contact of a body with itself and with obstacles.
 #[derive(Debug)]
@@ -79,8 +76,6 @@ pub struct BarrierContact {
     least_limit: f64,
     /// The pairs near the current iterate.
     neighbourhood: Neighbourhood,
-    /// The displacement of each vertex in the last move that left the neighbourhood, in m.
-    strides: Vec<f64>,
     joined: Joined,
     friction: Friction,
     /// Pairs that shortened a move since the last iterate.
@@ -115,15 +110,14 @@ impl BarrierContact {
             return;
         }
         let start = std::mem::take(&mut self.friction.start);
-        self.visit(&start);
+        let near = self.near(&start);
         let meeting = Meeting { mesh: &self.mesh, x: &start };
         let mut touching = Vec::new();
-        for &Near { number, closest } in self.neighbourhood.separations().near() {
-            let pair = &self.neighbourhood.pairs()[number];
-            let Spacing { thickness, gap } = self.spacing(pair);
+        for (pair, closest) in near {
+            let Spacing { thickness, gap } = self.spacing(&pair);
             let is_active = closest.distance - thickness < gap;
-            if is_active && meeting.may_join(pair, &closest) {
-                touching.push((*pair, self.law(pair, &closest), closest));
+            if is_active && meeting.may_join(&pair, &closest) {
+                touching.push((pair, self.law(&pair, &closest), closest));
             }
         }
         self.friction.start = start;
@@ -135,64 +129,62 @@ impl BarrierContact {
         Law::new(self.spacing(pair), self.resistance.of(pair, closest))
     }
 
+    /// Returns the pairs within reach at a place, in order.
+    fn near(&mut self, x: &[Vector3<f64>]) -> Vec<(Pair, Closest)> {
+        if !self.neighbourhood.knows(x) {
+            self.follow([x, x]);
+        }
+        self.neighbourhood.visit(&self.search, x);
+        let all = self.neighbourhood.nearby().within_reach().chain(self.neighbourhood.strays().within_reach());
+        let mut all: Vec<(Pair, Closest)> = all.map(|(pair, closest)| (*pair, *closest)).collect();
+        all.sort_by_key(|(pair, _)| *pair);
+        all.dedup_by_key(|(pair, _)| *pair);
+        all
+    }
+
     /// Makes all pairs near an iterate known, and measures them there.
     fn visit(&mut self, x: &[Vector3<f64>]) {
-        if !self.covers(x) {
-            let [least, most] = self.slack;
-            let radii = self.strides.iter().map(|stride| (least + STRAYING * stride).min(most)).collect();
-            self.neighbourhood.renew(&mut self.search, &self.mesh, x, x, radii);
-            self.counts.searches += 1;
+        if !self.neighbourhood.knows(x) {
+            self.follow([x, x]);
         }
+        self.neighbourhood.settle(&self.search, x);
         self.neighbourhood.visit(&self.search, x);
     }
 
-    /// Whether the neighbourhood covers x. It grows to do so if it lacks few vertices.
-    fn covers(&mut self, x: &[Vector3<f64>]) -> bool {
-        let (is_covered, searches) = self.neighbourhood.cover(&mut self.search, &self.mesh, x);
-        self.counts.searches += searches;
-        is_covered
-    }
-
-    /// Whether the neighbourhood covers a move. If it lacks many vertices, it is renewed, unless the move is long.
-    fn covers_move(&mut self, step: &Move<'_>) -> bool {
-        if self.covers(step.from()) && self.covers(step.to()) {
-            return true;
-        }
-        self.strides.copy_from_slice(step.excursions());
+    /// Makes all pairs near a move known. Returns whether there are new ones.
+    fn follow(&mut self, ends: [&[Vector3<f64>]; 2]) -> bool {
         let [least, most] = self.slack;
-        let mean = self.strides.iter().sum::<f64>() / self.strides.len() as f64;
-        if step.longest() > LONG * most || mean > most {
-            return false;
-        }
-        let radii = self.strides.iter().map(|stride| least + (0.5 + STRAYING) * stride).collect();
-        self.neighbourhood.renew(&mut self.search, &self.mesh, step.from(), &step.after(0.5), radii);
-        self.counts.searches += 1;
-        true
+        let radius = |stride: f64| (least + STRAYING * stride).min(most);
+        let radii = || excursions(ends[0], ends[1]).into_iter().map(radius).collect();
+        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, ends, radii);
+        self.counts.searches += u64::from(is_new);
+        is_new
     }
 
     /// Returns the part of a move that certainly has no crossing.
     fn safe_part(&mut self, step: &Move<'_>) -> f64 {
-        let (count, judgement) = if self.covers_move(step) {
-            self.neighbourhood.visit(&self.search, step.from());
-            let pairs = self.neighbourhood.pairs();
-            (pairs.len(), self.judge(step, pairs, self.neighbourhood.separations()))
-        } else {
-            self.counts.searches += 1;
-            let pairs = self.search.pairs(&self.mesh, swept(step.from(), step.to()));
-            let mut separations = Separations::default();
-            separations.measure(&pairs, step.from(), self.search.halves(), self.search.threads);
-            (pairs.len(), self.judge(step, &pairs, &separations))
-        };
-        let Judgement { part, tested, blocking } = judgement;
+        let strays = self.follow([step.from(), step.to()]);
+        self.neighbourhood.visit(&self.search, step.from());
+        let near = self.judge(step, self.neighbourhood.nearby());
+        let part = self.note(near);
+        if !strays {
+            return part;
+        }
+        let far = self.judge(step, self.neighbourhood.strays());
+        part.min(self.note(far))
+    }
+
+    /// Notes a judgement, and returns the safe part of the move.
+    fn note(&mut self, Judgement { part, pairs, tested, blocking }: Judgement) -> f64 {
         self.blocking.extend(blocking);
-        self.counts.candidates += count as u64;
+        self.counts.candidates += pairs;
         self.counts.tested += tested;
         part
     }
 
     /// Judges a move by some pairs, measured at its start.
-    fn judge(&self, step: &Move<'_>, pairs: &[Pair], separations: &Separations) -> Judgement {
-        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, pairs, separations: separations.all() };
+    fn judge(&self, step: &Move<'_>, nearby: &Nearby) -> Judgement {
+        let judge = Judge { mesh: &self.mesh, spacings: &self.spacings, step, nearby };
         judge.judge(self.search.threads)
     }
 }
@@ -213,7 +205,6 @@ impl ContactModel for BarrierContact {
         self.blocking.clear();
         // A run that resumes from a checkpoint must find the same pairs in the same order.
         self.neighbourhood.clear();
-        self.strides.fill(0.0);
     }
 
     fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
@@ -252,8 +243,7 @@ impl ContactModel for BarrierContact {
         let mut known = self.joined.pairs.iter().peekable();
         let meeting = Meeting { mesh: &self.mesh, x };
         let mut added = Vec::new();
-        for Near { number, closest } in self.neighbourhood.separations().near() {
-            let pair = &self.neighbourhood.pairs()[*number];
+        for (pair, closest) in self.neighbourhood.nearby().within_reach() {
             if closest.separation > self.spacings.joining(&self.mesh, pair) {
                 continue;
             }

@@ -6,7 +6,7 @@ use energy_solve::ContactCounts;
 use super::spacing::{Skin, Spacings};
 use super::{BarrierContact, Friction, Joined, Resistance};
 use crate::collision::{
-    CollisionMesh, Crossing, Exclusions, Near, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
+    CollisionMesh, Crossing, Exclusions, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
 };
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
@@ -156,7 +156,6 @@ impl BarrierContact {
             least_limit: EDGES * mesh.mean_edge(x),
             search: Search::new(&mesh, x, rules),
             neighbourhood: Neighbourhood::default(),
-            strides: vec![0.0; x.len()],
             joined: Joined::default(),
             friction: Friction::default(),
             blocking: Vec::new(),
@@ -173,8 +172,7 @@ impl BarrierContact {
     fn fit_skins(&mut self, obstacles: &[ObstacleStart], x: &[Vector3<f64>]) -> Result<(), ContactError> {
         self.visit(x);
         let mut nearest: Vec<Option<(f64, Pair)>> = vec![None; obstacles.len()];
-        for Near { number, closest } in self.neighbourhood.separations().near() {
-            let pair = &self.neighbourhood.pairs()[*number];
+        for (pair, closest) in self.neighbourhood.nearby().within_reach() {
             let Some(obstacle) = self.mesh.obstacle_of(pair) else { continue };
             let distance = closest.distance - obstacles[obstacle].radius;
             if nearest[obstacle].is_none_or(|(known, _)| distance < known) {
@@ -198,9 +196,8 @@ impl BarrierContact {
 
     fn check_distances(&mut self, x: &[Vector3<f64>]) -> Result<(), ContactError> {
         self.visit(x);
-        let all = self.neighbourhood.separations().near().iter();
-        let all = all.map(|near| (near.closest.distance, &self.neighbourhood.pairs()[near.number]));
-        let all = all.map(|(distance, pair)| (distance, self.spacing(pair).thickness, pair));
+        let all = self.neighbourhood.nearby().within_reach();
+        let all = all.map(|(pair, closest)| (closest.distance, self.spacing(pair).thickness, pair));
         let close: Vec<_> = all.filter(|(distance, thickness, _)| distance <= thickness).collect();
         let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         closest.map_or(Ok(()), |&(distance, thickness, pair)| {

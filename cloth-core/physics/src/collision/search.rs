@@ -14,6 +14,8 @@ const FEW: usize = 1000;
 pub struct Search {
     own: Trees,
     obstacles: Trees,
+    /// Whether the hierarchies of cloth and hair fit the regions of the last search. Those for obstacles always do.
+    is_own_fitted: bool,
     rules: Rules,
     /// The largest number of threads.
     pub threads: usize,
@@ -80,6 +82,12 @@ impl Trees {
         self.triangles.refit(triangles);
         self.edges.refit(edges);
     }
+
+    fn refit_some(&mut self, [points, triangles, edges]: [Vec<(usize, Bounds)>; 3]) {
+        self.points.refit_some(&points);
+        self.triangles.refit_some(&triangles);
+        self.edges.refit_some(&edges);
+    }
 }
 
 /// Features by their places in the mesh's lists, as pairs are ordered.
@@ -122,7 +130,7 @@ impl Search {
         let boxes = Boxes::new(mesh, x.iter().map(|x| Bounds::of(&[*x])).collect(), &rules.halves);
         let first = mesh.own_features();
         let [own, obstacles] = boxes.split(first);
-        Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), rules, threads: 1 }
+        Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), is_own_fitted: true, rules, threads: 1 }
     }
 
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
@@ -148,6 +156,7 @@ impl Search {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         let [own_boxes, obstacle_boxes] = boxes.split(self.obstacles.first);
         self.obstacles.refit(obstacle_boxes);
+        self.is_own_fitted = self.rules.with_itself;
         let mut found = Found::default();
         if self.rules.with_itself {
             self.own.refit(own_boxes);
@@ -200,33 +209,63 @@ impl Search {
         }
     }
 
-    /// Those of [`Search::pairs`] that have a changed vertex.
-    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: Vec<Bounds>) -> Vec<Pair> {
-        let boxes = self.refit(mesh, regions);
-        let mut found = Found::default();
-        let changed = |vertices: &[u32]| vertices.iter().any(|vertex| is_changed[*vertex as usize]);
-        for (point, around) in boxes.points.iter().enumerate().filter(|(point, _)| changed(&[mesh.points()[*point]])) {
-            for trees in self.partners(mesh, mesh.points()[point]) {
+    /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
+    /// and others whose boxes meet. The regions of the other vertices lie in those of the last search.
+    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[Bounds]) -> Vec<Pair> {
+        let changed = self.changed(is_changed, mesh, regions);
+        self.refit_changed(mesh, &changed, regions);
+        let (mut found, [points, triangles, edges]) = (Found::default(), &changed);
+        for (point, around) in points {
+            for trees in self.partners(mesh, mesh.points()[*point]) {
                 trees.triangles.near(around, |triangle| {
-                    self.add_point_and_triangle(mesh, point, trees.first[1] + triangle, &mut found);
+                    self.add_point_and_triangle(mesh, *point, trees.first[1] + triangle, &mut found);
                 });
             }
         }
-        let triangles = mesh.triangles().iter().zip(&boxes.triangles).enumerate();
-        for (triangle, (corners, around)) in triangles.filter(|(_, (corners, _))| changed(*corners)) {
-            for trees in self.partners(mesh, corners[0]) {
+        for (triangle, around) in triangles {
+            for trees in self.partners(mesh, mesh.triangles()[*triangle][0]) {
                 trees.points.near(around, |point| {
-                    self.add_point_and_triangle(mesh, trees.first[0] + point, triangle, &mut found);
+                    self.add_point_and_triangle(mesh, trees.first[0] + point, *triangle, &mut found);
                 });
             }
         }
-        let edges = mesh.edges().iter().zip(&boxes.edges).enumerate();
-        for (edge, (ends, around)) in edges.filter(|(_, (ends, _))| changed(*ends)) {
-            for trees in self.partners(mesh, ends[0]) {
-                trees.edges.near(around, |other| self.add_edges(mesh, edge, trees.first[2] + other, &mut found));
+        for (edge, around) in edges {
+            for trees in self.partners(mesh, mesh.edges()[*edge][0]) {
+                trees.edges.near(around, |other| self.add_edges(mesh, *edge, trees.first[2] + other, &mut found));
             }
         }
         in_order(mesh, found)
+    }
+
+    /// Returns the points, triangles and edges with a changed vertex, each with the box around the regions of its
+    /// vertices.
+    fn changed(&self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[Bounds]) -> [Vec<(usize, Bounds)>; 3] {
+        let around = |vertices: &[u32]| -> Option<Bounds> {
+            let is_changed = vertices.iter().any(|vertex| is_changed[*vertex as usize]);
+            let region = |vertex: &u32| regions[*vertex as usize].extended(self.rules.halves[*vertex as usize]);
+            is_changed.then(|| vertices.iter().map(region).fold(Bounds::EMPTY, Bounds::around))
+        };
+        let numbered = |(number, vertices): (usize, &[u32])| Some((number, around(vertices)?));
+        [
+            mesh.points().chunks(1).enumerate().filter_map(numbered).collect(),
+            mesh.triangles().iter().map(|corners| &corners[..]).enumerate().filter_map(numbered).collect(),
+            mesh.edges().iter().map(|ends| &ends[..]).enumerate().filter_map(numbered).collect(),
+        ]
+    }
+
+    /// Adapts the hierarchies to the boxes of changed features, which are in order.
+    fn refit_changed(&mut self, mesh: &CollisionMesh, changed: &[Vec<(usize, Bounds)>; 3], regions: &[Bounds]) {
+        let first = self.obstacles.first;
+        let split: [_; 3] = std::array::from_fn(|kind| {
+            changed[kind].split_at(changed[kind].partition_point(|(number, _)| *number < first[kind]))
+        });
+        if split.iter().any(|(_, others)| !others.is_empty()) && !self.is_own_fitted {
+            self.own.refit(Boxes::new(mesh, regions.to_vec(), &self.rules.halves).split(first)[0]);
+            self.is_own_fitted = true;
+        }
+        self.own.refit_some(split.map(|(own, _)| own.to_vec()));
+        let shifted = |kind: usize| split[kind].1.iter().map(|(number, around)| (number - first[kind], *around)).collect();
+        self.obstacles.refit_some([shifted(0), shifted(1), shifted(2)]);
     }
 
     /// The features with which those at a vertex may collide.
@@ -234,14 +273,6 @@ impl Search {
         let is_own = mesh.obstacle(vertex).is_none();
         let itself = (!is_own || self.rules.with_itself).then_some(&self.own);
         itself.into_iter().chain(is_own.then_some(&self.obstacles))
-    }
-
-    fn refit(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>) -> Boxes {
-        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
-        let [own, obstacles] = boxes.split(self.obstacles.first);
-        self.own.refit(own);
-        self.obstacles.refit(obstacles);
-        boxes
     }
 
     /// Adds a point and a triangle if they can collide.

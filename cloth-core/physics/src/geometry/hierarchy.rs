@@ -15,6 +15,8 @@ pub struct Hierarchy {
     pub(super) boxes: Vec<Bounds>,
     /// The same boxes, for comparisons in lanes.
     pub(super) rounded: RoundedBoxes,
+    /// The place of each item in `items`.
+    places: Vec<usize>,
 }
 
 /// A node of the tree. Its first child is the next node.
@@ -43,8 +45,10 @@ impl Hierarchy {
     /// Builds the tree over the boxes of items 0, 1, ….
     pub fn new(bounds: &[Bounds]) -> Self {
         let items = (0..bounds.len()).collect();
-        let mut tree = Self { nodes: Vec::new(), items, boxes: Vec::new(), rounded: RoundedBoxes::default() };
+        let places = vec![0; bounds.len()];
+        let mut tree = Self { nodes: Vec::new(), items, boxes: Vec::new(), rounded: RoundedBoxes::default(), places };
         tree.build(bounds, 0, bounds.len());
+        tree.items.iter().enumerate().for_each(|(place, &item)| tree.places[item] = place);
         tree.boxes = tree.items.iter().map(|&item| bounds[item]).collect();
         tree.rounded.set(&tree.boxes);
         tree
@@ -83,6 +87,36 @@ impl Hierarchy {
                 Some(second) => self.nodes[number + 1].bounds.around(self.nodes[second].bounds),
             };
         }
+    }
+
+    /// Adapts the tree to new boxes of some items.
+    pub fn refit_some(&mut self, changed: &[(usize, Bounds)]) {
+        let mut places = Vec::with_capacity(changed.len());
+        for (item, bounds) in changed {
+            let place = self.places[*item];
+            self.boxes[place] = *bounds;
+            self.rounded.replace(place, bounds);
+            places.push(place);
+        }
+        places.sort_unstable();
+        self.refit_places(0, &places);
+    }
+
+    /// Adapts a node to the new boxes at some places in it, in order.
+    fn refit_places(&mut self, number: usize, places: &[usize]) {
+        if places.is_empty() {
+            return;
+        }
+        let Node { from, to, second, .. } = self.nodes[number];
+        self.nodes[number].bounds = match second {
+            None => self.boxes[from..to].iter().copied().fold(Bounds::EMPTY, Bounds::around),
+            Some(second) => {
+                let (before, after) = places.split_at(places.partition_point(|place| *place < self.nodes[second].from));
+                self.refit_places(number + 1, before);
+                self.refit_places(second, after);
+                self.nodes[number + 1].bounds.around(self.nodes[second].bounds)
+            }
+        };
     }
 
     /// Calls `found` with each item whose box overlaps a box, in tree order.

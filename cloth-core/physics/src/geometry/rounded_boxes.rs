@@ -27,6 +27,14 @@ impl RoundedBoxes {
         }
     }
 
+    /// Takes one new box.
+    pub fn replace(&mut self, number: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            self.low[axis][number] = below(bounds.low[axis]);
+            self.high[axis][number] = -below(-bounds.high[axis]);
+        }
+    }
+
     /// Calls `found` with each box, of those from one number to another, that overlaps a box of another set.
     #[inline(always)]
     pub fn overlapping<L: Level>(
