@@ -5,9 +5,7 @@ use energy_solve::ContactCounts;
 
 use super::spacing::{Skin, Spacings};
 use super::{BarrierContact, Friction, Joined, Resistance};
-use crate::collision::{
-    CollisionMesh, Crossing, Exclusions, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
-};
+use crate::collision::{CollisionMesh, Crossing, Exclusions, Neighbourhood, Pair, PairKind, Rules, Search, crossings};
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
 pub(super) const SKIN: f64 = 1.0 / 3.0;

@@ -2,7 +2,7 @@ use energy_dsl::Vector3;
 
 use super::displacement::mean;
 use super::{CollisionMesh, Nearby, Search};
-use crate::geometry::{Bounds, norm, subtract};
+use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current
 /// iterate.
@@ -18,14 +18,17 @@ pub struct Neighbourhood {
     radii: Vec<f64>,
     nearby: Nearby,
     strays: Strays,
+    /// Whether searches are fitted to all balls. They need not be before the first vertices leave them.
+    is_fitted: bool,
 }
 
 /// The vertices that left their balls on the last such move, and their pairs.
 #[derive(Clone, Debug, Default)]
 struct Strays {
-    /// The box around the path of each stray vertex, relative to the mean of all vertices; empty for the others.
-    paths: Vec<Bounds>,
-    /// Distance from their paths that was searched, in m. The radii of new balls.
+    /// All vertices at the start and at the end of the move, relative to their mean. Empty before the first such move.
+    ends: [Vec<Vector3<f64>>; 2],
+    is_stray: Vec<bool>,
+    /// The distance from their paths that was searched, in m. The radii of new balls.
     radii: Vec<f64>,
     nearby: Nearby,
 }
@@ -33,7 +36,7 @@ struct Strays {
 /// The largest part of all vertices whose pairs are searched for alone. If more leave their balls, a search for all
 /// pairs costs less.
 const FEW: f64 = 0.2;
-/// Bound of the distance of a vertex from its path by rounding, relative to the distance that is searched.
+/// Bound of the distance by which rounding takes a vertex off its path, relative to the distance that is searched.
 const ROUNDING: f64 = 1e-6;
 
 impl Neighbourhood {
@@ -69,41 +72,55 @@ impl Neighbourhood {
     ) -> bool {
         // Balls are convex: if they cover both ends of a straight move, they cover the whole move.
         let [from, to] = ends.map(|x| self.lacks(x));
-        let is_stray: Vec<bool> = from.iter().zip(to).map(|(from, to)| from | to).collect();
+        let mut is_stray: Vec<bool> = from.iter().zip(to).map(|(from, to)| from | to).collect();
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
             return false;
         }
         let radii = radii();
-        let means = ends.map(mean);
-        let path = |vertex: usize| Bounds::of(&[0, 1].map(|end| subtract(ends[end][vertex], means[end])));
+        let ends = ends.map(relative);
+        let path =
+            |vertex: usize| MovingBounds([0, 1].map(|end| Bounds::of(&[ends[end][vertex]]).extended(radii[vertex])));
         let vertices = 0..is_stray.len();
-        if count as f64 > FEW * vertices.len() as f64 {
+        let pairs = if count as f64 > FEW * vertices.len() as f64 {
             self.clear();
-            let paths: Vec<Bounds> = vertices.map(path).collect();
-            let regions = paths.iter().zip(&radii).map(|(path, radius)| path.extended(*radius)).collect();
-            self.strays = Strays { paths, radii, nearby: Nearby::new(search.pairs(mesh, regions)) };
+            is_stray.fill(true);
+            search.pairs(mesh, vertices.map(path).collect())
         } else {
-            let (mut paths, mut regions) = (vec![Bounds::EMPTY; vertices.len()], self.balls());
-            for vertex in vertices.filter(|&vertex| is_stray[vertex]) {
-                paths[vertex] = path(vertex);
-                regions[vertex] = regions[vertex].around(paths[vertex].extended(radii[vertex]));
+            if !std::mem::replace(&mut self.is_fitted, true) {
+                search.fit(mesh, self.balls());
             }
-            self.strays = Strays { paths, radii, nearby: Nearby::new(search.pairs_with(&is_stray, mesh, &regions)) };
-        }
+            let mut regions = self.balls();
+            for vertex in vertices.filter(|&vertex| is_stray[vertex]) {
+                // The region must cover the old ball and the new one, wherever on the path that will be.
+                let [start, end] = path(vertex).0;
+                regions[vertex] = MovingBounds::fixed(regions[vertex].0[0].around(start).around(end));
+            }
+            search.pairs_with(&is_stray, mesh, &regions)
+        };
+        self.strays = Strays { ends, is_stray, radii, nearby: Nearby::new(pairs) };
         true
     }
 
-    /// Whether all pairs near x are known: each vertex is in its ball, or on its path on the last move that left balls.
+    /// Whether all pairs near x are known: each vertex is in its ball or a stray, and all strays are at one instant of
+    /// the move.
     pub fn knows(&self, x: &[Vector3<f64>]) -> bool {
-        let (lacks, mean) = (self.lacks(x), mean(x));
-        let Strays { paths, radii, .. } = &self.strays;
-        // Rounding takes points off their paths.
-        let is_on_path = |vertex: usize| {
-            let square = paths[vertex].distance_squared(subtract(x[vertex], mean));
-            square <= (ROUNDING * radii[vertex]).powi(2)
-        };
-        (0..x.len()).all(|vertex| !lacks[vertex] || !paths.is_empty() && is_on_path(vertex))
+        let Strays { ends: [start, end], is_stray, radii, .. } = &self.strays;
+        let lacking: Vec<usize> =
+            (0..).zip(self.lacks(x)).filter(|(_, lacks)| *lacks).map(|(vertex, _)| vertex).collect();
+        if lacking.is_empty() || start.is_empty() {
+            return lacking.is_empty();
+        }
+        let (x, path) = (relative(x), |vertex: usize| subtract(end[vertex], start[vertex]));
+        let farthest = lacking.iter().copied().max_by(|a, b| norm(path(*a)).total_cmp(&norm(path(*b))));
+        let part = farthest.map_or(0.0, |vertex| {
+            let (path, gone) = (path(vertex), subtract(x[vertex], start[vertex]));
+            if path == [0.0; 3] { 0.0 } else { (dot(gone, path) / dot(path, path)).clamp(0.0, 1.0) }
+        });
+        lacking.iter().all(|&vertex| {
+            let away = norm(subtract(x[vertex], add_scaled(start[vertex], part, path(vertex))));
+            is_stray[vertex] && away <= ROUNDING * radii[vertex]
+        })
     }
 
     /// Puts new balls around the vertices that are outside of theirs at x, a place whose pairs are known.
@@ -112,15 +129,13 @@ impl Neighbourhood {
         if !lacks.contains(&true) {
             return;
         }
-        let mean = mean(x);
+        let Strays { radii, nearby: mut found, .. } = std::mem::take(&mut self.strays);
         self.centres.resize(x.len(), [0.0; 3]);
         self.radii.resize(x.len(), 0.0);
-        for vertex in (0..x.len()).filter(|&vertex| lacks[vertex]) {
-            self.centres[vertex] = subtract(x[vertex], mean);
-            self.radii[vertex] = self.strays.radii[vertex];
+        for (vertex, centre) in relative(x).into_iter().enumerate().filter(|(vertex, _)| lacks[*vertex]) {
+            (self.centres[vertex], self.radii[vertex]) = (centre, radii[vertex]);
         }
         let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
-        let Strays { nearby: mut found, .. } = std::mem::take(&mut self.strays);
         found.keep_near(search, x, &farthest);
         self.nearby = found.joined_with(std::mem::take(&mut self.nearby));
     }
@@ -139,8 +154,14 @@ impl Neighbourhood {
         x.iter().zip(&self.centres).map(|(x, centre)| norm(subtract(subtract(*x, mean), *centre))).collect()
     }
 
-    fn balls(&self) -> Vec<Bounds> {
+    fn balls(&self) -> Vec<MovingBounds> {
         let ball = |(centre, radius): (&Vector3<f64>, &f64)| Bounds::of(&[*centre]).extended(*radius);
-        self.centres.iter().zip(&self.radii).map(ball).collect()
+        self.centres.iter().zip(&self.radii).map(ball).map(MovingBounds::fixed).collect()
     }
+}
+
+/// Returns positions relative to their mean.
+fn relative(x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mean = mean(x);
+    x.iter().map(|x| subtract(*x, mean)).collect()
 }

@@ -4,7 +4,7 @@ use energy_solve::threads::for_each;
 
 use super::mesh::CollisionMesh;
 use super::{Exclusions, Pair, PairKind};
-use crate::geometry::{Bounds, Branches, Hierarchy};
+use crate::geometry::{Bounds, Branches, Hierarchy, MovingBounds, Volume};
 
 /// A mesh with fewer vertices is searched on one thread.
 const FEW: usize = 1000;
@@ -37,24 +37,25 @@ pub struct Rules {
 /// Hierarchies of the points, triangles and edges from certain places in the mesh's lists on.
 #[derive(Clone, Debug)]
 struct Trees {
-    points: Hierarchy,
-    triangles: Hierarchy,
-    edges: Hierarchy,
+    points: Hierarchy<MovingBounds>,
+    triangles: Hierarchy<MovingBounds>,
+    edges: Hierarchy<MovingBounds>,
     first: [usize; 3],
 }
 
 /// The boxes around the regions of all features, extended by half the reach.
 struct Boxes {
-    points: Vec<Bounds>,
-    triangles: Vec<Bounds>,
-    edges: Vec<Bounds>,
+    points: Vec<MovingBounds>,
+    triangles: Vec<MovingBounds>,
+    edges: Vec<MovingBounds>,
 }
 
 impl Boxes {
-    fn new(mesh: &CollisionMesh, mut regions: Vec<Bounds>, halves: &[f64]) -> Self {
+    fn new(mesh: &CollisionMesh, mut regions: Vec<MovingBounds>, halves: &[f64]) -> Self {
         regions.iter_mut().zip(halves).for_each(|(region, half)| *region = region.extended(*half));
-        let around =
-            |vertices: &[u32]| vertices.iter().fold(Bounds::EMPTY, |all, &vertex| all.around(regions[vertex as usize]));
+        let around = |vertices: &[u32]| {
+            vertices.iter().fold(MovingBounds::empty(), |all, &vertex| all.joined(regions[vertex as usize]))
+        };
         Self {
             points: mesh.points().iter().map(|&point| regions[point as usize]).collect(),
             triangles: mesh.triangles().iter().map(|corners| around(corners)).collect(),
@@ -63,7 +64,7 @@ impl Boxes {
     }
 
     /// Splits the boxes into those of cloth and hair, and those of obstacles.
-    fn split(&self, [points, triangles, edges]: [usize; 3]) -> [[&[Bounds]; 3]; 2] {
+    fn split(&self, [points, triangles, edges]: [usize; 3]) -> [[&[MovingBounds]; 3]; 2] {
         let (own_points, other_points) = self.points.split_at(points);
         let (own_triangles, other_triangles) = self.triangles.split_at(triangles);
         let (own_edges, other_edges) = self.edges.split_at(edges);
@@ -72,18 +73,18 @@ impl Boxes {
 }
 
 impl Trees {
-    fn new(boxes: [&[Bounds]; 3], first: [usize; 3]) -> Self {
+    fn new(boxes: [&[MovingBounds]; 3], first: [usize; 3]) -> Self {
         let [points, triangles, edges] = boxes.map(Hierarchy::new);
         Self { points, triangles, edges, first }
     }
 
-    fn refit(&mut self, [points, triangles, edges]: [&[Bounds]; 3]) {
+    fn refit(&mut self, [points, triangles, edges]: [&[MovingBounds]; 3]) {
         self.points.refit(points);
         self.triangles.refit(triangles);
         self.edges.refit(edges);
     }
 
-    fn refit_some(&mut self, [points, triangles, edges]: [Vec<(usize, Bounds)>; 3]) {
+    fn refit_some(&mut self, [points, triangles, edges]: [Vec<(usize, MovingBounds)>; 3]) {
         self.points.refit_some(&points);
         self.triangles.refit_some(&triangles);
         self.edges.refit_some(&edges);
@@ -127,10 +128,16 @@ const TASKS: [Task; 5] = [
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let boxes = Boxes::new(mesh, x.iter().map(|x| Bounds::of(&[*x])).collect(), &rules.halves);
+        let boxes = Boxes::new(mesh, x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect(), &rules.halves);
         let first = mesh.own_features();
         let [own, obstacles] = boxes.split(first);
-        Self { own: Trees::new(own, [0; 3]), obstacles: Trees::new(obstacles, first), is_own_fitted: true, rules, threads: 1 }
+        Self {
+            own: Trees::new(own, [0; 3]),
+            obstacles: Trees::new(obstacles, first),
+            is_own_fitted: true,
+            rules,
+            threads: 1,
+        }
     }
 
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
@@ -152,7 +159,7 @@ impl Search {
 
     /// Returns all pairs that can come within their reach while each vertex stays in its region, and others whose boxes
     /// meet. Pairs are in order.
-    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<Bounds>) -> Vec<Pair> {
+    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         let [own_boxes, obstacle_boxes] = boxes.split(self.obstacles.first);
         self.obstacles.refit(obstacle_boxes);
@@ -196,7 +203,7 @@ impl Search {
     }
 
     /// Finds pairs with obstacles, without the hierarchies of cloth and hair: most features are near no obstacle.
-    fn find_near_obstacles(&self, mesh: &CollisionMesh, own: [&[Bounds]; 3], found: &mut Found) {
+    fn find_near_obstacles(&self, mesh: &CollisionMesh, own: [&[MovingBounds]; 3], found: &mut Found) {
         let Trees { points, triangles, edges, first } = &self.obstacles;
         for (point, around) in own[0].iter().enumerate() {
             triangles.near(around, |triangle| self.add_point_and_triangle(mesh, point, first[1] + triangle, found));
@@ -209,9 +216,18 @@ impl Search {
         }
     }
 
+    /// Adapts to regions without a search.
+    pub fn fit(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) {
+        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
+        let [own, obstacles] = boxes.split(self.obstacles.first);
+        self.own.refit(own);
+        self.obstacles.refit(obstacles);
+        self.is_own_fitted = true;
+    }
+
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
-    /// and others whose boxes meet. The regions of the other vertices lie in those of the last search.
-    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[Bounds]) -> Vec<Pair> {
+    /// and others whose boxes meet. The regions of the other vertices lie in those of the last call.
+    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
         let changed = self.changed(is_changed, mesh, regions);
         self.refit_changed(mesh, &changed, regions);
         let (mut found, [points, triangles, edges]) = (Found::default(), &changed);
@@ -239,11 +255,16 @@ impl Search {
 
     /// Returns the points, triangles and edges with a changed vertex, each with the box around the regions of its
     /// vertices.
-    fn changed(&self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[Bounds]) -> [Vec<(usize, Bounds)>; 3] {
-        let around = |vertices: &[u32]| -> Option<Bounds> {
+    fn changed(
+        &self,
+        is_changed: &[bool],
+        mesh: &CollisionMesh,
+        regions: &[MovingBounds],
+    ) -> [Vec<(usize, MovingBounds)>; 3] {
+        let around = |vertices: &[u32]| -> Option<MovingBounds> {
             let is_changed = vertices.iter().any(|vertex| is_changed[*vertex as usize]);
             let region = |vertex: &u32| regions[*vertex as usize].extended(self.rules.halves[*vertex as usize]);
-            is_changed.then(|| vertices.iter().map(region).fold(Bounds::EMPTY, Bounds::around))
+            is_changed.then(|| vertices.iter().map(region).fold(MovingBounds::empty(), MovingBounds::joined))
         };
         let numbered = |(number, vertices): (usize, &[u32])| Some((number, around(vertices)?));
         [
@@ -254,7 +275,12 @@ impl Search {
     }
 
     /// Adapts the hierarchies to the boxes of changed features, which are in order.
-    fn refit_changed(&mut self, mesh: &CollisionMesh, changed: &[Vec<(usize, Bounds)>; 3], regions: &[Bounds]) {
+    fn refit_changed(
+        &mut self,
+        mesh: &CollisionMesh,
+        changed: &[Vec<(usize, MovingBounds)>; 3],
+        regions: &[MovingBounds],
+    ) {
         let first = self.obstacles.first;
         let split: [_; 3] = std::array::from_fn(|kind| {
             changed[kind].split_at(changed[kind].partition_point(|(number, _)| *number < first[kind]))
@@ -264,7 +290,8 @@ impl Search {
             self.is_own_fitted = true;
         }
         self.own.refit_some(split.map(|(own, _)| own.to_vec()));
-        let shifted = |kind: usize| split[kind].1.iter().map(|(number, around)| (number - first[kind], *around)).collect();
+        let shifted =
+            |kind: usize| split[kind].1.iter().map(|(number, around)| (number - first[kind], *around)).collect();
         self.obstacles.refit_some([shifted(0), shifted(1), shifted(2)]);
     }
 

@@ -2,17 +2,17 @@
 
 use energy_dsl::Vector3;
 
-use super::Bounds;
 use super::rounded_boxes::RoundedBoxes;
+use super::{Bounds, Volume};
 
 /// A binary tree of boxes, split at the median along the longest axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Hierarchy {
-    pub(super) nodes: Vec<Node>,
+pub struct Hierarchy<B = Bounds> {
+    pub(super) nodes: Vec<Node<B>>,
     /// Items, in the order of the leaves.
     pub(super) items: Vec<usize>,
     /// The boxes of `items`, in the same order: leaves find theirs side by side.
-    pub(super) boxes: Vec<Bounds>,
+    pub(super) boxes: Vec<B>,
     /// The same boxes, for comparisons in lanes.
     pub(super) rounded: RoundedBoxes,
     /// The place of each item in `items`.
@@ -21,8 +21,8 @@ pub struct Hierarchy {
 
 /// A node of the tree. Its first child is the next node.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Node {
-    pub bounds: Bounds,
+pub(super) struct Node<B> {
+    pub bounds: B,
     /// The range of `items` in this node.
     pub from: usize,
     pub to: usize,
@@ -30,7 +30,7 @@ pub(super) struct Node {
     second: Option<usize>,
 }
 
-impl Node {
+impl<B> Node<B> {
     /// The index of the second child, if the node has more than this many items.
     #[inline]
     pub fn branches(&self, more_than: usize) -> Option<usize> {
@@ -41,9 +41,9 @@ impl Node {
 /// The largest number of items in a leaf.
 const LEAF: usize = 4;
 
-impl Hierarchy {
+impl<B: Volume> Hierarchy<B> {
     /// Builds the tree over the boxes of items 0, 1, ….
-    pub fn new(bounds: &[Bounds]) -> Self {
+    pub fn new(bounds: &[B]) -> Self {
         let items = (0..bounds.len()).collect();
         let places = vec![0; bounds.len()];
         let mut tree = Self { nodes: Vec::new(), items, boxes: Vec::new(), rounded: RoundedBoxes::default(), places };
@@ -54,18 +54,19 @@ impl Hierarchy {
         tree
     }
 
-    fn build(&mut self, bounds: &[Bounds], from: usize, to: usize) {
+    fn build(&mut self, bounds: &[B], from: usize, to: usize) {
         let all = self.items[from..to].iter().map(|&item| bounds[item]);
-        let around = all.fold(Bounds::EMPTY, Bounds::around);
+        let around = all.fold(B::empty(), B::joined);
         let node = self.nodes.len();
         self.nodes.push(Node { bounds: around, from, to, second: None });
         if to - from <= LEAF {
             return;
         }
-        let length = |axis: &usize| around.high[*axis] - around.low[*axis];
+        let length = |axis: &usize| around.at(0).high[*axis] - around.at(0).low[*axis];
         let axis = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
         let half = (to - from) / 2;
-        let order = |a: &usize, b: &usize| bounds[*a].middle(axis).total_cmp(&bounds[*b].middle(axis)).then(a.cmp(b));
+        let middle = |item: &usize| bounds[*item].at(0).middle(axis);
+        let order = |a: &usize, b: &usize| middle(a).total_cmp(&middle(b)).then(a.cmp(b));
         self.items[from..to].select_nth_unstable_by(half, order);
         self.build(bounds, from, from + half);
         self.nodes[node].second = Some(self.nodes.len());
@@ -74,7 +75,7 @@ impl Hierarchy {
 
     /// Adapts the boxes of the tree to new boxes of the items, and keeps its structure. Queries stay exact. They become
     /// slow if items move far relative to each other.
-    pub fn refit(&mut self, bounds: &[Bounds]) {
+    pub fn refit(&mut self, bounds: &[B]) {
         for (own, &item) in self.boxes.iter_mut().zip(&self.items) {
             *own = bounds[item];
         }
@@ -83,14 +84,14 @@ impl Hierarchy {
         for number in (0..self.nodes.len()).rev() {
             let Node { from, to, second, .. } = self.nodes[number];
             self.nodes[number].bounds = match second {
-                None => self.boxes[from..to].iter().copied().fold(Bounds::EMPTY, Bounds::around),
-                Some(second) => self.nodes[number + 1].bounds.around(self.nodes[second].bounds),
+                None => self.boxes[from..to].iter().copied().fold(B::empty(), B::joined),
+                Some(second) => self.nodes[number + 1].bounds.joined(self.nodes[second].bounds),
             };
         }
     }
 
     /// Adapts the tree to new boxes of some items.
-    pub fn refit_some(&mut self, changed: &[(usize, Bounds)]) {
+    pub fn refit_some(&mut self, changed: &[(usize, B)]) {
         let mut places = Vec::with_capacity(changed.len());
         for (item, bounds) in changed {
             let place = self.places[*item];
@@ -109,18 +110,18 @@ impl Hierarchy {
         }
         let Node { from, to, second, .. } = self.nodes[number];
         self.nodes[number].bounds = match second {
-            None => self.boxes[from..to].iter().copied().fold(Bounds::EMPTY, Bounds::around),
+            None => self.boxes[from..to].iter().copied().fold(B::empty(), B::joined),
             Some(second) => {
                 let (before, after) = places.split_at(places.partition_point(|place| *place < self.nodes[second].from));
                 self.refit_places(number + 1, before);
                 self.refit_places(second, after);
-                self.nodes[number + 1].bounds.around(self.nodes[second].bounds)
+                self.nodes[number + 1].bounds.joined(self.nodes[second].bounds)
             }
         };
     }
 
     /// Calls `found` with each item whose box overlaps a box, in tree order.
-    pub fn near(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
+    pub fn near(&self, bounds: &B, mut found: impl FnMut(usize)) {
         // Halving the items at each level keeps the depth below the number of bits of their count.
         let (mut waiting, mut end) = ([0; 64], 1);
         while end > 0 {
@@ -143,7 +144,9 @@ impl Hierarchy {
             }
         }
     }
+}
 
+impl Hierarchy {
     /// Returns the distance of a point from the bounding box of all items, in m.
     pub fn distance(&self, x: Vector3<f64>) -> f64 {
         self.nodes[0].bounds.distance_squared(x).sqrt()

@@ -2,9 +2,9 @@
 
 use energy_dsl::{Kernel, Level, dispatch};
 
-use super::Hierarchy;
 use super::hierarchy::Node;
 use super::rounded_boxes::LANES;
+use super::{Hierarchy, Volume};
 
 /// The pairs of a tree with itself, by the branches of the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum Branches {
     Across,
 }
 
-impl Hierarchy {
+impl<B: Volume> Hierarchy<B> {
     /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order. Boxes are rounded outwards
     /// to single precision.
     pub fn meeting(&self, other: &Self, found: impl FnMut(usize, usize)) {
@@ -43,15 +43,15 @@ impl Hierarchy {
 }
 
 /// Finds all pairs below two nodes.
-struct Meeting<'a, F> {
-    first: &'a Hierarchy,
-    second: &'a Hierarchy,
+struct Meeting<'a, B, F> {
+    first: &'a Hierarchy<B>,
+    second: &'a Hierarchy<B>,
     is_one_tree: bool,
     start: (usize, usize),
     found: F,
 }
 
-impl<F: FnMut(usize, usize)> Kernel for Meeting<'_, F> {
+impl<B: Volume, F: FnMut(usize, usize)> Kernel for Meeting<'_, B, F> {
     type Output = ();
 
     #[inline(always)]
@@ -68,7 +68,7 @@ impl<F: FnMut(usize, usize)> Kernel for Meeting<'_, F> {
                 (None, None) => self.compare::<L>(one, other, is_same),
                 (Some(right), _) if is_same => waiting.extend([(a + 1, a + 1), (a + 1, right), (right, right)]),
                 (Some(right), None) => waiting.extend([(a + 1, b), (right, b)]),
-                (Some(right), Some(_)) if one.bounds.is_longer_than(&other.bounds) => {
+                (Some(right), Some(_)) if one.bounds.at(0).is_longer_than(other.bounds.at(0)) => {
                     waiting.extend([(a + 1, b), (right, b)]);
                 }
                 (_, Some(right)) => waiting.extend([(a, b + 1), (a, right)]),
@@ -77,14 +77,14 @@ impl<F: FnMut(usize, usize)> Kernel for Meeting<'_, F> {
     }
 }
 
-impl<F: FnMut(usize, usize)> Meeting<'_, F> {
+impl<B: Volume, F: FnMut(usize, usize)> Meeting<'_, B, F> {
     /// Compares each box of one node with all of another, or with those after it in the same node.
     #[inline(always)]
-    fn compare<L: Level>(&mut self, one: &Node, other: &Node, is_same: bool) {
+    fn compare<L: Level>(&mut self, one: &Node<B>, other: &Node<B>, is_same: bool) {
         let Self { first, second, found, .. } = self;
         for place in (one.from..one.to).filter(|place| first.boxes[*place].overlaps(&other.bounds)) {
             let from = if is_same { place + 1 } else { other.from };
-            second.rounded.overlapping::<L>(from, other.to, (&first.rounded, place), |with| {
+            second.rounded.overlapping::<L, B>(from, other.to, (&first.rounded, place), |with| {
                 found(first.items[place], second.items[with]);
             });
         }

@@ -8,7 +8,7 @@ mod rounded_boxes;
 
 use energy_dsl::Real;
 
-pub use bounds::Bounds;
+pub use bounds::{Bounds, MovingBounds, Volume};
 pub use hierarchy::Hierarchy;
 pub use meeting::Branches;
 pub use pose::Pose;

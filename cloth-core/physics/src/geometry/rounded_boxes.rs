@@ -1,59 +1,64 @@
 use energy_dsl::{Lane, Level, Mask, Number};
 
-use super::Bounds;
+use super::Volume;
 
 /// The largest number of lanes.
 pub(super) const LANES: usize = 16;
 
-/// Boxes in single precision, rounded outwards, by coordinate: lanes compare one box with several.
+/// Boxes in single precision, rounded outwards, by instant and coordinate: lanes compare one box with several.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct RoundedBoxes {
+    instants: [Corners; 2],
+}
+
+/// The least and the greatest coordinates of boxes.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Corners {
     low: [Vec<f32>; 3],
     high: [Vec<f32>; 3],
 }
 
 impl RoundedBoxes {
     /// Takes new boxes.
-    pub fn set(&mut self, boxes: &[Bounds]) {
-        for axis in 0..3 {
-            let (low, high) = (&mut self.low[axis], &mut self.high[axis]);
-            low.clear();
-            low.extend(boxes.iter().map(|bounds| below(bounds.low[axis])));
-            high.clear();
-            high.extend(boxes.iter().map(|bounds| -below(-bounds.high[axis])));
-            // Lanes read beyond the last box.
-            low.resize(boxes.len() + LANES, f32::INFINITY);
-            high.resize(boxes.len() + LANES, f32::NEG_INFINITY);
+    pub fn set<B: Volume>(&mut self, boxes: &[B]) {
+        for (instant, Corners { low, high }) in self.instants.iter_mut().enumerate().take(B::INSTANTS) {
+            for axis in 0..3 {
+                let (low, high) = (&mut low[axis], &mut high[axis]);
+                low.clear();
+                low.extend(boxes.iter().map(|bounds| below(bounds.at(instant).low[axis])));
+                high.clear();
+                high.extend(boxes.iter().map(|bounds| -below(-bounds.at(instant).high[axis])));
+                // Lanes read beyond the last box.
+                low.resize(boxes.len() + LANES, f32::INFINITY);
+                high.resize(boxes.len() + LANES, f32::NEG_INFINITY);
+            }
         }
     }
 
     /// Takes one new box.
-    pub fn replace(&mut self, number: usize, bounds: &Bounds) {
-        for axis in 0..3 {
-            self.low[axis][number] = below(bounds.low[axis]);
-            self.high[axis][number] = -below(-bounds.high[axis]);
+    pub fn replace<B: Volume>(&mut self, number: usize, bounds: &B) {
+        for (instant, Corners { low, high }) in self.instants.iter_mut().enumerate().take(B::INSTANTS) {
+            for axis in 0..3 {
+                low[axis][number] = below(bounds.at(instant).low[axis]);
+                high[axis][number] = -below(-bounds.at(instant).high[axis]);
+            }
         }
     }
 
-    /// Calls `found` with each box, of those from one number to another, that overlaps a box of another set.
+    /// Calls `found` with each box, of those from one number to another, that overlaps a box of another set; see
+    /// [`Volume::overlaps`].
     #[inline(always)]
-    pub fn overlapping<L: Level>(
+    pub fn overlapping<L: Level, B: Volume>(
         &self,
         from: usize,
         to: usize,
         (others, other): (&Self, usize),
         mut found: impl FnMut(usize),
     ) {
-        let splat = |values: &[Vec<f32>; 3]| {
-            [L::F32::splat(values[0][other]), L::F32::splat(values[1][other]), L::F32::splat(values[2][other])]
-        };
-        let (low, high) = (splat(&others.low), splat(&others.high));
         for first in (from..to).step_by(L::F32::LANES) {
-            let mut overlaps = L::F32::load(&self.low[0][first..]).less_or_equal(high[0]);
-            overlaps = overlaps & low[0].less_or_equal(L::F32::load(&self.high[0][first..]));
+            let mut overlaps = self.along::<L, B>(0, first, others, other);
             for axis in 1..3 {
-                overlaps = overlaps & L::F32::load(&self.low[axis][first..]).less_or_equal(high[axis]);
-                overlaps = overlaps & low[axis].less_or_equal(L::F32::load(&self.high[axis][first..]));
+                overlaps = overlaps & self.along::<L, B>(axis, first, others, other);
             }
             let mut bits = overlaps.bits() & (u32::MAX >> (32 - (to - first).min(32)));
             while bits != 0 {
@@ -61,6 +66,26 @@ impl RoundedBoxes {
                 bits &= bits - 1;
             }
         }
+    }
+
+    /// Whether boxes from number `first` on overlap another one along an axis.
+    #[inline(always)]
+    fn along<L: Level, B: Volume>(
+        &self,
+        axis: usize,
+        first: usize,
+        others: &Self,
+        other: usize,
+    ) -> <L::F32 as Number>::Mask {
+        let (own, one) = (&self.instants[0], &others.instants[0]);
+        let mut begins = L::F32::load(&own.low[axis][first..]).less_or_equal(L::F32::splat(one.high[axis][other]));
+        let mut ends = L::F32::splat(one.low[axis][other]).less_or_equal(L::F32::load(&own.high[axis][first..]));
+        if B::INSTANTS == 2 {
+            let (own, one) = (&self.instants[1], &others.instants[1]);
+            begins = begins | L::F32::load(&own.low[axis][first..]).less_or_equal(L::F32::splat(one.high[axis][other]));
+            ends = ends | L::F32::splat(one.low[axis][other]).less_or_equal(L::F32::load(&own.high[axis][first..]));
+        }
+        begins & ends
     }
 }
 
