@@ -96,7 +96,7 @@ impl Neighbourhood {
                 let [start, end] = path(vertex).0;
                 regions[vertex] = MovingBounds::fixed(regions[vertex].0[0].around(start).around(end));
             }
-            search.pairs_with(&is_stray, mesh, &regions)
+            search.pairs_with(&is_stray, mesh, regions)
         };
         self.strays = Strays { ends, is_stray, radii, nearby: Nearby::new(pairs) };
         true

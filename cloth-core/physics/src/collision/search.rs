@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use energy_dsl::Vector3;
 use energy_solve::index;
 use energy_solve::threads::for_each;
@@ -43,51 +45,62 @@ struct Trees {
     first: [usize; 3],
 }
 
-/// The boxes around the regions of all features, extended by half the reach.
-struct Boxes {
-    points: Vec<MovingBounds>,
-    triangles: Vec<MovingBounds>,
-    edges: Vec<MovingBounds>,
+/// The boxes around the regions of features, extended by half the reach.
+struct Boxes<'a> {
+    mesh: &'a CollisionMesh,
+    /// The extended region of each vertex.
+    regions: Vec<MovingBounds>,
 }
 
-impl Boxes {
-    fn new(mesh: &CollisionMesh, mut regions: Vec<MovingBounds>, halves: &[f64]) -> Self {
+impl<'a> Boxes<'a> {
+    fn new(mesh: &'a CollisionMesh, mut regions: Vec<MovingBounds>, halves: &[f64]) -> Self {
         regions.iter_mut().zip(halves).for_each(|(region, half)| *region = region.extended(*half));
-        let around = |vertices: &[u32]| {
-            vertices.iter().fold(MovingBounds::empty(), |all, &vertex| all.joined(regions[vertex as usize]))
-        };
-        Self {
-            points: mesh.points().iter().map(|&point| regions[point as usize]).collect(),
-            triangles: mesh.triangles().iter().map(|corners| around(corners)).collect(),
-            edges: mesh.edges().iter().map(|ends| around(ends)).collect(),
-        }
+        Self { mesh, regions }
     }
 
-    /// Splits the boxes into those of cloth and hair, and those of obstacles.
-    fn split(&self, [points, triangles, edges]: [usize; 3]) -> [[&[MovingBounds]; 3]; 2] {
-        let (own_points, other_points) = self.points.split_at(points);
-        let (own_triangles, other_triangles) = self.triangles.split_at(triangles);
-        let (own_edges, other_edges) = self.edges.split_at(edges);
-        [[own_points, own_triangles, own_edges], [other_points, other_triangles, other_edges]]
+    fn point(&self, number: usize) -> MovingBounds {
+        self.regions[self.mesh.points()[number] as usize]
+    }
+
+    fn triangle(&self, number: usize) -> MovingBounds {
+        self.around(&self.mesh.triangles()[number])
+    }
+
+    fn edge(&self, number: usize) -> MovingBounds {
+        self.around(&self.mesh.edges()[number])
+    }
+
+    fn around(&self, vertices: &[u32]) -> MovingBounds {
+        let of = |vertex: u32| self.regions[vertex as usize];
+        vertices[1..].iter().fold(of(vertices[0]), |all, &vertex| all.joined(of(vertex)))
     }
 }
 
 impl Trees {
-    fn new(boxes: [&[MovingBounds]; 3], first: [usize; 3]) -> Self {
-        let [points, triangles, edges] = boxes.map(Hierarchy::new);
+    /// Builds the hierarchies of some features, by their places in the mesh's lists.
+    fn new(boxes: &Boxes<'_>, features: [Range<usize>; 3]) -> Self {
+        let first = features.each_ref().map(|range| range.start);
+        let [points, triangles, edges] = features;
+        let points: Vec<_> = points.map(|number| boxes.point(number)).collect();
+        let triangles: Vec<_> = triangles.map(|number| boxes.triangle(number)).collect();
+        let edges: Vec<_> = edges.map(|number| boxes.edge(number)).collect();
+        let (points, triangles, edges) = (Hierarchy::new(&points), Hierarchy::new(&triangles), Hierarchy::new(&edges));
         Self { points, triangles, edges, first }
     }
 
-    fn refit(&mut self, [points, triangles, edges]: [&[MovingBounds]; 3]) {
-        self.points.refit(points);
-        self.triangles.refit(triangles);
-        self.edges.refit(edges);
+    fn refit(&mut self, boxes: &Boxes<'_>) {
+        let [points, triangles, edges] = self.first;
+        self.points.refit(|item| boxes.point(points + item));
+        self.triangles.refit(|item| boxes.triangle(triangles + item));
+        self.edges.refit(|item| boxes.edge(edges + item));
     }
 
-    fn refit_some(&mut self, [points, triangles, edges]: [Vec<(usize, MovingBounds)>; 3]) {
-        self.points.refit_some(&points);
-        self.triangles.refit_some(&triangles);
-        self.edges.refit_some(&edges);
+    /// Adapts to the boxes of changed features, which are in order.
+    fn refit_some(&mut self, boxes: &Boxes<'_>, [points, triangles, edges]: [&[usize]; 3]) {
+        let [p, t, e] = self.first;
+        self.points.refit_some(points.iter().map(|number| number - p), |item| boxes.point(p + item));
+        self.triangles.refit_some(triangles.iter().map(|number| number - t), |item| boxes.triangle(t + item));
+        self.edges.refit_some(edges.iter().map(|number| number - e), |item| boxes.edge(e + item));
     }
 }
 
@@ -129,15 +142,11 @@ impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
         let boxes = Boxes::new(mesh, x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect(), &rules.halves);
-        let first = mesh.own_features();
-        let [own, obstacles] = boxes.split(first);
-        Self {
-            own: Trees::new(own, [0; 3]),
-            obstacles: Trees::new(obstacles, first),
-            is_own_fitted: true,
-            rules,
-            threads: 1,
-        }
+        let own = mesh.own_features();
+        let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
+        let obstacles = Trees::new(&boxes, std::array::from_fn(|kind| own[kind]..all[kind]));
+        let own = Trees::new(&boxes, own.map(|count| 0..count));
+        Self { own, obstacles, is_own_fitted: true, rules, threads: 1 }
     }
 
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
@@ -161,16 +170,15 @@ impl Search {
     /// meet. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
-        let [own_boxes, obstacle_boxes] = boxes.split(self.obstacles.first);
-        self.obstacles.refit(obstacle_boxes);
+        self.obstacles.refit(&boxes);
         self.is_own_fitted = self.rules.with_itself;
         let mut found = Found::default();
         if self.rules.with_itself {
-            self.own.refit(own_boxes);
+            self.own.refit(&boxes);
             let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
             for_each(threads, TASKS.to_vec(), |task| self.find(task, mesh)).into_iter().for_each(|one| found.add(one));
         } else {
-            self.find_near_obstacles(mesh, own_boxes, &mut found);
+            self.find_near_obstacles(&boxes, &mut found);
         }
         in_order(mesh, found)
     }
@@ -203,96 +211,75 @@ impl Search {
     }
 
     /// Finds pairs with obstacles, without the hierarchies of cloth and hair: most features are near no obstacle.
-    fn find_near_obstacles(&self, mesh: &CollisionMesh, own: [&[MovingBounds]; 3], found: &mut Found) {
-        let Trees { points, triangles, edges, first } = &self.obstacles;
-        for (point, around) in own[0].iter().enumerate() {
-            triangles.near(around, |triangle| self.add_point_and_triangle(mesh, point, first[1] + triangle, found));
+    fn find_near_obstacles(&self, boxes: &Boxes<'_>, found: &mut Found) {
+        let (mesh, Trees { points, triangles, edges, first }) = (boxes.mesh, &self.obstacles);
+        for point in 0..first[0] {
+            triangles.near(&boxes.point(point), |triangle| {
+                self.add_point_and_triangle(mesh, point, first[1] + triangle, found);
+            });
         }
-        for (triangle, around) in own[1].iter().enumerate() {
-            points.near(around, |point| self.add_point_and_triangle(mesh, first[0] + point, triangle, found));
+        for triangle in 0..first[1] {
+            points.near(&boxes.triangle(triangle), |point| {
+                self.add_point_and_triangle(mesh, first[0] + point, triangle, found);
+            });
         }
-        for (edge, around) in own[2].iter().enumerate() {
-            edges.near(around, |other| self.add_edges(mesh, edge, first[2] + other, found));
+        for edge in 0..first[2] {
+            edges.near(&boxes.edge(edge), |other| self.add_edges(mesh, edge, first[2] + other, found));
         }
     }
 
     /// Adapts to regions without a search.
     pub fn fit(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
-        let [own, obstacles] = boxes.split(self.obstacles.first);
-        self.own.refit(own);
-        self.obstacles.refit(obstacles);
+        self.own.refit(&boxes);
+        self.obstacles.refit(&boxes);
         self.is_own_fitted = true;
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
     /// and others whose boxes meet. The regions of the other vertices lie in those of the last call.
-    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
-        let changed = self.changed(is_changed, mesh, regions);
-        self.refit_changed(mesh, &changed, regions);
-        let (mut found, [points, triangles, edges]) = (Found::default(), &changed);
-        for (point, around) in points {
-            for trees in self.partners(mesh, mesh.points()[*point]) {
-                trees.triangles.near(around, |triangle| {
-                    self.add_point_and_triangle(mesh, *point, trees.first[1] + triangle, &mut found);
+    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
+        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
+        let [points, triangles, edges] = changed_features(mesh, is_changed);
+        self.refit_changed(&boxes, [&points, &triangles, &edges]);
+        let mut found = Found::default();
+        for point in points {
+            for trees in self.partners(mesh, mesh.points()[point]) {
+                trees.triangles.near(&boxes.point(point), |triangle| {
+                    self.add_point_and_triangle(mesh, point, trees.first[1] + triangle, &mut found);
                 });
             }
         }
-        for (triangle, around) in triangles {
-            for trees in self.partners(mesh, mesh.triangles()[*triangle][0]) {
-                trees.points.near(around, |point| {
-                    self.add_point_and_triangle(mesh, trees.first[0] + point, *triangle, &mut found);
+        for triangle in triangles {
+            for trees in self.partners(mesh, mesh.triangles()[triangle][0]) {
+                trees.points.near(&boxes.triangle(triangle), |point| {
+                    self.add_point_and_triangle(mesh, trees.first[0] + point, triangle, &mut found);
                 });
             }
         }
-        for (edge, around) in edges {
-            for trees in self.partners(mesh, mesh.edges()[*edge][0]) {
-                trees.edges.near(around, |other| self.add_edges(mesh, *edge, trees.first[2] + other, &mut found));
+        for edge in edges {
+            for trees in self.partners(mesh, mesh.edges()[edge][0]) {
+                trees.edges.near(&boxes.edge(edge), |other| {
+                    self.add_edges(mesh, edge, trees.first[2] + other, &mut found);
+                });
             }
         }
         in_order(mesh, found)
     }
 
-    /// Returns the points, triangles and edges with a changed vertex, each with the box around the regions of its
-    /// vertices.
-    fn changed(
-        &self,
-        is_changed: &[bool],
-        mesh: &CollisionMesh,
-        regions: &[MovingBounds],
-    ) -> [Vec<(usize, MovingBounds)>; 3] {
-        let around = |vertices: &[u32]| -> Option<MovingBounds> {
-            let is_changed = vertices.iter().any(|vertex| is_changed[*vertex as usize]);
-            let region = |vertex: &u32| regions[*vertex as usize].extended(self.rules.halves[*vertex as usize]);
-            is_changed.then(|| vertices.iter().map(region).fold(MovingBounds::empty(), MovingBounds::joined))
-        };
-        let numbered = |(number, vertices): (usize, &[u32])| Some((number, around(vertices)?));
-        [
-            mesh.points().chunks(1).enumerate().filter_map(numbered).collect(),
-            mesh.triangles().iter().map(|corners| &corners[..]).enumerate().filter_map(numbered).collect(),
-            mesh.edges().iter().map(|ends| &ends[..]).enumerate().filter_map(numbered).collect(),
-        ]
-    }
-
-    /// Adapts the hierarchies to the boxes of changed features, which are in order.
-    fn refit_changed(
-        &mut self,
-        mesh: &CollisionMesh,
-        changed: &[Vec<(usize, MovingBounds)>; 3],
-        regions: &[MovingBounds],
-    ) {
+    /// Adapts the hierarchies to the boxes of changed features.
+    fn refit_changed(&mut self, boxes: &Boxes<'_>, changed: [&[usize]; 3]) {
         let first = self.obstacles.first;
         let split: [_; 3] = std::array::from_fn(|kind| {
-            changed[kind].split_at(changed[kind].partition_point(|(number, _)| *number < first[kind]))
+            changed[kind].split_at(changed[kind].partition_point(|number| *number < first[kind]))
         });
-        if split.iter().any(|(_, others)| !others.is_empty()) && !self.is_own_fitted {
-            self.own.refit(Boxes::new(mesh, regions.to_vec(), &self.rules.halves).split(first)[0]);
+        let (own, others) = (split.map(|(own, _)| own), split.map(|(_, others)| others));
+        if !self.is_own_fitted && others.iter().any(|others| !others.is_empty()) {
+            self.own.refit(boxes);
             self.is_own_fitted = true;
         }
-        self.own.refit_some(split.map(|(own, _)| own.to_vec()));
-        let shifted =
-            |kind: usize| split[kind].1.iter().map(|(number, around)| (number - first[kind], *around)).collect();
-        self.obstacles.refit_some([shifted(0), shifted(1), shifted(2)]);
+        self.own.refit_some(boxes, own);
+        self.obstacles.refit_some(boxes, others);
     }
 
     /// The features with which those at a vertex may collide.
@@ -329,6 +316,16 @@ impl Search {
             && a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
             && !self.rules.exclusions.exclude(mesh, a, b)
     }
+}
+
+/// Returns the points, triangles and edges with a changed vertex, in order.
+fn changed_features(mesh: &CollisionMesh, is_changed: &[bool]) -> [Vec<usize>; 3] {
+    let changed = |vertices: &[u32]| vertices.iter().any(|vertex| is_changed[*vertex as usize]);
+    [
+        (0..mesh.points().len()).filter(|&point| changed(&mesh.points()[point..=point])).collect(),
+        (0..mesh.triangles().len()).filter(|&triangle| changed(&mesh.triangles()[triangle])).collect(),
+        (0..mesh.edges().len()).filter(|&edge| changed(&mesh.edges()[edge])).collect(),
+    ]
 }
 
 /// Returns the pairs of these features once and in order.

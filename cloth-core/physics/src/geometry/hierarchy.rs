@@ -75,9 +75,9 @@ impl<B: Volume> Hierarchy<B> {
 
     /// Adapts the boxes of the tree to new boxes of the items, and keeps its structure. Queries stay exact. They become
     /// slow if items move far relative to each other.
-    pub fn refit(&mut self, bounds: &[B]) {
+    pub fn refit(&mut self, bounds: impl Fn(usize) -> B) {
         for (own, &item) in self.boxes.iter_mut().zip(&self.items) {
-            *own = bounds[item];
+            *own = bounds(item);
         }
         self.rounded.set(&self.boxes);
         // Children follow their parents.
@@ -91,12 +91,12 @@ impl<B: Volume> Hierarchy<B> {
     }
 
     /// Adapts the tree to new boxes of some items.
-    pub fn refit_some(&mut self, changed: &[(usize, B)]) {
-        let mut places = Vec::with_capacity(changed.len());
-        for (item, bounds) in changed {
-            let place = self.places[*item];
-            self.boxes[place] = *bounds;
-            self.rounded.replace(place, bounds);
+    pub fn refit_some(&mut self, items: impl Iterator<Item = usize>, bounds: impl Fn(usize) -> B) {
+        let mut places = Vec::new();
+        for item in items {
+            let place = self.places[item];
+            self.boxes[place] = bounds(item);
+            self.rounded.replace(place, &self.boxes[place]);
             places.push(place);
         }
         places.sort_unstable();
