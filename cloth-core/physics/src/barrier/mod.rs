@@ -110,16 +110,21 @@ impl BarrierContact {
             return;
         }
         let start = std::mem::take(&mut self.friction.start);
-        let near = self.near(&start);
+        self.know(&start);
+        self.neighbourhood.visit(&self.search, &start);
         let meeting = Meeting { mesh: &self.mesh, x: &start };
         let mut touching = Vec::new();
-        for (pair, closest) in near {
-            let Spacing { thickness, gap } = self.spacing(&pair);
+        let [nearby, strays] = [self.neighbourhood.nearby(), self.neighbourhood.strays()];
+        for (pair, closest) in nearby.within_reach().chain(strays.within_reach()) {
+            let Spacing { thickness, gap } = self.spacing(pair);
             let is_active = closest.distance - thickness < gap;
-            if is_active && meeting.may_join(&pair, &closest) {
-                touching.push((pair, self.law(&pair, &closest), closest));
+            if is_active && meeting.may_join(pair, closest) {
+                touching.push((*pair, self.law(pair, closest), *closest));
             }
         }
+        // Both kinds may hold the same pair.
+        touching.sort_by_key(|(pair, ..)| *pair);
+        touching.dedup_by_key(|(pair, ..)| *pair);
         self.friction.start = start;
         self.friction.take(&self.mesh, touching);
     }
@@ -129,24 +134,16 @@ impl BarrierContact {
         Law::new(self.spacing(pair), self.resistance.of(pair, closest))
     }
 
-    /// Returns the pairs within reach at a place, in order.
-    fn near(&mut self, x: &[Vector3<f64>]) -> Vec<(Pair, Closest)> {
+    /// Makes all pairs near a place known.
+    fn know(&mut self, x: &[Vector3<f64>]) {
         if !self.neighbourhood.knows(x) {
             self.follow([x, x]);
         }
-        self.neighbourhood.visit(&self.search, x);
-        let all = self.neighbourhood.nearby().within_reach().chain(self.neighbourhood.strays().within_reach());
-        let mut all: Vec<(Pair, Closest)> = all.map(|(pair, closest)| (*pair, *closest)).collect();
-        all.sort_by_key(|(pair, _)| *pair);
-        all.dedup_by_key(|(pair, _)| *pair);
-        all
     }
 
     /// Makes all pairs near an iterate known, and measures them there.
     fn visit(&mut self, x: &[Vector3<f64>]) {
-        if !self.neighbourhood.knows(x) {
-            self.follow([x, x]);
-        }
+        self.know(x);
         self.neighbourhood.settle(&self.search, x);
         self.neighbourhood.visit(&self.search, x);
     }

@@ -18,8 +18,6 @@ pub struct Neighbourhood {
     radii: Vec<f64>,
     nearby: Nearby,
     strays: Strays,
-    /// Whether searches are fitted to all balls. They need not be before the first vertices leave them.
-    is_fitted: bool,
 }
 
 /// The vertices that left their balls on the last such move, and their pairs.
@@ -62,7 +60,8 @@ impl Neighbourhood {
     }
 
     /// Finds the pairs of the vertices that leave their balls on a straight move, up to a distance from their paths.
-    /// Returns whether there are such vertices. If they are many, all vertices count as strays, and no others are known.
+    /// Returns whether there are such vertices. If there are many, all vertices count as strays, and no other pairs are
+    /// known.
     pub fn follow(
         &mut self,
         search: &mut Search,
@@ -87,9 +86,6 @@ impl Neighbourhood {
             is_stray.fill(true);
             search.pairs(mesh, vertices.map(path).collect())
         } else {
-            if !std::mem::replace(&mut self.is_fitted, true) {
-                search.fit(mesh, self.balls());
-            }
             let mut regions = self.balls();
             for vertex in vertices.filter(|&vertex| is_stray[vertex]) {
                 // The region must cover the old ball and the new one, wherever on the path that will be.
@@ -123,10 +119,12 @@ impl Neighbourhood {
         })
     }
 
-    /// Puts new balls around the vertices that are outside of theirs at x, a place whose pairs are known.
+    /// Puts new balls around the vertices that are outside of theirs at x, a place whose pairs are known, and forgets
+    /// the move that led there.
     pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) {
         let lacks = self.lacks(x);
         if !lacks.contains(&true) {
+            self.strays = Strays::default();
             return;
         }
         let Strays { radii, nearby: mut found, .. } = std::mem::take(&mut self.strays);

@@ -167,7 +167,7 @@ impl Search {
     }
 
     /// Returns all pairs that can come within their reach while each vertex stays in its region, and others whose boxes
-    /// meet. Pairs are in order.
+    /// meet. Regions may move on straight lines. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         self.obstacles.refit(&boxes);
@@ -228,16 +228,9 @@ impl Search {
         }
     }
 
-    /// Adapts to regions without a search.
-    pub fn fit(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) {
-        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
-        self.own.refit(&boxes);
-        self.obstacles.refit(&boxes);
-        self.is_own_fitted = true;
-    }
-
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
-    /// and others whose boxes meet. The regions of the other vertices lie in those of the last call.
+    /// and others whose boxes meet. These regions are at rest, and lie in those of the searches before, at some
+    /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
     pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         let [points, triangles, edges] = changed_features(mesh, is_changed);
