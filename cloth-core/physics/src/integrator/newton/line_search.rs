@@ -38,18 +38,18 @@ pub(super) struct AcceptedStep {
 }
 
 impl IncrementalPotential<'_> {
-    /// Returns the longest step of at most `scale` directions that contact allows.
-    fn allowed(&mut self, x: &[Vector3<f64>], scale: f64, direction: &Direction) -> f64 {
+    /// Returns the part of a direction that contact allows.
+    fn allowed(&mut self, x: &[Vector3<f64>], direction: &Direction) -> f64 {
         if !self.body.system.has_contact() {
-            return scale;
+            return 1.0;
         }
-        let to = self.moved(x, scale, &direction.vectors);
-        scale * self.certified(x, &to)
+        let to = self.moved(x, 1.0, &direction.vectors);
+        self.certified(x, &to)
     }
 
     /// Returns the first of x + s d, x + s d/2, … that decreases E sufficiently (Armijo); `None` if none does. s is 1,
-    /// or less if contact allows no more. Directions
-    /// of projected Hessians are too short, if anything: a full step along one is doubled while that lowers E.
+    /// or less if contact allows no more. Directions of projected Hessians are too short, if anything: a full step along
+    /// one is doubled while that lowers E.
     pub(super) fn line_search(
         &mut self,
         x: &[Vector3<f64>],
@@ -57,7 +57,7 @@ impl IncrementalPotential<'_> {
         direction: &Direction,
         mut prefetch: Prefetch<'_>,
     ) -> Result<Option<AcceptedStep>, EvaluationError> {
-        let mut scale = self.allowed(x, 1.0, direction);
+        let mut scale = self.allowed(x, direction);
         let allowed = scale;
         if allowed == 0.0 {
             return Ok(None);
