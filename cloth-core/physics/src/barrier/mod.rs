@@ -44,7 +44,7 @@ pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
 pub use start::{ContactError, ObstacleStart, Participants};
 pub use untangle::Untangling;
 
-use crate::collision::{Closest, CollisionMesh, Move, Nearby, Neighbourhood, Pair, Search, excursions};
+use crate::collision::{Closest, CollisionMesh, Move, Nearby, Neighbourhood, Pair, Search};
 use feasible::Meeting;
 use friction::Friction;
 use joined::Joined;
@@ -137,7 +137,7 @@ impl BarrierContact {
     /// Makes all pairs near a place known.
     fn know(&mut self, x: &[Vector3<f64>]) {
         if !self.neighbourhood.knows(x) {
-            self.follow([x, x]);
+            self.follow([x, x], |_| 0.0);
         }
     }
 
@@ -148,19 +148,18 @@ impl BarrierContact {
         self.neighbourhood.visit(&self.search, x);
     }
 
-    /// Makes all pairs near a move known. Returns whether there are new ones.
-    fn follow(&mut self, ends: [&[Vector3<f64>]; 2]) -> bool {
+    /// Makes all pairs near a move known, on which each vertex strides this far, in m. Returns whether there are new ones.
+    fn follow(&mut self, ends: [&[Vector3<f64>]; 2], stride: impl Fn(usize) -> f64) -> bool {
         let [least, most] = self.slack;
-        let radius = |stride: f64| (least + STRAYING * stride).min(most);
-        let radii = || excursions(ends[0], ends[1]).into_iter().map(radius).collect();
-        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, ends, radii);
+        let radius = |vertex: usize| (least + STRAYING * stride(vertex)).min(most);
+        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, ends, radius);
         self.counts.searches += u64::from(is_new);
         is_new
     }
 
     /// Returns the part of a move that certainly has no crossing.
     fn safe_part(&mut self, step: &Move<'_>) -> f64 {
-        let strays = self.follow([step.from(), step.to()]);
+        let strays = self.follow([step.from(), step.to()], |vertex| step.excursions()[vertex]);
         self.neighbourhood.visit(&self.search, step.from());
         let near = self.judge(step, self.neighbourhood.nearby());
         let part = self.note(near);

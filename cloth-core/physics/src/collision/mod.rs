@@ -28,7 +28,6 @@ mod solid_core;
 pub use certificate::{Clearance, Move};
 pub use closest::Closest;
 pub use crossing::{Crossing, crossings};
-pub(crate) use displacement::excursions;
 pub use exclusions::{Exclusions, Members};
 pub use measured::Measured;
 pub use mesh::CollisionMesh;

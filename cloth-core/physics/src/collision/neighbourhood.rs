@@ -59,7 +59,7 @@ impl Neighbourhood {
         self.strays.nearby.visit(search, x);
     }
 
-    /// Finds the pairs of the vertices that leave their balls on a straight move, up to a distance from their paths.
+    /// Finds the pairs of the vertices that leave their balls on a straight move, up to a radius from their paths.
     /// Returns whether there are such vertices. If there are many, all vertices count as strays, and no other pairs are
     /// known.
     pub fn follow(
@@ -67,7 +67,7 @@ impl Neighbourhood {
         search: &mut Search,
         mesh: &CollisionMesh,
         ends: [&[Vector3<f64>]; 2],
-        radii: impl Fn() -> Vec<f64>,
+        radius: impl Fn(usize) -> f64,
     ) -> bool {
         // Balls are convex: if they cover both ends of a straight move, they cover the whole move.
         let [from, to] = ends.map(|x| self.lacks(x));
@@ -76,7 +76,7 @@ impl Neighbourhood {
         if count == 0 {
             return false;
         }
-        let radii = radii();
+        let radii: Vec<f64> = (0..is_stray.len()).map(radius).collect();
         let ends = ends.map(relative);
         let path =
             |vertex: usize| MovingBounds([0, 1].map(|end| Bounds::of(&[ends[end][vertex]]).extended(radii[vertex])));

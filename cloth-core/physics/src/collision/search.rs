@@ -141,7 +141,7 @@ const TASKS: [Task; 5] = [
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let boxes = Boxes::new(mesh, x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect(), &rules.halves);
+        let boxes = Boxes::new(mesh, places(x), &rules.halves);
         let own = mesh.own_features();
         let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
         let obstacles = Trees::new(&boxes, std::array::from_fn(|kind| own[kind]..all[kind]));
@@ -181,6 +181,11 @@ impl Search {
             self.find_near_obstacles(&boxes, &mut found);
         }
         in_order(mesh, found)
+    }
+
+    /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
+    pub fn pairs_at(&mut self, mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Pair> {
+        self.pairs(mesh, places(x))
     }
 
     /// Finds a part of the pairs of cloth and hair, with themselves and with obstacles.
@@ -309,6 +314,11 @@ impl Search {
             && a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
             && !self.rules.exclusions.exclude(mesh, a, b)
     }
+}
+
+/// Returns the regions of vertices that stay at x.
+fn places(x: &[Vector3<f64>]) -> Vec<MovingBounds> {
+    x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect()
 }
 
 /// Returns the points, triangles and edges with a changed vertex, in order.

@@ -233,7 +233,7 @@ proptest! {
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
         prop_assert!(!neighbourhood.knows(&from));
-        prop_assert!(neighbourhood.follow(&mut search, &mesh, [&from, &to], || vec![1e-3; 25]));
+        prop_assert!(neighbourhood.follow(&mut search, &mesh, [&from, &to], |_| 1e-3));
         let found = neighbourhood.strays().pairs();
         prop_assert!(found.is_sorted() && found.windows(2).all(|two| two[0] != two[1]));
         prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&from, &to, instant)), None);
@@ -260,7 +260,7 @@ proptest! {
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
         // All vertices move and stop half the way.
-        neighbourhood.follow(&mut search, &mesh, [&from, &to], || vec![5e-3; 25]);
+        neighbourhood.follow(&mut search, &mesh, [&from, &to], |_| 5e-3);
         let mut x = at(&from, &to, 0.5);
         neighbourhood.settle(&search, &x);
         for (strays, part) in &moves {
@@ -268,7 +268,7 @@ proptest! {
             for &(vertex, stray) in strays {
                 to[vertex] = add_scaled(x[vertex], 1.0, stray);
             }
-            neighbourhood.follow(&mut search, &mesh, [&x, &to], || vec![1e-3; 25]);
+            neighbourhood.follow(&mut search, &mesh, [&x, &to], |_| 1e-3);
             for instant in [0.0, 0.3, 0.7, 1.0] {
                 prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&x, &to, instant)), None);
             }
@@ -288,7 +288,7 @@ proptest! {
         let (mesh, x) = sheet(4);
         let mut search = Search::new(&mesh, &x, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        neighbourhood.follow(&mut search, &mesh, [&x, &x], || vec![1e-4; 25]);
+        neighbourhood.follow(&mut search, &mesh, [&x, &x], |_| 1e-4);
         neighbourhood.settle(&search, &x);
         let moved = |by: Vector3<f64>| {
             let mut moved = x.clone();
@@ -296,7 +296,7 @@ proptest! {
             moved
         };
         let to = moved(move_by);
-        neighbourhood.follow(&mut search, &mesh, [&x, &to], || vec![1e-4; 25]);
+        neighbourhood.follow(&mut search, &mesh, [&x, &to], |_| 1e-4);
         prop_assert!(neighbourhood.knows(&at(&x, &to, part)));
         let beside = moved(add_scaled(aside, part, move_by));
         let along = crate::geometry::dot(aside, move_by).powi(2);

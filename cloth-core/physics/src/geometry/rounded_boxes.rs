@@ -77,15 +77,28 @@ impl RoundedBoxes {
         others: &Self,
         other: usize,
     ) -> <L::F32 as Number>::Mask {
-        let (own, one) = (&self.instants[0], &others.instants[0]);
-        let mut begins = L::F32::load(&own.low[axis][first..]).less_or_equal(L::F32::splat(one.high[axis][other]));
-        let mut ends = L::F32::splat(one.low[axis][other]).less_or_equal(L::F32::load(&own.high[axis][first..]));
-        if B::INSTANTS == 2 {
-            let (own, one) = (&self.instants[1], &others.instants[1]);
-            begins = begins | L::F32::load(&own.low[axis][first..]).less_or_equal(L::F32::splat(one.high[axis][other]));
-            ends = ends | L::F32::splat(one.low[axis][other]).less_or_equal(L::F32::load(&own.high[axis][first..]));
+        let (mut begins, mut ends) = self.instants[0].meet::<L>(axis, first, &others.instants[0], other);
+        for instant in 1..B::INSTANTS {
+            let (one, two) = self.instants[instant].meet::<L>(axis, first, &others.instants[instant], other);
+            (begins, ends) = (begins | one, ends | two);
         }
         begins & ends
+    }
+}
+
+impl Corners {
+    /// Whether boxes from number `first` on begin before another one ends along an axis, and end after it begins.
+    #[inline(always)]
+    fn meet<L: Level>(
+        &self,
+        axis: usize,
+        first: usize,
+        others: &Self,
+        other: usize,
+    ) -> (<L::F32 as Number>::Mask, <L::F32 as Number>::Mask) {
+        let begins = L::F32::load(&self.low[axis][first..]).less_or_equal(L::F32::splat(others.high[axis][other]));
+        let ends = L::F32::splat(others.low[axis][other]).less_or_equal(L::F32::load(&self.high[axis][first..]));
+        (begins, ends)
     }
 }
 

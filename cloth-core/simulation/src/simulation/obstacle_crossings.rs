@@ -4,7 +4,6 @@ use energy_dsl::Vector3;
 
 use super::Simulation;
 use crate::collision::{Closest, Crossing, Rules, Search, crossings};
-use crate::geometry::{Bounds, MovingBounds};
 
 /// Penetration of a rounded solid that counts as a crossing, over its radius. Below it is a rounding error.
 const ROUNDING: f64 = 1e-12;
@@ -42,8 +41,7 @@ impl Simulation {
         let halves = (0..energy_solve::index(mesh.vertices())).map(radius).collect();
         let is_free = (0..mesh.vertices()).map(|vertex| vertex < self.x.len()).collect();
         let rules = Rules { halves, is_free, exclusions: self.exclusions.clone(), with_itself: false };
-        let places = x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect();
-        let pairs = Search::new(mesh, x, rules).pairs(mesh, places);
+        let pairs = Search::new(mesh, x, rules).pairs_at(mesh, x);
         let is_inside = |pair: &&crate::collision::Pair| {
             let radius = mesh.obstacle_of(pair).map_or(0.0, |obstacle| cores[obstacle].radius);
             Closest::of(pair, &pair.corners(x)).distance < (1.0 - ROUNDING) * radius

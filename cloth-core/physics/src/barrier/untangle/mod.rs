@@ -14,7 +14,7 @@ use super::spacing::{Skin, Spacing, Spacings};
 use super::start::{Participants, SKIN, TOUCHING, crossings_that_count};
 use crate::collision::{Closest, Pair, Rules, Search};
 use crate::contact::AnySolid;
-use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
+use crate::geometry::{add_scaled, dot, norm, subtract};
 use sides::{Facing, sides};
 
 /// Sweeps over all close pairs, after which the repair is given up.
@@ -54,7 +54,7 @@ impl Untangling<'_> {
         let mut search = Search::new(mesh, x, rules.clone());
         let mut now = x.to_vec();
         for _ in 0..SWEEPS {
-            let pairs = search.pairs(mesh, now.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect());
+            let pairs = search.pairs_at(mesh, &now);
             let close: Vec<_> = pairs.iter().map(|pair| (*pair, Closest::of(pair, &pair.corners(&now)))).collect();
             let crossings = crossings_that_count(mesh, &rules, &now);
             let is_apart = |(pair, closest): &(Pair, Closest)| closest.distance > self.least(&spacings, pair);
