@@ -148,7 +148,8 @@ impl BarrierContact {
         self.neighbourhood.visit(&self.search, x);
     }
 
-    /// Makes all pairs near a move known, on which each vertex strides this far, in m. Returns whether there are new ones.
+    /// Makes all pairs near a move known, on which each vertex strides this far, in m. Returns whether there are new
+    /// ones.
     fn follow(&mut self, ends: [&[Vector3<f64>]; 2], stride: impl Fn(usize) -> f64) -> bool {
         let [least, most] = self.slack;
         let radius = |vertex: usize| (least + STRAYING * stride(vertex)).min(most);
