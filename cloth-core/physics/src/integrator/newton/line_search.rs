@@ -48,8 +48,8 @@ impl IncrementalPotential<'_> {
     }
 
     /// Returns the first of x + s d, x + s d/2, … that decreases E sufficiently (Armijo); `None` if none does. s is 1,
-    /// or less if contact allows no more. Directions of projected Hessians are too short, if anything: a full step along
-    /// one is doubled while that lowers E.
+    /// or less if contact allows no more. Directions of projected Hessians are too short, if anything: a full step
+    /// along one is doubled while that lowers E.
     pub(super) fn line_search(
         &mut self,
         x: &[Vector3<f64>],
