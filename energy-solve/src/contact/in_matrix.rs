@@ -1,83 +1,97 @@
 use std::sync::Arc;
 
+use energy_dsl::Block;
+
 use super::Contact;
 use crate::matrix::block_matrix::{BlockMatrix, Contents};
-use crate::matrix::pattern::{Pattern, Storage};
+use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Precision;
+use crate::matrix::vector::add_scaled_block;
+use crate::threads::for_each;
 
 /// Contacts in a matrix whose pattern has all their blocks, such as those of a fixed obstacle with one triangle.
 #[derive(Debug)]
 pub struct ContactsInMatrix<T> {
-    /// The blocks before the contacts were added, by place in the matrix.
-    replaced: Vec<(usize, [[T; 3]; 3])>,
+    /// The blocks before the contacts were added.
+    replaced: Vec<Vec<Stored<T>>>,
     contents: Option<Arc<Contents>>,
-    /// The contacts that do not fit into the pattern.
+    /// The contacts that do not fit into the pattern, times the scale.
     pub others: Vec<Contact>,
 }
 
-/// The stored blocks of four rows in a pattern.
-struct Blocks {
-    rows: [u32; 4],
-    /// Whether the pattern has all blocks of the rows.
-    fit: bool,
-    /// Pairs of corners and the indices of their blocks.
-    places: Vec<(usize, usize, usize)>,
-}
+/// A block and its place in a matrix.
+type Stored<T> = (u32, [[T; 3]; 3]);
 
-impl Blocks {
-    /// Looks up the blocks of other rows.
-    fn find(&mut self, rows: [u32; 4], pattern: &Pattern) {
-        self.rows = rows;
-        self.places.clear();
+/// The pairs of corners of a stencil that a matrix stores, with the places of their blocks.
+#[derive(Default)]
+struct Places(Vec<(usize, usize, usize)>);
+
+impl Places {
+    /// Looks up the blocks of four rows. Returns whether the pattern has all of them.
+    fn find(&mut self, rows: [u32; 4], pattern: &Pattern) -> bool {
+        self.0.clear();
         let free = || rows.into_iter().enumerate().filter(|(_, row)| *row != Contact::FIXED);
         // An upper triangle stores each pair of rows once.
         let is_stored = |row: u32, column: u32| pattern.storage() == Storage::Whole || row <= column;
         let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
-        self.fit = pairs.filter(|((_, row), (_, column))| is_stored(*row, *column)).all(|((i, row), (j, column))| {
+        pairs.filter(|((_, row), (_, column))| is_stored(*row, *column)).all(|((i, row), (j, column))| {
             let place = pattern.place(row as usize, column as usize);
-            self.places.extend(place.map(|(place, _)| (i, j, place)));
+            self.0.extend(place.map(|(place, _)| (i, j, place)));
             place.is_some()
-        });
+        })
     }
 }
 
+/// Returns the blocks of the contacts that fit into a pattern, and the other contacts, all times a scale. Contacts of
+/// the same vertices that follow each other are summed.
+fn placed<T: Precision>(contacts: &[Contact], scale: f64, pattern: &Pattern) -> (Vec<Stored<T>>, Vec<Contact>) {
+    let (mut stored, mut others) = (Vec::new(), Vec::new());
+    let mut places = Places::default();
+    for same in contacts.chunk_by(|one, other| one.rows == other.rows) {
+        if !places.find(same[0].rows, pattern) {
+            let scaled = |block: Block<f64>| block.map(|row| row.map(|entry| scale * entry));
+            others.extend(same.iter().map(|contact| Contact { block: scaled(contact.block), ..*contact }));
+            continue;
+        }
+        for &(i, j, place) in &places.0 {
+            let mut sum = [[0.0; 3]; 3];
+            for Contact { weights, block, .. } in same {
+                add_scaled_block(&mut sum, scale * weights[i] * weights[j], block);
+            }
+            stored.push((index(place), sum.map(|row| row.map(T::from_f64))));
+        }
+    }
+    (stored, others)
+}
+
 impl<T: Precision> BlockMatrix<T> {
-    /// Adds the contacts whose blocks are all in the pattern. Solvers then treat them like every other stiffness.
-    /// [`BlockMatrix::remove_contacts`] restores the matrix exactly; until then no system may write to it.
-    pub fn add_contacts(&mut self, contacts: Vec<Contact>) -> ContactsInMatrix<T> {
-        let pattern = Arc::clone(self.pattern());
+    /// Adds lists of contacts, times a scale, if their blocks are all in the pattern. At most `threads` threads look
+    /// them up. Solvers then treat them like every other stiffness. [`BlockMatrix::remove_contacts`] restores the matrix
+    /// exactly; until then no system may write to it.
+    pub fn add_contacts(&mut self, contacts: &[Vec<Contact>], scale: f64, threads: usize) -> ContactsInMatrix<T> {
         let contents = self.take_contents();
-        let (mut replaced, mut others) = (Vec::new(), Vec::new());
-        // Several contacts of the same vertices follow each other.
-        let mut known = Blocks { rows: [Contact::FIXED; 4], fit: true, places: Vec::new() };
+        let pattern = &**self.pattern();
+        let parts = for_each(threads, contacts.iter().collect(), |part| placed(part, scale, pattern));
+        let (mut replaced, others): (Vec<Vec<Stored<T>>>, Vec<_>) = parts.into_iter().unzip();
         let values = self.values_and_nowhere();
-        for contact in contacts {
-            if known.rows != contact.rows {
-                known.find(contact.rows, &pattern);
-            }
-            if !known.fit {
-                others.push(contact);
-                continue;
-            }
-            for &(i, j, place) in &known.places {
-                let scale = contact.weights[i] * contact.weights[j];
-                replaced.push((place, values[place]));
-                for row in 0..3 {
-                    for column in 0..3 {
-                        values[place][row][column] =
-                            values[place][row][column] + T::from_f64(scale * contact.block[row][column]);
-                    }
+        for (place, block) in replaced.iter_mut().flatten() {
+            let value = &mut values[*place as usize];
+            let added = std::mem::replace(block, *value);
+            for row in 0..3 {
+                for column in 0..3 {
+                    value[row][column] = value[row][column] + added[row][column];
                 }
             }
         }
-        ContactsInMatrix { replaced, contents, others }
+        ContactsInMatrix { replaced, contents, others: others.concat() }
     }
 
     /// Restores the blocks that contacts were added to.
     pub fn remove_contacts(&mut self, contacts: ContactsInMatrix<T>) {
         let values = self.values_and_nowhere();
-        for (place, block) in contacts.replaced.into_iter().rev() {
-            values[place] = block;
+        // Several contacts may share a block.
+        for (place, block) in contacts.replaced.into_iter().rev().flat_map(|part| part.into_iter().rev()) {
+            values[place as usize] = block;
         }
         self.set_contents(contacts.contents);
     }
@@ -99,8 +113,9 @@ mod tests {
                 *value = 0.1 + number as f32;
             }
             let before = matrix.clone();
+            let half = |contact: Contact| Contact { block: contact.block.map(|row| row.map(|e| 0.5 * e)), ..contact };
             let (fits, crosses) = (with([Contact::FIXED, 2, 0, 1]), with([0, 1, 2, 3]));
-            let added = matrix.add_contacts(vec![fits, crosses]);
+            let added = matrix.add_contacts(&[vec![half(fits)], vec![half(crosses)]], 2.0, 1);
             assert_eq!(added.others, [crosses]);
             for (row, column, c) in [(2, 2, 0.0625), (2, 0, 0.125), (0, 1, 0.125), (1, 2, 0.0625), (3, 3, 0.0)] {
                 let change = matrix.block(row, column)[1][2] - before.block(row, column)[1][2];

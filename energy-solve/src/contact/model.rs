@@ -44,9 +44,9 @@ pub trait ContactModel: std::fmt::Debug + Send {
     /// Adds −∇U to the forces on all vertices, in N.
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]);
 
-    /// Returns the stiffness of each pair in contact, and of friction, in N/m, in an order that does not depend on
-    /// threads.
-    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact>;
+    /// Returns the stiffness of each pair in contact, and of friction, in N/m. They come in lists that several threads
+    /// may take, in an order that does not depend on threads. Those of the same vertices should follow each other.
+    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>>;
 
     /// Returns what was counted so far.
     fn counts(&self) -> ContactCounts;

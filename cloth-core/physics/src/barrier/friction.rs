@@ -12,8 +12,10 @@
 
 use energy_dsl::{Block, Packed, Vector3};
 use energy_elements::SlidingFriction;
+use energy_solve::threads::for_each;
 use energy_solve::{Contact, ContactMemory};
 
+use super::PART;
 use super::bristle::{Bristles, LENGTH};
 use super::law::Law;
 use crate::collision::{Closest, CollisionMesh, Pair};
@@ -51,12 +53,12 @@ pub struct Grip {
     pub deforms: bool,
 }
 
-/// All pairs in contact at the start of the step.
+/// All pairs in contact at the start of the step, in order.
 #[derive(Debug)]
 struct Slidings {
     pairs: Vec<Sliding>,
-    /// The potentials. Element i acts on the vector between the sliding points of pair i.
-    elements: Packed<SlidingFriction>,
+    /// The potentials, in parts. Element i of a part acts on the vector between the sliding points of its pair i.
+    elements: Vec<Packed<SlidingFriction>>,
 }
 
 /// A pair in contact at the start of the step.
@@ -128,7 +130,6 @@ impl Friction {
 
     /// Takes the pairs in contact at the start, in order, with their laws and closest points.
     pub fn take(&mut self, mesh: &CollisionMesh, touching: Vec<(Pair, Law, Closest)>) {
-        let mut elements = Vec::new();
         let of = |(pair, law, closest): (Pair, Law, Closest)| {
             let limit = self.coefficient(mesh, &pair) * law.force(law.apart(&closest));
             if limit <= 0.0 {
@@ -138,12 +139,13 @@ impl Friction {
             let normal = closest.normal;
             let between = sliding(&pair, &weights, anchor, &self.start);
             let straight = subtract(between, self.bristles.deflection(&pair, normal));
-            elements.push(SlidingFriction::new(normal, straight, limit, SOFTNESS));
-            Some(Sliding { pair, weights, anchor, normal, straight })
+            let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
+            Some((Sliding { pair, weights, anchor, normal, straight }, element))
         };
-        let pairs = touching.into_iter().filter_map(of).collect();
-        let stencils: Vec<[u32; 1]> = (0..elements.len()).map(|number| [energy_solve::index(number)]).collect();
-        self.sliding = Some(Slidings { pairs, elements: Packed::new(&elements, &stencils) });
+        let (pairs, elements): (Vec<_>, Vec<_>) = touching.into_iter().filter_map(of).unzip();
+        let stencils: Vec<[u32; 1]> = (0..).map(|number| [number]).take(PART).collect();
+        let packed = |part: &[SlidingFriction]| Packed::new(part, &stencils[..part.len()]);
+        self.sliding = Some(Slidings { pairs, elements: elements.chunks(PART).map(packed).collect() });
     }
 
     /// Returns the coefficients of the closest points on cloth and hair, and the closest point of an obstacle.
@@ -168,15 +170,15 @@ impl Friction {
     }
 
     /// Returns Σ μ λ (√(‖t‖² + ε²) − ε), in J.
-    pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-        let energies = self.sliding.as_ref().map(|sliding| sliding.energies(x));
-        energies.iter().flatten().fold(0.0, |sum, energy| sum + energy)
+    pub fn energy(&self, x: &[Vector3<f64>], threads: usize) -> f64 {
+        let sum = |part: Part<'_>| part.energies(x).iter().sum::<f64>();
+        for_each(threads, self.parts().collect(), sum).iter().sum()
     }
 
     /// Adds the forces of friction, in N.
-    pub fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        let Some(sliding) = &self.sliding else { return };
-        for (one, slope) in sliding.pairs.iter().zip(sliding.slopes(x)) {
+    pub fn add_force(&self, x: &[Vector3<f64>], threads: usize, force: &mut [Vector3<f64>]) {
+        let slopes = for_each(threads, self.parts().collect(), |part| part.slopes(x));
+        for (one, slope) in self.pairs().iter().zip(slopes.iter().flatten()) {
             let drag = slope.map(|component| -component);
             one.pair.add(one.weights, drag, force);
             for (vertex, weight) in one.anchor.iter().flat_map(Anchor::terms) {
@@ -185,18 +187,61 @@ impl Friction {
         }
     }
 
-    /// Adds the stiffness of friction. `row` is the row of a vertex in the matrix.
-    pub fn add_contacts(&self, x: &[Vector3<f64>], row: impl Fn(&u32) -> u32, contacts: &mut Vec<Contact>) {
-        let Some(sliding) = &self.sliding else { return };
-        contacts.extend(sliding.pairs.iter().zip(sliding.blocks(x)).map(|(one, block)| Contact {
-            rows: one.pair.vertices.each_ref().map(&row),
-            weights: one.weights,
-            block,
-        }));
+    /// Returns the stiffness of friction.
+    pub fn stiffness(&self, x: &[Vector3<f64>], threads: usize) -> Stiffness<'_> {
+        let blocks = for_each(threads, self.parts().collect(), |part| part.blocks(x));
+        Stiffness { pairs: self.pairs(), blocks: blocks.concat() }
+    }
+
+    fn pairs(&self) -> &[Sliding] {
+        self.sliding.as_ref().map_or(&[], |sliding| &sliding.pairs)
+    }
+
+    /// The pairs in parts, each with its potentials.
+    fn parts(&self) -> impl Iterator<Item = Part<'_>> {
+        let elements = self.sliding.iter().flat_map(|sliding| &sliding.elements);
+        self.pairs().chunks(PART).zip(elements).map(|(pairs, elements)| Part { pairs, elements })
     }
 }
 
-impl Slidings {
+/// The stiffness of friction at one place.
+pub(super) struct Stiffness<'a> {
+    pairs: &'a [Sliding],
+    /// The Hessian of each pair's energy, in N/m.
+    blocks: Vec<Block<f64>>,
+}
+
+/// The stiffness of the friction of one pair.
+#[derive(Clone, Copy)]
+pub(super) struct Rubbing<'a> {
+    weights: &'a [f64; 4],
+    block: &'a Block<f64>,
+}
+
+impl Stiffness<'_> {
+    /// The pairs from one pair up to another, in order. `None` stands for no bound.
+    pub fn between(&self, first: Option<&Pair>, end: Option<&Pair>) -> impl Iterator<Item = (&Pair, Rubbing<'_>)> {
+        let place = |pair: &Pair| self.pairs.partition_point(|one| one.pair < *pair);
+        let range = first.map_or(0, place)..end.map_or(self.pairs.len(), place);
+        let pairs = self.pairs[range.clone()].iter().zip(&self.blocks[range]);
+        pairs.map(|(one, block)| (&one.pair, Rubbing { weights: &one.weights, block }))
+    }
+}
+
+impl Rubbing<'_> {
+    /// The contact of vertices with these rows.
+    pub fn contact(self, rows: [u32; 4]) -> Contact {
+        Contact { rows, weights: *self.weights, block: *self.block }
+    }
+}
+
+/// Some pairs in contact at the start of the step, with their potentials.
+struct Part<'a> {
+    pairs: &'a [Sliding],
+    elements: &'a Packed<SlidingFriction>,
+}
+
+impl Part<'_> {
     /// The vector between the sliding points of each pair.
     fn ways(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         self.pairs.iter().map(|one| one.between(x)).collect()
@@ -246,11 +291,21 @@ impl Anchor {
 /// The vector between the points that slide, up to a constant: Σ cᵢ xᵢ. Differences to one corner lose fewer digits.
 fn sliding(pair: &Pair, weights: &[f64; 4], anchor: Option<Anchor>, x: &[Vector3<f64>]) -> Vector3<f64> {
     let corners = pair.corners(x);
-    let all = weights.iter().copied().zip(corners);
-    let origin = anchor.map_or(corners[0], |anchor| x[anchor.frame as usize]);
-    let on_obstacle = anchor.iter().flat_map(Anchor::terms).map(|(vertex, weight)| (weight, x[vertex]));
     // On a fixed obstacle the coefficients do not add up to 0.
-    let is_balanced = anchor.is_some() || weights.iter().sum::<f64>().abs() < 0.5;
-    let origin = if is_balanced { origin } else { [0.0; 3] };
-    all.chain(on_obstacle).fold([0.0; 3], |sum, (weight, x)| add_scaled(sum, weight, subtract(x, origin)))
+    let is_balanced = weights.iter().sum::<f64>().abs() < 0.5;
+    let origin = match anchor {
+        Some(anchor) => x[anchor.frame as usize],
+        None if is_balanced => corners[0],
+        None => [0.0; 3],
+    };
+    let mut sum = [0.0; 3];
+    for corner in 0..4 {
+        sum = add_scaled(sum, weights[corner], subtract(corners[corner], origin));
+    }
+    if let Some(anchor) = anchor {
+        for (vertex, weight) in anchor.terms() {
+            sum = add_scaled(sum, weight, subtract(x[vertex], origin));
+        }
+    }
+    sum
 }

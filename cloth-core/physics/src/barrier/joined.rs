@@ -1,9 +1,11 @@
 use std::cell::RefCell;
 
 use energy_dsl::Vector3;
+use energy_solve::threads::for_each;
 
+use super::PART;
 use super::law::{Barrier, Law, Order, evaluate};
-use crate::collision::{Closest, Measured, Pair};
+use crate::collision::{Closest, Measured, MeasuredPart, Pair};
 
 /// The pairs in contact, or close to it, in order.
 #[derive(Debug, Default)]
@@ -12,6 +14,18 @@ pub(super) struct Joined {
     pub laws: Vec<Law>,
     /// The pairs where they were last evaluated.
     measured: RefCell<Measured>,
+}
+
+/// Pairs that have an energy where they are.
+pub(super) struct Active<'a> {
+    /// The first pair of the part; `None` for the first part.
+    pub first: Option<&'a Pair>,
+    /// The first pair of the next part; `None` for the last part.
+    pub end: Option<&'a Pair>,
+    measured: MeasuredPart<'a>,
+    /// Their numbers among the measured pairs.
+    numbers: Vec<usize>,
+    barriers: Vec<Barrier>,
 }
 
 impl Joined {
@@ -35,14 +49,42 @@ impl Joined {
         self.pairs.binary_search(pair).is_ok()
     }
 
-    /// Calls `found` with each pair that has an energy at x, its closest points and its barrier.
-    pub fn for_each_active(&self, x: &[Vector3<f64>], order: Order, mut found: impl FnMut(&Pair, &Closest, Barrier)) {
-        let mut measured = self.measured.borrow_mut();
-        measured.measure(&self.pairs, x, 1);
-        let is_active = |&number: &usize| self.laws[number].is_active(measured.distance(number));
-        let active: Vec<usize> = (0..self.pairs.len()).filter(is_active).collect();
-        for (&number, barrier) in active.iter().zip(evaluate(order, &self.laws, &measured, &active)) {
-            found(&self.pairs[number], &measured.closest(number), barrier);
-        }
+    /// Evaluates the pairs that have an energy at x. Returns what `of_part` makes of consecutive ones, in order.
+    pub fn evaluate<R: Send>(
+        &self,
+        x: &[Vector3<f64>],
+        order: Order,
+        threads: usize,
+        of_part: impl Fn(&Active<'_>) -> R + Sync,
+    ) -> Vec<R> {
+        let (pairs, mut measured) = (&self.pairs, self.measured.borrow_mut());
+        let parts = measured.at(pairs, x, PART).zip(self.laws.chunks(PART)).enumerate().collect();
+        for_each(threads, parts, |(number, (part, laws))| {
+            let measured = part.measured();
+            let is_active = |&number: &usize| laws[number].is_active(measured.distance(number));
+            let numbers: Vec<usize> = (0..laws.len()).filter(is_active).collect();
+            let barriers = evaluate(order, laws, measured, &numbers);
+            let first = if number == 0 { None } else { measured.pairs.first() };
+            let end = pairs.get((number + 1) * PART);
+            of_part(&Active { first, end, measured, numbers, barriers })
+        })
+    }
+}
+
+impl Active<'_> {
+    /// The number of pairs.
+    pub fn len(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// The barrier of each pair.
+    pub fn barriers(&self) -> &[Barrier] {
+        &self.barriers
+    }
+
+    /// Each pair with its closest points and its barrier.
+    pub fn iter(&self) -> impl Iterator<Item = (&Pair, Closest, &Barrier)> {
+        let pair = |&number: &usize| (&self.measured.pairs[number], self.measured.closest(number));
+        self.numbers.iter().map(pair).zip(&self.barriers).map(|((pair, closest), barrier)| (pair, closest, barrier))
     }
 }

@@ -4,7 +4,7 @@ use energy_dsl::{Kernel, Lane, Level, Potential, Real, Vector3, dispatch};
 use energy_elements::DistanceBarrier;
 
 use super::spacing::Spacing;
-use crate::collision::{Closest, Measured};
+use crate::collision::{Closest, MeasuredPart};
 
 /// Stiffness of the barrier at half the gap over the resistance of the vertices. Factors from 3 to 30 need about the
 /// same number of iterations.
@@ -87,7 +87,7 @@ fn between<V: Real>(apart: V) -> [Vector3<V>; 2] {
 }
 
 /// Evaluates the barriers of some of the pairs with these laws, where they were measured.
-pub(super) fn evaluate(order: Order, laws: &[Law], measured: &Measured, numbers: &[usize]) -> Vec<Barrier> {
+pub(super) fn evaluate(order: Order, laws: &[Law], measured: MeasuredPart<'_>, numbers: &[usize]) -> Vec<Barrier> {
     let mut barriers = vec![Barrier::default(); numbers.len()];
     dispatch(Evaluation { order, laws, measured, numbers, barriers: &mut barriers });
     barriers
@@ -96,7 +96,7 @@ pub(super) fn evaluate(order: Order, laws: &[Law], measured: &Measured, numbers:
 struct Evaluation<'a> {
     order: Order,
     laws: &'a [Law],
-    measured: &'a Measured,
+    measured: MeasuredPart<'a>,
     numbers: &'a [usize],
     barriers: &'a mut [Barrier],
 }

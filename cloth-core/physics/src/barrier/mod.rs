@@ -34,9 +34,11 @@ mod resistance;
 mod rolling;
 mod spacing;
 mod start;
+mod stiffness;
 mod untangle;
 
 use energy_dsl::{Block, Vector3};
+use energy_solve::threads::for_each;
 use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
 
 pub use friction::Grip;
@@ -44,19 +46,20 @@ pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
 pub use start::{ContactError, ObstacleStart, Participants};
 pub use untangle::Untangling;
 
-use crate::collision::{Closest, CollisionMesh, Move, Nearby, Neighbourhood, Pair, Search};
+use crate::collision::{Closest, CollisionMesh, Move, Near, Nearby, Neighbourhood, Pair, Search};
 use feasible::Meeting;
 use friction::Friction;
-use joined::Joined;
+use joined::{Active, Joined};
 use judge::{Judge, Judgement};
-use law::{Law, Order};
+use law::{Barrier, Law, Order};
 use resistance::Resistance;
-use rolling::rolling;
 use spacing::{Spacing, Spacings};
 
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
 const JOINING: f64 = 1.25;
+/// Pairs that a thread evaluates at a time.
+const PART: usize = 1024;
 /// Part of the displacement of a move that leaves the neighbourhood, by which an iterate may stray before the next
 /// search.
 const STRAYING: f64 = 0.25;
@@ -148,6 +151,31 @@ impl BarrierContact {
         self.neighbourhood.visit(&self.search, x);
     }
 
+    /// Returns the pairs that join at x, where they were measured, in order.
+    fn joining(&self, x: &[Vector3<f64>]) -> Vec<(Pair, Closest)> {
+        let (mesh, spacings, known) = (&self.mesh, &self.spacings, &self.joined.pairs[..]);
+        let (nearby, meeting) = (self.neighbourhood.nearby(), Meeting { mesh, x });
+        let pairs = nearby.pairs();
+        let joining = |part: &[Near]| {
+            let Some(first) = part.first() else { return Vec::new() };
+            let start = known.partition_point(|pair| *pair < pairs[first.number]);
+            let mut known = known[start..].iter().peekable();
+            let mut joining = Vec::new();
+            for Near { number, closest } in part {
+                let pair = &pairs[*number];
+                if closest.separation > spacings.joining(mesh, pair) {
+                    continue;
+                }
+                while known.next_if(|other| *other < pair).is_some() {}
+                if known.peek() != Some(&pair) && meeting.may_join(pair, closest) {
+                    joining.push((*pair, *closest));
+                }
+            }
+            joining
+        };
+        for_each(self.search.threads, nearby.near().chunks(PART).collect(), joining).concat()
+    }
+
     /// Makes all pairs near a move known, on which each vertex strides this far, in m. Returns whether there are new
     /// ones.
     fn follow(&mut self, ends: [&[Vector3<f64>]; 2], stride: impl Fn(usize) -> f64) -> bool {
@@ -237,18 +265,7 @@ impl ContactModel for BarrierContact {
 
     fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
         self.visit(x);
-        let mut known = self.joined.pairs.iter().peekable();
-        let meeting = Meeting { mesh: &self.mesh, x };
-        let mut added = Vec::new();
-        for (pair, closest) in self.neighbourhood.nearby().within_reach() {
-            if closest.separation > self.spacings.joining(&self.mesh, pair) {
-                continue;
-            }
-            while known.next_if(|other| *other < pair).is_some() {}
-            if known.peek() != Some(&pair) && meeting.may_join(pair, closest) {
-                added.push((*pair, *closest));
-            }
-        }
+        let mut added = self.joining(x);
         let mut blocking = std::mem::take(&mut self.blocking);
         blocking.sort_unstable();
         blocking.dedup();
@@ -264,37 +281,39 @@ impl ContactModel for BarrierContact {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-        let mut sum = self.friction.energy(x);
-        self.joined.for_each_active(x, Order::Energy, |_, _, barrier| sum += barrier.energy);
-        sum
+        let of_part = |active: &Active<'_>| active.barriers().iter().map(|barrier| barrier.energy).sum::<f64>();
+        let energies = self.joined.evaluate(x, Order::Energy, self.search.threads, of_part);
+        self.friction.energy(x, self.search.threads) + energies.iter().sum::<f64>()
     }
 
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
-        self.joined.for_each_active(x, Order::Force, |pair, closest, barrier| {
-            pair.add(closest.weights, closest.normal.map(|component| barrier.force * component), force);
-        });
-        self.friction.add_force(x, force);
+        let push = |(pair, closest, barrier): (&Pair, Closest, &Barrier)| {
+            (*pair, closest.weights, closest.normal.map(|component| barrier.force * component))
+        };
+        let of_part = |active: &Active<'_>| active.iter().map(push).collect::<Vec<_>>();
+        let pushes = self.joined.evaluate(x, Order::Force, self.search.threads, of_part);
+        pushes.iter().flatten().for_each(|(pair, weights, push)| pair.add(*weights, *push, force));
+        self.friction.add_force(x, self.search.threads, force);
     }
 
-    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
-        let row = |&vertex: &u32| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index);
-        let (mut contacts, mut active) = (Vec::new(), 0);
-        self.joined.for_each_active(x, Order::Curvature, |pair, closest, barrier| {
-            let n = closest.normal;
-            let rows = pair.vertices.each_ref().map(row);
-            let along_normal = |stiffness: f64| n.map(|a| n.map(|b| stiffness * a * b));
-            contacts.push(Contact { rows, weights: closest.weights, block: along_normal(barrier.curvature) });
-            if self.mesh.obstacle_of(pair).is_some() {
-                let block = along_normal(barrier.force * closest.distance);
-                let is_free = |(row, weight): (&u32, &f64)| *row != Contact::FIXED && *weight != 0.0;
-                let tilts = rolling(pair, closest, x).filter(|weights| rows.iter().zip(weights).any(is_free));
-                contacts.extend(tilts.map(|weights| Contact { rows, weights, block }));
-            }
-            active += 1;
-        });
-        self.counts.active += active;
+    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
+        let (mesh, threads) = (&self.mesh, self.search.threads);
+        let rows = |pair: &Pair| {
+            pair.vertices.map(|vertex| dofs.place(vertex as usize).map_or(Contact::FIXED, energy_solve::index))
+        };
+        let friction = self.friction.stiffness(x, threads);
+        let (active, mut contacts): (Vec<usize>, Vec<_>) = self
+            .joined
+            .evaluate(x, Order::Curvature, threads, |active| {
+                (active.len(), stiffness::contacts(active, &friction, mesh, rows, x))
+            })
+            .into_iter()
+            .unzip();
+        if contacts.is_empty() {
+            contacts.push(friction.between(None, None).map(|(pair, rubbing)| rubbing.contact(rows(pair))).collect());
+        }
+        self.counts.active += active.iter().sum::<usize>() as u64;
         self.counts.systems += 1;
-        self.friction.add_contacts(x, row, &mut contacts);
         contacts
     }
 

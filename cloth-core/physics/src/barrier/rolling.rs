@@ -23,23 +23,24 @@ const PARALLEL: f64 = 1e-3;
 /// are corners.
 pub(super) fn rolling(pair: &Pair, closest: &Closest, x: &[Vector3<f64>]) -> impl Iterator<Item = [f64; 4]> {
     let corners = pair.corners(x);
-    let mut orthonormal: Vec<([f64; 4], Vector3<f64>)> = Vec::with_capacity(2);
-    for (from, to) in sides(pair.kind, &closest.weights) {
+    let mut orthonormal: [Option<([f64; 4], Vector3<f64>)>; 2] = [None; 2];
+    for (number, (from, to)) in sides(pair.kind, &closest.weights).enumerate() {
         let mut weights = [0.0; 4];
         (weights[from], weights[to]) = (-1.0, 1.0);
         let mut tangent = subtract(corners[to], corners[from]);
         let length = norm(tangent);
-        for (other, unit) in &orthonormal {
+        for (other, unit) in orthonormal.iter().flatten() {
             let part = dot(tangent, *unit);
             weights = std::array::from_fn(|corner| weights[corner] - part * other[corner]);
             tangent = add_scaled(tangent, -part, *unit);
         }
         let across = norm(tangent);
         if across > PARALLEL * length {
-            orthonormal.push((weights.map(|weight| weight / across), tangent.map(|component| component / across)));
+            let unit = tangent.map(|component| component / across);
+            orthonormal[number] = Some((weights.map(|weight| weight / across), unit));
         }
     }
-    orthonormal.into_iter().map(|(weights, _)| weights)
+    orthonormal.into_iter().flatten().map(|(weights, _)| weights)
 }
 
 /// Returns the sides along which the closest points can move: pairs of corners with both weights.

@@ -100,13 +100,13 @@ fn friction_opposes_sliding() {
         // The force is minus the gradient of the energy, and the stiffness its derivative.
         let stiffness = {
             let (_, mut contact) = force_at(FRICTION, &moved);
-            contact.contacts(&DofMap::new(&[false; 6]), &moved)
+            contact.contacts(&DofMap::new(&[false; 6]), &moved).concat()
         };
         for (vertex, axis) in (3..6).flat_map(|vertex| (0..3).map(move |axis| (vertex, axis))) {
             let at = |offset: f64| {
                 let mut moved = moved.clone();
                 moved[vertex][axis] += offset;
-                contact.friction.energy(&moved)
+                contact.friction.energy(&moved, 1)
             };
             const H: f64 = 1e-7;
             let slope = (8.0 * (at(H) - at(-H)) - (at(2.0 * H) - at(-2.0 * H))) / (12.0 * H);
@@ -160,7 +160,7 @@ fn the_stiffness_is_the_curvature_along_the_normal() {
     for x in states() {
         let mut contact = contact(&x);
         contact.meet(&x);
-        let found = contact.contacts(&DofMap::new(&[false; 6]), &x);
+        let found = contact.contacts(&DofMap::new(&[false; 6]), &x).concat();
         assert!(!found.is_empty());
         for ((pair, law, closest), one) in active(&contact, &x).into_iter().zip(&found) {
             assert_eq!((one.weights, one.rows), (closest.weights, pair.vertices));

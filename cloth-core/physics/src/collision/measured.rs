@@ -1,8 +1,6 @@
 use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
-use energy_solve::threads::for_each;
 
 use super::closest::corners;
-use super::separations::PART;
 use super::{Closest, Pair, PairKind};
 
 /// The closest points of many pairs at one place.
@@ -15,20 +13,43 @@ pub struct Measured {
     separations: Vec<f64>,
 }
 
+/// Consecutive pairs, to be measured at one place.
+#[derive(Debug)]
+pub struct Unmeasured<'a> {
+    pairs: &'a [Pair],
+    /// The place; `None` if the pairs have been measured there.
+    place: Option<&'a [Vector3<f64>]>,
+    numbers: &'a mut [[f64; 8]],
+    separations: &'a mut [f64],
+}
+
+/// The closest points of consecutive pairs at one place.
+#[derive(Clone, Copy, Debug)]
+pub struct MeasuredPart<'a> {
+    /// The pairs.
+    pub pairs: &'a [Pair],
+    numbers: &'a [[f64; 8]],
+    separations: &'a [f64],
+}
+
 impl Measured {
-    /// Measures pairs at x, unless they have been measured there. Pairs are in order, so those of one kind are
-    /// consecutive.
-    pub fn measure(&mut self, pairs: &[Pair], x: &[Vector3<f64>], threads: usize) {
-        if self.numbers.len() == pairs.len() && self.place == x {
-            return;
+    /// Divides pairs into parts of this length, which are measured at x unless they have been. All parts must be
+    /// measured. Pairs are in order, so those of one kind are consecutive.
+    pub fn at<'a>(
+        &'a mut self,
+        pairs: &'a [Pair],
+        x: &'a [Vector3<f64>],
+        length: usize,
+    ) -> impl Iterator<Item = Unmeasured<'a>> {
+        let is_known = self.numbers.len() == pairs.len() && self.place == x;
+        if !is_known {
+            x.clone_into(&mut self.place);
+            self.numbers.resize(pairs.len(), [0.0; 8]);
+            self.separations.resize(pairs.len(), 0.0);
         }
-        x.clone_into(&mut self.place);
-        self.numbers.resize(pairs.len(), [0.0; 8]);
-        self.separations.resize(pairs.len(), 0.0);
-        let Self { numbers, separations, .. } = self;
-        let parts = pairs.chunks(PART).zip(numbers.chunks_mut(PART)).zip(separations.chunks_mut(PART));
-        let parts = parts.map(|((pairs, numbers), separations)| Measure { pairs, x, numbers, separations });
-        for_each(threads, parts.collect(), dispatch);
+        let place = (!is_known).then_some(x);
+        let parts = pairs.chunks(length).zip(self.numbers.chunks_mut(length)).zip(self.separations.chunks_mut(length));
+        parts.map(move |((pairs, numbers), separations)| Unmeasured { pairs, place, numbers, separations })
     }
 
     /// Discards everything. Required if pairs change.
@@ -37,7 +58,20 @@ impl Measured {
         self.numbers.clear();
         self.separations.clear();
     }
+}
 
+impl<'a> Unmeasured<'a> {
+    /// Measures the pairs.
+    pub fn measured(self) -> MeasuredPart<'a> {
+        let Self { pairs, place, numbers, separations } = self;
+        if let Some(x) = place {
+            dispatch(Measure { pairs, x, numbers, separations });
+        }
+        MeasuredPart { pairs, numbers, separations }
+    }
+}
+
+impl MeasuredPart<'_> {
     /// The distance of a pair, in m.
     #[inline]
     pub fn distance(&self, number: usize) -> f64 {

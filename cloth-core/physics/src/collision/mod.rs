@@ -29,7 +29,7 @@ pub use certificate::{Clearance, Move};
 pub use closest::Closest;
 pub use crossing::{Crossing, crossings};
 pub use exclusions::{Exclusions, Members};
-pub use measured::Measured;
+pub use measured::{Measured, MeasuredPart};
 pub use mesh::CollisionMesh;
 pub use nearby::Nearby;
 pub use neighbourhood::Neighbourhood;

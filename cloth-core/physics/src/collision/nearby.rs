@@ -27,7 +27,12 @@ impl Nearby {
 
     /// The pairs that were within reach where they were last measured, with their closest points.
     pub fn within_reach(&self) -> impl Iterator<Item = (&Pair, &Closest)> {
-        self.separations.near().iter().map(|Near { number, closest }| (&self.pairs[*number], closest))
+        self.near().iter().map(|Near { number, closest }| (&self.pairs[*number], closest))
+    }
+
+    /// The numbers of these pairs, and their closest points.
+    pub fn near(&self) -> &[Near] {
+        self.separations.near()
     }
 
     /// Measures the pairs at x, unless they have been measured there.

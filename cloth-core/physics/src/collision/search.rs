@@ -10,6 +10,10 @@ use crate::geometry::{Bounds, Branches, Hierarchy, MovingBounds, Volume};
 
 /// A mesh with fewer vertices is searched on one thread.
 const FEW: usize = 1000;
+/// Changed features whose pairs a thread finds at a time.
+const CHANGED: usize = 512;
+/// Fewer pairs are put in order on one thread.
+const FEW_PAIRS: usize = 4096;
 
 /// Finds the pairs whose vertices may meet within given regions.
 #[derive(Clone, Debug)]
@@ -88,11 +92,16 @@ impl Trees {
         Self { points, triangles, edges, first }
     }
 
-    fn refit(&mut self, boxes: &Boxes<'_>) {
+    /// Adapts to the boxes of all features.
+    fn refit<'a>(&mut self, boxes: &Boxes<'a>, threads: usize) {
         let [points, triangles, edges] = self.first;
-        self.points.refit(|item| boxes.point(points + item));
-        self.triangles.refit(|item| boxes.triangle(triangles + item));
-        self.edges.refit(|item| boxes.edge(edges + item));
+        let trees: Vec<(&mut Hierarchy<MovingBounds>, fn(&Boxes<'a>, usize) -> MovingBounds, usize)> = vec![
+            // There are as many edges as triangles and points.
+            (&mut self.edges, Boxes::edge, edges),
+            (&mut self.triangles, Boxes::triangle, triangles),
+            (&mut self.points, Boxes::point, points),
+        ];
+        for_each(threads, trees, |(tree, of, first)| tree.refit(|item| of(boxes, first + item)));
     }
 
     /// Adapts to the boxes of changed features, which are in order.
@@ -127,6 +136,14 @@ enum Task {
     PointsOnTriangles,
     Edges(Branches),
     Obstacles,
+}
+
+/// Features with a changed vertex whose pairs a thread finds at a time, by their places in the mesh's lists.
+#[derive(Clone, Copy, Debug)]
+enum Changed<'a> {
+    Points(&'a [usize]),
+    Triangles(&'a [usize]),
+    Edges(&'a [usize]),
 }
 
 /// All tasks, in an order that gives two threads about the same work.
@@ -170,17 +187,17 @@ impl Search {
     /// meet. Regions may move on straight lines. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
-        self.obstacles.refit(&boxes);
+        let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
+        self.obstacles.refit(&boxes, 1);
         self.is_own_fitted = self.rules.with_itself;
         let mut found = Found::default();
         if self.rules.with_itself {
-            self.own.refit(&boxes);
-            let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
+            self.own.refit(&boxes, threads);
             for_each(threads, TASKS.to_vec(), |task| self.find(task, mesh)).into_iter().for_each(|one| found.add(one));
         } else {
             self.find_near_obstacles(&boxes, &mut found);
         }
-        in_order(mesh, found)
+        in_order(mesh, found, threads)
     }
 
     /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
@@ -238,31 +255,52 @@ impl Search {
     /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
     pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
-        let [points, triangles, edges] = changed_features(mesh, is_changed);
-        self.refit_changed(&boxes, [&points, &triangles, &edges]);
+        let changed = changed_features(mesh, is_changed);
+        self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
+        let [points, triangles, edges] = &changed;
+        let points = points.chunks(CHANGED).map(Changed::Points);
+        let triangles = triangles.chunks(CHANGED).map(Changed::Triangles);
+        let tasks = points.chain(triangles).chain(edges.chunks(CHANGED).map(Changed::Edges)).collect();
         let mut found = Found::default();
-        for point in points {
-            for trees in self.partners(mesh, mesh.points()[point]) {
-                trees.triangles.near(&boxes.point(point), |triangle| {
-                    self.add_point_and_triangle(mesh, point, trees.first[1] + triangle, &mut found);
-                });
+        for_each(self.threads, tasks, |task| self.find_changed(task, &boxes))
+            .into_iter()
+            .for_each(|one| found.add(one));
+        in_order(mesh, found, self.threads)
+    }
+
+    /// Finds the pairs of some changed features.
+    fn find_changed(&self, task: Changed<'_>, boxes: &Boxes<'_>) -> Found {
+        let (mesh, mut found) = (boxes.mesh, Found::default());
+        match task {
+            Changed::Points(points) => {
+                for &point in points {
+                    for trees in self.partners(mesh, mesh.points()[point]) {
+                        trees.triangles.near(&boxes.point(point), |triangle| {
+                            self.add_point_and_triangle(mesh, point, trees.first[1] + triangle, &mut found);
+                        });
+                    }
+                }
+            }
+            Changed::Triangles(triangles) => {
+                for &triangle in triangles {
+                    for trees in self.partners(mesh, mesh.triangles()[triangle][0]) {
+                        trees.points.near(&boxes.triangle(triangle), |point| {
+                            self.add_point_and_triangle(mesh, trees.first[0] + point, triangle, &mut found);
+                        });
+                    }
+                }
+            }
+            Changed::Edges(edges) => {
+                for &edge in edges {
+                    for trees in self.partners(mesh, mesh.edges()[edge][0]) {
+                        trees.edges.near(&boxes.edge(edge), |other| {
+                            self.add_edges(mesh, edge, trees.first[2] + other, &mut found);
+                        });
+                    }
+                }
             }
         }
-        for triangle in triangles {
-            for trees in self.partners(mesh, mesh.triangles()[triangle][0]) {
-                trees.points.near(&boxes.triangle(triangle), |point| {
-                    self.add_point_and_triangle(mesh, trees.first[0] + point, triangle, &mut found);
-                });
-            }
-        }
-        for edge in edges {
-            for trees in self.partners(mesh, mesh.edges()[edge][0]) {
-                trees.edges.near(&boxes.edge(edge), |other| {
-                    self.add_edges(mesh, edge, trees.first[2] + other, &mut found);
-                });
-            }
-        }
-        in_order(mesh, found)
+        found
     }
 
     /// Adapts the hierarchies to the boxes of changed features.
@@ -273,7 +311,7 @@ impl Search {
         });
         let (own, others) = (split.map(|(own, _)| own), split.map(|(_, others)| others));
         if !self.is_own_fitted && others.iter().any(|others| !others.is_empty()) {
-            self.own.refit(boxes);
+            self.own.refit(boxes, 1);
             self.is_own_fitted = true;
         }
         self.own.refit_some(boxes, own);
@@ -332,19 +370,30 @@ fn changed_features(mesh: &CollisionMesh, is_changed: &[bool]) -> [Vec<usize>; 3
 }
 
 /// Returns the pairs of these features once and in order.
-fn in_order(mesh: &CollisionMesh, found: Found) -> Vec<Pair> {
+fn in_order(mesh: &CollisionMesh, Found { on_triangles, of_edges }: Found, threads: usize) -> Vec<Pair> {
+    let threads = if on_triangles.len() + of_edges.len() < FEW_PAIRS { 1 } else { threads };
+    let kinds = vec![(PairKind::PointTriangle, on_triangles), (PairKind::EdgeEdge, of_edges)];
+    for_each(threads, kinds, |(kind, features)| pairs_in_order(mesh, kind, features)).concat()
+}
+
+fn pairs_in_order(mesh: &CollisionMesh, kind: PairKind, features: Vec<Features>) -> Vec<Pair> {
     let [points, triangles, edges] = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
-    let on_triangles = sorted(found.on_triangles, [points, triangles]);
-    let of_edges = sorted(found.of_edges, [edges, edges]);
-    let on_triangle = |features: Features| {
-        let (point, [a, b, c]) = (mesh.points()[features[0] as usize], mesh.triangles()[features[1] as usize]);
-        Pair { kind: PairKind::PointTriangle, features, vertices: [point, a, b, c] }
-    };
-    let of_edges = of_edges.into_iter().map(|features| {
-        let [[a, b], [c, d]] = features.map(|edge| mesh.edges()[edge as usize]);
-        Pair { kind: PairKind::EdgeEdge, features, vertices: [a, b, c, d] }
-    });
-    on_triangles.into_iter().map(on_triangle).chain(of_edges).collect()
+    match kind {
+        PairKind::PointTriangle => {
+            let pair = |features: Features| {
+                let (point, [a, b, c]) = (mesh.points()[features[0] as usize], mesh.triangles()[features[1] as usize]);
+                Pair { kind, features, vertices: [point, a, b, c] }
+            };
+            sorted(features, [points, triangles]).into_iter().map(pair).collect()
+        }
+        PairKind::EdgeEdge => {
+            let pair = |features: Features| {
+                let [[a, b], [c, d]] = features.map(|edge| mesh.edges()[edge as usize]);
+                Pair { kind, features, vertices: [a, b, c, d] }
+            };
+            sorted(features, [edges, edges]).into_iter().map(pair).collect()
+        }
+    }
 }
 
 /// Sorts features whose numbers are below some counts, and drops repeated ones. Time is linear: they are counted by

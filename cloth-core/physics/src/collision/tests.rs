@@ -96,7 +96,7 @@ proptest! {
     #[test]
     fn lanes_measure_what_single_pairs_are([x, _] in impact(), half in 0.0..0.02) {
         let (pairs, mut measured, mut separations) = (pairs(), Measured::default(), Separations::default());
-        measured.measure(&pairs, &x, 2);
+        let measured = measured.at(&pairs, &x, pairs.len()).next().expect("one part").measured();
         separations.measure(&pairs, &x, &[half; 6], 2);
         let mut near = separations.near().iter().peekable();
         for (number, pair) in pairs.iter().enumerate() {

@@ -191,7 +191,7 @@ mod tests {
             self.inner.add_force(x, force);
         }
 
-        fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Contact> {
+        fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
             self.inner.contacts(dofs, x)
         }
 

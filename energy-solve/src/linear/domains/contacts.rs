@@ -6,9 +6,12 @@ use energy_dsl::{Block, Level, Vector3};
 use super::{InverseFactor, Precision, Wide, scaled};
 use crate::contact::{Contact, factors};
 use crate::matrix::pattern::index;
+use crate::threads::for_each;
 
 /// Marks a vertex of a contact whose row is not in the domain.
 const ELSEWHERE: u32 = u32::MAX;
+/// Contacts that a thread scales at a time.
+const PART: usize = 1024;
 
 /// The contacts that act on a domain, scaled to Σ g gᵀ without its diagonal blocks. Here g has the 3-vector cᵢ C⁻¹ r at
 /// row i, and r rᵀ is a summand of the contact's block.
@@ -18,7 +21,8 @@ const ELSEWHERE: u32 = u32::MAX;
 pub(crate) struct DomainContacts<T> {
     /// Rows that contacts act on, counted from the first row of the domain, ascending.
     rows: Vec<u32>,
-    factors: Vec<ScaledFactor<T>>,
+    /// One list for each part of the contacts.
+    factors: Vec<Vec<ScaledFactor<T>>>,
 }
 
 #[derive(Clone, Debug)]
@@ -57,8 +61,26 @@ pub(crate) fn distribute<T: Precision>(
     contacts: &[Contact],
     ranges: &[Range<usize>],
     inverses: &[InverseFactor<T>],
+    threads: usize,
 ) -> Vec<DomainContacts<T>> {
     let (mut all, homes) = published(contacts, ranges);
+    let parts = contacts.chunks(PART).collect();
+    for part in for_each(threads, parts, |part| scaled_factors(part, ranges.len(), &homes, inverses)) {
+        for (domain, factors) in all.iter_mut().zip(part) {
+            domain.factors.push(factors);
+        }
+    }
+    all
+}
+
+/// Returns the summands of some contacts for each domain.
+fn scaled_factors<T: Precision>(
+    contacts: &[Contact],
+    domains: usize,
+    homes: &[Home],
+    inverses: &[InverseFactor<T>],
+) -> Vec<Vec<ScaledFactor<T>>> {
+    let mut all: Vec<_> = (0..domains).map(|_| Vec::new()).collect();
     for contact in contacts {
         let mut vertices = [Vertex::default(); 4];
         let mut count = 0;
@@ -86,7 +108,7 @@ pub(crate) fn distribute<T: Precision>(
                     let target =
                         |vertex: &Vertex| if vertex.home.domain == *domain { vertex.home.row } else { ELSEWHERE };
                     vertices.iter().zip(&mut scaled_factor.targets).for_each(|(vertex, t)| *t = target(vertex));
-                    all[*domain as usize].factors.push(scaled_factor.clone());
+                    all[*domain as usize].push(scaled_factor.clone());
                 }
             }
         }
@@ -154,7 +176,7 @@ impl<T: Precision> DomainContacts<T> {
             return;
         }
         let t: Vec<_> = borders.iter().map(|border| border.read().expect("no other thread panicked")).collect();
-        for ScaledFactor { vectors, sources, targets } in &self.factors {
+        for ScaledFactor { vectors, sources, targets } in self.factors.iter().flatten() {
             let mut own = [T::from_f64(0.0); 4];
             let mut sum = T::from_f64(0.0);
             for vertex in 0..4 {

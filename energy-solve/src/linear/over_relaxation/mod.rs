@@ -121,14 +121,14 @@ impl<T: Precision> OverRelaxation<T> {
 
     /// Scales contacts with C⁻¹ and hands them to the domains.
     fn take_contacts(&mut self, contacts: &[Contact]) {
-        let Self { inverses, domains, contact_borders, .. } = self;
+        let Self { threads, inverses, domains, contact_borders, .. } = self;
         contact_borders.clear();
         if contacts.is_empty() {
             domains.iter_mut().for_each(|domain| domain.contacts = Default::default());
             return;
         }
         let ranges: Vec<_> = domains.iter().map(|domain| domain.triangle.rows.clone()).collect();
-        for (domain, contacts) in domains.iter_mut().zip(distribute(contacts, &ranges, inverses)) {
+        for (domain, contacts) in domains.iter_mut().zip(distribute(contacts, &ranges, inverses, *threads)) {
             contact_borders.push(contacts.border());
             domain.contacts = contacts;
         }

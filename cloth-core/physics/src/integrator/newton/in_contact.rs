@@ -87,15 +87,11 @@ impl IncrementalPotential<'_> {
         }
     }
 
-    /// Returns the Hessian of contact's contribution to E.
-    pub(super) fn contacts(&mut self, x: &[Vector3<f64>]) -> Vec<Contact> {
-        let square = self.dt * self.dt;
+    /// Returns the stiffness of the contacts, in N/m.
+    pub(super) fn contacts(&mut self, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
         let Some((contact, dofs)) = self.body.system.contact() else { return Vec::new() };
-        let mut contacts = contact.contacts(dofs, x);
+        let contacts = contact.contacts(dofs, x);
         self.report.contact = ContactWork::between(&self.counted, &contact.counts());
-        for contact in &mut contacts {
-            contact.block = contact.block.map(|row| row.map(|entry| square * entry));
-        }
         contacts
     }
 

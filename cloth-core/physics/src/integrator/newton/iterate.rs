@@ -170,9 +170,10 @@ impl<'a> Iterate<'a> {
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
         let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
         let contacts = self.potential.contacts(&self.x);
+        let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
         let Memory { matrix, solver } = &mut *self.memory;
         let started = Instant::now();
-        let contacts = matrix.add_contacts(contacts);
+        let contacts = matrix.add_contacts(&contacts, scale, threads);
         let prepared = solver.prepare(matrix, &contacts.others, self.trial);
         self.potential.report.phases.factorisation += started.elapsed();
 
@@ -213,8 +214,9 @@ impl<'a> Iterate<'a> {
         let mut matrix = self.potential.body.system.matrix();
         self.potential.linearise(&self.x, curvature, &mut matrix)?;
         let contacts = self.potential.contacts(&self.x);
-        let contacts = matrix.add_contacts(contacts);
-        let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), self.potential.body.system.threads());
+        let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
+        let contacts = matrix.add_contacts(&contacts, scale, threads);
+        let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), threads);
         solver.scale_with_contacts(&matrix, &contacts.others)?;
         Ok(solver.solve(downhill, direction, options))
     }
