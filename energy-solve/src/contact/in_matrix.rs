@@ -45,7 +45,7 @@ impl Places {
 /// Returns the blocks of the contacts that fit into a pattern, and the other contacts, all times a scale. Contacts of
 /// the same vertices that follow each other are summed.
 fn placed<T: Precision>(contacts: &[Contact], scale: f64, pattern: &Pattern) -> (Vec<Stored<T>>, Vec<Contact>) {
-    let (mut stored, mut others) = (Vec::new(), Vec::new());
+    let (mut stored, mut others) = (Vec::with_capacity(2 * contacts.len()), Vec::new());
     let mut places = Places::default();
     for same in contacts.chunk_by(|one, other| one.rows == other.rows) {
         if !places.find(same[0].rows, pattern) {

@@ -54,8 +54,10 @@ pub struct Move<'a> {
 impl<'a> Move<'a> {
     /// Starts the certificate of a move of all vertices.
     pub fn new(from: &'a [Vector3<f64>], to: &'a [Vector3<f64>]) -> Self {
-        let largest = |x: &[Vector3<f64>]| x.iter().flatten().fold(0.0, |largest: f64, c| largest.max(c.abs()));
-        Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * largest(from).max(largest(to)) }
+        let larger =
+            |[a, b, c]: Vector3<f64>, x: &Vector3<f64>| [a.max(x[0].abs()), b.max(x[1].abs()), c.max(x[2].abs())];
+        let [a, b, c] = from.iter().chain(to).fold([0.0; 3], larger);
+        Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * a.max(b).max(c) }
     }
 
     /// The positions at the start.

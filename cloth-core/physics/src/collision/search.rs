@@ -124,9 +124,10 @@ struct Found {
 }
 
 impl Found {
-    fn add(&mut self, other: Self) {
-        self.on_triangles.extend(other.on_triangles);
-        self.of_edges.extend(other.of_edges);
+    fn all(parts: &[Self]) -> Self {
+        let on_triangles: Vec<_> = parts.iter().map(|part| &part.on_triangles[..]).collect();
+        let of_edges: Vec<_> = parts.iter().map(|part| &part.of_edges[..]).collect();
+        Self { on_triangles: on_triangles.concat(), of_edges: of_edges.concat() }
     }
 }
 
@@ -190,13 +191,12 @@ impl Search {
         let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
         self.obstacles.refit(&boxes, 1);
         self.is_own_fitted = self.rules.with_itself;
-        let mut found = Found::default();
-        if self.rules.with_itself {
+        let found = if self.rules.with_itself {
             self.own.refit(&boxes, threads);
-            for_each(threads, TASKS.to_vec(), |task| self.find(task, mesh)).into_iter().for_each(|one| found.add(one));
+            Found::all(&for_each(threads, TASKS.to_vec(), |task| self.find(task, mesh)))
         } else {
-            self.find_near_obstacles(&boxes, &mut found);
-        }
+            self.find_near_obstacles(&boxes)
+        };
         in_order(mesh, found, threads)
     }
 
@@ -233,21 +233,23 @@ impl Search {
     }
 
     /// Finds pairs with obstacles, without the hierarchies of cloth and hair: most features are near no obstacle.
-    fn find_near_obstacles(&self, boxes: &Boxes<'_>, found: &mut Found) {
+    fn find_near_obstacles(&self, boxes: &Boxes<'_>) -> Found {
         let (mesh, Trees { points, triangles, edges, first }) = (boxes.mesh, &self.obstacles);
+        let mut found = Found::default();
         for point in 0..first[0] {
             triangles.near(&boxes.point(point), |triangle| {
-                self.add_point_and_triangle(mesh, point, first[1] + triangle, found);
+                self.add_point_and_triangle(mesh, point, first[1] + triangle, &mut found);
             });
         }
         for triangle in 0..first[1] {
             points.near(&boxes.triangle(triangle), |point| {
-                self.add_point_and_triangle(mesh, first[0] + point, triangle, found);
+                self.add_point_and_triangle(mesh, first[0] + point, triangle, &mut found);
             });
         }
         for edge in 0..first[2] {
-            edges.near(&boxes.edge(edge), |other| self.add_edges(mesh, edge, first[2] + other, found));
+            edges.near(&boxes.edge(edge), |other| self.add_edges(mesh, edge, first[2] + other, &mut found));
         }
+        found
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
@@ -261,10 +263,7 @@ impl Search {
         let points = points.chunks(CHANGED).map(Changed::Points);
         let triangles = triangles.chunks(CHANGED).map(Changed::Triangles);
         let tasks = points.chain(triangles).chain(edges.chunks(CHANGED).map(Changed::Edges)).collect();
-        let mut found = Found::default();
-        for_each(self.threads, tasks, |task| self.find_changed(task, &boxes))
-            .into_iter()
-            .for_each(|one| found.add(one));
+        let found = Found::all(&for_each(self.threads, tasks, |task| self.find_changed(task, &boxes)));
         in_order(mesh, found, self.threads)
     }
 

@@ -44,10 +44,7 @@ impl Separations {
             of_edges,
             apart_of_edges,
         ));
-        self.near.clear();
-        for near in for_each(threads, all.collect(), |part| dispatch(Measure { part, x, halves })) {
-            self.near.extend(near);
-        }
+        self.near = for_each(threads, all.collect(), |part| dispatch(Measure { part, x, halves })).concat();
     }
 
     /// Discards everything. Required if pairs change.
@@ -113,7 +110,7 @@ impl Kernel for Measure<'_> {
     fn run<L: Level>(self) -> Vec<Near> {
         let Self { part: Part { kind, first, pairs, separations }, x, halves } = self;
         let lanes = L::F64::LANES;
-        let mut near = Vec::new();
+        let mut near = Vec::with_capacity(pairs.len() / 4);
         let chunks = pairs.chunks(lanes).zip(separations.chunks_mut(lanes));
         for (start, (pairs, separations)) in chunks.enumerate().map(|(chunk, parts)| (first + chunk * lanes, parts)) {
             let (mut vertices, mut reach) = ([[0; 16]; 4], [0.0; 16]);
