@@ -122,6 +122,8 @@ fn functions_of_one_dihedral_angle_are_recognised() {
         "θ * norm(x4 - x3)",
         "θ^2 / norm_squared(x1 - x2)",
         "θ + dihedral(x2, x1, x4, x3)",
+        "θ - dihedral(x1, x4, x3, x2)",
+        "(θ - dihedral(x1, x4, x3, x2)) * sin(θ)",
         "θ * dihedral(x1, x3, x2, x4)",
         "θ^2 + dot(x1 - x2, x3 - x4)",
         "k * norm(gradient(θ, x1))",
@@ -141,7 +143,11 @@ fn functions_of_one_dihedral_angle_are_recognised() {
         "energy A(x1, x2, x3: Point) { dihedral(x1, x1, x2, x3) }",
         "energy A(x1, x2, x3: Point; x4: Vec3) { dihedral(x1, x2, x3, x4) }",
         "energy A(x1, x2, x3, x4: Point) { dihedral(2 * x1, x2, x3, x4) }",
-        "energy A(x1, x2, x3, x4: Point; rest X: Vec3) { rest { let s = dihedral(X, 2 * X, 3 * X, X); } s * norm(x1 - x2 + x3 - x4) }",
+        "energy A(x1, x2, x3, x4: Point) { dihedral(2 * (x4 - x3), x1 - x3, x3 - x3, x2 - x3) }",
+        "energy A(x1, x2: Point; rest X: Vec3) {
+            rest { let s = dihedral(X, 2 * X, 3 * X, X); }
+            s * norm(x1 - x2)
+        }",
         "force A(x1, x2, x3, x4: Point) { let g = gradient(dihedral(x1, x2, x3, x4), x1); [g, g, g, g] }",
     ] {
         assert_eq!(of(source), None, "{source}");
