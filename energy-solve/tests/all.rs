@@ -7,6 +7,7 @@ mod curvature;
 mod dissipation;
 mod elements;
 mod export;
+mod hinges;
 mod least_squares;
 mod multigrid;
 mod solvers;

@@ -89,3 +89,67 @@ fn what_does_not_fit_is_refused_with_the_expected_size() {
     let error = read(STRIP).elements::<f64>(2, &[Column::Each(&sound)], &[Column::Same(&[1.0])]).unwrap_err();
     assert!(error.to_string().starts_with("element 1: Strip: the rest shape is degenerate"), "{error}");
 }
+
+/// Elements whose energy depends on points through one dihedral angle only say of which points.
+#[test]
+fn functions_of_one_dihedral_angle_are_recognised() {
+    let of_hinge = |formula: &str| {
+        let source = format!(
+            "energy Bend(x1, x2, x3, x4: Point; k, θ0: Scalar) {{
+                let θ = dihedral(x1, x2, x3, x4);
+                ({formula}) + k * θ0
+            }}"
+        );
+        read(&source).declaration().dihedral
+    };
+    for formula in [
+        "θ",
+        "k * (θ - θ0)^2",
+        "cos(θ)",
+        "1 - cos(θ)",
+        "sin(θ / 2)",
+        "k * (sin(θ / 2) - sin(θ0 / 2))^2",
+        "cos(θ / 2)",
+        "k * one_minus_cos(θ - θ0) + θ^3",
+        "sqrt(8) * sin(θ / sqrt(8))",
+        "if θ < θ0 { k * (θ - θ0)^2 } else { exp(θ) }",
+        "if norm(x4 - x3) < θ0 { θ } else { 2 * θ }",
+        "gradient(k * θ^3, k) + sin(2 * θ) * sin(θ)",
+    ] {
+        assert_eq!(of_hinge(formula), Some([0, 1, 2, 3]), "{formula}");
+    }
+    for formula in [
+        "θ * norm(x4 - x3)",
+        "θ^2 / norm_squared(x1 - x2)",
+        "θ + dihedral(x2, x1, x4, x3)",
+        "θ - dihedral(x1, x4, x3, x2)",
+        "(θ - dihedral(x1, x4, x3, x2)) * sin(θ)",
+        "θ * dihedral(x1, x3, x2, x4)",
+        "θ^2 + dot(x1 - x2, x3 - x4)",
+        "k * norm(gradient(θ, x1))",
+        "θ + dot(x1, x1)",
+    ] {
+        assert_eq!(of_hinge(formula), None, "{formula}");
+    }
+
+    let of = |source: &str| read(source).declaration().dihedral;
+    let permuted = "energy A(p, q, a, b: Point) { dihedral(a, b, q, p)^2 }";
+    assert_eq!(of(permuted), Some([2, 3, 1, 0]), "the points have any order");
+    let constraint = "constraint A(x1, x2, x3, x4: Point; θ0: Scalar) { dihedral(x1, x2, x3, x4) - θ0 }";
+    assert_eq!(of(constraint), Some([0, 1, 2, 3]), "the energy of a constraint counts");
+    for source in [
+        "constraint A(x1, x2, x3, x4: Point) { [dihedral(x1, x2, x3, x4), norm(x1 - x2)] }",
+        "energy A(x1, x2, x3: Point) { angle(x1 - x3, x2 - x3) }",
+        "energy A(x1, x2, x3: Point) { dihedral(x1, x1, x2, x3) }",
+        "energy A(x1, x2, x3: Point; x4: Vec3) { dihedral(x1, x2, x3, x4) }",
+        "energy A(x1, x2, x3, x4: Point) { dihedral(2 * x1, x2, x3, x4) }",
+        "energy A(x1, x2, x3, x4: Point) { dihedral(2 * (x4 - x3), x1 - x3, x3 - x3, x2 - x3) }",
+        "energy A(x1, x2: Point; rest X: Vec3) {
+            rest { let s = dihedral(X, 2 * X, 3 * X, X); }
+            s * norm(x1 - x2)
+        }",
+        "force A(x1, x2, x3, x4: Point) { let g = gradient(dihedral(x1, x2, x3, x4), x1); [g, g, g, g] }",
+    ] {
+        assert_eq!(of(source), None, "{source}");
+    }
+}

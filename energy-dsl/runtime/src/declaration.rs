@@ -145,7 +145,8 @@ pub struct Declaration {
     pub rows: usize,
     /// Claimed properties.
     pub properties: &'static [Property],
-    /// Whether points enter only as differences. Proved on the expression graph, as are the next four fields.
+    /// Whether points enter only as differences. Proved on the expression graph, as are the next four fields and
+    /// `dihedral`.
     pub translation_invariant: bool,
     /// Whether the second derivatives of the energy, or the position derivatives of the force, are not identically zero
     /// (as they are for gravity).
@@ -162,6 +163,10 @@ pub struct Declaration {
     /// Points of each difference vector in the reduced coordinates, with their signs (`true`: added). Empty for
     /// residuals.
     pub reduced_vectors: &'static [&'static [(usize, bool)]],
+    /// Points x₁, x₂, x₃ and x₄ if the energy depends on points only through the dihedral angle of the triangles
+    /// x₁x₃x₄ and x₂x₃x₄. `reduced_vectors` are then x₄ − x₃, x₁ − x₃ and x₂ − x₃, in this order. `None` for all other
+    /// formulas.
+    pub dihedral: Option<[usize; 4]>,
     /// Robust primitives that the formula was compiled to.
     pub primitives: &'static [&'static str],
     /// Routines and their costs.

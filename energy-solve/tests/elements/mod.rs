@@ -26,6 +26,7 @@ const fn declaration(name: &'static str, kind: Kind, formula: &'static str, rows
         symmetric: matches!(kind, Kind::Energy),
         reduced_coordinates: 3,
         reduced_vectors: &[&[(0, true), (1, false)]],
+        dihedral: None,
         primitives: &[],
         routines: &[],
     }

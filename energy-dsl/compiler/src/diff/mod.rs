@@ -8,12 +8,14 @@
 mod adjoint;
 mod coordinates;
 mod cut;
+mod dihedral;
 mod expand;
 mod forward;
 mod local;
 mod plan;
 
 pub use coordinates::{Coordinates, Moving};
+pub use dihedral::only_dihedral;
 pub use forward::{first_derivatives, second_derivatives};
 pub use local::Order;
 pub use plan::{Plan, SecondOrder, first_order, hessian_vector, second_order};
@@ -22,8 +24,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::{Graph, NodeId, Op};
 
-/// Returns the nodes through which `outputs` depend on moving inputs, in topological order. A rule leads to its
-/// arguments, or to its value if only that can be differentiated. Masks and rounding errors have no derivatives.
+/// Returns the nodes through which `outputs` depend on moving inputs, in topological order.
 fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<NodeId> {
     let mut seen = BTreeSet::new();
     let mut stack: Vec<NodeId> = outputs.to_vec();
@@ -31,17 +32,23 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<N
         if !graph.varies(node) || !seen.insert(node) {
             continue;
         }
-        match graph.rule(node) {
-            Some(rule) if order == Order::Second && rule.second.is_none() => stack.push(rule.value),
-            Some(rule) => stack.extend(&rule.arguments),
-            None => match graph.op(node) {
-                Op::Select(_, yes, no) => stack.extend([yes, no]),
-                op if op.is_mask() || op.is_constant_in_exact_arithmetic() => {}
-                op => stack.extend(op.operands()),
-            },
-        }
+        stack.extend(moving_operands(graph, node, order));
     }
     seen
+}
+
+/// Returns the nodes that a node is differentiated by. A rule has its arguments, or its value if only that can be
+/// differentiated. Masks and rounding errors have no derivatives.
+fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
+    match graph.rule(node) {
+        Some(rule) if order == Order::Second && rule.second.is_none() => vec![rule.value],
+        Some(rule) => rule.arguments.clone(),
+        None => match graph.op(node) {
+            Op::Select(_, yes, no) => vec![yes, no],
+            op if op.is_mask() || op.is_constant_in_exact_arithmetic() => Vec::new(),
+            op => op.operands().collect(),
+        },
+    }
 }
 
 /// Adds a term to the sum at an index.

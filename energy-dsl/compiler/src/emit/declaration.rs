@@ -28,6 +28,10 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
         let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
         quote!(&[#(#ends),*])
     });
+    let dihedral = match routines.dihedral {
+        Some(points) => quote!(::core::option::Option::Some([#(#points),*])),
+        None => quote!(::core::option::Option::None),
+    };
     let primitives = &routines.primitives;
     let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
     let list = routines.list.iter().map(|r| routine(routines, r));
@@ -50,6 +54,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             symmetric: #symmetric,
             reduced_coordinates: #coordinates,
             reduced_vectors: &[#(#vectors),*],
+            dihedral: #dihedral,
             primitives: &[#(#primitives),*],
             routines: &[#(#list),*],
         }

@@ -50,6 +50,7 @@ fn describe(program: &Program, routines: &Routines) -> Declaration {
         symmetric,
         reduced_coordinates: routines.coordinates,
         reduced_vectors: vectors.leak(),
+        dihedral: routines.dihedral,
         primitives: routines.primitives.clone().leak(),
         routines: list.collect::<Vec<_>>().leak(),
     }

@@ -4,7 +4,7 @@ mod constraint;
 mod hazards;
 
 use crate::check::Program;
-use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, second_order};
+use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, Repetition, RestFormula};
 use energy_runtime::{Flag, Kind, OperationCount};
@@ -151,6 +151,8 @@ pub struct Routines {
     pub vectors: Vec<Vec<(usize, bool)>>,
     /// Expansion of the derivatives of an energy to points.
     pub expansion: Option<Expansion>,
+    /// Points of the dihedral angle that the energy is a function of; `None` for other formulas.
+    pub dihedral: Option<[usize; 4]>,
     /// Whether points enter only as differences.
     pub translation_invariant: bool,
     /// Robust primitives that the formula uses.
@@ -214,17 +216,19 @@ pub fn differentiate(
         _ => Coordinates::of_points(g, &outputs, Moving::Positions),
     };
     let mut plans = Vec::new();
-    let mut expansion = None;
+    let (mut expansion, mut dihedral) = (None, None);
     let list: Vec<Whole> = match program.kind {
         Kind::Energy => {
             let (energy, plan) = second_order(g, "hessian", outputs[0], &coordinates);
             plans.push(plan);
             expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
+            dihedral = only_dihedral(g, energy.value, &coordinates);
             potential(g, &energy, &coordinates, program.points(), &mut plans)
         }
         Kind::Constraint => {
             let (list, energy) = constraint::routines(g, program, &outputs, &coordinates, &mut plans);
             expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
+            dihedral = only_dihedral(g, energy.value, &coordinates);
             list
         }
         Kind::Force => force(g, &outputs, &coordinates, program.points(), &mut plans),
@@ -239,6 +243,7 @@ pub fn differentiate(
         coordinates: coordinates.len(),
         vectors: if program.kind == Kind::Residual { Vec::new() } else { coordinates.vectors.clone() },
         expansion,
+        dihedral,
         translation_invariant: coordinates.translation_invariant,
         primitives,
         plans,

@@ -4,7 +4,7 @@ use super::{MOST, upper_index};
 
 /// Relative tolerance: an eigenvalue above −τ, with τ this fraction of the largest diagonal entry, counts as
 /// non-negative. A membrane at rest has a singular Hessian, and rounding moves its zero eigenvalues to either side.
-const TOLERANCE: f64 = 64.0 * f64::EPSILON;
+pub(super) const TOLERANCE: f64 = 64.0 * f64::EPSILON;
 
 /// Returns a mask of the lanes where A + τ I has a factorisation L D Lᵀ with D > 0, so that no eigenvalue of A is below
 /// −τ. This takes n³/6 multiplications and n divisions, far less than computing eigenvalues.

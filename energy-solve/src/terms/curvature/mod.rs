@@ -1,10 +1,12 @@
 //! Projection of element Hessians to positive semi-definite matrices.
 //!
 //! The projection works on the small Hessian by an element's difference vectors (6×6 for a triangle, 3×3 for a spring),
-//! one element per lane. The result equals the projection of the full Hessian; see [`Orthonormal`].
+//! one element per lane. The result equals the projection of the full Hessian; see [`Orthonormal`]. Only functions of a
+//! dihedral angle are treated otherwise: `hinge.rs` replaces the parts of their Hessians one by one.
 
 mod definite;
 mod dense;
+mod hinge;
 mod jacobi;
 mod orthonormal;
 mod planar;
@@ -14,10 +16,15 @@ use energy_dsl::{Kernel, Lane, Level, LevelName, Mask, dispatch_at};
 
 pub(crate) use definite::is_semi_definite;
 pub use dense::change_dense;
+pub(crate) use hinge::Hinges;
 pub(crate) use orthonormal::Orthonormal;
 
 /// Treatment of negative eigenvalues of element Hessians. Force laws have no Hessian; their Jacobians are used
 /// unchanged.
+///
+/// The Hessian of a function f(θ) of one [dihedral angle](energy_dsl::Declaration::dihedral) is f″ ∇θ ∇θᵀ plus f′ times
+/// a matrix for each of its two triangles. These three parts are treated one by one, in closed form. Their sum is
+/// positive semi-definite, and so is its difference to the exact Hessian, but it is not the nearest such matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Curvature {
     /// Keeps negative eigenvalues; the sum may be indefinite.

@@ -94,7 +94,8 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let lanes = lanes(&batch);
         let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
         let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
-        let projected = self.project::<L>(E::DECLARATION, &lanes, reduced.hessian.as_mut(), n, batch.points.as_ref());
+        let derivatives = (reduced.gradient.as_ref(), reduced.hessian.as_mut());
+        let projected = self.project::<L>(E::DECLARATION, &lanes, derivatives, n, batch.points.as_ref());
         let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
         L::F64::dispatch(Addition {

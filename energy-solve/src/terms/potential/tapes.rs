@@ -194,19 +194,22 @@ impl Kernel for Project<'_, '_, '_> {
     fn run<L: Level>(self) {
         let Self { declaration, block: (first, count), stencils, reduced, x, projected, work } = self;
         let n = declaration.reduced_coordinates;
-        let slots = &mut reduced[1 + n..];
+        let (value_and_gradient, slots) = reduced.split_at_mut(1 + n);
+        let mut gradient = vec![L::F64::splat(0.0); n];
         let mut hessian = vec![L::F64::splat(0.0); slots.len()];
         let mut points = vec![[L::F64::splat(0.0); 3]; declaration.points.len()];
         let mut at = 0;
         while at < count {
             let lanes = lanes::<L>(first, count, at, stencils);
-            for (number, slot) in hessian.iter_mut().zip(&*slots) {
+            for (number, slot) in
+                gradient.iter_mut().chain(&mut hessian).zip(value_and_gradient[1..].iter().chain(&*slots))
+            {
                 *number = L::F64::load(&slot[at..]);
             }
             for point in 0..points.len() {
                 points[point] = L::F64::gather(x, lanes.all_vertices(point));
             }
-            projected[at] = work.project::<L>(declaration, &lanes, &mut hessian, n, &points);
+            projected[at] = work.project::<L>(declaration, &lanes, (&gradient, &mut hessian), n, &points);
             if projected[at] != 0 {
                 for (number, slot) in hessian.iter().zip(&mut *slots) {
                     number.store(&mut slot[at..]);

@@ -1,7 +1,9 @@
-use energy_dsl::{BLOCK, Declaration, Lane, Level, Mask, Vector3, triangle_index};
+use energy_dsl::{BLOCK, Declaration, Lane, Level, Mask, Number, Vector3, triangle_index};
 
 use super::pack_energies::PackEnergies;
-use crate::terms::curvature::{Curvature, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite};
+use crate::terms::curvature::{
+    Curvature, Hinges, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite,
+};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::BlockPlaces;
 use crate::terms::scatter::{Lanes, TriangleBuffer, VectorBuffer, points_of_triangle};
@@ -138,19 +140,30 @@ impl Hessians<'_, '_> {
         &mut self,
         declaration: &Declaration,
         lanes: &Lanes<'_>,
-        hessian: &mut [L::F64],
+        (gradient, hessian): (&[L::F64], &mut [L::F64]),
         n: usize,
         points: &[Vector3<L::F64>],
     ) -> u32 {
-        if let Some(orthonormal) = self.orthonormal
-            && self.sum.curvature != Curvature::Exact
-        {
-            let open = (!is_semi_definite(hessian, n)).bits() & (u32::MAX >> (32 - lanes.count));
-            if open != 0 {
-                return self.change_indefinite::<L>(declaration, orthonormal, hessian, open, points);
+        let curvature = self.sum.curvature;
+        let Some(orthonormal) = self.orthonormal else { return 0 };
+        if curvature == Curvature::Exact {
+            return 0;
+        }
+        let (mut open, mut changed) = (u32::MAX >> (32 - lanes.count), 0);
+        if let Some(of) = declaration.dihedral {
+            let vectors = hinge_vectors::<L>(of, points);
+            let lanes = L::F64::dispatch(Hinges { curvature, vectors, gradient, upper: &mut *hessian });
+            changed = lanes.changed & open;
+            open &= !lanes.treated;
+            if open == 0 {
+                return changed;
             }
         }
-        0
+        open &= (!is_semi_definite(hessian, n)).bits();
+        if open != 0 {
+            changed |= self.change_indefinite::<L>(declaration, orthonormal, hessian, open, points);
+        }
+        changed
     }
 
     /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two
@@ -211,6 +224,18 @@ impl Hessians<'_, '_> {
         }
         changed
     }
+}
+
+/// Returns the difference vectors x₄ − x₃, x₁ − x₃ and x₂ − x₃ of a hinge.
+#[inline(always)]
+fn hinge_vectors<L: Level>([x1, x2, x3, x4]: [usize; 4], points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 3] {
+    let mut vectors = [points[x4], points[x1], points[x2]];
+    for vector in &mut vectors {
+        for axis in 0..3 {
+            vector[axis] = vector[axis] - points[x3][axis];
+        }
+    }
+    vectors
 }
 
 /// Returns the one or two difference vectors of an element.
