@@ -49,6 +49,14 @@ struct Trees {
     first: [usize; 3],
 }
 
+/// A kind of features.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Point,
+    Triangle,
+    Edge,
+}
+
 /// The boxes around the regions of features, extended by half the reach.
 struct Boxes<'a> {
     mesh: &'a CollisionMesh,
@@ -74,6 +82,14 @@ impl<'a> Boxes<'a> {
         self.around(&self.mesh.edges()[number])
     }
 
+    fn of(&self, kind: Kind, number: usize) -> MovingBounds {
+        match kind {
+            Kind::Point => self.point(number),
+            Kind::Triangle => self.triangle(number),
+            Kind::Edge => self.edge(number),
+        }
+    }
+
     fn around(&self, vertices: &[u32]) -> MovingBounds {
         let of = |vertex: u32| self.regions[vertex as usize];
         vertices[1..].iter().fold(of(vertices[0]), |all, &vertex| all.joined(of(vertex)))
@@ -93,15 +109,11 @@ impl Trees {
     }
 
     /// Adapts to the boxes of all features.
-    fn refit<'a>(&mut self, boxes: &Boxes<'a>, threads: usize) {
-        let [points, triangles, edges] = self.first;
-        let trees: Vec<(&mut Hierarchy<MovingBounds>, fn(&Boxes<'a>, usize) -> MovingBounds, usize)> = vec![
-            // There are as many edges as triangles and points.
-            (&mut self.edges, Boxes::edge, edges),
-            (&mut self.triangles, Boxes::triangle, triangles),
-            (&mut self.points, Boxes::point, points),
-        ];
-        for_each(threads, trees, |(tree, of, first)| tree.refit(|item| of(boxes, first + item)));
+    fn refit(&mut self, boxes: &Boxes<'_>, threads: usize) {
+        let Self { points, triangles, edges, first: [p, t, e] } = self;
+        // There are as many edges as triangles and points.
+        let trees = vec![(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)];
+        for_each(threads, trees, |(tree, kind, first)| tree.refit(|item| boxes.of(kind, first + item)));
     }
 
     /// Adapts to the boxes of changed features, which are in order.
@@ -137,14 +149,6 @@ enum Task {
     PointsOnTriangles,
     Edges(Branches),
     Obstacles,
-}
-
-/// Features with a changed vertex whose pairs a thread finds at a time, by their places in the mesh's lists.
-#[derive(Clone, Copy, Debug)]
-enum Changed<'a> {
-    Points(&'a [usize]),
-    Triangles(&'a [usize]),
-    Edges(&'a [usize]),
 }
 
 /// All tasks, in an order that gives two threads about the same work.
@@ -259,41 +263,37 @@ impl Search {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         let changed = changed_features(mesh, is_changed);
         self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
-        let [points, triangles, edges] = &changed;
-        let points = points.chunks(CHANGED).map(Changed::Points);
-        let triangles = triangles.chunks(CHANGED).map(Changed::Triangles);
-        let tasks = points.chain(triangles).chain(edges.chunks(CHANGED).map(Changed::Edges)).collect();
-        let found = Found::all(&for_each(self.threads, tasks, |task| self.find_changed(task, &boxes)));
+        let kinds = [Kind::Point, Kind::Triangle, Kind::Edge].into_iter().zip(&changed);
+        let parts = kinds.flat_map(|(kind, features)| features.chunks(CHANGED).map(move |part| (kind, part))).collect();
+        let found =
+            Found::all(&for_each(self.threads, parts, |(kind, features)| self.find_changed(kind, features, &boxes)));
         in_order(mesh, found, self.threads)
     }
 
-    /// Finds the pairs of some changed features.
-    fn find_changed(&self, task: Changed<'_>, boxes: &Boxes<'_>) -> Found {
+    /// Finds the pairs of some changed features of one kind.
+    fn find_changed(&self, kind: Kind, features: &[usize], boxes: &Boxes<'_>) -> Found {
         let (mesh, mut found) = (boxes.mesh, Found::default());
-        match task {
-            Changed::Points(points) => {
-                for &point in points {
-                    for trees in self.partners(mesh, mesh.points()[point]) {
-                        trees.triangles.near(&boxes.point(point), |triangle| {
-                            self.add_point_and_triangle(mesh, point, trees.first[1] + triangle, &mut found);
+        for &number in features {
+            let bounds = boxes.of(kind, number);
+            match kind {
+                Kind::Point => {
+                    for trees in self.partners(mesh, mesh.points()[number]) {
+                        trees.triangles.near(&bounds, |triangle| {
+                            self.add_point_and_triangle(mesh, number, trees.first[1] + triangle, &mut found);
                         });
                     }
                 }
-            }
-            Changed::Triangles(triangles) => {
-                for &triangle in triangles {
-                    for trees in self.partners(mesh, mesh.triangles()[triangle][0]) {
-                        trees.points.near(&boxes.triangle(triangle), |point| {
-                            self.add_point_and_triangle(mesh, trees.first[0] + point, triangle, &mut found);
+                Kind::Triangle => {
+                    for trees in self.partners(mesh, mesh.triangles()[number][0]) {
+                        trees.points.near(&bounds, |point| {
+                            self.add_point_and_triangle(mesh, trees.first[0] + point, number, &mut found);
                         });
                     }
                 }
-            }
-            Changed::Edges(edges) => {
-                for &edge in edges {
-                    for trees in self.partners(mesh, mesh.edges()[edge][0]) {
-                        trees.edges.near(&boxes.edge(edge), |other| {
-                            self.add_edges(mesh, edge, trees.first[2] + other, &mut found);
+                Kind::Edge => {
+                    for trees in self.partners(mesh, mesh.edges()[number][0]) {
+                        trees.edges.near(&bounds, |other| {
+                            self.add_edges(mesh, number, trees.first[2] + other, &mut found);
                         });
                     }
                 }
