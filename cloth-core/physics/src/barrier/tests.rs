@@ -298,3 +298,66 @@ proptest! {
         prop_assert!(!known.joined.pairs.is_empty());
     }
 }
+
+/// The layers of a large mesh have pairs for several parts, so that threads share them.
+#[test]
+fn threads_change_no_bit_of_many_pairs() {
+    const SIDE: usize = 30;
+    const VERTICES: usize = 2 * SIDE * SIDE;
+    // The upper layer is shifted by a third of a cell, so that edges cross.
+    let place = |vertex: usize| -> Vector3<f64> {
+        let (layer, row, column) = (vertex / (SIDE * SIDE), vertex / SIDE % SIDE, vertex % SIDE);
+        let shift = layer as f64 / 3.0;
+        let wave = 1e-4 * ((7 * row + 3 * column) as f64).sin();
+        [0.01 * (column as f64 + shift), 0.01 * (row as f64 + shift), 0.002 * layer as f64 + wave]
+    };
+    let cells = |layer: usize| {
+        (0..(SIDE - 1) * (SIDE - 1)).flat_map(move |cell| {
+            let first = layer * SIDE * SIDE + cell / (SIDE - 1) * SIDE + cell % (SIDE - 1);
+            let above = first + SIDE;
+            [[first, first + 1, above + 1], [first, above + 1, above]]
+        })
+    };
+    let triangles: Vec<_> = cells(0).chain(cells(1)).collect();
+    let x: Vec<_> = (0..VERTICES).map(place).collect();
+    // The upper layer falls and slides, a corner of it so far that its pairs alone are searched for.
+    let to = |part: f64, corner: usize| -> Vec<Vector3<f64>> {
+        let falls = |vertex: usize| vertex >= SIDE * SIDE && vertex % SIDE < corner && vertex / SIDE % SIDE < corner;
+        let moved = |vertex: usize| if falls(vertex) { [5e-5, 3e-5, -4e-3 * part] } else { [0.0; 3] };
+        x.iter().enumerate().map(|(vertex, x)| add_scaled(*x, 1.0, moved(vertex))).collect()
+    };
+    let run = |threads: usize| {
+        let mesh = CollisionMesh::new(VERTICES, &triangles, &[], &[]);
+        let (free, radii) = (vec![true; VERTICES], vec![0.5 * THICKNESS; VERTICES]);
+        let mut contact = BarrierContact::new(mesh, &x, free, radii, GAP).unwrap().with_friction(vec![0.3; VERTICES]);
+        contact.set_threads(threads);
+        contact.begin_step(&x);
+        let dofs = DofMap::new(&[false; VERTICES]);
+        let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+        let mut results = Vec::new();
+        let parts = [to(1.0, SIDE), to(0.6, 8)].map(|to| contact.certify(&x, &to));
+        results.extend(parts);
+        contact.set_resistance(&dofs, vec![block; VERTICES], vec![1.0; VERTICES]);
+        for corner in [SIDE, 8] {
+            let place = to(0.2 * parts[0], corner);
+            results.push(contact.meet(&place));
+            results.push(contact.energy(&place));
+            let mut force = vec![[0.0; 3]; VERTICES];
+            contact.add_force(&place, &mut force);
+            results.extend(force.as_flattened());
+            let contacts = contact.contacts(&dofs, &place).concat();
+            let rubbing = contact.friction.stiffness(&place, 1).between(None, None).count();
+            assert!(rubbing > PART, "{rubbing} pairs rub");
+            assert_eq!(contacts.len(), active(&contact, &place).len() + rubbing);
+            for Contact { weights, block, .. } in contacts {
+                results.extend(weights.iter().chain(block.as_flattened()));
+            }
+        }
+        assert!(contact.joined.pairs.len() > 2 * PART, "{} pairs", contact.joined.pairs.len());
+        assert!(contact.counts().shortened > 0);
+        results.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+    };
+    let one = run(1);
+    assert!(one.len() > 100_000, "{}", one.len());
+    assert!(one == run(2) && one == run(3));
+}
