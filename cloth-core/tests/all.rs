@@ -13,6 +13,7 @@ mod fuzz;
 mod known_answers;
 mod limits;
 mod linear_solvers;
+mod local_elimination;
 mod mesh_obstacle;
 mod motion;
 mod obstacles;

@@ -104,9 +104,14 @@ struct Sums {
     counts: Vec<Counts>,
 }
 
-fn sums(read: bool, threads: usize, curvature: Curvature) -> Sums {
+/// Returns the sums of a sheet, or of the system restricted to some of its vertices.
+fn sums(read: bool, threads: usize, curvature: Curvature, is_restricted: bool) -> Sums {
     let (mut system, x, v) = sheet(read);
     system.set_threads(threads);
+    if is_restricted {
+        let chosen: Vec<bool> = (0..x.len()).map(|vertex| vertex % 7 < 3 || vertex > 9000).collect();
+        system = system.restricted(&chosen).unwrap();
+    }
     let state = State { x: &x, v: &v };
     let energies = system.energies(&x).unwrap().into_iter().map(|term| term.energy.map(f64::to_bits)).collect();
     let elements = system.terms().next().and_then(|(term, _)| term.element_energies(&x)).unwrap_or_default();
@@ -124,11 +129,23 @@ fn sums(read: bool, threads: usize, curvature: Curvature) -> Sums {
 #[test]
 fn terms_that_are_read_have_the_bits_of_compiled_ones() {
     for (threads, curvature) in [(1, Curvature::Clamped), (3, Curvature::Clamped), (2, Curvature::Exact)] {
-        let (compiled, read) = (sums(false, threads, curvature), sums(true, threads, curvature));
+        let [compiled, read] = [false, true].map(|read| sums(read, threads, curvature, false));
         assert_eq!(compiled.counts, read.counts, "{threads} threads, {curvature:?}");
         assert!(compiled == read, "{threads} threads, {curvature:?}");
         let (membrane, bending) = (&compiled.counts[0], &compiled.counts[1]);
         assert!(bending.hessian.flagged > 0 && membrane.hessian.skipped > 0, "{bending:?}, {membrane:?}");
         assert_eq!(membrane.hessian.projected > 100, curvature == Curvature::Clamped, "{membrane:?}");
+    }
+}
+
+#[test]
+fn restricted_terms_that_are_read_have_the_bits_of_compiled_ones() {
+    for (threads, curvature) in [(1, Curvature::Clamped), (3, Curvature::Clamped), (2, Curvature::Exact)] {
+        let [compiled, read] = [false, true].map(|read| sums(read, threads, curvature, true));
+        assert!(compiled == read, "{threads} threads, {curvature:?}");
+        let one = sums(true, 1, curvature, true);
+        assert!(one == read, "{threads} threads, {curvature:?}");
+        let evaluated = |sums: &Sums| sums.counts[0].hessian.evaluated;
+        assert!(evaluated(&read) < evaluated(&self::sums(true, 1, curvature, false)));
     }
 }

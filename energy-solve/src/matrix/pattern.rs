@@ -58,6 +58,29 @@ impl Pattern {
         Self { storage, row_start, columns, diagonal }
     }
 
+    /// Returns the pattern of the blocks between these rows, which ascend, and the index in it of each block of this
+    /// pattern: [`Pattern::nowhere`] for the others.
+    pub(crate) fn restricted(&self, rows: &[usize]) -> (Self, Vec<u32>) {
+        let mut new_row = vec![None; self.rows()];
+        rows.iter().enumerate().for_each(|(number, &row)| new_row[row] = Some(index(number)));
+        let mut slots = vec![u32::MAX; self.blocks() + 1];
+        let (mut row_start, mut columns, mut diagonal) = (vec![0], Vec::new(), Vec::with_capacity(rows.len()));
+        for &row in rows {
+            for (slot, column) in self.row(row) {
+                let Some(new_column) = new_row[column] else { continue };
+                slots[slot] = index(columns.len());
+                if column == row {
+                    diagonal.push(slots[slot]);
+                }
+                columns.push(new_column);
+            }
+            row_start.push(index(columns.len()));
+        }
+        let nowhere = index(columns.len());
+        slots.iter_mut().for_each(|slot| *slot = nowhere.min(*slot));
+        (Self { storage: self.storage, row_start, columns, diagonal }, slots)
+    }
+
     /// Returns which part of the matrix is stored.
     #[must_use]
     pub fn storage(&self) -> Storage {

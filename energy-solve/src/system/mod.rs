@@ -4,6 +4,7 @@ mod constant;
 mod division;
 mod error;
 mod linearise;
+mod restriction;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -78,19 +79,24 @@ impl System {
         let pattern = Arc::new(Pattern::from_stencils(storage, dofs.free().len(), stencils));
         let placed = |term: Box<dyn Term>| Counted { term: term.place(&dofs, &pattern), counts: Counts::default() };
         let terms = terms.into_iter().map(placed).collect();
+        Ok(Self::with_placed(terms, dofs, pattern, 1))
+    }
+
+    /// Creates the sum of placed terms.
+    fn with_placed(terms: Vec<Counted>, dofs: DofMap, pattern: Arc<Pattern>, threads: usize) -> Self {
         let mut system = Self {
             dofs,
             pattern,
             terms,
-            threads: 1,
+            threads,
             shares: Vec::new(),
             evaluated_at: Vec::new(),
             changing: None,
             constants: Vec::new(),
             contact: None,
         };
-        system.set_threads(1);
-        Ok(system)
+        system.set_threads(threads);
+        system
     }
 
     /// Sets the largest number of threads. Small systems use fewer. Results are bit-identical for any number.

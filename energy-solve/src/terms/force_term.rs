@@ -1,9 +1,10 @@
 use std::fmt::{self, Debug};
+use std::sync::Arc;
 
 use energy_dsl::{Array, Block, Declaration, ForceLaw, Kernel, Level, Potential, Value, Vector3, dispatch};
 
 use crate::matrix::dof_map::DofMap;
-use crate::matrix::pattern::Pattern;
+use crate::matrix::pattern::{Pattern, index};
 use crate::matrix::precision::Blocks;
 use crate::matrix::vector::block_times;
 use crate::terms::active::{Active, points_of};
@@ -11,6 +12,7 @@ use crate::terms::counts::Tally;
 use crate::terms::element_list::ElementList;
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::Places;
+use crate::terms::restriction::Restriction;
 use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
@@ -68,7 +70,7 @@ impl<E: ForceLaw<f64> + Debug + Send> TermDescription for ForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug + Send + 'static> Term for ForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send + Sync + 'static> Term for ForceTerm<E> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let n = self.list.arity();
         let active = Active::new(self.list.stencils(), dofs);
@@ -77,14 +79,14 @@ impl<E: ForceLaw<f64> + Debug + Send + 'static> Term for ForceTerm<E> {
             pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
             places = Places::new(&active, self.list.stencils(), &pairs, dofs, pattern);
         }
-        Box::new(PlacedForceTerm { term: *self, active, places, pairs })
+        Box::new(PlacedForceTerm { term: self.into(), active, places, pairs })
     }
 }
 
 /// A [`ForceTerm`] within a system.
 #[derive(Debug)]
 struct PlacedForceTerm<E: ForceLaw<f64>> {
-    term: ForceTerm<E>,
+    term: Arc<ForceTerm<E>>,
     active: Active,
     places: Places,
     /// The pairs of points whose blocks are stored.
@@ -122,7 +124,7 @@ impl<E: ForceLaw<f64>> PlacedForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug + Send> TermDescription for PlacedForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send + Sync> TermDescription for PlacedForceTerm<E> {
     fn name(&self) -> &str {
         self.term.name()
     }
@@ -140,7 +142,14 @@ impl<E: ForceLaw<f64> + Debug + Send> TermDescription for PlacedForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug + Send> PlacedTerm for PlacedForceTerm<E> {
+impl<E: ForceLaw<f64> + Debug + Send + Sync + 'static> PlacedTerm for PlacedForceTerm<E> {
+    fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
+        let numbers = restriction.remaining(self.active.iter(), self.stencils());
+        let active = Active::some(numbers.iter().map(|&number| index(self.active.element(number))).collect());
+        let places = self.places.restricted(&numbers, restriction);
+        Some(Box::new(Self { term: Arc::clone(&self.term), active, places, pairs: self.pairs.clone() }))
+    }
+
     fn dissipation(&self, state: State<'_>) -> Option<(f64, Tally)> {
         let evaluated = E::DECLARATION.velocity_dependent.then(|| dispatch(Dissipation { term: self, state }));
         evaluated.map(|(sum, flagged)| (sum, self.tally(flagged)))

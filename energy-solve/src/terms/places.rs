@@ -5,6 +5,7 @@ use energy_dsl::BLOCK;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::terms::active::Active;
+use crate::terms::restriction::Restriction;
 use crate::terms::stencils::Stencils;
 
 /// Scatter maps of elements whose Hessians are symmetric.
@@ -33,6 +34,13 @@ impl BlockPlaces {
             Storage::Whole => places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>()),
         };
         Self { upper, mirrored }
+    }
+
+    /// Returns the maps of some of the elements to a restricted matrix.
+    #[must_use]
+    pub fn restricted(&self, elements: &[usize], restriction: &Restriction<'_>) -> Self {
+        let (upper, mirrored) = (&self.upper, &self.mirrored);
+        Self { upper: upper.restricted(elements, restriction), mirrored: mirrored.restricted(elements, restriction) }
     }
 
     /// Returns the maps of some of the elements.
@@ -86,6 +94,13 @@ impl Places {
         }
         let slots = elements.iter().flat_map(|&element| self.of(element..element + 1)).copied().collect();
         Self { pairs: self.pairs, slots, transposed }
+    }
+
+    /// Returns the map of some of the elements to a restricted matrix.
+    pub(crate) fn restricted(&self, elements: &[usize], restriction: &Restriction<'_>) -> Self {
+        let mut places = self.selected(elements);
+        places.slots.iter_mut().for_each(|slot| *slot = restriction.slot(*slot));
+        places
     }
 
     /// Whether the map is empty.

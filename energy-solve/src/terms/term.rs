@@ -4,6 +4,7 @@ use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
 use crate::terms::counts::Tally;
 use crate::terms::linearisation::Linearisation;
+use crate::terms::restriction::Restriction;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
@@ -73,6 +74,11 @@ pub trait PlacedTerm: TermDescription {
     fn divide(&mut self, _shares: &[Share]) {}
     /// The term as one that several threads can sum; `None` if a single thread must.
     fn divisible(&self) -> Option<&dyn Divisible> {
+        None
+    }
+    /// Returns the elements with a chosen vertex, as a term of the restricted system until the end of the step. `None`
+    /// if the term cannot be restricted.
+    fn restricted(&self, _restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
         None
     }
     /// Updates what stays fixed over a step, such as the normal force of friction or the pose of an obstacle.

@@ -440,7 +440,7 @@ impl FabricTerms {
         elements: Vec<E>,
     ) -> Result<(), FabricError>
     where
-        E: ForceLaw<f64> + std::fmt::Debug + Send + 'static,
+        E: ForceLaw<f64> + std::fmt::Debug + Send + Sync + 'static,
     {
         self.terms.push(Box::new(ForceTerm::new(self.list(name, elements, stencils)?)));
         Ok(())

@@ -89,6 +89,12 @@ pub struct IntegratorMemory {
 pub struct StepReport {
     /// Linear systems solved.
     pub solves: u64,
+    /// Linear systems of local eliminations, which are not among [`StepReport::solves`].
+    #[serde(default)]
+    pub local_solves: u64,
+    /// Vertices of these systems.
+    #[serde(default)]
+    pub local_vertices: u64,
     /// Solves of symmetric systems, by linear solver.
     pub solved_by: SolvedBy,
     /// Iterations of the linear solver.
@@ -108,6 +114,8 @@ pub struct StepReport {
 impl std::ops::AddAssign for StepReport {
     fn add_assign(&mut self, other: Self) {
         self.solves += other.solves;
+        self.local_solves += other.local_solves;
+        self.local_vertices += other.local_vertices;
         self.solved_by += other.solved_by;
         self.iterations += other.iterations;
         self.projected |= other.projected;

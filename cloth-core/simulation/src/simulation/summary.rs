@@ -238,6 +238,7 @@ impl fmt::Display for Summary {
             writeln!(f, "{note}")?;
         }
         let Totals { steps, solves, solved_by, iterations, projected, rejected, stepping_time, .. } = &self.totals;
+        let Totals { local_solves, local_vertices, .. } = &self.totals;
         let simulated = *steps as f64 * self.dt;
         writeln!(f, "{}: {steps} steps of {} s = {simulated:.3} s", self.integrator, self.dt)?;
         if let Some(dt) = self.shortened_from {
@@ -249,6 +250,10 @@ impl fmt::Display for Summary {
         if *solves > 0 {
             let mean = *iterations as f64 / *solves as f64;
             writeln!(f, "{solves} linear solves, {iterations} iterations ({mean:.1} each)")?;
+            if *local_solves > 0 {
+                let mean = *local_vertices as f64 / *local_solves as f64;
+                writeln!(f, "{local_solves} local solves of {mean:.0} vertices on average, not among them")?;
+            }
             if *solved_by != SolvedBy::default() {
                 writeln!(f, "by {solved_by}")?;
             }

@@ -12,6 +12,12 @@ pub struct Totals {
     pub steps: u64,
     /// Linear systems solved.
     pub solves: u64,
+    /// Linear systems of local eliminations, which are not among the solves.
+    #[serde(default)]
+    pub local_solves: u64,
+    /// The sum of the numbers of their vertices.
+    #[serde(default)]
+    pub local_vertices: u64,
     /// Solves of symmetric systems, by linear solver.
     #[serde(default)]
     pub solved_by: SolvedBy,
@@ -49,6 +55,8 @@ impl Totals {
     pub(super) fn add(&mut self, report: &StepReport, slept: u64, elapsed: Duration) {
         self.steps += 1;
         self.solves += report.solves;
+        self.local_solves += report.local_solves;
+        self.local_vertices += report.local_vertices;
         self.solved_by += report.solved_by;
         self.iterations += report.iterations;
         self.projected += u64::from(report.projected);

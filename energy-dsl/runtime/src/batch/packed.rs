@@ -108,6 +108,27 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         packed
     }
 
+    /// Returns the elements with these indices, in this order.
+    #[must_use]
+    pub fn selected(&self, indices: &[usize]) -> Self {
+        let blocks = indices.len().div_ceil(BLOCK);
+        let mut numbers = Aligned::new(blocks * E::NUMBERS * BLOCK, S::from_f64(0.0));
+        let mut stencils = vec![0; blocks * self.points * BLOCK];
+        for place in 0..blocks * BLOCK {
+            let index = indices[place.min(indices.len() - 1)];
+            let (from, to) = (index / BLOCK, place / BLOCK);
+            for number in 0..E::NUMBERS {
+                numbers[(to * E::NUMBERS + number) * BLOCK + place % BLOCK] =
+                    self.numbers[(from * E::NUMBERS + number) * BLOCK + index % BLOCK];
+            }
+            for point in 0..self.points {
+                stencils[(to * self.points + point) * BLOCK + place % BLOCK] =
+                    self.stencils[(from * self.points + point) * BLOCK + index % BLOCK];
+            }
+        }
+        Self { elements: indices.len(), points: self.points, reach: self.reach, numbers, stencils, of: PhantomData }
+    }
+
     /// Returns the number of elements.
     #[must_use]
     pub fn len(&self) -> usize {

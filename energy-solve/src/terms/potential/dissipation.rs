@@ -1,6 +1,7 @@
 //! Non-linear damping forces, declared as dissipation functions.
 
 use std::fmt::Debug;
+use std::sync::Arc;
 
 use energy_dsl::{Declaration, Element, Packed, PackedPotential, Vector3};
 
@@ -13,6 +14,7 @@ use crate::terms::counts::Tally;
 use crate::terms::curvature::Curvature;
 use crate::terms::linearisation::{Linearisation, Weights};
 use crate::terms::places::BlockPlaces;
+use crate::terms::restriction::Restriction;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
@@ -73,14 +75,14 @@ impl<L: DissipationLaw + 'static> Term for DissipationTerm<L> {
         let is_free = stencils.iter().map(|mut stencil| stencil.any(is_free)).collect();
         let places = BlockPlaces::of_all(stencils, dofs, pattern);
         let acting = acting::<L>(Vec::new(), &self, &places);
-        Box::new(PlacedDissipationTerm { term: *self, is_free, places, shares: Vec::new(), acting })
+        Box::new(PlacedDissipationTerm { term: self.into(), is_free, places, shares: Vec::new(), acting })
     }
 }
 
 /// A [`DissipationTerm`] within a system.
 #[derive(Debug)]
 struct PlacedDissipationTerm<L: DissipationLaw> {
-    term: DissipationTerm<L>,
+    term: Arc<DissipationTerm<L>>,
     /// Whether each stencil has a free vertex.
     is_free: Vec<bool>,
     /// Places of the blocks of all stencils.
@@ -153,7 +155,14 @@ impl<L: DissipationLaw> TermDescription for PlacedDissipationTerm<L> {
     }
 }
 
-impl<L: DissipationLaw> PlacedTerm for PlacedDissipationTerm<L> {
+impl<L: DissipationLaw + 'static> PlacedTerm for PlacedDissipationTerm<L> {
+    /// The law selects elements at the start of a step, which the restriction does not outlive.
+    fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
+        let (term, acting) = (Arc::clone(&self.term), self.acting.restricted_to(restriction));
+        let (is_free, places, shares) = (Vec::new(), BlockPlaces::default(), Vec::new());
+        Some(Box::new(Self { term, is_free, places, shares, acting }))
+    }
+
     fn begin_step(&mut self, start: StepStart<'_>) {
         let elements = self.term.law.elements(&start, &self.is_free);
         self.acting = acting(elements, &self.term, &self.places);

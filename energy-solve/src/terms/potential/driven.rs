@@ -12,6 +12,7 @@ use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::BlockPlaces;
+use crate::terms::restriction::Restriction;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
@@ -153,6 +154,10 @@ impl<L: DrivenLaw> Divisible for PlacedDrivenTerm<L> {
 }
 
 impl<L: DrivenLaw> PlacedTerm for PlacedDrivenTerm<L> {
+    fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
+        self.now.restricted(restriction)
+    }
+
     /// Takes the elements at the end of the step.
     fn begin_step(&mut self, start: StepStart<'_>) {
         let end = start.time + start.dt;

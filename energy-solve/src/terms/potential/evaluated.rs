@@ -12,7 +12,7 @@ use super::work::{Expanded, Gradients, Hessians, Values, lanes_in};
 use crate::terms::scatter::Lanes;
 
 /// Elements of one type, packed for lanes. Ranges start at multiples of [`Evaluated::PACK`].
-pub(super) trait Evaluated: Debug + Send + Sync {
+pub(super) trait Evaluated: Debug + Send + Sync + 'static {
     /// Elements that are evaluated together.
     const PACK: usize;
 
@@ -20,6 +20,8 @@ pub(super) trait Evaluated: Debug + Send + Sync {
     fn declaration(&self) -> &'static Declaration;
     /// Returns the vertices of all elements by pack, point, element.
     fn stencils(&self) -> &[u32];
+    /// Returns the elements with these indices.
+    fn selected(&self, indices: &[usize]) -> Self;
     /// Evaluates Σ U.
     fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>);
     /// Evaluates U and ∇U.
@@ -30,7 +32,7 @@ pub(super) trait Evaluated: Debug + Send + Sync {
     fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64]));
 }
 
-impl<E: PackedPotential<f64> + Debug + Send + Sync> Evaluated for Packed<E> {
+impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> Evaluated for Packed<E> {
     const PACK: usize = BLOCK;
 
     fn declaration(&self) -> &'static Declaration {
@@ -39,6 +41,10 @@ impl<E: PackedPotential<f64> + Debug + Send + Sync> Evaluated for Packed<E> {
 
     fn stencils(&self) -> &[u32] {
         Packed::stencils(self)
+    }
+
+    fn selected(&self, indices: &[usize]) -> Self {
+        Packed::selected(self, indices)
     }
 
     fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>) {

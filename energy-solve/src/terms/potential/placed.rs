@@ -15,6 +15,7 @@ use crate::terms::counts::Tally;
 use crate::terms::curvature::Orthonormal;
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::BlockPlaces;
+use crate::terms::restriction::Restriction;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
@@ -84,6 +85,16 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
             orthonormal: Orthonormal::new(declaration),
             shares: Vec::new(),
         }
+    }
+
+    /// Returns the active elements with a chosen vertex.
+    pub(super) fn restricted_to(&self, restriction: &Restriction<'_>) -> Self {
+        let stencils = self.stencils();
+        let numbers = restriction.remaining(self.active.iter(), stencils);
+        let vertices = numbers.iter().flat_map(|&number| stencils.stencil(self.active.element(number))).collect();
+        let (active, packed) = (Active::all(numbers.len()), self.packed.selected(&numbers));
+        let places = self.places.restricted(&numbers, restriction);
+        Self::in_places(self.name.clone(), (numbers.len(), vertices), (active, packed), places)
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -215,6 +226,10 @@ impl<E: Evaluated> PlacedTerm for PlacedPotentialTerm<E> {
 
     fn forget_blocks(&mut self) {
         self.places = BlockPlaces::default();
+    }
+
+    fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
+        Some(Box::new(self.restricted_to(restriction)))
     }
 
     fn divide(&mut self, shares: &[Share]) {

@@ -60,6 +60,15 @@ impl Evaluated for TapePacks {
         &self.stencils
     }
 
+    fn selected(&self, indices: &[usize]) -> Self {
+        let points = self.declaration.points.len();
+        let vertex = |number: usize, point: usize| {
+            let element = indices[number];
+            self.stencils[(element / TAPE_BLOCK * points + point) * TAPE_BLOCK + element % TAPE_BLOCK]
+        };
+        Self::new(self.declaration, self.elements.selected(indices), vertex)
+    }
+
     fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>) {
         self.for_each_block("value", packs, x, &mut |block, stencils| {
             dispatch(AddValues { block, stencils, work: &mut *work });

@@ -7,7 +7,7 @@ use energy_dsl::{
 use energy_elements::ArcAngle;
 use energy_solve::{
     BlockPlaces, Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm,
-    Precision, Quantity, State, Stencils, Storage, Tally, Term, TermDescription, index,
+    Precision, Quantity, Restriction, State, Stencils, Storage, Tally, Term, TermDescription, index,
 };
 
 use super::assembly::{CurvedPart, OuterProducts};
@@ -72,6 +72,14 @@ pub(super) struct PatchPlaces {
     pub(super) vertices: usize,
     pub(super) slots: Vec<u32>,
     pub(super) mirrored: Vec<u32>,
+}
+
+impl PatchPlaces {
+    /// Returns the slots in a restricted matrix.
+    fn restricted(&self, restriction: &Restriction<'_>) -> Self {
+        let slots = |slots: &[u32]| slots.iter().map(|&slot| restriction.slot(slot)).collect();
+        Self { vertices: self.vertices, slots: slots(&self.slots), mirrored: slots(&self.mirrored) }
+    }
 }
 
 /// A plate that does not fit a mesh.
@@ -306,6 +314,12 @@ impl Patch {
         (!angles.is_empty()).then_some(Self { vertices, angles })
     }
 
+    /// Returns the same patch, whose hinges have new indices.
+    fn renumbered(&self, new_index: &[usize]) -> Self {
+        let angles = self.angles.iter().map(|angle| Angle { hinge: new_index[angle.hinge], ..*angle }).collect();
+        Self { vertices: self.vertices.clone(), angles }
+    }
+
     fn residual(&self, values: &[f64]) -> [f64; 3] {
         let mut r = [0.0; 3];
         for angle in &self.angles {
@@ -397,6 +411,35 @@ impl Term for PlateTerm {
 }
 
 impl PlacedTerm for PlateTerm {
+    /// Keeps the patches with a chosen vertex and the hinges that they need. Hinges get new indices: sums over hinges
+    /// then take as long as the restricted term is large.
+    fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
+        let numbers = restriction.remaining(self.active.iter().copied(), self.stencils());
+        let patches: Vec<&Patch> = numbers.iter().map(|&number| &self.patches[self.active[number]]).collect();
+        let stencil = |&number: &usize| self.stencils().stencil(self.active[number]);
+        let mut is_needed = vec![false; self.hinges.len()];
+        patches.iter().flat_map(|patch| &patch.angles).for_each(|angle| is_needed[angle.hinge] = true);
+        let kept: Vec<usize> = (0..self.needed.len()).filter(|&number| is_needed[self.needed[number]]).collect();
+        let hinges: Vec<usize> = kept.iter().map(|&number| self.needed[number]).collect();
+        let mut new_index = vec![0; self.hinges.len()];
+        hinges.iter().enumerate().for_each(|(new, &hinge)| new_index[hinge] = new);
+        Some(Box::new(Self {
+            name: self.name.clone(),
+            hinges: hinges.iter().map(|&hinge| self.hinges[hinge]).collect(),
+            rest: hinges.iter().map(|&hinge| self.rest[hinge]).collect(),
+            limits: None,
+            patches: patches.iter().map(|patch| patch.renumbered(&new_index)).collect(),
+            stencils: numbers.iter().flat_map(stencil).collect(),
+            arity: self.arity,
+            active: (0..numbers.len()).collect(),
+            places: numbers.iter().map(|&number| self.places[number].restricted(restriction)).collect(),
+            needed: (0..hinges.len()).collect(),
+            packed: self.packed.selected(&kept),
+            hinge_places: self.hinge_places.restricted(&kept, restriction),
+            found: AtomicU64::default(),
+        }))
+    }
+
     fn has_energy(&self) -> bool {
         true
     }

@@ -10,6 +10,7 @@ use super::forcing::Forcing;
 use super::in_contact::PIN_MOVES;
 use super::incremental_potential::{Energy, EnergyAndGradient, IncrementalPotential};
 use super::line_search::{AcceptedStep, Prefetch};
+use super::local::Few;
 use super::{Memory, NewtonOptions, largest};
 
 /// The current iterate of a step, with the quantities evaluated there.
@@ -36,6 +37,8 @@ pub(super) struct Iterate<'a> {
     pins: f64,
     /// Moves of pins that contact had stopped.
     pin_moves: usize,
+    /// Whether local eliminations may save time. `false` also once a term turned out not to be restrictable.
+    may_eliminate: bool,
 }
 
 /// A search direction.
@@ -47,9 +50,26 @@ pub(super) struct Direction {
     /// Whether the Hessian was projected.
     pub is_projected: bool,
     /// The largest component of the displacements, in m.
-    length: f64,
+    pub length: f64,
     forcing: Forcing,
     solved: SolveReport,
+}
+
+impl Direction {
+    /// Creates the direction that a solve found for `downhill`, which is −∇E. It is zero if the solve met a NaN.
+    pub(super) fn new(
+        downhill: &[Vector3<f64>],
+        mut vectors: Vec<Vector3<f64>>,
+        curvature: Curvature,
+        forcing: Forcing,
+        solved: SolveReport,
+    ) -> Self {
+        if solved.stopped == StopReason::NonFinite {
+            vectors.fill([0.0; 3]);
+        }
+        let (slope, length) = (-dot(downhill, &vectors), largest(&vectors));
+        Self { vectors, slope, is_projected: curvature != Curvature::Exact, length, forcing, solved }
+    }
 }
 
 impl<'a> Iterate<'a> {
@@ -63,6 +83,7 @@ impl<'a> Iterate<'a> {
     ) -> Result<Self, EvaluationError> {
         let in_contact = potential.body.system.has_contact();
         let projection = Projection::on_demand(potential.touches_obstacles_only());
+        let may_eliminate = potential.may_eliminate();
         let mut pins = if in_contact { potential.begin_contact(&mut x) } else { 1.0 };
         let mut found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
         if found.is_none() && in_contact {
@@ -95,6 +116,7 @@ impl<'a> Iterate<'a> {
             converged: false,
             pins,
             pin_moves: 0,
+            may_eliminate,
         })
     }
 
@@ -109,10 +131,15 @@ impl<'a> Iterate<'a> {
                 break;
             }
             let direction = self.direction()?;
-            match self.search(&direction)? {
+            let few = self.few_that_move(&direction);
+            match self.search(&direction, few.is_some())? {
                 Some(step) => {
+                    let scale = step.scale;
                     self.accept(step, &direction);
                     self.move_pins()?;
+                    if let Some(few) = few {
+                        self.eliminate(&few, scale)?;
+                    }
                 }
                 None if direction.is_projected => {
                     let iterations = self.potential.report.solves;
@@ -156,8 +183,7 @@ impl<'a> Iterate<'a> {
         let forcing = self.options.forcing(largest(&downhill), self.last);
         self.last = Some(forcing);
         let (vectors, solved) = self.solve(&downhill, curvature, forcing.tolerance)?;
-        let (slope, length) = (-dot(&downhill, &vectors), largest(&vectors));
-        Ok(Direction { vectors, slope, is_projected, length, forcing, solved })
+        Ok(Direction::new(&downhill, vectors, curvature, forcing, solved))
     }
 
     /// Solves H d = −∇E. If an exact Hessian turns out to be indefinite, returns the truncated direction of conjugate
@@ -192,9 +218,6 @@ impl<'a> Iterate<'a> {
         if curvature != Curvature::Exact && !solved.converged() {
             solved = self.solve_in_double(downhill, curvature, &options, &mut direction)?;
         }
-        if solved.stopped == StopReason::NonFinite {
-            direction.fill([0.0; 3]);
-        }
         let report = &mut self.potential.report;
         report.phases.solve += started.elapsed();
         report.solves += 1;
@@ -221,14 +244,39 @@ impl<'a> Iterate<'a> {
         Ok(solver.solve(downhill, direction, options))
     }
 
-    /// Searches along the direction; `None` if no step lowers E.
-    fn search(&mut self, direction: &Direction) -> Result<Option<AcceptedStep>, EvaluationError> {
+    /// Returns the vertices to eliminate after a step along the direction; `None` if all are to move together, or the
+    /// step may be the last.
+    fn few_that_move(&self, direction: &Direction) -> Option<Few> {
+        let may_be_last = self.options.may_be_balanced(direction.forcing, self.potential.dt);
+        let may_eliminate = self.may_eliminate && self.pins == 1.0 && !may_be_last;
+        may_eliminate.then(|| self.potential.few_that_move(direction)).flatten()
+    }
+
+    /// Lets the few vertices that a step of this scale moved far proceed on their own, unless the iterate converged.
+    fn eliminate(&mut self, few: &Few, scale: f64) -> Result<(), EvaluationError> {
+        if self.converged {
+            return Ok(());
+        }
+        let shortest = (scale * few.far).max(self.potential.dt * self.options.velocity_tolerance);
+        match self.potential.eliminate(few, &mut self.x, shortest)? {
+            Some(change) => self.energy.value += change,
+            None => self.may_eliminate = false,
+        }
+        (self.gradient, self.linearised) = (None, None);
+        Ok(())
+    }
+
+    /// Searches along the direction; `None` if no step lowers E. Nothing is prefetched if the iterate moves on before
+    /// the next iteration.
+    fn search(&mut self, direction: &Direction, moves_on: bool) -> Result<Option<AcceptedStep>, EvaluationError> {
         if direction.length == 0.0 && direction.forcing.gradient > 0.0 {
             return Ok(None);
         }
         let dt = self.potential.dt;
         let is_last = direction.length < dt * self.options.velocity_tolerance;
-        let prefetch = if self.options.may_be_balanced(direction.forcing, dt) {
+        let prefetch = if moves_on {
+            Prefetch::Nothing
+        } else if self.options.may_be_balanced(direction.forcing, dt) {
             Prefetch::Gradient
         } else if direction.is_projected || is_last || !self.took_full_step || !direction.solved.converged() {
             Prefetch::Nothing

@@ -3,6 +3,7 @@ mod in_contact;
 mod incremental_potential;
 mod iterate;
 mod line_search;
+mod local;
 
 use std::time::Duration;
 
@@ -30,6 +31,9 @@ use iterate::Iterate;
 ///   project each element's Hessian to positive semi-definite: projection on demand (Longva, Löschner,
 ///   Fernández-Fernández, Larionov, Ascher and Bender 2023). A body that touches obstacles only does so after
 ///   directions that lead nowhere, and after steps that contact shortened.
+/// - After an iteration that moves fewer than 15 % of the free vertices by more than a tenth of the largest move, these
+///   vertices proceed with up to four iterations of their own: nonlinear elimination (Cai and Keyes 2002). Cloth that
+///   touches cloth, and bodies with a term that cannot be restricted ([`PlacedTerm::restricted`]), do without.
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
 ///
