@@ -66,8 +66,8 @@ fn placed<T: Precision>(contacts: &[Contact], scale: f64, pattern: &Pattern) -> 
 
 impl<T: Precision> BlockMatrix<T> {
     /// Adds lists of contacts, times a scale, if their blocks are all in the pattern. At most `threads` threads look
-    /// them up. Solvers then treat them like every other stiffness. [`BlockMatrix::remove_contacts`] restores the matrix
-    /// exactly; until then no system may write to it.
+    /// them up. Solvers then treat them like every other stiffness. No system may write to the matrix until
+    /// [`BlockMatrix::remove_contacts`] restores it exactly.
     pub fn add_contacts(&mut self, contacts: &[Vec<Contact>], scale: f64, threads: usize) -> ContactsInMatrix<T> {
         let contents = self.take_contents();
         let pattern = &**self.pattern();
