@@ -310,6 +310,7 @@ impl ContactModel for BarrierContact {
             .into_iter()
             .unzip();
         if contacts.is_empty() {
+            // No pair has joined, but friction acts on the pairs at the start of the step.
             contacts.push(friction.between(None, None).map(|(pair, rubbing)| rubbing.contact(rows(pair))).collect());
         }
         self.counts.active += active.iter().sum::<usize>() as u64;
