@@ -1,12 +1,28 @@
 //! Work divided among threads. The results do not depend on the number of threads.
 
 use std::panic::resume_unwind;
+use std::sync::Mutex;
 
-/// Applies `work` to every item on at most `threads` threads, including the calling one. Results are in the order of
-/// the items.
+/// Applies `work` to every item on at most `threads` threads, including the calling one. Each thread takes one item
+/// after the other, so one that starts late takes fewer. Results are in the order of the items.
 pub fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
-    let each = |items: Vec<I>| items.into_iter().map(&work).collect::<Vec<R>>();
-    in_parts(threads, items, each).into_iter().flatten().collect()
+    let threads = threads.min(items.len());
+    if threads <= 1 {
+        return items.into_iter().map(work).collect();
+    }
+    let waiting = Mutex::new(items.into_iter().enumerate());
+    let next = || waiting.lock().expect("no thread panics while it takes an item").next();
+    let until_none_waits = |_| {
+        let mut done = Vec::new();
+        while let Some((number, item)) = next() {
+            done.push((number, work(item)));
+        }
+        done
+    };
+    let mut done: Vec<(usize, R)> =
+        in_parts(threads, vec![(); threads], until_none_waits).into_iter().flatten().collect();
+    done.sort_unstable_by_key(|(number, _)| *number);
+    done.into_iter().map(|(_, result)| result).collect()
 }
 
 /// Divides the items among at most `threads` threads and applies `work` to each part, all parts at the same time.

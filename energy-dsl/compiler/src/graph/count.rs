@@ -1,19 +1,17 @@
-use std::collections::BTreeSet;
-
 use super::{Graph, NodeId, Op};
 use energy_runtime::OperationCount;
 
 /// Returns the nodes needed to compute `outputs`, in topological order. Rules are replaced by their values.
 #[must_use]
-pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
-    let mut seen = BTreeSet::new();
+pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> Vec<NodeId> {
+    let mut is_needed = vec![false; graph.len()];
     let mut stack: Vec<NodeId> = outputs.iter().map(|&o| graph.resolve(o)).collect();
     while let Some(node) = stack.pop() {
-        if seen.insert(node) {
+        if !std::mem::replace(&mut is_needed[node.0 as usize], true) {
             stack.extend(graph.fused(node).operands().map(|o| graph.resolve(o)));
         }
     }
-    seen
+    (0..).zip(is_needed).filter(|(_, is_needed)| *is_needed).map(|(number, _)| NodeId(number)).collect()
 }
 
 /// Counts the operations needed to compute `outputs`.

@@ -3,6 +3,15 @@
 use super::{Graph, Input, NodeId, Op, reachable};
 use energy_runtime::{Baseline, Inputs, Mask, Number};
 
+/// The operations that compute some outputs of a graph, in order. They are found once, for any number of inputs.
+#[derive(Clone, Debug)]
+pub struct Interpreter {
+    /// Operands are places in this list.
+    operations: Vec<Op>,
+    /// The places of the outputs.
+    outputs: Vec<NodeId>,
+}
+
 /// The result of an operation.
 #[derive(Clone)]
 enum Computed<T: Number> {
@@ -12,81 +21,81 @@ enum Computed<T: Number> {
     Mask(T::Mask),
 }
 
-/// Returns the values of `outputs`, none of which may be a mask.
-pub fn interpret<T: Number>(graph: &Graph, outputs: &[NodeId], inputs: &Inputs<'_, T>) -> Vec<T> {
-    interpret_with(graph, outputs, inputs, &[])
-}
+/// The results of the operations so far.
+struct Values<T: Number>(Vec<Computed<T>>);
 
-/// Returns the values of `outputs` of a graph that reads precomputed numbers.
-pub fn interpret_with<T: Number>(
-    graph: &Graph,
-    outputs: &[NodeId],
-    inputs: &Inputs<'_, T>,
-    precomputed: &[T],
-) -> Vec<T> {
-    let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
-    for node in reachable(graph, outputs) {
-        values[node.0 as usize] = Some(compute(graph, node, inputs, precomputed, &values));
-    }
-    outputs.iter().map(|&o| number(graph, &values, o)).collect()
-}
-
-/// Returns the branch that every comparison, minimum, maximum and absolute value takes on the way to `outputs`.
-pub fn branches_with<T: Number>(
-    graph: &Graph,
-    outputs: &[NodeId],
-    inputs: &Inputs<'_, T>,
-    precomputed: &[T],
-) -> Vec<T::Mask> {
-    let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
-    let mut branches = Vec::new();
-    for node in reachable(graph, outputs) {
-        let value = compute(graph, node, inputs, precomputed, &values);
-        let n = |node| number(graph, &values, node);
-        match (graph.fused(node), &value) {
-            (Op::Min(a, b) | Op::Max(a, b), _) => branches.push(n(a).less(n(b))),
-            (Op::Abs(a), _) => branches.push(n(a).less(T::from_f64(0.0))),
-            (_, Computed::Mask(mask)) => branches.push(*mask),
-            (_, Computed::Number(_)) => {}
+impl<T: Number> Values<T> {
+    fn number(&self, place: NodeId) -> T {
+        match &self.0[place.0 as usize] {
+            Computed::Number(value) => value.clone(),
+            Computed::Mask(_) => unreachable!("compiler bug: a number was expected of {place:?}"),
         }
-        values[node.0 as usize] = Some(value);
     }
-    branches
-}
 
-/// Returns the value of a mask.
-pub fn interpret_mask<T: Number>(graph: &Graph, output: NodeId, inputs: &Inputs<'_, T>) -> T::Mask {
-    let mut values: Vec<Option<Computed<T>>> = vec![None; graph.len()];
-    for node in reachable(graph, &[output]) {
-        values[node.0 as usize] = Some(compute(graph, node, inputs, &[], &values));
-    }
-    mask(graph, &values, output)
-}
-
-fn number<T: Number>(graph: &Graph, values: &[Option<Computed<T>>], node: NodeId) -> T {
-    match &values[graph.resolve(node).0 as usize] {
-        Some(Computed::Number(value)) => value.clone(),
-        _ => unreachable!("compiler bug: a number was expected of {node:?}"),
+    fn mask(&self, place: NodeId) -> T::Mask {
+        match &self.0[place.0 as usize] {
+            Computed::Mask(value) => *value,
+            Computed::Number(_) => unreachable!("compiler bug: a mask was expected of {place:?}"),
+        }
     }
 }
 
-fn mask<T: Number>(graph: &Graph, values: &[Option<Computed<T>>], node: NodeId) -> T::Mask {
-    match &values[graph.resolve(node).0 as usize] {
-        Some(Computed::Mask(value)) => *value,
-        _ => unreachable!("compiler bug: a mask was expected of {node:?}"),
+impl Interpreter {
+    /// Finds the operations that compute `outputs`.
+    #[must_use]
+    pub fn new(graph: &Graph, outputs: &[NodeId]) -> Self {
+        let nodes = reachable(graph, outputs);
+        let mut places = vec![NodeId(0); graph.len()];
+        for (place, node) in (0..).zip(&nodes) {
+            places[node.0 as usize] = NodeId(place);
+        }
+        let place = |node: NodeId| places[graph.resolve(node).0 as usize];
+        let operations = nodes.iter().map(|&node| graph.fused(node).with_operands(place)).collect();
+        Self { operations, outputs: outputs.iter().map(|&output| place(output)).collect() }
     }
-}
 
-fn compute<T: Number>(
-    graph: &Graph,
-    node: NodeId,
-    inputs: &Inputs<'_, T>,
-    precomputed: &[T],
-    values: &[Option<Computed<T>>],
-) -> Computed<T> {
-    let n = |node| number(graph, values, node);
-    let m = |node| mask::<T>(graph, values, node);
-    apply(graph.fused(node), inputs, precomputed, n, m)
+    /// Returns the values of the outputs, none of which may be a mask. `precomputed` are the numbers that a graph may
+    /// read besides its inputs.
+    pub fn evaluate<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Vec<T> {
+        let values = self.values(inputs, precomputed);
+        self.outputs.iter().map(|&output| values.number(output)).collect()
+    }
+
+    /// Returns the values of outputs that are masks.
+    pub fn masks<T: Number>(&self, inputs: &Inputs<'_, T>) -> Vec<T::Mask> {
+        let values = self.values(inputs, &[]);
+        self.outputs.iter().map(|&output| values.mask(output)).collect()
+    }
+
+    /// Returns the branch that every comparison, minimum, maximum and absolute value takes on the way to the outputs.
+    pub fn branches<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Vec<T::Mask> {
+        let values = self.values(inputs, precomputed);
+        let n = |place| values.number(place);
+        let branch = |(op, value): (&Op, &Computed<T>)| match (op, value) {
+            (Op::Min(a, b) | Op::Max(a, b), _) => Some(n(*a).less(n(*b))),
+            (Op::Abs(a), _) => Some(n(*a).less(T::from_f64(0.0))),
+            (_, Computed::Mask(mask)) => Some(*mask),
+            (_, Computed::Number(_)) => None,
+        };
+        self.operations.iter().zip(&values.0).filter_map(branch).collect()
+    }
+
+    /// Returns which precomputed numbers the outputs depend on, in order.
+    pub fn precomputed(&self) -> impl Iterator<Item = usize> {
+        self.operations.iter().filter_map(|op| match op {
+            Op::Input(Input::Precomputed(number)) => Some(usize::from(*number)),
+            _ => None,
+        })
+    }
+
+    fn values<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Values<T> {
+        let mut values = Values(Vec::with_capacity(self.operations.len()));
+        for &op in &self.operations {
+            let value = apply(op, inputs, precomputed, |place| values.number(place), |place| values.mask(place));
+            values.0.push(value);
+        }
+        values
+    }
 }
 
 /// Evaluates one operation; `n` and `m` return its operands.

@@ -18,7 +18,7 @@ mod substitute;
 mod sums;
 
 pub use count::{count, reachable};
-pub use interpret::{branches_with, interpret, interpret_mask, interpret_with};
+pub use interpret::Interpreter;
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub(crate) use origin::Origin;
@@ -28,7 +28,9 @@ pub use signs::with_signs_inside;
 pub(crate) use spectrum::{Dependence, Spectrum};
 pub(crate) use substitute::Substitution;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
+
+use rustc_hash::FxHashMap;
 
 /// The form that functions are lowered to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,12 +51,12 @@ pub struct Graph {
     varies: Vec<bool>,
     /// Number of uses of each node as an operand.
     users: Vec<u32>,
-    index: HashMap<Op, NodeId>,
+    index: FxHashMap<Op, NodeId>,
     rules: Vec<Rule>,
-    rule_index: HashMap<(Primitive, Vec<NodeId>), NodeId>,
+    rule_index: FxHashMap<(Primitive, Vec<NodeId>), NodeId>,
     assumptions: Vec<Assumption>,
     /// Origins of vectors, by their components; see `origin.rs`.
-    origins: HashMap<Vec<NodeId>, Origin>,
+    origins: FxHashMap<Vec<NodeId>, Origin>,
     /// Singular values, with the vectors that their derivatives need.
     spectra: Vec<Spectrum>,
     /// Determinants of square matrices. That of a rest shape must be positive.
@@ -91,11 +93,11 @@ impl Graph {
             nodes: Vec::new(),
             varies: Vec::new(),
             users: Vec::new(),
-            index: HashMap::new(),
+            index: FxHashMap::default(),
             rules: Vec::new(),
-            rule_index: HashMap::new(),
+            rule_index: FxHashMap::default(),
             assumptions: Vec::new(),
-            origins: HashMap::new(),
+            origins: FxHashMap::default(),
             spectra: Vec::new(),
             determinants: Vec::new(),
             rounded: BTreeSet::new(),

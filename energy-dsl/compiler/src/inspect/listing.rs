@@ -5,7 +5,7 @@ use proc_macro2::TokenStream;
 use crate::check::Program;
 use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
-use crate::graph::{NodeId, interpret, interpret_mask};
+use crate::graph::{Interpreter, NodeId};
 use crate::inspect::layout::{layout, methods};
 use crate::inspect::textbook::{file_programs, programs};
 use crate::lower::lower;
@@ -99,12 +99,10 @@ impl Listing {
         let routine = self.routines.list.iter().find(|r| r.name == routine)?;
         let graph = &self.routines.graph;
         let groups = match &routine.general {
-            Some(general) if path == Path::General || !interpret_mask(graph, general.ordinary, inputs).all() => {
-                &general.groups
-            }
+            Some(general) if path == Path::General || !self.mask(general.ordinary, inputs).all() => &general.groups,
             _ => &routine.groups,
         };
-        Some(groups.iter().map(|group| interpret(graph, group, inputs)).collect())
+        Some(groups.iter().map(|group| Interpreter::new(graph, group).evaluate(inputs, &[])).collect())
     }
 
     /// Returns whether a routine of a declaration without rest shape raises a flag; `None` for an unknown routine.
@@ -112,7 +110,11 @@ impl Listing {
     pub fn is_flagged<T: Number>(&self, routine: &str, inputs: &Inputs<'_, T>) -> Option<bool> {
         let routine = self.routines.list.iter().find(|r| r.name == routine)?;
         let flags = routine.general.as_ref().map_or(routine.flags, |general| general.flags);
-        Some(flags.into_iter().flatten().any(|mask| interpret_mask(&self.routines.graph, mask, inputs).any()))
+        Some(flags.into_iter().flatten().any(|flag| self.mask(flag, inputs).any()))
+    }
+
+    fn mask<T: Number>(&self, node: NodeId, inputs: &Inputs<'_, T>) -> T::Mask {
+        Interpreter::new(&self.routines.graph, &[node]).masks(inputs)[0]
     }
 
     /// Lists what each routine costs on the ordinary path, and the Hessian if a point is pinned: total operations, and

@@ -2,7 +2,7 @@ use proc_macro2::TokenStream;
 
 use crate::check::{Program, Source, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
-use crate::graph::{Input, NodeId, Op, branches_with, interpret_with, reachable};
+use crate::graph::{Interpreter, NodeId};
 use crate::inspect::tower::Tower;
 use crate::lower::{TextbookFormula, lower_textbook};
 use crate::syntax::{parse, parse_file};
@@ -23,7 +23,19 @@ use energy_runtime::{Inputs, Number};
 #[derive(Clone, Debug)]
 pub struct Textbook {
     program: Program,
-    formula: TextbookFormula,
+    rows: Interpreter,
+    /// The derivatives that the formula uses.
+    derivatives: Vec<Derivative>,
+    /// The rows, and all that is differentiated.
+    everything: Interpreter,
+}
+
+/// A derivative that a formula uses, by one number of a section.
+#[derive(Clone, Debug)]
+struct Derivative {
+    of: Interpreter,
+    source: Source,
+    by: usize,
 }
 
 impl Textbook {
@@ -36,8 +48,15 @@ impl Textbook {
             let here = Span::of(proc_macro2::Span::call_site());
             Diagnostics::from(Diagnostic::new(&here, "expected a declaration, found none"))
         })?;
-        let formula = lower_textbook(&program);
-        Ok(Self { program, formula })
+        let TextbookFormula { formula, gradients } = lower_textbook(&program);
+        let interpreter = |outputs: &[NodeId]| Interpreter::new(&formula.graph, outputs);
+        let inner = gradients.iter().map(|(of, ..)| *of);
+        let everything: Vec<NodeId> = formula.outputs.iter().copied().chain(inner).collect();
+        let derivative =
+            |&(of, source, by): &(NodeId, Source, usize)| Derivative { of: interpreter(&[of]), source, by };
+        let derivatives = gradients.iter().map(derivative).collect();
+        let (rows, everything) = (interpreter(&formula.outputs), interpreter(&everything));
+        Ok(Self { program, rows, derivatives, everything })
     }
 
     /// Returns the checked declaration.
@@ -55,13 +74,12 @@ impl Textbook {
     /// # Panics
     /// When an input slice is shorter than declared.
     pub fn evaluate<T: Number>(&self, inputs: &Inputs<'_, T>) -> Vec<T> {
-        let formula = &self.formula.formula;
-        if self.formula.gradients.is_empty() {
-            return interpret_with(&formula.graph, &formula.outputs, inputs, &[]);
+        if self.derivatives.is_empty() {
+            return self.rows.evaluate(inputs, &[]);
         }
         let inputs = TowerInputs::of(inputs);
-        let gradients = self.gradients(&formula.outputs, &inputs, 1);
-        let rows = interpret_with(&formula.graph, &formula.outputs, &inputs.borrow(), &gradients);
+        let gradients = self.gradients(&self.rows, &inputs, 1);
+        let rows = self.rows.evaluate(&inputs.borrow(), &gradients);
         rows.into_iter().map(Tower::into_plain).collect()
     }
 
@@ -73,29 +91,23 @@ impl Textbook {
     /// When an input slice is shorter than declared.
     #[must_use]
     pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Vec<bool> {
-        let formula = &self.formula.formula;
-        if self.formula.gradients.is_empty() {
-            return branches_with(&formula.graph, &formula.outputs, inputs, &[]);
+        if self.derivatives.is_empty() {
+            return self.everything.branches(inputs, &[]);
         }
         let inputs = TowerInputs::of(inputs);
-        let inner = self.formula.gradients.iter().map(|(of, ..)| *of);
-        let outputs: Vec<NodeId> = formula.outputs.iter().copied().chain(inner).collect();
-        let gradients = self.gradients(&outputs, &inputs, 1);
-        branches_with(&formula.graph, &outputs, &inputs.borrow(), &gradients)
+        let gradients = self.gradients(&self.everything, &inputs, 1);
+        self.everything.branches(&inputs.borrow(), &gradients)
     }
 
-    /// Returns the derivatives that `outputs` use (0 for unused ones). Each is differentiated with
-    /// an ε of its own depth.
-    fn gradients<T: Number>(&self, outputs: &[NodeId], inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
-        let graph = &self.formula.formula.graph;
-        let mut numbers = vec![Tower::from_f64(0.0); self.formula.gradients.len()];
-        for node in reachable(graph, outputs) {
-            let Op::Input(Input::Precomputed(number)) = graph.op(node) else { continue };
-            let number = usize::from(number);
-            let (of, source, by) = self.formula.gradients[number];
-            let moved = inputs.raised(source, by, depth);
-            let within = self.gradients(&[of], &moved, depth + 1);
-            numbers[number] = interpret_with(graph, &[of], &moved.borrow(), &within).remove(0).slope(depth);
+    /// Returns the derivatives that some outputs use (0 for unused ones). Each is differentiated with an ε of its own
+    /// depth.
+    fn gradients<T: Number>(&self, outputs: &Interpreter, inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
+        let mut numbers = vec![Tower::from_f64(0.0); self.derivatives.len()];
+        for number in outputs.precomputed() {
+            let Derivative { of, source, by } = &self.derivatives[number];
+            let moved = inputs.raised(*source, *by, depth);
+            let within = self.gradients(of, &moved, depth + 1);
+            numbers[number] = of.evaluate(&moved.borrow(), &within).remove(0).slope(depth);
         }
         numbers
     }

@@ -259,7 +259,7 @@ fn quotient_or(g: &mut Graph, a: NodeId, b: NodeId, limit: NodeId) -> NodeId {
 mod tests {
     use super::*;
     use crate::functions::RECOGNISERS;
-    use crate::graph::{Input, interpret};
+    use crate::graph::{Input, Interpreter};
     use energy_runtime::Inputs;
 
     type Formula = fn(&mut Graph, NodeId, NodeId) -> NodeId;
@@ -307,7 +307,7 @@ mod tests {
         let found = DividedDifference::new(g, &reflection).of(g, f);
         let mirrored = formula(g, values[1], values[0]);
         let inputs = Inputs { parameters: &[], rest: &[], positions: &[a, b], velocities: &[] };
-        let numbers = interpret(g, &[found, f, mirrored], &inputs);
+        let numbers = Interpreter::new(g, &[found, f, mirrored]).evaluate(&inputs, &[]);
         [numbers[0], (numbers[1] - numbers[2]) / (a - b)]
     }
 

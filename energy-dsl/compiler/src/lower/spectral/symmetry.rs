@@ -1,6 +1,6 @@
 //! Finds out whether a function of singular values stays the same after a reflection, by trying numbers.
 
-use crate::graph::{Graph, Input, NodeId, Op, Substitution, interpret_with};
+use crate::graph::{Graph, Input, Interpreter, NodeId, Op, Substitution};
 use energy_runtime::Inputs;
 
 /// Number of random points.
@@ -19,13 +19,14 @@ pub(super) fn is_unchanged(g: &mut Graph, psi: NodeId, images: &[(NodeId, NodeId
     if before == after {
         return true;
     }
+    let both = Interpreter::new(g, &[before, after]);
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let sizes = Sizes::of(g);
     let equal = |_| {
         let [positions, parameters, rest, precomputed] =
             [images.len(), sizes.parameters, sizes.rest, sizes.precomputed].map(|count| random.numbers(count));
         let inputs = Inputs { parameters: &parameters, rest: &rest, positions: &positions, velocities: &[] };
-        let both = interpret_with(g, &[before, after], &inputs, &precomputed);
+        let both = both.evaluate(&inputs, &precomputed);
         (both[0] - both[1]).abs() <= TOLERANCE * both[0].abs().max(both[1].abs())
     };
     (0..POINTS).all(equal)
