@@ -2,40 +2,72 @@
 
 use std::fmt::Debug;
 
-use energy_dsl::{Block, PackedPotential, Vector3};
+use energy_compiler::Interpreted;
+use energy_dsl::tape::Column;
+use energy_dsl::{Block, Element, PackedPotential, Vector3};
 use energy_elements::{
     AsRigidAsPossible, BaraffWitkinShear, BaraffWitkinStretch, DistanceBarrier, FlatBending, HairBend, HookeSpring,
     NeoHookean, PowerLaw, SquaredDistanceBarrier, StVK, StableNeoHookean, StableNeoHookeanLog,
 };
-use energy_solve::{Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, Weights};
+use energy_solve::{
+    Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, TapeTerm, Term, Weights,
+};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+
+/// Returns a term of generated elements, each with points of its own.
+pub(crate) fn compiled<E, const N: usize>(elements: &[E]) -> Box<dyn Term>
+where
+    E: PackedPotential<f64> + Debug + 'static + Send + Sync,
+{
+    let list = ElementList::new("elements", elements.to_vec(), &stencils::<N>(elements.len())).unwrap();
+    Box::new(PotentialTerm::new(list))
+}
+
+/// An element that is read at run time: projection is the same, and generated ones take seconds each to build.
+pub(crate) struct Read(Interpreted);
+
+impl Read {
+    pub(crate) fn new<E: Element>() -> Self {
+        Self(Interpreted::from_source(E::DECLARATION.source).unwrap().pop().unwrap())
+    }
+
+    /// Returns a term of equal elements, each with points of its own.
+    pub(crate) fn term(&self, count: usize, rest: &[&[f64]], parameters: &[f64]) -> Box<dyn Term> {
+        let rest: Vec<_> = rest.iter().map(|numbers| Column::Same(numbers)).collect();
+        let parameters: Vec<_> = parameters.chunks(1).map(Column::Same).collect();
+        let elements = self.0.elements(count, &rest, &parameters).unwrap();
+        let declaration = self.0.declaration();
+        let vertices = 0..count * declaration.points.len();
+        Box::new(TapeTerm::new("elements".into(), declaration, elements.tape().clone(), vertices))
+    }
+}
+
+fn stencils<const N: usize>(count: usize) -> Vec<[usize; N]> {
+    (0..count).map(|i| std::array::from_fn(|p| N * i + p)).collect()
+}
 
 /// Returns the Hessian of each element as a dense matrix, and the evaluation counts.
-pub(crate) fn hessians<E, const N: usize>(
-    elements: &[E],
+pub(crate) fn hessians<const N: usize>(
+    elements: Box<dyn Term>,
     x: &[[Vector3<f64>; N]],
     curvature: Curvature,
-) -> (Vec<DMatrix<f64>>, Counts)
-where
-    E: PackedPotential<f64> + Clone + Debug + 'static + Send + Sync,
-{
-    let stencils: Vec<[usize; N]> = (0..x.len()).map(|i| std::array::from_fn(|p| N * i + p)).collect();
-    let list = ElementList::new("elements", elements.to_vec(), &stencils).unwrap();
+) -> (Vec<DMatrix<f64>>, Counts) {
     let positions = x.concat();
-    let mut system = System::new(vec![Box::new(PotentialTerm::new(list))], &vec![false; positions.len()]).unwrap();
+    let mut system = System::new(vec![elements], &vec![false; positions.len()]).unwrap();
     let mut matrix = system.matrix();
     let weights = Weights { position: -1.0, velocity: 0.0 };
     let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
     let v = vec![[0.0; 3]; positions.len()];
     system.linearise(State { x: &positions, v: &v }, options, &mut matrix).unwrap();
-    let dense = |stencil: &[usize; N]| {
+    let dense = |stencil: [usize; N]| {
         DMatrix::from_fn(3 * N, 3 * N, |row, column| {
             let block: Block<f64> = matrix.block(stencil[row / 3], stencil[column / 3]);
             block[row % 3][column % 3]
         })
     };
-    let dense = stencils.iter().map(dense).collect();
+    let dense = stencils(x.len()).into_iter().map(dense).collect();
     (dense, system.terms().next().unwrap().1)
 }
 
@@ -46,15 +78,12 @@ pub(crate) fn with_eigenvalues(of: &DMatrix<f64>, change: impl Fn(f64) -> f64) -
 }
 
 /// Compares all three treatments of negative eigenvalues on the same elements.
-fn check<E, const N: usize>(elements: &[E], x: &[[Vector3<f64>; N]]) -> Result<(), TestCaseError>
-where
-    E: PackedPotential<f64> + Clone + Debug + 'static + Send + Sync,
-{
-    let (exact, none) = hessians(elements, x, Curvature::Exact);
+fn check<const N: usize>(elements: impl Fn() -> Box<dyn Term>, x: &[[Vector3<f64>; N]]) -> Result<(), TestCaseError> {
+    let (exact, none) = hessians(elements(), x, Curvature::Exact);
     prop_assert_eq!(none.hessian.projected, 0);
     for curvature in [Curvature::Clamped, Curvature::Absolute] {
         let change = |value: f64| if curvature == Curvature::Clamped { value.max(0.0) } else { value.abs() };
-        let (found, counts) = hessians(elements, x, curvature);
+        let (found, counts) = hessians(elements(), x, curvature);
         let mut indefinite = 0;
         for (element, (found, exact)) in found.iter().zip(&exact).enumerate() {
             let size = exact.amax();
@@ -82,44 +111,60 @@ pub(crate) fn points<const N: usize>() -> impl Strategy<Value = Vec<[Vector3<f64
     proptest::collection::vec(one, COUNT)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+/// Runs a test on random inputs.
+pub(crate) fn on_random<S: Strategy>(inputs: &S, test: impl Fn(S::Value) -> Result<(), TestCaseError>) {
+    TestRunner::new(ProptestConfig::with_cases(24)).run(inputs, test).unwrap();
+}
 
-    #[test]
-    fn springs(x in points::<2>(), length in 0.1..2.0_f64) {
-        check(&[HookeSpring { K: 3.0, L: length }; COUNT], &x)?;
-    }
+#[test]
+fn springs() {
+    on_random(&(points::<2>(), 0.1..2.0_f64), |(x, length)| {
+        check(|| compiled::<_, 2>(&[HookeSpring { K: 3.0, L: length }; COUNT]), &x)
+    });
+}
 
-    #[test]
-    fn hair(x in points::<3>()) {
-        check(&[HairBend { k: 2.0 }; COUNT], &x)?;
-    }
+#[test]
+fn hair() {
+    let hair = Read::new::<HairBend>();
+    on_random(&points::<3>(), |x| check(|| hair.term(COUNT, &[], &[2.0]), &x));
+}
 
-    #[test]
-    fn membranes(x in points::<3>(), size in 0.5..2.0_f64) {
+#[test]
+fn membranes() {
+    let (arap, stretch, shear) =
+        (Read::new::<AsRigidAsPossible>(), Read::new::<BaraffWitkinStretch>(), Read::new::<BaraffWitkinShear>());
+    let isotropic = [Read::new::<StableNeoHookean>(), Read::new::<StableNeoHookeanLog>(), Read::new::<NeoHookean>()];
+    on_random(&(points::<3>(), 0.5..2.0_f64), |(x, size)| {
         let (u0, u1, u2) = ([0.0, 0.0], [size, 0.0], [0.3, size]);
-        check(&[StVK::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
-        check(&[AsRigidAsPossible::new(u0, u1, u2, 1.0).unwrap(); COUNT], &x)?;
-        check(&[StableNeoHookean::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
-        check(&[StableNeoHookeanLog::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
-        check(&[NeoHookean::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT], &x)?;
-        check(&[BaraffWitkinStretch::new(u0, u1, u2, 1.0, 1.1, 0.9).unwrap(); COUNT], &x)?;
-        check(&[BaraffWitkinShear::new(u0, u1, u2, 1.0).unwrap(); COUNT], &x)?;
-    }
+        check(|| compiled::<_, 3>(&[StVK::new(u0, u1, u2, 1.0, 2.0).unwrap(); COUNT]), &x)?;
+        let rest: [&[f64]; 3] = [&u0, &u1, &u2];
+        for element in &isotropic {
+            check(|| element.term(COUNT, &rest, &[1.0, 2.0]), &x)?;
+        }
+        check(|| arap.term(COUNT, &rest, &[1.0]), &x)?;
+        check(|| stretch.term(COUNT, &rest, &[1.0, 1.1, 0.9]), &x)?;
+        check(|| shear.term(COUNT, &rest, &[1.0]), &x)
+    });
+}
 
-    #[test]
-    fn barriers_and_powers(x in points::<2>(), near in 0.1..3.0_f64) {
-        check(&[DistanceBarrier { κ: 2.0, dhat: near }; COUNT], &x)?;
-        check(&[SquaredDistanceBarrier { κ: 2.0, dhat: near }; COUNT], &x)?;
-        check(&[PowerLaw { α: near }; COUNT], &x)?;
-    }
+#[test]
+fn barriers_and_powers() {
+    let barriers = [Read::new::<DistanceBarrier>(), Read::new::<SquaredDistanceBarrier>()];
+    let power = Read::new::<PowerLaw>();
+    on_random(&(points::<2>(), 0.1..3.0_f64), |(x, near)| {
+        for barrier in &barriers {
+            check(|| barrier.term(COUNT, &[], &[2.0, near]), &x)?;
+        }
+        check(|| power.term(COUNT, &[], &[near]), &x)
+    });
+}
 
-    #[test]
-    fn flat_hinges(x in points::<4>()) {
-        // Functions of a dihedral angle do not get the nearest matrix: `hinges.rs` has their tests.
-        let flat = FlatBending::new([0.5, 1.0, 0.0], [0.4, -0.9, 0.0], [0.0; 3], [1.0, 0.0, 0.0], 2.0).unwrap();
-        check(&[flat; COUNT], &x)?;
-    }
+#[test]
+fn flat_hinges() {
+    // Functions of a dihedral angle do not get the nearest matrix: `hinges.rs` has their tests.
+    let flat = Read::new::<FlatBending>();
+    let rest: [&[f64]; 4] = [&[0.5, 1.0, 0.0], &[0.4, -0.9, 0.0], &[0.0; 3], &[1.0, 0.0, 0.0]];
+    on_random(&points::<4>(), |x| check(|| flat.term(COUNT, &rest, &[2.0]), &x));
 }
 
 #[test]
@@ -127,8 +172,8 @@ fn an_element_at_rest_is_not_projected() {
     let rest = StVK::new([0.0, 0.0], [1.0, 0.0], [0.3, 0.9], 1.0, 2.0).unwrap();
     // Rotated, so that the zeros of its Hessian have rounding errors.
     let x = [[0.1, 0.2, 0.3], [0.1 + 0.6, 0.2, 0.3 + 0.8], [0.1 + 0.18, 0.2 + 0.9, 0.3 + 0.24]];
-    let (exact, _) = hessians(&[rest], &[x], Curvature::Exact);
-    let (found, counts) = hessians(&[rest], &[x], Curvature::Clamped);
+    let (exact, _) = hessians(compiled::<_, 3>(&[rest]), &[x], Curvature::Exact);
+    let (found, counts) = hessians(compiled::<_, 3>(&[rest]), &[x], Curvature::Clamped);
     assert_eq!((counts.hessian.evaluated, counts.hessian.projected), (1, 0));
     assert_eq!(found, exact);
 }
@@ -137,8 +182,8 @@ fn an_element_at_rest_is_not_projected() {
 fn lanes_do_not_affect_each_other() {
     let spring = |length| HookeSpring { K: 1.0, L: length };
     let x = [[[0.0; 3], [1.0, 0.2, 0.3]]; 2];
-    let (alone, _) = hessians(&[spring(2.0)], &x[..1], Curvature::Clamped);
-    let (beside, counts) = hessians(&[spring(2.0), spring(0.5)], &x, Curvature::Clamped);
+    let (alone, _) = hessians(compiled::<_, 2>(&[spring(2.0)]), &x[..1], Curvature::Clamped);
+    let (beside, counts) = hessians(compiled::<_, 2>(&[spring(2.0), spring(0.5)]), &x, Curvature::Clamped);
     assert_eq!(alone[0], beside[0]);
     assert_eq!(counts.hessian.projected, 1);
 }

@@ -201,10 +201,18 @@ impl CollisionMesh {
     }
 
     /// Whether two features have a vertex in common, or vertices that are sewn together.
-    pub(super) fn are_joined(&self, a: &[u32], b: &[u32]) -> bool {
-        if !self.has_seams {
-            return a.iter().any(|p| b.contains(p));
+    #[inline]
+    pub(super) fn are_joined<const M: usize, const N: usize>(&self, a: &[u32; M], b: &[u32; N]) -> bool {
+        let mut joined = false;
+        for p in a {
+            for q in b {
+                joined |= p == q;
+            }
         }
+        joined || self.has_seams && self.are_sewn(a, b)
+    }
+
+    fn are_sewn(&self, a: &[u32], b: &[u32]) -> bool {
         let sewn = |vertex: &u32| self.sewn[*vertex as usize];
         a.iter().any(|p| b.iter().any(|q| sewn(p) == sewn(q)))
     }

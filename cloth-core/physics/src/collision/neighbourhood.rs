@@ -84,7 +84,7 @@ impl Neighbourhood {
         let pairs = if count as f64 > FEW * vertices.len() as f64 {
             self.clear();
             is_stray.fill(true);
-            search.pairs(mesh, vertices.map(path).collect())
+            search.pairs(mesh, &vertices.map(path).collect::<Vec<_>>())
         } else {
             let mut regions = self.balls();
             for vertex in vertices.filter(|&vertex| is_stray[vertex]) {
@@ -92,7 +92,7 @@ impl Neighbourhood {
                 let [start, end] = path(vertex).0;
                 regions[vertex] = MovingBounds::fixed(regions[vertex].0[0].around(start).around(end));
             }
-            search.pairs_with(&is_stray, mesh, regions)
+            search.pairs_with(&is_stray, mesh, &regions)
         };
         self.strays = Strays { ends, is_stray, radii, nearby: Nearby::new(pairs) };
         true

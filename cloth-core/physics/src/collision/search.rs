@@ -6,7 +6,7 @@ use energy_solve::threads::for_each;
 
 use super::mesh::CollisionMesh;
 use super::{Exclusions, Pair, PairKind};
-use crate::geometry::{Bounds, Branches, Hierarchy, MovingBounds, Volume};
+use crate::geometry::{Bounds, Branches, Hierarchy, MovingBounds, RoundedMovingBounds, Volume};
 
 /// A mesh with fewer vertices is searched on one thread.
 const FEW: usize = 1000;
@@ -43,9 +43,9 @@ pub struct Rules {
 /// Hierarchies of the points, triangles and edges from certain places in the mesh's lists on.
 #[derive(Clone, Debug)]
 struct Trees {
-    points: Hierarchy<MovingBounds>,
-    triangles: Hierarchy<MovingBounds>,
-    edges: Hierarchy<MovingBounds>,
+    points: Hierarchy<RoundedMovingBounds>,
+    triangles: Hierarchy<RoundedMovingBounds>,
+    edges: Hierarchy<RoundedMovingBounds>,
     first: [usize; 3],
 }
 
@@ -61,28 +61,28 @@ enum Kind {
 struct Boxes<'a> {
     mesh: &'a CollisionMesh,
     /// The extended region of each vertex.
-    regions: Vec<MovingBounds>,
+    regions: Vec<RoundedMovingBounds>,
 }
 
 impl<'a> Boxes<'a> {
-    fn new(mesh: &'a CollisionMesh, mut regions: Vec<MovingBounds>, halves: &[f64]) -> Self {
-        regions.iter_mut().zip(halves).for_each(|(region, half)| *region = region.extended(*half));
+    fn new(mesh: &'a CollisionMesh, regions: &[MovingBounds], halves: &[f64]) -> Self {
+        let regions = regions.iter().zip(halves).map(|(region, half)| region.rounded(*half)).collect();
         Self { mesh, regions }
     }
 
-    fn point(&self, number: usize) -> MovingBounds {
+    fn point(&self, number: usize) -> RoundedMovingBounds {
         self.regions[self.mesh.points()[number] as usize]
     }
 
-    fn triangle(&self, number: usize) -> MovingBounds {
+    fn triangle(&self, number: usize) -> RoundedMovingBounds {
         self.around(&self.mesh.triangles()[number])
     }
 
-    fn edge(&self, number: usize) -> MovingBounds {
+    fn edge(&self, number: usize) -> RoundedMovingBounds {
         self.around(&self.mesh.edges()[number])
     }
 
-    fn of(&self, kind: Kind, number: usize) -> MovingBounds {
+    fn of(&self, kind: Kind, number: usize) -> RoundedMovingBounds {
         match kind {
             Kind::Point => self.point(number),
             Kind::Triangle => self.triangle(number),
@@ -90,7 +90,7 @@ impl<'a> Boxes<'a> {
         }
     }
 
-    fn around(&self, vertices: &[u32]) -> MovingBounds {
+    fn around(&self, vertices: &[u32]) -> RoundedMovingBounds {
         let of = |vertex: u32| self.regions[vertex as usize];
         vertices[1..].iter().fold(of(vertices[0]), |all, &vertex| all.joined(of(vertex)))
     }
@@ -163,7 +163,7 @@ const TASKS: [Task; 5] = [
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let boxes = Boxes::new(mesh, places(x), &rules.halves);
+        let boxes = Boxes::new(mesh, &places(x), &rules.halves);
         let own = mesh.own_features();
         let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
         let obstacles = Trees::new(&boxes, std::array::from_fn(|kind| own[kind]..all[kind]));
@@ -190,7 +190,7 @@ impl Search {
 
     /// Returns all pairs that can come within their reach while each vertex stays in its region, and others whose boxes
     /// meet. Regions may move on straight lines. Pairs are in order.
-    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
+    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
         self.obstacles.refit(&boxes, 1);
@@ -206,7 +206,7 @@ impl Search {
 
     /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
     pub fn pairs_at(&mut self, mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Pair> {
-        self.pairs(mesh, places(x))
+        self.pairs(mesh, &places(x))
     }
 
     /// Finds a part of the pairs of cloth and hair, with themselves and with obstacles.
@@ -259,7 +259,7 @@ impl Search {
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
     /// and others whose boxes meet. These regions are at rest, and lie in those of the searches before, at some
     /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
-    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: Vec<MovingBounds>) -> Vec<Pair> {
+    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
         let boxes = Boxes::new(mesh, regions, &self.rules.halves);
         let changed = changed_features(mesh, is_changed);
         self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
@@ -325,30 +325,40 @@ impl Search {
     }
 
     /// Adds a point and a triangle if they can collide.
+    #[inline]
     fn add_point_and_triangle(&self, mesh: &CollisionMesh, point: usize, triangle: usize, found: &mut Found) {
-        if self.can_collide(mesh, &[mesh.points()[point]], &mesh.triangles()[triangle]) {
+        let (p, corners) = ([mesh.points()[point]], mesh.triangles()[triangle]);
+        if !mesh.are_joined(&p, &corners) && self.can_collide(mesh, &p, &corners) {
             found.on_triangles.push([index(point), index(triangle)]);
         }
     }
 
-    /// Adds two edges if they can collide.
+    /// Adds two edges if they can collide. Most edges that meet are neighbours: that test is inlined.
+    #[inline(always)]
     fn add_edges(&self, mesh: &CollisionMesh, one: usize, other: usize, found: &mut Found) {
-        // The triangles of an edge collide with points, such as the centre of a ball.
-        let is_covered = |point: usize, edge: usize| {
-            let [a, b] = mesh.edges()[point];
-            a == b && !mesh.apexes(edge).is_empty()
-        };
-        if is_covered(one, other) || is_covered(other, one) {
-            return;
+        let (a, b) = (mesh.edges()[one], mesh.edges()[other]);
+        if !mesh.are_joined(&a, &b) {
+            self.add_separate_edges(mesh, [one, other], [a, b], found);
         }
-        if self.can_collide(mesh, &mesh.edges()[one], &mesh.edges()[other]) {
+    }
+
+    fn add_separate_edges(
+        &self,
+        mesh: &CollisionMesh,
+        [one, other]: [usize; 2],
+        [a, b]: [[u32; 2]; 2],
+        found: &mut Found,
+    ) {
+        // The triangles of an edge collide with points, such as the centre of a ball.
+        let is_covered = |[p, q]: [u32; 2], edge: usize| p == q && !mesh.apexes(edge).is_empty();
+        if self.can_collide(mesh, &a, &b) && !is_covered(a, other) && !is_covered(b, one) {
             found.of_edges.push([index(one.min(other)), index(one.max(other))]);
         }
     }
 
+    /// Whether two features that are not joined may respond to a contact, and no rule excludes them.
     fn can_collide(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        !mesh.are_joined(a, b)
-            && a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
+        a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
             && !self.rules.exclusions.exclude(mesh, a, b)
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct Node<B> {
     pub from: usize,
     pub to: usize,
     /// The index of the second child; `None` for a leaf.
-    second: Option<usize>,
+    pub second: Option<usize>,
 }
 
 impl<B> Node<B> {
@@ -37,9 +37,6 @@ impl<B> Node<B> {
         self.second.filter(|_| self.to - self.from > more_than)
     }
 }
-
-/// The largest number of items in a leaf.
-const LEAF: usize = 4;
 
 impl<B: Volume> Hierarchy<B> {
     /// Builds the tree over the boxes of items 0, 1, ….
@@ -59,10 +56,10 @@ impl<B: Volume> Hierarchy<B> {
         let around = all.fold(B::empty(), B::joined);
         let node = self.nodes.len();
         self.nodes.push(Node { bounds: around, from, to, second: None });
-        if to - from <= LEAF {
+        if to - from <= B::LEAF {
             return;
         }
-        let length = |axis: &usize| around.at(0).high[*axis] - around.at(0).low[*axis];
+        let length = |axis: &usize| around.at(0).length(*axis);
         let axis = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
         let half = (to - from) / 2;
         let middle = |item: &usize| bounds[*item].at(0).middle(axis);
@@ -118,31 +115,6 @@ impl<B: Volume> Hierarchy<B> {
                 self.nodes[number + 1].bounds.joined(self.nodes[second].bounds)
             }
         };
-    }
-
-    /// Calls `found` with each item whose box overlaps a box, in tree order.
-    pub fn near(&self, bounds: &B, mut found: impl FnMut(usize)) {
-        // Halving the items at each level keeps the depth below the number of bits of their count.
-        let (mut waiting, mut end) = ([0; 64], 1);
-        while end > 0 {
-            end -= 1;
-            let number = waiting[end];
-            let node = &self.nodes[number];
-            if !node.bounds.overlaps(bounds) {
-                continue;
-            }
-            match node.second {
-                None => {
-                    for place in (node.from..node.to).filter(|place| self.boxes[*place].overlaps(bounds)) {
-                        found(self.items[place]);
-                    }
-                }
-                Some(second) => {
-                    [waiting[end], waiting[end + 1]] = [second, number + 1];
-                    end += 2;
-                }
-            }
-        }
     }
 }
 

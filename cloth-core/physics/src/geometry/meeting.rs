@@ -3,7 +3,7 @@
 use energy_dsl::{Kernel, Level, dispatch};
 
 use super::hierarchy::Node;
-use super::rounded_boxes::LANES;
+use super::rounded_boxes::{LANES, RoundedBox};
 use super::{Hierarchy, Volume};
 
 /// The pairs of a tree with itself, by the branches of the root.
@@ -82,11 +82,12 @@ impl<B: Volume, F: FnMut(usize, usize)> Meeting<'_, B, F> {
     #[inline(always)]
     fn compare<L: Level>(&mut self, one: &Node<B>, other: &Node<B>, is_same: bool) {
         let Self { first, second, found, .. } = self;
-        for place in (one.from..one.to).filter(|place| first.boxes[*place].overlaps(&other.bounds)) {
+        let around = RoundedBox::new(&other.bounds);
+        for place in first.rounded.overlapping::<L, B>(one.from, one.to, &around) {
             let from = if is_same { place + 1 } else { other.from };
-            second.rounded.overlapping::<L, B>(from, other.to, (&first.rounded, place), |with| {
+            for with in second.rounded.overlapping::<L, B>(from, other.to, &RoundedBox::new(&first.boxes[place])) {
                 found(first.items[place], second.items[with]);
-            });
+            }
         }
     }
 }

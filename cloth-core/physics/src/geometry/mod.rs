@@ -3,12 +3,13 @@
 mod bounds;
 mod hierarchy;
 mod meeting;
+mod near;
 mod pose;
 mod rounded_boxes;
 
 use energy_dsl::Real;
 
-pub use bounds::{Bounds, MovingBounds, Volume};
+pub use bounds::{Bounds, Coordinate, MovingBounds, RoundedMovingBounds, Volume};
 pub use hierarchy::Hierarchy;
 pub use meeting::Branches;
 pub use pose::Pose;

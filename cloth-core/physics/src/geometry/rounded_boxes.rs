@@ -1,6 +1,8 @@
 use energy_dsl::{Lane, Level, Mask, Number};
+use energy_solve::index;
 
-use super::Volume;
+use super::bounds::Coordinate;
+use super::{Bounds, Volume};
 
 /// The largest number of lanes.
 pub(super) const LANES: usize = 16;
@@ -18,6 +20,18 @@ struct Corners {
     high: [Vec<f32>; 3],
 }
 
+/// One such box, by instant.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RoundedBox([Bounds<f32>; 2]);
+
+impl RoundedBox {
+    /// Rounds a box.
+    #[inline(always)]
+    pub fn new<B: Volume>(bounds: &B) -> Self {
+        Self([bounds.at(0).rounded(), bounds.at(B::INSTANTS - 1).rounded()])
+    }
+}
+
 impl RoundedBoxes {
     /// Takes new boxes.
     pub fn set<B: Volume>(&mut self, boxes: &[B]) {
@@ -25,9 +39,9 @@ impl RoundedBoxes {
             for axis in 0..3 {
                 let (low, high) = (&mut low[axis], &mut high[axis]);
                 low.clear();
-                low.extend(boxes.iter().map(|bounds| below(bounds.at(instant).low[axis])));
+                low.extend(boxes.iter().map(|bounds| bounds.at(instant).low[axis].below()));
                 high.clear();
-                high.extend(boxes.iter().map(|bounds| -below(-bounds.at(instant).high[axis])));
+                high.extend(boxes.iter().map(|bounds| bounds.at(instant).high[axis].above()));
                 // Lanes read beyond the last box.
                 low.resize(boxes.len() + LANES, f32::INFINITY);
                 high.resize(boxes.len() + LANES, f32::NEG_INFINITY);
@@ -37,35 +51,27 @@ impl RoundedBoxes {
 
     /// Takes one new box.
     pub fn replace<B: Volume>(&mut self, number: usize, bounds: &B) {
-        for (instant, Corners { low, high }) in self.instants.iter_mut().enumerate().take(B::INSTANTS) {
+        let rounded = RoundedBox::new(bounds);
+        for (Corners { low, high }, one) in self.instants.iter_mut().zip(&rounded.0).take(B::INSTANTS) {
             for axis in 0..3 {
-                low[axis][number] = below(bounds.at(instant).low[axis]);
-                high[axis][number] = -below(-bounds.at(instant).high[axis]);
+                (low[axis][number], high[axis][number]) = (one.low[axis], one.high[axis]);
             }
         }
     }
 
-    /// Calls `found` with each box, of those from one number to another, that overlaps a box of another set; see
-    /// [`Volume::overlaps`].
+    /// Returns which boxes, of at most 32 from one number to another, overlap another box; see [`Volume::overlaps`].
     #[inline(always)]
-    pub fn overlapping<L: Level, B: Volume>(
-        &self,
-        from: usize,
-        to: usize,
-        (others, other): (&Self, usize),
-        mut found: impl FnMut(usize),
-    ) {
+    pub fn overlapping<L: Level, B: Volume>(&self, from: usize, to: usize, other: &RoundedBox) -> Overlapping {
+        let mut bits = 0;
         for first in (from..to).step_by(L::F32::LANES) {
-            let mut overlaps = self.along::<L, B>(0, first, others, other);
+            let mut overlaps = self.along::<L, B>(0, first, &other.0);
             for axis in 1..3 {
-                overlaps = overlaps & self.along::<L, B>(axis, first, others, other);
+                overlaps = overlaps & self.along::<L, B>(axis, first, &other.0);
             }
-            let mut bits = overlaps.bits() & (u32::MAX >> (32 - (to - first).min(32)));
-            while bits != 0 {
-                found(first + bits.trailing_zeros() as usize);
-                bits &= bits - 1;
-            }
+            bits |= overlaps.bits() << (first - from);
         }
+        let valid = u32::MAX.checked_shr(32 - index(to - from)).unwrap_or(0);
+        Overlapping { first: from, bits: bits & valid }
     }
 
     /// Whether boxes from number `first` on overlap another one along an axis.
@@ -74,15 +80,34 @@ impl RoundedBoxes {
         &self,
         axis: usize,
         first: usize,
-        others: &Self,
-        other: usize,
+        other: &[Bounds<f32>; 2],
     ) -> <L::F32 as Number>::Mask {
-        let (mut begins, mut ends) = self.instants[0].meet::<L>(axis, first, &others.instants[0], other);
+        let (mut begins, mut ends) = self.instants[0].meet::<L>(axis, first, &other[0]);
         for instant in 1..B::INSTANTS {
-            let (one, two) = self.instants[instant].meet::<L>(axis, first, &others.instants[instant], other);
+            let (one, two) = self.instants[instant].meet::<L>(axis, first, &other[instant]);
             (begins, ends) = (begins | one, ends | two);
         }
         begins & ends
+    }
+}
+
+/// Numbers of boxes, ascending.
+pub(super) struct Overlapping {
+    first: usize,
+    bits: u32,
+}
+
+impl Iterator for Overlapping {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.bits == 0 {
+            return None;
+        }
+        let next = self.first + self.bits.trailing_zeros() as usize;
+        self.bits &= self.bits - 1;
+        Some(next)
     }
 }
 
@@ -93,20 +118,12 @@ impl Corners {
         &self,
         axis: usize,
         first: usize,
-        others: &Self,
-        other: usize,
+        other: &Bounds<f32>,
     ) -> (<L::F32 as Number>::Mask, <L::F32 as Number>::Mask) {
-        let begins = L::F32::load(&self.low[axis][first..]).less_or_equal(L::F32::splat(others.high[axis][other]));
-        let ends = L::F32::splat(others.low[axis][other]).less_or_equal(L::F32::load(&self.high[axis][first..]));
+        let begins = L::F32::load(&self.low[axis][first..]).less_or_equal(L::F32::splat(other.high[axis]));
+        let ends = L::F32::splat(other.low[axis]).less_or_equal(L::F32::load(&self.high[axis][first..]));
         (begins, ends)
     }
-}
-
-/// A number just below x. The subtraction exceeds the error of rounding, and has no branches.
-#[inline]
-fn below(x: f64) -> f32 {
-    let near = (x as f32).min(f32::MAX);
-    near - near.abs() * f32::EPSILON - f32::MIN_POSITIVE
 }
 
 #[cfg(test)]
@@ -118,14 +135,14 @@ mod tests {
     proptest! {
         #[test]
         fn rounded_numbers_are_below_by_little(x in prop_oneof![-1e7..1e7_f64, -1e-3..1e-3_f64, Just(0.0)]) {
-            let rounded = f64::from(below(x));
+            let rounded = f64::from(x.below());
             prop_assert!(rounded < x && x - rounded <= 4e-7 * x.abs() + 1e-37, "{x:e} {rounded:e}");
         }
     }
 
     #[test]
     fn numbers_out_of_range_are_rounded_too() {
-        assert!(below(1e300) >= 3e38 && below(1e300).is_finite());
-        assert_eq!(below(-1e300), f32::NEG_INFINITY);
+        assert!(1e300.below() >= 3e38 && 1e300.below().is_finite());
+        assert_eq!((-1e300).below(), f32::NEG_INFINITY);
     }
 }
