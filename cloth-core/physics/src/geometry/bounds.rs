@@ -12,49 +12,43 @@ pub struct Bounds<T = f64> {
 }
 
 /// A coordinate in double or single precision.
-pub trait Coordinate: Copy + std::fmt::Debug + PartialOrd + Into<f64> {
+pub trait Coordinate: Copy + std::fmt::Debug + PartialOrd + std::ops::Neg<Output = Self> + Into<f64> {
     /// A number above all others.
     const INFINITY: Self;
     /// A number below all others.
     const NEG_INFINITY: Self;
 
-    /// The smaller of two numbers.
-    fn least(self, other: Self) -> Self;
-
-    /// The larger of two numbers.
-    fn greatest(self, other: Self) -> Self;
-
     /// A number that is at most this one, in single precision.
     fn below(self) -> f32;
 
     /// A number that is at least this one, in single precision.
-    fn above(self) -> f32;
+    #[inline(always)]
+    fn above(self) -> f32 {
+        -(-self).below()
+    }
+
+    /// The smaller of two numbers.
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+
+    /// The larger of two numbers.
+    #[inline(always)]
+    fn greatest(self, other: Self) -> Self {
+        if other > self { other } else { self }
+    }
 }
 
 impl Coordinate for f64 {
     const INFINITY: Self = Self::INFINITY;
     const NEG_INFINITY: Self = Self::NEG_INFINITY;
 
-    #[inline(always)]
-    fn least(self, other: Self) -> Self {
-        self.min(other)
-    }
-
-    #[inline(always)]
-    fn greatest(self, other: Self) -> Self {
-        self.max(other)
-    }
-
     /// The subtraction exceeds the error of rounding, and has no branches.
     #[inline(always)]
     fn below(self) -> f32 {
         let near = (self as f32).min(f32::MAX);
         near - near.abs() * f32::EPSILON - f32::MIN_POSITIVE
-    }
-
-    #[inline(always)]
-    fn above(self) -> f32 {
-        -(-self).below()
     }
 }
 
@@ -63,22 +57,7 @@ impl Coordinate for f32 {
     const NEG_INFINITY: Self = Self::NEG_INFINITY;
 
     #[inline(always)]
-    fn least(self, other: Self) -> Self {
-        self.min(other)
-    }
-
-    #[inline(always)]
-    fn greatest(self, other: Self) -> Self {
-        self.max(other)
-    }
-
-    #[inline(always)]
     fn below(self) -> f32 {
-        self
-    }
-
-    #[inline(always)]
-    fn above(self) -> f32 {
         self
     }
 }
@@ -170,6 +149,14 @@ impl MovingBounds {
 /// A [`MovingBounds`] in single precision: hierarchies of many boxes are bound by memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundedMovingBounds([Bounds<f32>; 2]);
+
+impl RoundedMovingBounds {
+    /// Returns the smallest such box that certainly contains a volume.
+    #[inline(always)]
+    pub(super) fn around<B: Volume>(volume: &B) -> Self {
+        Self([volume.at(0).rounded(), volume.at(B::INSTANTS - 1).rounded()])
+    }
+}
 
 impl Volume for RoundedMovingBounds {
     type Number = f32;

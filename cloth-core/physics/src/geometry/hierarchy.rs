@@ -1,4 +1,4 @@
-//! A bounding volume hierarchy: the nearest item to a point, and all items near a box.
+//! A bounding volume hierarchy, and the nearest item to a point.
 
 use energy_dsl::Vector3;
 

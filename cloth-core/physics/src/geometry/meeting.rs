@@ -3,8 +3,8 @@
 use energy_dsl::{Kernel, Level, dispatch};
 
 use super::hierarchy::Node;
-use super::rounded_boxes::{LANES, RoundedBox};
-use super::{Hierarchy, Volume};
+use super::rounded_boxes::LANES;
+use super::{Hierarchy, RoundedMovingBounds, Volume};
 
 /// The pairs of a tree with itself, by the branches of the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,10 +82,12 @@ impl<B: Volume, F: FnMut(usize, usize)> Meeting<'_, B, F> {
     #[inline(always)]
     fn compare<L: Level>(&mut self, one: &Node<B>, other: &Node<B>, is_same: bool) {
         let Self { first, second, found, .. } = self;
-        let around = RoundedBox::new(&other.bounds);
+        let around = RoundedMovingBounds::around(&other.bounds);
         for place in first.rounded.overlapping::<L, B>(one.from, one.to, &around) {
             let from = if is_same { place + 1 } else { other.from };
-            for with in second.rounded.overlapping::<L, B>(from, other.to, &RoundedBox::new(&first.boxes[place])) {
+            for with in
+                second.rounded.overlapping::<L, B>(from, other.to, &RoundedMovingBounds::around(&first.boxes[place]))
+            {
                 found(first.items[place], second.items[with]);
             }
         }

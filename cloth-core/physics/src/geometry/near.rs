@@ -2,8 +2,7 @@
 
 use energy_dsl::{Kernel, Level, dispatch};
 
-use super::rounded_boxes::RoundedBox;
-use super::{Hierarchy, Volume};
+use super::{Hierarchy, RoundedMovingBounds, Volume};
 
 impl<B: Volume> Hierarchy<B> {
     /// Calls `found` with each item whose box overlaps a box, in tree order. Boxes are rounded outwards to single
@@ -26,7 +25,7 @@ impl<B: Volume, F: FnMut(usize)> Kernel for Near<'_, B, F> {
     #[inline(always)]
     fn run<L: Level>(self) {
         let Self { tree, bounds, mut found } = self;
-        let rounded = RoundedBox::new(bounds);
+        let rounded = RoundedMovingBounds::around(bounds);
         // Halving the items at each level keeps the depth below the number of bits of their count.
         let (mut waiting, mut end) = ([0; 64], 1);
         while end > 0 {

@@ -2,7 +2,7 @@ use energy_dsl::{Lane, Level, Mask, Number};
 use energy_solve::index;
 
 use super::bounds::Coordinate;
-use super::{Bounds, Volume};
+use super::{Bounds, RoundedMovingBounds, Volume};
 
 /// The largest number of lanes.
 pub(super) const LANES: usize = 16;
@@ -18,18 +18,6 @@ pub(super) struct RoundedBoxes {
 struct Corners {
     low: [Vec<f32>; 3],
     high: [Vec<f32>; 3],
-}
-
-/// One such box, by instant.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RoundedBox([Bounds<f32>; 2]);
-
-impl RoundedBox {
-    /// Rounds a box.
-    #[inline(always)]
-    pub fn new<B: Volume>(bounds: &B) -> Self {
-        Self([bounds.at(0).rounded(), bounds.at(B::INSTANTS - 1).rounded()])
-    }
 }
 
 impl RoundedBoxes {
@@ -51,8 +39,9 @@ impl RoundedBoxes {
 
     /// Takes one new box.
     pub fn replace<B: Volume>(&mut self, number: usize, bounds: &B) {
-        let rounded = RoundedBox::new(bounds);
-        for (Corners { low, high }, one) in self.instants.iter_mut().zip(&rounded.0).take(B::INSTANTS) {
+        let rounded = RoundedMovingBounds::around(bounds);
+        for (instant, Corners { low, high }) in self.instants.iter_mut().enumerate().take(B::INSTANTS) {
+            let one = rounded.at(instant);
             for axis in 0..3 {
                 (low[axis][number], high[axis][number]) = (one.low[axis], one.high[axis]);
             }
@@ -61,12 +50,12 @@ impl RoundedBoxes {
 
     /// Returns which boxes, of at most 32 from one number to another, overlap another box; see [`Volume::overlaps`].
     #[inline(always)]
-    pub fn overlapping<L: Level, B: Volume>(&self, from: usize, to: usize, other: &RoundedBox) -> Overlapping {
+    pub fn overlapping<L: Level, B: Volume>(&self, from: usize, to: usize, other: &RoundedMovingBounds) -> Overlapping {
         let mut bits = 0;
         for first in (from..to).step_by(L::F32::LANES) {
-            let mut overlaps = self.along::<L, B>(0, first, &other.0);
+            let mut overlaps = self.along::<L, B>(0, first, other);
             for axis in 1..3 {
-                overlaps = overlaps & self.along::<L, B>(axis, first, &other.0);
+                overlaps = overlaps & self.along::<L, B>(axis, first, other);
             }
             bits |= overlaps.bits() << (first - from);
         }
@@ -80,11 +69,11 @@ impl RoundedBoxes {
         &self,
         axis: usize,
         first: usize,
-        other: &[Bounds<f32>; 2],
+        other: &RoundedMovingBounds,
     ) -> <L::F32 as Number>::Mask {
-        let (mut begins, mut ends) = self.instants[0].meet::<L>(axis, first, &other[0]);
+        let (mut begins, mut ends) = self.instants[0].meet::<L>(axis, first, other.at(0));
         for instant in 1..B::INSTANTS {
-            let (one, two) = self.instants[instant].meet::<L>(axis, first, &other[instant]);
+            let (one, two) = self.instants[instant].meet::<L>(axis, first, other.at(instant));
             (begins, ends) = (begins | one, ends | two);
         }
         begins & ends
