@@ -30,12 +30,18 @@ impl System {
         let terms = self.terms.iter().map(restricted).collect::<Option<_>>()?;
         let mut system = Self::with_placed(terms, dofs, Arc::new(pattern), self.threads);
         system.contact = self.contact.take();
+        if let Some(contact) = &mut system.contact {
+            contact.restrict(chosen);
+        }
         Some(system)
     }
 
     /// Takes contact back from a restricted system, and adds its evaluation counts.
     pub fn rejoin(&mut self, restricted: Self) {
         self.contact = restricted.contact;
+        if let Some(contact) = &mut self.contact {
+            contact.release();
+        }
         for (whole, Counted { counts, .. }) in self.terms.iter_mut().zip(restricted.terms) {
             // The other elements do not count as skipped: nothing asked for them.
             let asked = |tally: Tally| Tally { skipped: 0, ..tally };

@@ -45,6 +45,15 @@ impl Joined {
         self.measured.get_mut().clear();
     }
 
+    /// Removes the pairs that have none of these vertices, and returns them with their laws.
+    pub fn split_off_others(&mut self, vertices: &[bool]) -> Vec<(Pair, Law)> {
+        self.measured.get_mut().clear();
+        let all = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.laws));
+        let (kept, others): (Vec<_>, Vec<_>) = all.partition(|(pair, _)| pair.has_any(vertices));
+        (self.pairs, self.laws) = kept.into_iter().unzip();
+        others
+    }
+
     pub fn contains(&self, pair: &Pair) -> bool {
         self.pairs.binary_search(pair).is_ok()
     }

@@ -80,6 +80,8 @@ pub struct BarrierContact {
     /// The pairs near the current iterate.
     neighbourhood: Neighbourhood,
     joined: Joined,
+    /// The joined pairs of vertices that do not move for a while.
+    fixed: Vec<(Pair, Law)>,
     friction: Friction,
     /// Pairs that shortened a move since the last iterate.
     blocking: Vec<Pair>,
@@ -316,6 +318,18 @@ impl ContactModel for BarrierContact {
         self.counts.active += active.iter().sum::<usize>() as u64;
         self.counts.systems += 1;
         contacts
+    }
+
+    fn restrict(&mut self, moving: &[bool]) {
+        self.neighbourhood.restrict(moving);
+        self.fixed = self.joined.split_off_others(moving);
+    }
+
+    fn release(&mut self) {
+        self.neighbourhood.release();
+        if !self.fixed.is_empty() {
+            self.joined.extend(std::mem::take(&mut self.fixed).into_iter());
+        }
     }
 
     fn counts(&self) -> ContactCounts {

@@ -155,6 +155,7 @@ impl BarrierContact {
             search: Search::new(&mesh, x, rules),
             neighbourhood: Neighbourhood::default(),
             joined: Joined::default(),
+            fixed: Vec::new(),
             friction: Friction::default(),
             blocking: Vec::new(),
             resistance: Resistance::default(),

@@ -51,6 +51,16 @@ impl Nearby {
         self.pairs.retain(|_| kept.next().expect("one for each pair"));
     }
 
+    /// Removes the pairs that have none of these vertices, and returns them.
+    pub fn split_off_others(&mut self, vertices: &[bool]) -> Self {
+        let is_kept: Vec<bool> = self.pairs.iter().map(|pair| pair.has_any(vertices)).collect();
+        self.separations.retain(&is_kept);
+        let all = std::mem::take(&mut self.pairs).into_iter().zip(is_kept);
+        let (kept, others): (Vec<_>, Vec<_>) = all.partition(|(_, is_kept)| *is_kept);
+        self.pairs = kept.into_iter().map(|(pair, _)| pair).collect();
+        Self::new(others.into_iter().map(|(pair, _)| pair).collect())
+    }
+
     /// Returns the pairs of both.
     pub fn joined_with(mut self, others: Self) -> Self {
         if others.pairs.is_empty() {

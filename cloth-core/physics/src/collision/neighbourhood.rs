@@ -18,6 +18,18 @@ pub struct Neighbourhood {
     radii: Vec<f64>,
     nearby: Nearby,
     strays: Strays,
+    /// The mean of all vertices where balls were last settled.
+    settled: Vector3<f64>,
+    fixed: Option<Fixed>,
+}
+
+/// The part of a neighbourhood that does not move while only some vertices do.
+#[derive(Clone, Debug)]
+struct Fixed {
+    /// The mean of all vertices, as balls see it: theirs must not move either.
+    mean: Vector3<f64>,
+    /// The pairs of other vertices.
+    pairs: Nearby,
 }
 
 /// The vertices that left their balls on the last such move, and their pairs.
@@ -77,11 +89,11 @@ impl Neighbourhood {
             return false;
         }
         let radii: Vec<f64> = (0..is_stray.len()).map(radius).collect();
-        let ends = ends.map(relative);
+        let ends = ends.map(|x| self.relative(x));
         let path =
             |vertex: usize| MovingBounds([0, 1].map(|end| Bounds::of(&[ends[end][vertex]]).extended(radii[vertex])));
         let vertices = 0..is_stray.len();
-        let pairs = if count as f64 > FEW * vertices.len() as f64 {
+        let pairs = if self.fixed.is_none() && count as f64 > FEW * vertices.len() as f64 {
             self.clear();
             is_stray.fill(true);
             search.pairs(mesh, &vertices.map(path).collect::<Vec<_>>())
@@ -107,7 +119,7 @@ impl Neighbourhood {
         if lacking.is_empty() || start.is_empty() {
             return lacking.is_empty();
         }
-        let (x, path) = (relative(x), |vertex: usize| subtract(end[vertex], start[vertex]));
+        let (x, path) = (self.relative(x), |vertex: usize| subtract(end[vertex], start[vertex]));
         let farthest = lacking.iter().copied().max_by(|a, b| norm(path(*a)).total_cmp(&norm(path(*b))));
         let part = farthest.map_or(0.0, |vertex| {
             let (path, gone) = (path(vertex), subtract(x[vertex], start[vertex]));
@@ -122,6 +134,7 @@ impl Neighbourhood {
     /// Puts new balls around the vertices that are outside of theirs at x, a place whose pairs are known, and forgets
     /// the move that led there.
     pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) {
+        self.settled = mean(x);
         let lacks = self.lacks(x);
         if !lacks.contains(&true) {
             self.strays = Strays::default();
@@ -130,12 +143,26 @@ impl Neighbourhood {
         let Strays { radii, nearby: mut found, .. } = std::mem::take(&mut self.strays);
         self.centres.resize(x.len(), [0.0; 3]);
         self.radii.resize(x.len(), 0.0);
-        for (vertex, centre) in relative(x).into_iter().enumerate().filter(|(vertex, _)| lacks[*vertex]) {
+        for (vertex, centre) in self.relative(x).into_iter().enumerate().filter(|(vertex, _)| lacks[*vertex]) {
             (self.centres[vertex], self.radii[vertex]) = (centre, radii[vertex]);
         }
         let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
         found.keep_near(search, x, &farthest);
         self.nearby = found.joined_with(std::mem::take(&mut self.nearby));
+    }
+
+    /// Lets only some vertices move, from where balls were last settled, and puts the pairs of others aside.
+    pub fn restrict(&mut self, moving: &[bool]) {
+        self.fixed = Some(Fixed { mean: self.settled, pairs: self.nearby.split_off_others(moving) });
+    }
+
+    /// Lets all vertices move again, from where balls were last settled.
+    pub fn release(&mut self) {
+        let Some(Fixed { mean, pairs }) = self.fixed.take() else { return };
+        let drift = subtract(mean, self.settled);
+        self.centres.iter_mut().for_each(|centre| *centre = add_scaled(*centre, 1.0, drift));
+        self.strays = Strays::default();
+        self.nearby = pairs.joined_with(std::mem::take(&mut self.nearby));
     }
 
     /// Whether each vertex is outside of its ball.
@@ -148,18 +175,17 @@ impl Neighbourhood {
 
     /// The distance of each vertex from the centre of its ball, in m.
     fn away(&self, x: &[Vector3<f64>]) -> Vec<f64> {
-        let mean = mean(x);
-        x.iter().zip(&self.centres).map(|(x, centre)| norm(subtract(subtract(*x, mean), *centre))).collect()
+        self.relative(x).iter().zip(&self.centres).map(|(x, centre)| norm(subtract(*x, *centre))).collect()
+    }
+
+    /// Returns positions relative to the mean of all vertices.
+    fn relative(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mean = self.fixed.as_ref().map_or_else(|| mean(x), |fixed| fixed.mean);
+        x.iter().map(|x| subtract(*x, mean)).collect()
     }
 
     fn balls(&self) -> Vec<MovingBounds> {
         let ball = |(centre, radius): (&Vector3<f64>, &f64)| Bounds::of(&[*centre]).extended(*radius);
         self.centres.iter().zip(&self.radii).map(ball).map(MovingBounds::fixed).collect()
     }
-}
-
-/// Returns positions relative to their mean.
-fn relative(x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    let mean = mean(x);
-    x.iter().map(|x| subtract(*x, mean)).collect()
 }

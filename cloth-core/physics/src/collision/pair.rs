@@ -46,6 +46,12 @@ impl Pair {
         self.vertices.map(|vertex| all[vertex as usize])
     }
 
+    /// Whether one of its vertices is among these.
+    #[inline]
+    pub fn has_any(&self, vertices: &[bool]) -> bool {
+        self.of(vertices).contains(&true)
+    }
+
     /// The largest decrease of the distance by these excursions of the vertices.
     #[inline]
     pub fn approach(&self, excursions: &[f64]) -> f64 {

@@ -90,11 +90,24 @@ pub enum DeclaredError {
         unit: String,
     },
     /// No element has a parameter of this name.
-    #[error("{}: no element has a parameter `{parameter}`", .path.display())]
-    Unused { path: PathBuf, parameter: String },
+    #[error("{}: no element has a parameter `{parameter}`; expected {}", .path.display(), one_of(.known))]
+    Unused {
+        path: PathBuf,
+        parameter: String,
+        /// The parameters of all elements.
+        known: Vec<String>,
+    },
     /// An element rejects a rest shape.
     #[error("{}: on vertices {vertices:?}: {source}", .path.display())]
     Rest { path: PathBuf, vertices: Vec<usize>, source: energy_dsl::RestError },
+}
+
+/// Returns a list of names for a message.
+fn one_of(names: &[String]) -> String {
+    match names {
+        [] => "none".into(),
+        names => format!("`{}`", names.join("`, `")),
+    }
 }
 
 /// The mesh that the elements act on.
@@ -117,7 +130,8 @@ impl Declared {
             .map(|parameter| canonical_name(parameter.name))
             .collect();
         if let Some(unused) = self.parameters.keys().find(|name| !known.contains(&canonical_name(name))) {
-            return Err(DeclaredError::Unused { path: self.path.clone(), parameter: unused.clone() });
+            let known = known.into_iter().collect();
+            return Err(DeclaredError::Unused { path: self.path.clone(), parameter: unused.clone(), known });
         }
         elements.into_iter().map(|element| self.term(element, target)).collect()
     }

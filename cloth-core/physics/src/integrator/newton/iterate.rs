@@ -37,7 +37,7 @@ pub(super) struct Iterate<'a> {
     pins: f64,
     /// Moves of pins that contact had stopped.
     pin_moves: usize,
-    /// Whether local eliminations may save time. `false` also once a term turned out not to be restrictable.
+    /// `false` once a term turned out not to be restrictable.
     may_eliminate: bool,
 }
 
@@ -83,7 +83,6 @@ impl<'a> Iterate<'a> {
     ) -> Result<Self, EvaluationError> {
         let in_contact = potential.body.system.has_contact();
         let projection = Projection::on_demand(potential.touches_obstacles_only());
-        let may_eliminate = potential.may_eliminate();
         let mut pins = if in_contact { potential.begin_contact(&mut x) } else { 1.0 };
         let mut found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
         if found.is_none() && in_contact {
@@ -116,7 +115,7 @@ impl<'a> Iterate<'a> {
             converged: false,
             pins,
             pin_moves: 0,
-            may_eliminate,
+            may_eliminate: true,
         })
     }
 

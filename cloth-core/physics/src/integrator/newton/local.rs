@@ -10,8 +10,8 @@
 //! J. Sci. Comput. 24). It changes the path to the minimum of E, not the minimum: a step converges by iterations on all
 //! vertices only. E decreases, because each local iteration has the same line search.
 //!
-//! Bodies that collide with themselves are excluded: they search for pairs and certify moves of the whole body in each
-//! local iteration, which takes longer than the saved iterations.
+//! Contact is restricted to the pairs of V. Otherwise the certificates of local iterations would take longer than the
+//! saved iterations.
 
 use std::time::Instant;
 
@@ -45,11 +45,6 @@ pub(super) struct Few {
 }
 
 impl IncrementalPotential<'_> {
-    /// Whether local eliminations may save time: the body does not collide with itself.
-    pub(super) fn may_eliminate(&mut self) -> bool {
-        !self.body.system.has_contact() || self.touches_obstacles_only()
-    }
-
     /// Returns the vertices that a direction moves far, and their neighbours on edges and triangles, which give way to
     /// them. `None` if they are too many, or the direction is zero.
     pub(super) fn few_that_move(&self, direction: &Direction) -> Option<Few> {
