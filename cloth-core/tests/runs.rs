@@ -449,7 +449,11 @@ fn a_material_from_a_file_moves_like_the_built_in_one() {
         let message = refused(&["run", "bad.toml", "-o", "bad"], folder.path());
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     };
-    expect(&text.replace("lambda = ", "lamda = "), OWN, &["no element has a parameter `lamda`; expected `lambda`, `mu`"]);
+    expect(
+        &text.replace("lambda = ", "lamda = "),
+        OWN,
+        &["no element has a parameter `lamda`; expected `lambda`, `mu`"],
+    );
     expect(&text.replace(&format!("lambda = {lambda}, "), ""), OWN, &["OwnMembrane needs the parameter `λ` [N/m]"]);
     expect(&text, &OWN.replace("trace(E)", "trac(E)"), &["own.energy", "trac"]);
     expect(&text.replace("own.energy", "none.energy"), OWN, &["cannot read none.energy"]);

@@ -91,6 +91,12 @@ impl<'a> Move<'a> {
         separation - pair.approach(&self.excursions) > reach + self.rounding
     }
 
+    /// A lower bound of the separation of a pair at the end, from one at the start.
+    #[inline]
+    pub fn least_separation(&self, pair: &Pair, separation: f64) -> f64 {
+        separation - pair.approach(&self.excursions) - self.rounding
+    }
+
     /// A separation at the start beyond which no pair that approaches by this much comes within reach.
     pub fn beyond(&self, reach: f64, approach: f64) -> f64 {
         // The rounding of a sum and a difference.

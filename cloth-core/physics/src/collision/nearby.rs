@@ -22,7 +22,7 @@ impl Nearby {
 
     /// A lower bound of the distance of each pair where they were last measured; see [`Closest::separation`].
     pub fn separations(&self) -> &[f64] {
-        self.separations.all()
+        &self.separations.all
     }
 
     /// The pairs that were within reach where they were last measured, with their closest points.
@@ -32,7 +32,7 @@ impl Nearby {
 
     /// The numbers of these pairs, and their closest points.
     pub fn near(&self) -> &[Near] {
-        self.separations.near()
+        &self.separations.near
     }
 
     /// Measures the pairs at x, unless they have been measured there.
@@ -45,7 +45,7 @@ impl Nearby {
     pub fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>], farthest: &[f64]) {
         self.visit(search, x);
         let is_near = |(pair, separation): (&Pair, &f64)| separation - pair.approach(farthest) <= search.reach(pair);
-        let is_kept: Vec<bool> = self.pairs.iter().zip(self.separations.all()).map(is_near).collect();
+        let is_kept: Vec<bool> = self.pairs.iter().zip(&self.separations.all).map(is_near).collect();
         self.separations.retain(&is_kept);
         let mut kept = is_kept.into_iter();
         self.pairs.retain(|_| kept.next().expect("one for each pair"));
@@ -53,23 +53,57 @@ impl Nearby {
 
     /// Removes the pairs that have none of these vertices, and returns them.
     pub fn split_off_others(&mut self, vertices: &[bool]) -> Self {
-        let is_kept: Vec<bool> = self.pairs.iter().map(|pair| pair.has_any(vertices)).collect();
-        self.separations.retain(&is_kept);
-        let all = std::mem::take(&mut self.pairs).into_iter().zip(is_kept);
-        let (kept, others): (Vec<_>, Vec<_>) = all.partition(|(_, is_kept)| *is_kept);
-        self.pairs = kept.into_iter().map(|(pair, _)| pair).collect();
-        Self::new(others.into_iter().map(|(pair, _)| pair).collect())
+        let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
+        let place = || self.separations.place.clone();
+        let others = Self::collect(place(), self.entries().filter(|entry| !has_any(entry)));
+        *self = Self::collect(place(), self.entries().filter(has_any));
+        others
     }
 
-    /// Returns the pairs of both.
-    pub fn joined_with(mut self, others: Self) -> Self {
+    /// Returns the pairs of both. Those of the other must be as far apart at the place where these were measured as
+    /// where they were measured themselves.
+    pub fn joined_with(self, others: &Self) -> Self {
         if others.pairs.is_empty() {
             return self;
         }
-        self.pairs.extend(others.pairs);
-        // Two runs in order are merged in linear time.
-        self.pairs.sort();
-        self.pairs.dedup();
-        Self::new(self.pairs)
+        let (mut own, mut others) = (self.entries().peekable(), others.entries().peekable());
+        let in_order = std::iter::from_fn(|| match (own.peek(), others.peek()) {
+            (Some(one), Some(other)) if one.pair == other.pair => {
+                others.next();
+                own.next()
+            }
+            (Some(one), Some(other)) if one.pair > other.pair => others.next(),
+            (None, _) => others.next(),
+            _ => own.next(),
+        });
+        Self::collect(self.separations.place.clone(), in_order)
     }
+
+    /// Collects pairs in order.
+    fn collect<'a>(place: Vec<Vector3<f64>>, entries: impl Iterator<Item = Entry<'a>>) -> Self {
+        let (mut pairs, mut all, mut near) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, Entry { pair, separation, closest }) in entries.enumerate() {
+            pairs.push(*pair);
+            all.push(separation);
+            near.extend(closest.map(|closest| Near { number, closest: *closest }));
+        }
+        Self { pairs, separations: Separations { place, all, near } }
+    }
+
+    fn entries(&self) -> impl Iterator<Item = Entry<'_>> {
+        let mut near = self.near().iter().peekable();
+        let pairs = self.pairs.iter().zip(&self.separations.all).enumerate();
+        pairs.map(move |(number, (pair, &separation))| {
+            let closest = near.next_if(|near| near.number == number).map(|near| &near.closest);
+            Entry { pair, separation, closest }
+        })
+    }
+}
+
+/// A measured pair.
+struct Entry<'a> {
+    pair: &'a Pair,
+    separation: f64,
+    /// `None` if the pair is out of reach.
+    closest: Option<&'a Closest>,
 }

@@ -148,7 +148,8 @@ impl Neighbourhood {
         }
         let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
         found.keep_near(search, x, &farthest);
-        self.nearby = found.joined_with(std::mem::take(&mut self.nearby));
+        self.nearby.visit(search, x);
+        self.nearby = found.joined_with(&self.nearby);
     }
 
     /// Lets only some vertices move, from where balls were last settled, and puts the pairs of others aside.
@@ -162,7 +163,7 @@ impl Neighbourhood {
         let drift = subtract(mean, self.settled);
         self.centres.iter_mut().for_each(|centre| *centre = add_scaled(*centre, 1.0, drift));
         self.strays = Strays::default();
-        self.nearby = pairs.joined_with(std::mem::take(&mut self.nearby));
+        self.nearby = std::mem::take(&mut self.nearby).joined_with(&pairs);
     }
 
     /// Whether each vertex is outside of its ball.

@@ -98,11 +98,11 @@ proptest! {
         let (pairs, mut measured, mut separations) = (pairs(), Measured::default(), Separations::default());
         let measured = measured.at(&pairs, &x, pairs.len()).next().expect("one part").measured();
         separations.measure(&pairs, &x, &[half; 6], 2);
-        let mut near = separations.near().iter().peekable();
+        let mut near = separations.near.iter().peekable();
         for (number, pair) in pairs.iter().enumerate() {
             let closest = Closest::of(pair, &pair.corners(&x));
             prop_assert_eq!(measured.closest(number), closest);
-            prop_assert_eq!(separations.all()[number], closest.separation);
+            prop_assert_eq!(separations.all[number], closest.separation);
             let is_near = near.next_if(|near| near.number == number);
             prop_assert_eq!(is_near.map(|near| near.closest), (closest.separation <= 2.0 * half).then_some(closest));
         }
