@@ -245,22 +245,28 @@ fn run(simulation: &mut Simulation, steps: usize) -> u64 {
 }
 
 #[test]
-fn only_cloth_that_does_not_touch_cloth_is_eliminated() {
-    for (contact, is_eliminated) in [("off", true), ("obstacles", true), ("on", false)] {
+fn cloth_is_eliminated_with_and_without_contact() {
+    for contact in ["off", "obstacles", "on"] {
         let mut simulation = Simulation::new(&flag(contact)).unwrap();
         run(&mut simulation, 15);
         let totals = simulation.summary().unwrap().totals;
-        assert_eq!(totals.local_solves > 0, is_eliminated, "{contact}: {totals:?}");
+        assert!(totals.local_solves > 0, "{contact}: {totals:?}");
         // At most 15 % of the vertices, and their neighbours.
         assert!(totals.local_vertices <= totals.local_solves * 100, "{contact}: {totals:?}");
         let line = simulation.summary().unwrap().to_string();
-        assert_eq!(line.contains("vertices on average, not among them"), is_eliminated, "{line}");
+        assert!(line.contains("vertices on average, not among them"), "{line}");
     }
 }
 
 #[test]
 fn threads_and_resumed_runs_change_no_bit() {
-    let scene = flag("obstacles");
+    for contact in ["obstacles", "on"] {
+        bits_stay(contact);
+    }
+}
+
+fn bits_stay(contact: &str) {
+    let scene = flag(contact);
     let new = |threads| Simulation::new(&scene).unwrap().with_threads(threads);
     let (mut one, mut two, mut resumed) = (new(1), new(2), new(1));
     assert!(run(&mut one, 14) > 0);

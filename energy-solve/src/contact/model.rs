@@ -16,11 +16,6 @@ use crate::matrix::dof_map::DofMap;
 ///    a line search sees a single function.
 /// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
 pub trait ContactModel: std::fmt::Debug + Send {
-    /// Whether free vertices can meet each other. Otherwise they meet only what no force moves, such as obstacles.
-    fn is_mutual(&self) -> bool {
-        true
-    }
-
     /// Sets the largest number of threads. Results must not depend on it.
     fn set_threads(&mut self, _threads: usize) {}
 

@@ -217,10 +217,6 @@ impl BarrierContact {
 }
 
 impl ContactModel for BarrierContact {
-    fn is_mutual(&self) -> bool {
-        self.search.is_with_itself()
-    }
-
     fn set_threads(&mut self, threads: usize) {
         self.search.threads = threads;
     }

@@ -288,15 +288,71 @@ proptest! {
             x = moved(0.5 * part);
             forgetful.neighbourhood.clear();
             prop_assert_eq!(known.meet(&x).to_bits(), forgetful.meet(&x).to_bits());
-            let joined = |contact: &BarrierContact| -> Vec<_> {
-                let Joined { pairs, laws, .. } = &contact.joined;
-                pairs.iter().zip(laws).map(|(pair, law)| (*pair, law.stiffness.to_bits())).collect()
-            };
             prop_assert_eq!(joined(&known), joined(&forgetful));
         }
         prop_assert!(known.counts().searches < forgetful.counts().searches);
         prop_assert!(!known.joined.pairs.is_empty());
     }
+
+    /// While only some vertices move, certificates, changes of energy, and the pairs of these vertices and forces on them
+    /// are those of the whole contact. Afterwards, so are all certificates, and no pair is lost.
+    #[test]
+    fn a_restriction_changes_no_result(
+        moves in prop::collection::vec((prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 50), 0..4_i32), 6),
+        moving in prop::collection::vec(prop::bool::weighted(0.2), 50),
+    ) {
+        let [mut whole, mut restricted] = [contact_of_layers(), contact_of_layers()];
+        let mut x = layers().1;
+        let (first, last) = (0, moves.len() - 1);
+        let mut before = Vec::new();
+        for (number, (directions, decade)) in moves.into_iter().enumerate() {
+            let is_local = number != first && number != last;
+            let size = 0.005 * 10.0_f64.powi(-decade);
+            let moved = |part: f64| -> Vec<Vector3<f64>> {
+                let part = |vertex: usize| if moving[vertex] || !is_local { part * size } else { 0.0 };
+                let all = x.iter().zip(&directions).enumerate();
+                all.map(|(vertex, (x, direction))| add_scaled(*x, part(vertex), *direction)).collect()
+            };
+            let part = whole.certify(&x, &moved(1.0));
+            prop_assert_eq!(part.to_bits(), restricted.certify(&x, &moved(1.0)).to_bits());
+            let next = moved(0.5 * part);
+            for contact in [&mut whole, &mut restricted] {
+                contact.meet(&next);
+            }
+            if is_local {
+                let change = |contact: &BarrierContact| contact.energy(&next) - contact.energy(&x);
+                let (expected, found) = (change(&whole), change(&restricted));
+                prop_assert!((found - expected).abs() <= 1e-13 * whole.energy(&x).max(whole.energy(&next)));
+                let forces = [&whole, &restricted].map(|contact| {
+                    let mut force = vec![[0.0; 3]; 50];
+                    contact.add_force(&next, &mut force);
+                    force
+                });
+                let largest = forces[0].iter().map(|force| norm(*force)).fold(0.0, f64::max);
+                for vertex in (0..50).filter(|&vertex| moving[vertex]) {
+                    prop_assert!(norm(subtract(forces[1][vertex], forces[0][vertex])) <= 1e-14 * largest);
+                }
+                let mut expected = joined(&whole);
+                expected.retain(|(pair, _)| pair.has_any(&moving));
+                prop_assert_eq!(expected, joined(&restricted));
+            }
+            x = next;
+            if number == first {
+                before = joined(&restricted);
+                restricted.restrict(&moving);
+            } else if number + 1 == last {
+                restricted.release();
+                let after = joined(&restricted);
+                prop_assert!(before.iter().all(|pair| after.contains(pair)));
+            }
+        }
+    }
+}
+
+/// The joined pairs and their stiffness.
+fn joined(contact: &BarrierContact) -> Vec<(Pair, u64)> {
+    let Joined { pairs, laws, .. } = &contact.joined;
+    pairs.iter().zip(laws).map(|(pair, law)| (*pair, law.stiffness.to_bits())).collect()
 }
 
 /// The layers of a large mesh have pairs for several parts, so that threads share them.

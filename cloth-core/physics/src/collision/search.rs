@@ -171,11 +171,6 @@ impl Search {
         Self { own, obstacles, is_own_fitted: true, rules, threads: 1 }
     }
 
-    /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
-    pub fn is_with_itself(&self) -> bool {
-        self.rules.with_itself
-    }
-
     /// Half the reach at each vertex, in m.
     pub fn halves(&self) -> &[f64] {
         &self.rules.halves

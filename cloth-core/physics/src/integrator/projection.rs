@@ -9,11 +9,10 @@ use energy_solve::Curvature;
 ///
 /// An indefinite sum, or a step that does not shrink, also leads to projected iterations.
 ///
-/// Cloth that touches obstacles only is different: few vertices are in trouble, and the others proceed. Conjugate
-/// gradients stop at the first direction of negative curvature, and the truncated direction is followed as long as it
-/// lowers the energy. One projected iteration follows a step that contact shortened, because the barriers that stopped
-/// it are far from quadratic. This saves a tenth of the iterations. Between layers of cloth it costs more than it
-/// saves: truncated directions push layers into each other, and contact shortens more steps.
+/// Cloth in contact is different: few vertices are in trouble, and the others proceed. Conjugate gradients stop at the
+/// first direction of negative curvature, and the truncated direction is followed as long as it lowers the energy. One
+/// projected iteration follows a step that contact shortened, because the barriers that stopped it are far from
+/// quadratic. With obstacles, this saves a tenth of the iterations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projection {
     pub(super) curvature: Curvature,

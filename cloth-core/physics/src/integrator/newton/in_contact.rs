@@ -16,11 +16,6 @@ pub(super) const PIN_MOVES: usize = 60;
 const PIN_SHARE: f64 = 0.5;
 
 impl IncrementalPotential<'_> {
-    /// Whether the body collides, but only with obstacles.
-    pub(super) fn touches_obstacles_only(&mut self) -> bool {
-        self.body.system.contact().is_some_and(|(contact, _)| !contact.is_mutual())
-    }
-
     /// Forgets the pairs of the last step, and shortens the move to the first iterate x until it is certain to have no
     /// crossing. Returns the part of their way that pins and obstacles have gone.
     pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {

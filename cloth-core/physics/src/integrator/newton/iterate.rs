@@ -82,7 +82,7 @@ impl<'a> Iterate<'a> {
         mut x: Vec<Vector3<f64>>,
     ) -> Result<Self, EvaluationError> {
         let in_contact = potential.body.system.has_contact();
-        let projection = Projection::on_demand(potential.touches_obstacles_only());
+        let projection = Projection::on_demand(in_contact);
         let mut pins = if in_contact { potential.begin_contact(&mut x) } else { 1.0 };
         let mut found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
         if found.is_none() && in_contact {
