@@ -86,8 +86,8 @@ pub struct ContactCounts {
     pub shortened: u64,
     /// The sum of the parts that were left of them.
     pub left: f64,
-    /// Pairs in contact, summed over the linear systems.
+    /// Pairs in contact, summed over the linear systems of all vertices.
     pub active: u64,
-    /// Linear systems.
+    /// Linear systems of all vertices.
     pub systems: u64,
 }

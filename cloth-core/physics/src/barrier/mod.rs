@@ -311,8 +311,10 @@ impl ContactModel for BarrierContact {
             // No pair has joined, but friction acts on the pairs at the start of the step.
             contacts.push(friction.between(None, None).map(|(pair, rubbing)| rubbing.contact(rows(pair))).collect());
         }
-        self.counts.active += active.iter().sum::<usize>() as u64;
-        self.counts.systems += 1;
+        if !self.neighbourhood.is_restricted() {
+            self.counts.active += active.iter().sum::<usize>() as u64;
+            self.counts.systems += 1;
+        }
         contacts
     }
 

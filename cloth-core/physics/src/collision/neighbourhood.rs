@@ -157,6 +157,11 @@ impl Neighbourhood {
         self.fixed = Some(Fixed { mean: self.settled, pairs: self.nearby.split_off_others(moving) });
     }
 
+    /// Whether only some vertices move.
+    pub fn is_restricted(&self) -> bool {
+        self.fixed.is_some()
+    }
+
     /// Lets all vertices move again, from where balls were last settled.
     pub fn release(&mut self) {
         let Some(Fixed { mean, pairs }) = self.fixed.take() else { return };
