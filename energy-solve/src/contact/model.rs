@@ -15,8 +15,8 @@ use crate::matrix::dof_map::DofMap;
 /// 4. [`ContactModel::meet`] is called at each new iterate. Pairs join there and then stay until the step ends, so that
 ///    a line search sees a single function.
 /// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
-/// 6. Between [`ContactModel::restrict`] and [`ContactModel::release`], only some vertices move. The other pairs then
-///    cost nothing.
+/// 6. Between [`ContactModel::restrict`] and [`ContactModel::release`], only some vertices move. Pairs of others
+///    may then be left out.
 pub trait ContactModel: std::fmt::Debug + Send {
     /// Sets the largest number of threads. Results must not depend on it.
     fn set_threads(&mut self, _threads: usize) {}
