@@ -261,11 +261,11 @@ fn cloth_is_eliminated_with_and_without_contact() {
 #[test]
 fn threads_and_resumed_runs_change_no_bit() {
     for contact in ["obstacles", "on"] {
-        bits_stay(contact);
+        threads_and_resumed_runs_agree(contact);
     }
 }
 
-fn bits_stay(contact: &str) {
+fn threads_and_resumed_runs_agree(contact: &str) {
     let scene = flag(contact);
     let new = |threads| Simulation::new(&scene).unwrap().with_threads(threads);
     let (mut one, mut two, mut resumed) = (new(1), new(2), new(1));

@@ -46,11 +46,11 @@ pub trait ContactModel: std::fmt::Debug + Send {
     fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>>;
 
     /// From now on until [`ContactModel::release`], only these vertices move, from an iterate where the last
-    /// [`ContactModel::meet`] was. Pairs of other vertices may be left out of all sums. Default: none is left out.
-    fn restrict(&mut self, _moving: &[bool]) {}
+    /// [`ContactModel::meet`] was. Pairs of other vertices may be left out of all sums.
+    fn restrict(&mut self, moving: &[bool]);
 
     /// Lets all vertices move again, from an iterate where the last [`ContactModel::meet`] was.
-    fn release(&mut self) {}
+    fn release(&mut self);
 
     /// Returns what was counted so far.
     fn counts(&self) -> ContactCounts;

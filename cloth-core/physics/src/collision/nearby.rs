@@ -44,20 +44,21 @@ impl Nearby {
     /// from x: boxes of tilted features meet long before the features do.
     pub fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>], farthest: &[f64]) {
         self.visit(search, x);
-        let is_near = |(pair, separation): (&Pair, &f64)| separation - pair.approach(farthest) <= search.reach(pair);
-        let is_kept: Vec<bool> = self.pairs.iter().zip(&self.separations.all).map(is_near).collect();
-        self.separations.retain(&is_kept);
-        let mut kept = is_kept.into_iter();
-        self.pairs.retain(|_| kept.next().expect("one for each pair"));
+        let is_near =
+            |Entry { pair, separation, .. }: &Entry<'_>| separation - pair.approach(farthest) <= search.reach(pair);
+        *self = self.selected(is_near);
     }
 
     /// Removes the pairs that have none of these vertices, and returns them.
     pub fn split_off_others(&mut self, vertices: &[bool]) -> Self {
-        let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
-        let place = || self.separations.place.clone();
-        let others = Self::collect(place(), self.entries().filter(|entry| !has_any(entry)));
-        *self = Self::collect(place(), self.entries().filter(has_any));
+        let others = self.selected(|entry| !entry.pair.has_any(vertices));
+        *self = self.selected(|entry| entry.pair.has_any(vertices));
         others
+    }
+
+    /// Returns some of the pairs.
+    fn selected(&self, is_selected: impl FnMut(&Entry<'_>) -> bool) -> Self {
+        Self::collect(self.separations.place.clone(), self.entries().filter(is_selected))
     }
 
     /// Returns the pairs of both. Those of the other must be as far apart at the place where these were measured as

@@ -58,19 +58,6 @@ impl Separations {
         });
         self.near = near.concat();
     }
-
-    /// Keeps some of the pairs.
-    pub fn retain(&mut self, is_kept: &[bool]) {
-        let mut kept = is_kept.iter();
-        self.all.retain(|_| *kept.next().expect("one for each pair"));
-        let (mut passed, mut place) = (0, 0);
-        self.near.retain_mut(|near| {
-            place += is_kept[passed..near.number].iter().filter(|kept| **kept).count();
-            passed = near.number;
-            near.number = place;
-            is_kept[passed]
-        });
-    }
 }
 
 /// Consecutive pairs of one kind.
