@@ -78,6 +78,8 @@ pub struct ContactMemory {
 pub struct ContactCounts {
     /// Searches for candidate pairs.
     pub searches: u64,
+    /// Searches that found nothing near anything.
+    pub clear: u64,
     /// Candidate pairs that could come within reach near the iterate, summed over the certified moves.
     pub candidates: u64,
     /// Pairs whose move needed more than a comparison of distances.

@@ -32,6 +32,9 @@ impl Judge<'_> {
         let pairs = self.nearby.pairs();
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();
         let mut judgement = Judgement { part: 1.0, pairs: pairs.len() as u64, tested: 0, blocking: Vec::new() };
+        if pairs.is_empty() {
+            return judgement;
+        }
         let farthest = self.farthest();
         for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part, farthest)) {
             judgement.tested += tested;

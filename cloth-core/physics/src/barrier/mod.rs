@@ -55,6 +55,8 @@ use law::{Barrier, Law, Order};
 use resistance::Resistance;
 use spacing::{Spacing, Spacings};
 
+/// The activation gap over the thickness of cloth.
+pub const GAP_PER_THICKNESS: f64 = 2.0;
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
 const JOINING: f64 = 1.25;
@@ -183,8 +185,9 @@ impl BarrierContact {
     fn follow(&mut self, ends: [&[Vector3<f64>]; 2], stride: impl Fn(usize) -> f64) -> bool {
         let [least, most] = self.slack;
         let radius = |vertex: usize| (least + STRAYING * stride(vertex)).min(most);
-        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, ends, radius);
+        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, ends, radius, self.slack);
         self.counts.searches += u64::from(is_new);
+        self.counts.clear += u64::from(is_new && self.neighbourhood.strays().pairs().is_empty());
         is_new
     }
 
@@ -232,7 +235,7 @@ impl ContactModel for BarrierContact {
 
     fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
         // NaN is in no region.
-        if !to.iter().flatten().all(|coordinate| coordinate.is_finite()) {
+        if !to.as_flattened().iter().fold(true, |all, coordinate| all & coordinate.is_finite()) {
             return 0.0;
         }
         let step = Move::new(from, to);

@@ -5,7 +5,9 @@ use energy_solve::ContactCounts;
 
 use super::spacing::{Skin, Spacings};
 use super::{BarrierContact, Friction, Joined, Resistance};
-use crate::collision::{CollisionMesh, Crossing, Exclusions, Neighbourhood, Pair, PairKind, Rules, Search, crossings};
+use crate::collision::{
+    CollisionMesh, Crossing, Exclusions, MovingBalls, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
+};
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
 pub(super) const SKIN: f64 = 1.0 / 3.0;
@@ -146,13 +148,16 @@ impl BarrierContact {
         let skin = |start: &ObstacleStart| Skin { radius: start.radius, thickness: 0.0, gap: start.reach };
         let spacings = Spacings { radii, gap, skins: obstacles.iter().map(skin).collect() };
         let rules = Rules { halves: spacings.halves(&mesh), is_free, exclusions, with_itself };
-        check_crossings(&mesh, &rules, &obstacles, x)?;
+        let mut search = Search::new(&mesh, x, rules);
+        if !search.is_clear(&mesh, &MovingBalls { ends: [x, x], radii: &vec![0.0; x.len()] }) {
+            check_crossings(&mesh, search.rules(), &obstacles, x)?;
+        }
         let mut contact = Self {
             spacings,
             slack: [0.5 * gap, gap.max(0.15 * mesh.mean_edge(x))],
             limit: None,
             least_limit: EDGES * mesh.mean_edge(x),
-            search: Search::new(&mesh, x, rules),
+            search,
             neighbourhood: Neighbourhood::default(),
             joined: Joined::default(),
             fixed: Vec::new(),

@@ -294,8 +294,8 @@ proptest! {
         prop_assert!(!known.joined.pairs.is_empty());
     }
 
-    /// While only some vertices move, certificates, changes of energy, and the pairs of these vertices and forces on them
-    /// are those of the whole contact. Afterwards, so are all certificates, and no pair is lost.
+    /// While only some vertices move, certificates, changes of energy, and the pairs of these vertices and forces on
+    /// them are those of the whole contact. Afterwards, so are all certificates, and no pair is lost.
     #[test]
     fn a_restriction_changes_no_result(
         moves in prop::collection::vec((prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 50), 0..4_i32), 6),

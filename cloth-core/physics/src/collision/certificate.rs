@@ -16,7 +16,7 @@
 
 use energy_dsl::{Real, Vector3};
 
-use super::displacement::excursions;
+use super::displacement::{excursions, largest_coordinate};
 use super::{Closest, Pair, plane};
 use crate::geometry::{add_scaled, dot, subtract};
 
@@ -54,10 +54,8 @@ pub struct Move<'a> {
 impl<'a> Move<'a> {
     /// Starts the certificate of a move of all vertices.
     pub fn new(from: &'a [Vector3<f64>], to: &'a [Vector3<f64>]) -> Self {
-        let larger =
-            |[a, b, c]: Vector3<f64>, x: &Vector3<f64>| [a.max(x[0].abs()), b.max(x[1].abs()), c.max(x[2].abs())];
-        let [a, b, c] = from.iter().chain(to).fold([0.0; 3], larger);
-        Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * a.max(b).max(c) }
+        let largest = largest_coordinate(from).max(largest_coordinate(to));
+        Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * largest }
     }
 
     /// The positions at the start.

@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 use energy_solve::index;
 
 use super::CollisionMesh;
-use crate::geometry::{Bounds, Branches, Hierarchy, norm, subtract};
+use crate::geometry::{Bounds, Hierarchy, norm, subtract};
 
 /// Pairs of features that do not collide: those that the scene excludes, and parts that are pinned in an obstacle.
 #[derive(Clone, Debug, Default)]
@@ -70,7 +70,7 @@ impl Exclusions {
         let some: Vec<usize> = (0..x.len()).filter(|&vertex| counts(vertex)).collect();
         let around: Vec<Bounds> =
             some.iter().map(|&vertex| Bounds::of(&[x[vertex]]).extended(0.5 * distance)).collect();
-        Hierarchy::new(&around).meeting_itself(Branches::All, |one, other| {
+        Hierarchy::new(&around).meeting_itself([[0, 0]], |one, other| {
             let (a, b) = (some[one], some[other]);
             if norm(subtract(x[a], x[b])) < distance {
                 self.vertices.insert([index(a.min(b)), index(a.max(b))]);

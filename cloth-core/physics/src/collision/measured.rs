@@ -41,7 +41,7 @@ impl Measured {
         x: &'a [Vector3<f64>],
         length: usize,
     ) -> impl Iterator<Item = Unmeasured<'a>> {
-        let is_known = self.numbers.len() == pairs.len() && self.place == x;
+        let is_known = self.numbers.len() == pairs.len() && (pairs.is_empty() || self.place == x);
         if !is_known {
             x.clone_into(&mut self.place);
             self.numbers.resize(pairs.len(), [0.0; 8]);

@@ -16,14 +16,19 @@ mod displacement;
 mod exclusions;
 mod measured;
 mod mesh;
+mod moving_balls;
 mod nearby;
 mod neighbourhood;
 mod pair;
 mod plane;
+mod rectangle;
 mod safe_pairs;
 mod search;
 mod separations;
+mod sheet;
+mod smooth;
 mod solid_core;
+mod tiling;
 
 pub use certificate::{Clearance, Move};
 pub use closest::Closest;
@@ -31,6 +36,7 @@ pub use crossing::{Crossing, crossings};
 pub use exclusions::{Exclusions, Members};
 pub use measured::{Measured, MeasuredPart};
 pub use mesh::CollisionMesh;
+pub use moving_balls::MovingBalls;
 pub use nearby::Nearby;
 pub use neighbourhood::Neighbourhood;
 pub use pair::{Pair, PairKind};
@@ -38,5 +44,7 @@ pub use search::{Rules, Search};
 pub use separations::{Near, PART, Separations};
 pub use solid_core::Core;
 
+#[cfg(test)]
+mod smooth_tests;
 #[cfg(test)]
 mod tests;

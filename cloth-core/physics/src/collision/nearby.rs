@@ -67,6 +67,9 @@ impl Nearby {
         if others.pairs.is_empty() {
             return self;
         }
+        if self.pairs.is_empty() {
+            return others.clone();
+        }
         let (mut own, mut others) = (self.entries().peekable(), others.entries().peekable());
         let in_order = std::iter::from_fn(|| match (own.peek(), others.peek()) {
             (Some(one), Some(other)) if one.pair == other.pair => {

@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 
 use super::displacement::mean;
-use super::{CollisionMesh, Nearby, Search};
+use super::{CollisionMesh, MovingBalls, Nearby, Pair, Search};
 use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current
@@ -72,42 +72,71 @@ impl Neighbourhood {
     }
 
     /// Finds the pairs of the vertices that leave their balls on a straight move, up to a radius from their paths.
-    /// Returns whether there are such vertices. If there are many, all vertices count as strays, and no other pairs are
-    /// known.
+    /// Returns whether there are such vertices. If there are many, or nothing is near, all vertices count as strays,
+    /// and no other pairs are known. The search may choose other radii within the `limits`; see [`Search::pairs_near`].
     pub fn follow(
         &mut self,
         search: &mut Search,
         mesh: &CollisionMesh,
         ends: [&[Vector3<f64>]; 2],
         radius: impl Fn(usize) -> f64,
+        limits: [f64; 2],
     ) -> bool {
         // Balls are convex: if they cover both ends of a straight move, they cover the whole move.
         let [from, to] = ends.map(|x| self.lacks(x));
-        let mut is_stray: Vec<bool> = from.iter().zip(to).map(|(from, to)| from | to).collect();
+        let mut is_stray: Vec<bool> = from.zip(to).map(|(from, to)| from | to).collect();
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
             return false;
         }
-        let radii: Vec<f64> = (0..is_stray.len()).map(radius).collect();
-        let ends = ends.map(|x| self.relative(x));
-        let path =
-            |vertex: usize| MovingBounds([0, 1].map(|end| Bounds::of(&[ends[end][vertex]]).extended(radii[vertex])));
-        let vertices = 0..is_stray.len();
-        let pairs = if self.fixed.is_none() && count as f64 > FEW * vertices.len() as f64 {
+        let wanted: Vec<f64> = (0..is_stray.len()).map(radius).collect();
+        let ends = ends.map(|x| self.relative(x).collect::<Vec<_>>());
+        let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
+        let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
+        let (pairs, radii) = if self.fixed.is_none() && are_many {
             self.clear();
             is_stray.fill(true);
-            search.pairs(mesh, &vertices.map(path).collect::<Vec<_>>())
+            search.pairs_near(mesh, &paths, limits)
+        } else if search.is_unfitted() {
+            let mut pairs = self.search_around(search, mesh, &paths, &is_stray);
+            pairs.retain(|pair| pair.has_any(&is_stray));
+            (pairs, wanted)
         } else {
             let mut regions = self.balls();
-            for vertex in vertices.filter(|&vertex| is_stray[vertex]) {
+            for vertex in (0..is_stray.len()).filter(|&vertex| is_stray[vertex]) {
                 // The region must cover the old ball and the new one, wherever on the path that will be.
-                let [start, end] = path(vertex).0;
+                let [start, end] = paths.bounds(vertex).0;
                 regions[vertex] = MovingBounds::fixed(regions[vertex].0[0].around(start).around(end));
             }
-            search.pairs_with(&is_stray, mesh, &regions)
+            (search.pairs_with(&is_stray, mesh, &regions), wanted)
         };
         self.strays = Strays { ends, is_stray, radii, nearby: Nearby::new(pairs) };
         true
+    }
+
+    /// Whether nothing is near anything.
+    fn is_clear(&self) -> bool {
+        self.nearby.pairs().is_empty()
+    }
+
+    /// Returns all pairs while strays are in their old balls or within their radius from their paths.
+    fn search_around(
+        &self,
+        search: &mut Search,
+        mesh: &CollisionMesh,
+        paths: &MovingBalls<'_>,
+        is_stray: &[bool],
+    ) -> Vec<Pair> {
+        let mut ends = [self.centres.clone(), self.centres.clone()];
+        let mut radii = self.radii.clone();
+        for vertex in (0..is_stray.len()).filter(|&vertex| is_stray[vertex]) {
+            for (end, path) in ends.iter_mut().zip(paths.ends) {
+                end[vertex] = path[vertex];
+                let old = self.radii[vertex] + norm(subtract(path[vertex], self.centres[vertex]));
+                radii[vertex] = old.max(paths.radii[vertex]).max(radii[vertex]);
+            }
+        }
+        search.pairs(mesh, &MovingBalls { ends: [&ends[0], &ends[1]], radii: &radii })
     }
 
     /// Whether all pairs near x are known: each vertex is in its ball or a stray, and all strays are at one instant of
@@ -115,11 +144,11 @@ impl Neighbourhood {
     pub fn knows(&self, x: &[Vector3<f64>]) -> bool {
         let Strays { ends: [start, end], is_stray, radii, .. } = &self.strays;
         let lacking: Vec<usize> =
-            (0..).zip(self.lacks(x)).filter(|(_, lacks)| *lacks).map(|(vertex, _)| vertex).collect();
+            self.lacks(x).enumerate().filter(|(_, lacks)| *lacks).map(|(vertex, _)| vertex).collect();
         if lacking.is_empty() || start.is_empty() {
             return lacking.is_empty();
         }
-        let (x, path) = (self.relative(x), |vertex: usize| subtract(end[vertex], start[vertex]));
+        let (x, path) = (self.relative(x).collect::<Vec<_>>(), |vertex: usize| subtract(end[vertex], start[vertex]));
         let farthest = lacking.iter().copied().max_by(|a, b| norm(path(*a)).total_cmp(&norm(path(*b))));
         let part = farthest.map_or(0.0, |vertex| {
             let (path, gone) = (path(vertex), subtract(x[vertex], start[vertex]));
@@ -135,7 +164,7 @@ impl Neighbourhood {
     /// the move that led there.
     pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) {
         self.settled = mean(x);
-        let lacks = self.lacks(x);
+        let lacks: Vec<bool> = self.lacks(x).collect();
         if !lacks.contains(&true) {
             self.strays = Strays::default();
             return;
@@ -143,10 +172,11 @@ impl Neighbourhood {
         let Strays { radii, nearby: mut found, .. } = std::mem::take(&mut self.strays);
         self.centres.resize(x.len(), [0.0; 3]);
         self.radii.resize(x.len(), 0.0);
-        for (vertex, centre) in self.relative(x).into_iter().enumerate().filter(|(vertex, _)| lacks[*vertex]) {
+        let relative: Vec<_> = self.relative(x).collect();
+        for (vertex, centre) in relative.into_iter().enumerate().filter(|(vertex, _)| lacks[*vertex]) {
             (self.centres[vertex], self.radii[vertex]) = (centre, radii[vertex]);
         }
-        let farthest: Vec<f64> = self.away(x).iter().zip(&self.radii).map(|(away, radius)| away + radius).collect();
+        let farthest: Vec<f64> = self.away(x).zip(&self.radii).map(|(away, radius)| away + radius).collect();
         found.keep_near(search, x, &farthest);
         self.nearby.visit(search, x);
         self.nearby = found.joined_with(&self.nearby);
@@ -172,22 +202,25 @@ impl Neighbourhood {
     }
 
     /// Whether each vertex is outside of its ball.
-    fn lacks(&self, x: &[Vector3<f64>]) -> Vec<bool> {
-        if self.radii.is_empty() {
-            return vec![true; x.len()];
-        }
-        self.away(x).iter().zip(&self.radii).map(|(away, radius)| away > radius).collect()
+    fn lacks(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = bool> {
+        self.relative(x).enumerate().map(|(vertex, x)| {
+            let ball = self.centres.get(vertex).zip(self.radii.get(vertex));
+            ball.is_none_or(|(centre, radius)| {
+                let away = subtract(x, *centre);
+                dot(away, away) > radius * radius
+            })
+        })
     }
 
     /// The distance of each vertex from the centre of its ball, in m.
-    fn away(&self, x: &[Vector3<f64>]) -> Vec<f64> {
-        self.relative(x).iter().zip(&self.centres).map(|(x, centre)| norm(subtract(*x, *centre))).collect()
+    fn away(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = f64> {
+        self.relative(x).zip(&self.centres).map(|(x, centre)| norm(subtract(x, *centre)))
     }
 
     /// Returns positions relative to the mean of all vertices.
-    fn relative(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    fn relative(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = Vector3<f64>> {
         let mean = self.fixed.as_ref().map_or_else(|| mean(x), |fixed| fixed.mean);
-        x.iter().map(|x| subtract(*x, mean)).collect()
+        x.iter().map(move |x| subtract(*x, mean))
     }
 
     fn balls(&self) -> Vec<MovingBounds> {

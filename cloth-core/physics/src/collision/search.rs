@@ -1,28 +1,39 @@
 use std::ops::Range;
+use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::index;
 use energy_solve::threads::for_each;
 
 use super::mesh::CollisionMesh;
-use super::{Exclusions, Pair, PairKind};
-use crate::geometry::{Bounds, Branches, Hierarchy, MovingBounds, RoundedMovingBounds, Volume};
+use super::smooth::Shapes;
+use super::tiling::Tiling;
+use super::{Exclusions, MovingBalls, Pair, PairKind};
+use crate::geometry::{Bounds, Hierarchy, MovingBounds, RoundedMovingBounds, Volume};
 
 /// A mesh with fewer vertices is searched on one thread.
 const FEW: usize = 1000;
 /// Changed features whose pairs a thread finds at a time.
 const CHANGED: usize = 512;
+/// Pairs of tiles that a thread takes at a time.
+const TILES: usize = 256;
 /// Fewer pairs are put in order on one thread.
 const FEW_PAIRS: usize = 4096;
 
 /// Finds the pairs whose vertices may meet within given regions.
 #[derive(Clone, Debug)]
 pub struct Search {
+    tiling: Arc<Tiling>,
+    /// The boxes of all tiles.
+    tiles: Hierarchy<RoundedMovingBounds>,
+    /// Cloth and hair, grouped by tiles.
     own: Trees,
     obstacles: Trees,
-    /// Whether the hierarchies of cloth and hair fit the regions of the last search. Those for obstacles always do.
+    /// Whether all of cloth and hair fits the regions of the last search. Obstacles always do.
     is_own_fitted: bool,
     rules: Rules,
+    /// The largest half of the reach at a vertex of cloth or hair, in m.
+    half: f64,
     /// The largest number of threads.
     pub threads: usize,
 }
@@ -51,7 +62,7 @@ struct Trees {
 
 /// A kind of features.
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+pub(super) enum Kind {
     Point,
     Triangle,
     Edge,
@@ -65,9 +76,13 @@ struct Boxes<'a> {
 }
 
 impl<'a> Boxes<'a> {
-    fn new(mesh: &'a CollisionMesh, regions: &[MovingBounds], halves: &[f64]) -> Self {
-        let regions = regions.iter().zip(halves).map(|(region, half)| region.rounded(*half)).collect();
+    fn new(mesh: &'a CollisionMesh, regions: impl Iterator<Item = MovingBounds>, halves: &[f64]) -> Self {
+        let regions = regions.zip(halves).map(|(region, half)| region.rounded(*half)).collect();
         Self { mesh, regions }
+    }
+
+    fn around(mesh: &'a CollisionMesh, balls: &MovingBalls<'_>, halves: &[f64]) -> Self {
+        Self::new(mesh, (0..mesh.vertices()).map(|vertex| balls.bounds(vertex)), halves)
     }
 
     fn point(&self, number: usize) -> RoundedMovingBounds {
@@ -75,11 +90,11 @@ impl<'a> Boxes<'a> {
     }
 
     fn triangle(&self, number: usize) -> RoundedMovingBounds {
-        self.around(&self.mesh.triangles()[number])
+        self.joined(&self.mesh.triangles()[number])
     }
 
     fn edge(&self, number: usize) -> RoundedMovingBounds {
-        self.around(&self.mesh.edges()[number])
+        self.joined(&self.mesh.edges()[number])
     }
 
     fn of(&self, kind: Kind, number: usize) -> RoundedMovingBounds {
@@ -90,7 +105,7 @@ impl<'a> Boxes<'a> {
         }
     }
 
-    fn around(&self, vertices: &[u32]) -> RoundedMovingBounds {
+    fn joined(&self, vertices: &[u32]) -> RoundedMovingBounds {
         let of = |vertex: u32| self.regions[vertex as usize];
         vertices[1..].iter().fold(of(vertices[0]), |all, &vertex| all.joined(of(vertex)))
     }
@@ -98,14 +113,21 @@ impl<'a> Boxes<'a> {
 
 impl Trees {
     /// Builds the hierarchies of some features, by their places in the mesh's lists.
-    fn new(boxes: &Boxes<'_>, features: [Range<usize>; 3]) -> Self {
+    fn new(boxes: &Boxes<'_>, features: [Range<usize>; 3], tile_of: impl Fn(Kind, usize) -> usize) -> Self {
         let first = features.each_ref().map(|range| range.start);
+        let tree = |kind: Kind, features: Range<usize>| {
+            let boxes: Vec<_> = features.map(|number| boxes.of(kind, number)).collect();
+            Hierarchy::grouped(&boxes, |item| tile_of(kind, item))
+        };
         let [points, triangles, edges] = features;
-        let points: Vec<_> = points.map(|number| boxes.point(number)).collect();
-        let triangles: Vec<_> = triangles.map(|number| boxes.triangle(number)).collect();
-        let edges: Vec<_> = edges.map(|number| boxes.edge(number)).collect();
-        let (points, triangles, edges) = (Hierarchy::new(&points), Hierarchy::new(&triangles), Hierarchy::new(&edges));
+        let [points, triangles, edges] =
+            [(Kind::Point, points), (Kind::Triangle, triangles), (Kind::Edge, edges)].map(|(kind, of)| tree(kind, of));
         Self { points, triangles, edges, first }
+    }
+
+    /// Whether there are no features. A plane is a triangle without points and edges.
+    fn is_empty(&self) -> bool {
+        self.points.is_empty() && self.triangles.is_empty() && self.edges.is_empty()
     }
 
     /// Adapts to the boxes of all features.
@@ -114,6 +136,15 @@ impl Trees {
         // There are as many edges as triangles and points.
         let trees = vec![(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)];
         for_each(threads, trees, |(tree, kind, first)| tree.refit(|item| boxes.of(kind, first + item)));
+    }
+
+    /// Adapts some tiles to the boxes of their features.
+    fn refit_tiles(&mut self, boxes: &Boxes<'_>, tiles: &[usize]) {
+        let Self { points, triangles, edges, first: [p, t, e] } = self;
+        for (tree, kind, first) in [(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)]
+        {
+            tiles.iter().for_each(|tile| tree.refit_group(*tile, |item| boxes.of(kind, first + item)));
+        }
     }
 
     /// Adapts to the boxes of changed features, which are in order.
@@ -144,31 +175,35 @@ impl Found {
 }
 
 /// A part of a search. Together they find all pairs.
-#[derive(Clone, Copy, Debug)]
-enum Task {
-    PointsOnTriangles,
-    Edges(Branches),
-    Obstacles,
+enum Task<'a> {
+    Edges(&'a [[usize; 2]]),
+    PointsOnTriangles(&'a [[usize; 2]]),
+    Obstacles(&'a [usize]),
 }
-
-/// All tasks, in an order that gives two threads about the same work.
-const TASKS: [Task; 5] = [
-    Task::Edges(Branches::First),
-    Task::Edges(Branches::Second),
-    Task::PointsOnTriangles,
-    Task::Edges(Branches::Across),
-    Task::Obstacles,
-];
 
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let boxes = Boxes::new(mesh, &places(x), &rules.halves);
+        let places = x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x])));
+        let boxes = Boxes::new(mesh, places, &rules.halves);
         let own = mesh.own_features();
         let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
-        let obstacles = Trees::new(&boxes, std::array::from_fn(|kind| own[kind]..all[kind]));
-        let own = Trees::new(&boxes, own.map(|count| 0..count));
-        Self { own, obstacles, is_own_fitted: true, rules, threads: 1 }
+        let mut tiling = Tiling::new(mesh, x);
+        if !rules.with_itself {
+            tiling.forget_triangles();
+        }
+        let tiling = Arc::new(tiling);
+        let obstacles = Trees::new(&boxes, std::array::from_fn(|kind| own[kind]..all[kind]), |_, _| 0);
+        let own = Trees::new(&boxes, own.map(|count| 0..count), |kind, number| tiling.tile_of(kind, number));
+        let shapes = Shapes::new(&tiling, [x, x]);
+        let boxes: Vec<_> = (0..tiling.tiles.len()).map(|tile| shapes.bounds(tile, 0.0)).collect();
+        let half = rules.halves[..mesh.own_vertices()].iter().copied().fold(0.0, f64::max);
+        Self { tiles: Hierarchy::new(&boxes), tiling, own, obstacles, is_own_fitted: true, half, rules, threads: 1 }
+    }
+
+    /// What may collide.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
     }
 
     /// Half the reach at each vertex, in m.
@@ -183,79 +218,151 @@ impl Search {
         half(pair.vertices[0]) + half(pair.vertices[pair.first()])
     }
 
-    /// Returns all pairs that can come within their reach while each vertex stays in its region, and others whose boxes
-    /// meet. Regions may move on straight lines. Pairs are in order.
-    pub fn pairs(&mut self, mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
-        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
+    /// Whether certainly no pair comes within its reach while each vertex stays in its ball: cloth is smooth
+    /// everywhere, so that nothing crosses, its parts stay away from each other, and no obstacle is near. Costs little.
+    pub fn is_clear(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> bool {
+        let tiling = Arc::clone(&self.tiling);
+        self.is_clear_on(mesh, &Shapes::new(&tiling, balls.ends), balls)
+    }
+
+    fn is_clear_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> bool {
+        self.is_own_fitted = false;
+        self.crowded(shapes, balls).is_empty() && self.near_obstacles(mesh, balls).is_empty()
+    }
+
+    /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
+    /// meet. Pairs are in order.
+    pub fn pairs(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> Vec<Pair> {
+        let tiling = Arc::clone(&self.tiling);
+        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends), balls)
+    }
+
+    /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
+    /// meet, in order. Chooses the radii: if nothing is near anything, all are as large as possible up to `widest`;
+    /// otherwise those of `balls`, but less where cloth is smooth for a radius of at least `least`.
+    pub fn pairs_near(
+        &mut self,
+        mesh: &CollisionMesh,
+        balls: &MovingBalls<'_>,
+        [least, widest]: [f64; 2],
+    ) -> (Vec<Pair>, Vec<f64>) {
+        let (tiling, mut radii) = (Arc::clone(&self.tiling), balls.radii.to_vec());
+        let shapes = Shapes::new(&tiling, balls.ends);
+        let clear = if self.rules.with_itself { widest.min(shapes.clear_radius(self.half)) } else { widest };
+        let wide = vec![clear; radii.len()];
+        if clear >= least && self.is_clear_on(mesh, &shapes, &MovingBalls { radii: &wide, ..*balls }) {
+            return (Vec::new(), wide);
+        }
+        if self.rules.with_itself {
+            shapes.shrink(&mut radii, self.half, least);
+        }
+        (self.pairs_on(mesh, &shapes, &MovingBalls { radii: &radii, ..*balls }), radii)
+    }
+
+    /// Returns the pairs on a move with some shapes.
+    fn pairs_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> Vec<Pair> {
+        let (crowded, near_obstacles) = (self.crowded(shapes, balls), self.near_obstacles(mesh, balls));
+        let mut tiles = [crowded.as_flattened(), &near_obstacles].concat();
+        tiles.sort_unstable();
+        tiles.dedup();
+        self.is_own_fitted = 2 * tiles.len() > self.tiling.tiles.len();
+        if tiles.is_empty() {
+            return Vec::new();
+        }
         let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
-        self.obstacles.refit(&boxes, 1);
-        self.is_own_fitted = self.rules.with_itself;
-        let found = if self.rules.with_itself {
+        let boxes = Boxes::around(mesh, balls, &self.rules.halves);
+        if self.is_own_fitted {
             self.own.refit(&boxes, threads);
-            Found::all(&for_each(threads, TASKS.to_vec(), |task| self.find(task, mesh)))
         } else {
-            self.find_near_obstacles(&boxes)
-        };
-        in_order(mesh, found, threads)
+            self.own.refit_tiles(&boxes, &tiles);
+        }
+        let mut tasks = vec![Task::Obstacles(&near_obstacles)];
+        for pairs in crowded.chunks(TILES) {
+            tasks.extend([Task::Edges(pairs), Task::PointsOnTriangles(pairs)]);
+        }
+        in_order(mesh, Found::all(&for_each(threads, tasks, |task| self.find(&task, mesh))), threads)
+    }
+
+    /// Returns the pairs of tiles, or of a tile with itself, with features that may meet while each vertex stays in its
+    /// ball.
+    fn crowded(&mut self, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> Vec<[usize; 2]> {
+        let reaches = shapes.reaches(balls.radii, &self.rules.halves);
+        self.tiles.refit(|tile| shapes.bounds(tile, reaches[tile]));
+        let mut crowded = Vec::new();
+        if self.rules.with_itself {
+            let smooth = shapes.smooth(&reaches);
+            let mut add = |one: usize, other: usize| {
+                if !smooth.have_no_pairs(one, other) {
+                    crowded.push([one, other]);
+                }
+            };
+            (0..reaches.len()).for_each(|tile| add(tile, tile));
+            self.tiles.meeting_itself([[0, 0]], add);
+        }
+        crowded
+    }
+
+    /// Returns the tiles near obstacles, after [`Search::crowded`] for the same balls.
+    fn near_obstacles(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> Vec<usize> {
+        let mut near = Vec::new();
+        if !self.obstacles.is_empty() {
+            self.obstacles.refit(&Boxes::around(mesh, balls, &self.rules.halves), 1);
+            let Trees { points, triangles, edges, .. } = &self.obstacles;
+            for tree in [points, triangles, edges] {
+                self.tiles.meeting(tree, [[0, 0]], |tile, _| near.push(tile));
+            }
+            near.sort_unstable();
+            near.dedup();
+        }
+        near
     }
 
     /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
     pub fn pairs_at(&mut self, mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Pair> {
-        self.pairs(mesh, &places(x))
+        self.pairs(mesh, &MovingBalls { ends: [x, x], radii: &vec![0.0; x.len()] })
     }
 
-    /// Finds a part of the pairs of cloth and hair, with themselves and with obstacles.
-    fn find(&self, task: Task, mesh: &CollisionMesh) -> Found {
-        let (own, mut found) = (&self.own, Found::default());
-        match task {
-            Task::PointsOnTriangles => own.points.meeting(&own.triangles, |point, triangle| {
-                self.add_point_and_triangle(mesh, point, triangle, &mut found);
-            }),
-            Task::Edges(branches) => own.edges.meeting_itself(branches, |one, other| {
+    /// Finds a part of the pairs.
+    fn find(&self, task: &Task<'_>, mesh: &CollisionMesh) -> Found {
+        let (Self { own, obstacles, .. }, mut found) = (self, Found::default());
+        match *task {
+            Task::Edges(tiles) => own.edges.meeting_itself(tiles.iter().copied(), |one, other| {
                 self.add_edges(mesh, one, other, &mut found);
             }),
-            Task::Obstacles => self.find_on_obstacles(mesh, &mut found),
+            Task::PointsOnTriangles(tiles) => {
+                let reversed = tiles.iter().filter(|[a, b]| a != b).map(|&[a, b]| [b, a]);
+                own.points.meeting(&own.triangles, tiles.iter().copied().chain(reversed), |point, triangle| {
+                    self.add_point_and_triangle(mesh, point, triangle, &mut found);
+                });
+            }
+            Task::Obstacles(tiles) => {
+                let [points, triangles, edges] = obstacles.first;
+                let with_all = || tiles.iter().map(|&tile| [tile, 0]);
+                own.points.meeting(&obstacles.triangles, with_all(), |point, triangle| {
+                    self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
+                });
+                own.triangles.meeting(&obstacles.points, with_all(), |triangle, point| {
+                    self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
+                });
+                own.edges.meeting(&obstacles.edges, with_all(), |one, other| {
+                    self.add_edges(mesh, one, edges + other, &mut found);
+                });
+            }
         }
         found
     }
 
-    fn find_on_obstacles(&self, mesh: &CollisionMesh, found: &mut Found) {
-        let Self { own, obstacles, .. } = self;
-        let [points, triangles, edges] = obstacles.first;
-        own.points.meeting(&obstacles.triangles, |point, triangle| {
-            self.add_point_and_triangle(mesh, point, triangles + triangle, found);
-        });
-        obstacles.points.meeting(&own.triangles, |point, triangle| {
-            self.add_point_and_triangle(mesh, points + point, triangle, found);
-        });
-        own.edges.meeting(&obstacles.edges, |one, other| self.add_edges(mesh, one, edges + other, found));
-    }
-
-    /// Finds pairs with obstacles, without the hierarchies of cloth and hair: most features are near no obstacle.
-    fn find_near_obstacles(&self, boxes: &Boxes<'_>) -> Found {
-        let (mesh, Trees { points, triangles, edges, first }) = (boxes.mesh, &self.obstacles);
-        let mut found = Found::default();
-        for point in 0..first[0] {
-            triangles.near(&boxes.point(point), |triangle| {
-                self.add_point_and_triangle(mesh, point, first[1] + triangle, &mut found);
-            });
-        }
-        for triangle in 0..first[1] {
-            points.near(&boxes.triangle(triangle), |point| {
-                self.add_point_and_triangle(mesh, first[0] + point, triangle, &mut found);
-            });
-        }
-        for edge in 0..first[2] {
-            edges.near(&boxes.edge(edge), |other| self.add_edges(mesh, edge, first[2] + other, &mut found));
-        }
-        found
+    /// Whether only parts of cloth and hair fit the regions of the last search: then [`Search::pairs`] costs less than
+    /// [`Search::pairs_with`].
+    pub fn is_unfitted(&self) -> bool {
+        self.rules.with_itself && !self.is_own_fitted
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
     /// and others whose boxes meet. These regions are at rest, and lie in those of the searches before, at some
     /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
     pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
-        let boxes = Boxes::new(mesh, regions, &self.rules.halves);
+        let boxes = Boxes::new(mesh, regions.iter().copied(), &self.rules.halves);
         let changed = changed_features(mesh, is_changed);
         self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
         let kinds = [Kind::Point, Kind::Triangle, Kind::Edge].into_iter().zip(&changed);
@@ -304,7 +411,7 @@ impl Search {
             changed[kind].split_at(changed[kind].partition_point(|number| *number < first[kind]))
         });
         let (own, others) = (split.map(|(own, _)| own), split.map(|(_, others)| others));
-        if !self.is_own_fitted && others.iter().any(|others| !others.is_empty()) {
+        if !self.is_own_fitted && (self.rules.with_itself || others.iter().any(|others| !others.is_empty())) {
             self.own.refit(boxes, 1);
             self.is_own_fitted = true;
         }
@@ -356,11 +463,6 @@ impl Search {
         a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
             && !self.rules.exclusions.exclude(mesh, a, b)
     }
-}
-
-/// Returns the regions of vertices that stay at x.
-fn places(x: &[Vector3<f64>]) -> Vec<MovingBounds> {
-    x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x]))).collect()
 }
 
 /// Returns the points, triangles and edges with a changed vertex, in order.

@@ -33,15 +33,21 @@ pub struct Near {
 
 impl Separations {
     /// Measures pairs at x, unless they have been measured there. Pairs that certainly stayed out of reach since then
-    /// keep a lower bound. Pairs are in order, so those of one kind are consecutive. `halves` has half the reach at each
-    /// vertex, in m.
+    /// keep a lower bound. Pairs are in order, so those of one kind are consecutive. `halves` has half the reach at
+    /// each vertex, in m.
     pub fn measure(&mut self, pairs: &[Pair], x: &[Vector3<f64>], halves: &[f64], threads: usize) {
+        if pairs.is_empty() {
+            *self = Self::default();
+            return;
+        }
         let is_known = self.all.len() == pairs.len() && self.place.len() == x.len();
         if is_known && self.place == x {
             return;
         }
-        let before = std::mem::replace(&mut self.place, x.to_vec());
-        let step = is_known.then(|| Move::new(&before, x));
+        // A look at the whole move costs more than a few pairs do.
+        let before = (is_known && pairs.len() > x.len() / 4).then(|| self.place.clone());
+        x.clone_into(&mut self.place);
+        let step = before.as_ref().map(|before| Move::new(before, x));
         self.all.resize(pairs.len(), 0.0);
         let points = pairs.partition_point(|pair| pair.kind == PairKind::PointTriangle);
         let (on_triangles, of_edges) = pairs.split_at(points);

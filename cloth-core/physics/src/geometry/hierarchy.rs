@@ -1,5 +1,7 @@
 //! A bounding volume hierarchy, and the nearest item to a point.
 
+use std::ops::Range;
+
 use energy_dsl::Vector3;
 
 use super::rounded_boxes::RoundedBoxes;
@@ -17,6 +19,8 @@ pub struct Hierarchy<B = Bounds> {
     pub(super) rounded: RoundedBoxes,
     /// The place of each item in `items`.
     places: Vec<usize>,
+    /// The nodes of each group, the first of which holds all its items.
+    groups: Vec<Range<usize>>,
 }
 
 /// A node of the tree. Its first child is the next node.
@@ -38,19 +42,68 @@ impl<B> Node<B> {
     }
 }
 
+/// Items below one node.
+struct Group<B> {
+    number: usize,
+    items: Vec<usize>,
+    bounds: B,
+}
+
 impl<B: Volume> Hierarchy<B> {
-    /// Builds the tree over the boxes of items 0, 1, ….
+    /// Builds the tree over the boxes of items 0, 1, …, which are one group.
     pub fn new(bounds: &[B]) -> Self {
-        let items = (0..bounds.len()).collect();
-        let places = vec![0; bounds.len()];
-        let mut tree = Self { nodes: Vec::new(), items, boxes: Vec::new(), rounded: RoundedBoxes::default(), places };
-        tree.build(bounds, 0, bounds.len());
+        Self::grouped(bounds, |_| 0)
+    }
+
+    /// Builds the tree over the boxes of items 0, 1, …, so that the items of each group are below a node of their own.
+    pub fn grouped(bounds: &[B], group: impl Fn(usize) -> usize) -> Self {
+        let mut items: Vec<usize> = (0..bounds.len()).collect();
+        items.sort_by_key(|item| group(*item));
+        let gathered = |items: &[usize]| Group {
+            number: group(items[0]),
+            items: items.to_vec(),
+            bounds: items.iter().map(|&item| bounds[item]).fold(B::empty(), B::joined),
+        };
+        let mut groups: Vec<_> = items.chunk_by(|a, b| group(*a) == group(*b)).map(gathered).collect();
+        let mut tree = Self {
+            nodes: Vec::new(),
+            items: Vec::new(),
+            boxes: Vec::new(),
+            rounded: RoundedBoxes::default(),
+            places: vec![0; bounds.len()],
+            groups: vec![0..0; groups.last().map_or(1, |last| last.number + 1)],
+        };
+        tree.build_groups(bounds, &mut groups);
         tree.items.iter().enumerate().for_each(|(place, &item)| tree.places[item] = place);
         tree.boxes = tree.items.iter().map(|&item| bounds[item]).collect();
         tree.rounded.set(&tree.boxes);
         tree
     }
 
+    /// Adds the items of some groups, divided at the median of the groups.
+    fn build_groups(&mut self, bounds: &[B], groups: &mut [Group<B>]) {
+        let (node, from) = (self.nodes.len(), self.items.len());
+        if let [] | [_] = groups {
+            groups.iter().for_each(|group| self.items.extend(&group.items));
+            self.build(bounds, from, self.items.len());
+            groups.iter().for_each(|group| self.groups[group.number] = node..self.nodes.len());
+            return;
+        }
+        let around = groups.iter().map(|group| group.bounds).fold(B::empty(), B::joined);
+        let to = from + groups.iter().map(|group| group.items.len()).sum::<usize>();
+        self.nodes.push(Node { bounds: around, from, to, second: None });
+        let axis = longest_axis(&around);
+        let middle = |group: &Group<B>| group.bounds.at(0).middle(axis);
+        let order = |a: &Group<B>, b: &Group<B>| middle(a).total_cmp(&middle(b)).then(a.number.cmp(&b.number));
+        let half = groups.len() / 2;
+        groups.select_nth_unstable_by(half, order);
+        let (before, after) = groups.split_at_mut(half);
+        self.build_groups(bounds, before);
+        self.nodes[node].second = Some(self.nodes.len());
+        self.build_groups(bounds, after);
+    }
+
+    /// Adds the nodes of some items, divided at the median.
     fn build(&mut self, bounds: &[B], from: usize, to: usize) {
         let all = self.items[from..to].iter().map(|&item| bounds[item]);
         let around = all.fold(B::empty(), B::joined);
@@ -59,8 +112,7 @@ impl<B: Volume> Hierarchy<B> {
         if to - from <= B::LEAF {
             return;
         }
-        let length = |axis: &usize| around.at(0).length(*axis);
-        let axis = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
+        let axis = longest_axis(&around);
         let half = (to - from) / 2;
         let middle = |item: &usize| bounds[*item].at(0).middle(axis);
         let order = |a: &usize, b: &usize| middle(a).total_cmp(&middle(b)).then(a.cmp(b));
@@ -70,6 +122,16 @@ impl<B: Volume> Hierarchy<B> {
         self.build(bounds, from + half, to);
     }
 
+    /// Whether there are no items.
+    pub fn is_empty(&self) -> bool {
+        self.items.is_empty()
+    }
+
+    /// The node that holds all items of a group, if it has any.
+    pub(super) fn root(&self, group: usize) -> Option<usize> {
+        self.groups.get(group).filter(|nodes| !nodes.is_empty()).map(|nodes| nodes.start)
+    }
+
     /// Adapts the boxes of the tree to new boxes of the items, and keeps its structure. Queries stay exact. They become
     /// slow if items move far relative to each other.
     pub fn refit(&mut self, bounds: impl Fn(usize) -> B) {
@@ -77,8 +139,22 @@ impl<B: Volume> Hierarchy<B> {
             *own = bounds(item);
         }
         self.rounded.set(&self.boxes);
+        self.refit_nodes(0..self.nodes.len());
+    }
+
+    /// Adapts the boxes of a group to new boxes of its items. Nodes with several groups keep theirs.
+    pub fn refit_group(&mut self, group: usize, bounds: impl Fn(usize) -> B) {
+        let Some(root) = self.root(group) else { return };
+        for place in self.nodes[root].from..self.nodes[root].to {
+            self.boxes[place] = bounds(self.items[place]);
+            self.rounded.replace(place, &self.boxes[place]);
+        }
+        self.refit_nodes(self.groups[group].clone());
+    }
+
+    fn refit_nodes(&mut self, nodes: Range<usize>) {
         // Children follow their parents.
-        for number in (0..self.nodes.len()).rev() {
+        for number in nodes.rev() {
             let Node { from, to, second, .. } = self.nodes[number];
             self.nodes[number].bounds = match second {
                 None => self.boxes[from..to].iter().copied().fold(B::empty(), B::joined),
@@ -116,6 +192,11 @@ impl<B: Volume> Hierarchy<B> {
             }
         };
     }
+}
+
+fn longest_axis<B: Volume>(bounds: &B) -> usize {
+    let length = |axis: &usize| bounds.at(0).length(*axis);
+    (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0)
 }
 
 impl Hierarchy {

@@ -6,48 +6,28 @@ use super::hierarchy::Node;
 use super::rounded_boxes::LANES;
 use super::{Hierarchy, RoundedMovingBounds, Volume};
 
-/// The pairs of a tree with itself, by the branches of the root.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Branches {
-    /// All pairs of items.
-    All,
-    /// Pairs within the first branch.
-    First,
-    /// Pairs within the second branch.
-    Second,
-    /// Pairs of one item in each branch.
-    Across,
-}
-
 impl<B: Volume> Hierarchy<B> {
-    /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order. Boxes are rounded outwards
-    /// to single precision.
-    pub fn meeting(&self, other: &Self, found: impl FnMut(usize, usize)) {
-        dispatch(Meeting { first: self, second: other, is_one_tree: false, start: (0, 0), found });
+    /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order, among some pairs of groups
+    /// of these trees. Boxes are rounded outwards to single precision.
+    pub fn meeting(&self, other: &Self, groups: impl IntoIterator<Item = [usize; 2]>, found: impl FnMut(usize, usize)) {
+        let waiting = groups.into_iter().filter_map(|[a, b]| Some((self.root(a)?, other.root(b)?))).collect();
+        dispatch(Meeting { first: self, second: other, is_one_tree: false, waiting, found });
     }
 
-    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order, of some branches.
-    /// Boxes are rounded outwards to single precision.
-    pub fn meeting_itself(&self, branches: Branches, found: impl FnMut(usize, usize)) {
-        let start = match (branches, self.nodes[0].branches(LANES)) {
-            (Branches::All, _) => (0, 0),
-            // The root has no branches.
-            (Branches::First, None) => (0, 0),
-            (_, None) => return,
-            (Branches::First, _) => (1, 1),
-            (Branches::Second, Some(second)) => (second, second),
-            (Branches::Across, Some(second)) => (1, second),
-        };
-        dispatch(Meeting { first: self, second: self, is_one_tree: true, start, found });
+    /// Calls `found` with each pair of different items whose boxes overlap, once and in any order, among some pairs of
+    /// groups. Boxes are rounded outwards to single precision.
+    pub fn meeting_itself(&self, groups: impl IntoIterator<Item = [usize; 2]>, found: impl FnMut(usize, usize)) {
+        let waiting = groups.into_iter().filter_map(|[a, b]| Some((self.root(a)?, self.root(b)?))).collect();
+        dispatch(Meeting { first: self, second: self, is_one_tree: true, waiting, found });
     }
 }
 
-/// Finds all pairs below two nodes.
+/// Finds all pairs below some pairs of nodes.
 struct Meeting<'a, B, F> {
     first: &'a Hierarchy<B>,
     second: &'a Hierarchy<B>,
     is_one_tree: bool,
-    start: (usize, usize),
+    waiting: Vec<(usize, usize)>,
     found: F,
 }
 
@@ -56,7 +36,7 @@ impl<B: Volume, F: FnMut(usize, usize)> Kernel for Meeting<'_, B, F> {
 
     #[inline(always)]
     fn run<L: Level>(mut self) {
-        let mut waiting = vec![self.start];
+        let mut waiting = std::mem::take(&mut self.waiting);
         while let Some((a, b)) = waiting.pop() {
             let (one, other) = (&self.first.nodes[a], &self.second.nodes[b]);
             let is_same = self.is_one_tree && a == b;

@@ -11,7 +11,6 @@ use energy_dsl::Real;
 
 pub use bounds::{Bounds, Coordinate, MovingBounds, RoundedMovingBounds, Volume};
 pub use hierarchy::Hierarchy;
-pub use meeting::Branches;
 pub use pose::Pose;
 
 // Vectors of numbers, or of SIMD lanes of numbers. They are written out by components: closures that build arrays would

@@ -1,7 +1,6 @@
 use energy_dsl::{Lane, Level, Mask, Number};
 use energy_solve::index;
 
-use super::bounds::Coordinate;
 use super::{Bounds, RoundedMovingBounds, Volume};
 
 /// The largest number of lanes.
@@ -23,17 +22,13 @@ struct Corners {
 impl RoundedBoxes {
     /// Takes new boxes.
     pub fn set<B: Volume>(&mut self, boxes: &[B]) {
-        for (instant, Corners { low, high }) in self.instants.iter_mut().enumerate().take(B::INSTANTS) {
-            for axis in 0..3 {
-                let (low, high) = (&mut low[axis], &mut high[axis]);
-                low.clear();
-                low.extend(boxes.iter().map(|bounds| bounds.at(instant).low[axis].below()));
-                high.clear();
-                high.extend(boxes.iter().map(|bounds| bounds.at(instant).high[axis].above()));
-                // Lanes read beyond the last box.
-                low.resize(boxes.len() + LANES, f32::INFINITY);
-                high.resize(boxes.len() + LANES, f32::NEG_INFINITY);
-            }
+        // Lanes read beyond the last box.
+        for Corners { low, high } in self.instants.iter_mut().take(B::INSTANTS) {
+            low.iter_mut().for_each(|low| low.resize(boxes.len() + LANES, f32::INFINITY));
+            high.iter_mut().for_each(|high| high.resize(boxes.len() + LANES, f32::NEG_INFINITY));
+        }
+        for (number, bounds) in boxes.iter().enumerate() {
+            self.replace(number, bounds);
         }
     }
 
@@ -119,7 +114,7 @@ impl Corners {
 mod tests {
     use proptest::prelude::*;
 
-    use super::*;
+    use crate::geometry::Coordinate;
 
     proptest! {
         #[test]

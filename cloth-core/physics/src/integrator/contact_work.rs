@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct ContactWork {
     /// Searches for pairs that may collide.
     pub searches: u64,
+    /// Searches that found nothing near anything.
+    pub clear: u64,
     /// Certified moves.
     pub moves: u64,
     /// Moves that were shortened.
@@ -28,6 +30,7 @@ impl ContactWork {
     pub(super) fn between(before: &ContactCounts, now: &ContactCounts) -> Self {
         Self {
             searches: now.searches - before.searches,
+            clear: now.clear - before.clear,
             moves: now.moves - before.moves,
             shortened: now.shortened - before.shortened,
             left: now.left - before.left,
@@ -42,6 +45,7 @@ impl ContactWork {
 impl std::ops::AddAssign for ContactWork {
     fn add_assign(&mut self, other: Self) {
         self.searches += other.searches;
+        self.clear += other.clear;
         self.moves += other.moves;
         self.shortened += other.shortened;
         self.left += other.left;
@@ -53,7 +57,7 @@ impl std::ops::AddAssign for ContactWork {
 }
 
 /// Such as `12 pairs in contact per linear system; 40 moves, of which 3 were shortened to 0.61 on average; 95 pairs per
-/// move, 20 of them tested; 10 searches`.
+/// move, 20 of them tested; 10 searches, 4 of which found nothing near`.
 impl std::fmt::Display for ContactWork {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
@@ -63,6 +67,10 @@ impl std::fmt::Display for ContactWork {
             write!(f, ", of which {} were shortened to {mean:.2} on average", self.shortened)?;
         }
         let [candidates, tested] = [self.candidates, self.tested].map(|sum| per(sum, self.moves));
-        write!(f, "; {candidates:.0} pairs per move, {tested:.0} of them tested; {} searches", self.searches)
+        write!(f, "; {candidates:.0} pairs per move, {tested:.0} of them tested; {} searches", self.searches)?;
+        if self.clear > 0 {
+            write!(f, ", {} of which found nothing near", self.clear)?;
+        }
+        Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Contact of a scene with itself and with obstacles.
 
-use crate::barrier::{BarrierContact, ContactError, ObstacleStart, Participants, Untangling};
+use crate::barrier::{BarrierContact, ContactError, GAP_PER_THICKNESS, ObstacleStart, Participants, Untangling};
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{norm, subtract};
@@ -8,8 +8,6 @@ use crate::model::Model;
 
 use super::Island;
 
-/// The activation gap over the thickness.
-const GAP: f64 = 2.0;
 /// The largest reach of contact over the shortest edge. Features of a flat sheet must not touch their neighbours.
 const LARGEST_REACH: f64 = 0.4;
 
@@ -52,7 +50,7 @@ fn participants(island: &Island, model: &Model, with_itself: bool) -> Participan
     let all = vertices.iter().map(|&vertex| model.thickness[vertex]);
     let thickest = all.clone().fold(0.0, f64::max);
     // Coarse fabrics on fine meshes get thinner, with a gap in proportion.
-    let scale = (LARGEST_REACH * shortest / ((1.0 + GAP) * thickest)).min(1.0);
+    let scale = (LARGEST_REACH * shortest / ((1.0 + GAP_PER_THICKNESS) * thickest)).min(1.0);
     let start = |(obstacle, radius): (&Obstacle, f64)| ObstacleStart {
         name: obstacle.name.clone(),
         radius,
@@ -62,7 +60,7 @@ fn participants(island: &Island, model: &Model, with_itself: bool) -> Participan
     Participants {
         is_free: (0..x.len()).map(|place| vertices.get(place).is_some_and(|&own| !model.pinned_forever[own])).collect(),
         radii: all.map(|thickness| 0.5 * scale * thickness).collect(),
-        gap: GAP * scale * thickest,
+        gap: GAP_PER_THICKNESS * scale * thickest,
         obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
         exclusions: model.exclusions.restricted(&local, vertices.len()),
         with_itself,
