@@ -209,6 +209,23 @@ fn each_run_of_the_benchmark_measures_its_own_memory() {
 }
 
 #[test]
+fn the_benchmark_tells_what_contact_costs() {
+    let folder = TempDir::new().unwrap();
+    let sizes = ["bench", "--sizes", "9", "--cloth", "cotton", "--threads", "1", "--seconds", "0.02"];
+    let arguments = [&sizes[..], &["--contact", "off,on"]].concat();
+    let json = cloth(&[&arguments[..], &["--json"]].concat(), folder.path());
+    let runs: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).unwrap();
+    let of = |pointer: &str| runs.iter().map(|run| run.pointer(pointer).cloned()).collect::<Vec<_>>();
+    assert_eq!(of("/contact"), [Some(false.into()), Some(true.into())]);
+    // Nothing touches, and hardly anything is searched.
+    assert_eq!(of("/lowest")[0], of("/lowest")[1]);
+    assert_eq!(of("/report/contact/candidates"), [Some(0.into()), Some(0.into())]);
+    assert!(of("/report/contact/clear")[1].as_ref().is_some_and(|clear| clear.as_u64() > Some(0)), "{runs:?}");
+    let table = String::from_utf8(cloth(&arguments, folder.path()).stdout).unwrap();
+    assert!(table.contains("of no contact") && table.contains("× "), "{table}");
+}
+
+#[test]
 fn a_dry_run_tells_size_memory_and_time_and_writes_nothing() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();

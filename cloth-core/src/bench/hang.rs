@@ -3,6 +3,8 @@ use energy_solve::{ElementList, ListError, PotentialTerm, System, SystemError};
 use serde::{Deserialize, Serialize};
 
 use crate::Body;
+use crate::barrier::{BarrierContact, ContactError, GAP_PER_THICKNESS};
+use crate::collision::CollisionMesh;
 use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
 use crate::integrator::StepError;
 use crate::mesh::{Diagonals, MeshError, Plane, Sheet, SpringNetwork};
@@ -56,6 +58,9 @@ pub enum BenchError {
     /// The terms cannot be assembled into a system.
     #[error(transparent)]
     System(#[from] SystemError),
+    /// The cloth touches itself at the start.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
     /// A step failed.
     #[error("{cloth}, {vertices} vertices, step {step}: {source}")]
     Step {
@@ -78,13 +83,7 @@ const CORNER_STIFFNESS: f64 = 1e6;
 /// # Errors
 /// Returns an error if `cells` is 0.
 pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
-    let sheet = Sheet {
-        cells: [cells, cells],
-        size: [1.0, 1.0],
-        diagonals: Diagonals::Regular,
-        plane: Plane::Horizontal,
-        pleats: None,
-    };
+    let sheet = sheet(cells);
     let mesh = sheet.mesh()?;
     let surroundings = Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.1 };
     let mut garment = fabric::terms(&cloth.fabric(), &mesh, &SpringNetwork::default(), &surroundings)?;
@@ -103,4 +102,30 @@ pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
     garment.terms.push(Box::new(PotentialTerm::new(ElementList::new("corners", springs, &held)?)));
     let system = System::new(garment.terms, &pinned)?;
     Ok(Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system })
+}
+
+/// Lets a sheet of [`hang`] touch itself, with the thickness of its fabric.
+///
+/// # Errors
+/// If the sheet touches itself at the start.
+pub(super) fn add_contact(body: &mut Body, cloth: Cloth, cells: usize) -> Result<(), BenchError> {
+    let mesh = sheet(cells).mesh()?;
+    let thickness = cloth.fabric().thickness();
+    let x = &body.x;
+    let is_free = (0..x.len()).map(|vertex| vertex < mesh.vertices().len()).collect();
+    let mesh = CollisionMesh::new(x.len(), mesh.triangles(), &[], &[]);
+    let gap = GAP_PER_THICKNESS * thickness;
+    let contact = BarrierContact::new(mesh, x, is_free, vec![0.5 * thickness; x.len()], gap)?;
+    body.system.set_contact(Box::new(contact));
+    Ok(())
+}
+
+fn sheet(cells: usize) -> Sheet {
+    Sheet {
+        cells: [cells, cells],
+        size: [1.0, 1.0],
+        diagonals: Diagonals::Regular,
+        plane: Plane::Horizontal,
+        pleats: None,
+    }
 }

@@ -28,6 +28,8 @@ pub struct Measured {
     pub threads: usize,
     /// The linear solver.
     pub linear_solver: LinearSolverChoice,
+    /// Whether the cloth may touch itself.
+    pub contact: bool,
     /// Number of steps.
     pub steps: u64,
     /// Totals of the steps.
@@ -44,8 +46,8 @@ pub struct Measured {
 
 impl Measured {
     /// The key that runs of different sizes share.
-    fn kind(&self) -> (Cloth, usize, LinearSolverChoice) {
-        (self.cloth, self.threads, self.linear_solver)
+    fn kind(&self) -> (Cloth, usize, LinearSolverChoice, bool) {
+        (self.cloth, self.threads, self.linear_solver, self.contact)
     }
 
     /// Mean wall time of a step, in s.
@@ -59,7 +61,8 @@ impl Measured {
     }
 }
 
-/// Simulates a cloth for `seconds` of simulated time, at least one step. Calls `progress` after every step.
+/// Simulates a cloth for `seconds` of simulated time, at least one step; with `contact`, it may touch itself. Calls
+/// `progress` after every step.
 ///
 /// # Errors
 /// Returns an error if a step fails.
@@ -68,11 +71,15 @@ pub fn measure(
     cells: usize,
     threads: usize,
     linear_solver: LinearSolverChoice,
+    contact: bool,
     seconds: f64,
     mut progress: impl FnMut(),
 ) -> Result<Measured, BenchError> {
     let started = Instant::now();
     let mut body = hang(cloth, cells)?;
+    if contact {
+        hang::add_contact(&mut body, cloth, cells)?;
+    }
     body.system.set_threads(threads);
     // The absolute stopping criterion of the published comparison, at the scale of this scene.
     let tolerances = NewtonOptions { velocity_tolerance: 1e-3, impulse_tolerance: 1e-6, ..NewtonOptions::default() };
@@ -95,6 +102,7 @@ pub fn measure(
         vertices,
         threads,
         linear_solver,
+        contact,
         steps,
         report,
         set_up,

@@ -15,6 +15,7 @@ pub fn table(runs: &[Measured]) -> Table {
         "vertices",
         "threads",
         "solver",
+        "contact",
         "ms/step",
         "Newton/step",
         "CG/Newton",
@@ -22,32 +23,38 @@ pub fn table(runs: &[Measured]) -> Table {
         "factor",
         "solve",
         "line search",
+        "collision",
         "set-up ms",
         "peak MB",
         "lowest m",
         "growth",
         "of one thread",
+        "of no contact",
         "solved by",
     ]);
     for run in runs {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let step_time = |run: &Measured| 1e3 * run.step_time();
         let share = |time: Duration| format!("{:.0} %", 100.0 * time.as_secs_f64() / run.time.as_secs_f64());
-        let Phases { assembly, factorisation, solve, line_search, collision: _ } = run.report.phases;
+        let Phases { assembly, factorisation, solve, line_search, collision } = run.report.phases;
         let comparable = runs.iter().filter(|other| other.kind() == run.kind());
         let smaller = comparable.filter(|other| other.vertices < run.vertices);
         let before = smaller.max_by_key(|other| other.vertices);
         let growth =
             before.map_or("–".to_owned(), |before| format!("{:.2}", exponent(&[before.point(), run.point()])));
-        let same = |other: &&Measured| {
-            other.cloth == run.cloth && other.vertices == run.vertices && other.linear_solver == run.linear_solver
+        let with = |threads: usize, contact: bool| {
+            let kind = (run.cloth, threads, run.linear_solver, contact);
+            let other = runs.iter().find(|other| other.vertices == run.vertices && other.kind() == kind);
+            other.map_or("–".to_owned(), |other| format!("× {:.2}", step_time(run) / step_time(other)))
         };
-        let alone = runs.iter().filter(same).find(|other| other.threads == 1 && run.threads > 1);
+        let alone = if run.threads > 1 { with(1, run.contact) } else { "–".to_owned() };
+        let without_contact = if run.contact { with(run.threads, false) } else { "–".to_owned() };
         table.add_row([
             run.cloth.name().to_owned(),
             run.vertices.to_string(),
             run.threads.to_string(),
             run.linear_solver.name().to_owned(),
+            if run.contact { "on" } else { "off" }.to_owned(),
             format!("{:.2}", step_time(run)),
             format!("{:.1}", run.report.solves as f64 / run.steps as f64),
             format!("{:.1}", run.report.iterations as f64 / run.report.solves as f64),
@@ -55,11 +62,13 @@ pub fn table(runs: &[Measured]) -> Table {
             share(factorisation),
             share(solve),
             share(line_search),
+            share(collision),
             format!("{:.0}", milliseconds(run.set_up)),
             run.peak_memory.map_or("–".to_owned(), |bytes| format!("{:.0}", bytes as f64 / 1e6)),
             format!("{:.4}", run.lowest),
             growth,
-            alone.map_or("–".to_owned(), |alone| format!("× {:.2}", step_time(run) / step_time(alone))),
+            alone,
+            without_contact,
             run.report.solved_by.to_string(),
         ]);
     }
@@ -70,7 +79,7 @@ pub fn table(runs: &[Measured]) -> Table {
 }
 
 /// Returns the exponent p of t ~ nᵖ, where t is the step time and n the number of vertices, by least squares of ln t.
-/// One line per fabric, number of threads and solver with at least three sizes.
+/// One line per fabric, number of threads, solver and contact with at least three sizes.
 #[must_use]
 pub fn growth(runs: &[Measured]) -> String {
     let mut lines = String::new();
@@ -82,7 +91,8 @@ pub fn growth(runs: &[Measured]) -> String {
         let points: Vec<[f64; 2]> = comparable.map(Measured::point).collect();
         if points.len() >= 3 {
             let threads = if run.threads == 1 { "thread" } else { "threads" };
-            let of = format!("{}, {} {threads}", run.cloth.name(), run.threads);
+            let contact = if run.contact { ", with contact" } else { "" };
+            let of = format!("{}, {} {threads}{contact}", run.cloth.name(), run.threads);
             lines += &format!("{of}: a step's time grows as vertices ^ {:.2}\n", exponent(&points));
         }
     }

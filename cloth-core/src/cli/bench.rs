@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use cloth_core::bench::sleep::{self, Sizes};
 use cloth_core::bench::{self, Cloth, Measured, trajectory_error};
 use cloth_core::integrator::LinearSolverChoice;
@@ -34,6 +34,9 @@ pub struct Bench {
     /// Linear solvers: `auto`, `over-relaxation`, `multigrid`, `cholesky`, `incomplete-cholesky`.
     #[arg(long, value_delimiter = ',', default_value = "auto", value_parser = solver_by_name)]
     solver: Vec<LinearSolverChoice>,
+    /// Contact of the cloth with itself: `off`, `on`. Nothing touches, so this is what readiness costs.
+    #[arg(long, value_delimiter = ',', default_value = "off")]
+    contact: Vec<Contact>,
     /// Simulated time, in s. Default: 1, or 0.3 from 129 vertices per side.
     #[arg(long, value_parser = positive)]
     seconds: Option<f64>,
@@ -50,6 +53,12 @@ pub struct Bench {
     /// With --error: output folder for the figures as CSV, Markdown and SVG.
     #[arg(short, long, requires = "error")]
     output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Contact {
+    Off,
+    On,
 }
 
 impl Bench {
@@ -72,7 +81,7 @@ impl Bench {
         print(&format!("{}\n{}", bench::table(&measured), bench::growth(&measured)))
     }
 
-    /// Returns one run for each combination of cloth, threads, solver and size.
+    /// Returns one run for each combination of cloth, threads, solver, size and contact.
     fn runs(&self) -> Vec<HangRun> {
         let cloths = if self.cloth.is_empty() { &Cloth::ALL } else { &*self.cloth };
         let mut runs = Vec::new();
@@ -81,7 +90,8 @@ impl Bench {
                 for &solver in &self.solver {
                     for &size in &self.sizes {
                         let seconds = self.seconds.unwrap_or(if size < 129 { 1.0 } else { 0.3 });
-                        runs.push(HangRun { cloth, size, threads, solver, seconds });
+                        let run = |&contact| HangRun { cloth, size, threads, solver, contact, seconds };
+                        runs.extend(self.contact.iter().map(run));
                     }
                 }
             }
@@ -97,25 +107,30 @@ struct HangRun {
     size: u16,
     threads: u16,
     solver: LinearSolverChoice,
+    contact: Contact,
     /// Simulated time, in s.
     seconds: f64,
 }
 
 impl HangRun {
     fn measure(&self) -> Result<Measured> {
-        let &Self { cloth, size, threads, solver, seconds } = self;
+        let &Self { cloth, size, threads, solver, contact, seconds } = self;
         let progress = progress_bar((seconds / 0.01).round() as u64);
         let cells = usize::from(size) - 1;
-        let measured = bench::measure(cloth, cells, usize::from(threads), solver, seconds, || progress.inc(1))?;
+        let measured =
+            bench::measure(cloth, cells, usize::from(threads), solver, contact == Contact::On, seconds, || {
+                progress.inc(1)
+            })?;
         progress.finish_and_clear();
         Ok(measured)
     }
 
     /// Measures in a child process, so that the peak memory of earlier runs does not count.
     fn measure_in_own_process(&self) -> Result<Measured> {
-        let Self { cloth, size, threads, solver, seconds } = self;
+        let Self { cloth, size, threads, solver, contact, seconds } = self;
+        let contact = if *contact == Contact::On { "on" } else { "off" };
         let mut child = Command::new(std::env::current_exe().context("cannot find the path of this program")?);
-        child.args(["bench", "--json", "--cloth", cloth.name(), "--solver", solver.name()]);
+        child.args(["bench", "--json", "--cloth", cloth.name(), "--solver", solver.name(), "--contact", contact]);
         child.args([format!("--sizes={size}"), format!("--threads={threads}"), format!("--seconds={seconds}")]);
         let done = child.stderr(Stdio::inherit()).output().context("cannot start a run of the benchmark")?;
         anyhow::ensure!(done.status.success(), "{} at {size} vertices per side: {}", cloth.name(), done.status);
