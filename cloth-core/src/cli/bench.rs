@@ -34,7 +34,7 @@ pub struct Bench {
     /// Linear solvers: `auto`, `over-relaxation`, `multigrid`, `cholesky`, `incomplete-cholesky`.
     #[arg(long, value_delimiter = ',', default_value = "auto", value_parser = solver_by_name)]
     solver: Vec<LinearSolverChoice>,
-    /// Contact of the cloth with itself: `off`, `on`. Nothing touches, so this is what readiness costs.
+    /// Contact of the cloth with itself: `off`, `on`. Cotton touches nothing, so the difference is what searches cost.
     #[arg(long, value_delimiter = ',', default_value = "off")]
     contact: Vec<Contact>,
     /// Simulated time, in s. Default: 1, or 0.3 from 129 vertices per side.
