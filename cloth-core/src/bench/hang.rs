@@ -3,7 +3,7 @@ use energy_solve::{ElementList, ListError, PotentialTerm, System, SystemError};
 use serde::{Deserialize, Serialize};
 
 use crate::Body;
-use crate::barrier::{BarrierContact, ContactError, GAP_PER_THICKNESS};
+use crate::barrier::{BarrierContact, ContactError, GAP_PER_THICKNESS, thinning};
 use crate::collision::CollisionMesh;
 use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
 use crate::integrator::StepError;
@@ -104,16 +104,17 @@ pub fn hang(cloth: Cloth, cells: usize) -> Result<Body, BenchError> {
     Ok(Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system })
 }
 
-/// Lets a sheet of [`hang`] touch itself, with the thickness of its fabric.
+/// Lets a sheet of [`hang`] touch itself, with the thickness of its fabric as scenes have it.
 ///
 /// # Errors
 /// If the sheet touches itself at the start.
 pub(super) fn add_contact(body: &mut Body, cloth: Cloth, cells: usize) -> Result<(), BenchError> {
     let mesh = sheet(cells).mesh()?;
-    let thickness = cloth.fabric().thickness();
     let x = &body.x;
     let is_free = (0..x.len()).map(|vertex| vertex < mesh.vertices().len()).collect();
     let mesh = CollisionMesh::new(x.len(), mesh.triangles(), &[], &[]);
+    let whole = cloth.fabric().thickness();
+    let thickness = thinning(whole, mesh.shortest_edge(x)) * whole;
     let gap = GAP_PER_THICKNESS * thickness;
     let contact = BarrierContact::new(mesh, x, is_free, vec![0.5 * thickness; x.len()], gap)?;
     body.system.set_contact(Box::new(contact));

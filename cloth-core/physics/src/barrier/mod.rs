@@ -53,10 +53,9 @@ use joined::{Active, Joined};
 use judge::{Judge, Judgement};
 use law::{Barrier, Law, Order};
 use resistance::Resistance;
+pub use spacing::{GAP_PER_THICKNESS, thinning};
 use spacing::{Spacing, Spacings};
 
-/// The activation gap over the thickness of cloth.
-pub const GAP_PER_THICKNESS: f64 = 2.0;
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb
 /// the line search in which they first act.
 const JOINING: f64 = 1.25;

@@ -3,6 +3,18 @@
 use super::JOINING;
 use crate::collision::{Clearance, CollisionMesh, Pair};
 
+/// The activation gap over the thickness of cloth.
+pub const GAP_PER_THICKNESS: f64 = 2.0;
+/// The largest reach of contact over the shortest edge. Features of a flat sheet must not touch their neighbours.
+const LARGEST_REACH: f64 = 0.4;
+
+/// Returns the part of their thickness that fabrics keep in contact: coarse fabrics on fine meshes get thinner, with a
+/// gap in proportion. Both lengths are in m.
+#[must_use]
+pub fn thinning(thickest: f64, shortest_edge: f64) -> f64 {
+    (LARGEST_REACH * shortest_edge / ((1.0 + GAP_PER_THICKNESS) * thickest)).min(1.0)
+}
+
 /// The skin of an obstacle: the barrier acts between it and the surface of contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Skin {

@@ -227,7 +227,10 @@ impl Search {
 
     fn is_clear_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> bool {
         self.is_own_fitted = false;
-        self.crowded(shapes, balls).is_empty() && self.near_obstacles(mesh, balls).is_empty()
+        if !self.crowded(shapes, balls).is_empty() {
+            return false;
+        }
+        self.obstacles.is_empty() || self.near_obstacles(&Boxes::around(mesh, balls, &self.rules.halves)).is_empty()
     }
 
     /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
@@ -261,16 +264,18 @@ impl Search {
 
     /// Returns the pairs on a move with some shapes.
     fn pairs_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> Vec<Pair> {
-        let (crowded, near_obstacles) = (self.crowded(shapes, balls), self.near_obstacles(mesh, balls));
+        let crowded = self.crowded(shapes, balls);
+        self.is_own_fitted = false;
+        if crowded.is_empty() && self.obstacles.is_empty() {
+            return Vec::new();
+        }
+        let boxes = Boxes::around(mesh, balls, &self.rules.halves);
+        let near_obstacles = self.near_obstacles(&boxes);
         let mut tiles = [crowded.as_flattened(), &near_obstacles].concat();
         tiles.sort_unstable();
         tiles.dedup();
         self.is_own_fitted = 2 * tiles.len() > self.tiling.tiles.len();
-        if tiles.is_empty() {
-            return Vec::new();
-        }
         let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
-        let boxes = Boxes::around(mesh, balls, &self.rules.halves);
         if self.is_own_fitted {
             self.own.refit(&boxes, threads);
         } else {
@@ -302,18 +307,15 @@ impl Search {
         crowded
     }
 
-    /// Returns the tiles near obstacles, after [`Search::crowded`] for the same balls.
-    fn near_obstacles(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> Vec<usize> {
-        let mut near = Vec::new();
-        if !self.obstacles.is_empty() {
-            self.obstacles.refit(&Boxes::around(mesh, balls, &self.rules.halves), 1);
-            let Trees { points, triangles, edges, .. } = &self.obstacles;
-            for tree in [points, triangles, edges] {
-                self.tiles.meeting(tree, [[0, 0]], |tile, _| near.push(tile));
-            }
-            near.sort_unstable();
-            near.dedup();
+    /// Returns the tiles near obstacles, after [`Search::crowded`] for the same balls, which have these boxes.
+    fn near_obstacles(&mut self, boxes: &Boxes<'_>) -> Vec<usize> {
+        self.obstacles.refit(boxes, 1);
+        let (mut near, Trees { points, triangles, edges, .. }) = (Vec::new(), &self.obstacles);
+        for tree in [points, triangles, edges] {
+            self.tiles.meeting(tree, [[0, 0]], |tile, _| near.push(tile));
         }
+        near.sort_unstable();
+        near.dedup();
         near
     }
 

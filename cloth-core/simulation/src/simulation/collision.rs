@@ -1,15 +1,14 @@
 //! Contact of a scene with itself and with obstacles.
 
-use crate::barrier::{BarrierContact, ContactError, GAP_PER_THICKNESS, ObstacleStart, Participants, Untangling};
+use crate::barrier::{
+    BarrierContact, ContactError, GAP_PER_THICKNESS, ObstacleStart, Participants, Untangling, thinning,
+};
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{norm, subtract};
 use crate::model::Model;
 
 use super::Island;
-
-/// The largest reach of contact over the shortest edge. Features of a flat sheet must not touch their neighbours.
-const LARGEST_REACH: f64 = 0.4;
 
 /// Returns the points, edges and triangles of a model.
 pub(super) fn mesh_of(model: &Model) -> CollisionMesh {
@@ -49,8 +48,7 @@ fn participants(island: &Island, model: &Model, with_itself: bool) -> Participan
     let shortest = own.shortest_edge(x);
     let all = vertices.iter().map(|&vertex| model.thickness[vertex]);
     let thickest = all.clone().fold(0.0, f64::max);
-    // Coarse fabrics on fine meshes get thinner, with a gap in proportion.
-    let scale = (LARGEST_REACH * shortest / ((1.0 + GAP_PER_THICKNESS) * thickest)).min(1.0);
+    let scale = thinning(thickest, shortest);
     let start = |(obstacle, radius): (&Obstacle, f64)| ObstacleStart {
         name: obstacle.name.clone(),
         radius,
