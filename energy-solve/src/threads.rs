@@ -1,5 +1,6 @@
 //! Work divided among threads. The results do not depend on the number of threads.
 
+use std::ops::Range;
 use std::panic::resume_unwind;
 use std::sync::Mutex;
 
@@ -23,6 +24,24 @@ pub fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I
         in_parts(threads, vec![(); threads], until_none_waits).into_iter().flatten().collect();
     done.sort_unstable_by_key(|(number, _)| *number);
     done.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Collects what `work` makes of consecutive ranges of the numbers below `count`, of this length, on at most `threads`
+/// threads. One thread takes all numbers at once, so entries must depend on their own number alone.
+pub fn collect<R: Send>(
+    threads: usize,
+    count: usize,
+    length: usize,
+    work: impl Fn(Range<usize>) -> Vec<R> + Sync,
+) -> Vec<R> {
+    if threads <= 1 || count <= length {
+        return work(0..count);
+    }
+    let ranges = (0..count).step_by(length).map(|first| first..count.min(first + length)).collect();
+    let parts = for_each(threads, ranges, work);
+    let mut all = Vec::with_capacity(count);
+    parts.into_iter().for_each(|part| all.extend(part));
+    all
 }
 
 /// Divides the items among at most `threads` threads and applies `work` to each part, all parts at the same time.
@@ -68,6 +87,17 @@ mod tests {
                 let results = for_each(threads, (0..count).collect(), |item: usize| item * item);
                 assert_eq!(results, (0..count).map(|item| item * item).collect::<Vec<_>>(), "{threads} threads");
             }
+        }
+    }
+
+    #[test]
+    fn ranges_cover_all_numbers() {
+        for (threads, count) in [(1, 7), (2, 0), (2, 3), (2, 7), (3, 20)] {
+            let numbers = collect(threads, count, 3, |range| {
+                assert!(threads == 1 || range.len() <= 3);
+                range.collect()
+            });
+            assert_eq!(numbers, (0..count).collect::<Vec<_>>(), "{threads} threads");
         }
     }
 

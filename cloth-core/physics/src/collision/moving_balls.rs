@@ -13,7 +13,10 @@ pub struct MovingBalls<'a> {
 
 impl MovingBalls<'_> {
     /// Returns the box around the ball of a vertex.
+    #[inline]
     pub fn bounds(&self, vertex: usize) -> MovingBounds {
-        MovingBounds(self.ends.map(|centres| Bounds::of(&[centres[vertex]]).extended(self.radii[vertex])))
+        let ball = |centre: Vector3<f64>| Bounds { low: centre, high: centre }.extended(self.radii[vertex]);
+        let [start, end] = self.ends;
+        MovingBounds([ball(start[vertex]), ball(end[vertex])])
     }
 }

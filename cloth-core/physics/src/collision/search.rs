@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::index;
-use energy_solve::threads::for_each;
+use energy_solve::threads::{collect, for_each};
 
 use super::mesh::CollisionMesh;
 use super::smooth::Shapes;
@@ -16,7 +16,9 @@ const FEW: usize = 1000;
 /// Changed features whose pairs a thread finds at a time.
 const CHANGED: usize = 512;
 /// Pairs of tiles that a thread takes at a time.
-const TILES: usize = 256;
+const TILES: usize = 64;
+/// Vertices that a thread takes at a time.
+const VERTICES: usize = 2048;
 /// Fewer pairs are put in order on one thread.
 const FEW_PAIRS: usize = 4096;
 
@@ -76,13 +78,14 @@ struct Boxes<'a> {
 }
 
 impl<'a> Boxes<'a> {
-    fn new(mesh: &'a CollisionMesh, regions: impl Iterator<Item = MovingBounds>, halves: &[f64]) -> Self {
-        let regions = regions.zip(halves).map(|(region, half)| region.rounded(*half)).collect();
-        Self { mesh, regions }
-    }
-
-    fn around(mesh: &'a CollisionMesh, balls: &MovingBalls<'_>, halves: &[f64]) -> Self {
-        Self::new(mesh, (0..mesh.vertices()).map(|vertex| balls.bounds(vertex)), halves)
+    fn new(
+        mesh: &'a CollisionMesh,
+        region: impl Fn(usize) -> MovingBounds + Sync,
+        halves: &[f64],
+        threads: usize,
+    ) -> Self {
+        let extended = |vertex: usize| region(vertex).rounded(halves[vertex]);
+        Self { mesh, regions: collect(threads, mesh.vertices(), VERTICES, |range| range.map(extended).collect()) }
     }
 
     fn point(&self, number: usize) -> RoundedMovingBounds {
@@ -184,8 +187,8 @@ enum Task<'a> {
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let places = x.iter().map(|x| MovingBounds::fixed(Bounds::of(&[*x])));
-        let boxes = Boxes::new(mesh, places, &rules.halves);
+        let place = |vertex: usize| MovingBounds::fixed(Bounds::of(&[x[vertex]]));
+        let boxes = Boxes::new(mesh, place, &rules.halves, 1);
         let own = mesh.own_features();
         let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
         let mut tiling = Tiling::new(mesh, x);
@@ -195,10 +198,19 @@ impl Search {
         let tiling = Arc::new(tiling);
         let obstacles = Trees::new(&boxes, std::array::from_fn(|kind| own[kind]..all[kind]), |_, _| 0);
         let own = Trees::new(&boxes, own.map(|count| 0..count), |kind, number| tiling.tile_of(kind, number));
-        let shapes = Shapes::new(&tiling, [x, x]);
+        let shapes = Shapes::new(&tiling, [x, x], 1);
         let boxes: Vec<_> = (0..tiling.tiles.len()).map(|tile| shapes.bounds(tile, 0.0)).collect();
         let half = rules.halves[..mesh.own_vertices()].iter().copied().fold(0.0, f64::max);
         Self { tiles: Hierarchy::new(&boxes), tiling, own, obstacles, is_own_fitted: true, half, rules, threads: 1 }
+    }
+
+    /// The number of threads that search a mesh.
+    fn threads_in(&self, mesh: &CollisionMesh) -> usize {
+        if mesh.vertices() < FEW { 1 } else { self.threads }
+    }
+
+    fn boxes<'a>(&self, mesh: &'a CollisionMesh, balls: &MovingBalls<'_>) -> Boxes<'a> {
+        Boxes::new(mesh, |vertex| balls.bounds(vertex), &self.rules.halves, self.threads_in(mesh))
     }
 
     /// What may collide.
@@ -222,7 +234,7 @@ impl Search {
     /// everywhere, so that nothing crosses, its parts stay away from each other, and no obstacle is near. Costs little.
     pub fn is_clear(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> bool {
         let tiling = Arc::clone(&self.tiling);
-        self.is_clear_on(mesh, &Shapes::new(&tiling, balls.ends), balls)
+        self.is_clear_on(mesh, &Shapes::new(&tiling, balls.ends, self.threads_in(mesh)), balls)
     }
 
     fn is_clear_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> bool {
@@ -230,14 +242,14 @@ impl Search {
         if !self.crowded(shapes, balls).is_empty() {
             return false;
         }
-        self.obstacles.is_empty() || self.near_obstacles(&Boxes::around(mesh, balls, &self.rules.halves)).is_empty()
+        self.obstacles.is_empty() || self.near_obstacles(&self.boxes(mesh, balls)).is_empty()
     }
 
     /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
     /// meet. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> Vec<Pair> {
         let tiling = Arc::clone(&self.tiling);
-        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends), balls)
+        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends, self.threads_in(mesh)), balls)
     }
 
     /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
@@ -250,7 +262,7 @@ impl Search {
         [least, widest]: [f64; 2],
     ) -> (Vec<Pair>, Vec<f64>) {
         let (tiling, mut radii) = (Arc::clone(&self.tiling), balls.radii.to_vec());
-        let shapes = Shapes::new(&tiling, balls.ends);
+        let shapes = Shapes::new(&tiling, balls.ends, self.threads_in(mesh));
         let clear = if self.rules.with_itself { widest.min(shapes.clear_radius(self.half)) } else { widest };
         let wide = vec![clear; radii.len()];
         if clear >= least && self.is_clear_on(mesh, &shapes, &MovingBalls { radii: &wide, ..*balls }) {
@@ -269,13 +281,13 @@ impl Search {
         if crowded.is_empty() && self.obstacles.is_empty() {
             return Vec::new();
         }
-        let boxes = Boxes::around(mesh, balls, &self.rules.halves);
+        let boxes = self.boxes(mesh, balls);
         let near_obstacles = self.near_obstacles(&boxes);
         let mut tiles = [crowded.as_flattened(), &near_obstacles].concat();
         tiles.sort_unstable();
         tiles.dedup();
         self.is_own_fitted = 2 * tiles.len() > self.tiling.tiles.len();
-        let threads = if mesh.vertices() < FEW { 1 } else { self.threads };
+        let threads = self.threads_in(mesh);
         if self.is_own_fitted {
             self.own.refit(&boxes, threads);
         } else {
@@ -364,7 +376,7 @@ impl Search {
     /// and others whose boxes meet. These regions are at rest, and lie in those of the searches before, at some
     /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
     pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
-        let boxes = Boxes::new(mesh, regions.iter().copied(), &self.rules.halves);
+        let boxes = Boxes::new(mesh, |vertex| regions[vertex], &self.rules.halves, self.threads_in(mesh));
         let changed = changed_features(mesh, is_changed);
         self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
         let kinds = [Kind::Point, Kind::Triangle, Kind::Edge].into_iter().zip(&changed);

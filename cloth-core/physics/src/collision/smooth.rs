@@ -21,12 +21,15 @@
 //! nothing about distances.
 
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
+use energy_solve::threads::collect;
 
 use super::tiling::{Reference, Tile, Tiling};
 use crate::geometry::{Bounds, Coordinate, MovingBounds, RoundedMovingBounds, dot, subtract};
 
 /// Bound of the rounding errors of (1 − ε) w / |P|: relative to w / |P|, and to the largest coordinate.
 const ROUNDING: f64 = 1e-12;
+/// Tiles that a thread looks at, at a time.
+const TILES: usize = 64;
 
 /// The shapes of all tiles on a straight move of the vertices.
 #[derive(Debug)]
@@ -57,14 +60,19 @@ struct Shape {
 
 impl<'a> Shapes<'a> {
     /// Looks at all tiles on a move with these ends, which must be finite.
-    pub fn new(tiling: &'a Tiling, ends: [&[Vector3<f64>]; 2]) -> Self {
+    pub fn new(tiling: &'a Tiling, ends: [&[Vector3<f64>]; 2], threads: usize) -> Self {
         let padded = |x: &[Vector3<f64>]| x.iter().map(|&[a, b, c]| [a, b, c, 0.0]).collect::<Vec<_>>();
-        let tiles = dispatch(Look { tiling, ends: ends.map(padded) });
+        let ends = &ends.map(padded);
+        let tiles = collect(threads, tiling.tiles.len(), TILES, |range| {
+            dispatch(Look { tiles: &tiling.tiles[range], ends })
+        });
         let apart = |block: &Vec<usize>| {
             let joined = block.iter().map(|tile| tiles[*tile]).reduce(Shape::joined);
             joined.map_or(f64::NEG_INFINITY, |shape| shape.apart())
         };
-        let apart = tiling.blocks.iter().map(apart).collect();
+        let apart = collect(threads, tiling.blocks.len(), TILES, |range| {
+            tiling.blocks[range].iter().map(apart).collect()
+        });
         Self { tiling, tiles, apart }
     }
 
@@ -130,11 +138,11 @@ struct Entries {
 /// A vector, and a number that fills the lanes.
 type Column = [f64; 4];
 
-/// Finds the shapes of all tiles.
+/// Finds the shapes of some tiles.
 struct Look<'a> {
-    tiling: &'a Tiling,
+    tiles: &'a [Tile],
     /// The places of vertices at the start and at the end.
-    ends: [Vec<Column>; 2],
+    ends: &'a [Vec<Column>; 2],
 }
 
 impl Kernel for Look<'_> {
@@ -142,9 +150,9 @@ impl Kernel for Look<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> Vec<Shape> {
-        let [start, end] = &self.ends;
-        let mut shapes = Vec::with_capacity(self.tiling.tiles.len());
-        for tile in &self.tiling.tiles {
+        let [start, end] = self.ends;
+        let mut shapes = Vec::with_capacity(self.tiles.len());
+        for tile in self.tiles {
             shapes.push(Shape {
                 around: [tile.around(start), tile.around(end)],
                 derivatives: [tile.derivatives(start), tile.derivatives(end)],
