@@ -98,9 +98,7 @@ impl Neighbourhood {
             is_stray.fill(true);
             search.pairs_near(mesh, &paths, limits)
         } else if search.is_unfitted() {
-            let mut pairs = self.search_around(search, mesh, &paths, &is_stray);
-            pairs.retain(|pair| pair.has_any(&is_stray));
-            (pairs, wanted)
+            (self.search_around(search, mesh, &paths, &is_stray), wanted)
         } else {
             let mut regions = self.balls();
             for vertex in (0..is_stray.len()).filter(|&vertex| is_stray[vertex]) {
@@ -119,7 +117,7 @@ impl Neighbourhood {
         self.nearby.pairs().is_empty()
     }
 
-    /// Returns all pairs while strays are in their old balls or within their radius from their paths.
+    /// Returns the pairs of strays while these are in their old balls or within their radius from their paths.
     fn search_around(
         &self,
         search: &mut Search,
@@ -136,7 +134,7 @@ impl Neighbourhood {
                 radii[vertex] = old.max(paths.radii[vertex]).max(radii[vertex]);
             }
         }
-        search.pairs(mesh, &MovingBalls { ends: [&ends[0], &ends[1]], radii: &radii })
+        search.pairs_around(mesh, &MovingBalls { ends: [&ends[0], &ends[1]], radii: &radii }, is_stray)
     }
 
     /// Whether all pairs near x are known: each vertex is in its ball or a stray, and all strays are at one instant of

@@ -141,13 +141,23 @@ impl Trees {
         for_each(threads, trees, |(tree, kind, first)| tree.refit(|item| boxes.of(kind, first + item)));
     }
 
-    /// Adapts some tiles to the boxes of their features.
-    fn refit_tiles(&mut self, boxes: &Boxes<'_>, tiles: &[usize]) {
+    /// Adapts some tiles to the boxes of their points, of others to those of their triangles, and of others to those of
+    /// their edges.
+    fn refit_tiles(
+        &mut self,
+        boxes: &Boxes<'_>,
+        [with_points, with_triangles, with_edges]: [&[usize]; 3],
+        threads: usize,
+    ) {
         let Self { points, triangles, edges, first: [p, t, e] } = self;
-        for (tree, kind, first) in [(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)]
-        {
+        let trees = vec![
+            (edges, Kind::Edge, *e, with_edges),
+            (triangles, Kind::Triangle, *t, with_triangles),
+            (points, Kind::Point, *p, with_points),
+        ];
+        for_each(threads, trees, |(tree, kind, first, tiles)| {
             tiles.iter().for_each(|tile| tree.refit_group(*tile, |item| boxes.of(kind, first + item)));
-        }
+        });
     }
 
     /// Adapts to the boxes of changed features, which are in order.
@@ -181,7 +191,27 @@ impl Found {
 enum Task<'a> {
     Edges(&'a [[usize; 2]]),
     PointsOnTriangles(&'a [[usize; 2]]),
-    Obstacles(&'a [usize]),
+    Obstacles(&'a NearObstacles),
+}
+
+/// Tiles near the points of obstacles, those near their triangles, and those near their edges, in order.
+#[derive(Default)]
+struct NearObstacles {
+    points: Vec<usize>,
+    triangles: Vec<usize>,
+    edges: Vec<usize>,
+}
+
+impl NearObstacles {
+    fn is_empty(&self) -> bool {
+        self.points.is_empty() && self.triangles.is_empty() && self.edges.is_empty()
+    }
+
+    fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        for tiles in [&mut self.points, &mut self.triangles, &mut self.edges] {
+            tiles.retain(|tile| is_kept(*tile));
+        }
+    }
 }
 
 impl Search {
@@ -249,7 +279,16 @@ impl Search {
     /// meet. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> Vec<Pair> {
         let tiling = Arc::clone(&self.tiling);
-        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends, self.threads_in(mesh)), balls)
+        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends, self.threads_in(mesh)), balls, |_| true)
+    }
+
+    /// Returns the pairs with a changed vertex among those of [`Search::pairs`].
+    pub fn pairs_around(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>, is_changed: &[bool]) -> Vec<Pair> {
+        let tiling = Arc::clone(&self.tiling);
+        let shapes = Shapes::new(&tiling, balls.ends, self.threads_in(mesh));
+        let mut pairs = self.pairs_on(mesh, &shapes, balls, |vertex| is_changed[vertex]);
+        pairs.retain(|pair| pair.has_any(is_changed));
+        pairs
     }
 
     /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
@@ -271,33 +310,55 @@ impl Search {
         if self.rules.with_itself {
             shapes.shrink(&mut radii, self.half, least);
         }
-        (self.pairs_on(mesh, &shapes, &MovingBalls { radii: &radii, ..*balls }), radii)
+        (self.pairs_on(mesh, &shapes, &MovingBalls { radii: &radii, ..*balls }, |_| true), radii)
     }
 
-    /// Returns the pairs on a move with some shapes.
-    fn pairs_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> Vec<Pair> {
-        let crowded = self.crowded(shapes, balls);
+    /// Returns the pairs on a move with some shapes. Pairs without a changed vertex may be missing.
+    fn pairs_on(
+        &mut self,
+        mesh: &CollisionMesh,
+        shapes: &Shapes<'_>,
+        balls: &MovingBalls<'_>,
+        is_changed: impl Fn(usize) -> bool,
+    ) -> Vec<Pair> {
+        let mut crowded = self.crowded(shapes, balls);
         self.is_own_fitted = false;
         if crowded.is_empty() && self.obstacles.is_empty() {
             return Vec::new();
         }
         let boxes = self.boxes(mesh, balls);
-        let near_obstacles = self.near_obstacles(&boxes);
-        let mut tiles = [crowded.as_flattened(), &near_obstacles].concat();
-        tiles.sort_unstable();
-        tiles.dedup();
-        self.is_own_fitted = 2 * tiles.len() > self.tiling.tiles.len();
-        let threads = self.threads_in(mesh);
-        if self.is_own_fitted {
-            self.own.refit(&boxes, threads);
-        } else {
-            self.own.refit_tiles(&boxes, &tiles);
+        let mut near_obstacles = self.near_obstacles(&boxes);
+        let has_changed: Vec<bool> = self.tiling.tiles.iter().map(|tile| tile.has_any(&is_changed)).collect();
+        crowded.retain(|tiles| tiles.iter().any(|tile| has_changed[*tile]));
+        if !(mesh.own_vertices()..mesh.vertices()).any(&is_changed) {
+            near_obstacles.retain(|tile| has_changed[tile]);
         }
+        let threads = self.threads_in(mesh);
+        self.fit(&boxes, &crowded, &near_obstacles, threads);
         let mut tasks = vec![Task::Obstacles(&near_obstacles)];
         for pairs in crowded.chunks(TILES) {
             tasks.extend([Task::Edges(pairs), Task::PointsOnTriangles(pairs)]);
         }
         in_order(mesh, Found::all(&for_each(threads, tasks, |task| self.find(&task, mesh))), threads)
+    }
+
+    /// Adapts what is searched in these tiles to boxes, or all of it if that costs little more.
+    fn fit(&mut self, boxes: &Boxes<'_>, crowded: &[[usize; 2]], near: &NearObstacles, threads: usize) {
+        let with_crowded = |near: &[usize]| {
+            let mut tiles = [crowded.as_flattened(), near].concat();
+            tiles.sort_unstable();
+            tiles.dedup();
+            tiles
+        };
+        // Points meet triangles, triangles meet points.
+        let [points, triangles, edges] = [&near.triangles, &near.points, &near.edges].map(|near| with_crowded(near));
+        let fewest = points.len().min(triangles.len()).min(edges.len());
+        self.is_own_fitted = 2 * fewest > self.tiling.tiles.len();
+        if self.is_own_fitted {
+            self.own.refit(boxes, threads);
+        } else {
+            self.own.refit_tiles(boxes, [&points, &triangles, &edges], threads);
+        }
     }
 
     /// Returns the pairs of tiles, or of a tile with itself, with features that may meet while each vertex stays in its
@@ -320,15 +381,17 @@ impl Search {
     }
 
     /// Returns the tiles near obstacles, after [`Search::crowded`] for the same balls, which have these boxes.
-    fn near_obstacles(&mut self, boxes: &Boxes<'_>) -> Vec<usize> {
+    fn near_obstacles(&mut self, boxes: &Boxes<'_>) -> NearObstacles {
         self.obstacles.refit(boxes, 1);
-        let (mut near, Trees { points, triangles, edges, .. }) = (Vec::new(), &self.obstacles);
-        for tree in [points, triangles, edges] {
+        let near = |tree: &Hierarchy<RoundedMovingBounds>| {
+            let mut near = Vec::new();
             self.tiles.meeting(tree, [[0, 0]], |tile, _| near.push(tile));
-        }
-        near.sort_unstable();
-        near.dedup();
-        near
+            near.sort_unstable();
+            near.dedup();
+            near
+        };
+        let Trees { points, triangles, edges, .. } = &self.obstacles;
+        NearObstacles { points: near(points), triangles: near(triangles), edges: near(edges) }
     }
 
     /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
@@ -349,16 +412,16 @@ impl Search {
                     self.add_point_and_triangle(mesh, point, triangle, &mut found);
                 });
             }
-            Task::Obstacles(tiles) => {
+            Task::Obstacles(near) => {
                 let [points, triangles, edges] = obstacles.first;
-                let with_all = || tiles.iter().map(|&tile| [tile, 0]);
-                own.points.meeting(&obstacles.triangles, with_all(), |point, triangle| {
+                let with_all = |tiles: &'_ [usize]| tiles.iter().map(|&tile| [tile, 0]).collect::<Vec<_>>();
+                own.points.meeting(&obstacles.triangles, with_all(&near.triangles), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
                 });
-                own.triangles.meeting(&obstacles.points, with_all(), |triangle, point| {
+                own.triangles.meeting(&obstacles.points, with_all(&near.points), |triangle, point| {
                     self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
                 });
-                own.edges.meeting(&obstacles.edges, with_all(), |one, other| {
+                own.edges.meeting(&obstacles.edges, with_all(&near.edges), |one, other| {
                     self.add_edges(mesh, one, edges + other, &mut found);
                 });
             }

@@ -63,16 +63,14 @@ impl<'a> Shapes<'a> {
     pub fn new(tiling: &'a Tiling, ends: [&[Vector3<f64>]; 2], threads: usize) -> Self {
         let padded = |x: &[Vector3<f64>]| x.iter().map(|&[a, b, c]| [a, b, c, 0.0]).collect::<Vec<_>>();
         let ends = &ends.map(padded);
-        let tiles = collect(threads, tiling.tiles.len(), TILES, |range| {
-            dispatch(Look { tiles: &tiling.tiles[range], ends })
-        });
+        let tiles =
+            collect(threads, tiling.tiles.len(), TILES, |range| dispatch(Look { tiles: &tiling.tiles[range], ends }));
         let apart = |block: &Vec<usize>| {
             let joined = block.iter().map(|tile| tiles[*tile]).reduce(Shape::joined);
             joined.map_or(f64::NEG_INFINITY, |shape| shape.apart())
         };
-        let apart = collect(threads, tiling.blocks.len(), TILES, |range| {
-            tiling.blocks[range].iter().map(apart).collect()
-        });
+        let apart =
+            collect(threads, tiling.blocks.len(), TILES, |range| tiling.blocks[range].iter().map(apart).collect());
         Self { tiling, tiles, apart }
     }
 
