@@ -35,11 +35,8 @@ impl Judge<'_> {
         if pairs.is_empty() {
             return judgement;
         }
-        let reach = self.spacings.largest_reach();
-        // Pairs beyond this distance certainly stay out of reach.
-        let farthest = self.step.beyond(reach, 2.0 * self.step.longest());
-        let of_part = |(first, part)| self.doubtful(first, part, reach, farthest);
-        for (tested, doubtful) in for_each(threads, parts, of_part) {
+        let farthest = self.farthest();
+        for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part, farthest)) {
             judgement.tested += tested;
             for number in doubtful {
                 let pair = &pairs[number];
@@ -54,11 +51,11 @@ impl Judge<'_> {
     }
 
     /// The number of pairs that comparisons of distances do not dismiss, and those that are not safe at first sight,
-    /// among consecutive pairs from number `first` on. `reach` is the largest of all pairs.
-    fn doubtful(&self, first: usize, pairs: &[Pair], reach: f64, farthest: f64) -> (u64, Vec<usize>) {
+    /// among consecutive pairs from number `first` on.
+    fn doubtful(&self, first: usize, pairs: &[Pair], farthest: f64) -> (u64, Vec<usize>) {
         let mut close = Vec::new();
         for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.nearby.separations()[first..])) {
-            if *separation > farthest || self.step.stays_beyond(reach, pair, *separation) {
+            if *separation > farthest {
                 continue;
             }
             let clearance = self.clearance(pair);
@@ -67,6 +64,11 @@ impl Judge<'_> {
             }
         }
         (close.len() as u64, self.step.doubtful(self.nearby.pairs(), &close))
+    }
+
+    /// Pairs beyond this distance certainly stay out of reach, in m.
+    fn farthest(&self) -> f64 {
+        self.step.beyond(self.spacings.largest_reach(), 2.0 * self.step.longest())
     }
 
     fn clearance(&self, pair: &Pair) -> Clearance {

@@ -51,8 +51,11 @@ impl Nearby {
 
     /// Removes the pairs that have none of these vertices, and returns them.
     pub fn split_off_others(&mut self, vertices: &[bool]) -> Self {
-        let others = self.selected(|entry| !entry.pair.has_any(vertices));
-        *self = self.selected(|entry| entry.pair.has_any(vertices));
+        let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
+        let (kept, others): (Vec<_>, Vec<_>) = self.entries().partition(has_any);
+        let place = &self.separations.place;
+        let [kept, others] = [kept, others].map(|entries| Self::collect(place.clone(), entries.into_iter()));
+        *self = kept;
         others
     }
 
@@ -85,7 +88,8 @@ impl Nearby {
 
     /// Collects pairs in order.
     fn collect<'a>(place: Vec<Vector3<f64>>, entries: impl Iterator<Item = Entry<'a>>) -> Self {
-        let (mut pairs, mut all, mut near) = (Vec::new(), Vec::new(), Vec::new());
+        let most = entries.size_hint().1.unwrap_or(0);
+        let (mut pairs, mut all, mut near) = (Vec::with_capacity(most), Vec::with_capacity(most), Vec::new());
         for (number, Entry { pair, separation, closest }) in entries.enumerate() {
             pairs.push(*pair);
             all.push(separation);
