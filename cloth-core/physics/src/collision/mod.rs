@@ -14,6 +14,7 @@ mod closest;
 mod crossing;
 mod displacement;
 mod exclusions;
+mod found;
 mod measured;
 mod mesh;
 mod moving_balls;
@@ -29,6 +30,7 @@ mod sheet;
 mod smooth;
 mod solid_core;
 mod tiling;
+mod trees;
 
 pub use certificate::{Clearance, Move};
 pub use closest::Closest;

@@ -1,15 +1,16 @@
-use std::ops::Range;
 use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::index;
-use energy_solve::threads::{collect, for_each};
+use energy_solve::threads::for_each;
 
+use super::found::Found;
 use super::mesh::CollisionMesh;
 use super::smooth::Shapes;
 use super::tiling::Tiling;
-use super::{Exclusions, MovingBalls, Pair, PairKind};
-use crate::geometry::{Bounds, Hierarchy, MovingBounds, RoundedMovingBounds, Volume};
+use super::trees::{Boxes, Kind, Trees};
+use super::{Exclusions, MovingBalls, Pair};
+use crate::geometry::{Bounds, Hierarchy, MovingBounds, RoundedMovingBounds};
 
 /// A mesh with fewer vertices is searched on one thread.
 const FEW: usize = 1000;
@@ -17,10 +18,6 @@ const FEW: usize = 1000;
 const CHANGED: usize = 512;
 /// Pairs of tiles that a thread takes at a time.
 const TILES: usize = 64;
-/// Vertices that a thread takes at a time.
-const VERTICES: usize = 2048;
-/// Fewer pairs are put in order on one thread.
-const FEW_PAIRS: usize = 4096;
 
 /// Finds the pairs whose vertices may meet within given regions.
 #[derive(Clone, Debug)]
@@ -31,6 +28,8 @@ pub struct Search {
     /// Cloth and hair, grouped by tiles.
     own: Trees,
     obstacles: Trees,
+    /// Whether edges of cloth and hair meet edges of obstacles; see [`edges_meet_obstacles`].
+    edges_meet_obstacles: bool,
     /// Whether all of cloth and hair fits the regions of the last search. Obstacles always do.
     is_own_fitted: bool,
     rules: Rules,
@@ -51,140 +50,6 @@ pub struct Rules {
     pub exclusions: Exclusions,
     /// Whether cloth and hair collide with themselves and each other, not only with obstacles.
     pub with_itself: bool,
-}
-
-/// Hierarchies of the points, triangles and edges from certain places in the mesh's lists on.
-#[derive(Clone, Debug)]
-struct Trees {
-    points: Hierarchy<RoundedMovingBounds>,
-    triangles: Hierarchy<RoundedMovingBounds>,
-    edges: Hierarchy<RoundedMovingBounds>,
-    first: [usize; 3],
-}
-
-/// A kind of features.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
-    Point,
-    Triangle,
-    Edge,
-}
-
-/// The boxes around the regions of features, extended by half the reach.
-struct Boxes<'a> {
-    mesh: &'a CollisionMesh,
-    /// The extended region of each vertex.
-    regions: Vec<RoundedMovingBounds>,
-}
-
-impl<'a> Boxes<'a> {
-    fn new(
-        mesh: &'a CollisionMesh,
-        region: impl Fn(usize) -> MovingBounds + Sync,
-        halves: &[f64],
-        threads: usize,
-    ) -> Self {
-        let extended = |vertex: usize| region(vertex).rounded(halves[vertex]);
-        Self { mesh, regions: collect(threads, mesh.vertices(), VERTICES, |range| range.map(extended).collect()) }
-    }
-
-    fn point(&self, number: usize) -> RoundedMovingBounds {
-        self.regions[self.mesh.points()[number] as usize]
-    }
-
-    fn triangle(&self, number: usize) -> RoundedMovingBounds {
-        self.joined(&self.mesh.triangles()[number])
-    }
-
-    fn edge(&self, number: usize) -> RoundedMovingBounds {
-        self.joined(&self.mesh.edges()[number])
-    }
-
-    fn of(&self, kind: Kind, number: usize) -> RoundedMovingBounds {
-        match kind {
-            Kind::Point => self.point(number),
-            Kind::Triangle => self.triangle(number),
-            Kind::Edge => self.edge(number),
-        }
-    }
-
-    fn joined(&self, vertices: &[u32]) -> RoundedMovingBounds {
-        let of = |vertex: u32| self.regions[vertex as usize];
-        vertices[1..].iter().fold(of(vertices[0]), |all, &vertex| all.joined(of(vertex)))
-    }
-}
-
-impl Trees {
-    /// Builds the hierarchies of some features, by their places in the mesh's lists.
-    fn new(boxes: &Boxes<'_>, features: [Range<usize>; 3], tile_of: impl Fn(Kind, usize) -> usize) -> Self {
-        let first = features.each_ref().map(|range| range.start);
-        let tree = |kind: Kind, features: Range<usize>| {
-            let boxes: Vec<_> = features.map(|number| boxes.of(kind, number)).collect();
-            Hierarchy::grouped(&boxes, |item| tile_of(kind, item))
-        };
-        let [points, triangles, edges] = features;
-        let [points, triangles, edges] =
-            [(Kind::Point, points), (Kind::Triangle, triangles), (Kind::Edge, edges)].map(|(kind, of)| tree(kind, of));
-        Self { points, triangles, edges, first }
-    }
-
-    /// Whether there are no features. A plane is a triangle without points and edges.
-    fn is_empty(&self) -> bool {
-        self.points.is_empty() && self.triangles.is_empty() && self.edges.is_empty()
-    }
-
-    /// Adapts to the boxes of all features.
-    fn refit(&mut self, boxes: &Boxes<'_>, threads: usize) {
-        let Self { points, triangles, edges, first: [p, t, e] } = self;
-        // There are as many edges as triangles and points.
-        let trees = vec![(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)];
-        for_each(threads, trees, |(tree, kind, first)| tree.refit(|item| boxes.of(kind, first + item)));
-    }
-
-    /// Adapts some tiles to the boxes of their points, of others to those of their triangles, and of others to those of
-    /// their edges.
-    fn refit_tiles(
-        &mut self,
-        boxes: &Boxes<'_>,
-        [with_points, with_triangles, with_edges]: [&[usize]; 3],
-        threads: usize,
-    ) {
-        let Self { points, triangles, edges, first: [p, t, e] } = self;
-        let trees = vec![
-            (edges, Kind::Edge, *e, with_edges),
-            (triangles, Kind::Triangle, *t, with_triangles),
-            (points, Kind::Point, *p, with_points),
-        ];
-        for_each(threads, trees, |(tree, kind, first, tiles)| {
-            tiles.iter().for_each(|tile| tree.refit_group(*tile, |item| boxes.of(kind, first + item)));
-        });
-    }
-
-    /// Adapts to the boxes of changed features, which are in order.
-    fn refit_some(&mut self, boxes: &Boxes<'_>, [points, triangles, edges]: [&[usize]; 3]) {
-        let [p, t, e] = self.first;
-        self.points.refit_some(points.iter().map(|number| number - p), |item| boxes.point(p + item));
-        self.triangles.refit_some(triangles.iter().map(|number| number - t), |item| boxes.triangle(t + item));
-        self.edges.refit_some(edges.iter().map(|number| number - e), |item| boxes.edge(e + item));
-    }
-}
-
-/// Features by their places in the mesh's lists, as pairs are ordered.
-type Features = [u32; 2];
-
-/// The features that a search found.
-#[derive(Default)]
-struct Found {
-    on_triangles: Vec<Features>,
-    of_edges: Vec<Features>,
-}
-
-impl Found {
-    fn all(parts: &[Self]) -> Self {
-        let on_triangles: Vec<_> = parts.iter().map(|part| &part.on_triangles[..]).collect();
-        let of_edges: Vec<_> = parts.iter().map(|part| &part.of_edges[..]).collect();
-        Self { on_triangles: on_triangles.concat(), of_edges: of_edges.concat() }
-    }
 }
 
 /// A part of a search. Together they find all pairs.
@@ -231,7 +96,17 @@ impl Search {
         let shapes = Shapes::new(&tiling, [x, x], 1);
         let boxes: Vec<_> = (0..tiling.tiles.len()).map(|tile| shapes.bounds(tile, 0.0)).collect();
         let half = rules.halves[..mesh.own_vertices()].iter().copied().fold(0.0, f64::max);
-        Self { tiles: Hierarchy::new(&boxes), tiling, own, obstacles, is_own_fitted: true, half, rules, threads: 1 }
+        Self {
+            tiles: Hierarchy::new(&boxes),
+            tiling,
+            own,
+            obstacles,
+            edges_meet_obstacles: edges_meet_obstacles(mesh),
+            is_own_fitted: true,
+            half,
+            rules,
+            threads: 1,
+        }
     }
 
     /// The number of threads that search a mesh.
@@ -339,7 +214,7 @@ impl Search {
         for pairs in crowded.chunks(TILES) {
             tasks.extend([Task::Edges(pairs), Task::PointsOnTriangles(pairs)]);
         }
-        in_order(mesh, Found::all(&for_each(threads, tasks, |task| self.find(&task, mesh))), threads)
+        Found::all(&for_each(threads, tasks, |task| self.find(&task, mesh))).in_order(mesh, threads)
     }
 
     /// Adapts what is searched in these tiles to boxes, or all of it if that costs little more.
@@ -391,7 +266,8 @@ impl Search {
             near
         };
         let Trees { points, triangles, edges, .. } = &self.obstacles;
-        NearObstacles { points: near(points), triangles: near(triangles), edges: near(edges) }
+        let edges = if self.edges_meet_obstacles { near(edges) } else { Vec::new() };
+        NearObstacles { points: near(points), triangles: near(triangles), edges }
     }
 
     /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
@@ -446,7 +322,7 @@ impl Search {
         let parts = kinds.flat_map(|(kind, features)| features.chunks(CHANGED).map(move |part| (kind, part))).collect();
         let found =
             Found::all(&for_each(self.threads, parts, |(kind, features)| self.find_changed(kind, features, &boxes)));
-        in_order(mesh, found, self.threads)
+        found.in_order(mesh, self.threads)
     }
 
     /// Finds the pairs of some changed features of one kind.
@@ -528,8 +404,7 @@ impl Search {
         [a, b]: [[u32; 2]; 2],
         found: &mut Found,
     ) {
-        // The triangles of an edge collide with points, such as the centre of a ball.
-        let is_covered = |[p, q]: [u32; 2], edge: usize| p == q && !mesh.apexes(edge).is_empty();
+        let is_covered = |point: [u32; 2], edge: usize| is_point(point) && is_side(mesh, edge);
         if self.can_collide(mesh, &a, &b) && !is_covered(a, other) && !is_covered(b, one) {
             found.of_edges.push([index(one.min(other)), index(one.max(other))]);
         }
@@ -552,50 +427,18 @@ fn changed_features(mesh: &CollisionMesh, is_changed: &[bool]) -> [Vec<usize>; 3
     ]
 }
 
-/// Returns the pairs of these features once and in order.
-fn in_order(mesh: &CollisionMesh, Found { on_triangles, of_edges }: Found, threads: usize) -> Vec<Pair> {
-    let threads = if on_triangles.len() + of_edges.len() < FEW_PAIRS { 1 } else { threads };
-    let kinds = vec![(PairKind::PointTriangle, on_triangles), (PairKind::EdgeEdge, of_edges)];
-    for_each(threads, kinds, |(kind, features)| pairs_in_order(mesh, kind, features)).concat()
+/// Whether an edge is a point, such as the centre of a ball. The sides of triangles do not collide with it: the triangles
+/// do.
+fn is_point([p, q]: [u32; 2]) -> bool {
+    p == q
 }
 
-fn pairs_in_order(mesh: &CollisionMesh, kind: PairKind, features: Vec<Features>) -> Vec<Pair> {
-    let [points, triangles, edges] = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
-    match kind {
-        PairKind::PointTriangle => {
-            let pair = |features: Features| {
-                let (point, [a, b, c]) = (mesh.points()[features[0] as usize], mesh.triangles()[features[1] as usize]);
-                Pair { kind, features, vertices: [point, a, b, c] }
-            };
-            sorted(features, [points, triangles]).into_iter().map(pair).collect()
-        }
-        PairKind::EdgeEdge => {
-            let pair = |features: Features| {
-                let [[a, b], [c, d]] = features.map(|edge| mesh.edges()[edge as usize]);
-                Pair { kind, features, vertices: [a, b, c, d] }
-            };
-            sorted(features, [edges, edges]).into_iter().map(pair).collect()
-        }
-    }
+fn is_side(mesh: &CollisionMesh, edge: usize) -> bool {
+    !mesh.apexes(edge).is_empty()
 }
 
-/// Sorts features whose numbers are below some counts, and drops repeated ones. Time is linear: they are counted by
-/// their second number, then by the first.
-fn sorted(mut features: Vec<Features>, counts: [usize; 2]) -> Vec<Features> {
-    let mut sorted = vec![[0; 2]; features.len()];
-    for key in [1, 0] {
-        let mut places = vec![0; counts[key] + 1];
-        features.iter().for_each(|one| places[one[key] as usize + 1] += 1);
-        for number in 1..places.len() {
-            places[number] += places[number - 1];
-        }
-        for one in &features {
-            let place = &mut places[one[key] as usize];
-            sorted[*place] = *one;
-            *place += 1;
-        }
-        std::mem::swap(&mut features, &mut sorted);
-    }
-    features.dedup();
-    features
+/// Whether there are obstacles with edges, or with points that meet hair.
+fn edges_meet_obstacles(mesh: &CollisionMesh) -> bool {
+    let (own, all) = (mesh.own_features()[2], mesh.edges().len());
+    (own..all).any(|edge| !is_point(mesh.edges()[edge])) || own < all && (0..own).any(|edge| !is_side(mesh, edge))
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::tests::{all_pairs, at};
 use super::*;
-use crate::geometry::add_scaled;
+use crate::geometry::{add_scaled, norm, subtract};
 use crate::mesh::{Diagonals, Plane, Sheet};
 
 const CELLS: [usize; 2] = [12, 10];
@@ -158,4 +158,65 @@ proptest! {
             }
         }
     }
+
+    /// A search around some vertices finds their pairs, those with obstacles of all kinds among them, and no others.
+    #[test]
+    fn a_search_around_vertices_finds_their_pairs(
+        shapes in prop::array::uniform2(meander()),
+        (middle, size, is_obstacle_changed) in (0..143_usize, 0.0..0.1_f64, prop::bool::ANY),
+        (reach, radius, instant) in (1e-3..4e-3_f64, 0.0..3e-3_f64, 0.0..1.0_f64),
+    ) {
+        let (scene, obstacles) = (Scene::sheet(), obstacles());
+        let (mesh, own) = (scene.mesh().with_obstacles(&obstacles), scene.x.len());
+        let with_obstacles = |x: &[Vector3<f64>]| {
+            x.iter().chain(obstacles.iter().flat_map(|core| &core.vertices)).copied().collect::<Vec<_>>()
+        };
+        let halves = vec![0.5 * reach; mesh.vertices()];
+        let is_free = (0..mesh.vertices()).map(|vertex| vertex < own).collect();
+        let rules = Rules { halves, is_free, with_itself: true, ..Rules::default() };
+        let mut search = Search::new(&mesh, &with_obstacles(&scene.x), rules);
+
+        let [from, to] = shapes.map(|shape| with_obstacles(&meandering(&scene, shape)));
+        let balls = MovingBalls { ends: [&from, &to], radii: &vec![radius; mesh.vertices()] };
+        let is_near = |vertex: usize| norm(subtract(scene.x[vertex], scene.x[middle])) < size;
+        let is_changed: Vec<_> = (0..mesh.vertices())
+            .map(|vertex| if vertex < own { is_near(vertex) } else { is_obstacle_changed })
+            .collect();
+        let around = search.pairs_around(&mesh, &balls, &is_changed);
+        let mut all = search.pairs(&mesh, &balls);
+        let x = at(&from, &to, instant);
+        let is_point = |[a, b]: [u32; 2]| a == b;
+        for pair in all_pairs(&mesh).iter().filter(|pair| pair.vertices.iter().any(|vertex| (*vertex as usize) < own)) {
+            let [a, b, c, d] = pair.vertices;
+            // Triangles meet the point of a ball; edges need not.
+            if pair.kind == PairKind::EdgeEdge && (is_point([a, b]) || is_point([c, d])) {
+                continue;
+            }
+            let apart = Closest::of(pair, &pair.corners(&x)).distance;
+            prop_assert!(all.binary_search(pair).is_ok() || apart > reach, "{:?} at {}", pair, apart);
+        }
+        all.retain(|pair| pair.has_any(&is_changed));
+        prop_assert_eq!(around, all);
+    }
+}
+
+/// A ball, a rail, a tetrahedron and a plane near the sheet.
+fn obstacles() -> [Core; 4] {
+    let tetrahedron = [[0.0, 0.02, 0.003], [0.01, 0.02, 0.013], [0.0, 0.03, 0.013], [0.01, 0.03, 0.013]];
+    let plane = [[-9.0, -9.0, -0.01], [9.0, -9.0, -0.01], [0.0, 9.0, -0.01]];
+    [
+        Core { vertices: vec![[0.03, 0.0, 0.005]], segments: vec![[0, 0]], ..Core::default() },
+        Core {
+            vertices: vec![[-0.05, -0.02, 0.004], [0.0, -0.03, 0.004]],
+            segments: vec![[0, 1]],
+            faces: vec![[0, 1, 1]],
+            ..Core::default()
+        },
+        Core {
+            vertices: tetrahedron.to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+            ..Core::default()
+        },
+        Core { vertices: plane.to_vec(), faces: vec![[0, 1, 2]], ..Core::default() },
+    ]
 }

@@ -4,8 +4,8 @@ use energy_dsl::Vector3;
 
 use super::CollisionMesh;
 use super::rectangle::{Place, Rectangle, doubled_area, inverse, least_height};
-use super::search::Kind;
 use super::sheet::Sheet;
+use super::trees::Kind;
 
 /// The width of a tile relative to the mean length of edges: a tile of a regular grid has 4 × 4 cells.
 const WIDTH: f64 = 3.5;
