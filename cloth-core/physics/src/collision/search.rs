@@ -60,7 +60,6 @@ enum Task<'a> {
 }
 
 /// Tiles near the points of obstacles, those near their triangles, and those near their edges, in order.
-#[derive(Default)]
 struct NearObstacles {
     points: Vec<usize>,
     triangles: Vec<usize>,
@@ -225,7 +224,7 @@ impl Search {
             tiles.dedup();
             tiles
         };
-        // Points meet triangles, triangles meet points.
+        // Points of cloth meet triangles of obstacles, triangles meet points.
         let [points, triangles, edges] = [&near.triangles, &near.points, &near.edges].map(|near| with_crowded(near));
         let fewest = points.len().min(triangles.len()).min(edges.len());
         self.is_own_fitted = 2 * fewest > self.tiling.tiles.len();
@@ -290,7 +289,7 @@ impl Search {
             }
             Task::Obstacles(near) => {
                 let [points, triangles, edges] = obstacles.first;
-                let with_all = |tiles: &'_ [usize]| tiles.iter().map(|&tile| [tile, 0]).collect::<Vec<_>>();
+                let with_all = |tiles: &[usize]| tiles.iter().map(|&tile| [tile, 0]).collect::<Vec<_>>();
                 own.points.meeting(&obstacles.triangles, with_all(&near.triangles), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
                 });
@@ -427,8 +426,7 @@ fn changed_features(mesh: &CollisionMesh, is_changed: &[bool]) -> [Vec<usize>; 3
     ]
 }
 
-/// Whether an edge is a point, such as the centre of a ball. The sides of triangles do not collide with it: the triangles
-/// do.
+/// Whether an edge is a point, such as the centre of a ball. Triangles collide with it, so their sides need not.
 fn is_point([p, q]: [u32; 2]) -> bool {
     p == q
 }

@@ -35,6 +35,7 @@ pub(super) struct Boxes<'a> {
 }
 
 impl<'a> Boxes<'a> {
+    /// Extends the region of each vertex by half its reach.
     pub fn new(
         mesh: &'a CollisionMesh,
         region: impl Fn(usize) -> MovingBounds + Sync,
