@@ -46,7 +46,7 @@ impl Nearby {
         self.visit(search, x);
         let is_near =
             |Entry { pair, separation, .. }: &Entry<'_>| separation - pair.approach(farthest) <= search.reach(pair);
-        *self = self.selected(is_near);
+        *self = Self::collect(self.separations.place.clone(), self.entries().filter(is_near));
     }
 
     /// Removes the pairs that have none of these vertices, and returns them.
@@ -57,11 +57,6 @@ impl Nearby {
         let [kept, others] = [kept, others].map(|entries| Self::collect(place.clone(), entries.into_iter()));
         *self = kept;
         others
-    }
-
-    /// Returns some of the pairs.
-    fn selected(&self, is_selected: impl FnMut(&Entry<'_>) -> bool) -> Self {
-        Self::collect(self.separations.place.clone(), self.entries().filter(is_selected))
     }
 
     /// Returns the pairs of both. Those of the other must be as far apart at the place where these were measured as

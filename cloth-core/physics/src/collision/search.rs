@@ -225,13 +225,12 @@ impl Search {
             tiles
         };
         // Points of cloth meet triangles of obstacles, triangles meet points.
-        let [points, triangles, edges] = [&near.triangles, &near.points, &near.edges].map(|near| with_crowded(near));
-        let fewest = points.len().min(triangles.len()).min(edges.len());
-        self.is_own_fitted = 2 * fewest > self.tiling.tiles.len();
+        let tiles = [&near.triangles, &near.points, &near.edges].map(|near| with_crowded(near));
+        self.is_own_fitted = tiles.iter().all(|tiles| 2 * tiles.len() > self.tiling.tiles.len());
         if self.is_own_fitted {
             self.own.refit(boxes, threads);
         } else {
-            self.own.refit_tiles(boxes, [&points, &triangles, &edges], threads);
+            self.own.refit_tiles(boxes, &tiles, threads);
         }
     }
 
@@ -289,14 +288,15 @@ impl Search {
             }
             Task::Obstacles(near) => {
                 let [points, triangles, edges] = obstacles.first;
-                let with_all = |tiles: &[usize]| tiles.iter().map(|&tile| [tile, 0]).collect::<Vec<_>>();
-                own.points.meeting(&obstacles.triangles, with_all(&near.triangles), |point, triangle| {
+                // All features of obstacles are in one group.
+                let group = |&tile: &usize| [tile, 0];
+                own.points.meeting(&obstacles.triangles, near.triangles.iter().map(group), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
                 });
-                own.triangles.meeting(&obstacles.points, with_all(&near.points), |triangle, point| {
+                own.triangles.meeting(&obstacles.points, near.points.iter().map(group), |triangle, point| {
                     self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
                 });
-                own.edges.meeting(&obstacles.edges, with_all(&near.edges), |one, other| {
+                own.edges.meeting(&obstacles.edges, near.edges.iter().map(group), |one, other| {
                     self.add_edges(mesh, one, edges + other, &mut found);
                 });
             }
@@ -304,8 +304,8 @@ impl Search {
         found
     }
 
-    /// Whether only parts of cloth and hair fit the regions of the last search: then [`Search::pairs`] costs less than
-    /// [`Search::pairs_with`].
+    /// Whether only parts of cloth and hair fit the regions of the last search: then [`Search::pairs_around`] costs less
+    /// than [`Search::pairs_with`].
     pub fn is_unfitted(&self) -> bool {
         self.rules.with_itself && !self.is_own_fitted
     }

@@ -185,11 +185,10 @@ proptest! {
         let around = search.pairs_around(&mesh, &balls, &is_changed);
         let mut all = search.pairs(&mesh, &balls);
         let x = at(&from, &to, instant);
-        let is_point = |[a, b]: [u32; 2]| a == b;
         for pair in all_pairs(&mesh).iter().filter(|pair| pair.vertices.iter().any(|vertex| (*vertex as usize) < own)) {
             let [a, b, c, d] = pair.vertices;
             // Triangles meet the point of a ball; edges need not.
-            if pair.kind == PairKind::EdgeEdge && (is_point([a, b]) || is_point([c, d])) {
+            if pair.kind == PairKind::EdgeEdge && (a == b || c == d) {
                 continue;
             }
             let apart = Closest::of(pair, &pair.corners(&x)).distance;

@@ -110,7 +110,11 @@ proptest! {
 
     /// Where pairs are not measured again, they keep a lower bound of their distance, and are out of reach.
     #[test]
-    fn separations_stay_lower_bounds([x, y] in impact(), half in 0.0..0.02, ends in prop::collection::vec(0.0..1.0, 6)) {
+    fn separations_stay_lower_bounds(
+        [x, y] in impact(),
+        half in 0.0..0.02,
+        ends in prop::collection::vec(0.0..1.0, 6),
+    ) {
         let (pairs, mut separations) = (pairs(), Separations::default());
         for time in ends {
             let place = at(&x, &y, 0.02 * time);
@@ -121,7 +125,9 @@ proptest! {
                 prop_assert!(bound <= separation, "{} {}", bound, separation);
                 prop_assert!(bound == separation || *bound > 2.0 * half, "{} {}", bound, separation);
             }
-            let near = |all: &Separations| -> Vec<_> { all.near.iter().map(|near| (near.number, near.closest)).collect() };
+            let near = |all: &Separations| -> Vec<_> {
+                all.near.iter().map(|near| (near.number, near.closest)).collect()
+            };
             prop_assert_eq!(near(&separations), near(&fresh));
         }
     }

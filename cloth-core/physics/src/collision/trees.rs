@@ -19,7 +19,7 @@ pub(super) struct Trees {
     pub first: [usize; 3],
 }
 
-/// A kind of features.
+/// A kind of features, in the order of lists by kind.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
     Point,
@@ -93,29 +93,24 @@ impl Trees {
 
     /// Adapts to the boxes of all features.
     pub fn refit(&mut self, boxes: &Boxes<'_>, threads: usize) {
-        let Self { points, triangles, edges, first: [p, t, e] } = self;
-        // There are as many edges as triangles and points.
-        let trees = vec![(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)];
-        for_each(threads, trees, |(tree, kind, first)| tree.refit(|item| boxes.of(kind, first + item)));
+        self.each(threads, |tree, kind, first| tree.refit(|item| boxes.of(kind, first + item)));
     }
 
     /// Adapts some tiles to the boxes of their points, of others to those of their triangles, and of others to those of
     /// their edges.
-    pub fn refit_tiles(
-        &mut self,
-        boxes: &Boxes<'_>,
-        [with_points, with_triangles, with_edges]: [&[usize]; 3],
-        threads: usize,
-    ) {
-        let Self { points, triangles, edges, first: [p, t, e] } = self;
-        let trees = vec![
-            (edges, Kind::Edge, *e, with_edges),
-            (triangles, Kind::Triangle, *t, with_triangles),
-            (points, Kind::Point, *p, with_points),
-        ];
-        for_each(threads, trees, |(tree, kind, first, tiles)| {
-            tiles.iter().for_each(|tile| tree.refit_group(*tile, |item| boxes.of(kind, first + item)));
+    pub fn refit_tiles(&mut self, boxes: &Boxes<'_>, tiles: &[Vec<usize>; 3], threads: usize) {
+        self.each(threads, |tree, kind, first| {
+            let of_tile = |tile: &usize| tree.refit_group(*tile, |item| boxes.of(kind, first + item));
+            tiles[kind as usize].iter().for_each(of_tile);
         });
+    }
+
+    /// Changes each hierarchy, given its kind and the place of its first feature.
+    fn each(&mut self, threads: usize, change: impl Fn(&mut Hierarchy<RoundedMovingBounds>, Kind, usize) + Sync) {
+        let Self { points, triangles, edges, first: [p, t, e] } = self;
+        // There are as many edges as triangles and points.
+        let trees = vec![(edges, Kind::Edge, *e), (triangles, Kind::Triangle, *t), (points, Kind::Point, *p)];
+        for_each(threads, trees, |(tree, kind, first)| change(tree, kind, first));
     }
 
     /// Adapts to the boxes of changed features, which are in order.
