@@ -16,8 +16,8 @@ use crate::terms::share::{Divisible, Share};
 use crate::terms::state::State;
 use crate::threads::{for_each, split_mut};
 
-/// Free vertices per thread, at least: fewer do not repay the cost of starting a thread.
-const MIN_VERTICES_PER_THREAD: usize = 2048;
+/// Free vertices per thread, at least: fewer do not repay the cost of waking a thread.
+const MIN_VERTICES_PER_THREAD: usize = 512;
 
 /// One entry per term: its parallel form, if it has one, and whether to assemble its Jacobian.
 type Terms<'a> = [Option<(&'a dyn Divisible, bool)>];

@@ -129,20 +129,22 @@ impl Friction {
     }
 
     /// Takes the pairs in contact at the start, in order, with their laws and closest points.
-    pub fn take(&mut self, mesh: &CollisionMesh, touching: Vec<(Pair, Law, Closest)>) {
-        let of = |(pair, law, closest): (Pair, Law, Closest)| {
-            let limit = self.coefficient(mesh, &pair) * law.force(law.apart(&closest));
+    pub fn take(&mut self, mesh: &CollisionMesh, touching: &[(Pair, Law, Closest)], threads: usize) {
+        let of = |(pair, law, closest): &(Pair, Law, Closest)| {
+            let limit = self.coefficient(mesh, pair) * law.force(law.apart(closest));
             if limit <= 0.0 {
                 return None;
             }
-            let (weights, anchor) = self.sliding_point(mesh, &pair, &closest);
+            let (weights, anchor) = self.sliding_point(mesh, pair, closest);
             let normal = closest.normal;
-            let between = sliding(&pair, &weights, anchor, &self.start);
-            let straight = subtract(between, self.bristles.deflection(&pair, normal));
+            let between = sliding(pair, &weights, anchor, &self.start);
+            let straight = subtract(between, self.bristles.deflection(pair, normal));
             let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
-            Some((Sliding { pair, weights, anchor, normal, straight }, element))
+            Some((Sliding { pair: *pair, weights, anchor, normal, straight }, element))
         };
-        let (pairs, elements): (Vec<_>, Vec<_>) = touching.into_iter().filter_map(of).unzip();
+        let part = |part: &[(Pair, Law, Closest)]| part.iter().filter_map(of).collect::<Vec<_>>();
+        let parts = for_each(threads, touching.chunks(PART).collect(), part);
+        let (pairs, elements): (Vec<_>, Vec<_>) = parts.into_iter().flatten().unzip();
         let stencils: Vec<[u32; 1]> = (0..).map(|number| [number]).take(PART).collect();
         let packed = |part: &[SlidingFriction]| Packed::new(part, &stencils[..part.len()]);
         self.sliding = Some(Slidings { pairs, elements: elements.chunks(PART).map(packed).collect() });

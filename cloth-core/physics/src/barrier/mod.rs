@@ -118,21 +118,28 @@ impl BarrierContact {
         let start = std::mem::take(&mut self.friction.start);
         self.know(&start);
         self.neighbourhood.visit(&self.search, &start);
-        let meeting = Meeting { mesh: &self.mesh, x: &start };
-        let mut touching = Vec::new();
         let [nearby, strays] = [self.neighbourhood.nearby(), self.neighbourhood.strays()];
-        for (pair, closest) in nearby.within_reach().chain(strays.within_reach()) {
-            let Spacing { thickness, gap } = self.spacing(pair);
-            let is_active = closest.distance - thickness < gap;
-            if is_active && meeting.may_join(pair, closest) {
-                touching.push((*pair, self.law(pair, closest), *closest));
-            }
-        }
+        let mut touching = [nearby, strays].map(|nearby| self.touching(nearby, &start)).concat();
         // Both kinds may hold the same pair.
         touching.sort_by_key(|(pair, ..)| *pair);
         touching.dedup_by_key(|(pair, ..)| *pair);
         self.friction.start = start;
-        self.friction.take(&self.mesh, touching);
+        self.friction.take(&self.mesh, &touching, self.search.threads);
+    }
+
+    /// Returns the pairs in contact at x, where they were measured, in order.
+    fn touching(&self, nearby: &Nearby, x: &[Vector3<f64>]) -> Vec<(Pair, Law, Closest)> {
+        let Self { mesh, spacings, resistance, .. } = self;
+        let (pairs, meeting) = (nearby.pairs(), Meeting { mesh, x });
+        let touching = |Near { number, closest }: &Near| {
+            let pair = &pairs[*number];
+            let spacing = spacings.of(mesh, pair);
+            let is_active = closest.distance - spacing.thickness < spacing.gap;
+            let law = || Law::new(spacing, resistance.of(pair, closest));
+            (is_active && meeting.may_join(pair, closest)).then(|| (*pair, law(), *closest))
+        };
+        let part = |part: &[Near]| part.iter().filter_map(touching).collect::<Vec<_>>();
+        for_each(self.search.threads, nearby.near().chunks(PART).collect(), part).concat()
     }
 
     /// The law of a pair that joins with these closest points.

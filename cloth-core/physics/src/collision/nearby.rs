@@ -1,6 +1,9 @@
-use energy_dsl::Vector3;
+use std::ops::Range;
 
-use super::{Closest, Near, Pair, Search, Separations};
+use energy_dsl::Vector3;
+use energy_solve::threads::{for_each, ranges};
+
+use super::{Closest, Near, PART, Pair, Search, Separations};
 
 /// Some pairs, in order, and how far they are apart at one place.
 #[derive(Clone, Debug, Default)]
@@ -46,7 +49,9 @@ impl Nearby {
         self.visit(search, x);
         let is_near =
             |Entry { pair, separation, .. }: &Entry<'_>| separation - pair.approach(farthest) <= search.reach(pair);
-        *self = Self::collect(self.separations.place.clone(), self.entries().filter(is_near));
+        let parts = ranges(search.threads, self.pairs.len(), PART);
+        let kept = for_each(search.threads, parts, |part| Self::collect(self.entries_in(part).filter(is_near)));
+        *self = Self::concatenated(std::mem::take(&mut self.separations.place), kept);
     }
 
     /// Removes the pairs that have none of these vertices, and returns them.
@@ -54,35 +59,35 @@ impl Nearby {
         let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
         let (kept, others): (Vec<_>, Vec<_>) = self.entries().partition(has_any);
         let place = &self.separations.place;
-        let [kept, others] = [kept, others].map(|entries| Self::collect(place.clone(), entries.into_iter()));
+        let [kept, others] = [kept, others].map(|entries| Self::collect(entries.into_iter()).at(place.clone()));
         *self = kept;
         others
     }
 
     /// Returns the pairs of both. Those of the other must be as far apart at the place where these were measured as
     /// where they were measured themselves.
-    pub fn joined_with(self, others: &Self) -> Self {
+    pub fn joined_with(mut self, others: &Self, threads: usize) -> Self {
         if others.pairs.is_empty() {
             return self;
         }
         if self.pairs.is_empty() {
             return others.clone();
         }
-        let (mut own, mut others) = (self.entries().peekable(), others.entries().peekable());
-        let in_order = std::iter::from_fn(|| match (own.peek(), others.peek()) {
-            (Some(one), Some(other)) if one.pair == other.pair => {
-                others.next();
-                own.next()
-            }
-            (Some(one), Some(other)) if one.pair > other.pair => others.next(),
-            (None, _) => others.next(),
-            _ => own.next(),
+        let count = self.pairs.len();
+        let place_in_others = |number: usize| match number {
+            0 => 0,
+            _ if number == count => others.pairs.len(),
+            _ => others.pairs.partition_point(|pair| *pair < self.pairs[number]),
+        };
+        let parts = for_each(threads, ranges(threads, count, PART), |part| {
+            let part_of_others = place_in_others(part.start)..place_in_others(part.end);
+            Self::collect(merged(self.entries_in(part), others.entries_in(part_of_others)))
         });
-        Self::collect(self.separations.place.clone(), in_order)
+        Self::concatenated(std::mem::take(&mut self.separations.place), parts)
     }
 
-    /// Collects pairs in order.
-    fn collect<'a>(place: Vec<Vector3<f64>>, entries: impl Iterator<Item = Entry<'a>>) -> Self {
+    /// Collects pairs in order, without their place.
+    fn collect<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Self {
         let most = entries.size_hint().1.unwrap_or(0);
         let (mut pairs, mut all, mut near) = (Vec::with_capacity(most), Vec::with_capacity(most), Vec::new());
         for (number, Entry { pair, separation, closest }) in entries.enumerate() {
@@ -90,17 +95,59 @@ impl Nearby {
             all.push(separation);
             near.extend(closest.map(|closest| Near { number, closest: *closest }));
         }
-        Self { pairs, separations: Separations { place, all, near } }
+        Self { pairs, separations: Separations { place: Vec::new(), all, near } }
+    }
+
+    /// Concatenates parts that were measured at this place.
+    fn concatenated(place: Vec<Vector3<f64>>, parts: Vec<Self>) -> Self {
+        let mut parts = parts.into_iter();
+        let mut whole = parts.next().unwrap_or_default();
+        for Self { pairs, separations: Separations { all, near, .. } } in parts {
+            let first = whole.pairs.len();
+            whole.separations.near.extend(near.into_iter().map(|near| Near { number: first + near.number, ..near }));
+            whole.separations.all.extend(all);
+            whole.pairs.extend(pairs);
+        }
+        whole.at(place)
+    }
+
+    /// Returns the pairs, measured at this place.
+    fn at(mut self, place: Vec<Vector3<f64>>) -> Self {
+        self.separations.place = place;
+        self
     }
 
     fn entries(&self) -> impl Iterator<Item = Entry<'_>> {
-        let mut near = self.near().iter().peekable();
-        let pairs = self.pairs.iter().zip(&self.separations.all).enumerate();
+        self.entries_in(0..self.pairs.len())
+    }
+
+    /// The pairs with these numbers.
+    fn entries_in(&self, range: Range<usize>) -> impl Iterator<Item = Entry<'_>> {
+        let first_near = self.near().partition_point(|near| near.number < range.start);
+        let mut near = self.near()[first_near..].iter().peekable();
+        let pairs = range.clone().zip(self.pairs[range.clone()].iter().zip(&self.separations.all[range]));
         pairs.map(move |(number, (pair, &separation))| {
             let closest = near.next_if(|near| near.number == number).map(|near| &near.closest);
             Entry { pair, separation, closest }
         })
     }
+}
+
+/// Returns the pairs of two sequences in order, and those of both once.
+fn merged<'a>(
+    own: impl Iterator<Item = Entry<'a>>,
+    others: impl Iterator<Item = Entry<'a>>,
+) -> impl Iterator<Item = Entry<'a>> {
+    let (mut own, mut others) = (own.peekable(), others.peekable());
+    std::iter::from_fn(move || match (own.peek(), others.peek()) {
+        (Some(one), Some(other)) if one.pair == other.pair => {
+            others.next();
+            own.next()
+        }
+        (Some(one), Some(other)) if one.pair > other.pair => others.next(),
+        (None, _) => others.next(),
+        _ => own.next(),
+    })
 }
 
 /// A measured pair.

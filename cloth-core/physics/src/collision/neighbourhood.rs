@@ -83,14 +83,15 @@ impl Neighbourhood {
         limits: [f64; 2],
     ) -> bool {
         // Balls are convex: if they cover both ends of a straight move, they cover the whole move.
-        let [from, to] = ends.map(|x| self.lacks(x));
+        let means = ends.map(|x| self.mean(x));
+        let [from, to] = [0, 1].map(|end| self.lacks(ends[end], means[end]));
         let mut is_stray: Vec<bool> = from.zip(to).map(|(from, to)| from | to).collect();
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
             return false;
         }
         let wanted: Vec<f64> = (0..is_stray.len()).map(radius).collect();
-        let ends = ends.map(|x| self.relative(x).collect::<Vec<_>>());
+        let ends = [0, 1].map(|end| relative(ends[end], means[end]).collect::<Vec<_>>());
         let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
         let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
         let (pairs, radii) = if self.fixed.is_none() && are_many {
@@ -141,12 +142,13 @@ impl Neighbourhood {
     /// the move.
     pub fn knows(&self, x: &[Vector3<f64>]) -> bool {
         let Strays { ends: [start, end], is_stray, radii, .. } = &self.strays;
+        let mean = self.mean(x);
         let lacking: Vec<usize> =
-            self.lacks(x).enumerate().filter(|(_, lacks)| *lacks).map(|(vertex, _)| vertex).collect();
+            self.lacks(x, mean).enumerate().filter(|(_, lacks)| *lacks).map(|(vertex, _)| vertex).collect();
         if lacking.is_empty() || start.is_empty() {
             return lacking.is_empty();
         }
-        let (x, path) = (self.relative(x).collect::<Vec<_>>(), |vertex: usize| subtract(end[vertex], start[vertex]));
+        let (x, path) = (relative(x, mean).collect::<Vec<_>>(), |vertex: usize| subtract(end[vertex], start[vertex]));
         let farthest = lacking.iter().copied().max_by(|a, b| norm(path(*a)).total_cmp(&norm(path(*b))));
         let part = farthest.map_or(0.0, |vertex| {
             let (path, gone) = (path(vertex), subtract(x[vertex], start[vertex]));
@@ -162,7 +164,8 @@ impl Neighbourhood {
     /// the move that led there.
     pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) {
         self.settled = mean(x);
-        let lacks: Vec<bool> = self.lacks(x).collect();
+        let mean = self.fixed.as_ref().map_or(self.settled, |fixed| fixed.mean);
+        let lacks: Vec<bool> = self.lacks(x, mean).collect();
         if !lacks.contains(&true) {
             self.strays = Strays::default();
             return;
@@ -170,14 +173,14 @@ impl Neighbourhood {
         let Strays { radii, nearby: mut found, .. } = std::mem::take(&mut self.strays);
         self.centres.resize(x.len(), [0.0; 3]);
         self.radii.resize(x.len(), 0.0);
-        let relative: Vec<_> = self.relative(x).collect();
-        for (vertex, centre) in relative.into_iter().enumerate().filter(|(vertex, _)| lacks[*vertex]) {
+        for (vertex, centre) in relative(x, mean).enumerate().filter(|(vertex, _)| lacks[*vertex]) {
             (self.centres[vertex], self.radii[vertex]) = (centre, radii[vertex]);
         }
-        let farthest: Vec<f64> = self.away(x).zip(&self.radii).map(|(away, radius)| away + radius).collect();
+        let away = relative(x, mean).zip(&self.centres).map(|(x, centre)| norm(subtract(x, *centre)));
+        let farthest: Vec<f64> = away.zip(&self.radii).map(|(away, radius)| away + radius).collect();
         found.keep_near(search, x, &farthest);
         self.nearby.visit(search, x);
-        self.nearby = found.joined_with(&self.nearby);
+        self.nearby = found.joined_with(&self.nearby, search.threads);
     }
 
     /// Lets only some vertices move, from where balls were last settled, and puts the pairs of others aside.
@@ -196,12 +199,12 @@ impl Neighbourhood {
         let drift = subtract(mean, self.settled);
         self.centres.iter_mut().for_each(|centre| *centre = add_scaled(*centre, 1.0, drift));
         self.strays = Strays::default();
-        self.nearby = std::mem::take(&mut self.nearby).joined_with(&pairs);
+        self.nearby = std::mem::take(&mut self.nearby).joined_with(&pairs, 1);
     }
 
-    /// Whether each vertex is outside of its ball.
-    fn lacks(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = bool> {
-        self.relative(x).enumerate().map(|(vertex, x)| {
+    /// Whether each vertex is outside of its ball. `mean` is that of x.
+    fn lacks(&self, x: &[Vector3<f64>], mean: Vector3<f64>) -> impl Iterator<Item = bool> {
+        relative(x, mean).enumerate().map(|(vertex, x)| {
             let ball = self.centres.get(vertex).zip(self.radii.get(vertex));
             ball.is_none_or(|(centre, radius)| {
                 let away = subtract(x, *centre);
@@ -210,19 +213,18 @@ impl Neighbourhood {
         })
     }
 
-    /// The distance of each vertex from the centre of its ball, in m.
-    fn away(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = f64> {
-        self.relative(x).zip(&self.centres).map(|(x, centre)| norm(subtract(x, *centre)))
-    }
-
-    /// Returns positions relative to the mean of all vertices.
-    fn relative(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = Vector3<f64>> {
-        let mean = self.fixed.as_ref().map_or_else(|| mean(x), |fixed| fixed.mean);
-        x.iter().map(move |x| subtract(*x, mean))
+    /// Returns the mean of all vertices, as balls see it.
+    fn mean(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        self.fixed.as_ref().map_or_else(|| mean(x), |fixed| fixed.mean)
     }
 
     fn balls(&self) -> Vec<MovingBounds> {
         let ball = |(centre, radius): (&Vector3<f64>, &f64)| Bounds::of(&[*centre]).extended(*radius);
         self.centres.iter().zip(&self.radii).map(ball).map(MovingBounds::fixed).collect()
     }
+}
+
+/// Returns positions relative to their mean.
+fn relative(x: &[Vector3<f64>], mean: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> {
+    x.iter().map(move |x| subtract(*x, mean))
 }

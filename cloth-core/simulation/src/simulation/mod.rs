@@ -16,6 +16,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
+use energy_solve::threads::in_pool;
 use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError, index};
 
 pub use deformed::MostDeformed;
@@ -348,7 +349,8 @@ impl Simulation {
         let start = Instant::now();
         let step = self.steps_done() + 1;
         self.release_pins(self.time())?;
-        let (report, slept) = self.step_islands(step).map_err(|source| {
+        let stepped = in_pool(self.threads.unwrap_or(usize::MAX), || self.step_islands(step));
+        let (report, slept) = stepped.map_err(|source| {
             self.roll_back();
             let deformed = deformed::most_deformed(&self.parts, &self.x, &source).map(Box::new);
             SimulationError::Step { step, time: step as f64 * self.dt, deformed, source }

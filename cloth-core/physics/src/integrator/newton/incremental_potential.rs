@@ -2,12 +2,16 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use energy_dsl::Vector3;
+use energy_solve::threads::for_each;
 use energy_solve::{
     BlockMatrix, ContactCounts, Curvature, EvaluationError, LinearisationOptions, Precision, State, System, Weights,
 };
 
 use super::super::{StepReport, if_finite, moved_by_velocity};
 use crate::body::Body;
+
+/// Vertices that one thread takes at a time.
+const PART: usize = 4096;
 
 /// The incremental potential E of one step, and a record of its evaluations.
 pub(super) struct IncrementalPotential<'a> {
@@ -54,13 +58,8 @@ impl<'a> IncrementalPotential<'a> {
     /// Evaluates E without contact: a lower bound, for contact only adds to it.
     pub(super) fn energy_without_contact(&mut self, x: &[Vector3<f64>]) -> Result<Energy, EvaluationError> {
         let started = Instant::now();
-        let (mut value, mut magnitude) = (0.0, 0.0);
-        for &vertex in self.body.system.dofs().free() {
-            let inertial = self.inertial(vertex);
-            let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - inertial[axis]);
-            value += 0.5 * self.body.masses[vertex] * away.iter().map(|component| component * component).sum::<f64>();
-        }
-        magnitude += value;
+        let mut value = self.inertia(x);
+        let mut magnitude = value;
         let Some(energies) = if_finite(self.body.system.energies(x))? else {
             return Ok(Energy { value: f64::INFINITY, magnitude: f64::INFINITY });
         };
@@ -76,6 +75,20 @@ impl<'a> IncrementalPotential<'a> {
         }
         self.report.phases.line_search += started.elapsed();
         Ok(Energy { value, magnitude })
+    }
+
+    /// Returns ½ (x − x̂)ᵀ M (x − x̂).
+    fn inertia(&self, x: &[Vector3<f64>]) -> f64 {
+        let (Body { x: start, v, masses, system }, dt) = (&*self.body, self.dt);
+        let of_part = |part: &[usize]| {
+            let of_vertex = |&vertex: &usize| {
+                let inertial = moved_by_velocity(&start[vertex], &v[vertex], dt);
+                let away: Vector3<f64> = std::array::from_fn(|axis| x[vertex][axis] - inertial[axis]);
+                0.5 * masses[vertex] * away.iter().map(|component| component * component).sum::<f64>()
+            };
+            part.iter().map(of_vertex).sum::<f64>()
+        };
+        for_each(system.threads(), system.dofs().free().chunks(PART).collect(), of_part).iter().sum()
     }
 
     /// Adds contact to E without it. x must be certified.
