@@ -106,7 +106,7 @@ fn a_flag_of_one_term_is_a_flag_of_the_sum() {
     let (rest, mut x) = shapes();
     let brick = Brick::new(rest, 3.0, 2.0).expect("a sound rest shape");
     assert!(!brick.hessian(&x).flags.any());
-    // Inverts the neighbourhood of one corner: the logarithm of the volume there is no number.
+    // Inverts the neighbourhood of one corner: the logarithm of the volume there is not a number.
     x[6] = [-1.5, -1.5, -1.5];
     let flagged = single_points(rest).iter().filter(|point| point.value(&x).flags.any()).count();
     assert!((1..8).contains(&flagged), "{flagged} points");

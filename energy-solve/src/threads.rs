@@ -48,8 +48,8 @@ pub fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Runs `work` on a thread of the pool if it may use several threads. Within it, [`for_each`] does not wait for a thread that
-/// wakes too late to help.
+/// Runs `work` on a thread of the pool if it may use several threads. Within it, [`for_each`] does not wait for a
+/// thread that wakes too late to help.
 pub fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     match (threads > 1).then(pool).flatten() {
         Some(pool) => pool.install(work),

@@ -3,7 +3,7 @@ use serde::Deserialize;
 
 use cloth_physics::integrator::Scheme;
 
-/// What collides in a scene.
+/// The parts of a scene that collide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ContactChoice {
@@ -16,8 +16,9 @@ pub enum ContactChoice {
 }
 
 impl ContactChoice {
-    /// What collides if the scene does not say so. Only `newton` can keep cloth from passing through itself. Contact
-    /// couples everything: nothing could sleep on its own, and hair would lose its direct solution, strand by strand.
+    /// The parts that collide if the scene does not say so. Only `newton` can keep cloth from passing through itself.
+    /// Contact couples everything: nothing could sleep on its own, and hair would lose its direct solution, strand by
+    /// strand.
     pub(super) fn usual(scheme: Scheme, sleeps: bool, has_cloth: bool) -> Self {
         if scheme == Scheme::Newton && !sleeps && has_cloth { Self::On } else { Self::Obstacles }
     }

@@ -38,7 +38,7 @@ pub struct Scene {
     pub integrator: Scheme,
     /// Convergence criteria of Newton's method.
     pub tolerances: Tolerances,
-    /// What collides.
+    /// The parts that collide.
     pub contact: ContactChoice,
     /// Whether shallow crossings at the start are repaired.
     pub untangle: bool,

@@ -55,7 +55,7 @@ pub enum RunError {
          pass --ignore-memory", Gigabytes(*.available as f64)
     )]
     Memory {
-        /// What the run needs.
+        /// The memory that the run needs.
         need: MemoryNeed,
         /// The memory that is available, in bytes.
         available: u64,
@@ -123,7 +123,7 @@ pub struct Run {
     /// The scene file and the files that it names, as they were when the run began.
     scene_file: Option<InputFile>,
     inputs: Vec<InputFile>,
-    /// What the user should know about the resumption.
+    /// Warnings about the resumption.
     notes: Vec<String>,
 }
 
@@ -250,7 +250,7 @@ impl Run {
         Ok(())
     }
 
-    /// What the user should know about the start of the run.
+    /// Warnings about the start of the run.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes

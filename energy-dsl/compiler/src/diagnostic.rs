@@ -83,7 +83,7 @@ pub struct Diagnostic {
     pub help: Option<String>,
     /// Place of the error.
     pub span: Span,
-    /// Another place that the error concerns, and what is there.
+    /// Another place that the error concerns, and a note on it.
     pub other: Option<(String, Span)>,
 }
 
@@ -93,7 +93,7 @@ impl Diagnostic {
         Self { message: message.into(), help: None, span: span.clone(), other: None }
     }
 
-    /// Adds another place, and what is there.
+    /// Adds another place, and a note on it.
     #[must_use]
     pub fn see(mut self, other: (String, Span)) -> Self {
         self.other = Some(other);

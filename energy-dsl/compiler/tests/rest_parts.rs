@@ -1,4 +1,4 @@
-//! What the rest shape alone determines is stored, and sums of like terms are loops.
+//! Numbers that the rest shape alone determines are stored, and sums of like terms are loops.
 
 use energy_compiler::{Interpreted, Listing};
 use energy_runtime::Inputs;
@@ -42,7 +42,7 @@ fn the_determinant_of_a_product_with_the_rest_shape_is_split() {
     assert!(100 * split < 72 * whole, "{split} operations, {whole} without the rule");
 }
 
-/// A mirrored frame is no rest shape: its determinant may be negative.
+/// A mirrored frame is not a rest shape: its determinant may be negative.
 const MIRRORED: &str = "energy Mirrored(a, b, c, d: Point; rest M: Mat3x3; k: Scalar) {
     rest { let N = M; }
     k * det(columns(b - a, c - a, d - a) * N)

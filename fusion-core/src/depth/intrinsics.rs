@@ -80,7 +80,7 @@ impl GivenCamera {
     }
 }
 
-/// A name or numbers that are no camera.
+/// A name that is unknown, or numbers that do not describe a camera.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected `fx,fy,cx,cy` in pixels, or one of freiburg1, freiburg2, freiburg3, got `{0}`")]
 pub struct CameraNameError(String);

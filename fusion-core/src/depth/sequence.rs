@@ -117,7 +117,7 @@ impl DepthSequence {
     /// Opens a folder with `intrinsics.json`.
     ///
     /// # Errors
-    /// As [`Self::open_with`].
+    /// Fails as [`Self::open_with`] does.
     pub fn open(folder: &Path) -> Result<Self, SequenceError> {
         Self::open_with(folder, None)
     }

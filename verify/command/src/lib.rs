@@ -1,4 +1,4 @@
-//! What the program `verify` measures beyond the audit of [`verify`].
+//! Measurements of the program `verify` beyond the audit of [`verify`].
 //!
 //! * [`reference`](mod@reference) compares the elements with recorded multi-precision values.
 //! * [`stress`](mod@stress) sweeps towards every singularity.

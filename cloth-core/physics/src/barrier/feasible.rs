@@ -1,11 +1,11 @@
-//! Which pairs of close features act as a contact.
+//! Selects the pairs of close features that act as a contact.
 //!
 //! Two layers of cloth lie close in many pairs of features. A point counts where it is nearest to a triangle, its
 //! edges or corners, as a local minimum of the distance: once, although several triangles meet there (Offset geometric
 //! contact: Chen, Hsu, Liu, Macklin, Yang and Yuksel 2025).
 //!
 //! Two edges count where their insides are nearest to each other, unless one of them lies in a valley. Edges of flat or
-//! gently curved layers are no strict minima: which of them is nearest changes with every small motion. A pair that is
+//! gently curved layers are not strict minima: which of them is nearest changes with every small motion. A pair that is
 //! missing at one iterate would stop the next move.
 //!
 //! Cloth on a ball or a rail is nearest to its core almost everywhere, so all of its features count there.

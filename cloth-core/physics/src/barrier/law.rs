@@ -34,7 +34,7 @@ pub(super) struct Barrier {
     pub curvature: f64,
 }
 
-/// What to evaluate.
+/// The quantities to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
     Energy,

@@ -25,7 +25,7 @@ impl PairKind {
 /// Two features that may touch. Pairs are ordered by kind, then by features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pair {
-    /// Which two features.
+    /// The kinds of the two features.
     pub kind: PairKind,
     /// The places of the two features in the mesh's lists of points, triangles and edges.
     pub features: [u32; 2],

@@ -117,7 +117,7 @@ impl Search {
         Boxes::new(mesh, |vertex| balls.bounds(vertex), &self.rules.halves, self.threads_in(mesh))
     }
 
-    /// What may collide.
+    /// The rules that select what may collide.
     pub fn rules(&self) -> &Rules {
         &self.rules
     }
@@ -304,8 +304,8 @@ impl Search {
         found
     }
 
-    /// Whether only parts of cloth and hair fit the regions of the last search: then [`Search::pairs_around`] costs less
-    /// than [`Search::pairs_with`].
+    /// Whether only parts of cloth and hair fit the regions of the last search: then [`Search::pairs_around`] costs
+    /// less than [`Search::pairs_with`].
     pub fn is_unfitted(&self) -> bool {
         self.rules.with_itself && !self.is_own_fitted
     }

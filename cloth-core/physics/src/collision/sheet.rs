@@ -24,7 +24,7 @@ impl Sheet {
         (0..points).for_each(|point| sheets[of(mesh.points()[point])].points.push(point));
         (0..triangles).for_each(|triangle| sheets[of(mesh.triangles()[triangle][0])].triangles.push(triangle));
         (0..edges).for_each(|edge| sheets[of(mesh.edges()[edge][0])].edges.push(edge));
-        // A vertex without edges is no point.
+        // A vertex without edges is not a point.
         sheets.retain(|sheet| !sheet.edges.is_empty());
         sheets
     }

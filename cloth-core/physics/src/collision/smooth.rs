@@ -40,7 +40,7 @@ pub(super) struct Shapes<'a> {
     apart: Vec<f64>,
 }
 
-/// Which blocks of a tiling have no pairs.
+/// The blocks of a tiling that have no pairs.
 #[derive(Debug)]
 pub(super) struct Smooth<'a> {
     tiling: &'a Tiling,
@@ -105,7 +105,7 @@ impl<'a> Shapes<'a> {
         MovingBounds(self.tiles[tile].around).rounded(reach)
     }
 
-    /// Which blocks have no pairs within the reach of their tiles.
+    /// Finds the blocks that have no pairs within the reach of their tiles.
     pub fn smooth(&self, reaches: &[f64]) -> Smooth<'a> {
         let reach = |block: &Vec<usize>| block.iter().map(|tile| reaches[*tile]).fold(0.0, f64::max);
         let blocks = self.tiling.blocks.iter().zip(&self.apart);

@@ -1,4 +1,4 @@
-//! What searches leave out because cloth is smooth.
+//! Searches leave out parts of cloth that are smooth.
 
 use energy_dsl::Vector3;
 use proptest::prelude::*;
@@ -89,7 +89,7 @@ fn a_sheet_near_anything_is_not_clear() {
     let scene = Scene::sheet();
     let above = |height: f64| {
         let corners = [[-9.0, -9.0, -height], [9.0, -9.0, -height], [0.0, 9.0, -height]];
-        // Of a plane, there is nothing but a triangle.
+        // A plane is a single triangle.
         let plane = Core { vertices: corners.to_vec(), faces: vec![[0, 1, 2]], ..Core::default() };
         let mesh = scene.mesh().with_obstacles(std::slice::from_ref(&plane));
         let x = [&scene.x[..], &corners].concat();

@@ -114,7 +114,7 @@ impl Volume for Bounds {
 
     const INSTANTS: usize = 1;
 
-    /// The nearest item is sought among all items of a leaf.
+    /// All items of a leaf are compared to find the nearest one.
     const LEAF: usize = 4;
 
     #[inline]

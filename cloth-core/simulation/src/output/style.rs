@@ -1,4 +1,4 @@
-//! What a scene's choice of style means for its pictures.
+//! The looks of pictures that a scene's choice of style stands for.
 
 use energy_dsl::Vector3;
 

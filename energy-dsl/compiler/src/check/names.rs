@@ -41,7 +41,7 @@ pub(super) fn check_names(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<
     names.unused
 }
 
-/// What a name stands for.
+/// The meaning of a name.
 #[derive(Clone, Copy, PartialEq)]
 enum Role {
     Constant,

@@ -8,12 +8,12 @@ use crate::check::Program;
 use crate::lower::Repetition;
 use crate::routines::Routines;
 
-/// Returns the name of the type for one term; `None` if the formula is no sum of like terms.
+/// Returns the name of the type for one term; `None` if the formula is not a sum of like terms.
 pub(super) fn term_of(name: &Ident, routines: &Routines) -> Option<Ident> {
     routines.repetition.as_ref().map(|_| format_ident!("TermOf{name}"))
 }
 
-/// Emits the type for one term; nothing if the formula is no sum of like terms.
+/// Emits the type for one term; nothing if the formula is not a sum of like terms.
 pub(super) fn term(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     let (Some(term), Some(repetition)) = (term_of(name, routines), &routines.repetition) else {
         return TokenStream::new();

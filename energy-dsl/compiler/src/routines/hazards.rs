@@ -1,4 +1,4 @@
-//! Where a formula may be singular: the operations that the user wrote, seen from outside of robust primitives.
+//! Finds where a formula may be singular: the operations that the user wrote, seen from outside of robust primitives.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use energy_runtime::Flag;
 /// Masks of the places where a routine needs more than its ordinary path.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hazards {
-    /// Where a result may be a convention: degenerate, kink. The general path looks closer.
+    /// Inputs at which a result may be a convention: degenerate, kink. The general path looks closer.
     pub(super) flags: [Option<NodeId>; 2],
     /// Where all operands are of moderate size and away from singularities; `None` if they always are.
     pub(super) sound: Option<NodeId>,

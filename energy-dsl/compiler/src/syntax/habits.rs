@@ -1,6 +1,6 @@
 //! Remedies for what other languages and other keyboards write.
 
-/// Names of functions elsewhere, and what is written here.
+/// Names of functions elsewhere, and those of this language.
 const FUNCTIONS: &[(&str, &str)] = &[
     ("length", "norm(v)"),
     ("len", "norm(v)"),
@@ -53,7 +53,7 @@ pub(crate) fn function(name: &str) -> Option<&'static str> {
     FUNCTIONS.iter().find(|(elsewhere, _)| *elsewhere == name).map(|(_, here)| *here)
 }
 
-/// Whether a name means something in mathematics, so that it is no misspelling.
+/// Whether a name means something in mathematics, so that it is not a misspelling.
 pub(crate) fn is_mathematics(name: &str) -> bool {
     MATHEMATICS.contains(&name)
 }

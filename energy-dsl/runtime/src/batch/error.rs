@@ -1,4 +1,4 @@
-//! What can be wrong with a call for many elements, and the flags that it returns.
+//! Errors of a call for many elements, and the flags that it returns.
 
 use std::fmt;
 use std::ops::Range;
@@ -46,7 +46,7 @@ pub enum BatchError {
     },
     /// A slice of results of another length than the range needs.
     Output {
-        /// What the slice receives.
+        /// The results that the slice receives.
         of: &'static str,
         /// Numbers that the range needs.
         needed: usize,

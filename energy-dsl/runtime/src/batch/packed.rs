@@ -14,7 +14,7 @@ pub const BLOCK: usize = 16;
 
 /// Elements that can be stored as plain numbers.
 pub trait Stored<S: Real>: Element {
-    /// Numbers per element: its parameters and what its rest shape determines.
+    /// Numbers per element: its parameters and those that its rest shape determines.
     const NUMBERS: usize;
 
     /// Writes the numbers to indices 0, `stride`, 2 `stride`, ….

@@ -161,7 +161,7 @@ pub trait Number:
         self
     }
     /// Returns the number in double precision with an extended exponent; `None` if the type has more digits than that
-    /// or is no plain number.
+    /// or is not a plain number.
     #[doc(hidden)]
     fn extended(&self) -> Option<Unbounded<f64>> {
         None

@@ -102,7 +102,7 @@ struct State<S> {
     stored: Vec<(usize, usize)>,
     /// Slots of the inputs that differ between terms, and their indices among the numbers of a term.
     of_term: Vec<(usize, usize)>,
-    /// The sum over all terms; `None` if the element is no sum of like terms.
+    /// The sum over all terms; `None` if the element is not a sum of like terms.
     sum: Option<Sum<S>>,
 }
 

@@ -124,7 +124,7 @@ struct Vertex {
     home: Home,
 }
 
-/// Where a row lives.
+/// The place of a row.
 #[derive(Clone, Copy, Default)]
 struct Home {
     domain: u32,

@@ -8,7 +8,7 @@ use crate::terms::active::Active;
 use crate::terms::places::BlockPlaces;
 use crate::terms::stencils::Stencils;
 
-/// The name and the stencils of a term whose elements are made anew when they change.
+/// The name and the stencils of a term whose elements are created again when they change.
 #[derive(Debug)]
 pub(super) struct NamedStencils {
     pub name: String,

@@ -43,7 +43,7 @@ pub(super) struct Malformed {
     pub text: String,
 }
 
-/// What the following faces belong to.
+/// The groups, object and material of the following faces.
 #[derive(Default)]
 struct Current {
     groups: Vec<usize>,

@@ -54,7 +54,7 @@ pub enum ObjError {
     },
 }
 
-/// Which part of an OBJ file to read, and how.
+/// The part of an OBJ file to read, and how to read it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjOptions<'a> {
     /// Groups, objects or materials whose faces are read; `None` for all faces.
@@ -127,11 +127,11 @@ struct Triangulation {
     /// The vertex of the file for each vertex.
     sources: Vec<usize>,
     triangles: Vec<[usize; 3]>,
-    /// Of each triangle: its corners in the file, its line, and the groups of its face.
+    /// The corners of each triangle in the file, its line, and the groups of its face.
     corners: Vec<[Corner; 3]>,
     lines: Vec<usize>,
     groups: Vec<Vec<usize>>,
-    /// Of each triangle: its index before welding.
+    /// The index of each triangle before welding.
     kept: Vec<usize>,
     unwelded: usize,
     welded: usize,
