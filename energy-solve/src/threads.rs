@@ -11,15 +11,17 @@ use rayon_core::{ThreadPool, ThreadPoolBuilder};
 const STACK: usize = 16 << 20;
 
 /// The threads, one per core, which sleep between two calls: to wake one takes a tenth of the time that it takes to
-/// start one. `None` if the system refuses to start them.
+/// start one. `None` if the system refuses to start them, or in a fork of the process, which has none of its threads.
 fn pool() -> Option<&'static ThreadPool> {
-    static POOL: OnceLock<Option<ThreadPool>> = OnceLock::new();
+    static POOL: OnceLock<(u32, Option<ThreadPool>)> = OnceLock::new();
     let start = || {
         let name = |number| format!("energy-solve {number}");
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        ThreadPoolBuilder::new().num_threads(cores).stack_size(STACK).thread_name(name).build().ok()
+        let builder = ThreadPoolBuilder::new().num_threads(cores).stack_size(STACK).thread_name(name);
+        (std::process::id(), builder.build().ok())
     };
-    POOL.get_or_init(start).as_ref()
+    let (process, pool) = POOL.get_or_init(start);
+    pool.as_ref().filter(|_| *process == std::process::id())
 }
 
 /// Applies `work` to every item on at most `threads` threads, including the calling one. Each thread takes one item

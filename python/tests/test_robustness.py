@@ -1,6 +1,9 @@
 """Wrong arrays, many calls and many threads: exceptions that say what was expected, and no leak."""
 
 import gc
+import hashlib
+import os
+import signal
 import sys
 import threading
 from pathlib import Path
@@ -174,6 +177,30 @@ def test_a_second_thread_in_one_simulation_is_told_so():
     assert raised and "this Simulation is in use by another thread" in raised[0]
     alone.step(30)
     assert np.array_equal(simulation.positions, alone.positions)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_fork_takes_the_steps_of_its_parent():
+    scene = {
+        "dt": 0.01, "duration": 1.0, "integrator": "newton",
+        "mesh": {"sheet": {"cells": [40, 40], "size": [1.0, 1.0]}},
+        "fabric": {"density": 0.15, "material": {"stvk": {"stretch_stiffness": 50.0, "poisson_ratio": 0.3}}},
+        "pins": [{"nearest": [-0.5, 0.5, 0.0]}],
+    }
+    simulation = ed.Simulation(scene, threads=2)
+    simulation.step(1)
+    receiver, sender = os.pipe()
+    child = os.fork()
+    if child == 0:
+        # Threads do not survive a fork. A step that waited for them would never end.
+        signal.alarm(30)
+        simulation.step(1)
+        os.write(sender, hashlib.sha256(simulation.positions.tobytes()).digest())
+        os._exit(0)
+    simulation.step(1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert os.read(receiver, 32) == hashlib.sha256(simulation.positions.tobytes()).digest()
 
 
 def resident():

@@ -50,7 +50,8 @@ impl Nearby {
         let is_near =
             |Entry { pair, separation, .. }: &Entry<'_>| separation - pair.approach(farthest) <= search.reach(pair);
         let parts = ranges(search.threads, self.pairs.len(), PART);
-        let kept = for_each(search.threads, parts, |part| Self::collect(self.entries_in(part).filter(is_near)));
+        let kept =
+            for_each(search.threads, parts, |part| Self::collect(part.len(), self.entries_in(part).filter(is_near)));
         *self = Self::concatenated(std::mem::take(&mut self.separations.place), kept);
     }
 
@@ -59,7 +60,8 @@ impl Nearby {
         let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
         let (kept, others): (Vec<_>, Vec<_>) = self.entries().partition(has_any);
         let place = &self.separations.place;
-        let [kept, others] = [kept, others].map(|entries| Self::collect(entries.into_iter()).at(place.clone()));
+        let [kept, others] =
+            [kept, others].map(|entries| Self::collect(entries.len(), entries.into_iter()).at(place.clone()));
         *self = kept;
         others
     }
@@ -81,14 +83,14 @@ impl Nearby {
         };
         let parts = for_each(threads, ranges(threads, count, PART), |part| {
             let part_of_others = place_in_others(part.start)..place_in_others(part.end);
-            Self::collect(merged(self.entries_in(part), others.entries_in(part_of_others)))
+            let most = part.len() + part_of_others.len();
+            Self::collect(most, merged(self.entries_in(part), others.entries_in(part_of_others)))
         });
         Self::concatenated(std::mem::take(&mut self.separations.place), parts)
     }
 
-    /// Collects pairs in order, without their place.
-    fn collect<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Self {
-        let most = entries.size_hint().1.unwrap_or(0);
+    /// Collects pairs in order, without their place. `most` bounds their number.
+    fn collect<'a>(most: usize, entries: impl Iterator<Item = Entry<'a>>) -> Self {
         let (mut pairs, mut all, mut near) = (Vec::with_capacity(most), Vec::with_capacity(most), Vec::new());
         for (number, Entry { pair, separation, closest }) in entries.enumerate() {
             pairs.push(*pair);
@@ -156,4 +158,42 @@ struct Entry<'a> {
     separation: f64,
     /// `None` if the pair is out of reach.
     closest: Option<&'a Closest>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision::PairKind;
+
+    /// Pairs with these numbers, each third of them within reach.
+    fn numbered(numbers: impl Iterator<Item = u32>) -> Nearby {
+        let mut nearby = Nearby::default();
+        for (place, number) in numbers.enumerate() {
+            let (features, separation) = ([number, 0], f64::from(number));
+            nearby.pairs.push(Pair { kind: PairKind::EdgeEdge, features, vertices: [number; 4] });
+            nearby.separations.all.push(separation);
+            if number.is_multiple_of(3) {
+                let closest = Closest { weights: [0.0; 4], normal: [0.0; 3], distance: separation, separation };
+                nearby.separations.near.push(Near { number: place, closest });
+            }
+        }
+        nearby
+    }
+
+    #[test]
+    fn pairs_of_two_lists_are_joined_once_and_in_order() {
+        let count = 3 * PART as u32;
+        for (own, other) in [(2, 3), (3, 2), (1, 7), (7, 1), (4, 4)] {
+            let list = |step: u32| (1..count).filter(move |number| number.is_multiple_of(step));
+            let both = (1..count).filter(|number| number.is_multiple_of(own) || number.is_multiple_of(other));
+            let expected = numbered(both);
+            for threads in [1, 2, 3] {
+                let joined = numbered(list(own)).joined_with(&numbered(list(other)), threads);
+                assert_eq!(joined.pairs, expected.pairs, "{own} {other} {threads}");
+                assert_eq!(joined.separations(), expected.separations(), "{own} {other} {threads}");
+                let near = |nearby: &Nearby| nearby.within_reach().map(|(pair, _)| *pair).collect::<Vec<_>>();
+                assert_eq!(near(&joined), near(&expected), "{own} {other} {threads}");
+            }
+        }
+    }
 }

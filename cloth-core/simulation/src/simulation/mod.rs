@@ -84,6 +84,9 @@ pub enum SimulationError {
     },
 }
 
+/// Fewer vertices are not worth a change to a thread of the pool.
+const FEW: usize = 1000;
+
 /// The state of a scene and its history so far.
 ///
 /// Vertices that no force couples fall into separate [`Island`]s. Each island is stepped on its own and can sleep on
@@ -349,7 +352,8 @@ impl Simulation {
         let start = Instant::now();
         let step = self.steps_done() + 1;
         self.release_pins(self.time())?;
-        let stepped = in_pool(self.threads.unwrap_or(usize::MAX), || self.step_islands(step));
+        let threads = if self.x.len() < FEW { 1 } else { self.threads.unwrap_or(usize::MAX) };
+        let stepped = in_pool(threads, || self.step_islands(step));
         let (report, slept) = stepped.map_err(|source| {
             self.roll_back();
             let deformed = deformed::most_deformed(&self.parts, &self.x, &source).map(Box::new);

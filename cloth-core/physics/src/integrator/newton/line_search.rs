@@ -38,15 +38,6 @@ pub(super) struct AcceptedStep {
 }
 
 impl IncrementalPotential<'_> {
-    /// Returns the part of a direction that contact allows.
-    fn allowed(&mut self, x: &[Vector3<f64>], direction: &Direction) -> f64 {
-        if !self.body.system.has_contact() {
-            return 1.0;
-        }
-        let to = self.moved(x, 1.0, &direction.vectors);
-        self.certified(x, &to)
-    }
-
     /// Returns the first of x + s d, x + s d/2, … that decreases E sufficiently (Armijo); `None` if none does. s is 1,
     /// or less if contact allows no more. Directions of projected Hessians are too short, if anything: a full step
     /// along one is doubled while that lowers E.
@@ -57,13 +48,15 @@ impl IncrementalPotential<'_> {
         direction: &Direction,
         mut prefetch: Prefetch<'_>,
     ) -> Result<Option<AcceptedStep>, EvaluationError> {
-        let mut scale = self.allowed(x, direction);
-        let allowed = scale;
+        let end = self.moved(x, 1.0, &direction.vectors);
+        let allowed = self.certified(x, &end);
+        let (mut scale, mut end) = (allowed, Some(end));
         if allowed == 0.0 {
             return Ok(None);
         }
         for _ in 0..=HALVINGS {
-            let moved = self.moved(x, scale, &direction.vectors);
+            let end = end.take().filter(|_| scale == 1.0);
+            let moved = end.unwrap_or_else(|| self.moved(x, scale, &direction.vectors));
             let (mut gradient, mut linearised) = (None, None);
             match std::mem::replace(&mut prefetch, Prefetch::Nothing) {
                 Prefetch::Nothing => {}
