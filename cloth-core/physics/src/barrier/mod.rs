@@ -150,14 +150,16 @@ impl BarrierContact {
     /// Makes all pairs near a place known.
     fn know(&mut self, x: &[Vector3<f64>]) {
         if !self.neighbourhood.knows(x) {
-            self.follow([x, x], |_| 0.0);
+            self.follow(&Move::new(x, x));
         }
     }
 
     /// Makes all pairs near an iterate known, and measures them there.
     fn visit(&mut self, x: &[Vector3<f64>]) {
-        self.know(x);
-        self.neighbourhood.settle(&self.search, x);
+        if !self.neighbourhood.settle(&self.search, x) {
+            self.follow(&Move::new(x, x));
+            self.neighbourhood.settle(&self.search, x);
+        }
         self.neighbourhood.visit(&self.search, x);
     }
 
@@ -186,12 +188,11 @@ impl BarrierContact {
         for_each(self.search.threads, nearby.near().chunks(PART).collect(), joining).concat()
     }
 
-    /// Makes all pairs near a move known, on which each vertex strides this far, in m. Returns whether there are new
-    /// ones.
-    fn follow(&mut self, ends: [&[Vector3<f64>]; 2], stride: impl Fn(usize) -> f64) -> bool {
+    /// Makes all pairs near a move known. Returns whether there are new ones.
+    fn follow(&mut self, step: &Move<'_>) -> bool {
         let [least, most] = self.slack;
-        let radius = |vertex: usize| (least + STRAYING * stride(vertex)).min(most);
-        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, ends, radius, self.slack);
+        let radius = |vertex: usize| (least + STRAYING * step.excursions()[vertex]).min(most);
+        let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, step, radius, self.slack);
         self.counts.searches += u64::from(is_new);
         self.counts.clear += u64::from(is_new && self.neighbourhood.strays().pairs().is_empty());
         is_new
@@ -199,7 +200,7 @@ impl BarrierContact {
 
     /// Returns the part of a move that certainly has no crossing.
     fn safe_part(&mut self, step: &Move<'_>) -> f64 {
-        let strays = self.follow([step.from(), step.to()], |vertex| step.excursions()[vertex]);
+        let strays = self.follow(step);
         self.neighbourhood.visit(&self.search, step.from());
         let near = self.judge(step, self.neighbourhood.nearby());
         let part = self.note(near);
@@ -240,11 +241,11 @@ impl ContactModel for BarrierContact {
     }
 
     fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
+        let step = Move::new(from, to);
         // NaN is in no region.
-        if !to.as_flattened().iter().fold(true, |all, coordinate| all & coordinate.is_finite()) {
+        if !step.is_finite() {
             return 0.0;
         }
-        let step = Move::new(from, to);
         // The first move of a step is the warm start.
         let limit = *self.limit.get_or_insert(step.longest().max(self.least_limit));
         let part = if step.longest() > limit {

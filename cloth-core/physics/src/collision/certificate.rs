@@ -16,7 +16,7 @@
 
 use energy_dsl::{Real, Vector3};
 
-use super::displacement::{excursions, largest_coordinate};
+use super::displacement::{excursions, largest_coordinate, mean};
 use super::{Closest, Pair, plane};
 use crate::geometry::{add_scaled, dot, subtract};
 
@@ -45,6 +45,8 @@ pub struct Clearance {
 pub struct Move<'a> {
     from: &'a [Vector3<f64>],
     to: &'a [Vector3<f64>],
+    /// The mean of all positions at the start, and at the end.
+    means: [Vector3<f64>; 2],
     /// The displacement of each vertex relative to the mean, in m.
     excursions: Vec<f64>,
     /// Bound of the rounding errors of a separation, in m.
@@ -55,7 +57,24 @@ impl<'a> Move<'a> {
     /// Starts the certificate of a move of all vertices.
     pub fn new(from: &'a [Vector3<f64>], to: &'a [Vector3<f64>]) -> Self {
         let largest = largest_coordinate(from).max(largest_coordinate(to));
-        Self { from, to, excursions: excursions(from, to), rounding: ROUNDING * largest }
+        let means = [mean(from), mean(to)];
+        let excursions = excursions(from, to, subtract(means[1], means[0]));
+        Self { from, to, means, excursions, rounding: ROUNDING * largest }
+    }
+
+    /// Whether all positions are finite. Their means are then finite too, unless some are close to the largest number.
+    pub fn is_finite(&self) -> bool {
+        self.means.as_flattened().iter().all(|coordinate| coordinate.is_finite())
+    }
+
+    /// The positions at the start and at the end.
+    pub fn ends(&self) -> [&'a [Vector3<f64>]; 2] {
+        [self.from, self.to]
+    }
+
+    /// The mean of all positions at the start, and at the end.
+    pub fn means(&self) -> [Vector3<f64>; 2] {
+        self.means
     }
 
     /// The positions at the start.

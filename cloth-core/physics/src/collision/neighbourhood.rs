@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 
 use super::displacement::mean;
-use super::{CollisionMesh, MovingBalls, Nearby, Pair, Search};
+use super::{CollisionMesh, Move, MovingBalls, Nearby, Pair, Search};
 use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current
@@ -78,20 +78,18 @@ impl Neighbourhood {
         &mut self,
         search: &mut Search,
         mesh: &CollisionMesh,
-        ends: [&[Vector3<f64>]; 2],
+        step: &Move<'_>,
         radius: impl Fn(usize) -> f64,
         limits: [f64; 2],
     ) -> bool {
-        // Balls are convex: if they cover both ends of a straight move, they cover the whole move.
-        let means = ends.map(|x| self.mean(x));
-        let [from, to] = [0, 1].map(|end| self.lacks(ends[end], means[end]));
-        let mut is_stray: Vec<bool> = from.zip(to).map(|(from, to)| from | to).collect();
+        let (ends, origins) = (step.ends(), step.means().map(|mean| self.origin(mean)));
+        let mut is_stray = self.leave(ends, origins);
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
             return false;
         }
         let wanted: Vec<f64> = (0..is_stray.len()).map(radius).collect();
-        let ends = [0, 1].map(|end| relative(ends[end], means[end]).collect::<Vec<_>>());
+        let ends = [0, 1].map(|end| relative(ends[end], origins[end]).collect::<Vec<_>>());
         let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
         let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
         let (pairs, radii) = if self.fixed.is_none() && are_many {
@@ -141,46 +139,54 @@ impl Neighbourhood {
     /// Whether all pairs near x are known: each vertex is in its ball or a stray, and all strays are at one instant of
     /// the move.
     pub fn knows(&self, x: &[Vector3<f64>]) -> bool {
+        let origin = self.origin(mean(x));
+        self.knows_strays(x, origin, &self.outside(x, origin))
+    }
+
+    /// Whether all pairs near x are known if these vertices are outside of their balls.
+    fn knows_strays(&self, x: &[Vector3<f64>], origin: Vector3<f64>, outside: &[usize]) -> bool {
         let Strays { ends: [start, end], is_stray, radii, .. } = &self.strays;
-        let mean = self.mean(x);
-        let lacking: Vec<usize> =
-            self.lacks(x, mean).enumerate().filter(|(_, lacks)| *lacks).map(|(vertex, _)| vertex).collect();
-        if lacking.is_empty() || start.is_empty() {
-            return lacking.is_empty();
+        if outside.is_empty() || start.is_empty() {
+            return outside.is_empty();
         }
-        let (x, path) = (relative(x, mean).collect::<Vec<_>>(), |vertex: usize| subtract(end[vertex], start[vertex]));
-        let farthest = lacking.iter().copied().max_by(|a, b| norm(path(*a)).total_cmp(&norm(path(*b))));
+        let path = |vertex: usize| subtract(end[vertex], start[vertex]);
+        let gone = |vertex: usize| subtract(subtract(x[vertex], origin), start[vertex]);
+        let farthest = outside.iter().copied().max_by(|a, b| norm(path(*a)).total_cmp(&norm(path(*b))));
         let part = farthest.map_or(0.0, |vertex| {
-            let (path, gone) = (path(vertex), subtract(x[vertex], start[vertex]));
+            let (path, gone) = (path(vertex), gone(vertex));
             if path == [0.0; 3] { 0.0 } else { (dot(gone, path) / dot(path, path)).clamp(0.0, 1.0) }
         });
-        lacking.iter().all(|&vertex| {
-            let away = norm(subtract(x[vertex], add_scaled(start[vertex], part, path(vertex))));
+        outside.iter().all(|&vertex| {
+            let away = norm(add_scaled(gone(vertex), -part, path(vertex)));
             is_stray[vertex] && away <= ROUNDING * radii[vertex]
         })
     }
 
-    /// Puts new balls around the vertices that are outside of theirs at x, a place whose pairs are known, and forgets
-    /// the move that led there.
-    pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) {
-        self.settled = mean(x);
-        let mean = self.fixed.as_ref().map_or(self.settled, |fixed| fixed.mean);
-        let lacks: Vec<bool> = self.lacks(x, mean).collect();
-        if !lacks.contains(&true) {
-            self.strays = Strays::default();
-            return;
+    /// Puts new balls around the vertices that are outside of theirs at x, and forgets the move that led there. Returns
+    /// `false`, and does nothing, if some pairs near x are not known.
+    pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) -> bool {
+        let mean = mean(x);
+        let origin = self.origin(mean);
+        let outside = self.outside(x, origin);
+        if !self.knows_strays(x, origin, &outside) {
+            return false;
         }
+        self.settled = mean;
         let Strays { radii, nearby: mut found, .. } = std::mem::take(&mut self.strays);
+        if outside.is_empty() {
+            return true;
+        }
         self.centres.resize(x.len(), [0.0; 3]);
         self.radii.resize(x.len(), 0.0);
-        for (vertex, centre) in relative(x, mean).enumerate().filter(|(vertex, _)| lacks[*vertex]) {
-            (self.centres[vertex], self.radii[vertex]) = (centre, radii[vertex]);
+        for vertex in outside {
+            (self.centres[vertex], self.radii[vertex]) = (subtract(x[vertex], origin), radii[vertex]);
         }
-        let away = relative(x, mean).zip(&self.centres).map(|(x, centre)| norm(subtract(x, *centre)));
+        let away = relative(x, origin).zip(&self.centres).map(|(x, centre)| norm(subtract(x, *centre)));
         let farthest: Vec<f64> = away.zip(&self.radii).map(|(away, radius)| away + radius).collect();
         found.keep_near(search, x, &farthest);
         self.nearby.visit(search, x);
         self.nearby = found.joined_with(&self.nearby, search.threads);
+        true
     }
 
     /// Lets only some vertices move, from where balls were last settled, and puts the pairs of others aside.
@@ -202,20 +208,30 @@ impl Neighbourhood {
         self.nearby = std::mem::take(&mut self.nearby).joined_with(&pairs, 1);
     }
 
-    /// Whether each vertex is outside of its ball. `mean` is that of x.
-    fn lacks(&self, x: &[Vector3<f64>], mean: Vector3<f64>) -> impl Iterator<Item = bool> {
-        relative(x, mean).enumerate().map(|(vertex, x)| {
-            let ball = self.centres.get(vertex).zip(self.radii.get(vertex));
-            ball.is_none_or(|(centre, radius)| {
-                let away = subtract(x, *centre);
-                dot(away, away) > radius * radius
-            })
-        })
+    /// Whether each vertex is outside of its ball at an end of a move. Balls are convex: if they cover both ends of a
+    /// straight move, they cover the whole move.
+    fn leave(&self, [from, to]: [&[Vector3<f64>]; 2], origins: [Vector3<f64>; 2]) -> Vec<bool> {
+        if self.radii.is_empty() {
+            return vec![true; from.len()];
+        }
+        let balls = self.centres.iter().zip(&self.radii);
+        let leaves = |((from, to), ball)| is_outside(from, origins[0], ball) | is_outside(to, origins[1], ball);
+        from.iter().zip(to).zip(balls).map(leaves).collect()
     }
 
-    /// Returns the mean of all vertices, as balls see it.
-    fn mean(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        self.fixed.as_ref().map_or_else(|| mean(x), |fixed| fixed.mean)
+    /// The vertices outside of their balls.
+    fn outside(&self, x: &[Vector3<f64>], origin: Vector3<f64>) -> Vec<usize> {
+        if self.radii.is_empty() {
+            return (0..x.len()).collect();
+        }
+        let balls = self.centres.iter().zip(&self.radii);
+        let outside = x.iter().zip(balls).enumerate().filter(|(_, (x, ball))| is_outside(x, origin, *ball));
+        outside.map(|(vertex, _)| vertex).collect()
+    }
+
+    /// The place from which balls see positions, if this is the mean of all vertices.
+    fn origin(&self, mean: Vector3<f64>) -> Vector3<f64> {
+        self.fixed.as_ref().map_or(mean, |fixed| fixed.mean)
     }
 
     fn balls(&self) -> Vec<MovingBounds> {
@@ -224,7 +240,14 @@ impl Neighbourhood {
     }
 }
 
-/// Returns positions relative to their mean.
-fn relative(x: &[Vector3<f64>], mean: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> {
-    x.iter().map(move |x| subtract(*x, mean))
+/// Whether a position is outside of a ball, which has a centre relative to the origin, and a radius.
+#[inline]
+fn is_outside(x: &Vector3<f64>, origin: Vector3<f64>, (centre, radius): (&Vector3<f64>, &f64)) -> bool {
+    let away = subtract(subtract(*x, origin), *centre);
+    dot(away, away) > radius * radius
+}
+
+/// Returns positions relative to an origin.
+fn relative(x: &[Vector3<f64>], origin: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> {
+    x.iter().map(move |x| subtract(*x, origin))
 }

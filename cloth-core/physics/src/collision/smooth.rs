@@ -279,11 +279,17 @@ fn left_inverse([a, b]: [Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
 /// The norm |A| of a matrix: the largest |A v| for |v| = 1.
 fn largest_stretch([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
     let (x, y, z) = (a * a + c * c, a * b + c * d, b * b + d * d);
-    (0.5 * (x + z) + (0.5 * (x - z)).hypot(y)).sqrt()
+    (0.5 * (x + z) + length(0.5 * (x - z), y)).sqrt()
 }
 
 /// The least |R v| for |v| = 1. It is 1 / |P| for the left inverse P.
 fn least_stretch(columns: [Vector3<f64>; 2]) -> f64 {
     let [[x, y], [_, z]] = product(columns, columns);
-    (0.5 * (x + z) - (0.5 * (x - z)).hypot(y)).max(0.0).sqrt()
+    (0.5 * (x + z) - length(0.5 * (x - z), y)).max(0.0).sqrt()
+}
+
+/// √(x² + y²), faster than `hypot`, which guards against overflow. Here an infinite length only means that nothing is
+/// known.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }

@@ -257,7 +257,7 @@ proptest! {
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
         prop_assert!(!neighbourhood.knows(&from));
-        prop_assert!(neighbourhood.follow(&mut search, &mesh, [&from, &to], |_| 1e-3, [2e-4, 4e-3]));
+        prop_assert!(neighbourhood.follow(&mut search, &mesh, &Move::new(&from, &to), |_| 1e-3, [2e-4, 4e-3]));
         let found = neighbourhood.strays().pairs();
         prop_assert!(found.is_sorted() && found.windows(2).all(|two| two[0] != two[1]));
         prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&from, &to, instant)), None);
@@ -284,7 +284,7 @@ proptest! {
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
         // All vertices move and stop half the way.
-        neighbourhood.follow(&mut search, &mesh, [&from, &to], |_| 5e-3, [1e-3, 8e-3]);
+        neighbourhood.follow(&mut search, &mesh, &Move::new(&from, &to), |_| 5e-3, [1e-3, 8e-3]);
         let mut x = at(&from, &to, 0.5);
         neighbourhood.settle(&search, &x);
         for (strays, part) in &moves {
@@ -292,7 +292,7 @@ proptest! {
             for &(vertex, stray) in strays {
                 to[vertex] = add_scaled(x[vertex], 1.0, stray);
             }
-            neighbourhood.follow(&mut search, &mesh, [&x, &to], |_| 1e-3, [2e-4, 4e-3]);
+            neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-3, [2e-4, 4e-3]);
             for instant in [0.0, 0.3, 0.7, 1.0] {
                 prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&x, &to, instant)), None);
             }
@@ -312,7 +312,7 @@ proptest! {
         let (mesh, x) = sheet(4);
         let mut search = Search::new(&mesh, &x, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        neighbourhood.follow(&mut search, &mesh, [&x, &x], |_| 1e-4, [1e-4; 2]);
+        neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &x), |_| 1e-4, [1e-4; 2]);
         neighbourhood.settle(&search, &x);
         let moved = |by: Vector3<f64>| {
             let mut moved = x.clone();
@@ -320,7 +320,7 @@ proptest! {
             moved
         };
         let to = moved(move_by);
-        neighbourhood.follow(&mut search, &mesh, [&x, &to], |_| 1e-4, [1e-4; 2]);
+        neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-4, [1e-4; 2]);
         prop_assert!(neighbourhood.knows(&at(&x, &to, part)));
         let beside = moved(add_scaled(aside, part, move_by));
         let along = crate::geometry::dot(aside, move_by).powi(2);
