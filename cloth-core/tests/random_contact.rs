@@ -49,8 +49,9 @@ fn drop() -> impl Strategy<Value = String> {
     )
 }
 
-/// A spinning sheet flies onto solids that stand on a floor and turn.
-fn drop_on_solids() -> impl Strategy<Value = String> {
+/// A spinning sheet flies onto a solid that turns, just above a floor or far above it. Just above it, a solid may push
+/// cloth into a gap that is narrower than the cloth is thick: then the scene demands the impossible.
+fn drop_on_solids() -> impl Strategy<Value = (String, bool)> {
     let vector = |size: f64| prop::array::uniform3(-size..size);
     let solid = prop_oneof![
         (0.005..0.03_f64).prop_map(|radius| format!("sphere = {{ radius = {radius:?} }}")),
@@ -59,15 +60,17 @@ fn drop_on_solids() -> impl Strategy<Value = String> {
         }),
         prop::array::uniform3(0.005..0.06_f64).prop_map(|size| format!("box = {{ size = {size:?} }}")),
     ];
-    (fabric(), solid, vector(1.0), vector(20.0), 0.0..10.0_f64, 0.0..0.8_f64, -300.0..300.0_f64).prop_map(
-        |(cloth, solid, drift, spin, speed, friction, angle)| {
+    let floor = prop::sample::select(vec![-0.03, -0.12]);
+    (fabric(), solid, vector(1.0), vector(20.0), 0.0..10.0_f64, 0.0..0.8_f64, -300.0..300.0_f64, floor).prop_map(
+        |(cloth, solid, drift, spin, speed, friction, angle, floor)| {
             let motion = format!("velocity = {:?}\nspin = {spin:?}\n", [drift[0], drift[1], -speed]);
             let turns = format!(
                 "friction = {friction:?}\nmotion.keys = [{{ time = 0.0 }}, {{ time = 1.0, angle = {angle:?} }}]\n"
             );
-            let floor = "[[obstacles]]\nplane = { point = [0.0, 0.0, -0.03] }\nfriction = 0.3\n";
-            sheet("cloth", 5, [0.011, 0.007, 0.16], &motion, &cloth)
-                + &format!("[[obstacles]]\n{solid}\nthickness = 0.002\n{turns}{floor}")
+            let plane = format!("[[obstacles]]\nplane = {{ point = [0.0, 0.0, {floor:?}] }}\nfriction = 0.3\n");
+            let text = sheet("cloth", 5, [0.011, 0.007, 0.16], &motion, &cloth)
+                + &format!("[[obstacles]]\n{solid}\nthickness = 0.002\n{turns}{plane}");
+            (text, floor > -0.1)
         },
     )
 }
@@ -103,16 +106,16 @@ fn fold() -> impl Strategy<Value = String> {
     })
 }
 
-/// A scene, and whether its pins move. Moving pins may demand the impossible.
+/// A scene, and whether it may demand the impossible, as moving pins do.
 fn scene() -> impl Strategy<Value = (String, bool)> {
-    let still = prop_oneof![drop(), drop_on_solids()].prop_map(|text| (text, false));
-    let moving = prop_oneof![pull(), fold()].prop_map(|text| (text, true));
-    (0.001..0.033_f64, prop_oneof![still, moving]).prop_map(|(dt, (rest, moves))| {
+    let drops = prop_oneof![drop().prop_map(|text| (text, false)), drop_on_solids()];
+    let moving_pins = prop_oneof![pull(), fold()].prop_map(|text| (text, true));
+    (0.001..0.033_f64, prop_oneof![drops, moving_pins]).prop_map(|(dt, (rest, may_be_impossible))| {
         let text = format!(
             "dt = {dt:?}\nduration = 10.0\nintegrator = \"newton\"\ncontact = \"on\"\nadaptive = true\n\
              tolerances.velocity = 1e-3\ndrag = 0.5\n{rest}"
         );
-        (text, moves)
+        (text, may_be_impossible)
     })
 }
 
@@ -124,13 +127,13 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: scenes(), ..ProptestConfig::default() })]
 
     #[test]
-    fn no_random_scene_has_a_crossing_or_a_nan((text, pins_move) in scene()) {
+    fn no_random_scene_has_a_crossing_or_a_nan((text, may_be_impossible) in scene()) {
         let parsed = Scene::parse(&text, "random.toml".as_ref()).unwrap_or_else(|error| panic!("{error}"));
         let mut simulation = Simulation::new(&parsed).unwrap_or_else(|error| panic!("{error}"));
         for step in 0..STEPS {
             if let Err(error) = simulation.step() {
                 println!("step {step}: {error}");
-                prop_assert!(pins_move, "step {}: {}", step, error);
+                prop_assert!(may_be_impossible, "step {}: {}", step, error);
                 break;
             }
             prop_assert_eq!(simulation.crossings(), []);

@@ -83,7 +83,7 @@ impl Neighbourhood {
         limits: [f64; 2],
     ) -> bool {
         let (ends, origins) = (step.ends(), step.means().map(|mean| self.origin(mean)));
-        let mut is_stray = self.leave(ends, origins);
+        let mut is_stray = self.leaving(ends, origins);
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
             return false;
@@ -210,7 +210,7 @@ impl Neighbourhood {
 
     /// Whether each vertex is outside of its ball at an end of a move. Balls are convex: if they cover both ends of a
     /// straight move, they cover the whole move.
-    fn leave(&self, [from, to]: [&[Vector3<f64>]; 2], origins: [Vector3<f64>; 2]) -> Vec<bool> {
+    fn leaving(&self, [from, to]: [&[Vector3<f64>]; 2], origins: [Vector3<f64>; 2]) -> Vec<bool> {
         if self.radii.is_empty() {
             return vec![true; from.len()];
         }
