@@ -50,7 +50,7 @@ fn drop() -> impl Strategy<Value = String> {
 }
 
 /// A spinning sheet flies onto a solid that turns, just above a floor or far above it. Just above it, a solid may push
-/// cloth into a gap that is narrower than the cloth is thick: then the scene demands the impossible.
+/// cloth into a gap that is too narrow for it: then the scene demands the impossible.
 fn drop_on_solids() -> impl Strategy<Value = (String, bool)> {
     let vector = |size: f64| prop::array::uniform3(-size..size);
     let solid = prop_oneof![

@@ -157,7 +157,7 @@ impl BarrierContact {
     /// Makes all pairs near an iterate known, and measures them there.
     fn visit(&mut self, x: &[Vector3<f64>]) {
         if !self.neighbourhood.settle(&self.search, x) {
-            self.follow(&Move::new(x, x));
+            self.know(x);
             self.neighbourhood.settle(&self.search, x);
         }
         self.neighbourhood.visit(&self.search, x);

@@ -67,11 +67,6 @@ impl<'a> Move<'a> {
         self.means.as_flattened().iter().all(|coordinate| coordinate.is_finite())
     }
 
-    /// The positions at the start and at the end.
-    pub fn ends(&self) -> [&'a [Vector3<f64>]; 2] {
-        [self.from, self.to]
-    }
-
     /// The mean of all positions at the start, and at the end.
     pub fn means(&self) -> [Vector3<f64>; 2] {
         self.means

@@ -51,14 +51,14 @@ impl Nearby {
             |Entry { pair, separation, .. }: &Entry<'_>| separation - pair.approach(farthest) <= search.reach(pair);
         let parts = ranges(search.threads, self.pairs.len(), PART);
         let kept =
-            for_each(search.threads, parts, |part| Self::collect(part.len(), self.entries_in(part).filter(is_near)));
+            for_each(search.threads, parts, |part| Self::collect(part.len(), self.entries(part).filter(is_near)));
         *self = Self::concatenated(std::mem::take(&mut self.separations.place), kept);
     }
 
     /// Removes the pairs that have none of these vertices, and returns them.
     pub fn split_off_others(&mut self, vertices: &[bool]) -> Self {
         let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
-        let (kept, others): (Vec<_>, Vec<_>) = self.entries().partition(has_any);
+        let (kept, others): (Vec<_>, Vec<_>) = self.entries(0..self.pairs.len()).partition(has_any);
         let place = &self.separations.place;
         let [kept, others] =
             [kept, others].map(|entries| Self::collect(entries.len(), entries.into_iter()).at(place.clone()));
@@ -84,7 +84,7 @@ impl Nearby {
         let parts = for_each(threads, ranges(threads, count, PART), |part| {
             let part_of_others = place_in_others(part.start)..place_in_others(part.end);
             let most = part.len() + part_of_others.len();
-            Self::collect(most, merged(self.entries_in(part), others.entries_in(part_of_others)))
+            Self::collect(most, merged(self.entries(part), others.entries(part_of_others)))
         });
         Self::concatenated(std::mem::take(&mut self.separations.place), parts)
     }
@@ -119,12 +119,8 @@ impl Nearby {
         self
     }
 
-    fn entries(&self) -> impl Iterator<Item = Entry<'_>> {
-        self.entries_in(0..self.pairs.len())
-    }
-
     /// The pairs with these numbers.
-    fn entries_in(&self, range: Range<usize>) -> impl Iterator<Item = Entry<'_>> {
+    fn entries(&self, range: Range<usize>) -> impl Iterator<Item = Entry<'_>> {
         let first_near = self.near().partition_point(|near| near.number < range.start);
         let mut near = self.near()[first_near..].iter().peekable();
         let pairs = range.clone().zip(self.pairs[range.clone()].iter().zip(&self.separations.all[range]));
@@ -165,7 +161,7 @@ mod tests {
     use super::*;
     use crate::collision::PairKind;
 
-    /// Pairs with these numbers, each third of them within reach.
+    /// Pairs with these numbers; multiples of three are within reach.
     fn numbered(numbers: impl Iterator<Item = u32>) -> Nearby {
         let mut nearby = Nearby::default();
         for (place, number) in numbers.enumerate() {

@@ -82,7 +82,7 @@ impl Neighbourhood {
         radius: impl Fn(usize) -> f64,
         limits: [f64; 2],
     ) -> bool {
-        let (ends, origins) = (step.ends(), step.means().map(|mean| self.origin(mean)));
+        let (ends, origins) = ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)));
         let mut is_stray = self.leaving(ends, origins);
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
