@@ -24,6 +24,15 @@ impl Found {
         Self { on_triangles: on_triangles.concat(), of_edges: of_edges.concat() }
     }
 
+    /// Drops the pairs without one of some vertices.
+    pub fn keep_around(&mut self, mesh: &CollisionMesh, is_one: &[bool]) {
+        let has_one = |vertices: &[u32]| vertices.iter().any(|vertex| is_one[*vertex as usize]);
+        self.on_triangles.retain(|[point, triangle]| {
+            is_one[mesh.points()[*point as usize] as usize] || has_one(&mesh.triangles()[*triangle as usize])
+        });
+        self.of_edges.retain(|edges| edges.iter().any(|edge| has_one(&mesh.edges()[*edge as usize])));
+    }
+
     /// Returns the pairs once and in order.
     pub fn in_order(self, mesh: &CollisionMesh, threads: usize) -> Vec<Pair> {
         let Self { on_triangles, of_edges } = self;

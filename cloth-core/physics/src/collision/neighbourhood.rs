@@ -1,4 +1,5 @@
 use energy_dsl::Vector3;
+use energy_solve::threads::collect;
 
 use super::displacement::mean;
 use super::{CollisionMesh, Move, MovingBalls, Nearby, Pair, Search};
@@ -46,6 +47,8 @@ struct Strays {
 /// The largest part of all vertices whose pairs are searched for alone. If more leave their balls, a search for all
 /// pairs costs less.
 const FEW: f64 = 0.2;
+/// Vertices that a thread takes at a time.
+const VERTICES: usize = 2048;
 /// Bound of the distance by which rounding takes a vertex off its path, relative to the distance that is searched.
 const ROUNDING: f64 = 1e-6;
 
@@ -79,17 +82,19 @@ impl Neighbourhood {
         search: &mut Search,
         mesh: &CollisionMesh,
         step: &Move<'_>,
-        radius: impl Fn(usize) -> f64,
+        radius: impl Fn(usize) -> f64 + Sync,
         limits: [f64; 2],
     ) -> bool {
         let (ends, origins) = ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)));
-        let mut is_stray = self.leaving(ends, origins);
+        let threads = search.threads;
+        let mut is_stray = self.leaving(ends, origins, threads);
         let count = is_stray.iter().filter(|stray| **stray).count();
         if count == 0 {
             return false;
         }
-        let wanted: Vec<f64> = (0..is_stray.len()).map(radius).collect();
-        let ends = [0, 1].map(|end| relative(ends[end], origins[end]).collect::<Vec<_>>());
+        let wanted = of_each(threads, is_stray.len(), radius);
+        let ends =
+            [0, 1].map(|end| of_each(threads, is_stray.len(), |vertex| subtract(ends[end][vertex], origins[end])));
         let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
         let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
         let (pairs, radii) = if self.fixed.is_none() && are_many {
@@ -99,13 +104,13 @@ impl Neighbourhood {
         } else if search.is_unfitted() {
             (self.search_around(search, mesh, &paths, &is_stray), wanted)
         } else {
-            let mut regions = self.balls();
-            for vertex in (0..is_stray.len()).filter(|&vertex| is_stray[vertex]) {
-                // The region must cover the old ball and the new one, wherever on the path that will be.
+            let region = |vertex: usize| {
+                let ball = Bounds::of(&[self.centres[vertex]]).extended(self.radii[vertex]);
+                // The region of a stray must cover the old ball and the new one, wherever on the path that will be.
                 let [start, end] = paths.bounds(vertex).0;
-                regions[vertex] = MovingBounds::fixed(regions[vertex].0[0].around(start).around(end));
-            }
-            (search.pairs_with(&is_stray, mesh, &regions), wanted)
+                MovingBounds::fixed(if is_stray[vertex] { ball.around(start).around(end) } else { ball })
+            };
+            (search.pairs_with(&is_stray, mesh, region), wanted)
         };
         self.strays = Strays { ends, is_stray, radii, nearby: Nearby::new(pairs) };
         true
@@ -140,7 +145,7 @@ impl Neighbourhood {
     /// the move.
     pub fn knows(&self, x: &[Vector3<f64>]) -> bool {
         let origin = self.origin(mean(x));
-        self.knows_strays(x, origin, &self.outside(x, origin))
+        self.knows_strays(x, origin, &self.outside(x, origin, 1))
     }
 
     /// Whether all pairs near x are known if these vertices are outside of their balls.
@@ -167,7 +172,7 @@ impl Neighbourhood {
     pub fn settle(&mut self, search: &Search, x: &[Vector3<f64>]) -> bool {
         let mean = mean(x);
         let origin = self.origin(mean);
-        let outside = self.outside(x, origin);
+        let outside = self.outside(x, origin, search.threads);
         if !self.knows_strays(x, origin, &outside) {
             return false;
         }
@@ -181,8 +186,9 @@ impl Neighbourhood {
         for vertex in outside {
             (self.centres[vertex], self.radii[vertex]) = (subtract(x[vertex], origin), radii[vertex]);
         }
-        let away = relative(x, origin).zip(&self.centres).map(|(x, centre)| norm(subtract(x, *centre)));
-        let farthest: Vec<f64> = away.zip(&self.radii).map(|(away, radius)| away + radius).collect();
+        let farthest = of_each(search.threads, x.len(), |vertex| {
+            norm(subtract(subtract(x[vertex], origin), self.centres[vertex])) + self.radii[vertex]
+        });
         found.keep_near(search, x, &farthest);
         self.nearby.visit(search, x);
         self.nearby = found.joined_with(&self.nearby, search.threads);
@@ -210,23 +216,23 @@ impl Neighbourhood {
 
     /// Whether each vertex is outside of its ball at an end of a move. Balls are convex: if they cover both ends of a
     /// straight move, they cover the whole move.
-    fn leaving(&self, [from, to]: [&[Vector3<f64>]; 2], origins: [Vector3<f64>; 2]) -> Vec<bool> {
+    fn leaving(&self, [from, to]: [&[Vector3<f64>]; 2], origins: [Vector3<f64>; 2], threads: usize) -> Vec<bool> {
         if self.radii.is_empty() {
             return vec![true; from.len()];
         }
-        let balls = self.centres.iter().zip(&self.radii);
-        let leaves = |((from, to), ball)| is_outside(from, origins[0], ball) | is_outside(to, origins[1], ball);
-        from.iter().zip(to).zip(balls).map(leaves).collect()
+        of_each(threads, from.len(), |vertex| {
+            self.is_outside(vertex, from, origins[0]) | self.is_outside(vertex, to, origins[1])
+        })
     }
 
     /// The vertices outside of their balls.
-    fn outside(&self, x: &[Vector3<f64>], origin: Vector3<f64>) -> Vec<usize> {
+    fn outside(&self, x: &[Vector3<f64>], origin: Vector3<f64>, threads: usize) -> Vec<usize> {
         if self.radii.is_empty() {
             return (0..x.len()).collect();
         }
-        let balls = self.centres.iter().zip(&self.radii);
-        let outside = x.iter().zip(balls).enumerate().filter(|(_, (x, ball))| is_outside(x, origin, *ball));
-        outside.map(|(vertex, _)| vertex).collect()
+        collect(threads, x.len(), VERTICES, |range| {
+            range.filter(|vertex| self.is_outside(*vertex, x, origin)).collect()
+        })
     }
 
     /// The place from which balls see positions, if this is the mean of all vertices.
@@ -234,20 +240,15 @@ impl Neighbourhood {
         self.fixed.as_ref().map_or(mean, |fixed| fixed.mean)
     }
 
-    fn balls(&self) -> Vec<MovingBounds> {
-        let ball = |(centre, radius): (&Vector3<f64>, &f64)| Bounds::of(&[*centre]).extended(*radius);
-        self.centres.iter().zip(&self.radii).map(ball).map(MovingBounds::fixed).collect()
+    /// Whether a vertex is outside of its ball at some positions.
+    #[inline]
+    fn is_outside(&self, vertex: usize, x: &[Vector3<f64>], origin: Vector3<f64>) -> bool {
+        let away = subtract(subtract(x[vertex], origin), self.centres[vertex]);
+        dot(away, away) > self.radii[vertex] * self.radii[vertex]
     }
 }
 
-/// Whether a position is outside of a ball, which has a centre relative to the origin, and a radius.
-#[inline]
-fn is_outside(x: &Vector3<f64>, origin: Vector3<f64>, (centre, radius): (&Vector3<f64>, &f64)) -> bool {
-    let away = subtract(subtract(*x, origin), *centre);
-    dot(away, away) > radius * radius
-}
-
-/// Returns positions relative to an origin.
-fn relative(x: &[Vector3<f64>], origin: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> {
-    x.iter().map(move |x| subtract(*x, origin))
+/// Returns a quantity of each vertex.
+fn of_each<R: Send>(threads: usize, vertices: usize, quantity: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    collect(threads, vertices, VERTICES, |range| range.map(&quantity).collect())
 }

@@ -7,7 +7,7 @@ use energy_solve::threads::for_each;
 use super::found::Found;
 use super::mesh::CollisionMesh;
 use super::smooth::Shapes;
-use super::tiling::Tiling;
+use super::tiling::{Tile, Tiling};
 use super::trees::{Boxes, Kind, Trees};
 use super::{Exclusions, MovingBalls, Pair};
 use crate::geometry::{Bounds, Hierarchy, MovingBounds, RoundedMovingBounds};
@@ -78,6 +78,26 @@ impl NearObstacles {
     }
 }
 
+/// The vertices whose pairs are wanted, and the parts that contain them.
+struct Wanted<'a> {
+    /// Whether each vertex is wanted; `None` if all are.
+    vertices: Option<&'a [bool]>,
+    tiles: Vec<bool>,
+    obstacles: bool,
+}
+
+impl<'a> Wanted<'a> {
+    fn all(tiling: &Tiling) -> Self {
+        Self { vertices: None, tiles: vec![true; tiling.tiles.len()], obstacles: true }
+    }
+
+    fn only(vertices: &'a [bool], tiling: &Tiling, mesh: &CollisionMesh) -> Self {
+        let has_any = |tile: &Tile| tile.vertices.iter().any(|vertex| vertices[*vertex as usize]);
+        let obstacles = vertices[mesh.own_vertices()..].contains(&true);
+        Self { vertices: Some(vertices), tiles: tiling.tiles.iter().map(has_any).collect(), obstacles }
+    }
+}
+
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
@@ -143,7 +163,7 @@ impl Search {
 
     fn is_clear_on(&mut self, mesh: &CollisionMesh, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> bool {
         self.is_own_fitted = false;
-        if !self.crowded(shapes, balls).is_empty() {
+        if !self.crowded(shapes, balls, self.threads_in(mesh)).is_empty() {
             return false;
         }
         self.obstacles.is_empty() || self.near_obstacles(&self.boxes(mesh, balls)).is_empty()
@@ -153,16 +173,15 @@ impl Search {
     /// meet. Pairs are in order.
     pub fn pairs(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>) -> Vec<Pair> {
         let tiling = Arc::clone(&self.tiling);
-        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends, self.threads_in(mesh)), balls, |_| true)
+        self.pairs_on(mesh, &Shapes::new(&tiling, balls.ends, self.threads_in(mesh)), balls, &Wanted::all(&tiling))
     }
 
     /// Returns the pairs with a changed vertex among those of [`Search::pairs`].
     pub fn pairs_around(&mut self, mesh: &CollisionMesh, balls: &MovingBalls<'_>, is_changed: &[bool]) -> Vec<Pair> {
         let tiling = Arc::clone(&self.tiling);
-        let shapes = Shapes::new(&tiling, balls.ends, self.threads_in(mesh));
-        let mut pairs = self.pairs_on(mesh, &shapes, balls, |vertex| is_changed[vertex]);
-        pairs.retain(|pair| pair.has_any(is_changed));
-        pairs
+        let wanted = Wanted::only(is_changed, &tiling, mesh);
+        let shapes = Shapes::around(&tiling, balls.ends, &wanted.tiles, self.threads_in(mesh));
+        self.pairs_on(mesh, &shapes, balls, &wanted)
     }
 
     /// Returns all pairs that can come within their reach while each vertex stays in its ball, and others whose boxes
@@ -184,28 +203,27 @@ impl Search {
         if self.rules.with_itself {
             shapes.shrink(&mut radii, self.half, least);
         }
-        (self.pairs_on(mesh, &shapes, &MovingBalls { radii: &radii, ..*balls }, |_| true), radii)
+        (self.pairs_on(mesh, &shapes, &MovingBalls { radii: &radii, ..*balls }, &Wanted::all(&tiling)), radii)
     }
 
-    /// Returns the pairs on a move with some shapes. Pairs without a changed vertex may be missing.
+    /// Returns the wanted pairs on a move with some shapes.
     fn pairs_on(
         &mut self,
         mesh: &CollisionMesh,
         shapes: &Shapes<'_>,
         balls: &MovingBalls<'_>,
-        is_changed: impl Fn(usize) -> bool,
+        wanted: &Wanted<'_>,
     ) -> Vec<Pair> {
-        let mut crowded = self.crowded(shapes, balls);
+        let mut crowded = self.crowded(shapes, balls, self.threads_in(mesh));
         self.is_own_fitted = false;
         if crowded.is_empty() && self.obstacles.is_empty() {
             return Vec::new();
         }
         let boxes = self.boxes(mesh, balls);
         let mut near_obstacles = self.near_obstacles(&boxes);
-        let has_changed: Vec<bool> = self.tiling.tiles.iter().map(|tile| tile.has_any(&is_changed)).collect();
-        crowded.retain(|tiles| tiles.iter().any(|tile| has_changed[*tile]));
-        if !(mesh.own_vertices()..mesh.vertices()).any(&is_changed) {
-            near_obstacles.retain(|tile| has_changed[tile]);
+        crowded.retain(|tiles| tiles.iter().any(|tile| wanted.tiles[*tile]));
+        if !wanted.obstacles {
+            near_obstacles.retain(|tile| wanted.tiles[tile]);
         }
         let threads = self.threads_in(mesh);
         self.fit(&boxes, &crowded, &near_obstacles, threads);
@@ -213,7 +231,12 @@ impl Search {
         for pairs in crowded.chunks(TILES) {
             tasks.extend([Task::Edges(pairs), Task::PointsOnTriangles(pairs)]);
         }
-        Found::all(&for_each(threads, tasks, |task| self.find(&task, mesh))).in_order(mesh, threads)
+        let find = |task| {
+            let mut found = self.find(&task, mesh);
+            wanted.vertices.iter().for_each(|vertices| found.keep_around(mesh, vertices));
+            found
+        };
+        Found::all(&for_each(threads, tasks, find)).in_order(mesh, threads)
     }
 
     /// Adapts what is searched in these tiles to boxes, or all of it if that costs little more.
@@ -236,8 +259,8 @@ impl Search {
 
     /// Returns the pairs of tiles, or of a tile with itself, with features that may meet while each vertex stays in its
     /// ball.
-    fn crowded(&mut self, shapes: &Shapes<'_>, balls: &MovingBalls<'_>) -> Vec<[usize; 2]> {
-        let reaches = shapes.reaches(balls.radii, &self.rules.halves);
+    fn crowded(&mut self, shapes: &Shapes<'_>, balls: &MovingBalls<'_>, threads: usize) -> Vec<[usize; 2]> {
+        let reaches = shapes.reaches(balls.radii, &self.rules.halves, threads);
         self.tiles.refit(|tile| shapes.bounds(tile, reaches[tile]));
         let mut crowded = Vec::new();
         if self.rules.with_itself {
@@ -313,8 +336,13 @@ impl Search {
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
     /// and others whose boxes meet. These regions are at rest, and lie in those of the searches before, at some
     /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
-    pub fn pairs_with(&mut self, is_changed: &[bool], mesh: &CollisionMesh, regions: &[MovingBounds]) -> Vec<Pair> {
-        let boxes = Boxes::new(mesh, |vertex| regions[vertex], &self.rules.halves, self.threads_in(mesh));
+    pub fn pairs_with(
+        &mut self,
+        is_changed: &[bool],
+        mesh: &CollisionMesh,
+        region: impl Fn(usize) -> MovingBounds + Sync,
+    ) -> Vec<Pair> {
+        let boxes = Boxes::new(mesh, region, &self.rules.halves, self.threads_in(mesh));
         let changed = changed_features(mesh, is_changed);
         self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
         let kinds = [Kind::Point, Kind::Triangle, Kind::Edge].into_iter().zip(&changed);

@@ -44,10 +44,9 @@ impl Separations {
         if is_known && self.place == x {
             return;
         }
+        let before = std::mem::replace(&mut self.place, x.to_vec());
         // A look at the whole move costs more than a few pairs do.
-        let before = (is_known && pairs.len() > x.len() / 4).then(|| self.place.clone());
-        x.clone_into(&mut self.place);
-        let step = before.as_ref().map(|before| Move::new(before, x));
+        let step = (is_known && pairs.len() > x.len() / 4).then(|| Move::new(&before, x));
         self.all.resize(pairs.len(), 0.0);
         let points = pairs.partition_point(|pair| pair.kind == PairKind::PointTriangle);
         let (on_triangles, of_edges) = pairs.split_at(points);

@@ -30,6 +30,8 @@ use crate::geometry::{Bounds, Coordinate, MovingBounds, RoundedMovingBounds, dot
 const ROUNDING: f64 = 1e-12;
 /// Tiles that a thread looks at, at a time.
 const TILES: usize = 64;
+/// Vertices that a thread copies at a time.
+const VERTICES: usize = 4096;
 
 /// The shapes of all tiles on a straight move of the vertices.
 #[derive(Debug)]
@@ -61,13 +63,25 @@ struct Shape {
 impl<'a> Shapes<'a> {
     /// Looks at all tiles on a move with these ends, which must be finite.
     pub fn new(tiling: &'a Tiling, ends: [&[Vector3<f64>]; 2], threads: usize) -> Self {
-        let padded = |x: &[Vector3<f64>]| x.iter().map(|&[a, b, c]| [a, b, c, 0.0]).collect::<Vec<_>>();
-        let ends = &ends.map(padded);
-        let tiles =
-            collect(threads, tiling.tiles.len(), TILES, |range| dispatch(Look { tiles: &tiling.tiles[range], ends }));
+        Self::around(tiling, ends, &vec![true; tiling.tiles.len()], threads)
+    }
+
+    /// Looks at all tiles as [`Shapes::new`], but leaves open how far apart features are in blocks without a wanted
+    /// tile.
+    pub fn around(tiling: &'a Tiling, ends: [&[Vector3<f64>]; 2], is_wanted: &[bool], threads: usize) -> Self {
+        let padded = |x: &[Vector3<f64>]| x.iter().map(|&[a, b, c]| [a, b, c, 0.0]).collect();
+        let ends = &ends.map(|x| collect(threads, x.len(), VERTICES, |range| padded(&x[range])));
+        let has_wanted = |block: &[usize]| block.iter().any(|tile| is_wanted[*tile]);
+        let mut is_part = vec![false; tiling.tiles.len()];
+        for block in tiling.blocks.iter().filter(|block| has_wanted(block)) {
+            block.iter().for_each(|tile| is_part[*tile] = true);
+        }
+        let tiles = collect(threads, tiling.tiles.len(), TILES, |range| {
+            dispatch(Look { tiles: &tiling.tiles[range.clone()], is_part: &is_part[range], ends })
+        });
         let apart = |block: &Vec<usize>| {
-            let joined = block.iter().map(|tile| tiles[*tile]).reduce(Shape::joined);
-            joined.map_or(f64::NEG_INFINITY, |shape| shape.apart())
+            let shapes = block.iter().filter(|_| has_wanted(block)).map(|tile| tiles[*tile]);
+            shapes.reduce(Shape::joined).map_or(f64::NEG_INFINITY, |shape| shape.apart())
         };
         let apart =
             collect(threads, tiling.blocks.len(), TILES, |range| tiling.blocks[range].iter().map(apart).collect());
@@ -95,9 +109,11 @@ impl<'a> Shapes<'a> {
     }
 
     /// The largest distance from its path within which a vertex of each tile reaches others, in m.
-    pub fn reaches(&self, radii: &[f64], halves: &[f64]) -> Vec<f64> {
+    pub fn reaches(&self, radii: &[f64], halves: &[f64], threads: usize) -> Vec<f64> {
         let reach = |vertex: &u32| radii[*vertex as usize] + halves[*vertex as usize];
-        self.tiling.tiles.iter().map(|tile| tile.surroundings.iter().map(reach).fold(0.0, f64::max)).collect()
+        let of_tile = |tile: &Tile| tile.surroundings.iter().map(reach).fold(0.0, f64::max);
+        let tiles = &self.tiling.tiles;
+        collect(threads, tiles.len(), TILES, |range| tiles[range].iter().map(of_tile).collect())
     }
 
     /// The box of a tile within its reach.
@@ -139,6 +155,8 @@ type Column = [f64; 4];
 /// Finds the shapes of some tiles.
 struct Look<'a> {
     tiles: &'a [Tile],
+    /// Whether F matters in each of these tiles.
+    is_part: &'a [bool],
     /// The places of vertices at the start and at the end.
     ends: &'a [Vec<Column>; 2],
 }
@@ -150,12 +168,10 @@ impl Kernel for Look<'_> {
     fn run<L: Level>(self) -> Vec<Shape> {
         let [start, end] = self.ends;
         let mut shapes = Vec::with_capacity(self.tiles.len());
-        for tile in self.tiles {
-            shapes.push(Shape {
-                around: [tile.around(start), tile.around(end)],
-                derivatives: [tile.derivatives(start), tile.derivatives(end)],
-                height: tile.height,
-            });
+        for (tile, is_part) in self.tiles.iter().zip(self.is_part) {
+            let derivatives =
+                if *is_part { [tile.derivatives(start), tile.derivatives(end)] } else { [Entries::EMPTY; 2] };
+            shapes.push(Shape { around: [tile.around(start), tile.around(end)], derivatives, height: tile.height });
         }
         shapes
     }

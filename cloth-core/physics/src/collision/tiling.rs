@@ -41,13 +41,6 @@ pub(super) struct Tile {
     at: [usize; 2],
 }
 
-impl Tile {
-    /// Whether one of its features has one of some vertices.
-    pub fn has_any(&self, is_among: impl Fn(usize) -> bool) -> bool {
-        self.vertices.iter().any(|vertex| is_among(*vertex as usize))
-    }
-}
-
 /// A triangle in the plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
