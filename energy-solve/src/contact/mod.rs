@@ -7,8 +7,10 @@
 mod block;
 mod in_matrix;
 mod model;
+mod pressed;
 
 pub use block::Contact;
 pub(crate) use block::factors;
 pub use in_matrix::ContactsInMatrix;
 pub use model::{ContactCounts, ContactMemory, ContactModel};
+pub use pressed::{Pressed, Presser};

@@ -1,6 +1,6 @@
 use energy_dsl::{Block, Vector3};
 
-use super::Contact;
+use super::{Contact, Pressed};
 use crate::matrix::dof_map::DofMap;
 
 /// Contact between features of a body, as an integrator that minimises an incremental potential uses it.
@@ -51,6 +51,11 @@ pub trait ContactModel: std::fmt::Debug + Send {
 
     /// Lets all vertices move again, from an iterate where the last [`ContactModel::meet`] was.
     fn release(&mut self);
+
+    /// Returns where contact presses the most at x, for messages. Default nowhere.
+    fn most_pressed(&self, _x: &[Vector3<f64>]) -> Option<Pressed> {
+        None
+    }
 
     /// Returns what was counted so far.
     fn counts(&self) -> ContactCounts;

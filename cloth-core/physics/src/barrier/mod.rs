@@ -30,6 +30,7 @@ mod friction;
 mod joined;
 mod judge;
 mod law;
+mod pressed;
 mod resistance;
 mod rolling;
 mod spacing;
@@ -39,7 +40,7 @@ mod untangle;
 
 use energy_dsl::{Block, Vector3};
 use energy_solve::threads::for_each;
-use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap};
+use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap, Pressed};
 
 pub use friction::Grip;
 pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
@@ -70,6 +71,8 @@ const STRAYING: f64 = 0.25;
 pub struct BarrierContact {
     mesh: CollisionMesh,
     spacings: Spacings,
+    /// The names of obstacles, for messages.
+    names: Vec<String>,
     /// The least and the largest distance that vertices may move before the next search, in m.
     slack: [f64; 2],
     search: Search,
@@ -338,6 +341,10 @@ impl ContactModel for BarrierContact {
         if !self.fixed.is_empty() {
             self.joined.extend(std::mem::take(&mut self.fixed).into_iter());
         }
+    }
+
+    fn most_pressed(&self, x: &[Vector3<f64>]) -> Option<Pressed> {
+        self.find_most_pressed(x)
     }
 
     fn counts(&self) -> ContactCounts {

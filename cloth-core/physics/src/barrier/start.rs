@@ -154,6 +154,7 @@ impl BarrierContact {
         }
         let mut contact = Self {
             spacings,
+            names: obstacles.iter().map(|start| start.name.clone()).collect(),
             slack: [0.5 * gap, gap.max(0.15 * mesh.mean_edge(x))],
             limit: None,
             least_limit: EDGES * mesh.mean_edge(x),

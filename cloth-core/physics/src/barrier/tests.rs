@@ -1,6 +1,6 @@
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{Distance, EdgeEdgeDistance, PointEdgeDistance, PointTriangleDistance};
-use energy_solve::{ContactModel, DofMap};
+use energy_solve::{ContactModel, DofMap, Pressed, Presser};
 use proptest::prelude::*;
 
 use super::*;
@@ -416,4 +416,32 @@ fn threads_change_no_bit_of_many_pairs() {
     let one = run(1);
     assert!(one.len() > 100_000, "{}", one.len());
     assert!(one == run(2) && one == run(3));
+}
+
+#[test]
+fn the_most_pressed_feature_is_named_with_both_sides() {
+    // A vertex of the second triangle is close to the first.
+    let x = states().remove(0);
+    let mut contact = contact(&x);
+    assert_eq!(contact.most_pressed(&x), None);
+    contact.meet(&x);
+    let pressed = |vertices: &[usize], by: &[&[usize]]| {
+        let by = by.iter().map(|vertices| Presser::Vertices(vertices.to_vec())).collect();
+        Some(Pressed { vertices: vertices.to_vec(), by })
+    };
+    let found = contact.most_pressed(&x);
+    assert!(found == pressed(&[3], &[&[0, 1, 2]]) || found == pressed(&[0, 1, 2], &[&[3]]), "{found:?}");
+    // A third triangle presses the vertex from above.
+    let mesh = CollisionMesh::new(9, &[[0, 1, 2], [3, 4, 5], [6, 7, 8]], &[], &[]);
+    let corners = |heights: [f64; 3]| [[0.0, 0.0, heights[0]], [0.1, 0.0, heights[1]], [0.0, 0.1, heights[2]]];
+    let (below, above) = (corners([0.0; 3]), corners([0.0046, 0.0024, 0.0024]));
+    let between = [[0.05, 0.045, 0.00125], [-0.2, -0.1, 0.0025], [-0.1, -0.2, 0.0025]];
+    let x = [below, between, above].concat();
+    let mut contact = BarrierContact::new(mesh, &x, vec![true; 9], vec![0.5 * THICKNESS; 9], GAP).unwrap();
+    contact.begin_step(&x);
+    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+    contact.set_resistance(&DofMap::new(&[false; 9]), vec![block; 9], vec![1.0; 9]);
+    contact.meet(&x);
+    let found = contact.most_pressed(&x).unwrap();
+    assert_eq!((found.vertices.as_slice(), found.by.len()), (&[3][..], 2), "{found:?}");
 }

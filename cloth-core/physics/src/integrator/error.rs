@@ -1,4 +1,4 @@
-use energy_solve::{CholeskyError, EvaluationError, SingularBlock, StopReason};
+use energy_solve::{CholeskyError, EvaluationError, Pressed, SingularBlock, StopReason};
 
 /// A step that failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,38 +33,41 @@ pub enum StepError {
     /// The line search of Newton's method failed: no step along the direction lowers the energy.
     #[error(
         "no step along the direction of Newton iteration {iterations} lowers the energy \
-         (its linear system: {stopped}{}). Try a smaller dt",
-        if *.in_contact { "; contact shortened moves" } else { "" }
+         (its linear system: {stopped}){}a smaller dt", remedy(.pressed)
     )]
     Stuck {
         /// Newton iterations.
         iterations: u64,
         /// Why the linear solver stopped.
         stopped: StopReason,
-        /// Whether contact shortened a move of this step.
-        in_contact: bool,
+        /// Where contact presses the most, if it shortened a move of this step.
+        pressed: Option<Pressed>,
     },
     /// Contact does not let pins and obstacles reach their places at the end of the step.
     #[error(
-        "contact stopped pins and obstacles after {:.1} % of their way, in {moves} moves; they may press cloth against \
-         cloth. Try a smaller dt, or slower motions", 100.0 * .part
+        "contact stopped pins and obstacles after {:.1} % of their way, in {moves} moves{}slower motions, or a smaller \
+         dt", 100.0 * .part, remedy(.pressed)
     )]
     PinsBlocked {
         /// Moves of the pins and obstacles.
         moves: usize,
         /// The part of their way that they went.
         part: f64,
+        /// Where contact presses the most.
+        pressed: Option<Pressed>,
     },
     /// Newton's method did not converge.
     #[error(
         "Newton's method did not converge in {iterations} iterations: \
-         the last changed a velocity by {change:.3e} m/s. Try a smaller dt"
+         the last changed a velocity by {change:.3e} m/s{}a smaller dt", remedy(.pressed)
     )]
     NotConverged {
         /// Newton iterations.
         iterations: u64,
         /// The largest change of a velocity component in the last iteration, in m/s.
         change: f64,
+        /// Where contact presses the most, if it shortened a move of this step.
+        pressed: Option<Pressed>,
     },
     /// A force has neither an energy nor a dissipation function, so Newton's method cannot minimise anything.
     #[error(
@@ -103,6 +106,7 @@ impl StepError {
     /// Renumbers the vertices in the error, from the numbering of a body to `vertices[…]` of the scene.
     #[must_use]
     pub fn on_vertices(self, vertices: &[usize]) -> Self {
+        let renumbered = |pressed: Option<Pressed>| pressed.map(|pressed| pressed.on_vertices(vertices));
         match self {
             Self::Evaluation(EvaluationError::NonFiniteState { what, vertex, value }) => {
                 EvaluationError::NonFiniteState { what, vertex: vertices[vertex], value }.into()
@@ -114,12 +118,22 @@ impl StepError {
             Self::NotSolved { iterations, stopped, residual, target, vertex } => {
                 Self::NotSolved { iterations, stopped, residual, target, vertex: vertices[vertex] }
             }
+            Self::Stuck { iterations, stopped, pressed } => {
+                Self::Stuck { iterations, stopped, pressed: renumbered(pressed) }
+            }
+            Self::PinsBlocked { moves, part, pressed } => {
+                Self::PinsBlocked { moves, part, pressed: renumbered(pressed) }
+            }
+            Self::NotConverged { iterations, change, pressed } => {
+                Self::NotConverged { iterations, change, pressed: renumbered(pressed) }
+            }
             Self::NonFinite { vertex, position } => Self::NonFinite { vertex: vertices[vertex], position },
             Self::TooFast { vertex, speed } => Self::TooFast { vertex: vertices[vertex], speed },
             Self::Hopeless { dt, reason } => Self::Hopeless { dt, reason: Box::new(reason.on_vertices(vertices)) },
             other => other,
         }
     }
+
     /// The vertices that the error names; empty if it names none.
     #[must_use]
     pub fn vertices(&self) -> Vec<usize> {
@@ -129,8 +143,19 @@ impl StepError {
             | Self::NotSolved { vertex, .. }
             | Self::NonFinite { vertex, .. }
             | Self::TooFast { vertex, .. } => vec![*vertex],
+            Self::Stuck { pressed: Some(pressed), .. }
+            | Self::PinsBlocked { pressed: Some(pressed), .. }
+            | Self::NotConverged { pressed: Some(pressed), .. } => pressed.vertices.clone(),
             Self::Hopeless { reason, .. } => reason.vertices(),
             _ => Vec::new(),
         }
+    }
+}
+
+/// Says where contact presses the most, and begins to say what may help.
+fn remedy(pressed: &Option<Pressed>) -> String {
+    match pressed {
+        Some(pressed) => format!("; contact {pressed}. Leave more room there, or try "),
+        None => ". Try ".into(),
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Contact};
+use energy_solve::{BlockMatrix, Contact, Pressed};
 
 use super::super::ContactWork;
 use super::incremental_potential::IncrementalPotential;
@@ -80,6 +80,11 @@ impl IncrementalPotential<'_> {
                 }
             }
         }
+    }
+
+    /// Returns where contact presses the most at x.
+    pub(super) fn most_pressed(&mut self, x: &[Vector3<f64>]) -> Option<Pressed> {
+        self.body.system.contact().and_then(|(contact, _)| contact.most_pressed(x))
     }
 
     /// Returns the stiffness of the contacts, in N/m.

@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport, StopReason, dot};
+use energy_solve::{Curvature, EvaluationError, OverRelaxation, Pressed, SolveOptions, SolveReport, StopReason, dot};
 
 use super::super::projection::{Progress, Projection};
 use super::super::trial::Trial;
@@ -124,7 +124,8 @@ impl<'a> Iterate<'a> {
         while !self.converged {
             let iterations = self.potential.report.solves;
             if iterations == self.options.iteration_limit as u64 {
-                return Err(StepError::NotConverged { iterations, change: self.change });
+                let pressed = self.shortening();
+                return Err(StepError::NotConverged { iterations, change: self.change, pressed });
             }
             if self.is_balanced()? {
                 break;
@@ -142,8 +143,8 @@ impl<'a> Iterate<'a> {
                 }
                 None if direction.is_projected => {
                     let iterations = self.potential.report.solves;
-                    let in_contact = self.potential.report.contact.shortened > 0;
-                    return Err(StepError::Stuck { iterations, stopped: direction.solved.stopped, in_contact });
+                    let (stopped, pressed) = (direction.solved.stopped, self.shortening());
+                    return Err(StepError::Stuck { iterations, stopped, pressed });
                 }
                 None => self.projection.demand(),
             }
@@ -154,6 +155,12 @@ impl<'a> Iterate<'a> {
     /// Returns the positions and the report of the step.
     pub(super) fn into_result(self) -> (Vec<Vector3<f64>>, StepReport) {
         (self.x, self.potential.report)
+    }
+
+    /// Returns where contact presses the most, if it shortened a move of this step.
+    fn shortening(&mut self) -> Option<Pressed> {
+        let is_shortened = self.potential.report.contact.shortened > 0;
+        is_shortened.then(|| self.potential.most_pressed(&self.x)).flatten()
     }
 
     /// Whether residual impulses are below the tolerance, if the last solve makes that likely. Never before the first
@@ -291,7 +298,8 @@ impl<'a> Iterate<'a> {
             return Ok(());
         }
         if self.pin_moves == PIN_MOVES {
-            return Err(StepError::PinsBlocked { moves: PIN_MOVES, part: self.pins });
+            let pressed = self.potential.most_pressed(&self.x);
+            return Err(StepError::PinsBlocked { moves: PIN_MOVES, part: self.pins, pressed });
         }
         self.pin_moves += 1;
         let part = self.potential.move_pins(&mut self.x);
