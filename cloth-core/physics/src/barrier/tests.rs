@@ -445,3 +445,46 @@ fn the_most_pressed_feature_is_named_with_both_sides() {
     let found = contact.most_pressed(&x).unwrap();
     assert_eq!((found.vertices.as_slice(), found.by.len()), (&[3][..], 2), "{found:?}");
 }
+
+/// Vertices that move on their own shift the mean of all, with which the balls of the others move afterwards. A pair
+/// that was too far apart to be known must still be found.
+#[test]
+fn a_restriction_hides_no_pair_from_the_next_moves() {
+    const LAYERS: usize = 20;
+    const VERTICES: usize = 3 * LAYERS + 6;
+    // A stack of triangles, and two more aside, 1 cm above each other.
+    let triangle = |x: f64, z: f64| [[x, 0.0, z], [x + 0.01, 0.0, z], [x, 0.01, z]];
+    let stack = (0..LAYERS).map(|layer| triangle(0.0, 0.002 * layer as f64));
+    let x: Vec<_> = stack.chain([triangle(0.1, 0.0), triangle(0.1, 0.01)]).flatten().collect();
+    let triangles: Vec<_> = (0..VERTICES / 3).map(|number| [0, 1, 2].map(|corner| 3 * number + corner)).collect();
+    let mesh = CollisionMesh::new(VERTICES, &triangles, &[], &[]);
+    let (free, radii) = (vec![true; VERTICES], vec![0.5 * THICKNESS; VERTICES]);
+    let mut contact = BarrierContact::new(mesh, &x, free, radii, GAP).unwrap();
+    let moved = |x: &[Vector3<f64>], vertices: std::ops::Range<usize>, by: Vector3<f64>| {
+        let mut moved = x.to_vec();
+        moved[vertices].iter_mut().for_each(|x| *x = add_scaled(*x, 1.0, by));
+        moved
+    };
+    contact.begin_step(&x);
+    assert_eq!(contact.certify(&x, &x), 1.0);
+    contact.set_resistance(&DofMap::new(&[false; VERTICES]), vec![[[1.0; 3]; 3]; VERTICES], vec![1.0; VERTICES]);
+    contact.meet(&x);
+    // The first layer is pulled out, so far that all others seem to move by several centimetres.
+    contact.restrict(&(0..VERTICES).map(|vertex| vertex < 3).collect::<Vec<_>>());
+    let mut here = x;
+    for _ in 0..30 {
+        let to = moved(&here, 0..3, [-0.03, 0.0, 0.0]);
+        let part = contact.certify(&here, &to);
+        here = moved(&here, 0..3, [-0.03 * part, 0.0, 0.0]);
+        contact.meet(&here);
+    }
+    assert!(here[0][0] < -0.5, "{}", here[0][0]);
+    contact.release();
+    let searches = contact.counts().searches;
+    let fallen = moved(&here, VERTICES - 3..VERTICES - 2, [0.002, 0.002, -0.02]);
+    let part = contact.certify(&here, &fallen);
+    assert!(part < 0.5, "{part}");
+    // Few vertices leave their balls, so that the hierarchies of the searches before are used again.
+    assert!(contact.counts().searches == searches + 1 && !contact.search.is_unfitted());
+    assert!(contact.neighbourhood.strays().pairs().len() < 20);
+}

@@ -8,12 +8,12 @@ use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current
 /// iterate.
 ///
-/// Distances do not change if all vertices are translated, so balls move with the mean of all vertices. Late iterates
-/// of a step move little and need no search. If a move takes vertices out of their balls, one search finds the pairs
+/// Distances do not change if all vertices are translated, so balls move with the mean of all vertices, unless only
+/// some vertices may move. Late iterates of a step move little and need no search. If a move takes vertices out of their balls, one search finds the pairs
 /// that these vertices meet on the way and near its end: the new balls of the next iterate need no other.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbourhood {
-    /// The centre of each vertex's ball, relative to the mean of all vertices.
+    /// The centre of each vertex's ball, relative to the origin of all.
     centres: Vec<Vector3<f64>>,
     /// The radius of each ball, in m. Empty before the first search.
     radii: Vec<f64>,
@@ -21,14 +21,16 @@ pub struct Neighbourhood {
     strays: Strays,
     /// The mean of all vertices where balls were last settled.
     settled: Vector3<f64>,
+    /// The origin of all balls, relative to the mean of all vertices.
+    offset: Vector3<f64>,
     fixed: Option<Fixed>,
 }
 
 /// The part of a neighbourhood that does not move while only some vertices do.
 #[derive(Clone, Debug)]
 struct Fixed {
-    /// The mean of all vertices, as balls see it: theirs must not move either.
-    mean: Vector3<f64>,
+    /// The origin of all balls: theirs must not move either.
+    origin: Vector3<f64>,
     /// The pairs of other vertices.
     pairs: Nearby,
 }
@@ -36,7 +38,8 @@ struct Fixed {
 /// The vertices that left their balls on the last such move, and their pairs.
 #[derive(Clone, Debug, Default)]
 struct Strays {
-    /// All vertices at the start and at the end of the move, relative to their mean. Empty before the first such move.
+    /// All vertices at the start and at the end of the move, relative to the origin of balls. Empty before the first
+    /// such move.
     ends: [Vec<Vector3<f64>>; 2],
     is_stray: Vec<bool>,
     /// The distance from their paths that was searched, in m. The radii of new balls.
@@ -98,7 +101,7 @@ impl Neighbourhood {
         let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
         let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
         let (pairs, radii) = if self.fixed.is_none() && are_many {
-            self.clear();
+            *self = Self { offset: self.offset, ..Self::default() };
             is_stray.fill(true);
             search.pairs_near(mesh, &paths, limits)
         } else if search.is_unfitted() {
@@ -197,7 +200,8 @@ impl Neighbourhood {
 
     /// Lets only some vertices move, from where balls were last settled, and puts the pairs of others aside.
     pub fn restrict(&mut self, moving: &[bool]) {
-        self.fixed = Some(Fixed { mean: self.settled, pairs: self.nearby.split_off_others(moving) });
+        let origin = self.origin(self.settled);
+        self.fixed = Some(Fixed { origin, pairs: self.nearby.split_off_others(moving) });
     }
 
     /// Whether only some vertices move.
@@ -205,11 +209,11 @@ impl Neighbourhood {
         self.fixed.is_some()
     }
 
-    /// Lets all vertices move again, from where balls were last settled.
+    /// Lets all vertices move again, from where balls were last settled. Balls stay where they are, relative to their
+    /// origin too: searches that look at some vertices only rely on the regions of the others.
     pub fn release(&mut self) {
-        let Some(Fixed { mean, pairs }) = self.fixed.take() else { return };
-        let drift = subtract(mean, self.settled);
-        self.centres.iter_mut().for_each(|centre| *centre = add_scaled(*centre, 1.0, drift));
+        let Some(Fixed { origin, pairs }) = self.fixed.take() else { return };
+        self.offset = subtract(origin, self.settled);
         self.strays = Strays::default();
         self.nearby = std::mem::take(&mut self.nearby).joined_with(&pairs, 1);
     }
@@ -237,7 +241,7 @@ impl Neighbourhood {
 
     /// The place from which balls see positions, if this is the mean of all vertices.
     fn origin(&self, mean: Vector3<f64>) -> Vector3<f64> {
-        self.fixed.as_ref().map_or(mean, |fixed| fixed.mean)
+        self.fixed.as_ref().map_or_else(|| add_scaled(mean, 1.0, self.offset), |fixed| fixed.origin)
     }
 
     /// Whether a vertex is outside of its ball at some positions.
