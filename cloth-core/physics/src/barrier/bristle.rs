@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use energy_dsl::Vector3;
-use energy_solve::ContactMemory;
+use energy_solve::{ContactMemory, index};
 
 use crate::collision::{Pair, PairKind};
 use crate::geometry::{add_scaled, dot, norm};
@@ -13,6 +13,9 @@ pub(super) const LENGTH: f64 = 1e-4;
 /// The cosine between the normals of two pairs with one feature in common, above which they are the same contact.
 const SAME_CONTACT: f64 = 0.5;
 
+/// The kind of pairs of edges in names.
+const EDGES: u32 = 1;
+
 /// The deflections at the start of a step, by pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Bristles {
@@ -20,19 +23,20 @@ pub(super) struct Bristles {
     names: Vec<[u32; 3]>,
     /// The normal and the deflection (in m) of each pair.
     vectors: Vec<[Vector3<f64>; 2]>,
+    /// The places of pairs of edges, by their second edge.
+    by_second_edge: Vec<u32>,
 }
 
 /// The name of a pair: its kind and its features.
 fn name(pair: &Pair) -> [u32; 3] {
     let [first, second] = pair.features;
-    [u32::from(pair.kind == PairKind::EdgeEdge), first, second]
+    [if pair.kind == PairKind::EdgeEdge { EDGES } else { 0 }, first, second]
 }
 
 impl Bristles {
     /// Takes the pairs in order, each with its normal and the way that it has slid, in m.
     pub fn new(pairs: impl Iterator<Item = (Pair, Vector3<f64>, Vector3<f64>)>) -> Self {
-        let (names, vectors) = pairs.map(|(pair, normal, way)| (name(&pair), [normal, shortened(way)])).unzip();
-        Self { names, vectors }
+        Self::in_order(pairs.map(|(pair, normal, way)| (name(&pair), [normal, shortened(way)])).unzip())
     }
 
     /// Returns the deflection of a pair, in m, across its normal. A point that has moved on to another triangle, or an
@@ -48,11 +52,11 @@ impl Bristles {
         })
     }
 
-    /// The pair with the same first feature and the most similar normal, if it is similar at all.
+    /// The pair with the same point, or a common edge, and the most similar normal, if it is similar at all.
     fn similar(&self, pair: &Pair, normal: Vector3<f64>) -> Option<usize> {
         let cosine = |place: &usize| dot(self.vectors[*place][0], normal);
-        let candidates = self.with_first_feature(pair).filter(|place| cosine(place) > SAME_CONTACT);
-        candidates.max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
+        let candidates = self.with_first_feature(pair).chain(self.with_second_edge(pair));
+        candidates.filter(|place| cosine(place) > SAME_CONTACT).max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
     }
 
     fn with_first_feature(&self, pair: &Pair) -> Range<usize> {
@@ -62,6 +66,21 @@ impl Bristles {
         self.names.partition_point(before)..self.names.partition_point(until)
     }
 
+    fn with_second_edge(&self, pair: &Pair) -> impl Iterator<Item = usize> {
+        let second = |place: &u32| self.names[*place as usize][2];
+        let [kind, _, edge] = name(pair);
+        let places = if kind == EDGES { &self.by_second_edge[..] } else { &[] };
+        let first = places.partition_point(|place| second(place) < edge);
+        places[first..].iter().take_while(move |place| second(place) == edge).map(|place| *place as usize)
+    }
+
+    fn in_order((names, vectors): (Vec<[u32; 3]>, Vec<[Vector3<f64>; 2]>)) -> Self {
+        let first = names.partition_point(|[kind, ..]| *kind < EDGES);
+        let mut by_second_edge: Vec<u32> = (first..names.len()).map(index).collect();
+        by_second_edge.sort_by_key(|place| names[*place as usize][2]);
+        Self { names, vectors, by_second_edge }
+    }
+
     /// Returns the deflections for a checkpoint.
     pub fn memory(self) -> ContactMemory {
         ContactMemory { names: self.names, vectors: self.vectors }
@@ -69,7 +88,7 @@ impl Bristles {
 
     /// Restores the deflections of a checkpoint.
     pub fn restored(memory: ContactMemory) -> Self {
-        Self { names: memory.names, vectors: memory.vectors }
+        Self::in_order((memory.names, memory.vectors))
     }
 }
 
@@ -107,6 +126,21 @@ mod tests {
         assert_eq!(bristles.deflection(&pair([3, 9]), turned), [0.0, 7e-5, 0.0]);
         for (features, normal) in [([2, 1], UP), ([4, 1], UP), ([3, 2], [0.0, 0.0, -1.0])] {
             assert_eq!(bristles.deflection(&pair(features), normal), [0.0; 3]);
+        }
+    }
+
+    #[test]
+    fn either_edge_of_a_pair_may_move_on() {
+        let pair = |features: [u32; 2]| Pair { kind: PairKind::EdgeEdge, ..pair(features) };
+        let ways = [([3, 7], UP, [0.0, 5e-5, 0.0]), ([4, 6], [0.0, 0.0, -1.0], [0.0, 7e-5, 0.0])];
+        let bristles = Bristles::new(ways.into_iter().map(|(features, normal, way)| (pair(features), normal, way)));
+        for bristles in [Bristles::restored(bristles.clone().memory()), bristles] {
+            for features in [[3, 7], [3, 8], [2, 7]] {
+                assert_eq!(bristles.deflection(&pair(features), UP), [0.0, 5e-5, 0.0], "{features:?}");
+            }
+            for features in [[2, 6], [4, 9], [7, 9]] {
+                assert_eq!(bristles.deflection(&pair(features), UP), [0.0; 3], "{features:?}");
+            }
         }
     }
 }

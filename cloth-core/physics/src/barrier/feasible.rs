@@ -8,6 +8,9 @@
 //! gently curved layers are not strict minima: which of them is nearest changes with every small motion. A pair that is
 //! missing at one iterate would stop the next move.
 //!
+//! Hair has no triangles. Where its segments meet, or end, that corner counts against other segments: once, if no edge
+//! there comes nearer. So do corners of cloth and obstacles against hair.
+//!
 //! Cloth on a ball or a rail is nearest to its core almost everywhere, so all of its features count there.
 
 use energy_dsl::Vector3;
@@ -57,22 +60,43 @@ impl Meeting<'_> {
 
     fn edges_meet(&self, pair: &Pair, closest: &Closest) -> bool {
         let [first, second] = pair.features;
+        let [a, b, c, d] = pair.vertices;
         let towards = closest.normal;
         let away = towards.map(|component| -component);
-        are_inside(closest)
+        let are_strands = self.is_strand(first) && self.is_strand(second);
+        self.counts_along([a, b], &closest.weights[..2], self.is_strand(second), away)
+            && self.counts_along([c, d], &closest.weights[2..], self.is_strand(first), towards)
             && !self.is_valley(first, away)
             && !self.is_valley(second, towards)
-            && !self.are_parallel(pair.vertices)
+            && (are_strands || !self.are_parallel(pair.vertices))
+    }
+
+    /// Whether an edge is a segment of hair.
+    fn is_strand(&self, edge: u32) -> bool {
+        self.mesh.apexes(edge as usize).is_empty()
+    }
+
+    /// Whether the closest point on an edge counts against another one, in this direction. The inside does. A corner
+    /// does against hair, if no edge there comes nearer; only the first edge at the corner counts it.
+    fn counts_along(&self, edge: [u32; 2], weights: &[f64], is_against_hair: bool, direction: Vector3<f64>) -> bool {
+        let (corner, other) = match [weights[0] != 0.0, weights[1] != 0.0] {
+            [true, true] => return true,
+            [is_first, _] if is_first => (edge[0], edge[1]),
+            _ => (edge[1], edge[0]),
+        };
+        let (here, neighbours) = (self.x[corner as usize], self.mesh.neighbours(corner));
+        let behind = |&other: &u32| dot(subtract(self.x[other as usize], here), direction) <= 0.0;
+        is_against_hair && neighbours.iter().min() == Some(&other) && neighbours.iter().all(behind)
     }
 
     /// Whether a pair of edges has the edge of a rail, which is the second.
     fn has_rail(&self, pair: &Pair) -> bool {
-        self.mesh.obstacle_of(pair).is_some() && self.mesh.apexes(pair.features[1] as usize).is_empty()
+        self.mesh.obstacle_of(pair).is_some() && self.is_strand(pair.features[1])
     }
 
     /// Whether an edge of cloth or hair meets a rail. Vertices of cloth do so, too.
     fn meets_rail(&self, pair: &Pair, closest: &Closest) -> bool {
-        self.mesh.apexes(pair.features[0] as usize).is_empty() || are_inside(closest)
+        self.is_strand(pair.features[0]) || are_inside(closest)
     }
 
     /// Whether a triangle of an edge rises in a direction.
@@ -147,6 +171,35 @@ mod tests {
         let features = [edge([0, 1]).unwrap(), edge([4, 5]).unwrap()];
         let pair = Pair { kind: PairKind::EdgeEdge, features, vertices: [0, 1, 4, 5] };
         Meeting { mesh: &mesh, x: &x }.may_join(&pair, &Closest::of(&pair, &pair.corners(&x)))
+    }
+
+    #[test]
+    fn corners_of_hair_join_once() {
+        // A strand with a kink at vertex 1 above a straight one, which ends at vertex 5.
+        let mesh = CollisionMesh::new(6, &[], &[[0, 1], [1, 2], [3, 4], [4, 5]], &[]);
+        let joined = |kinked: [Vector3<f64>; 3], straight: [Vector3<f64>; 3]| {
+            let x = [kinked, straight].concat();
+            let meeting = Meeting { mesh: &mesh, x: &x };
+            let edges = mesh.edges();
+            let pairs = (0..2).flat_map(|one| (2..4).map(move |other| [one, other]));
+            let pairs = pairs.map(|features: [usize; 2]| {
+                let [[a, b], [c, d]] = features.map(|edge| edges[edge]);
+                Pair { kind: PairKind::EdgeEdge, features: features.map(|one| one as u32), vertices: [a, b, c, d] }
+            });
+            let joins = |pair: &Pair| meeting.may_join(pair, &Closest::of(pair, &pair.corners(&x)));
+            pairs.filter(joins).map(|pair| pair.features).collect::<Vec<_>>()
+        };
+        let straight = [[-1.0, 0.0, 0.0], [0.25, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        let hangs = [[0.5, -0.5, 1.0], [0.5, 0.0, 0.1], [0.5, 0.5, 1.0]];
+        assert_eq!(joined(hangs, straight), [[0, 3]], "a kink above the inside");
+        let over_corner = hangs.map(|[x, y, z]| [x - 0.25, y, z]);
+        assert_eq!(joined(over_corner, straight), [[0, 2]], "a kink above a corner");
+        let stands = hangs.map(|[x, y, z]| [x, y, 0.2 - z]);
+        assert_eq!(joined(stands, straight), [[0, 3], [1, 3]], "the insides of both segments come nearer");
+        let crosses = [[0.5, -0.5, 0.1], [0.5, 0.5, 0.1], [0.5, 0.9, 0.1]];
+        assert_eq!(joined(crosses, straight), [[0, 3]], "insides");
+        let parallel = straight.map(|[x, y, z]| [0.7 * x + 0.05, y + 0.1, z]);
+        assert!(!joined(parallel, straight).is_empty(), "side by side");
     }
 
     #[test]

@@ -114,6 +114,11 @@ impl Friction {
         (self.bristles, self.sliding) = (Bristles::restored(memory), None);
     }
 
+    /// Creates the friction of bodies and obstacles that have none.
+    pub fn without_grip(obstacles: usize) -> Self {
+        Self { grips: vec![Grip::default(); obstacles], ..Self::default() }
+    }
+
     /// Whether anything has friction.
     pub fn is_rough(&self) -> bool {
         !self.coefficients.is_empty() || self.grips.iter().any(|grip| grip.coefficient > 0.0)

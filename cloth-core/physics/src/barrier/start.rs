@@ -162,7 +162,7 @@ impl BarrierContact {
             neighbourhood: Neighbourhood::default(),
             joined: Joined::default(),
             fixed: Vec::new(),
-            friction: Friction::default(),
+            friction: Friction::without_grip(obstacles.len()),
             blocking: Vec::new(),
             resistance: Resistance::default(),
             counts: ContactCounts::default(),

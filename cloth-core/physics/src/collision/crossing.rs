@@ -132,12 +132,18 @@ fn enters(v: Vector3<f64>, far: Vector3<f64>, [p, q]: [Vector3<f64>; 2]) -> bool
         return false;
     }
     let Some((flat, turn)) = projection([v, p, q]) else {
-        return projection([v, far, p]).is_none() && projection([v, far, q]).is_none();
+        let is_on_line = projection([v, far, p]).is_none() && projection([v, far, q]).is_none();
+        return is_on_line && (is_same_way(v, far, p) || is_same_way(v, far, q));
     };
     let turn_of = |b: Vector3<f64>, c: Vector3<f64>| flat.turn(v, b, c);
     let within = |sign: Sign| sign == Sign::Zero || sign == turn;
     // The segment is at least as long as a point, so it shares more than v if it starts into the angle at v.
     within(turn_of(p, far)) && within(turn_of(far, q)) && far != v
+}
+
+/// Whether two points of a line through v are on the same side of v.
+fn is_same_way(v: Vector3<f64>, a: Vector3<f64>, b: Vector3<f64>) -> bool {
+    (0..3).any(|axis| (a[axis] > v[axis] && b[axis] > v[axis]) || (a[axis] < v[axis] && b[axis] < v[axis]))
 }
 
 /// Whether a segment in the plane of a triangle meets it.

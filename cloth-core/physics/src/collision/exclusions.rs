@@ -40,11 +40,14 @@ impl Exclusions {
         Self { own: vec![0; vertices], obstacles: vec![0; obstacles], ..Self::default() }
     }
 
-    /// Excludes pairs of features in which one is of the first set and the other of the second. Returns whether there
-    /// was a place for the names.
+    /// Excludes pairs of features in which one has a vertex of the first set and the other one of the second. Returns
+    /// `false`, and changes nothing, if there are too many names.
+    ///
+    /// If a pair collides, so do the pairs of vertices and edges of its features: a pair is certified by these.
     #[must_use]
     pub fn add_sets(&mut self, sets: [(&str, Members); 2]) -> bool {
-        let new = sets.iter().filter(|(name, _)| !self.names.contains_key(*name)).count();
+        let new: BTreeSet<&str> = sets.iter().map(|(name, _)| *name).collect();
+        let new = new.into_iter().filter(|name| !self.names.contains_key(*name)).count();
         if self.names.len() + new > Self::MOST_NAMES {
             return false;
         }
@@ -55,8 +58,8 @@ impl Exclusions {
 
     /// Returns the bit of a set.
     fn set(&mut self, name: &str, members: Members) -> u64 {
-        let next = 1 << self.names.len();
-        let bit = *self.names.entry(name.to_owned()).or_insert(next);
+        let number = self.names.len();
+        let bit = *self.names.entry(name.to_owned()).or_insert_with(|| 1 << number);
         match members {
             Members::Vertices(vertices) => vertices.into_iter().for_each(|vertex| self.own[vertex] |= bit),
             Members::Obstacle(number) => self.obstacles[number] |= bit,
@@ -123,12 +126,48 @@ impl Exclusions {
             Some(obstacle) => self.obstacles[obstacle],
             None => self.own[vertex as usize],
         };
-        let [a, b] = [a, b].map(|feature| feature.iter().map(sets_at).fold(u64::MAX, |all, sets| all & sets));
+        let [a, b] = [a, b].map(|feature| feature.iter().map(sets_at).fold(0, |all, sets| all | sets));
         self.sets.iter().any(|[one, other]| (a & one != 0 && b & other != 0) || (b & one != 0 && a & other != 0))
     }
 
     fn exclude_vertices(&self, a: &[u32], b: &[u32]) -> bool {
         let is_pair = |&p: &u32, &q: &u32| self.vertices.contains(&[p.min(q), p.max(q)]);
         !self.vertices.is_empty() && a.iter().any(|p| b.iter().any(|q| is_pair(p, q)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_that_collides_has_no_part_that_does_not() {
+        // A strip of four triangles; the first three vertices are the collar. A triangle is above it.
+        let triangles = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5], [6, 7, 8]];
+        let mesh = CollisionMesh::new(9, &triangles, &[], &[]);
+        let mut exclusions = Exclusions::new(9, 0);
+        let members = |range: std::ops::Range<usize>| Members::Vertices(range.collect());
+        assert!(exclusions.add_sets([("collar", members(0..3)), ("body", members(6..9))]));
+        let is_excluded = |feature: &[u32]| exclusions.exclude(&mesh, feature, &[6, 7, 8]);
+        let excluded = |features: &[[u32; 3]]| features.iter().map(|one| is_excluded(one)).collect::<Vec<_>>();
+        assert_eq!(excluded(&mesh.triangles()[..4]), [true, true, true, false]);
+        for triangle in &mesh.triangles()[..4] {
+            for part in [&triangle[..1], &triangle[1..2], &triangle[2..], &triangle[..2], &triangle[1..]] {
+                assert!(is_excluded(triangle) || !is_excluded(part), "{triangle:?} {part:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_names_can_be_used_again() {
+        let mut exclusions = Exclusions::new(1, 0);
+        let names: Vec<String> = (0..=Exclusions::MOST_NAMES).map(|number| number.to_string()).collect();
+        let mut add = |one: usize, other: usize| {
+            exclusions.add_sets([one, other].map(|name| (&names[name][..], Members::Vertices(vec![0]))))
+        };
+        for name in 0..Exclusions::MOST_NAMES {
+            assert!(add(name, name), "{name}");
+        }
+        assert!(!add(0, Exclusions::MOST_NAMES) && add(0, Exclusions::MOST_NAMES - 1));
     }
 }

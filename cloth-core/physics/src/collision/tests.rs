@@ -215,6 +215,11 @@ fn edges_may_start_at_a_corner_but_not_run_into_the_triangle() {
     assert_eq!(count([0.5, 0.0, 0.0]), 1, "along a side");
     assert_eq!(count([-0.2, -0.2, 0.0]), 0);
     assert_eq!(count([-0.2, 0.9, 0.0]), 0);
+    let on_line = |end: f64| {
+        let x = [0.0, 1.0, 2.0, end].map(|x| [x, 0.0, 0.0]);
+        crossings(&mesh, &x).len()
+    };
+    assert_eq!([on_line(-1.0), on_line(0.5), on_line(3.0)], [0, 1, 1], "a triangle without area");
 }
 
 #[test]
