@@ -1,6 +1,6 @@
 //! Synchronisation of the threads that solve one system.
 
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 /// Number of spins before a waiting thread yields.
 const PATIENCE: u32 = 1 << 12;
@@ -11,12 +11,32 @@ pub(crate) struct SpinBarrier {
     participants: usize,
     arrived: AtomicUsize,
     round: AtomicUsize,
+    /// Whether a thread panicked, for which the others would wait forever.
+    is_broken: AtomicBool,
+}
+
+/// The time in which a thread takes part in a barrier.
+#[derive(Debug)]
+pub(crate) struct Participation<'a>(&'a SpinBarrier);
+
+impl Drop for Participation<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.is_broken.store(true, Ordering::Release);
+        }
+    }
 }
 
 impl SpinBarrier {
     /// Creates a barrier for `participants` threads.
     pub(crate) fn new(participants: usize) -> Self {
-        Self { participants, arrived: AtomicUsize::new(0), round: AtomicUsize::new(0) }
+        let (arrived, round) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        Self { participants, arrived, round, is_broken: AtomicBool::new(false) }
+    }
+
+    /// Begins the participation of a thread. If it panics meanwhile, the other threads panic instead of waiting.
+    pub(crate) fn participate(&self) -> Participation<'_> {
+        Participation(self)
     }
 
     /// Waits until all threads have called this. Everything they wrote before is visible afterwards.
@@ -32,6 +52,7 @@ impl SpinBarrier {
         }
         let mut looks = 0;
         while self.round.load(Ordering::Acquire) == round {
+            assert!(!self.is_broken.load(Ordering::Acquire), "another thread of the solver panicked");
             looks += 1;
             if looks < PATIENCE { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
@@ -65,5 +86,22 @@ impl PerDomain {
     /// Returns the largest number, or 0 if none is positive.
     pub(crate) fn largest(&self) -> f64 {
         self.numbers().fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::threads::in_parts;
+
+    #[test]
+    #[should_panic(expected = "panicked")]
+    fn a_panic_keeps_no_thread_waiting() {
+        let barrier = SpinBarrier::new(2);
+        in_parts(2, vec![0, 1], |parts| {
+            let _participation = barrier.participate();
+            assert!(parts != [1], "one panicked");
+            barrier.wait();
+        });
     }
 }

@@ -62,7 +62,7 @@ pub(super) struct Common<'a, T> {
     changes: Vec<RwLock<Vec<Wide<T>>>>,
     /// For each domain, its first aggregate and its part of Pᵀ r.
     restricted: Vec<(usize, RwLock<Vec<Wide<T>>>)>,
-    barrier: SpinBarrier,
+    pub(super) barrier: SpinBarrier,
     right_hand_scale: RightHandScale,
     /// s · s, r · z and p · q. All threads read each number before any of them reaches its next update.
     square: PerDomain,

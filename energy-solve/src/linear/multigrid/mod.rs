@@ -172,7 +172,10 @@ impl<T: Precision> Multigrid<T> {
             let rows = smoothers[number].triangle.rows.clone();
             Part { number, vectors, inverses: &inverses[rows.clone()], b: &b[rows], x }
         });
-        let solved = in_parts(*threads, parts.collect(), |parts| conjugate_gradients(parts, &common));
+        let solved = in_parts(*threads, parts.collect(), |parts| {
+            let _participation = common.barrier.participate();
+            conjugate_gradients(parts, &common)
+        });
         // All threads return the same report.
         solved.into_iter().next().unwrap_or(nothing)
     }

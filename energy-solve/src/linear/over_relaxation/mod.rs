@@ -156,7 +156,10 @@ impl<T: Precision> OverRelaxation<T> {
             let rows = domain.triangle.rows.clone();
             Part { number, inverses: &inverses[rows.clone()], b: &b[rows], domain, x }
         });
-        let solved = in_parts(*threads, parts.collect(), |parts| dispatch(Gradients { parts, common: &common }));
+        let solved = in_parts(*threads, parts.collect(), |parts| {
+            let _participation = common.barrier.participate();
+            dispatch(Gradients { parts, common: &common })
+        });
         // All threads return the same report.
         solved.into_iter().next().unwrap_or(SolveReport {
             iterations: 0,
