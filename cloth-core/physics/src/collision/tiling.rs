@@ -9,6 +9,11 @@ use super::trees::Kind;
 
 /// The width of a tile relative to the mean length of edges: a tile of a regular grid has 4 × 4 cells.
 const WIDTH: f64 = 3.5;
+/// The largest overhang of a feature over its tile relative to the size of a tile. A tile with a longer feature is not
+/// covered. If it extended all tiles, each of them would hold a large part of a mesh that is fine elsewhere.
+const MOST_OVERHANG: f64 = 1.0;
+/// The largest number of tiles over that of edges, roughly. A sheet that fills its rectangle has a quarter of it.
+const MOST_TILES: f64 = 0.125;
 /// Bound of rounding errors of the area that triangles cover, relative to the whole.
 const COVERED: f64 = 1e-9;
 
@@ -17,7 +22,8 @@ const COVERED: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct Tiling {
     pub tiles: Vec<Tile>,
-    /// The tiles of each block. Empty unless each place of its rectangle, the hull of its features, is in one triangle.
+    /// The tiles of each block. Empty unless exactly one triangle covers each place of the rectangle around its
+    /// features.
     pub blocks: Vec<Vec<usize>>,
     of_points: Vec<usize>,
     of_triangles: Vec<usize>,
@@ -28,7 +34,8 @@ pub(super) struct Tiling {
 /// A part of a sheet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tile {
-    /// The triangles that meet the hull of the tile's features, if these cover it once; none otherwise.
+    /// The triangles that meet the tile's rectangle, extended by the overhang of features, if they cover it once; none
+    /// otherwise.
     pub triangles: Vec<Reference>,
     /// The vertices of the tile's features.
     pub vertices: Vec<u32>,
@@ -214,10 +221,14 @@ impl Frame {
         };
         let edges = &sheet.sheet.edges;
         let mean = edges.iter().map(length).sum::<f64>() / edges.len() as f64;
+        let most = edges.len() as f64;
         // `max` takes 1 for NaN.
-        let count = |axis: usize| (around.length(axis) / (WIDTH * mean)).round().max(1.0).min(edges.len() as f64);
+        let count = |axis: usize, width: f64| (around.length(axis) / width).round().max(1.0).min(most);
+        // A narrow ring fills little of its rectangle.
+        let sparse = (count(0, WIDTH * mean) * count(1, WIDTH * mean) / (MOST_TILES * most)).sqrt().max(1.0);
+        let count = |axis: usize| count(axis, sparse * WIDTH * mean) as usize;
         // Hair extends along one axis.
-        let size = [count(0) as usize, if sheet.sheet.triangles.is_empty() { 1 } else { count(1) as usize }];
+        let size = [count(0), if sheet.sheet.triangles.is_empty() { 1 } else { count(1) }];
         Self { around, size, tile: [0, 1].map(|axis| around.length(axis) / size[axis] as f64) }
     }
 
@@ -253,9 +264,16 @@ impl Frame {
     /// Returns the tiles with their triangles.
     fn tiles(&self, sheet: &Projected<'_>) -> Vec<Tile> {
         let Projected { mesh, sheet: Sheet { triangles, edges, .. }, .. } = sheet;
-        let of_triangles = triangles.iter().map(|&triangle| self.overhang(sheet, &mesh.triangles()[triangle]));
-        let of_edges = edges.iter().map(|&edge| self.overhang(sheet, &mesh.edges()[edge]));
-        let overhang = of_triangles.chain(of_edges).fold(0.0, f64::max);
+        let of_triangles = triangles.iter().map(|&triangle| &mesh.triangles()[triangle][..]);
+        let features = of_triangles.chain(edges.iter().map(|&edge| &mesh.edges()[edge][..]));
+        let most = MOST_OVERHANG * self.tile[0].max(self.tile[1]);
+        let (mut overhang, mut long) = (0.0_f64, Vec::new());
+        for vertices in features {
+            match self.overhang(sheet, vertices) {
+                own if own <= most => overhang = overhang.max(own),
+                _ => long.push(vertices),
+            }
+        }
         let [columns, rows] = self.size;
         let at = (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row]));
         let hulls: Vec<_> = at.clone().map(|at| self.rectangle(at).extended(overhang).within(&self.around)).collect();
@@ -283,6 +301,10 @@ impl Frame {
         for &edge in edges.iter().filter(|edge| !sheet.continues_across(**edge)) {
             let (hull, numbers) = near(&mesh.edges()[edge]);
             numbers.for_each(|tile| is_covered[tile] &= !hulls[tile].has_inside(&hull));
+        }
+        for vertices in long {
+            let [column, row] = self.cell(sheet.middle(vertices));
+            is_covered[row * columns + column] = false;
         }
         for (tile, is_covered) in tiles.iter_mut().zip(is_covered) {
             if !is_covered || tile.height <= 0.0 {
@@ -337,5 +359,37 @@ mod tests {
         let folded: Vec<_> =
             x.iter().map(|&[a, b, _]| [(a - 0.1).abs(), b, if a > 0.1 { 0.01 } else { 0.0 }]).collect();
         assert!(count(&triangles, &folded) > 20);
+    }
+
+    #[test]
+    fn one_long_triangle_leaves_the_tiles_of_a_fine_mesh_small() {
+        let (mut triangles, mut x) = sheet([64, 64]);
+        // A flag of 20 cells at a corner.
+        x.extend([[-0.8, -0.35, 0.0], [-0.8, -0.34, 0.0]]);
+        triangles.push([0, x.len() - 2, x.len() - 1]);
+        let count = |triangles: &[[usize; 3]]| {
+            let tiling = Tiling::new(&CollisionMesh::new(x.len(), triangles, &[], &[]), &x);
+            let held = tiling.tiles.iter().map(|tile| tile.triangles.len()).sum::<usize>();
+            (held, tiling.blocks.iter().filter(|tiles| !tiles.is_empty()).count())
+        };
+        let (regular, flagged) = (count(&triangles[..triangles.len() - 1]), count(&triangles));
+        assert!(flagged.0 < 2 * regular.0, "{flagged:?} {regular:?}");
+        assert!(10 * flagged.1 > 9 * regular.1, "{flagged:?} {regular:?}");
+    }
+
+    #[test]
+    fn a_narrow_ring_has_far_fewer_tiles_than_edges() {
+        const CELLS: usize = 3000;
+        let place = |number: usize| {
+            let (angle, radius) =
+                ((number / 2) as f64 / CELLS as f64 * std::f64::consts::TAU, 1.0 + 2e-3 * (number % 2) as f64);
+            [radius * angle.cos(), radius * angle.sin(), 0.0]
+        };
+        let x: Vec<Vector3<f64>> = (0..2 * CELLS).map(place).collect();
+        let corner = |number: usize| number % (2 * CELLS);
+        let cell = |cell: usize| [[2 * cell, 2 * cell + 1, 2 * cell + 2], [2 * cell + 1, 2 * cell + 3, 2 * cell + 2]];
+        let triangles: Vec<_> = (0..CELLS).flat_map(cell).map(|corners| corners.map(corner)).collect();
+        let tiling = Tiling::new(&CollisionMesh::new(x.len(), &triangles, &[], &[]), &x);
+        assert!((CELLS / 4..CELLS).contains(&tiling.tiles.len()), "{}", tiling.tiles.len());
     }
 }
