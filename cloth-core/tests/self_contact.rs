@@ -229,4 +229,38 @@ fn forces_of_contact_carry_the_weight() {
     let entry = simulation.ledger().unwrap().entries().last().unwrap();
     assert!((entry.force_on_obstacles[2] / -weight - 1.0).abs() < 1e-4, "{:?}", entry.force_on_obstacles);
     assert!((entry.contact_force / largest - 1.0).abs() < 1e-6, "{} {largest}", entry.contact_force);
+    let total = forces.iter().fold([0.0; 3], |sum, force| [0, 1, 2].map(|axis| sum[axis] + force[axis]));
+    for axis in 0..3 {
+        let error = entry.force_on_obstacles[axis] + total[axis];
+        assert!(error.abs() < 1e-12 * weight, "{:?} {total:?}", entry.force_on_obstacles);
+    }
+}
+
+/// Friction holds a sheet on a slope, and the slope feels it.
+#[test]
+fn fixed_obstacles_feel_friction() {
+    let cloth = sheet("cloth", 5, 0.2, [0.0, 0.0, 0.0044], "");
+    let floor = "[[obstacles]]\nplane = {}\nfriction = 0.5\n";
+    let mut simulation = simulation(&(head("on", "gravity = [2.0, 0.0, -9.6]") + &cloth + floor));
+    simulation.keep_ledger().unwrap();
+    assert_eq!(crossings(&mut simulation, 60), 0);
+    let mass: f64 = simulation.masses().iter().sum();
+    let force = simulation.ledger().unwrap().entries().last().unwrap().force_on_obstacles;
+    assert!((force[0] / (2.0 * mass) - 1.0).abs() < 1e-2 && (force[2] / (-9.6 * mass) - 1.0).abs() < 1e-2, "{force:?}");
+}
+
+/// The summary says if contact pushes cloth away at the start, and if it makes fabrics thinner.
+#[test]
+fn notes_tell_what_contact_does_to_the_start() {
+    let notes = |text: &str| simulation(text).summary().unwrap().notes.join("\n");
+    let above = |height: f64, dt: f64| {
+        let cloth = sheet("cloth", 5, 0.2, [0.0, 0.0, height], "");
+        notes(&(head("on", "").replace("0.01", &dt.to_string()) + &cloth + "[[obstacles]]\nplane = {}\n"))
+    };
+    let (far, near) = (above(0.006, 0.001), above(0.003, 0.001));
+    assert!(far.is_empty() && above(0.0045, 0.01).is_empty(), "{far}");
+    let expected = "cloth and plane 0 start 3.000 mm apart, within the reach of contact, 5.000 mm";
+    assert!(near.starts_with(expected) && near.ends_with("or reduce the `thickness` of plane 0"), "{near}");
+    let fine = notes(&(head("on", "") + &sheet("cloth", 5, 0.005, [0.0; 3], "")));
+    assert!(fine.starts_with("contact gives fabrics ") && fine.contains("instead of 1.000 mm"), "{fine}");
 }

@@ -44,7 +44,7 @@ use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap, 
 
 pub use friction::Grip;
 pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
-pub use start::{ContactError, ObstacleStart, Participants};
+pub use start::{ContactError, FirstPush, ObstacleStart, Participants};
 pub use untangle::Untangling;
 
 use crate::collision::{Closest, CollisionMesh, Move, Near, Nearby, Neighbourhood, Pair, Search};
@@ -54,7 +54,7 @@ use joined::{Active, Joined};
 use judge::{Judge, Judgement};
 use law::{Barrier, Law, Order};
 use resistance::Resistance;
-pub use spacing::{GAP_PER_THICKNESS, thinning};
+pub use spacing::{GAP_PER_THICKNESS, LARGEST_REACH, thinning};
 use spacing::{Spacing, Spacings};
 
 /// Pairs within this many times the reach join if they are feasible. They have no energy yet, so they do not disturb

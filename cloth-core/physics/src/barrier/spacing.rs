@@ -6,7 +6,7 @@ use crate::collision::{Clearance, CollisionMesh, Pair};
 /// The activation gap over the thickness of cloth.
 pub const GAP_PER_THICKNESS: f64 = 2.0;
 /// The largest reach of contact over the shortest edge. Features of a flat sheet must not touch their neighbours.
-const LARGEST_REACH: f64 = 0.4;
+pub const LARGEST_REACH: f64 = 0.4;
 
 /// Returns the part of their thickness that fabrics keep in contact: coarse fabrics on fine meshes get thinner, with a
 /// gap in proportion. Both lengths are in m.

@@ -3,10 +3,12 @@
 use energy_dsl::Vector3;
 use energy_solve::ContactCounts;
 
-use super::spacing::{Skin, Spacings};
+use super::feasible::Meeting;
+use super::law::Law;
+use super::spacing::{Skin, Spacing, Spacings};
 use super::{BarrierContact, Friction, Joined, Resistance};
 use crate::collision::{
-    CollisionMesh, Crossing, Exclusions, MovingBalls, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
+    Closest, CollisionMesh, Crossing, Exclusions, MovingBalls, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
 };
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
@@ -122,6 +124,19 @@ pub struct ObstacleStart {
     pub reach: f64,
 }
 
+/// How contact pushes what starts within its reach.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstPush {
+    /// The name of the obstacle; `None` if cloth or hair pushes.
+    pub by: Option<String>,
+    /// The distance at the start, in m.
+    pub distance: f64,
+    /// The distance at which contact begins, in m.
+    pub reach: f64,
+    /// About the speed that the push leads to, in m/s.
+    pub speed: f64,
+}
+
 impl BarrierContact {
     /// Creates the contact of a mesh that starts at x. `radii` holds half of the thickness at each vertex, in m; pairs
     /// act within the activation gap `gap` of their thickness, in m. Pairs without a free vertex are ignored.
@@ -197,6 +212,26 @@ impl BarrierContact {
             *skin = Skin { thickness, gap: start.reach - thickness, ..*skin };
         }
         Ok(())
+    }
+
+    /// Returns the fastest push that contact gives to vertices right after the start at x, in steps of `dt`; `None` if
+    /// nothing starts within reach.
+    pub fn first_push(&mut self, x: &[Vector3<f64>], dt: f64) -> Option<FirstPush> {
+        self.visit(x);
+        let meeting = Meeting { mesh: &self.mesh, x };
+        let joined =
+            self.neighbourhood.nearby().within_reach().filter(|(pair, closest)| meeting.may_join(pair, closest));
+        let push = |(pair, closest): (&Pair, &Closest)| {
+            let obstacle = self.mesh.obstacle_of(pair);
+            let radius = obstacle.map_or(0.0, |obstacle| self.spacings.skins[obstacle].radius);
+            let Spacing { thickness, gap } = self.spacing(pair);
+            // The resistance of a vertex is about m/h². All of the energy becomes motion.
+            let law = Law::new(Spacing { thickness, gap }, 1.0 / (dt * dt));
+            let speed = (2.0 * law.energy(law.apart(closest))).sqrt();
+            let by = obstacle.map(|obstacle| self.names[obstacle].clone());
+            FirstPush { by, distance: closest.distance - radius, reach: thickness + gap - radius, speed }
+        };
+        joined.map(push).filter(|push| push.speed > 0.0).max_by(|one, other| one.speed.total_cmp(&other.speed))
     }
 
     fn check_distances(&mut self, x: &[Vector3<f64>]) -> Result<(), ContactError> {

@@ -112,9 +112,10 @@ impl Account {
         // Pairs in contact are known at the end of the step only.
         let mut contact = vec![[0.0; 3]; body.x.len()];
         body.system.add_contact_force(&body.x, &mut contact);
-        let (on_cloth, on_obstacles) = contact.split_at(opening.own);
+        let on_cloth = &contact[..opening.own];
         after.contact_force = on_cloth.iter().map(|force| norm(*force)).fold(0.0, f64::max);
-        after.force_on_obstacles = on_obstacles.iter().fold([0.0; 3], |sum, force| add_scaled(sum, 1.0, *force));
+        // Forces of cloth on cloth add up to zero. Fixed obstacles have no vertex that friction acts on.
+        after.force_on_obstacles = on_cloth.iter().fold([0.0; 3], |sum, force| add_scaled(sum, -1.0, *force));
         let moving: Vec<usize> = opening.pins.iter().map(|(vertex, ..)| *vertex).collect();
         for ((vertex, before, from), now) in opening.pins.iter().zip(potential_forces(body, &moving)) {
             let force = |axis: usize| 0.5 * (before[axis] + now[axis]) + contact[*vertex][axis];

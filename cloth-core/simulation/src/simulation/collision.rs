@@ -1,12 +1,14 @@
 //! Contact of a scene with itself and with obstacles.
 
 use crate::barrier::{
-    BarrierContact, ContactError, GAP_PER_THICKNESS, ObstacleStart, Participants, Untangling, thinning,
+    BarrierContact, ContactError, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, Participants, Untangling,
+    thinning,
 };
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{norm, subtract};
 use crate::model::Model;
+use crate::scene::Scene;
 
 use super::Island;
 
@@ -23,15 +25,20 @@ pub(super) fn add_contact(
     island: &mut Island,
     model: &mut Model,
     with_itself: bool,
-    untangle: bool,
+    scene: &Scene,
 ) -> Result<(), ContactError> {
     let participants = participants(island, model, with_itself);
-    if untangle {
+    if scene.untangle {
         repair(island, model, &participants);
     }
     check_sides(island, model)?;
     let vertices = island.vertices();
-    let contact = BarrierContact::among(participants, &island.body().x).map_err(|error| error.on_vertices(vertices))?;
+    let x = &island.body().x;
+    let mut contact = BarrierContact::among(participants, x).map_err(|error| error.on_vertices(vertices))?;
+    let gravity = norm(scene.gravity);
+    let is_fast = |push: &FirstPush| push.speed > (2.0 * gravity * push.reach).sqrt();
+    let push = contact.first_push(x, scene.dt).filter(is_fast);
+    push.into_iter().for_each(|push| note(model, note_on_push(&push)));
     let contact = contact.with_friction(vertices.iter().map(|&vertex| model.friction[vertex]).collect());
     let contact = contact.with_grips(island.prescribed().grips(&model.obstacles, vertices.len()));
     island.body_mut().system.set_contact(Box::new(contact));
@@ -39,16 +46,19 @@ pub(super) fn add_contact(
 }
 
 /// Returns what collides in an island.
-fn participants(island: &Island, model: &Model, with_itself: bool) -> Participants {
+fn participants(island: &Island, model: &mut Model, with_itself: bool) -> Participants {
     let vertices = island.vertices();
     let mut local = vec![None; model.x.len()];
     vertices.iter().enumerate().for_each(|(place, &vertex)| local[vertex] = Some(place));
     let own = mesh_of(model).restricted(&local, vertices.len());
     let x = &island.body().x;
     let shortest = own.shortest_edge(x);
-    let all = vertices.iter().map(|&vertex| model.thickness[vertex]);
-    let thickest = all.clone().fold(0.0, f64::max);
+    let all: Vec<f64> = vertices.iter().map(|&vertex| model.thickness[vertex]).collect();
+    let thickest = all.iter().copied().fold(0.0, f64::max);
     let scale = thinning(thickest, shortest);
+    if scale < 1.0 {
+        note(model, note_on_thickness(scale, thickest, shortest));
+    }
     let start = |(obstacle, radius): (&Obstacle, f64)| ObstacleStart {
         name: obstacle.name.clone(),
         radius,
@@ -57,13 +67,44 @@ fn participants(island: &Island, model: &Model, with_itself: bool) -> Participan
     let cores = island.prescribed().cores();
     Participants {
         is_free: (0..x.len()).map(|place| vertices.get(place).is_some_and(|&own| !model.pinned_forever[own])).collect(),
-        radii: all.map(|thickness| 0.5 * scale * thickness).collect(),
+        radii: all.iter().map(|thickness| 0.5 * scale * thickness).collect(),
         gap: GAP_PER_THICKNESS * scale * thickest,
         obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
         exclusions: model.exclusions.restricted(&local, vertices.len()),
         with_itself,
         mesh: own.with_obstacles(&cores),
     }
+}
+
+/// Adds a note, unless another island has led to it.
+fn note(model: &mut Model, note: String) {
+    if !model.notes.contains(&note) {
+        model.notes.push(note);
+    }
+}
+
+/// Says that fabrics are thinner in contact than described.
+fn note_on_thickness(scale: f64, thickest: f64, shortest: f64) -> String {
+    let [thickest, thinned, shortest] = [thickest, scale * thickest, shortest].map(|length| 1e3 * length);
+    format!(
+        "contact gives fabrics {:.1} % of their thickness, {thinned:.3} mm instead of {thickest:.3} mm: the shortest \
+         edge, of {shortest:.3} mm, must be longer than {:.1} times the reach of contact",
+        100.0 * scale,
+        1.0 / LARGEST_REACH
+    )
+}
+
+/// Says that contact pushes cloth away at the start.
+fn note_on_push(FirstPush { by, distance, reach, speed }: &FirstPush) -> String {
+    let [distance, reach] = [distance, reach].map(|length| 1e3 * length);
+    let (parts, remedy) = match by {
+        Some(obstacle) => (format!("cloth and {obstacle}"), format!("reduce the `thickness` of {obstacle}")),
+        None => ("parts of the cloth".to_owned(), "reduce the `thickness` of the fabric".to_owned()),
+    };
+    format!(
+        "{parts} start {distance:.3} mm apart, within the reach of contact, {reach:.3} mm, which pushes them apart at \
+         about {speed:.2} m/s, and faster if dt is smaller. Start them farther apart, or {remedy}"
+    )
 }
 
 /// Moves vertices of an island, and of the model, to where nothing crosses. Crossings that are too deep stay.

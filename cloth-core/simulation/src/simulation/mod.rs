@@ -461,7 +461,7 @@ fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, Simul
         islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, SystemError>>()?;
     let with_itself = scene.contact == ContactChoice::On;
     if scene.is_certified() && (with_itself || !model.obstacles.is_empty()) {
-        islands.iter_mut().try_for_each(|island| add_contact(island, model, with_itself, scene.untangle))?;
+        islands.iter_mut().try_for_each(|island| add_contact(island, model, with_itself, scene))?;
     }
     distribute_moving_pins(&mut islands, model);
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
