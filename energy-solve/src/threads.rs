@@ -11,7 +11,7 @@ use rayon_core::{ThreadPool, ThreadPoolBuilder};
 const STACK: usize = 16 << 20;
 
 /// The threads, one per core, which sleep between two calls: to wake one takes a tenth of the time that it takes to
-/// start one. `None` if the system refuses to start them, or in a fork of the process, which has none of its threads.
+/// start one. `None` if the system refuses to start them, or in a forked process, which inherits no threads.
 fn pool() -> Option<&'static ThreadPool> {
     static POOL: OnceLock<(u32, Option<ThreadPool>)> = OnceLock::new();
     let start = || {

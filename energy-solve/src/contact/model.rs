@@ -11,7 +11,7 @@ use crate::matrix::dof_map::DofMap;
 ///
 /// 1. [`ContactModel::begin_step`] forgets the pairs of the last step.
 /// 2. [`ContactModel::certify`] shortens each move: the warm start, the motion of pins, each trial of a line search.
-/// 3. [`ContactModel::set_resistance`] tells how stiff the body is, once in a step.
+/// 3. [`ContactModel::set_resistance`] tells how stiff the body is at the first iterate.
 /// 4. [`ContactModel::meet`] is called at each new iterate. Pairs join there and then stay until the step ends, so that
 ///    a line search sees a single function.
 /// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.

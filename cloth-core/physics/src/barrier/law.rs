@@ -23,7 +23,7 @@ pub(super) struct Law {
     pub stiffness: f64,
 }
 
-/// A barrier at a distance of the surfaces. What was not asked for is zero.
+/// A barrier at a distance of the surfaces. Quantities that were not requested are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Barrier {
     /// The energy, in J; infinite where the surfaces touch.

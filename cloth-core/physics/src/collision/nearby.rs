@@ -66,8 +66,7 @@ impl Nearby {
         others
     }
 
-    /// Returns the pairs of both. Those of the other must be as far apart at the place where these were measured as
-    /// where they were measured themselves.
+    /// Returns the pairs of both. The distances of the others must be the same at both places of measurement.
     pub fn joined_with(mut self, others: &Self, threads: usize) -> Self {
         if others.pairs.is_empty() {
             return self;

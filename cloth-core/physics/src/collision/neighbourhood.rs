@@ -9,8 +9,9 @@ use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 /// iterate.
 ///
 /// Distances do not change if all vertices are translated, so balls move with the mean of all vertices, unless only
-/// some vertices may move. Late iterates of a step move little and need no search. If a move takes vertices out of their balls, one search finds the pairs
-/// that these vertices meet on the way and near its end: the new balls of the next iterate need no other.
+/// some vertices may move. Late iterates of a step move little and need no search. If a move takes vertices out of
+/// their balls, one search finds the pairs that these vertices meet on the way and near its end. The next iterate then
+/// needs no further search.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbourhood {
     /// The centre of each vertex's ball, relative to the origin of all.

@@ -52,6 +52,12 @@ impl Pair {
         self.of(vertices).contains(&true)
     }
 
+    /// The distance within which it is near, if `halves` has half of it at each vertex.
+    #[inline(always)]
+    pub fn reach(&self, halves: &[f64]) -> f64 {
+        halves[self.vertices[0] as usize] + halves[self.vertices[self.first()] as usize]
+    }
+
     /// The largest decrease of the distance by these excursions of the vertices.
     #[inline]
     pub fn approach(&self, excursions: &[f64]) -> f64 {

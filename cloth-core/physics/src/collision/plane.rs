@@ -21,7 +21,6 @@ pub(super) fn safe_part(from: &[Vector3<f64>; 4], to: &[Vector3<f64>; 4], level:
         let end = if part == 1.0 { *to } else { [here(0), here(1), here(2), here(3)] };
         let ([start, least], largest) = heights(from, &end);
         let needed = level * largest;
-        // False for NaN.
         if least >= needed {
             return part;
         }

@@ -30,7 +30,8 @@ pub struct Search {
     obstacles: Trees,
     /// Whether edges of cloth and hair meet edges of obstacles; see [`edges_meet_obstacles`].
     edges_meet_obstacles: bool,
-    /// Whether all of cloth and hair fits the regions of the last search. Obstacles always do.
+    /// Whether all of cloth and hair fits the regions of the last search. Every search fits all
+    /// obstacles.
     is_own_fitted: bool,
     rules: Rules,
     /// The largest half of the reach at a vertex of cloth or hair, in m.
@@ -150,8 +151,7 @@ impl Search {
     /// The distance within which a pair is found, in m. It exceeds what contact needs by far more than rounding errors.
     #[inline]
     pub fn reach(&self, pair: &Pair) -> f64 {
-        let half = |vertex: u32| self.rules.halves[vertex as usize];
-        half(pair.vertices[0]) + half(pair.vertices[pair.first()])
+        pair.reach(&self.rules.halves)
     }
 
     /// Whether certainly no pair comes within its reach while each vertex stays in its ball: cloth is smooth
@@ -334,22 +334,23 @@ impl Search {
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
-    /// and others whose boxes meet. These regions are at rest, and lie in those of the searches before, at some
-    /// instant, unless a vertex is changed: a box at rest meets a moving one if they overlap at any instant.
+    /// and others whose boxes meet. Regions do not move. That of a vertex that is not changed lies in its region of the
+    /// searches before, at one instant. Its box there serves: a box at rest meets a moving one if they overlap at any
+    /// instant.
     pub fn pairs_with(
         &mut self,
         is_changed: &[bool],
         mesh: &CollisionMesh,
         region: impl Fn(usize) -> MovingBounds + Sync,
     ) -> Vec<Pair> {
-        let boxes = Boxes::new(mesh, region, &self.rules.halves, self.threads_in(mesh));
+        let threads = self.threads_in(mesh);
+        let boxes = Boxes::new(mesh, region, &self.rules.halves, threads);
         let changed = changed_features(mesh, is_changed);
         self.refit_changed(&boxes, changed.each_ref().map(|features| &features[..]));
         let kinds = [Kind::Point, Kind::Triangle, Kind::Edge].into_iter().zip(&changed);
         let parts = kinds.flat_map(|(kind, features)| features.chunks(CHANGED).map(move |part| (kind, part))).collect();
-        let found =
-            Found::all(&for_each(self.threads, parts, |(kind, features)| self.find_changed(kind, features, &boxes)));
-        found.in_order(mesh, self.threads)
+        let found = Found::all(&for_each(threads, parts, |(kind, features)| self.find_changed(kind, features, &boxes)));
+        found.in_order(mesh, threads)
     }
 
     /// Finds the pairs of some changed features of one kind.

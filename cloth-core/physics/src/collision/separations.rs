@@ -91,7 +91,7 @@ impl Part<'_> {
         let Some(step) = step else { return (0..self.pairs.len()).collect() };
         let mut uncertain = Vec::with_capacity(self.pairs.len());
         for (number, (pair, separation)) in self.pairs.iter().zip(&mut *self.separations).enumerate() {
-            let (reach, least) = (reach(pair, halves), step.least_separation(pair, *separation));
+            let (reach, least) = (pair.reach(halves), step.least_separation(pair, *separation));
             // False for NaN.
             if least - reach >= (1.0 - LOST) * (*separation - reach) {
                 *separation = least;
@@ -101,12 +101,6 @@ impl Part<'_> {
         }
         uncertain
     }
-}
-
-/// The distance within which a pair is near.
-#[inline(always)]
-fn reach(pair: &Pair, halves: &[f64]) -> f64 {
-    halves[pair.vertices[0] as usize] + halves[pair.vertices[pair.first()] as usize]
 }
 
 struct Measure<'a> {
@@ -133,7 +127,7 @@ impl Kernel for Measure<'_> {
                 for corner in 0..4 {
                     vertices[corner][lane] = pair.vertices[corner];
                 }
-                within_reach[lane] = reach(pair, halves);
+                within_reach[lane] = pair.reach(halves);
             }
             let closest = Closest::between(kind, &corners::<L>(x, &vertices));
             closest.separation.store(&mut apart);

@@ -8,8 +8,8 @@
 //! |P| |x(Y) − x(X)| ≥ |P (x(Y) − x(X))| = |Y − X + ∫ (P F − 1)(Y − X)| ≥ (1 − ε) |Y − X|.
 //!
 //! In the plane, the nearest points of two features without a common vertex are apart by at least w, the least height
-//! of these triangles: one of the points is a vertex, and the line to the other leaves the triangles around that vertex
-//! across an opposite side. So all such features in the rectangle are apart by at least (1 − ε) w / |P| in space. If
+//! of these triangles. One of the points is a vertex. The line to the other leaves the triangles around that vertex
+//! across an opposite side, so it is at least as long as a height. All such features in the rectangle are apart by at least (1 − ε) w / |P| in space. If
 //! vertices stray by r at most from where F is known, 2 r less is left. If that exceeds the reach, the rectangle has no
 //! pairs.
 //!
@@ -66,22 +66,22 @@ impl<'a> Shapes<'a> {
         Self::around(tiling, ends, &vec![true; tiling.tiles.len()], threads)
     }
 
-    /// Looks at all tiles as [`Shapes::new`], but leaves open how far apart features are in blocks without a wanted
-    /// tile.
+    /// Looks at the tiles of blocks with a wanted tile. It is not known how far features of other blocks are apart.
     pub fn around(tiling: &'a Tiling, ends: [&[Vector3<f64>]; 2], is_wanted: &[bool], threads: usize) -> Self {
         let padded = |x: &[Vector3<f64>]| x.iter().map(|&[a, b, c]| [a, b, c, 0.0]).collect();
         let ends = &ends.map(|x| collect(threads, x.len(), VERTICES, |range| padded(&x[range])));
         let has_wanted = |block: &[usize]| block.iter().any(|tile| is_wanted[*tile]);
-        let mut is_part = vec![false; tiling.tiles.len()];
+        let mut matters = vec![false; tiling.tiles.len()];
         for block in tiling.blocks.iter().filter(|block| has_wanted(block)) {
-            block.iter().for_each(|tile| is_part[*tile] = true);
+            block.iter().for_each(|tile| matters[*tile] = true);
         }
         let tiles = collect(threads, tiling.tiles.len(), TILES, |range| {
-            dispatch(Look { tiles: &tiling.tiles[range.clone()], is_part: &is_part[range], ends })
+            dispatch(Look { tiles: &tiling.tiles[range.clone()], matters: &matters[range], ends })
         });
         let apart = |block: &Vec<usize>| {
-            let shapes = block.iter().filter(|_| has_wanted(block)).map(|tile| tiles[*tile]);
-            shapes.reduce(Shape::joined).map_or(f64::NEG_INFINITY, |shape| shape.apart())
+            let wanted = if has_wanted(block) { &block[..] } else { &[] };
+            let joined = wanted.iter().map(|tile| tiles[*tile]).reduce(Shape::joined);
+            joined.map_or(f64::NEG_INFINITY, |shape| shape.apart())
         };
         let apart =
             collect(threads, tiling.blocks.len(), TILES, |range| tiling.blocks[range].iter().map(apart).collect());
@@ -156,7 +156,7 @@ type Column = [f64; 4];
 struct Look<'a> {
     tiles: &'a [Tile],
     /// Whether F matters in each of these tiles.
-    is_part: &'a [bool],
+    matters: &'a [bool],
     /// The places of vertices at the start and at the end.
     ends: &'a [Vec<Column>; 2],
 }
@@ -168,9 +168,9 @@ impl Kernel for Look<'_> {
     fn run<L: Level>(self) -> Vec<Shape> {
         let [start, end] = self.ends;
         let mut shapes = Vec::with_capacity(self.tiles.len());
-        for (tile, is_part) in self.tiles.iter().zip(self.is_part) {
+        for (tile, matters) in self.tiles.iter().zip(self.matters) {
             let derivatives =
-                if *is_part { [tile.derivatives(start), tile.derivatives(end)] } else { [Entries::EMPTY; 2] };
+                if *matters { [tile.derivatives(start), tile.derivatives(end)] } else { [Entries::EMPTY; 2] };
             shapes.push(Shape { around: [tile.around(start), tile.around(end)], derivatives, height: tile.height });
         }
         shapes

@@ -285,7 +285,6 @@ impl Island {
         free.map(|&local| [before[self.vertices[local]], self.body.x[local]])
     }
 
-    /// Copies positions and velocities to the scene.
     /// Writes the forces of contact on the vertices, in N, to `forces` of the scene.
     pub(super) fn scatter_contact_forces(&self, forces: &mut [Vector3<f64>]) {
         let mut own = vec![[0.0; 3]; self.body.x.len()];
@@ -295,6 +294,7 @@ impl Island {
         }
     }
 
+    /// Copies positions and velocities to the scene.
     pub(super) fn scatter(&self, x: &mut [Vector3<f64>], v: &mut [Vector3<f64>]) {
         for (local, &vertex) in self.vertices.iter().enumerate() {
             (x[vertex], v[vertex]) = (self.body.x[local], self.body.v[local]);

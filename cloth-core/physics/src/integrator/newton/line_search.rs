@@ -27,7 +27,7 @@ pub(super) enum Prefetch<'a> {
 pub(super) struct AcceptedStep {
     /// Length of the step, in units of the search direction.
     pub scale: f64,
-    /// The longest step that was tried: 1, or less if contact allows no more.
+    /// The length of the first step that was tried: 1, or less if contact allows no more.
     pub allowed: f64,
     /// E after the step.
     pub energy: Energy,
