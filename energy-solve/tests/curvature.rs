@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
-/// Returns a term of generated elements, each with points of its own.
+/// Returns a term of generated elements, each with its own points.
 pub(crate) fn compiled<E, const N: usize>(elements: &[E]) -> Box<dyn Term>
 where
     E: PackedPotential<f64> + Debug + 'static + Send + Sync,
@@ -33,7 +33,7 @@ impl Read {
         Self(Interpreted::from_source(E::DECLARATION.source).unwrap().pop().unwrap())
     }
 
-    /// Returns a term of equal elements, each with points of its own.
+    /// Returns a term of equal elements, each with its own points.
     pub(crate) fn term(&self, count: usize, rest: &[&[f64]], parameters: &[f64]) -> Box<dyn Term> {
         let rest: Vec<_> = rest.iter().map(|numbers| Column::Same(numbers)).collect();
         let parameters: Vec<_> = parameters.chunks(1).map(Column::Same).collect();

@@ -1,6 +1,6 @@
 //! The physics of cloth: what `cloth-core` assembles into scenes and steps through time.
 //!
-//! It is a crate of its own so that kernels and solvers are built with full optimisation, and scene files without.
+//! It is a separate crate so that kernels and solvers are built with full optimisation, and scene files without.
 //! Modules, from the bottom up; each uses only those above it:
 //!
 //! - [`geometry`]: vectors, rigid motions, boxes and hierarchies of boxes

@@ -1,6 +1,6 @@
 //! Scene files in TOML. Each key is a field below, with its unit; unknown keys are errors.
 //!
-//! It is a crate of its own because it runs once and need not be fast: it is built without optimisation.
+//! It is a separate crate because it runs once and need not be fast: it is built without optimisation.
 //!
 //! ```
 //! use cloth_scene::Scene;

@@ -1,6 +1,6 @@
 //! The simulation of cloth: assembles scenes, steps them through time, and draws and encodes their states.
 //!
-//! It is a crate of its own so that it is built with full optimisation, and the commands of `cloth-core` with little.
+//! It is a separate crate so that it is built with full optimisation, and the commands of `cloth-core` with little.
 //! Modules, from the bottom up; each uses only those above it:
 //!
 //! - [`ledger`]: the energy balance

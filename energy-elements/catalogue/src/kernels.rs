@@ -89,7 +89,7 @@ fn padded<S: Float>(numbers: Vec<S>) -> Vec<S> {
     if numbers.is_empty() { vec![S::from_f64(0.0)] } else { numbers }
 }
 
-/// Packs elements of which each has places of its own.
+/// Packs elements that each have their own places.
 fn packed<E: Stored<S>, S: Float>(count: usize, places: usize, element: impl Fn(usize) -> E) -> Option<Packed<E, S>> {
     u32::try_from(count * places).ok()?;
     let elements: Vec<E> = (0..count).map(element).collect();

@@ -1,6 +1,6 @@
 use std::fmt;
 
-/// Where contact presses a body the most. Messages about failed steps name it.
+/// The place where contact presses a body the most. Messages about failed steps name it.
 ///
 /// ```
 /// use energy_solve::{Pressed, Presser};
@@ -13,7 +13,7 @@ use std::fmt;
 pub struct Pressed {
     /// The vertices of the pressed feature.
     pub vertices: Vec<usize>,
-    /// What presses it: one thing, or two from opposite sides.
+    /// The things that press it: one, or two from opposite sides.
     pub by: Vec<Presser>,
 }
 

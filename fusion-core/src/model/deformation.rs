@@ -48,7 +48,7 @@ impl ModelOptions {
     /// Largest number of relaxations: attachments are then the same on the whole body.
     const MOST_RELAXATIONS: usize = 100;
 
-    /// Checks every option except the number of nodes per vertex, which has an error of its own.
+    /// Checks every option except the number of nodes per vertex, which has its own error.
     ///
     /// # Errors
     /// Names the first option that cannot be used.

@@ -16,7 +16,7 @@ pub fn sample_nodes(vertices: &[Vector3<f64>], radius: f64) -> Vec<usize> {
     nodes
 }
 
-/// Selects vertices as [`sample_nodes`] does, by distances along a surface: a hand on a thigh keeps nodes of its own.
+/// Selects vertices as [`sample_nodes`] does, by distances along a surface: a hand on a thigh keeps its own nodes.
 #[must_use]
 pub fn sample_on_surface(surface: &Surface, vertices: usize, radius: f64) -> Vec<usize> {
     let mut search = SurfaceSearch::new(surface);

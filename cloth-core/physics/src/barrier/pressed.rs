@@ -1,4 +1,4 @@
-//! Where contact presses the most, for messages.
+//! The place where contact presses the most, for messages.
 
 use energy_dsl::Vector3;
 use energy_solve::{Pressed, Presser};

@@ -5,7 +5,7 @@ use energy_dsl::Vector3;
 use crate::geometry::{add_scaled, norm, subtract};
 
 /// Returns the length of each displacement relative to their mean, in m. A rounding error of the mean moves all
-/// vertices alike, so it changes no distance.
+/// vertices equally, so it changes no distance.
 pub(super) fn excursions(from: &[Vector3<f64>], to: &[Vector3<f64>], mean: Vector3<f64>) -> Vec<f64> {
     let excursion = |(from, to): (&Vector3<f64>, &Vector3<f64>)| norm(subtract(subtract(*to, *from), mean));
     from.iter().zip(to).map(excursion).collect()

@@ -189,7 +189,7 @@ fn sheet(cells: usize) -> (CollisionMesh, Vec<Vector3<f64>>) {
 fn a_flat_sheet_has_no_crossings_and_a_folded_one_has() {
     let (mesh, flat) = sheet(6);
     assert_eq!(crossings(&mesh, &flat), []);
-    // The outer column is turned over onto its neighbours, first beside them and then into their plane.
+    // The outer column is turned over onto its neighbours, first next to them and then into their plane.
     let folded = |height: f64| {
         let turned = |(number, x): (usize, &Vector3<f64>)| {
             if number / 7 == 6 { [0.043, x[1] + 0.001, height] } else { *x }
@@ -311,7 +311,7 @@ proptest! {
         }
     }
 
-    /// Places beside the path of a stray are not known.
+    /// Places off the path of a stray are not known.
     #[test]
     fn only_places_on_the_way_are_known(move_by in vector(0.02), aside in vector(1e-3), part in 0.0..1.0_f64) {
         let (mesh, x) = sheet(4);

@@ -351,7 +351,7 @@ mod tests {
         let holed: Vec<_> = triangles.iter().copied().enumerate().filter(|(n, _)| *n != 1100).map(|(_, t)| t).collect();
         // At most the nine tiles around the hole, and so the blocks with one of them.
         assert!((1..=16).contains(&count(&holed, &x)), "{}", count(&holed, &x));
-        // A slit along an edge: one triangle has a vertex of its own.
+        // A slit along an edge: one triangle has its own vertex.
         let mut slit = triangles.clone();
         slit[1100][0] = x.len();
         let with_double = [&x[..], &[x[triangles[1100][0]]]].concat();

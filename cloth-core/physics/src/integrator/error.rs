@@ -40,7 +40,7 @@ pub enum StepError {
         iterations: u64,
         /// Why the linear solver stopped.
         stopped: StopReason,
-        /// Where contact presses the most, if it shortened a move of this step.
+        /// The place where contact presses the most, if it shortened a move of this step.
         pressed: Option<Pressed>,
     },
     /// Contact does not let pins and obstacles reach their places at the end of the step.
@@ -53,7 +53,7 @@ pub enum StepError {
         moves: usize,
         /// The part of their way that they went.
         part: f64,
-        /// Where contact presses the most.
+        /// The place where contact presses the most.
         pressed: Option<Pressed>,
     },
     /// Newton's method did not converge.
@@ -66,7 +66,7 @@ pub enum StepError {
         iterations: u64,
         /// The largest change of a velocity component in the last iteration, in m/s.
         change: f64,
-        /// Where contact presses the most, if it shortened a move of this step.
+        /// The place where contact presses the most, if it shortened a move of this step.
         pressed: Option<Pressed>,
     },
     /// A force has neither an energy nor a dissipation function, so Newton's method cannot minimise anything.

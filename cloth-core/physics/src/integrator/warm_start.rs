@@ -8,7 +8,7 @@ use crate::body::Body;
 /// last step took n iterations.
 ///
 /// Accelerations of soft modes persist from step to step; those of stiff modes do not. A step with many iterations had
-/// stiff modes, hence the factor 1/n.
+/// stiff modes. This is why the factor is 1/n.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct WarmStart {
     /// Accelerations of all vertices, in m/s²; empty before the first step.

@@ -20,7 +20,7 @@ pub struct Scenery {
     strands: Vec<Range<usize>>,
     /// Width of each strand, in m.
     widths: Vec<f64>,
-    /// The colour of each vertex; empty if no garment has one of its own.
+    /// The colour of each vertex; empty if no garment sets one.
     colours: Vec<Option<[f32; 3]>>,
     obstacles: Vec<Obstacle>,
     style: Style,

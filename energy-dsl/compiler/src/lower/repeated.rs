@@ -13,7 +13,7 @@ pub use energy_runtime::tape::Repetition;
 
 /// A sum of like terms.
 pub(super) struct LikeTerms {
-    /// The program of one term. It reads what differs from bindings of its own.
+    /// The program of one term. It reads its differences from its own bindings.
     pub(super) term: Program,
     /// Number of terms.
     pub(super) terms: usize,
@@ -100,7 +100,7 @@ impl<'a> Unifier<'a> {
             && let ("+", [sum, last]) = (function.name, &list[..])
         {
             terms.insert(0, last);
-            // The first term may be a sum of its own.
+            // The first term may itself be a sum.
             let (bindings, stored, constants) = (self.bindings.len(), self.stored.len(), self.constants.len());
             let all: Vec<&Typed> = std::iter::once(sum).chain(terms.iter().copied()).collect();
             if let Some(term) = self.unified(&all) {

@@ -15,7 +15,7 @@ pub(crate) struct SpinBarrier {
     is_broken: AtomicBool,
 }
 
-/// The time in which a thread takes part in a barrier.
+/// The time in which a thread may wait at a barrier.
 #[derive(Debug)]
 pub(crate) struct Participation<'a>(&'a SpinBarrier);
 

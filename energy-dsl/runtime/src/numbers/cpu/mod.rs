@@ -199,7 +199,7 @@ pub(crate) use x86::read_alone;
 #[cfg(target_arch = "x86_64")]
 use x86::{detected, run_at, run_scalar};
 
-/// Reads a number by a load of its own.
+/// Reads a number by a separate load.
 #[cfg(not(target_arch = "x86_64"))]
 #[inline(always)]
 pub(crate) fn read_alone<T: Copy>(number: &T) -> T {

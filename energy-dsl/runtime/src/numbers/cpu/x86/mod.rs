@@ -82,7 +82,7 @@ pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     }
 }
 
-/// Reads a number by a load of its own. Volatile loads are not merged into wider ones.
+/// Reads a number by a separate load. Volatile loads are not merged into wider ones.
 #[inline(always)]
 pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
     // SAFETY: a reference is valid for reads, aligned and initialised, and what it refers to is `Copy`.
