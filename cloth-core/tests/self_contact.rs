@@ -179,6 +179,19 @@ fn threads_and_resumed_runs_change_no_bit() {
     assert!(one.positions() == resumed.positions(), "resumed");
 }
 
+/// A run that resumes after its last step writes its summary again.
+#[test]
+fn the_summary_after_a_restoration_has_the_energy_of_contact() {
+    let (mut stepped, mut restored) = (simulation(&falling("on")), simulation(&falling("on")));
+    crossings(&mut stepped, 14);
+    restored.restore(stepped.save()).unwrap();
+    let [one, other] = [&mut stepped, &mut restored].map(|simulation| {
+        let terms = simulation.summary().unwrap().terms;
+        terms.iter().find(|term| term.name == "contact").unwrap().energy.unwrap()
+    });
+    assert!(one > 0.0 && one == other, "{one} J and {other} J");
+}
+
 /// The first step of each scene of contact: nothing crosses, nothing is too close.
 #[test]
 fn scenes_of_contact_start() {

@@ -6,7 +6,7 @@ use energy_elements::{DistanceBarrier, SlidingFriction};
 use energy_solve::{Counts, EvaluationError, State, Tally};
 use serde::{Deserialize, Serialize};
 
-use super::{Simulation, Totals};
+use super::{Island, Simulation, Totals};
 use crate::Body;
 use crate::integrator::{Phases, SolvedBy};
 use crate::model::{Model, TermLabel};
@@ -179,11 +179,12 @@ impl Simulation {
     /// Returns the elements of certified contact, which is not a term: the energy of the pairs at the end, friction
     /// included. Their number changes all the time; [`Totals::contact`] counts the work.
     fn contact_terms(&self) -> Vec<TermSummary> {
-        let energies = self.islands.iter().filter_map(|island| {
-            let body = island.body();
-            body.system.contact_energy(&body.x)
-        });
-        let Some(energy) = energies.reduce(|sum, energy| sum + energy) else { return Vec::new() };
+        let energies: Vec<f64> = self.islands.iter().filter_map(Island::contact_energy).collect();
+        if energies.is_empty() {
+            return Vec::new();
+        }
+        // Starting at 0 turns −0, the sum of no pairs, into 0.
+        let energy = energies.iter().fold(0.0, |sum, energy| sum + energy);
         let named = [
             ("contact", <DistanceBarrier as Element>::DECLARATION.name, Some(energy)),
             ("friction of contact", <SlidingFriction as Element>::DECLARATION.name, None),
