@@ -69,8 +69,9 @@ pub enum SimulationError {
     Restore(#[from] RestoreError),
     /// A step failed.
     #[error(
-        "step {step} (t = {time:.4} s){}: {source}",
-        .deformed.as_ref().map(|element| format!(", before which {element}")).unwrap_or_default()
+        "step {step} (t = {time:.4} s){}: {source}{}",
+        .deformed.as_ref().map(|element| format!(", before which {element}")).unwrap_or_default(),
+        .source.advice().map(|advice| format!(". {advice}")).unwrap_or_default()
     )]
     Step {
         /// The step that failed, from 1.
