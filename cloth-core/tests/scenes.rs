@@ -91,8 +91,8 @@ fn cloth_stays_outside_obstacles_and_distant_vertices_are_skipped() {
         }
         assert!(deepest > 0.0 && deepest < 0.005, "{obstacle}: {deepest}");
         let contact = summary.terms.iter().find(|term| term.element.ends_with("Contact")).unwrap();
-        assert!(contact.counts.hessian.evaluated > 0, "{contact:?}");
-        assert!(contact.counts.hessian.skipped > 0, "{contact:?}");
+        let hessian = contact.counts.unwrap().hessian;
+        assert!(hessian.evaluated > 0 && hessian.skipped > 0, "{contact:?}");
     }
 }
 

@@ -107,6 +107,7 @@ pub struct Simulation {
     prescribed: Prescribed,
     /// Pairs of features that do not collide.
     exclusions: Exclusions,
+    contact: ContactChoice,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
     masses: Vec<f64>,
@@ -169,6 +170,7 @@ impl Simulation {
             obstacle_mesh,
             prescribed,
             exclusions,
+            contact: scene.contact,
             x,
             v,
             masses,
@@ -367,7 +369,7 @@ impl Simulation {
     /// Steps the islands that are awake and returns how many sleep. Positions, velocities and the ledger change only
     /// after every island has succeeded.
     fn step_islands(&mut self, step: u64) -> Result<(StepReport, u64), StepError> {
-        let Self { islands, x, v, ledger, obstacles, summary, .. } = self;
+        let Self { islands, x, v, ledger, obstacles, summary, contact, .. } = self;
         let context = StepContext::new(step, self.dt, &self.motions, obstacles, self.may_sleep);
         let (mut total, mut slept) = (StepReport::default(), 0);
         for (number, island) in islands.iter_mut().enumerate() {
@@ -385,8 +387,9 @@ impl Simulation {
             if island.try_to_sleep(&context) {
                 ledger.iter_mut().for_each(|ledger| ledger.note_sleep(number));
             }
-            // Certified moves pass through nothing.
-            let passable = if island.body().system.has_contact() { &[] } else { &obstacles[..] };
+            // Certified moves pass through nothing, and without contact nothing is meant to stop.
+            let is_exempt = island.body().system.has_contact() || *contact == ContactChoice::Off;
+            let passable = if is_exempt { &[] } else { &obstacles[..] };
             for obstacle in passable {
                 let passage = obstacle.passages([context.time, context.end], island.moves(x));
                 passage.into_iter().for_each(|passage| summary.totals.note(passage));
@@ -439,7 +442,8 @@ impl Simulation {
 
     /// Warns of free vertices that start inside an obstacle.
     fn warn_of_vertices_inside_obstacles(&mut self) {
-        for obstacle in &self.obstacles {
+        let colliding = if self.contact == ContactChoice::Off { &[] } else { &self.obstacles[..] };
+        for obstacle in colliding {
             let solid = obstacle.at(0.0);
             let inside = |body: &Body| {
                 let free = body.system.dofs().free().iter();
