@@ -213,7 +213,7 @@ fn impossible_starts_are_refused_with_the_cause() {
     let flat = sheet(4, 0.2, [0.0; 3], "");
     let message = refused(&flat, "name = \"ball\"\nsphere = { radius = 0.06 }\n");
     assert!(
-        message.starts_with("5 vertices start inside ball, the deepest is vertex 12, 60.000 mm below"),
+        message.starts_with("5 vertices start inside ball, the deepest is vertex 12 of cloth, 60.000 mm below"),
         "{message}"
     );
     let message = refused(&flat, "name = \"pea\"\nsphere = { radius = 0.01, centre = [0.02, 0.03, 0.002] }\n");

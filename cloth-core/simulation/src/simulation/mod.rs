@@ -466,12 +466,21 @@ fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, Simul
         islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, SystemError>>()?;
     let with_itself = scene.contact == ContactChoice::On;
     if scene.is_certified() && (with_itself || !model.obstacles.is_empty()) {
-        islands.iter_mut().try_for_each(|island| add_contact(island, model, with_itself, scene.untangle))?;
+        for island in &mut islands {
+            add_contact(island, model, with_itself, scene.untangle).map_err(|error| named(error, scene, model))?;
+        }
     }
     distribute_moving_pins(&mut islands, model);
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
     Ok(islands)
+}
+
+/// Names the garments of an error at the start, and says whether a repair was tried.
+fn named(error: ContactError, scene: &Scene, model: &Model) -> ContactError {
+    let parts: Vec<_> = model.parts.iter().map(|part| (part.name.as_str(), part.vertices.clone())).collect();
+    let error = error.among_parts(&parts);
+    if scene.untangle { error.after_repair() } else { error }
 }
 
 /// Hands each moving pin to the island of its vertex.
