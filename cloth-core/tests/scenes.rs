@@ -176,6 +176,14 @@ fn an_integrator_that_loses_a_tenth_of_the_energy_gives_a_warning() {
 }
 
 #[test]
+fn energy_that_appears_gives_a_warning() {
+    let head = "dt = 0.02\nduration = 0.4\nintegrator = \"implicit-euler\"";
+    let ball = "[[obstacles]]\nsphere = { centre = [0.0, 0.0, -0.1], radius = 0.08 }\nstiffness = 5e9\n";
+    let warnings = finished(&(sheet(head, 6, 0.2) + ball)).summary().unwrap().warnings;
+    assert!(warnings.iter().any(|warning| warning.starts_with("implicit-euler gained ")), "{warnings:?}");
+}
+
+#[test]
 fn an_energy_balance_that_does_not_close_gives_a_warning() {
     // A strong pull within one and a half steps.
     let head = "dt = 0.02\nduration = 0.3\nintegrator = \"implicit-midpoint\"";

@@ -241,7 +241,8 @@ impl Simulation {
         summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));
         let Some(ledger) = &self.ledger else { return };
         let integrator = &summary.integrator;
-        summary.warnings.extend(ledger.imbalance(integrator).or_else(|| ledger.loss(integrator)));
+        let of_energy = ledger.imbalance(integrator).or_else(|| ledger.gain(integrator));
+        summary.warnings.extend(of_energy.or_else(|| ledger.loss(integrator)));
     }
 }
 
