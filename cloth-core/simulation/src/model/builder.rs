@@ -356,9 +356,12 @@ impl<'a> Builder<'a> {
 
     fn exclude(&mut self) -> Result<(), ExclusionError> {
         let Model { parts, obstacles, x, sewn, pinned_at_start, .. } = &self.model;
-        let mut exclusions = Referents { parts, obstacles, x, sewn }.exclusions(&self.scene.exclusions)?;
+        let referents = Referents { parts, obstacles, x, sewn };
+        let mut exclusions = referents.exclusions(&self.scene.exclusions)?;
+        let idle = referents.without_effect(&self.scene.exclusions, self.scene.contact);
         exclusions::hold(&mut exclusions, obstacles, x, pinned_at_start);
         self.model.exclusions = exclusions;
+        self.model.warnings.extend(idle);
         Ok(())
     }
 
