@@ -333,6 +333,7 @@ fn contradictory_scenes_are_rejected_with_a_remedy() {
 #[test]
 fn the_scenes_of_the_gallery_are_valid() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let gallery = std::fs::read_to_string(folder.join("../docs/scenes.md")).unwrap();
     let mut count = 0;
     let folders = [folder.clone(), folder.join("garment"), folder.join("contact")];
     let folders = folders.map(|folder| std::fs::read_dir(folder).unwrap());
@@ -341,6 +342,9 @@ fn the_scenes_of_the_gallery_are_valid() {
         if path.extension().is_some_and(|extension| extension == "toml") {
             let scene = Scene::read(&path).unwrap_or_else(|error| panic!("{error}"));
             let simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            let name = path.strip_prefix(&folder).unwrap().with_extension("").display().to_string();
+            let entries = [format!("### {name}\n"), format!("| `{name}` |")];
+            assert!(entries.iter().any(|entry| gallery.contains(entry)), "{name} is not in docs/scenes.md");
             assert!(simulation.warnings().is_empty(), "{}: {:?}", path.display(), simulation.warnings());
             for term in simulation.terms() {
                 let name = term.declaration().name;
