@@ -133,6 +133,11 @@ fn wrong_frames_are_refused_with_the_reason() {
     };
     let message = refused(&scene(&FRAMES.replace("body_*", "figure_*"), ""));
     assert!(message.contains("no file matches") && message.contains("figure_*.obj"), "{message}");
+    let message = refused(&scene(&FRAMES.replace(", frames_per_second = 10.0", ""), ""));
+    assert!(
+        message.contains("body_*.obj has a `*`") && message.contains("`frames_per_second` is missing"),
+        "{message}"
+    );
     let message = refused(&scene(FRAMES, "contact = \"off\""));
     assert!(message.contains("frames_per_second") && message.contains("newton"), "{message}");
     let message = refused(&scene(&format!("{FRAMES}\nmotion.keys = [{{ time = 0.0 }}]"), ""));
@@ -143,4 +148,7 @@ fn wrong_frames_are_refused_with_the_reason() {
     std::fs::write(folder.path().join("body_3.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let message = refused(&scene(FRAMES, ""));
     assert!(message.contains("body_3.obj has other vertices or faces than"), "{message}");
+    std::fs::rename(folder.path().join("body_3.obj"), folder.path().join("body_5.obj")).unwrap();
+    let message = refused(&scene(FRAMES, ""));
+    assert!(message.contains("body: no file has the number 3: "), "{message}");
 }

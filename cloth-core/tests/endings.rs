@@ -136,6 +136,25 @@ fn signals_set_the_exit_status_and_stay_ignored_if_they_were() {
     assert_eq!(child.wait().unwrap().code(), Some(143));
 }
 
+/// `timeout` sends its signal to the program and then to its group.
+#[cfg(unix)]
+#[test]
+fn a_signal_that_is_sent_twice_at_once_counts_once() {
+    if ignores(15) {
+        return;
+    }
+    let folder = with_scene(&endless());
+    let mut child = started(&["run", "scene.toml", "-o", "out"], folder.path());
+    let out = folder.path().join("out");
+    wait_for(&out.join("frames/cloth_0002.obj"));
+    send("-TERM", &child);
+    send("-TERM", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+    for name in ["run.json", "summary.txt", "cloth.glb", "cloth.png"] {
+        assert!(out.join(name).exists(), "{name} was not written");
+    }
+}
+
 #[test]
 fn pictures_of_frames_are_drawn_while_the_run_continues() {
     if std::thread::available_parallelism().map_or(1, usize::from) == 1 {

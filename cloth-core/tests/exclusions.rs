@@ -74,10 +74,25 @@ fn seams_exclude_what_is_near_them() {
 }
 
 #[test]
+fn exclusions_of_what_does_not_collide_give_a_warning() {
+    let exclude = "[[exclude]]\nbetween = [\"floor\", \"cloth\"]\n[[exclude]]\nbetween = [\"net\", \"cloth\"]\n\
+                   [[exclude]]\ncloser_than = 1e-3\n";
+    let warnings = |contact: &str| {
+        let text = falling(exclude).replacen("dt", &format!("contact = \"{contact}\"\ndt"), 1);
+        simulation(&text).unwrap().warnings().to_vec()
+    };
+    assert!(warnings("on").is_empty());
+    let of_obstacles = warnings("obstacles");
+    assert!(of_obstacles.len() == 2 && of_obstacles[0].starts_with("exclude[1] has no effect: "), "{of_obstacles:?}");
+    assert_eq!(warnings("off").len(), 3);
+}
+
+#[test]
 fn exclusions_that_mean_nothing_are_refused() {
     for (exclude, expected) in [
         ("between = [\"cloth\", \"body\"]", "exclude[0]: nothing is called `body`; there are net, cloth, floor"),
-        ("between = [\"cloth\", \"net\"]\ncloser_than = 0.1", "exclude[0]: expected one of `between`"),
+        ("between = [\"cloth\", \"net\"]\ncloser_than = 0.1", "test.toml:20:1: expected exactly one of `between`"),
+        ("", "test.toml:20:1: expected exactly one of `between`"),
         ("closer_than = 0.0", "expected a finite number greater than 0"),
     ] {
         let message = simulation(&falling(&format!("[[exclude]]\n{exclude}\n"))).unwrap_err();

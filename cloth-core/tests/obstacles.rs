@@ -189,6 +189,23 @@ fn threads_and_resumed_runs_change_no_bit() {
 }
 
 #[test]
+fn obstacles_of_one_name_are_refused() {
+    let sheet = sheet(1, 0.2, [0.0; 3], "");
+    let new = |names: [&str; 2]| {
+        let ball = "sphere = { radius = 0.1, centre = [0.0, 0.0, -1.0] }";
+        let balls = names.map(|name| format!("[[obstacles]]\n{name}\n{ball}\n")).concat();
+        Simulation::new(&scene(&(head("") + &sheet + &balls))).map_err(|error| error.to_string())
+    };
+    let expected = "two obstacles are called `ball`; give one of them another `name`";
+    assert_eq!(new(["name = \"ball\""; 2]).unwrap_err(), expected);
+    assert!(
+        new(["name = \"sphere 1\"", ""]).unwrap_err().contains("called `sphere 1`"),
+        "the other one has this name by default"
+    );
+    assert!(new(["", ""]).is_ok(), "names by default differ");
+}
+
+#[test]
 fn impossible_starts_are_refused_with_the_cause() {
     let refused = |cloth: &str, obstacle: &str| {
         Simulation::new(&scene(&(head("") + cloth + "[[obstacles]]\n" + obstacle))).unwrap_err().to_string()
@@ -196,7 +213,7 @@ fn impossible_starts_are_refused_with_the_cause() {
     let flat = sheet(4, 0.2, [0.0; 3], "");
     let message = refused(&flat, "name = \"ball\"\nsphere = { radius = 0.06 }\n");
     assert!(
-        message.starts_with("5 vertices start inside ball, the deepest is vertex 12, 60.000 mm below"),
+        message.starts_with("5 vertices start inside ball, the deepest is vertex 12 of cloth, 60.000 mm below"),
         "{message}"
     );
     let message = refused(&flat, "name = \"pea\"\nsphere = { radius = 0.01, centre = [0.02, 0.03, 0.002] }\n");

@@ -378,6 +378,8 @@ fn stats_list_evaluations_per_term_also_in_the_summary() {
         assert_eq!((membrane.len(), membrane[0], membrane[9], bending[0]), (10, 128, 0, 176));
         assert!(membrane[5] > 5 * 128 && bending[5] < 2 * 176 && bending[9] > 5 * 176, "{membrane:?} {bending:?}");
         assert!(text.contains("\n1 island\n") && text.contains("assembly"), "{text}");
+        let contact = text.lines().rfind(|line| line.trim_start().starts_with("friction of contact")).unwrap();
+        assert_eq!(contact.matches('–').count(), 10, "nothing counts the elements of contact: {contact}");
     }
 }
 

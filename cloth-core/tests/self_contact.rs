@@ -179,6 +179,41 @@ fn threads_and_resumed_runs_change_no_bit() {
     assert!(one.positions() == resumed.positions(), "resumed");
 }
 
+/// A run that resumes after its last step writes its summary again.
+#[test]
+fn the_summary_after_a_restoration_has_the_energy_of_contact() {
+    let (mut stepped, mut restored) = (simulation(&falling("on")), simulation(&falling("on")));
+    crossings(&mut stepped, 14);
+    restored.restore(stepped.save()).unwrap();
+    let [one, other] = [&mut stepped, &mut restored].map(|simulation| {
+        let terms = simulation.summary().unwrap().terms;
+        terms.iter().find(|term| term.name == "contact").unwrap().energy.unwrap()
+    });
+    assert!(one > 0.0 && one == other, "{one} J and {other} J");
+}
+
+/// Two sheets and a ball that cross: nothing collides, or all vertices are pinned.
+#[test]
+fn warnings_of_crossings_say_why_contact_did_not_prevent_them() {
+    let upright = "placement.rotate = { axis = [0.0, 1.0, 0.0], angle = 90.0 }";
+    let crossed = |contact: &str, pins: &str| {
+        let sheets = sheet("a", 2, 0.1, [0.0; 3], "") + &sheet("b", 2, 0.1, [0.01, 0.02, 0.0], upright);
+        let ball = "[[obstacles]]\nname = \"ball\"\nsphere = { radius = 0.01, centre = [0.03, 0.0, 0.015] }\n\
+                    motion.keys = [{ time = 0.0 }, { time = 0.02, translate = [0.0, 0.0, -0.015] }]\n";
+        let mut simulation = simulation(&(head(contact, "") + &sheets + ball + pins));
+        assert!(crossings(&mut simulation, 2) > 0);
+        simulation.summary().unwrap().warnings
+    };
+    for (contact, pins, cause) in [
+        ("off", "", "Nothing collides with `contact = \"off\"`"),
+        ("on", "[[pins]]\nall = true\n", "vertices there are pinned"),
+    ] {
+        let warnings = crossed(contact, pins);
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
+        assert!(warnings.iter().all(|warning| warning.contains(cause)), "{warnings:?}");
+    }
+}
+
 /// The first step of each scene of contact: nothing crosses, nothing is too close.
 #[test]
 fn scenes_of_contact_start() {

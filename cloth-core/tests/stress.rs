@@ -111,7 +111,7 @@ fn outcome(result: &Result<(), StepError>) -> Outcome {
         other => panic!("unexpected error: {other}"),
     };
     let message = error.to_string();
-    assert!(message.contains(words) && message.ends_with("Try a smaller dt"), "{message}");
+    assert!(message.contains(words) && error.advice().as_deref() == Some("Try a smaller dt"), "{message}");
     outcome
 }
 

@@ -48,8 +48,17 @@ fn scenes_that_start_with_shallow_crossings_run() {
     }
 }
 
+/// The message names the deepest crossings, with their garments, and does not advise what was tried.
 #[test]
 fn deep_crossings_are_refused_by_name() {
     let message = scene(true, 70.0, &ground()).unwrap_err().to_string();
-    assert!(message.contains("goes through the triangle") && message.contains("mm deep"), "{message}");
+    let depths: Vec<f64> =
+        message.split(" mm deep").filter_map(|before| before.rsplit(", ").next()?.parse().ok()).collect();
+    assert!(depths.len() == 3 && depths.is_sorted_by(|one, other| one >= other), "{message}");
+    for part in [" of garment 1 goes through the triangle ", " of ground, ", "`untangle` could not repair this"] {
+        assert!(message.contains(part), "{message}");
+    }
+    assert!(!message.contains("untangle = true"), "{message}");
+    let refused = scene(false, 70.0, &ground()).unwrap_err().to_string();
+    assert!(refused.contains("`untangle = true`") && !refused.contains("could not repair"), "{refused}");
 }

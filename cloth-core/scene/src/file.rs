@@ -150,9 +150,6 @@ impl TryFrom<File> for Scene {
         if let Some(seam) = file.seams.iter().position(|seam| seam.pairs.is_some() == seam.within.is_some()) {
             return Err(format!("seams[{seam}]: expected either `pairs` or `within`"));
         }
-        if let Some(number) = file.exclude.iter().position(|exclusion| !exclusion.is_one_choice()) {
-            return Err(format!("exclude[{number}]: expected one of `between`, `closer_than` and `near_seams`"));
-        }
         if !file.exclude.is_empty() && file.integrator != Scheme::Newton {
             return Err("`exclude` needs `integrator = \"newton\"`, whose contact is between features".to_owned());
         }

@@ -38,6 +38,7 @@ pub use contact_choice::ContactChoice;
 pub use error::SceneError;
 pub use exclusion::Exclusion;
 pub use garment::{Garment, Inflation, Mesh, Placement, Turn};
+pub use numbered_files::NumberingError;
 pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::{CameraChoice, OutputChoice};
 pub use pins::{Pin, PinBox, PinChoice, SoftPin};

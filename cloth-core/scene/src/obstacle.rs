@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Placement, Turn};
-use super::numbered_files::numbered_files;
+use super::numbered_files::{NumberingError, check_numbers, numbered_files};
 use cloth_physics::bounded::{Direction, MaybeReal, NonNegative, Number, Positive, Real, Reals};
 use cloth_physics::contact::{
     AnySolid, Ball, Capsule, Deformation, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError,
@@ -172,6 +172,15 @@ pub enum ObstacleError {
         .pattern.display()
     )]
     NoFrames { name: String, pattern: PathBuf },
+    /// The numbers of the frames have gaps or repeat.
+    #[error("{name}: {source}")]
+    Numbering { name: String, source: NumberingError },
+    /// The name of a file has a `*`, but the rate of the frames is missing.
+    #[error(
+        "{name}: {} has a `*` for the numbers of frames, but `frames_per_second` is missing; give their rate in 1/s",
+        .path.display()
+    )]
+    NoRate { name: String, path: PathBuf },
     /// A frame has other vertices or faces than the first one.
     #[error(
         "{name}: {} has other vertices or faces than {}; export the same mesh in every frame",
@@ -292,9 +301,15 @@ impl MeshKeys {
         paths: &[PathBuf],
         folder: &Path,
     ) -> Result<(MeshSolid, Option<Deformation>), ObstacleError> {
+        let pattern = folder.join(&self.path);
         let Some((first, others)) = paths.split_first() else {
-            return Err(ObstacleError::NoFrames { name: name.to_owned(), pattern: folder.join(&self.path) });
+            return Err(ObstacleError::NoFrames { name: name.to_owned(), pattern });
         };
+        if self.frames_per_second.is_some() {
+            check_numbers(&pattern).map_err(|source| ObstacleError::Numbering { name: name.to_owned(), source })?;
+        } else if pattern.to_string_lossy().contains('*') && !pattern.exists() {
+            return Err(ObstacleError::NoRate { name: name.to_owned(), path: pattern });
+        }
         let mesh = self.placed(name, first)?;
         let mut frames = vec![mesh.vertices().to_vec()];
         for path in others {

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -13,30 +14,50 @@ const ENDING: [i32; 3] = [SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
 #[cfg(not(unix))]
 const ENDING: [i32; 2] = [SIGINT, SIGTERM];
 
+/// Signals within this time of the first one repeat it: `timeout` sends one to the program and one to its group.
+const REPEAT: Duration = Duration::from_secs(1);
+/// The time between two looks at the flag of the first signal.
+const LOOK: Duration = Duration::from_millis(50);
+
 /// The signals that arrived so far.
 #[derive(Debug, Default)]
 pub struct Interrupts {
     stop: Arc<AtomicBool>,
+    /// Whether the next signal exits at once.
+    insists: Arc<AtomicBool>,
     last: Arc<AtomicUsize>,
 }
 
 impl Interrupts {
-    /// Listens for signals. The first one sets the flag; the second one exits at once. Signals that were ignored when
-    /// the program started stay ignored, so that `nohup cloth run` outlives its terminal.
+    /// Listens for signals. The first one sets the flag. One that comes later than a second after it exits at once.
+    /// Signals that were ignored when the program started stay ignored, so that `nohup cloth run` outlives its
+    /// terminal.
     pub fn listen() -> Result<Self> {
         let interrupts = Self::default();
         let ignored = ignored_at_start();
         for signal in ENDING.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0) {
             interrupts.listen_for(signal).context("cannot listen for signals")?;
         }
+        interrupts.await_repeats();
         Ok(interrupts)
     }
 
     fn listen_for(&self, signal: i32) -> std::io::Result<()> {
-        // Actions run in the order of their registration: the first signal finds the flag unset.
-        flag::register_conditional_shutdown(signal, exit_status(signal).into(), Arc::clone(&self.stop))?;
+        flag::register_conditional_shutdown(signal, exit_status(signal).into(), Arc::clone(&self.insists))?;
         flag::register_usize(signal, Arc::clone(&self.last), signal as usize)?;
         flag::register(signal, Arc::clone(&self.stop)).map(|_| ())
+    }
+
+    /// Waits in the background for the first signal, and for its repeats to be over.
+    fn await_repeats(&self) {
+        let (stop, insists) = (Arc::clone(&self.stop), Arc::clone(&self.insists));
+        std::thread::spawn(move || {
+            while !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(LOOK);
+            }
+            std::thread::sleep(REPEAT);
+            insists.store(true, Ordering::Relaxed);
+        });
     }
 
     /// Whether a signal has arrived.

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use energy_solve::Tally;
 use verify::audit::{Check, Options, Report, Target, audit_all, describe_failure};
 
 use super::record::{Record, RecordError};
+use super::stats;
 use crate::fabric::Material;
 use crate::materials;
 use crate::output::{OutputError, OutputFolder};
@@ -187,21 +187,12 @@ fn times(summary: &Summary) -> String {
 }
 
 fn evaluated(summary: &Summary) -> String {
-    let cells = |tally: &Tally| format!("<td>{}</td><td>{}</td>", tally.evaluated, tally.skipped);
+    let cell = |number: Option<u64>| format!("<td>{}</td>", number.map_or("–".to_owned(), |count| count.to_string()));
     let rows = summary.terms.iter().map(|term| {
         let energy = term.energy.map_or("–".to_owned(), |energy| format!("{energy:.4e}"));
-        let counts = [&term.counts.value, &term.counts.gradient, &term.counts.hessian].map(cells).concat();
-        let (flagged, projected) = (
-            term.counts.value.flagged + term.counts.gradient.flagged + term.counts.hessian.flagged,
-            term.counts.hessian.projected,
-        );
-        format!(
-            "<tr><td>{}</td><td class=\"text\">{}</td><td>{energy}</td>{counts}\
-             <td>{flagged}</td><td>{projected}</td><td>{}</td></tr>\n",
-            escaped(&term.name),
-            escaped(&term.element),
-            term.reused
-        )
+        let counts: String = stats::evaluated(term).into_iter().chain([term.reused]).map(cell).collect();
+        let (name, element) = (escaped(&term.name), escaped(&term.element));
+        format!("<tr><td>{name}</td><td class=\"text\">{element}</td><td>{energy}</td>{counts}</tr>\n")
     });
     let left_out: String =
         summary.left_out.iter().map(|reason| format!("<p>Left out: {}.</p>\n", escaped(reason))).collect();

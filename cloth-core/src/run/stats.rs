@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use comfy_table::{CellAlignment, Table, presets};
-use energy_solve::Tally;
+use energy_solve::Counts;
 
 use crate::integrator::{ContactWork, SolvedBy};
-use crate::simulation::Summary;
+use crate::simulation::{Summary, TermSummary};
 
 /// Formats a table with one row per term: its elements; the values, gradients and Hessians that were evaluated or
 /// skipped, because all their vertices are pinned; and the numbers of flagged, projected and reused ones. Islands,
@@ -60,14 +60,22 @@ fn terms(summary: &Summary) -> Table {
         "reused",
     ]);
     for term in &summary.terms {
-        let (value, gradient, hessian) = (&term.counts.value, &term.counts.gradient, &term.counts.hessian);
-        let pair = |tally: &Tally| [tally.evaluated, tally.skipped];
-        let flagged = value.flagged + gradient.flagged + hessian.flagged;
-        let numbers = [value, gradient, hessian].into_iter().flat_map(pair);
-        let numbers = numbers.chain([flagged, hessian.projected, term.reused]).map(|number| number.to_string());
-        table.add_row([term.name.clone(), term.elements.to_string()].into_iter().chain(numbers));
+        let elements = term.elements.map(|elements| elements as u64);
+        let numbers = [elements].into_iter().chain(evaluated(term)).chain([term.reused]);
+        let cell = |number: Option<u64>| number.map_or("–".to_owned(), |number| number.to_string());
+        table.add_row([term.name.clone()].into_iter().chain(numbers.map(cell)));
     }
     aligned(table)
+}
+
+/// Returns the numbers of evaluated and skipped values, gradients and Hessians of a term, and of flagged and projected
+/// elements; `None` where nothing counts them.
+pub(super) fn evaluated(term: &TermSummary) -> [Option<u64>; 8] {
+    let Some(Counts { value, gradient, hessian, .. }) = &term.counts else { return [None; 8] };
+    let flagged = value.flagged + gradient.flagged + hessian.flagged;
+    let [[value, no_value], [gradient, no_gradient], [second, no_second]] =
+        [value, gradient, hessian].map(|tally| [tally.evaluated, tally.skipped]);
+    [value, no_value, gradient, no_gradient, second, no_second, flagged, hessian.projected].map(Some)
 }
 
 fn phases(summary: &Summary) -> Option<Table> {

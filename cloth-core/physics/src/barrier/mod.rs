@@ -44,7 +44,7 @@ use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap, 
 
 pub use friction::Grip;
 pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
-pub use start::{ContactError, FirstPush, ObstacleStart, Participants};
+pub use start::{ContactError, Feature, FirstPush, ObstacleStart, Participants};
 pub use untangle::Untangling;
 
 use crate::collision::{Closest, CollisionMesh, Move, Near, Nearby, Neighbourhood, Pair, Search};

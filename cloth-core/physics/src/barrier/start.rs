@@ -1,5 +1,8 @@
 //! The state in which contact begins.
 
+use std::fmt;
+use std::ops::Range;
+
 use energy_dsl::Vector3;
 use energy_solve::ContactCounts;
 
@@ -25,27 +28,28 @@ pub(super) const TOUCHING: f64 = 1e-6;
 pub enum ContactError {
     /// Edges cross triangles.
     #[error(
-        "the cloth crosses itself in {count} places at the start: {}. Move the parts apart, repair shallow crossings \
-         with `--untangle` or `untangle = true`, or set `contact = \"obstacles\"`", described(.first)
+        "the cloth crosses itself in {count} places at the start: {}. Move the parts apart,{} or set \
+         `contact = \"obstacles\"`", described(.deepest),
+        if *.is_repaired { "" } else { " repair shallow crossings with `--untangle` or `untangle = true`," }
     )]
     Crosses {
         /// Number of edges and triangles that cross.
         count: usize,
-        /// The first of them, each with its depth, in m.
-        first: Vec<(Crossing, f64)>,
+        /// The deepest of them: edge, triangle and depth, in m.
+        deepest: Vec<(Feature, Feature, f64)>,
+        /// Whether a repair was tried.
+        is_repaired: bool,
     },
     /// Two features are closer than the thickness.
     #[error(
         "{count} pairs of features are closer than the thickness at the start: {} are {distance:.3e} m apart, \
-         {thickness:.3e} m thick. Move them apart, or reduce the `thickness` of the fabric", named(*.pair, *.is_point)
+         {thickness:.3e} m thick. Move them apart, or reduce the `thickness` of the fabric", named(.pair)
     )]
     TooClose {
         /// Number of such pairs.
         count: usize,
-        /// The vertices of the closest pair.
-        pair: [usize; 4],
-        /// Whether it is a point and a triangle, or two edges.
-        is_point: bool,
+        /// The closest pair: a point and a triangle, or two edges.
+        pair: Box<[Feature; 2]>,
         /// Its distance, in m.
         distance: f64,
         /// Its thickness, in m.
@@ -62,36 +66,69 @@ pub enum ContactError {
         /// Number of such vertices.
         count: usize,
         /// The deepest of them.
-        vertex: usize,
+        vertex: Feature,
         /// Its depth, in m.
         depth: f64,
     },
     /// An edge or a triangle of the cloth crosses an obstacle.
     #[error(
-        "the cloth crosses {obstacle} in {count} places at the start, first between the vertices {}. Move the cloth \
-         out of {obstacle}, or refine its mesh there", listed(.vertices)
+        "the cloth crosses {obstacle} in {count} places at the start, the deepest between the vertices \
+         {vertices:#}. Move the cloth out of {obstacle}, or refine its mesh there"
     )]
     CrossesObstacle {
         /// The name of the obstacle.
         obstacle: String,
         /// Number of crossings of all kinds.
         count: usize,
-        /// The vertices of the cloth's edge or triangle.
-        vertices: Vec<usize>,
+        /// The cloth's edge or triangle.
+        vertices: Feature,
     },
     /// An edge or a triangle of the cloth touches an obstacle.
     #[error(
-        "the cloth touches {obstacle} at the start: the vertices {} span a part {:.3e} mm from its surface. Leave a \
-         distance", listed(.vertices), 1e3 * .distance
+        "the cloth touches {obstacle} at the start: the vertices {vertices:#} span a part {:.3e} mm from its surface. \
+         Leave a distance", 1e3 * .distance
     )]
     Touches {
         /// The name of the obstacle.
         obstacle: String,
         /// The vertices of the part.
-        vertices: Vec<usize>,
+        vertices: Feature,
         /// Its distance from the surface, in m; negative inside.
         distance: f64,
     },
+    /// A repair was tried, and failed.
+    #[error(
+        "{error}. `untangle` could not repair this: it moves no pinned vertex, and others by at most three times the \
+         thickness and gap of contact"
+    )]
+    Unrepaired {
+        /// The fault that remains.
+        error: Box<ContactError>,
+    },
+}
+
+/// A point, an edge or a triangle, for messages. `{:#}` lists its vertices with commas.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Feature {
+    /// Its vertices: those of the scene, or of its garment if it has a name.
+    pub vertices: Vec<usize>,
+    /// The name of its garment or hair.
+    pub part: Option<String>,
+}
+
+impl From<&[usize]> for Feature {
+    fn from(vertices: &[usize]) -> Self {
+        Self { vertices: vertices.to_vec(), part: None }
+    }
+}
+
+impl fmt::Display for Feature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let separator = if f.alternate() { ", " } else { "–" };
+        let vertices: Vec<String> = self.vertices.iter().map(ToString::to_string).collect();
+        f.write_str(&vertices.join(separator))?;
+        self.part.as_ref().map_or(Ok(()), |part| write!(f, " of {part}"))
+    }
 }
 
 /// The pairs that may collide from the start on, and their parameters.
@@ -204,7 +241,7 @@ impl BarrierContact {
             if let Some((distance, pair)) = nearest {
                 if distance <= TOUCHING * start.reach {
                     let vertices: Vec<usize> = pair.vertices.iter().map(|&vertex| vertex as usize).collect();
-                    let own = vertices.into_iter().filter(|&vertex| vertex < self.mesh.own_vertices()).collect();
+                    let own = own(&self.mesh, vertices);
                     return Err(ContactError::Touches { obstacle: start.name.clone(), vertices: own, distance });
                 }
                 thickness = thickness.min(0.5 * distance);
@@ -241,8 +278,10 @@ impl BarrierContact {
         let close: Vec<_> = all.filter(|(distance, thickness, _)| distance <= thickness).collect();
         let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         closest.map_or(Ok(()), |&(distance, thickness, pair)| {
-            let (is_point, pair) = (pair.kind == PairKind::PointTriangle, pair.vertices.map(|vertex| vertex as usize));
-            Err(ContactError::TooClose { count: close.len(), pair, is_point, distance, thickness })
+            let vertices = pair.vertices.map(|vertex| vertex as usize);
+            let (one, other) = vertices.split_at(if pair.kind == PairKind::PointTriangle { 1 } else { 2 });
+            let pair = Box::new([Feature::from(one), Feature::from(other)]);
+            Err(ContactError::TooClose { count: close.len(), pair, distance, thickness })
         })
     }
 }
@@ -266,69 +305,92 @@ fn check_crossings(
     obstacles: &[ObstacleStart],
     x: &[Vector3<f64>],
 ) -> Result<(), ContactError> {
-    let mut crossings = crossings_that_count(mesh, rules, x);
-    let count = crossings.len();
-    let Some(&first) = crossings.first() else { return Ok(()) };
-    let obstacle = |vertex: usize| mesh.obstacle(energy_solve::index(vertex));
-    Err(match obstacle(first.edge[0]).or(obstacle(first.triangle[0])) {
-        Some(number) => {
-            let all = first.edge.into_iter().chain(first.triangle);
-            let vertices = all.filter(|&vertex| vertex < mesh.own_vertices()).collect();
-            ContactError::CrossesObstacle { obstacle: obstacles[number].name.clone(), count, vertices }
-        }
-        None => {
-            crossings.truncate(NAMED);
-            let first = crossings.into_iter().map(|crossing| (crossing, crossing.depth(x))).collect();
-            ContactError::Crosses { count, first }
-        }
-    })
+    let obstacle = |crossing: &Crossing| {
+        let [edge, triangle] = [crossing.edge[0], crossing.triangle[0]].map(energy_solve::index);
+        mesh.obstacle(edge).or(mesh.obstacle(triangle))
+    };
+    let all = crossings_that_count(mesh, rules, x).into_iter();
+    let mut all: Vec<_> = all.map(|crossing| (crossing.depth(x), crossing)).collect();
+    all.sort_by(|(one, _), (other, _)| other.total_cmp(one));
+    let Some((_, deepest)) = all.first() else { return Ok(()) };
+    let count = all.len();
+    if let Some(number) = obstacle(deepest) {
+        let vertices = own(mesh, deepest.edge.into_iter().chain(deepest.triangle));
+        return Err(ContactError::CrossesObstacle { obstacle: obstacles[number].name.clone(), count, vertices });
+    }
+    let among_cloth = all.iter().filter(|(_, crossing)| obstacle(crossing).is_none()).take(NAMED);
+    let named = |(depth, crossing): &(f64, Crossing)| {
+        (Feature::from(&crossing.edge[..]), Feature::from(&crossing.triangle[..]), *depth)
+    };
+    Err(ContactError::Crosses { count, deepest: among_cloth.map(named).collect(), is_repaired: false })
+}
+
+/// Returns those of some vertices that do not belong to obstacles.
+fn own(mesh: &CollisionMesh, vertices: impl IntoIterator<Item = usize>) -> Feature {
+    let own = vertices.into_iter().filter(|&vertex| vertex < mesh.own_vertices());
+    Feature { vertices: own.collect(), part: None }
 }
 
 impl ContactError {
     /// Renumbers the vertices, from the numbering of a body to `vertices[…]` of the scene.
     #[must_use]
-    pub fn on_vertices(self, vertices: &[usize]) -> Self {
+    pub fn on_vertices(mut self, vertices: &[usize]) -> Self {
+        for feature in self.features() {
+            feature.vertices.iter_mut().for_each(|vertex| *vertex = vertices[*vertex]);
+        }
+        self
+    }
+
+    /// Names the garment or hair of each feature, and numbers its vertices within it. Each part comes with its vertices
+    /// in the scene.
+    #[must_use]
+    pub fn among_parts(mut self, parts: &[(&str, Range<usize>)]) -> Self {
+        for feature in self.features() {
+            let part = parts.iter().find(|(_, range)| feature.vertices.iter().all(|vertex| range.contains(vertex)));
+            if let Some((name, range)) = part {
+                feature.vertices.iter_mut().for_each(|vertex| *vertex -= range.start);
+                feature.part = Some((*name).to_owned());
+            }
+        }
+        self
+    }
+
+    /// The fault that remains after a repair was tried.
+    #[must_use]
+    pub fn after_repair(mut self) -> Self {
+        if let Self::Crosses { is_repaired, .. } = &mut self {
+            *is_repaired = true;
+        }
+        Self::Unrepaired { error: Box::new(self) }
+    }
+
+    fn features(&mut self) -> Vec<&mut Feature> {
         match self {
-            Self::Crosses { count, mut first } => {
-                for (Crossing { edge, triangle }, _) in &mut first {
-                    edge.iter_mut().chain(triangle).for_each(|vertex| *vertex = vertices[*vertex]);
-                }
-                Self::Crosses { count, first }
+            Self::Crosses { deepest, .. } => {
+                deepest.iter_mut().flat_map(|(edge, triangle, _)| [edge, triangle]).collect()
             }
-            Self::TooClose { count, pair, is_point, distance, thickness } => {
-                Self::TooClose { count, pair: pair.map(|vertex| vertices[vertex]), is_point, distance, thickness }
-            }
-            Self::CrossesObstacle { obstacle, count, vertices: own } => {
-                let own = own.into_iter().map(|vertex| vertices[vertex]).collect();
-                Self::CrossesObstacle { obstacle, count, vertices: own }
-            }
-            Self::Touches { obstacle, vertices: own, distance } => {
-                let own = own.into_iter().map(|vertex| vertices[vertex]).collect();
-                Self::Touches { obstacle, vertices: own, distance }
-            }
-            other @ Self::Inside { .. } => other,
+            Self::TooClose { pair, .. } => pair.iter_mut().collect(),
+            Self::Inside { vertex: feature, .. }
+            | Self::CrossesObstacle { vertices: feature, .. }
+            | Self::Touches { vertices: feature, .. } => vec![feature],
+            Self::Unrepaired { error } => error.features(),
         }
     }
 }
 
 /// Describes crossings and their depth.
-fn described(crossings: &[(Crossing, f64)]) -> String {
-    let one = |(Crossing { edge: [a, b], triangle: [p, q, r] }, depth): &(Crossing, f64)| {
-        format!("the edge {a}–{b} goes through the triangle {p}–{q}–{r}, {:.3} mm deep", 1e3 * depth)
+fn described(crossings: &[(Feature, Feature, f64)]) -> String {
+    let one = |(edge, triangle, depth): &(Feature, Feature, f64)| {
+        format!("the edge {edge} goes through the triangle {triangle}, {:.3} mm deep", 1e3 * depth)
     };
     crossings.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Lists vertices, such as `3, 4, 9`.
-fn listed(vertices: &[usize]) -> String {
-    vertices.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-}
-
 /// Names the features of a pair.
-fn named([a, b, c, d]: [usize; 4], is_point: bool) -> String {
-    if is_point {
-        format!("vertex {a} and the triangle {b}–{c}–{d}")
+fn named([one, other]: &[Feature; 2]) -> String {
+    if one.vertices.len() == 1 {
+        format!("vertex {one} and the triangle {other}")
     } else {
-        format!("the edges {a}–{b} and {c}–{d}")
+        format!("the edges {one} and {other}")
     }
 }

@@ -1,7 +1,7 @@
 use energy_solve::EvaluationError;
 
 use super::substep::Substep;
-use super::{Integrator, IntegratorMemory, StepError, StepReport};
+use super::{Integrator, IntegratorMemory, Rejection, StepError, StepReport};
 use crate::body::Body;
 
 /// Adaptive step sizes for another integrator. A failed step is rejected and retried at half its size. After
@@ -16,15 +16,6 @@ pub struct Adaptive {
     halvings: u32,
     successes: u32,
     last_rejection: Option<Rejection>,
-}
-
-/// A rejected step.
-#[derive(Clone, Debug, PartialEq)]
-#[expect(missing_docs, reason = "the fields say it")]
-pub struct Rejection {
-    /// Step size, in s.
-    pub dt: f64,
-    pub reason: StepError,
 }
 
 impl Adaptive {
@@ -61,6 +52,7 @@ impl Integrator for Adaptive {
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
         let start = Substep::of(body);
         let mut report = StepReport::default();
+        let mut first = None;
         // Time in units of the smallest step, so that parts add up exactly.
         let (mut done, whole) = (0_u64, 1_u64 << Self::MOST_HALVINGS);
         while done < whole {
@@ -80,14 +72,17 @@ impl Integrator for Adaptive {
                     }
                 }
                 Err(reason) => {
-                    self.last_rejection = Some(Rejection { dt: size, reason: reason.clone() });
+                    let rejection = Rejection { dt: size, reason: reason.clone() };
+                    let first = first.get_or_insert_with(|| rejection.clone());
+                    self.last_rejection = Some(rejection);
                     report.rejected += 1;
                     self.successes = 0;
                     self.halvings = (whole / part).ilog2() + 1;
                     if self.halvings > Self::MOST_HALVINGS {
                         (body.x, body.v) = (start.x, start.v);
                         self.halvings = 0;
-                        return Err(StepError::Hopeless { dt: size, reason: Box::new(reason) });
+                        let (first, reason) = (Box::new(first.clone()), Box::new(reason));
+                        return Err(StepError::Hopeless { dt: size, first, reason });
                     }
                 }
             }
@@ -107,5 +102,43 @@ impl Integrator for Adaptive {
     /// `None`: unstable steps are rejected.
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use energy_solve::System;
+
+    use super::*;
+
+    /// An integrator whose steps all fail, for a reason that depends on their size.
+    #[derive(Debug)]
+    struct Failing;
+
+    impl Integrator for Failing {
+        fn name(&self) -> &'static str {
+            "failing"
+        }
+
+        fn step(&mut self, _: &mut Body, dt: f64) -> Result<StepReport, StepError> {
+            Err(match dt {
+                1.0 => StepError::PinsBlocked { moves: 1, part: 0.5, pressed: None },
+                _ => StepError::NotConverged { iterations: 100, change: 1.0, pressed: None },
+            })
+        }
+
+        fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {
+            Ok(None)
+        }
+    }
+
+    #[test]
+    fn a_step_that_fails_at_every_size_keeps_its_first_reason() {
+        let system = System::new(Vec::new(), &[]).unwrap();
+        let mut body = Body { x: Vec::new(), v: Vec::new(), masses: Vec::new(), system };
+        let error = Adaptive::new(Box::new(Failing)).step(&mut body, 1.0).unwrap_err();
+        let StepError::Hopeless { dt, first, reason } = error else { panic!("{error}") };
+        assert!(dt < 1e-6 && first.dt == 1.0 && matches!(first.reason, StepError::PinsBlocked { .. }), "{first:?}");
+        assert!(matches!(*reason, StepError::NotConverged { .. }), "{reason}");
     }
 }

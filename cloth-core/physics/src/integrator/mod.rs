@@ -23,10 +23,10 @@ use serde::{Deserialize, Serialize};
 
 use energy_solve::EvaluationError;
 
-pub use adaptive::{Adaptive, Rejection};
+pub use adaptive::Adaptive;
 pub use bdf2::Bdf2;
 pub use contact_work::ContactWork;
-pub use error::StepError;
+pub use error::{Rejection, StepError};
 pub use explicit_euler::ExplicitEuler;
 pub use implicit_euler::ImplicitEuler;
 pub use implicit_midpoint::ImplicitMidpoint;

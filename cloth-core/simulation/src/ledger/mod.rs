@@ -105,6 +105,12 @@ impl Ledger {
     /// The fraction of the energy put in that an integrator may lose without a warning.
     pub const LOSS: f64 = 0.1;
 
+    /// The fraction of the energy put in that an integrator may gain without a warning.
+    pub const GAIN: f64 = 1.0;
+
+    /// Lost and gained energies up to this, in J, are no reason to warn.
+    pub const NEGLIGIBLE: f64 = 1e-12;
+
     /// Creates a ledger with the current state as its first entry. Each body comes with the label of each of its terms;
     /// `names` holds the name of each label.
     ///
@@ -251,15 +257,47 @@ impl Ledger {
         self.entries.iter().map(|entry| -entry.unaccounted(&self.entries[0])).fold(0.0, f64::max)
     }
 
+    /// The largest energy that appeared without work, in J.
+    #[must_use]
+    pub fn largest_gain(&self) -> f64 {
+        self.entries.iter().map(|entry| entry.unaccounted(&self.entries[0])).fold(0.0, f64::max)
+    }
+
     /// Returns a warning if the integrator lost more than [`Ledger::LOSS`] of the energy put in; `None` otherwise.
     #[must_use]
     pub fn loss(&self, integrator: &str) -> Option<String> {
         let (lost, all) = (self.largest_loss(), self.put_in());
-        (lost > Self::LOSS * all && all > f64::MIN_POSITIVE).then(|| {
+        (lost > Self::LOSS * all && lost > Self::NEGLIGIBLE).then(|| {
             format!(
                 "{integrator} lost {lost:.2e} J of the {all:.2e} J put in ({:.0} %): the size of its steps damps the \
-                 motion. A smaller dt loses less, and so do the integrators `bdf2` and `implicit-midpoint`",
-                100.0 * lost / all
+                 motion. A smaller dt loses less{}",
+                100.0 * lost / all,
+                self.less_damped(integrator)
+            )
+        })
+    }
+
+    /// Names integrators that lose less and can step the same scene. Certified contact needs `newton`.
+    fn less_damped(&self, integrator: &str) -> &'static str {
+        match integrator {
+            "newton" | "implicit-euler" if !self.in_contact => {
+                ", and so do the integrators `bdf2` and `implicit-midpoint`"
+            }
+            "bdf2" => ", and so does the integrator `implicit-midpoint`",
+            _ => "",
+        }
+    }
+
+    /// Returns a warning if the energy grew by more than [`Ledger::GAIN`] times the energy put in, without work; `None`
+    /// otherwise.
+    #[must_use]
+    pub fn gain(&self, integrator: &str) -> Option<String> {
+        let (gained, all) = (self.largest_gain(), self.put_in());
+        (gained > Self::GAIN * all && gained > Self::NEGLIGIBLE).then(|| {
+            let other = if integrator == "newton" { "" } else { ", or the integrator `newton`" };
+            format!(
+                "{integrator} gained {gained:.2e} J that no work explains, with {all:.2e} J put in: the motion is \
+                 unstable. Try a smaller dt{other}"
             )
         })
     }
@@ -277,5 +315,30 @@ impl Ledger {
                 100.0 * Self::TOLERANCE
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ledger of a body that loses half of its kinetic energy, in J.
+    fn losing(kinetic: f64, in_contact: bool) -> Ledger {
+        let entries = [1.0, 0.5].map(|part| Entry { kinetic: part * kinetic, ..Entry::default() }).to_vec();
+        let (potentials, works, accounts, changed) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Ledger { potentials, works, entries, in_contact, accounts, changed }
+    }
+
+    #[test]
+    fn advice_against_losses_names_integrators_that_can_step_the_scene() {
+        let advice = |integrator: &str, in_contact: bool| {
+            let warning = losing(1.0, in_contact).loss(integrator).unwrap();
+            warning.split_once("A smaller dt loses less").unwrap().1.to_owned()
+        };
+        let both = ", and so do the integrators `bdf2` and `implicit-midpoint`";
+        assert_eq!([advice("newton", false), advice("implicit-euler", false)], [both, both]);
+        assert_eq!(advice("newton", true), "", "certified contact needs newton");
+        assert_eq!(advice("bdf2", false), ", and so does the integrator `implicit-midpoint`");
+        assert_eq!(losing(1e-31, false).loss("newton"), None);
     }
 }

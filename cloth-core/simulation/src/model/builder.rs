@@ -19,7 +19,7 @@ use crate::fabric::{self, Hair, Place, StitchDamping, Surroundings};
 use crate::geometry::{Pose, add_scaled, norm, subtract};
 use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
 use crate::motion::Motion;
-use crate::scene::{ContactChoice, Garment, ObstacleError, Pin, Scene, Seam, Shape, SoftPin};
+use crate::scene::{ContactChoice, Garment, Pin, Scene, Seam, Shape, SoftPin};
 
 /// A model under construction.
 pub(super) struct Builder<'a> {
@@ -150,11 +150,7 @@ impl<'a> Builder<'a> {
     }
 
     fn check_names(&self) -> Result<(), ModelError> {
-        let mut names = BTreeSet::new();
-        match self.model.parts.iter().find(|part| !names.insert(&part.name)) {
-            Some(part) => Err(ModelError::SameName { name: part.name.clone() }),
-            None => Ok(()),
-        }
+        check_unique("garments or hairs", self.model.parts.iter().map(|part| &part.name))
     }
 
     fn part(&self, name: &str) -> Result<&Part, UnknownPart> {
@@ -360,16 +356,20 @@ impl<'a> Builder<'a> {
 
     fn exclude(&mut self) -> Result<(), ExclusionError> {
         let Model { parts, obstacles, x, sewn, pinned_at_start, .. } = &self.model;
-        let mut exclusions = Referents { parts, obstacles, x, sewn }.exclusions(&self.scene.exclusions)?;
+        let referents = Referents { parts, obstacles, x, sewn };
+        let mut exclusions = referents.exclusions(&self.scene.exclusions)?;
+        let idle = referents.without_effect(&self.scene.exclusions, self.scene.contact);
         exclusions::hold(&mut exclusions, obstacles, x, pinned_at_start);
         self.model.exclusions = exclusions;
+        self.model.warnings.extend(idle);
         Ok(())
     }
 
-    fn add_obstacles(&mut self) -> Result<(), ObstacleError> {
+    fn add_obstacles(&mut self) -> Result<(), ModelError> {
         let obstacles = self.scene.obstacles.iter().enumerate();
         let obstacles = obstacles.map(|(number, one)| one.obstacle(number, &self.scene.folder));
         let obstacles = obstacles.collect::<Result<Vec<_>, _>>()?;
+        check_unique("obstacles", obstacles.iter().map(|obstacle| &obstacle.name))?;
         let masses = |island: &IslandModel| island.vertices.iter().map(|&vertex| self.model.masses[vertex]).collect();
         let masses: Vec<Vec<f64>> = self.model.islands.iter().map(masses).collect();
         // Certified contact needs no terms: obstacles join the surface of the cloth.
@@ -543,6 +543,13 @@ fn stitches(
         terms.push(Box::new(DissipationTerm::new(format!("seam {seam} damping"), law, pairs)));
     }
     Ok(terms)
+}
+
+/// Returns an error if two names are equal. `kind` says in the message what they name.
+fn check_unique<'a>(kind: &'static str, mut names: impl Iterator<Item = &'a String>) -> Result<(), ModelError> {
+    let mut known = BTreeSet::new();
+    let repeated = names.find(|name| !known.insert(*name)).cloned();
+    repeated.map_or(Ok(()), |name| Err(ModelError::SameName { kind, name }))
 }
 
 /// Returns the mean of some positions.

@@ -6,7 +6,7 @@ use super::Part;
 use crate::collision::{Exclusions, Members};
 use crate::contact::Obstacle;
 use crate::geometry::{Bounds, Hierarchy, norm, subtract};
-use crate::scene::Exclusion;
+use crate::scene::{ContactChoice, Exclusion};
 
 /// An exclusion that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,22 +56,40 @@ impl Referents<'_> {
     /// Resolves the exclusions of a scene.
     pub fn exclusions(&self, descriptions: &[Exclusion]) -> Result<Exclusions, ExclusionError> {
         let mut exclusions = Exclusions::new(self.x.len(), self.obstacles.len());
-        for (number, Exclusion { between, closer_than, near_seams }) in descriptions.iter().enumerate() {
-            if let Some([one, other]) = between {
-                let sets = [(&one[..], self.members(number, one)?), (&other[..], self.members(number, other)?)];
-                if !exclusions.add_sets(sets) {
-                    return Err(ExclusionError::TooManyNames { exclusion: number });
+        for (number, description) in descriptions.iter().enumerate() {
+            match description {
+                Exclusion::Between([one, other]) => {
+                    let sets = [(&one[..], self.members(number, one)?), (&other[..], self.members(number, other)?)];
+                    if !exclusions.add_sets(sets) {
+                        return Err(ExclusionError::TooManyNames { exclusion: number });
+                    }
                 }
-            }
-            if let Some(distance) = closer_than {
-                exclusions.add_close(self.x, *distance, |_| true);
-            }
-            if let Some(distance) = near_seams {
-                let near = self.near_seams(*distance).ok_or(ExclusionError::NoSeam { exclusion: number })?;
-                exclusions.add_close(self.x, 2.0 * distance, |vertex| near[vertex]);
+                Exclusion::CloserThan(distance) => exclusions.add_close(self.x, *distance, |_| true),
+                Exclusion::NearSeams(distance) => {
+                    let near = self.near_seams(*distance).ok_or(ExclusionError::NoSeam { exclusion: number })?;
+                    exclusions.add_close(self.x, 2.0 * distance, |vertex| near[vertex]);
+                }
             }
         }
         Ok(exclusions)
+    }
+
+    /// Returns warnings of exclusions that exclude nothing, because nothing of theirs collides anyway.
+    pub fn without_effect(&self, descriptions: &[Exclusion], contact: ContactChoice) -> Vec<String> {
+        let is_obstacle = |name: &String| self.obstacles.iter().any(|obstacle| obstacle.name == *name);
+        let meets_obstacle = |exclusion: &Exclusion| match exclusion {
+            Exclusion::Between(names) => names.iter().any(is_obstacle),
+            Exclusion::CloserThan(_) | Exclusion::NearSeams(_) => false,
+        };
+        let reason = |exclusion: &Exclusion| match contact {
+            ContactChoice::Off => Some("nothing collides with `contact = \"off\"`"),
+            ContactChoice::Obstacles if !meets_obstacle(exclusion) => {
+                Some("with `contact = \"obstacles\"`, cloth and hair collide with obstacles only")
+            }
+            ContactChoice::Obstacles | ContactChoice::On => None,
+        };
+        let reasons = descriptions.iter().enumerate().filter_map(|(number, one)| Some((number, reason(one)?)));
+        reasons.map(|(number, reason)| format!("exclude[{number}] has no effect: {reason}")).collect()
     }
 
     /// Whether each vertex is near a seam; `None` if there is no seam.

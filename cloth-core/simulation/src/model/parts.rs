@@ -148,9 +148,13 @@ pub enum ModelError {
     /// A garment under pressure is not closed.
     #[error("{part}: inflation: {source}")]
     Inflation { part: String, source: NotClosed },
-    /// Two parts have the same name.
-    #[error("two garments or hairs are called `{name}`")]
-    SameName { name: String },
+    /// Two parts, or two obstacles, have the same name.
+    #[error("two {kind} are called `{name}`; give one of them another `name`")]
+    SameName {
+        /// `garments or hairs`, or `obstacles`.
+        kind: &'static str,
+        name: String,
+    },
     /// A pin is invalid.
     #[error(transparent)]
     Pin(#[from] PinError),

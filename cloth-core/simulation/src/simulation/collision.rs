@@ -1,8 +1,8 @@
 //! Contact of a scene with itself and with obstacles.
 
 use crate::barrier::{
-    BarrierContact, ContactError, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, Participants, Untangling,
-    thinning,
+    BarrierContact, ContactError, Feature, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, Participants,
+    Untangling, thinning,
 };
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
@@ -135,7 +135,7 @@ fn check_sides(island: &Island, model: &Model) -> Result<(), ContactError> {
         let free = body.system.dofs().free().iter().filter(|&&place| !model.pinned_at_start[island.vertices()[place]]);
         let inside: Vec<_> = free.map(depth).filter(|(_, depth)| *depth > 0.0).collect();
         if let Some(&(vertex, depth)) = inside.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
-            let (obstacle, vertex) = (obstacle.name.clone(), island.vertices()[vertex]);
+            let (obstacle, vertex) = (obstacle.name.clone(), Feature::from(&[island.vertices()[vertex]][..]));
             return Err(ContactError::Inside { obstacle, count: inside.len(), vertex, depth });
         }
     }

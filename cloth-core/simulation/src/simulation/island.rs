@@ -34,6 +34,9 @@ pub struct Island {
     sleep: SleepState,
     /// Histories of the terms at the start of the current step; empty between steps.
     histories: Vec<Vec<f64>>,
+    /// Energy of contact at the end of the last step, in J. Its pairs are forgotten when a step fails, and no
+    /// checkpoint has them.
+    contact_energy: f64,
 }
 
 /// The state of an island that its motion depends on, other than positions and velocities.
@@ -48,6 +51,9 @@ pub struct SavedIsland {
     /// The histories of the terms, such as plastic strains.
     #[serde(default)]
     histories: Vec<Vec<f64>>,
+    /// Energy of contact at the end of the last step, in J.
+    #[serde(default)]
+    contact_energy: f64,
 }
 
 impl Island {
@@ -73,7 +79,7 @@ impl Island {
         let in_gusts = in_wind && scene.wind.as_ref().is_some_and(|wind| !wind.gusts.is_empty());
         let (integrator, sleep) = (scene.stepper(), SleepState::AWAKE);
         let (moving, motions) = (Vec::new(), Vec::new());
-        let histories = Vec::new();
+        let (histories, contact_energy) = (Vec::new(), 0.0);
         Ok(Self {
             vertices,
             labels,
@@ -86,6 +92,7 @@ impl Island {
             stillness,
             sleep,
             histories,
+            contact_energy,
         })
     }
 
@@ -118,6 +125,11 @@ impl Island {
     /// The vertices of obstacles in the body.
     pub(super) fn prescribed(&self) -> &Prescribed {
         &self.prescribed
+    }
+
+    /// The energy of contact at the end of the last step, in J; `None` if the island does not collide.
+    pub(super) fn contact_energy(&self) -> Option<f64> {
+        self.body.system.has_contact().then_some(self.contact_energy)
     }
 
     pub(super) fn body_mut(&mut self) -> &mut Body {
@@ -248,12 +260,14 @@ impl Island {
         let ContactMemory { names, vectors } = self.body.system.contact_memory(&self.body.x);
         let bristles = (names, vectors);
         let histories = self.body.system.histories();
-        SavedIsland { integrator: self.integrator.memory(), sleep: self.sleep.clone(), bristles, histories }
+        let (integrator, sleep, contact_energy) = (self.integrator.memory(), self.sleep.clone(), self.contact_energy);
+        SavedIsland { integrator, sleep, bristles, histories, contact_energy }
     }
 
     pub(super) fn restore(&mut self, saved: SavedIsland) {
         self.integrator.restore(saved.integrator);
         self.sleep = saved.sleep;
+        self.contact_energy = saved.contact_energy;
         self.body.system.restore_histories(&saved.histories);
         if let Some((contact, _)) = self.body.system.contact() {
             let (names, vectors) = saved.bristles;
@@ -264,6 +278,7 @@ impl Island {
     /// Keeps the last step, now that it has succeeded everywhere.
     pub(super) fn keep_step(&mut self) {
         self.histories.clear();
+        self.contact_energy = self.body.system.contact_energy(&self.body.x).unwrap_or(0.0);
     }
 
     /// Restores the histories of the terms at the start of the last step, which failed elsewhere.

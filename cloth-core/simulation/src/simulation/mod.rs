@@ -69,8 +69,9 @@ pub enum SimulationError {
     Restore(#[from] RestoreError),
     /// A step failed.
     #[error(
-        "step {step} (t = {time:.4} s){}: {source}",
-        .deformed.as_ref().map(|element| format!(", before which {element}")).unwrap_or_default()
+        "step {step} (t = {time:.4} s){}: {source}{}",
+        .deformed.as_ref().map(|element| format!(", before which {element}")).unwrap_or_default(),
+        .source.advice().map(|advice| format!(". {advice}")).unwrap_or_default()
     )]
     Step {
         /// The step that failed, from 1.
@@ -106,6 +107,7 @@ pub struct Simulation {
     prescribed: Prescribed,
     /// Pairs of features that do not collide.
     exclusions: Exclusions,
+    contact: ContactChoice,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
     masses: Vec<f64>,
@@ -168,6 +170,7 @@ impl Simulation {
             obstacle_mesh,
             prescribed,
             exclusions,
+            contact: scene.contact,
             x,
             v,
             masses,
@@ -366,7 +369,7 @@ impl Simulation {
     /// Steps the islands that are awake and returns how many sleep. Positions, velocities and the ledger change only
     /// after every island has succeeded.
     fn step_islands(&mut self, step: u64) -> Result<(StepReport, u64), StepError> {
-        let Self { islands, x, v, ledger, obstacles, summary, .. } = self;
+        let Self { islands, x, v, ledger, obstacles, summary, contact, .. } = self;
         let context = StepContext::new(step, self.dt, &self.motions, obstacles, self.may_sleep);
         let (mut total, mut slept) = (StepReport::default(), 0);
         for (number, island) in islands.iter_mut().enumerate() {
@@ -384,8 +387,9 @@ impl Simulation {
             if island.try_to_sleep(&context) {
                 ledger.iter_mut().for_each(|ledger| ledger.note_sleep(number));
             }
-            // Certified moves pass through nothing.
-            let passable = if island.body().system.has_contact() { &[] } else { &obstacles[..] };
+            // Certified moves pass through nothing, and without contact nothing is meant to stop.
+            let is_exempt = island.body().system.has_contact() || *contact == ContactChoice::Off;
+            let passable = if is_exempt { &[] } else { &obstacles[..] };
             for obstacle in passable {
                 let passage = obstacle.passages([context.time, context.end], island.moves(x));
                 passage.into_iter().for_each(|passage| summary.totals.note(passage));
@@ -438,7 +442,8 @@ impl Simulation {
 
     /// Warns of free vertices that start inside an obstacle.
     fn warn_of_vertices_inside_obstacles(&mut self) {
-        for obstacle in &self.obstacles {
+        let colliding = if self.contact == ContactChoice::Off { &[] } else { &self.obstacles[..] };
+        for obstacle in colliding {
             let solid = obstacle.at(0.0);
             let inside = |body: &Body| {
                 let free = body.system.dofs().free().iter();
@@ -461,12 +466,21 @@ fn create_islands(scene: &Scene, model: &mut Model) -> Result<Vec<Island>, Simul
         islands.map(|island| Island::new(scene, model, island)).collect::<Result<Vec<_>, SystemError>>()?;
     let with_itself = scene.contact == ContactChoice::On;
     if scene.is_certified() && (with_itself || !model.obstacles.is_empty()) {
-        islands.iter_mut().try_for_each(|island| add_contact(island, model, with_itself, scene))?;
+        for island in &mut islands {
+            add_contact(island, model, with_itself, scene).map_err(|error| named(error, scene, model))?;
+        }
     }
     distribute_moving_pins(&mut islands, model);
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     islands.iter_mut().for_each(|island| island.body_mut().system.set_threads(threads));
     Ok(islands)
+}
+
+/// Names the garments of an error at the start, and says whether a repair was tried.
+fn named(error: ContactError, scene: &Scene, model: &Model) -> ContactError {
+    let parts: Vec<_> = model.parts.iter().map(|part| (part.name.as_str(), part.vertices.clone())).collect();
+    let error = error.among_parts(&parts);
+    if scene.untangle { error.after_repair() } else { error }
 }
 
 /// Hands each moving pin to the island of its vertex.

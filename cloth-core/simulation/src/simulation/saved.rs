@@ -49,17 +49,22 @@ impl From<SavedCounts> for Counts {
     }
 }
 
-/// Serialises [`Counts`] as [`SavedCounts`], for `#[serde(with)]`.
+/// Serialises optional [`Counts`] as [`SavedCounts`], for `#[serde(with)]`.
 pub(super) mod saved_counts {
     use super::{Counts, SavedCounts};
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    pub(in crate::simulation) fn serialize<S: Serializer>(counts: &Counts, serializer: S) -> Result<S::Ok, S::Error> {
-        SavedCounts::from(*counts).serialize(serializer)
+    pub(in crate::simulation) fn serialize<S: Serializer>(
+        counts: &Option<Counts>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        counts.map(SavedCounts::from).serialize(serializer)
     }
 
-    pub(in crate::simulation) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Counts, D::Error> {
-        SavedCounts::deserialize(deserializer).map(Counts::from)
+    pub(in crate::simulation) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Counts>, D::Error> {
+        Ok(Option::<SavedCounts>::deserialize(deserializer)?.map(Counts::from))
     }
 }
 

@@ -6,11 +6,11 @@ use energy_elements::{DistanceBarrier, SlidingFriction};
 use energy_solve::{Counts, EvaluationError, State, Tally};
 use serde::{Deserialize, Serialize};
 
-use super::{Simulation, Totals};
+use super::{Island, Simulation, Totals};
 use crate::Body;
 use crate::integrator::{Phases, SolvedBy};
 use crate::model::{Model, TermLabel};
-use crate::scene::Scene;
+use crate::scene::{ContactChoice, Scene};
 
 /// The outcome of a simulation. `Display` prints it as a report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -69,17 +69,18 @@ pub struct TermSummary {
     pub name: String,
     /// The name of its declared element.
     pub element: String,
-    /// Number of elements.
+    /// Number of elements; `None` for certified contact, whose pairs change all the time.
     #[serde(default)]
-    pub elements: usize,
+    pub elements: Option<usize>,
     /// Energy at the end, in J; `None` for a force law.
     pub energy: Option<f64>,
-    /// Numbers of evaluated and skipped elements, per routine.
-    #[serde(with = "super::saved::saved_counts")]
-    pub counts: Counts,
-    /// Constant Hessians that were reused instead of evaluated.
+    /// Numbers of evaluated and skipped elements, per routine; `None` for certified contact, whose work is in
+    /// [`Totals::contact`].
+    #[serde(default, with = "super::saved::saved_counts")]
+    pub counts: Option<Counts>,
+    /// Constant Hessians that were reused instead of evaluated; `None` for certified contact.
     #[serde(default)]
-    pub reused: u64,
+    pub reused: Option<u64>,
 }
 
 impl Summary {
@@ -133,16 +134,12 @@ impl Simulation {
     pub fn summary(&mut self) -> Result<Summary, EvaluationError> {
         let mut summary = self.summary.clone();
         let mut energies: Vec<Option<f64>> = vec![None; self.labels.len()];
-        let mut elements = vec![0; self.labels.len()];
         let add = |sum: &mut Vector3<f64>, part: Vector3<f64>| (0..3).for_each(|axis| sum[axis] += part[axis]);
         for island in &mut self.islands {
             let labels = island.labels().to_vec();
             let body = island.body_mut();
             for (&label, term) in labels.iter().zip(body.system.energies(&body.x)?) {
                 energies[label] = term.energy.map(|energy| energies[label].unwrap_or(0.0) + energy).or(energies[label]);
-            }
-            for (&label, (term, _)) in labels.iter().zip(body.system.terms()) {
-                elements[label] += term.stencils().len();
             }
             let force = body.system.forces(State { x: &body.x, v: &body.v })?;
             summary.kinetic_energy += body.kinetic_energy();
@@ -151,12 +148,7 @@ impl Simulation {
             add(&mut summary.pin_force, pin_force(body, &force));
             summary.asleep += usize::from(island.is_asleep());
         }
-        let term = |(number, counts): (usize, Counts)| {
-            let TermLabel { name, element } = self.labels[number].clone();
-            let (element, energy) = (element.to_owned(), energies[number]);
-            TermSummary { name, element, elements: elements[number], energy, reused: counts.reused, counts }
-        };
-        summary.terms = self.counts().into_iter().enumerate().map(term).collect();
+        summary.terms = self.term_summaries(&energies);
         summary.terms.extend(self.contact_terms());
         self.add_findings(&mut summary);
         Ok(summary)
@@ -166,33 +158,66 @@ impl Simulation {
     #[must_use]
     pub fn summary_without_energies(&self) -> Summary {
         let mut summary = self.summary.clone();
-        let term = |(label, counts): (&TermLabel, Counts)| {
-            let (name, element, reused) = (label.name.clone(), label.element.to_owned(), counts.reused);
-            TermSummary { name, element, elements: 0, energy: None, reused, counts }
-        };
-        summary.terms = self.labels.iter().zip(self.counts()).map(term).collect();
+        summary.terms = self.term_summaries(&vec![None; self.labels.len()]);
         self.add_findings(&mut summary);
         summary.warnings.push("the energies at the end are not finite".to_owned());
         summary
     }
 
+    /// Returns the terms of the scene, with the energy of each.
+    fn term_summaries(&self, energies: &[Option<f64>]) -> Vec<TermSummary> {
+        let mut elements = vec![0; self.labels.len()];
+        for island in &self.islands {
+            for (&label, (term, _)) in island.labels().iter().zip(island.body().system.terms()) {
+                elements[label] += term.stencils().len();
+            }
+        }
+        let term = |(number, counts): (usize, Counts)| {
+            let TermLabel { name, element } = self.labels[number].clone();
+            let (element, energy, elements) = (element.to_owned(), energies[number], Some(elements[number]));
+            TermSummary { name, element, elements, energy, reused: Some(counts.reused), counts: Some(counts) }
+        };
+        self.counts().into_iter().enumerate().map(term).collect()
+    }
+
     /// Returns the elements of certified contact, which is not a term: the energy of the pairs at the end, friction
-    /// included. Their number changes all the time; [`Totals::contact`] counts the work.
+    /// included.
     fn contact_terms(&self) -> Vec<TermSummary> {
-        let energies = self.islands.iter().filter_map(|island| {
-            let body = island.body();
-            body.system.contact_energy(&body.x)
-        });
-        let Some(energy) = energies.reduce(|sum, energy| sum + energy) else { return Vec::new() };
+        let energies: Vec<f64> = self.islands.iter().filter_map(Island::contact_energy).collect();
+        if energies.is_empty() {
+            return Vec::new();
+        }
+        // Starting at 0 turns −0, the sum of no pairs, into 0.
+        let energy = energies.iter().fold(0.0, |sum, energy| sum + energy);
         let named = [
             ("contact", <DistanceBarrier as Element>::DECLARATION.name, Some(energy)),
             ("friction of contact", <SlidingFriction as Element>::DECLARATION.name, None),
         ];
         let term = |(name, element, energy): (&str, &str, Option<f64>)| {
-            let (name, element, counts) = (name.to_owned(), element.to_owned(), Counts::default());
-            TermSummary { name, element, elements: 0, energy, counts, reused: 0 }
+            let (name, element) = (name.to_owned(), element.to_owned());
+            TermSummary { name, element, elements: None, energy, counts: None, reused: None }
         };
         named.map(term).into()
+    }
+
+    /// Says why cloth can pass through itself, or what prevents it.
+    fn cause_of_crossings(&self) -> &'static str {
+        match self.contact {
+            ContactChoice::Off => OFF,
+            ContactChoice::On => PINNED,
+            ContactChoice::Obstacles if self.summary.integrator == "newton" => "`contact = \"on\"` prevents this",
+            ContactChoice::Obstacles => "`integrator = \"newton\"` with `contact = \"on\"` prevents this",
+        }
+    }
+
+    /// Says why cloth can cross obstacles, or what prevents it.
+    fn cause_of_obstacle_crossings(&self) -> &'static str {
+        let is_certified = self.islands.iter().any(|island| island.body().system.has_contact());
+        match (self.contact, is_certified) {
+            (ContactChoice::Off, _) => OFF,
+            (_, true) => PINNED,
+            (_, false) => "The integrator `newton` keeps edges and triangles out of obstacles, others only vertices",
+        }
     }
 
     /// Adds the crossings at the end and the balance of energy.
@@ -201,24 +226,31 @@ impl Simulation {
         summary.obstacle_crossings = self.obstacle_crossings();
         if summary.crossings > 0 {
             summary.warnings.push(format!(
-                "the cloth passes through itself: at the end, edges cross triangles in {} places. \
-                 `integrator = \"newton\"` with `contact = \"on\"` prevents this",
-                summary.crossings
+                "the cloth passes through itself: at the end, edges cross triangles in {} places. {}",
+                summary.crossings,
+                self.cause_of_crossings()
             ));
         }
         if summary.obstacle_crossings > 0 {
             summary.warnings.push(format!(
-                "the cloth crosses obstacles in {} places at the end. The integrator `newton` keeps edges and \
-                 triangles out of obstacles, others only vertices",
-                summary.obstacle_crossings
+                "the cloth crosses obstacles in {} places at the end. {}",
+                summary.obstacle_crossings,
+                self.cause_of_obstacle_crossings()
             ));
         }
         summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));
         let Some(ledger) = &self.ledger else { return };
         let integrator = &summary.integrator;
-        summary.warnings.extend(ledger.imbalance(integrator).or_else(|| ledger.loss(integrator)));
+        let of_energy = ledger.imbalance(integrator).or_else(|| ledger.gain(integrator));
+        summary.warnings.extend(of_energy.or_else(|| ledger.loss(integrator)));
     }
 }
+
+/// The cause of crossings without contact.
+const OFF: &str = "Nothing collides with `contact = \"off\"`";
+/// The cause of crossings with certified contact.
+const PINNED: &str = "Contact moves free vertices only, and all vertices there are pinned: change the pins or their \
+                      motions";
 
 /// Returns the total force of the cloth on its pins, in N.
 fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
@@ -266,7 +298,8 @@ impl fmt::Display for Summary {
         writeln!(f, "{:<20} {:<20} {:>12}   evaluated (skipped) per routine", "term", "element", "energy, J")?;
         for term in &self.terms {
             let energy = term.energy.map_or("–".to_owned(), |energy| format!("{energy:.4e}"));
-            writeln!(f, "{:<20} {:<20} {energy:>12}   {}", term.name, term.element, routines(&term.counts))?;
+            let routines = term.counts.as_ref().map_or("–".to_owned(), routines);
+            writeln!(f, "{:<20} {:<20} {energy:>12}   {routines}", term.name, term.element)?;
         }
         for reason in &self.left_out {
             writeln!(f, "left out: {reason}")?;
