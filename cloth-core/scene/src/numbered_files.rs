@@ -28,15 +28,18 @@ pub enum NumberingError {
     },
 }
 
-/// Returns an error if the numbers of [`numbered_files`] have gaps or repeat.
+/// Returns an error if the numbers of [`numbered_files`] have gaps or repeat. Equal steps, as in 10, 20, 30, are not
+/// gaps.
 pub(super) fn check_numbers(pattern: &Path) -> Result<(), NumberingError> {
     let files = numbered(pattern);
+    let steps = files.iter().zip(files.iter().skip(1)).map(|((number, _), (next, _))| next - number);
+    let step = steps.filter(|step| *step > 0).min().unwrap_or(1);
     for ((number, before), (next, after)) in files.iter().zip(files.iter().skip(1)) {
         if number == next {
             return Err(NumberingError::SameNumber { one: before.clone(), other: after.clone() });
         }
-        if number + 1 < *next {
-            return Err(NumberingError::Gap { before: before.clone(), missing: number + 1, after: after.clone() });
+        if number + step < *next {
+            return Err(NumberingError::Gap { before: before.clone(), missing: number + step, after: after.clone() });
         }
     }
     Ok(())
@@ -81,6 +84,10 @@ mod tests {
             error.to_string().replace(&format!("{}/", folder.path().display()), ""),
             "no file has the number 3: body_10.obj follows body_2.obj. Number the frames without gaps"
         );
+        for name in ["arm_010.obj", "arm_020.obj", "arm_030.obj"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(check_numbers(&folder.path().join("arm_*.obj")), Ok(()));
         std::fs::write(folder.path().join("body_01.obj"), "").unwrap();
         let error = check_numbers(&folder.path().join("body_*.obj")).unwrap_err();
         assert!(error.to_string().ends_with("body_1.obj have the same number; remove one of them"), "{error}");
