@@ -40,11 +40,12 @@ impl Bristles {
     }
 
     /// Returns the deflection of a pair, in m, across its normal. A point that has moved on to another triangle, or an
-    /// edge to another edge, keeps its deflection.
-    pub fn deflection(&self, pair: &Pair, normal: Vector3<f64>) -> Vector3<f64> {
+    /// edge to another edge, keeps its deflection. If the second edge is an obstacle's, it may touch many edges, which
+    /// do not keep that of each other.
+    pub fn deflection(&self, pair: &Pair, normal: Vector3<f64>, is_on_obstacle: bool) -> Vector3<f64> {
         let known = match self.names.binary_search(&name(pair)) {
             Ok(place) => Some(place),
-            Err(_) => self.similar(pair, normal),
+            Err(_) => self.similar(pair, normal, is_on_obstacle),
         };
         known.map_or([0.0; 3], |place| {
             let [_, deflection] = self.vectors[place];
@@ -53,9 +54,10 @@ impl Bristles {
     }
 
     /// The pair with the same point, or a common edge, and the most similar normal, if it is similar at all.
-    fn similar(&self, pair: &Pair, normal: Vector3<f64>) -> Option<usize> {
+    fn similar(&self, pair: &Pair, normal: Vector3<f64>, is_on_obstacle: bool) -> Option<usize> {
         let cosine = |place: &usize| dot(self.vectors[*place][0], normal);
-        let candidates = self.with_first_feature(pair).chain(self.with_second_edge(pair));
+        let with_second = (!is_on_obstacle).then(|| self.with_second_edge(pair));
+        let candidates = self.with_first_feature(pair).chain(with_second.into_iter().flatten());
         candidates.filter(|place| cosine(place) > SAME_CONTACT).max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
     }
 
@@ -112,9 +114,9 @@ mod tests {
     fn deflections_are_short_and_lie_across_the_normal() {
         let ways = [([3, 1], [5e-5, 0.0, 0.0]), ([3, 4], [0.0, 1.0, 0.0])];
         let bristles = Bristles::new(ways.into_iter().map(|(features, way)| (pair(features), UP, way)));
-        assert_eq!(bristles.deflection(&pair([3, 1]), UP), [5e-5, 0.0, 0.0]);
-        assert_eq!(bristles.deflection(&pair([3, 4]), UP), [0.0, LENGTH, 0.0]);
-        assert_eq!(bristles.deflection(&pair([3, 1]), [0.6, 0.0, 0.8])[0], 5e-5 * 0.64);
+        assert_eq!(bristles.deflection(&pair([3, 1]), UP, false), [5e-5, 0.0, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 4]), UP, false), [0.0, LENGTH, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 1]), [0.6, 0.0, 0.8], false)[0], 5e-5 * 0.64);
     }
 
     #[test]
@@ -122,10 +124,10 @@ mod tests {
         let turned = [0.6, 0.0, 0.8];
         let ways = [([3, 1], UP, [0.0, 5e-5, 0.0]), ([3, 4], turned, [0.0, 7e-5, 0.0])];
         let bristles = Bristles::new(ways.into_iter().map(|(features, normal, way)| (pair(features), normal, way)));
-        assert_eq!(bristles.deflection(&pair([3, 2]), UP), [0.0, 5e-5, 0.0]);
-        assert_eq!(bristles.deflection(&pair([3, 9]), turned), [0.0, 7e-5, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 2]), UP, false), [0.0, 5e-5, 0.0]);
+        assert_eq!(bristles.deflection(&pair([3, 9]), turned, false), [0.0, 7e-5, 0.0]);
         for (features, normal) in [([2, 1], UP), ([4, 1], UP), ([3, 2], [0.0, 0.0, -1.0])] {
-            assert_eq!(bristles.deflection(&pair(features), normal), [0.0; 3]);
+            assert_eq!(bristles.deflection(&pair(features), normal, false), [0.0; 3]);
         }
     }
 
@@ -136,10 +138,12 @@ mod tests {
         let bristles = Bristles::new(ways.into_iter().map(|(features, normal, way)| (pair(features), normal, way)));
         for bristles in [Bristles::restored(bristles.clone().memory()), bristles] {
             for features in [[3, 7], [3, 8], [2, 7]] {
-                assert_eq!(bristles.deflection(&pair(features), UP), [0.0, 5e-5, 0.0], "{features:?}");
+                assert_eq!(bristles.deflection(&pair(features), UP, false), [0.0, 5e-5, 0.0], "{features:?}");
             }
+            assert_eq!(bristles.deflection(&pair([3, 8]), UP, true), [0.0, 5e-5, 0.0]);
+            assert_eq!(bristles.deflection(&pair([2, 7]), UP, true), [0.0; 3], "a new edge on a rail");
             for features in [[2, 6], [4, 9], [7, 9]] {
-                assert_eq!(bristles.deflection(&pair(features), UP), [0.0; 3], "{features:?}");
+                assert_eq!(bristles.deflection(&pair(features), UP, false), [0.0; 3], "{features:?}");
             }
         }
     }

@@ -143,7 +143,8 @@ impl Friction {
             let (weights, anchor) = self.sliding_point(mesh, pair, closest);
             let normal = closest.normal;
             let between = sliding(pair, &weights, anchor, &self.start);
-            let straight = subtract(between, self.bristles.deflection(pair, normal));
+            let is_on_obstacle = mesh.obstacle_of(pair).is_some();
+            let straight = subtract(between, self.bristles.deflection(pair, normal, is_on_obstacle));
             let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
             Some((Sliding { pair: *pair, weights, anchor, normal, straight }, element))
         };

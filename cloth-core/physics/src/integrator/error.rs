@@ -198,7 +198,9 @@ impl StepError {
 
 /// Joins alternatives to a sentence; `None` if there is none.
 fn joined<'a>(alternatives: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    let sentence = alternatives.into_iter().collect::<Vec<_>>().join(", or ");
+    let all: Vec<&str> = alternatives.into_iter().collect();
+    let (last, others) = all.split_last()?;
+    let sentence = if others.is_empty() { (*last).to_owned() } else { format!("{}, or {last}", others.join(", ")) };
     let first = sentence.chars().next()?.to_ascii_uppercase();
     Some(format!("{first}{}", &sentence[1..]))
 }
@@ -224,7 +226,7 @@ mod tests {
     fn advice_is_not_what_was_tried() {
         let pressed = Some(Pressed { vertices: vec![3], by: Vec::new() });
         let blocked = StepError::PinsBlocked { moves: 64, part: 0.25, pressed: pressed.clone() };
-        assert_eq!(blocked.advice().unwrap(), "Leave more room there, or try slower motions, or try a smaller dt");
+        assert_eq!(blocked.advice().unwrap(), "Leave more room there, try slower motions, or try a smaller dt");
         let stuck = StepError::NotConverged { iterations: 100, change: 1.0, pressed: None };
         assert_eq!(stuck.advice().unwrap(), "Try a smaller dt");
         let hopeless = |first: &StepError| {
