@@ -76,6 +76,12 @@ pub fn collect<R: Send>(
     all
 }
 
+/// Collects what `work` makes of each number below `count`, on at most `threads` threads. Each takes consecutive numbers,
+/// this many at a time.
+pub fn collect_each<R: Send>(threads: usize, count: usize, length: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    collect(threads, count, length, |range| range.map(&work).collect())
+}
+
 /// Divides the numbers below `count` into consecutive ranges of this length for [`for_each`], or into a single one for
 /// one thread.
 #[must_use]
@@ -141,6 +147,8 @@ mod tests {
                 range.collect()
             });
             assert_eq!(numbers, (0..count).collect::<Vec<_>>(), "{threads} threads");
+            let squares = collect_each(threads, count, 3, |number| number * number);
+            assert_eq!(squares, (0..count).map(|number| number * number).collect::<Vec<_>>(), "{threads} threads");
         }
     }
 

@@ -8,10 +8,10 @@ use energy_solve::ContactCounts;
 
 use super::feasible::Meeting;
 use super::law::Law;
-use super::spacing::{Skin, Spacing, Spacings};
+use super::spacing::{Skin, Spacings};
 use super::{BarrierContact, Friction, Joined, Resistance};
 use crate::collision::{
-    Closest, CollisionMesh, Crossing, Exclusions, MovingBalls, Neighbourhood, Pair, PairKind, Rules, Search, crossings,
+    Closest, CollisionMesh, Crossing, Exclusions, MovingBalls, Neighbourhood, Pair, Rules, Search, crossings,
 };
 
 /// The part of an obstacle's reach that is its thickness, which nothing enters.
@@ -240,9 +240,8 @@ impl BarrierContact {
             let mut thickness = SKIN * start.reach;
             if let Some((distance, pair)) = nearest {
                 if distance <= TOUCHING * start.reach {
-                    let vertices: Vec<usize> = pair.vertices.iter().map(|&vertex| vertex as usize).collect();
-                    let own = own(&self.mesh, vertices);
-                    return Err(ContactError::Touches { obstacle: start.name.clone(), vertices: own, distance });
+                    let vertices = own(&self.mesh, pair.vertices.map(|vertex| vertex as usize));
+                    return Err(ContactError::Touches { obstacle: start.name.clone(), vertices, distance });
                 }
                 thickness = thickness.min(0.5 * distance);
             }
@@ -261,12 +260,13 @@ impl BarrierContact {
         let push = |(pair, closest): (&Pair, &Closest)| {
             let obstacle = self.mesh.obstacle_of(pair);
             let radius = obstacle.map_or(0.0, |obstacle| self.spacings.skins[obstacle].radius);
-            let Spacing { thickness, gap } = self.spacing(pair);
+            let spacing = self.spacing(pair);
             // The resistance of a vertex is about m/h². All of the energy becomes motion.
-            let law = Law::new(Spacing { thickness, gap }, 1.0 / (dt * dt));
+            let law = Law::new(spacing, 1.0 / (dt * dt));
             let speed = (2.0 * law.energy(law.apart(closest))).sqrt();
             let by = obstacle.map(|obstacle| self.names[obstacle].clone());
-            FirstPush { by, distance: closest.distance - radius, reach: thickness + gap - radius, speed }
+            let reach = spacing.thickness + spacing.gap - radius;
+            FirstPush { by, distance: closest.distance - radius, reach, speed }
         };
         joined.map(push).filter(|push| push.speed > 0.0).max_by(|one, other| one.speed.total_cmp(&other.speed))
     }
@@ -279,7 +279,7 @@ impl BarrierContact {
         let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         closest.map_or(Ok(()), |&(distance, thickness, pair)| {
             let vertices = pair.vertices.map(|vertex| vertex as usize);
-            let (one, other) = vertices.split_at(if pair.kind == PairKind::PointTriangle { 1 } else { 2 });
+            let (one, other) = vertices.split_at(pair.first());
             let pair = Box::new([Feature::from(one), Feature::from(other)]);
             Err(ContactError::TooClose { count: close.len(), pair, distance, thickness })
         })

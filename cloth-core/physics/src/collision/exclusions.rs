@@ -126,7 +126,7 @@ impl Exclusions {
             Some(obstacle) => self.obstacles[obstacle],
             None => self.own[vertex as usize],
         };
-        let [a, b] = [a, b].map(|feature| feature.iter().map(sets_at).fold(0, |all, sets| all | sets));
+        let [a, b] = [a, b].map(|feature| feature.iter().map(sets_at).fold(0, |any, sets| any | sets));
         self.sets.iter().any(|[one, other]| (a & one != 0 && b & other != 0) || (b & one != 0 && a & other != 0))
     }
 

@@ -1,5 +1,5 @@
 use energy_dsl::Vector3;
-use energy_solve::threads::collect;
+use energy_solve::threads::{collect, collect_each};
 
 use super::displacement::mean;
 use super::{CollisionMesh, Move, MovingBalls, Nearby, Pair, Search};
@@ -96,9 +96,10 @@ impl Neighbourhood {
         if count == 0 {
             return false;
         }
-        let wanted = of_each(threads, is_stray.len(), radius);
-        let ends =
-            [0, 1].map(|end| of_each(threads, is_stray.len(), |vertex| subtract(ends[end][vertex], origins[end])));
+        let wanted = collect_each(threads, is_stray.len(), VERTICES, radius);
+        let ends = [0, 1].map(|end| {
+            collect_each(threads, is_stray.len(), VERTICES, |vertex| subtract(ends[end][vertex], origins[end]))
+        });
         let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
         let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
         let (pairs, radii) = if self.fixed.is_none() && are_many {
@@ -190,7 +191,7 @@ impl Neighbourhood {
         for vertex in outside {
             (self.centres[vertex], self.radii[vertex]) = (subtract(x[vertex], origin), radii[vertex]);
         }
-        let farthest = of_each(search.threads, x.len(), |vertex| {
+        let farthest = collect_each(search.threads, x.len(), VERTICES, |vertex| {
             norm(subtract(subtract(x[vertex], origin), self.centres[vertex])) + self.radii[vertex]
         });
         found.keep_near(search, x, &farthest);
@@ -225,7 +226,7 @@ impl Neighbourhood {
         if self.radii.is_empty() {
             return vec![true; from.len()];
         }
-        of_each(threads, from.len(), |vertex| {
+        collect_each(threads, from.len(), VERTICES, |vertex| {
             self.is_outside(vertex, from, origins[0]) | self.is_outside(vertex, to, origins[1])
         })
     }
@@ -251,9 +252,4 @@ impl Neighbourhood {
         let away = subtract(subtract(x[vertex], origin), self.centres[vertex]);
         dot(away, away) > self.radii[vertex] * self.radii[vertex]
     }
-}
-
-/// Returns a quantity of each vertex.
-fn of_each<R: Send>(threads: usize, vertices: usize, quantity: impl Fn(usize) -> R + Sync) -> Vec<R> {
-    collect(threads, vertices, VERTICES, |range| range.map(&quantity).collect())
 }

@@ -30,8 +30,7 @@ pub struct Search {
     obstacles: Trees,
     /// Whether edges of cloth and hair meet edges of obstacles; see [`edges_meet_obstacles`].
     edges_meet_obstacles: bool,
-    /// Whether all of cloth and hair fits the regions of the last search. Every search fits all
-    /// obstacles.
+    /// Whether all of cloth and hair fits the regions of the last search. Every search fits all obstacles.
     is_own_fitted: bool,
     rules: Rules,
     /// The largest half of the reach at a vertex of cloth or hair, in m.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use energy_solve::threads::{collect, for_each};
+use energy_solve::threads::{collect_each, for_each};
 
 use super::CollisionMesh;
 use crate::geometry::{Hierarchy, MovingBounds, RoundedMovingBounds, Volume};
@@ -43,7 +43,7 @@ impl<'a> Boxes<'a> {
         threads: usize,
     ) -> Self {
         let extended = |vertex: usize| region(vertex).rounded(halves[vertex]);
-        Self { mesh, regions: collect(threads, mesh.vertices(), VERTICES, |range| range.map(extended).collect()) }
+        Self { mesh, regions: collect_each(threads, mesh.vertices(), VERTICES, extended) }
     }
 
     fn point(&self, number: usize) -> RoundedMovingBounds {

@@ -124,7 +124,7 @@ impl<'a> Iterate<'a> {
         while !self.converged {
             let iterations = self.potential.report.solves;
             if iterations == self.options.iteration_limit as u64 {
-                let pressed = self.shortening();
+                let pressed = self.pressed();
                 return Err(StepError::NotConverged { iterations, change: self.change, pressed });
             }
             if self.is_balanced()? {
@@ -143,7 +143,7 @@ impl<'a> Iterate<'a> {
                 }
                 None if direction.is_projected => {
                     let iterations = self.potential.report.solves;
-                    let (stopped, pressed) = (direction.solved.stopped, self.shortening());
+                    let (stopped, pressed) = (direction.solved.stopped, self.pressed());
                     return Err(StepError::Stuck { iterations, stopped, pressed });
                 }
                 None => self.projection.demand(),
@@ -158,7 +158,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// Returns where contact presses the most, if it shortened a move of this step.
-    fn shortening(&mut self) -> Option<Pressed> {
+    fn pressed(&mut self) -> Option<Pressed> {
         let is_shortened = self.potential.report.contact.shortened > 0;
         is_shortened.then(|| self.potential.most_pressed(&self.x)).flatten()
     }
