@@ -21,6 +21,7 @@ mod other_programs;
 mod plate;
 mod random_contact;
 mod random_impacts;
+mod random_mixtures;
 mod runs;
 mod scenes;
 mod schema;

@@ -3,16 +3,19 @@
 //!
 //! `PROPTEST_CASES=4000 cargo test --release -p cloth-core --test all random_contact::` runs a hundred thousand steps.
 
+use std::path::Path;
+
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;
 use proptest::prelude::*;
+use proptest::test_runner::TestCaseError;
 
 const STEPS: usize = 25;
 /// Scenes in CI: a thousand steps.
 const SCENES: u32 = 40;
 
 /// A fabric, from soft and thick to stiff and thin.
-fn fabric() -> impl Strategy<Value = String> {
+pub(super) fn fabric() -> impl Strategy<Value = String> {
     let material = prop::sample::select(vec!["stvk", "neo-hookean", "stable-neo-hookean"]);
     (material, 0.7..2.5_f64, 0.1..0.4_f64, -3.5..-2.7_f64, 0.0..0.8_f64, -7.0..-4.0_f64).prop_map(
         |(material, stiffness, density, thickness, friction, bending)| {
@@ -27,7 +30,7 @@ fn fabric() -> impl Strategy<Value = String> {
     )
 }
 
-fn sheet(name: &str, cells: usize, at: [f64; 3], rest: &str, fabric: &str) -> String {
+pub(super) fn sheet(name: &str, cells: usize, at: [f64; 3], rest: &str, fabric: &str) -> String {
     let size = 0.025 * cells as f64;
     format!(
         "[[garment]]\nname = \"{name}\"\nplacement.translate = {at:?}\n\
@@ -35,9 +38,13 @@ fn sheet(name: &str, cells: usize, at: [f64; 3], rest: &str, fabric: &str) -> St
     )
 }
 
+/// A vector with components up to a size.
+pub(super) fn vector(size: f64) -> impl Strategy<Value = [f64; 3]> {
+    prop::array::uniform3(-size..size)
+}
+
 /// A spinning sheet flies onto another, which is held at its edge.
 fn drop() -> impl Strategy<Value = String> {
-    let vector = |size: f64| prop::array::uniform3(-size..size);
     (fabric(), fabric(), vector(0.02), vector(1.0), vector(20.0), 0.0..10.0_f64).prop_map(
         |(net, cloth, offset, drift, spin, speed)| {
             let velocity = [drift[0], drift[1], -speed];
@@ -52,7 +59,6 @@ fn drop() -> impl Strategy<Value = String> {
 /// A spinning sheet flies onto a solid that turns, just above a floor or far above it. Just above it, a solid may push
 /// cloth into a gap that is too narrow for it: then the scene demands the impossible.
 fn drop_on_solids() -> impl Strategy<Value = (String, bool)> {
-    let vector = |size: f64| prop::array::uniform3(-size..size);
     let solid = prop_oneof![
         (0.005..0.03_f64).prop_map(|radius| format!("sphere = {{ radius = {radius:?} }}")),
         (vector(0.06), 0.003..0.02_f64).prop_map(|(to, radius)| {
@@ -77,7 +83,7 @@ fn drop_on_solids() -> impl Strategy<Value = (String, bool)> {
 
 /// The corners of a sheet are pulled to random places.
 fn pull() -> impl Strategy<Value = String> {
-    let corner = prop::option::weighted(0.7, prop::array::uniform3(-0.1..0.1_f64));
+    let corner = prop::option::weighted(0.7, vector(0.1));
     (fabric(), prop::array::uniform4(corner), 0.05..0.5_f64).prop_map(|(fabric, corners, time)| {
         let ends = [[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]];
         let pins = ends.iter().zip(corners).filter_map(|(end, to)| {
@@ -110,35 +116,45 @@ fn fold() -> impl Strategy<Value = String> {
 fn scene() -> impl Strategy<Value = (String, bool)> {
     let drops = prop_oneof![drop().prop_map(|text| (text, false)), drop_on_solids()];
     let moving_pins = prop_oneof![pull(), fold()].prop_map(|text| (text, true));
-    (0.001..0.033_f64, prop_oneof![drops, moving_pins]).prop_map(|(dt, (rest, may_be_impossible))| {
-        let text = format!(
-            "dt = {dt:?}\nduration = 10.0\nintegrator = \"newton\"\ncontact = \"on\"\nadaptive = true\n\
-             tolerances.velocity = 1e-3\ndrag = 0.5\n{rest}"
-        );
-        (text, may_be_impossible)
-    })
+    prop_oneof![drops, moving_pins]
 }
 
-fn scenes() -> u32 {
+/// The number of scenes to run.
+pub(super) fn scenes() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(SCENES)
+}
+
+/// Runs a scene. Nothing crosses, all positions are finite, and a step fails only if the scene may demand the
+/// impossible.
+pub(super) fn judge(dt: f64, rest: &str, may_be_impossible: bool) -> Result<(), TestCaseError> {
+    let text = format!(
+        "dt = {dt:?}\nduration = 10.0\nintegrator = \"newton\"\ncontact = \"on\"\nadaptive = true\n\
+         tolerances.velocity = 1e-3\ndrag = 0.5\n{rest}"
+    );
+    let beside_meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/random.toml");
+    let parsed = Scene::parse(&text, &beside_meshes).unwrap_or_else(|error| panic!("{error}"));
+    let mut simulation = Simulation::new(&parsed).unwrap_or_else(|error| panic!("{error}"));
+    for step in 0..STEPS {
+        if let Err(error) = simulation.step() {
+            println!("step {step}: {error}");
+            prop_assert!(may_be_impossible, "step {}: {}", step, error);
+            break;
+        }
+        prop_assert_eq!(simulation.crossings(), []);
+        prop_assert_eq!(simulation.obstacle_crossings(), 0, "step {}", step);
+        prop_assert!(simulation.positions().as_flattened().iter().all(|coordinate| coordinate.is_finite()));
+    }
+    Ok(())
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: scenes(), ..ProptestConfig::default() })]
 
     #[test]
-    fn no_random_scene_has_a_crossing_or_a_nan((text, may_be_impossible) in scene()) {
-        let parsed = Scene::parse(&text, "random.toml".as_ref()).unwrap_or_else(|error| panic!("{error}"));
-        let mut simulation = Simulation::new(&parsed).unwrap_or_else(|error| panic!("{error}"));
-        for step in 0..STEPS {
-            if let Err(error) = simulation.step() {
-                println!("step {step}: {error}");
-                prop_assert!(may_be_impossible, "step {}: {}", step, error);
-                break;
-            }
-            prop_assert_eq!(simulation.crossings(), []);
-            prop_assert_eq!(simulation.obstacle_crossings(), 0, "step {}", step);
-            prop_assert!(simulation.positions().as_flattened().iter().all(|coordinate| coordinate.is_finite()));
-        }
+    fn no_random_scene_has_a_crossing_or_a_nan(
+        dt in 0.001..0.033_f64,
+        (text, may_be_impossible) in scene(),
+    ) {
+        judge(dt, &text, may_be_impossible)?;
     }
 }
