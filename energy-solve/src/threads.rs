@@ -67,12 +67,17 @@ pub fn collect<R: Send>(
     length: usize,
     work: impl Fn(Range<usize>) -> Vec<R> + Sync,
 ) -> Vec<R> {
-    let mut parts = for_each(threads, ranges(threads, count, length), work);
-    if parts.len() == 1 {
-        return parts.remove(0);
-    }
-    let mut all = Vec::with_capacity(count);
-    parts.into_iter().for_each(|part| all.extend(part));
+    concatenated(for_each(threads, ranges(threads, count, length), work))
+}
+
+/// Concatenates lists. A single one is not copied.
+#[must_use]
+pub fn concatenated<R>(parts: Vec<Vec<R>>) -> Vec<R> {
+    let count = parts.iter().map(Vec::len).sum::<usize>();
+    let mut parts = parts.into_iter();
+    let mut all = parts.next().unwrap_or_default();
+    all.reserve_exact(count - all.len());
+    parts.for_each(|part| all.extend(part));
     all
 }
 

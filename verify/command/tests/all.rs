@@ -1,6 +1,7 @@
 //! The tests of the public interface, one module a subject. One program links once and shares all cores.
 #![allow(missing_docs)]
 
+mod bench;
 mod command_line;
 mod elements;
 mod errata;

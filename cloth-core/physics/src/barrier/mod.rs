@@ -39,7 +39,7 @@ mod stiffness;
 mod untangle;
 
 use energy_dsl::{Block, Vector3};
-use energy_solve::threads::for_each;
+use energy_solve::threads::collect;
 use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap, Pressed};
 
 pub use friction::Grip;
@@ -141,8 +141,9 @@ impl BarrierContact {
             let law = || Law::new(spacing, resistance.of(pair, closest));
             (is_active && meeting.may_join(pair, closest)).then(|| (*pair, law(), *closest))
         };
-        let part = |part: &[Near]| part.iter().filter_map(touching).collect::<Vec<_>>();
-        for_each(self.search.threads, nearby.near().chunks(PART).collect(), part).concat()
+        collect(self.search.threads, nearby.near().len(), PART, |part| {
+            nearby.near()[part].iter().filter_map(touching).collect()
+        })
     }
 
     /// The law of a pair that joins with these closest points.
@@ -188,7 +189,7 @@ impl BarrierContact {
             }
             joining
         };
-        for_each(self.search.threads, nearby.near().chunks(PART).collect(), joining).concat()
+        collect(self.search.threads, nearby.near().len(), PART, |part| joining(&nearby.near()[part]))
     }
 
     /// Makes all pairs near a move known. Returns whether there are new ones.

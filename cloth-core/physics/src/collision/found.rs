@@ -1,6 +1,6 @@
 //! The pairs that a search found, in order.
 
-use energy_solve::threads::for_each;
+use energy_solve::threads::{concatenated, for_each};
 
 use super::{CollisionMesh, Pair, PairKind};
 
@@ -38,7 +38,7 @@ impl Found {
         let Self { on_triangles, of_edges } = self;
         let threads = if on_triangles.len() + of_edges.len() < FEW_PAIRS { 1 } else { threads };
         let kinds = vec![(PairKind::PointTriangle, on_triangles), (PairKind::EdgeEdge, of_edges)];
-        for_each(threads, kinds, |(kind, features)| pairs_in_order(mesh, kind, features)).concat()
+        concatenated(for_each(threads, kinds, |(kind, features)| pairs_in_order(mesh, kind, features)))
     }
 }
 

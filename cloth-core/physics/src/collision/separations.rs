@@ -1,5 +1,5 @@
 use energy_dsl::{Kernel, Lane, Level, Mask, Number, Vector3, dispatch};
-use energy_solve::threads::for_each;
+use energy_solve::threads::{concatenated, for_each};
 
 use super::closest::corners;
 use super::{Closest, Move, Pair, PairKind};
@@ -51,17 +51,20 @@ impl Separations {
         let points = pairs.partition_point(|pair| pair.kind == PairKind::PointTriangle);
         let (on_triangles, of_edges) = pairs.split_at(points);
         let (apart_on_triangles, apart_of_edges) = self.all.split_at_mut(points);
-        let all = parts(PairKind::PointTriangle, 0, on_triangles, apart_on_triangles).chain(parts(
+        // One thread need not concatenate what it finds.
+        let length = if threads <= 1 { pairs.len() } else { PART };
+        let all = parts(PairKind::PointTriangle, 0, on_triangles, apart_on_triangles, length).chain(parts(
             PairKind::EdgeEdge,
             points,
             of_edges,
             apart_of_edges,
+            length,
         ));
         let near = for_each(threads, all.collect(), |mut part| {
             let numbers = part.uncertain(step.as_ref(), halves);
             dispatch(Measure { part, numbers: &numbers, x, halves })
         });
-        self.near = near.concat();
+        self.near = concatenated(near);
     }
 }
 
@@ -74,14 +77,16 @@ struct Part<'a> {
     separations: &'a mut [f64],
 }
 
+/// Divides pairs into parts of a length.
 fn parts<'a>(
     kind: PairKind,
     first: usize,
     pairs: &'a [Pair],
     separations: &'a mut [f64],
+    length: usize,
 ) -> impl Iterator<Item = Part<'a>> {
-    let parts = pairs.chunks(PART).zip(separations.chunks_mut(PART)).enumerate();
-    parts.map(move |(number, (pairs, separations))| Part { kind, first: first + number * PART, pairs, separations })
+    let parts = pairs.chunks(length).zip(separations.chunks_mut(length)).enumerate();
+    parts.map(move |(number, (pairs, separations))| Part { kind, first: first + number * length, pairs, separations })
 }
 
 impl Part<'_> {

@@ -314,7 +314,6 @@ impl<'a> Iterate<'a> {
     fn accept(&mut self, step: AcceptedStep, direction: &Direction) {
         self.potential.advance(&mut self.x, step.scale, &direction.vectors);
         (self.energy, self.gradient, self.linearised) = (step.energy, step.gradient, step.linearised);
-        self.energy.value += self.potential.meet(&self.x);
         self.took_full_step = step.scale >= step.allowed;
         let change = step.scale * direction.length / self.potential.dt;
         let before = std::mem::replace(&mut self.change, change);
@@ -322,6 +321,9 @@ impl<'a> Iterate<'a> {
         let (is_whole, shrinks) = (step.allowed == 1.0, self.took_full_step && change < before);
         // A step that contact shortens, or along a truncated direction, says nothing about the distance to the minimum.
         self.converged = is_solution && is_whole && self.pins == 1.0 && change < self.options.velocity_tolerance;
+        if !self.converged {
+            self.energy.value += self.potential.meet(&self.x);
+        }
         self.projection.proceed(Progress { is_solution, is_whole, shrinks });
     }
 }

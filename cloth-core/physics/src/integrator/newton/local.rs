@@ -150,27 +150,30 @@ impl IncrementalPotential<'_> {
 
 #[cfg(test)]
 mod tests {
-    use energy_solve::System;
+    use energy_elements::StVK;
+    use energy_solve::{ElementList, PotentialTerm, System};
 
     use super::*;
     use crate::body::Body;
-    use crate::fabric::{Bending, Fabric, Material, Membrane, Rigidity, Surroundings, terms};
-    use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork, Topology};
+    use crate::mesh::{Diagonals, Plane, Sheet, lumped_masses};
 
-    /// A strip that is one tenth too long for its pinned ends, with a wrinkle.
+    /// A strip that is one tenth too long for its pinned ends, with a wrinkle. Its membrane is a term of its own: those
+    /// of a fabric would compile the kernels of all materials.
     fn strip() -> Body {
         let (diagonals, plane) = (Diagonals::Alternating, Plane::Horizontal);
         let mesh = Sheet { cells: [20, 5], size: [0.4, 0.1], diagonals, plane, pleats: None }.mesh().unwrap();
-        let bending = Bending::Plate(Rigidity::Flexural { rigidity: 1e-4, poisson_ratio: 0.3 });
-        let membrane = Membrane { stretch_stiffness: 100.0, poisson_ratio: 0.3, bending };
-        let fabric = Fabric::new(0.2, Material::Stvk(membrane));
-        let springs = SpringNetwork::of_mesh(&Topology::of(&mesh));
-        let garment = terms(&fabric, &mesh, &springs, &Surroundings { gravity: [0.0, 0.0, -9.81], drag: 1.0 }).unwrap();
+        let flat = |corner: usize| [mesh.vertices()[corner][0], mesh.vertices()[corner][1]];
+        let triangle = |corners: &[usize; 3]| {
+            let [a, b, c] = corners.map(flat);
+            StVK::new(a, b, c, 30.0, 40.0).unwrap()
+        };
+        let membrane = mesh.triangles().iter().map(triangle).collect();
+        let membrane = ElementList::new("membrane", membrane, mesh.triangles()).unwrap();
         let pinned: Vec<bool> = mesh.vertices().iter().map(|x| x[0].abs() > 0.199).collect();
         let x: Vec<Vector3<f64>> =
             mesh.vertices().iter().map(|x| [0.9 * x[0], x[1], 1e-3 * (40.0 * x[0]).sin()]).collect();
-        let system = System::new(garment.terms, &pinned).unwrap();
-        Body { v: vec![[0.0; 3]; x.len()], x, masses: garment.masses, system }
+        let system = System::new(vec![Box::new(PotentialTerm::new(membrane))], &pinned).unwrap();
+        Body { v: vec![[0.0; 3]; x.len()], x, masses: lumped_masses(&mesh, 0.2), system }
     }
 
     #[test]
