@@ -17,8 +17,8 @@ fn hair(rooted: bool) -> impl Strategy<Value = String> {
             let last = [root[0] + aside[0], root[1] + 0.05 + aside[1], root[2] + aside[2]];
             let direction = [direction[0], direction[1], direction[2] - 1.0];
             format!(
-                "[[hair]]\ncount = {count}\nsegments = {segments}\nlength = 0.1\nroot = {root:?}\nlast_root = {last:?}\n\
-                 direction = {direction:?}\ndensity = 1e-5\nstretch_stiffness = {:?}\nbend_stiffness = {:?}\n\
+                "[[hair]]\ncount = {count}\nsegments = {segments}\nlength = 0.1\nroot = {root:?}\n\
+                 last_root = {last:?}\ndirection = {direction:?}\ndensity = 1e-5\nstretch_stiffness = {:?}\nbend_stiffness = {:?}\n\
                  rooted = {rooted}\n",
                 10_f64.powf(stiffness),
                 10_f64.powf(bending)

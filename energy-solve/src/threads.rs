@@ -81,8 +81,8 @@ pub fn concatenated<R>(parts: Vec<Vec<R>>) -> Vec<R> {
     all
 }
 
-/// Collects what `work` makes of each number below `count`, on at most `threads` threads. Each takes consecutive numbers,
-/// this many at a time.
+/// Collects what `work` makes of each number below `count`, on at most `threads` threads. Each takes consecutive
+/// numbers, this many at a time.
 pub fn collect_each<R: Send>(threads: usize, count: usize, length: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     collect(threads, count, length, |range| range.map(&work).collect())
 }

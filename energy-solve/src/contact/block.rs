@@ -3,8 +3,8 @@ use energy_dsl::{Block, Vector3};
 /// The stiffness (c cᵀ) ⊗ B of one contact between up to four vertices: block (i, j) is cᵢ cⱼ B.
 ///
 /// The coefficients c express the vector between the closest points, Σ cᵢ xᵢ. B is positive semi-definite: the
-/// curvature of the contact's energy with respect to this vector. If Σ c = 0, a translation meets no resistance. Friction
-/// on an obstacle leaves out the obstacle's vertices.
+/// curvature of the contact's energy with respect to this vector. If Σ c = 0, a translation meets no resistance.
+/// Friction on an obstacle leaves out the obstacle's vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The rows of the four vertices in the matrix; [`Contact::FIXED`] for a pinned vertex.

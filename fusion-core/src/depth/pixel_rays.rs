@@ -75,7 +75,7 @@ impl PixelRays {
     /// Returns the point that a pixel sees at a depth.
     ///
     /// # Panics
-    /// As [`Self::ray`].
+    /// Like [`Self::ray`].
     #[must_use]
     pub fn point(&self, pixel: [usize; 2], depth: f64) -> Vector3<f64> {
         let [x, y] = self.ray(pixel);

@@ -11,8 +11,8 @@
 //! advance; compare the conservative advancement of Li, Kaufman and Jiang 2021).
 //!
 //! All positions that occur are rounded. The level is raised by 64 ε times the largest coordinate. This exceeds the sum
-//! of all rounding errors, relative to the largest coordinate and the three components. They are 2 ε for each of the two
-//! corners, 1 ε for their difference, and 3 ε for the dot product with a vector of length 1 + 4 ε.
+//! of all rounding errors, relative to the largest coordinate and the three components. They are 2 ε for each of the
+//! two corners, 1 ε for their difference, and 3 ε for the dot product with a vector of length 1 + 4 ε.
 
 use energy_dsl::{Real, Vector3};
 

@@ -165,7 +165,7 @@ impl StepError {
         joined(others.into_iter().chain(["try a smaller dt"]))
     }
 
-    /// What may help other than a smaller step.
+    /// Remedies other than a smaller step.
     fn remedies(&self) -> Vec<&'static str> {
         let pressed = match self {
             Self::Stuck { pressed, .. } | Self::PinsBlocked { pressed, .. } | Self::NotConverged { pressed, .. } => {

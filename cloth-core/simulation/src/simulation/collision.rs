@@ -102,8 +102,8 @@ fn note_on_push(FirstPush { by, distance, reach, speed }: &FirstPush) -> String 
         None => ("parts of the cloth".to_owned(), "reduce the `thickness` of the fabric".to_owned()),
     };
     format!(
-        "{parts} start {distance:.3} mm apart, within the reach of contact, {reach:.3} mm. It pushes them apart at about \
-         {speed:.2} m/s, and faster if dt is smaller. Start them farther apart, or {remedy}"
+        "{parts} start {distance:.3} mm apart, within the reach of contact, {reach:.3} mm. It pushes them apart at \
+         about {speed:.2} m/s, and faster if dt is smaller. Start them farther apart, or {remedy}"
     )
 }
 

@@ -343,7 +343,7 @@ impl<S: Scalar> Number for Unbounded<S> {
 /// It always uses fused operations. It is so rare that their cost does not matter, and all levels give the same bits.
 #[doc(hidden)]
 pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
-    /// What inputs and outputs are.
+    /// Kinds of inputs and outputs.
     const ROLES: Roles<'static>;
 
     /// Runs the path at a SIMD level.
