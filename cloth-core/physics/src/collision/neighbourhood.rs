@@ -72,6 +72,23 @@ impl Neighbourhood {
         *self = Self::default();
     }
 
+    /// Forgets the vertices that left their balls on the last such move. If they are still outside, the next move takes
+    /// them out of their balls again.
+    pub fn forget_strays(&mut self) {
+        self.strays = Strays::default();
+    }
+
+    /// Whether a straight move takes vertices out of their balls.
+    pub fn is_left_on(&self, step: &Move<'_>, threads: usize) -> bool {
+        let (ends, origins) = self.seen(step);
+        self.leaving(ends, origins, threads).contains(&true)
+    }
+
+    /// The positions at the start and at the end of a move, and the places from which balls see them.
+    fn seen<'a>(&self, step: &Move<'a>) -> ([&'a [Vector3<f64>]; 2], [Vector3<f64>; 2]) {
+        ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)))
+    }
+
     /// Measures all pairs at x, unless they have been measured there.
     pub fn visit(&mut self, search: &Search, x: &[Vector3<f64>]) {
         self.nearby.visit(search, x);
@@ -89,7 +106,7 @@ impl Neighbourhood {
         radius: impl Fn(usize) -> f64 + Sync,
         limits: [f64; 2],
     ) -> bool {
-        let (ends, origins) = ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)));
+        let (ends, origins) = self.seen(step);
         let threads = search.threads;
         let mut is_stray = self.leaving(ends, origins, threads);
         let count = is_stray.iter().filter(|stray| **stray).count();

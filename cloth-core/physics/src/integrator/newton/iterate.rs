@@ -321,6 +321,7 @@ impl<'a> Iterate<'a> {
         let (is_whole, shrinks) = (step.allowed == 1.0, self.took_full_step && change < before);
         // A step that contact shortens, or along a truncated direction, says nothing about the distance to the minimum.
         self.converged = is_solution && is_whole && self.pins == 1.0 && change < self.options.velocity_tolerance;
+        // The next step finds the pairs near the last iterate.
         if !self.converged {
             self.energy.value += self.potential.meet(&self.x);
         }
