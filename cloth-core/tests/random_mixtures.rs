@@ -18,8 +18,8 @@ fn hair(rooted: bool) -> impl Strategy<Value = String> {
             let direction = [direction[0], direction[1], direction[2] - 1.0];
             format!(
                 "[[hair]]\ncount = {count}\nsegments = {segments}\nlength = 0.1\nroot = {root:?}\n\
-                 last_root = {last:?}\ndirection = {direction:?}\ndensity = 1e-5\nstretch_stiffness = {:?}\nbend_stiffness = {:?}\n\
-                 rooted = {rooted}\n",
+                 last_root = {last:?}\ndirection = {direction:?}\ndensity = 1e-5\nstretch_stiffness = {:?}\n\
+                 bend_stiffness = {:?}\nrooted = {rooted}\n",
                 10_f64.powf(stiffness),
                 10_f64.powf(bending)
             )

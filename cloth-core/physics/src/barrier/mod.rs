@@ -83,8 +83,6 @@ pub struct BarrierContact {
     least_limit: f64,
     /// The pairs near the current iterate.
     neighbourhood: Neighbourhood,
-    /// Whether the neighbourhood is that of an earlier step.
-    is_old: bool,
     joined: Joined,
     /// The joined pairs of vertices that do not move for a while.
     fixed: Vec<(Pair, Law)>,
@@ -195,15 +193,7 @@ impl BarrierContact {
     }
 
     /// Makes all pairs near a move known. Returns whether there are new ones.
-    ///
-    /// The neighbourhood of an earlier step serves until a vertex leaves its ball. Then one that depends on the state
-    /// alone replaces it, as in a run that resumes from a checkpoint.
     fn follow(&mut self, step: &Move<'_>) -> bool {
-        let may_replace = self.is_old && !self.neighbourhood.is_restricted();
-        if may_replace && self.neighbourhood.is_left_on(step, self.search.threads) {
-            self.neighbourhood.clear();
-            self.is_old = false;
-        }
         let [least, most] = self.slack;
         let radius = |vertex: usize| (least + STRAYING * step.excursions()[vertex]).min(most);
         let is_new = self.neighbourhood.follow(&mut self.search, &self.mesh, step, radius, self.slack);
@@ -250,8 +240,7 @@ impl ContactModel for BarrierContact {
         self.limit = None;
         self.joined.clear();
         self.blocking.clear();
-        self.neighbourhood.forget_strays();
-        self.is_old = true;
+        self.neighbourhood.begin_step();
     }
 
     fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {

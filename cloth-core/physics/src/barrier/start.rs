@@ -212,7 +212,6 @@ impl BarrierContact {
             least_limit: EDGES * mesh.mean_edge(x),
             search,
             neighbourhood: Neighbourhood::default(),
-            is_old: false,
             joined: Joined::default(),
             fixed: Vec::new(),
             friction: Friction::without_grip(obstacles.len()),

@@ -20,6 +20,8 @@ pub struct Neighbourhood {
     radii: Vec<f64>,
     nearby: Nearby,
     strays: Strays,
+    /// Whether the last search for all pairs was in an earlier step.
+    is_old: bool,
     /// The mean of all vertices where balls were last settled.
     settled: Vector3<f64>,
     /// The origin of all balls, relative to the mean of all vertices.
@@ -68,25 +70,16 @@ impl Neighbourhood {
     }
 
     /// Forgets all pairs, so that the next ones depend on the state alone.
+    #[cfg(test)]
     pub fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// Forgets the vertices that left their balls on the last such move. If they are still outside, the next move takes
-    /// them out of their balls again.
-    pub fn forget_strays(&mut self) {
+    /// Keeps the pairs of the last step until a vertex leaves its ball. Then a search for all pairs replaces them, as in
+    /// a run that resumes from a checkpoint.
+    pub fn begin_step(&mut self) {
         self.strays = Strays::default();
-    }
-
-    /// Whether a straight move takes vertices out of their balls.
-    pub fn is_left_on(&self, step: &Move<'_>, threads: usize) -> bool {
-        let (ends, origins) = self.seen(step);
-        self.leaving(ends, origins, threads).contains(&true)
-    }
-
-    /// The positions at the start and at the end of a move, and the places from which balls see them.
-    fn seen<'a>(&self, step: &Move<'a>) -> ([&'a [Vector3<f64>]; 2], [Vector3<f64>; 2]) {
-        ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)))
+        self.is_old = true;
     }
 
     /// Measures all pairs at x, unless they have been measured there.
@@ -96,8 +89,8 @@ impl Neighbourhood {
     }
 
     /// Finds the pairs of the vertices that leave their balls on a straight move, up to a radius from their paths.
-    /// Returns whether there are such vertices. If there are many, or nothing is near, all vertices count as strays,
-    /// and no other pairs are known. The search may choose other radii within the `limits`; see [`Search::pairs_near`].
+    /// Returns whether there are such vertices. If there are many, if nothing is near, or if balls are those of an
+    /// earlier step, all vertices count as strays, and no other pairs are known. The search may choose other radii within the `limits`; see [`Search::pairs_near`].
     pub fn follow(
         &mut self,
         search: &mut Search,
@@ -106,7 +99,7 @@ impl Neighbourhood {
         radius: impl Fn(usize) -> f64 + Sync,
         limits: [f64; 2],
     ) -> bool {
-        let (ends, origins) = self.seen(step);
+        let (ends, origins) = ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)));
         let threads = search.threads;
         let mut is_stray = self.leaving(ends, origins, threads);
         let count = is_stray.iter().filter(|stray| **stray).count();
@@ -118,7 +111,7 @@ impl Neighbourhood {
             collect_each(threads, is_stray.len(), VERTICES, |vertex| subtract(ends[end][vertex], origins[end]))
         });
         let paths = MovingBalls { ends: [&ends[0], &ends[1]], radii: &wanted };
-        let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear();
+        let are_many = count as f64 > FEW * is_stray.len() as f64 || self.is_clear() || self.is_old;
         let (pairs, radii) = if self.fixed.is_none() && are_many {
             *self = Self { offset: self.offset, ..Self::default() };
             is_stray.fill(true);
