@@ -75,8 +75,8 @@ impl Neighbourhood {
         *self = Self::default();
     }
 
-    /// Keeps the pairs of the last step until a vertex leaves its ball. Then a search for all pairs replaces them, as in
-    /// a run that resumes from a checkpoint.
+    /// Keeps the pairs of the last step until a vertex leaves its ball. Then a search for all pairs replaces them, as
+    /// in a run that resumes from a checkpoint.
     pub fn begin_step(&mut self) {
         self.strays = Strays::default();
         self.is_old = true;
@@ -90,7 +90,8 @@ impl Neighbourhood {
 
     /// Finds the pairs of the vertices that leave their balls on a straight move, up to a radius from their paths.
     /// Returns whether there are such vertices. If there are many, if nothing is near, or if balls are those of an
-    /// earlier step, all vertices count as strays, and no other pairs are known. The search may choose other radii within the `limits`; see [`Search::pairs_near`].
+    /// earlier step, all vertices count as strays, and no other pairs are known. The search may choose other radii
+    /// within the `limits`; see [`Search::pairs_near`].
     pub fn follow(
         &mut self,
         search: &mut Search,
