@@ -6,6 +6,7 @@ use super::{Counted, System};
 use crate::matrix::dof_map::DofMap;
 use crate::terms::counts::{Counts, Tally};
 use crate::terms::restriction::Restriction;
+use crate::threads::for_each;
 
 impl System {
     /// Returns the system of the chosen free vertices; all others count as pinned. It evaluates only elements with a
@@ -24,10 +25,11 @@ impl System {
         let dofs = DofMap::new(&pinned);
         let (pattern, slots) = self.pattern.restricted(&rows);
         let restriction = Restriction { dofs: &dofs, slots: &slots };
-        let restricted = |Counted { term, .. }: &Counted| {
+        let restricted = |Counted { term, .. }: &mut Counted| {
             Some(Counted { term: term.restricted(&restriction)?, counts: Counts::default() })
         };
-        let terms = self.terms.iter().map(restricted).collect::<Option<_>>()?;
+        let terms = for_each(self.threads, self.terms.iter_mut().collect(), restricted);
+        let terms = terms.into_iter().collect::<Option<_>>()?;
         let mut system = Self::with_placed(terms, dofs, Arc::new(pattern), self.threads);
         system.contact = self.contact.take();
         if let Some(contact) = &mut system.contact {

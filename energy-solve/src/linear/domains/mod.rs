@@ -3,10 +3,10 @@
 //! Threads relax domains independently, exchange the vectors on their borders, and meet at barriers. The domains depend
 //! on the matrix alone, never on the number of threads, so that results do not either.
 
-mod barrier;
 mod contacts;
 mod couplings;
 mod diagonal;
+mod per_domain;
 mod right_hand_scale;
 mod triangle;
 
@@ -17,10 +17,10 @@ use energy_dsl::{BLOCK_NUMBERS, BlockSum, Kernel, Level};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::Pattern;
 
-pub(crate) use self::barrier::{PerDomain, SpinBarrier};
 pub(crate) use self::contacts::{DomainContacts, contact_diagonals, distribute};
 pub(crate) use self::couplings::Couplings;
 pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
+pub(crate) use self::per_domain::PerDomain;
 pub(crate) use self::right_hand_scale::RightHandScale;
 use self::triangle::Blocks;
 pub(crate) use self::triangle::{Triangle, scaled_block};

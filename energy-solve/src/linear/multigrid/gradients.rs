@@ -5,12 +5,12 @@ use energy_dsl::{Kernel, Level, Vector3, dispatch};
 use super::coarse::Coarse;
 use super::smoother::Smoother;
 use crate::linear::domains::{
-    InverseFactor, PerDomain, Precision, RightHandScale, SpinBarrier, Wide, add_products, scaled, sum_of_three,
-    unscaled,
+    InverseFactor, PerDomain, Precision, RightHandScale, Wide, add_products, scaled, sum_of_three, unscaled,
 };
 use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::widened;
+use crate::threads::SpinBarrier;
 
 /// Factor by which the tolerance may exceed that of over-relaxation. There the remaining error is smooth, and the norm,
 /// which gives smooth parts little weight, is half the relative error of the solution. Here the remaining error is
@@ -62,7 +62,6 @@ pub(super) struct Common<'a, T> {
     changes: Vec<RwLock<Vec<Wide<T>>>>,
     /// For each domain, its first aggregate and its part of Pᵀ r.
     restricted: Vec<(usize, RwLock<Vec<Wide<T>>>)>,
-    pub(super) barrier: SpinBarrier,
     right_hand_scale: RightHandScale,
     /// s · s, r · z and p · q. All threads read each number before any of them reaches its next update.
     square: PerDomain,
@@ -76,7 +75,6 @@ impl<'a, T: Precision> Common<'a, T> {
         options: &'a SolveOptions,
         smoothers: &'a [Smoother<T>],
         coarse: Option<&'a mut Coarse<T>>,
-        threads: usize,
     ) -> Self {
         let zeros = |length: usize| RwLock::new(vec![[T::from_f64(0.0); 4]; length]);
         let span = |smoother: &Smoother<T>| match &coarse {
@@ -94,7 +92,6 @@ impl<'a, T: Precision> Common<'a, T> {
             changes: borders(),
             restricted: spans.map(|span| (span.start, zeros(span.len()))).collect(),
             coarse: coarse.map(RwLock::new),
-            barrier: SpinBarrier::new(threads.clamp(1, smoothers.len().max(1))),
             right_hand_scale: RightHandScale::new(smoothers.len()),
             square: sum(),
             along: sum(),
@@ -136,8 +133,12 @@ pub(super) struct Part<'a, T> {
 }
 
 /// Runs conjugate gradients in one of the threads. [`super::Multigrid`] documents the formulas.
-pub(super) fn conjugate_gradients<T: Precision>(mut parts: Vec<Part<'_, T>>, common: &Common<'_, T>) -> SolveReport {
-    let Common { options, barrier, right_hand_scale, square, along, curvature, .. } = common;
+pub(super) fn conjugate_gradients<T: Precision>(
+    mut parts: Vec<Part<'_, T>>,
+    common: &Common<'_, T>,
+    barrier: &SpinBarrier,
+) -> SolveReport {
+    let Common { options, right_hand_scale, square, along, curvature, .. } = common;
     let leads = parts.iter().any(|part| part.number == 0);
     for Part { number, inverses, b, .. } in &parts {
         right_hand_scale.note(*number, inverses, b);

@@ -165,17 +165,14 @@ impl<T: Precision> Multigrid<T> {
             return SolveReport::indefinite();
         }
         let Self { pattern, threads, inverses, smoothers, vectors, coarse, .. } = self;
-        let common = Common::new(pattern, options, smoothers, coarse.as_mut(), *threads);
+        let common = Common::new(pattern, options, smoothers, coarse.as_mut());
         let lengths = smoothers.iter().map(|smoother| smoother.triangle.rows.len());
         let parts = vectors.iter_mut().zip(split_mut(x, lengths)).enumerate();
         let parts = parts.map(|(number, (vectors, x))| {
             let rows = smoothers[number].triangle.rows.clone();
             Part { number, vectors, inverses: &inverses[rows.clone()], b: &b[rows], x }
         });
-        let solved = in_parts(*threads, parts.collect(), |parts| {
-            let _participation = common.barrier.participate();
-            conjugate_gradients(parts, &common)
-        });
+        let solved = in_parts(*threads, parts.collect(), |parts, barrier| conjugate_gradients(parts, &common, barrier));
         // All threads return the same report.
         solved.into_iter().next().unwrap_or(nothing)
     }

@@ -8,14 +8,14 @@ use energy_dsl::{Block, Kernel, Level, Vector3, dispatch};
 use self::domain::Domain;
 use crate::contact::Contact;
 use crate::linear::domains::{
-    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, SpinBarrier, Wide, contact_diagonals, create_domains,
-    distribute, invert, ranges,
+    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, Wide, contact_diagonals, create_domains, distribute,
+    invert, ranges,
 };
 use crate::linear::preconditioner::SingularBlock;
 use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
-use crate::threads::{for_each, in_parts, split_mut};
+use crate::threads::{SpinBarrier, for_each, in_parts, split_mut};
 
 /// ω. Between 1.4 and 1.8, the iterations on sheets of cloth (soft, stiff, fine, coarse) differ by a fifth.
 const RELAXATION: f64 = 1.6;
@@ -145,7 +145,6 @@ impl<T: Precision> OverRelaxation<T> {
             options,
             borders,
             contact_borders,
-            barrier: SpinBarrier::new((*threads).clamp(1, lengths.len().max(1))),
             right_hand_scale: RightHandScale::new(lengths.len()),
             first_half: sum(),
             second_half: sum(),
@@ -156,9 +155,8 @@ impl<T: Precision> OverRelaxation<T> {
             let rows = domain.triangle.rows.clone();
             Part { number, inverses: &inverses[rows.clone()], b: &b[rows], domain, x }
         });
-        let solved = in_parts(*threads, parts.collect(), |parts| {
-            let _participation = common.barrier.participate();
-            dispatch(Gradients { parts, common: &common })
+        let solved = in_parts(*threads, parts.collect(), |parts, barrier| {
+            dispatch(Gradients { parts, common: &common, barrier })
         });
         // All threads return the same report.
         solved.into_iter().next().unwrap_or(SolveReport {
@@ -206,7 +204,6 @@ struct Common<'a, T> {
     options: &'a SolveOptions,
     borders: &'a [RwLock<Vec<Wide<T>>>],
     contact_borders: &'a [RwLock<Vec<Wide<T>>>],
-    barrier: SpinBarrier,
     right_hand_scale: RightHandScale,
     /// p · t, p · w and r · r. All threads read each number before any of them reaches its next update.
     first_half: PerDomain,
@@ -227,6 +224,7 @@ struct Part<'a, T> {
 struct Gradients<'a, T> {
     parts: Vec<Part<'a, T>>,
     common: &'a Common<'a, T>,
+    barrier: &'a SpinBarrier,
 }
 
 impl<T: Precision> Kernel for Gradients<'_, T> {
@@ -234,8 +232,8 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> SolveReport {
-        let Self { mut parts, common } = self;
-        let Common { pattern, options, borders, contact_borders, barrier, right_hand_scale, .. } = common;
+        let Self { mut parts, common, barrier } = self;
+        let Common { pattern, options, borders, contact_borders, right_hand_scale, .. } = common;
         let Common { first_half, second_half, square, .. } = common;
         for Part { number, inverses, b, .. } in &parts {
             right_hand_scale.note(*number, inverses, b);

@@ -1,62 +1,57 @@
 //! Work divided among threads. The results do not depend on the number of threads.
 
+mod barrier;
+mod meeting;
+mod pool;
+
 use std::ops::Range;
-use std::panic::resume_unwind;
-use std::sync::{Mutex, OnceLock};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use rayon_core::{ThreadPool, ThreadPoolBuilder};
+use rayon_core::ThreadPool;
 
-/// Bytes of stack of each thread of the pool. While a thread waits for others, it may begin the step of another
-/// simulation.
-const STACK: usize = 16 << 20;
-
-/// The threads, one per core, which sleep between two calls: to wake one takes a tenth of the time that it takes to
-/// start one. `None` if the system refuses to start them, or in a forked process, which inherits no threads.
-fn pool() -> Option<&'static ThreadPool> {
-    static POOL: OnceLock<(u32, Option<ThreadPool>)> = OnceLock::new();
-    let start = || {
-        let name = |number| format!("energy-solve {number}");
-        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let builder = ThreadPoolBuilder::new().num_threads(cores).stack_size(STACK).thread_name(name);
-        (std::process::id(), builder.build().ok())
-    };
-    let (process, pool) = POOL.get_or_init(start);
-    pool.as_ref().filter(|_| *process == std::process::id())
-}
+pub(crate) use barrier::SpinBarrier;
+pub(crate) use meeting::in_parts;
+pub use pool::in_pool;
+use pool::{pool, spin_while, with_helpers};
 
 /// Applies `work` to every item on at most `threads` threads, including the calling one. Each thread takes one item
 /// after the other, so one that starts late takes fewer. Results are in the order of the items.
 pub fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
+    let threads = threads.min(items.len());
+    match (threads > 1).then(pool).flatten() {
+        Some(pool) => shared(pool, threads, items, &work),
+        None => items.into_iter().map(work).collect(),
+    }
+}
+
+/// [`for_each`] on several threads. Out of line, so that callers on one thread stay small.
+#[inline(never)]
+fn shared<I: Send, R: Send>(
+    pool: &ThreadPool,
+    threads: usize,
+    items: Vec<I>,
+    work: &(impl Fn(I) -> R + Sync),
+) -> Vec<R> {
     let count = items.len();
-    let threads = threads.min(count);
-    let Some(pool) = (threads > 1).then(pool).flatten() else {
-        return items.into_iter().map(work).collect();
-    };
     let waiting = Mutex::new(items.into_iter().enumerate());
-    let done = Mutex::new(Vec::with_capacity(count));
+    let (done, number_done) = (Mutex::new(Vec::with_capacity(count)), AtomicUsize::new(0));
     let next = || waiting.lock().expect("no thread panics while it takes an item").next();
     let until_none_waits = || {
         while let Some((number, item)) = next() {
             let result = work(item);
             done.lock().expect("no thread panics while it adds a result").push((number, result));
+            number_done.fetch_add(1, Ordering::Release);
         }
     };
-    pool.in_place_scope(|scope| {
-        (1..threads).for_each(|_| scope.spawn(|_| until_none_waits()));
+    let lead = || {
         until_none_waits();
-    });
+        spin_while(|| number_done.load(Ordering::Acquire) < count);
+    };
+    with_helpers(pool, threads - 1, until_none_waits, lead);
     let mut done = done.into_inner().expect("no thread panics while it adds a result");
     done.sort_unstable_by_key(|(number, _)| *number);
     done.into_iter().map(|(_, result)| result).collect()
-}
-
-/// Runs `work` on a thread of the pool if it may use several threads. Within it, [`for_each`] does not wait for a
-/// thread that wakes too late to help.
-pub fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
-    match (threads > 1).then(pool).flatten() {
-        Some(pool) => pool.install(work),
-        None => work(),
-    }
 }
 
 /// Collects what `work` makes of consecutive ranges of the numbers below `count`, of this length, on at most `threads`
@@ -95,27 +90,6 @@ pub fn ranges(threads: usize, count: usize, length: usize) -> Vec<Range<usize>> 
     (0..count).step_by(length.max(1)).map(|first| first..count.min(first + length)).collect()
 }
 
-/// Divides the items among at most `threads` threads and applies `work` to each part, all parts at the same time.
-pub fn in_parts<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(Vec<I>) -> R + Sync) -> Vec<R> {
-    let mut parts = split(items, threads).into_iter();
-    let Some(own) = parts.next() else { return Vec::new() };
-    std::thread::scope(|scope| {
-        let work = &work;
-        let others: Vec<_> = parts.map(|part| scope.spawn(move || work(part))).collect();
-        let mut results = vec![work(own)];
-        results.extend(others.into_iter().map(|other| other.join().unwrap_or_else(|panic| resume_unwind(panic))));
-        results
-    })
-}
-
-/// Splits the items into at most `parts` non-empty runs of about the same length.
-fn split<I>(items: Vec<I>, parts: usize) -> Vec<Vec<I>> {
-    let (count, parts) = (items.len(), parts.clamp(1, items.len().max(1)));
-    let mut items = items.into_iter();
-    let run = |part: usize| items.by_ref().take((part + 1) * count / parts - part * count / parts).collect::<Vec<I>>();
-    (0..parts).map(run).filter(|run| !run.is_empty()).collect()
-}
-
 /// Splits a slice into consecutive parts of these lengths.
 pub(crate) fn split_mut<T>(mut slice: &mut [T], lengths: impl IntoIterator<Item = usize>) -> Vec<&mut [T]> {
     let mut parts = Vec::new();
@@ -142,6 +116,26 @@ mod tests {
                 assert_eq!(in_pool, squares, "{threads} threads of the pool");
             }
         }
+    }
+
+    /// More callers than threads of the pool, which also help each other.
+    #[test]
+    fn simultaneous_callers_do_not_wait_for_each_other() {
+        let squares = |caller: usize| {
+            in_pool(2, || {
+                for round in 0..200 {
+                    let numbers: Vec<usize> = (0..5 + round % 7).map(|number| caller * number).collect();
+                    let expected: Vec<_> = numbers.iter().map(|number| number * number).collect();
+                    assert_eq!(for_each(2, numbers.clone(), |number| number * number), expected);
+                    let parts = in_parts(2, numbers, |part, barrier| {
+                        barrier.wait();
+                        part.into_iter().map(|number| number * number).collect::<Vec<_>>()
+                    });
+                    assert_eq!(parts.concat(), expected);
+                }
+            });
+        };
+        std::thread::scope(|scope| (0..8).for_each(|caller| drop(scope.spawn(move || squares(caller)))));
     }
 
     #[test]
