@@ -12,6 +12,8 @@ use crate::collision::{Closest, Measured, MeasuredPart, Pair};
 pub(super) struct Joined {
     pub pairs: Vec<Pair>,
     pub laws: Vec<Law>,
+    /// All pairs at the time when only those of some vertices were taken.
+    unrestricted: Option<(Vec<Pair>, Vec<Law>)>,
     /// The pairs where they were last evaluated.
     measured: RefCell<Measured>,
 }
@@ -36,22 +38,39 @@ impl Joined {
     }
 
     /// Adds pairs that are not yet here.
-    pub fn extend(&mut self, added: impl Iterator<Item = (Pair, Law)>) {
-        let known = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.laws));
-        let mut all: Vec<(Pair, Law)> = known.chain(added).collect();
-        // Two runs in order are merged in linear time.
-        all.sort_by_key(|(pair, _)| *pair);
-        (self.pairs, self.laws) = all.into_iter().unzip();
+    pub fn extend(&mut self, mut added: Vec<(Pair, Law)>) {
+        added.sort_unstable_by_key(|(pair, _)| *pair);
+        let mut before = self.pairs.len();
+        self.pairs.extend(added.iter().map(|(pair, _)| *pair));
+        self.laws.extend(added.iter().map(|(_, law)| *law));
+        // The last ones first, so that each known pair moves once at most.
+        for (place, (pair, law)) in added.into_iter().enumerate().rev() {
+            while before > 0 && self.pairs[before - 1] > pair {
+                before -= 1;
+                self.pairs[before + place + 1] = self.pairs[before];
+                self.laws[before + place + 1] = self.laws[before];
+            }
+            (self.pairs[before + place], self.laws[before + place]) = (pair, law);
+        }
         self.measured.get_mut().clear();
     }
 
-    /// Removes the pairs that have none of these vertices, and returns them with their laws.
-    pub fn split_off_others(&mut self, vertices: &[bool]) -> Vec<(Pair, Law)> {
+    /// Leaves out the pairs that have none of these vertices, until [`Self::release`].
+    pub fn restrict(&mut self, vertices: &[bool]) {
+        let (pairs, laws) = (std::mem::take(&mut self.pairs), std::mem::take(&mut self.laws));
+        let chosen = pairs.iter().zip(&laws).filter(|(pair, _)| pair.has_any(vertices));
+        (self.pairs, self.laws) = chosen.map(|(pair, law)| (*pair, *law)).unzip();
+        self.unrestricted = Some((pairs, laws));
         self.measured.get_mut().clear();
-        let all = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.laws));
-        let (kept, others): (Vec<_>, Vec<_>) = all.partition(|(pair, _)| pair.has_any(vertices));
-        (self.pairs, self.laws) = kept.into_iter().unzip();
-        others
+    }
+
+    /// Takes all pairs again, and keeps those that joined meanwhile.
+    pub fn release(&mut self) {
+        let Some((pairs, laws)) = self.unrestricted.take() else { return };
+        let chosen = std::mem::replace(&mut self.pairs, pairs).into_iter();
+        let mut chosen: Vec<_> = chosen.zip(std::mem::replace(&mut self.laws, laws)).collect();
+        chosen.retain(|(pair, _)| !self.contains(pair));
+        self.extend(chosen);
     }
 
     pub fn contains(&self, pair: &Pair) -> bool {
@@ -95,5 +114,53 @@ impl Active<'_> {
     pub fn iter(&self) -> impl Iterator<Item = (&Pair, Closest, &Barrier)> {
         let pair = |&number: &usize| (&self.measured.pairs[number], self.measured.closest(number));
         self.numbers.iter().map(pair).zip(&self.barriers).map(|((pair, closest), barrier)| (pair, closest, barrier))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::barrier::spacing::Spacing;
+    use crate::collision::PairKind;
+
+    /// Pairs of vertices with these numbers, each with a stiffness of its own.
+    fn numbered(numbers: impl Iterator<Item = u32>) -> Vec<(Pair, Law)> {
+        let pair = |number| Pair { kind: PairKind::EdgeEdge, features: [number, 0], vertices: [number; 4] };
+        let law = |number| Law::new(Spacing { thickness: 1e-3, gap: 2e-3 }, f64::from(number));
+        numbers.map(|number| (pair(number), law(number))).collect()
+    }
+
+    fn assert_holds(joined: &Joined, numbers: impl Iterator<Item = u32>) {
+        let (pairs, laws): (Vec<_>, Vec<_>) = numbered(numbers).into_iter().unzip();
+        assert_eq!(joined.pairs, pairs);
+        let stiffnesses = |laws: &[Law]| laws.iter().map(|law| law.stiffness).collect::<Vec<_>>();
+        assert_eq!(stiffnesses(&joined.laws), stiffnesses(&laws));
+    }
+
+    #[test]
+    fn pairs_stay_in_order_with_their_laws() {
+        let mut joined = Joined::default();
+        joined.extend(numbered((0..30).rev().filter(|number| number % 3 == 1)));
+        joined.extend(numbered((0..40).filter(|number| number % 3 == 0)));
+        joined.extend(Vec::new());
+        joined.extend(numbered([32, 2].into_iter()));
+        assert_holds(
+            &joined,
+            (0..40).filter(|number| number % 3 == 0 || [2, 32].contains(number) || *number < 30 && number % 3 == 1),
+        );
+    }
+
+    #[test]
+    fn pairs_that_join_while_others_are_left_out_stay() {
+        let mut joined = Joined::default();
+        joined.extend(numbered((0..40).filter(|number| number % 2 == 0)));
+        let vertices: Vec<bool> = (0..40).map(|number| number % 4 < 2).collect();
+        joined.restrict(&vertices);
+        assert_holds(&joined, (0..40).filter(|number| number % 4 == 0));
+        joined.extend(numbered((0..40).filter(|number| number % 8 == 1)));
+        joined.release();
+        assert_holds(&joined, (0..40).filter(|number| number % 2 == 0 || number % 8 == 1));
+        joined.release();
+        assert_holds(&joined, (0..40).filter(|number| number % 2 == 0 || number % 8 == 1));
     }
 }

@@ -84,8 +84,6 @@ pub struct BarrierContact {
     /// The pairs near the current iterate.
     neighbourhood: Neighbourhood,
     joined: Joined,
-    /// The joined pairs of vertices that do not move for a while.
-    fixed: Vec<(Pair, Law)>,
     friction: Friction,
     /// Pairs that shortened a move since the last iterate.
     blocking: Vec<Pair>,
@@ -286,7 +284,7 @@ impl ContactModel for BarrierContact {
         let energy = |((_, closest), law): (&(Pair, Closest), &Law)| law.energy(law.apart(closest));
         let change = added.iter().zip(&laws).map(energy).sum();
         if !added.is_empty() {
-            self.joined.extend(added.into_iter().map(|(pair, _)| pair).zip(laws));
+            self.joined.extend(added.into_iter().map(|(pair, _)| pair).zip(laws).collect());
         }
         change
     }
@@ -332,15 +330,13 @@ impl ContactModel for BarrierContact {
     }
 
     fn restrict(&mut self, moving: &[bool]) {
-        self.neighbourhood.restrict(moving);
-        self.fixed = self.joined.split_off_others(moving);
+        self.neighbourhood.restrict(moving, self.search.threads);
+        self.joined.restrict(moving);
     }
 
     fn release(&mut self) {
-        self.neighbourhood.release();
-        if !self.fixed.is_empty() {
-            self.joined.extend(std::mem::take(&mut self.fixed).into_iter());
-        }
+        self.neighbourhood.release(self.search.threads);
+        self.joined.release();
     }
 
     fn most_pressed(&self, x: &[Vector3<f64>]) -> Option<Pressed> {

@@ -213,7 +213,6 @@ impl BarrierContact {
             search,
             neighbourhood: Neighbourhood::default(),
             joined: Joined::default(),
-            fixed: Vec::new(),
             friction: Friction::without_grip(obstacles.len()),
             blocking: Vec::new(),
             resistance: Resistance::default(),

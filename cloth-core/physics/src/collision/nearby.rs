@@ -47,45 +47,53 @@ impl Nearby {
     /// from x: boxes of tilted features meet long before the features do.
     pub fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>], farthest: &[f64]) {
         self.visit(search, x);
-        let is_near =
-            |Entry { pair, separation, .. }: &Entry<'_>| separation - pair.approach(farthest) <= search.reach(pair);
-        let parts = ranges(search.threads, self.pairs.len(), PART);
-        let kept =
-            for_each(search.threads, parts, |part| Self::collect(part.len(), self.entries(part).filter(is_near)));
-        *self = Self::concatenated(std::mem::take(&mut self.separations.place), kept);
+        *self = self.filtered(search.threads, |Entry { pair, separation, .. }| {
+            separation - pair.approach(farthest) <= search.reach(pair)
+        });
     }
 
-    /// Removes the pairs that have none of these vertices, and returns them.
-    pub fn split_off_others(&mut self, vertices: &[bool]) -> Self {
-        let has_any = |entry: &Entry<'_>| entry.pair.has_any(vertices);
-        let (kept, others): (Vec<_>, Vec<_>) = self.entries(0..self.pairs.len()).partition(has_any);
-        let place = &self.separations.place;
-        let [kept, others] =
-            [kept, others].map(|entries| Self::collect(entries.len(), entries.into_iter()).at(place.clone()));
-        *self = kept;
-        others
+    /// Returns the pairs that have any of these vertices.
+    pub fn with_any(&self, vertices: &[bool], threads: usize) -> Self {
+        self.filtered(threads, |entry| entry.pair.has_any(vertices))
     }
 
     /// Returns the pairs of both. The distances of the others must be the same at both places of measurement.
-    pub fn joined_with(mut self, others: &Self, threads: usize) -> Self {
+    pub fn joined_with(self, others: &Self, threads: usize) -> Self {
         if others.pairs.is_empty() {
             return self;
         }
-        if self.pairs.is_empty() {
-            return others.clone();
-        }
-        let count = self.pairs.len();
-        let place_in_others = |number: usize| match number {
+        self.joined_with_some(others, |_| true, threads)
+    }
+
+    /// Returns these pairs and the others that have none of some vertices. The distances of the others must be the same
+    /// at both places of measurement.
+    pub fn joined_with_others(self, others: &Self, vertices: &[bool], threads: usize) -> Self {
+        self.joined_with_some(others, |entry| !entry.pair.has_any(vertices), threads)
+    }
+
+    fn joined_with_some(self, others: &Self, is_one: impl Fn(&Entry<'_>) -> bool + Sync, threads: usize) -> Self {
+        let longer = if self.pairs.len() > others.pairs.len() { &self.pairs } else { &others.pairs };
+        let place_in = |pairs: &[Pair], number: usize| match number {
             0 => 0,
-            _ if number == count => others.pairs.len(),
-            _ => others.pairs.partition_point(|pair| *pair < self.pairs[number]),
+            _ if number == longer.len() => pairs.len(),
+            _ => pairs.partition_point(|pair| *pair < longer[number]),
         };
-        let parts = for_each(threads, ranges(threads, count, PART), |part| {
-            let part_of_others = place_in_others(part.start)..place_in_others(part.end);
-            let most = part.len() + part_of_others.len();
-            Self::collect(most, merged(self.entries(part), others.entries(part_of_others)))
+        let parts = for_each(threads, ranges(threads, longer.len(), PART), |part| {
+            let [own, other] = [&self, others].map(|list| {
+                let part = place_in(&list.pairs, part.start)..place_in(&list.pairs, part.end);
+                (part.len(), list.entries(part))
+            });
+            Self::collect(own.0 + other.0, merged(own.1, other.1.filter(&is_one)))
         });
-        Self::concatenated(std::mem::take(&mut self.separations.place), parts)
+        Self::concatenated(self.separations.place, parts)
+    }
+
+    /// Returns some of the pairs.
+    fn filtered(&self, threads: usize, is_one: impl Fn(&Entry<'_>) -> bool + Sync) -> Self {
+        let parts = for_each(threads, ranges(threads, self.pairs.len(), PART), |part| {
+            Self::collect(part.len(), self.entries(part).filter(&is_one))
+        });
+        Self::concatenated(self.separations.place.clone(), parts)
     }
 
     /// Collects pairs in order, without their place. `most` bounds their number.
@@ -175,6 +183,13 @@ mod tests {
         nearby
     }
 
+    fn assert_same(found: &Nearby, expected: &Nearby, case: &str) {
+        assert_eq!(found.pairs, expected.pairs, "{case}");
+        assert_eq!(found.separations(), expected.separations(), "{case}");
+        let near = |nearby: &Nearby| nearby.within_reach().map(|(pair, _)| *pair).collect::<Vec<_>>();
+        assert_eq!(near(found), near(expected), "{case}");
+    }
+
     #[test]
     fn pairs_of_two_lists_are_joined_once_and_in_order() {
         let count = 3 * PART as u32;
@@ -184,10 +199,24 @@ mod tests {
             let expected = numbered(both);
             for threads in [1, 2, 3] {
                 let joined = numbered(list(own)).joined_with(&numbered(list(other)), threads);
-                assert_eq!(joined.pairs, expected.pairs, "{own} {other} {threads}");
-                assert_eq!(joined.separations(), expected.separations(), "{own} {other} {threads}");
-                let near = |nearby: &Nearby| nearby.within_reach().map(|(pair, _)| *pair).collect::<Vec<_>>();
-                assert_eq!(near(&joined), near(&expected), "{own} {other} {threads}");
+                assert_same(&joined, &expected, &format!("{own} {other} {threads}"));
+            }
+        }
+    }
+    #[test]
+    fn pairs_of_some_vertices_are_replaced() {
+        let count = 3 * PART as u32;
+        let all = numbered(0..count);
+        for step in [2, 7, count + 1] {
+            let vertices: Vec<bool> = (1..=count).map(|number| number.is_multiple_of(step)).collect();
+            let has_vertex = |number: &u32| vertices[*number as usize];
+            for threads in [1, 2, 3] {
+                let chosen = all.with_any(&vertices, threads);
+                assert_same(&chosen, &numbered((0..count).filter(has_vertex)), &format!("{step} {threads}"));
+                let kept = numbered((0..count).filter(has_vertex).filter(|number| number.is_multiple_of(5)));
+                let expected = (0..count).filter(|number| !has_vertex(number) || number.is_multiple_of(5));
+                let joined = kept.joined_with_others(&all, &vertices, threads);
+                assert_same(&joined, &numbered(expected), &format!("{step} {threads}"));
             }
         }
     }

@@ -29,13 +29,15 @@ pub struct Neighbourhood {
     fixed: Option<Fixed>,
 }
 
-/// The part of a neighbourhood that does not move while only some vertices do.
+/// What was known before only some vertices moved.
 #[derive(Clone, Debug)]
 struct Fixed {
-    /// The origin of all balls: theirs must not move either.
+    /// The origin of all balls: those of other vertices must not move either.
     origin: Vector3<f64>,
-    /// The pairs of other vertices.
-    pairs: Nearby,
+    /// Whether each vertex moves.
+    moving: Vec<bool>,
+    /// All pairs. Those of fixed vertices stay as they are.
+    nearby: Nearby,
 }
 
 /// The vertices that left their balls on the last such move, and their pairs.
@@ -212,9 +214,10 @@ impl Neighbourhood {
     }
 
     /// Lets only some vertices move, from where balls were last settled, and puts the pairs of others aside.
-    pub fn restrict(&mut self, moving: &[bool]) {
-        let origin = self.origin(self.settled);
-        self.fixed = Some(Fixed { origin, pairs: self.nearby.split_off_others(moving) });
+    pub fn restrict(&mut self, moving: &[bool], threads: usize) {
+        let chosen = self.nearby.with_any(moving, threads);
+        let nearby = std::mem::replace(&mut self.nearby, chosen);
+        self.fixed = Some(Fixed { origin: self.origin(self.settled), moving: moving.to_vec(), nearby });
     }
 
     /// Whether only some vertices move.
@@ -224,11 +227,11 @@ impl Neighbourhood {
 
     /// Lets all vertices move again, from where balls were last settled. Balls stay where they are, relative to their
     /// origin too: searches that look at some vertices only rely on the regions of the others.
-    pub fn release(&mut self) {
-        let Some(Fixed { origin, pairs }) = self.fixed.take() else { return };
+    pub fn release(&mut self, threads: usize) {
+        let Some(Fixed { origin, moving, nearby }) = self.fixed.take() else { return };
         self.offset = subtract(origin, self.settled);
         self.strays = Strays::default();
-        self.nearby = std::mem::take(&mut self.nearby).joined_with(&pairs, 1);
+        self.nearby = std::mem::take(&mut self.nearby).joined_with_others(&nearby, &moving, threads);
     }
 
     /// Whether each vertex is outside of its ball at an end of a move. Balls are convex: if they cover both ends of a
