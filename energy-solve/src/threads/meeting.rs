@@ -4,6 +4,7 @@ use std::sync::{Mutex, OnceLock};
 
 use super::barrier::SpinBarrier;
 use super::pool::{pool, spin_while, with_helpers};
+use super::results::Results;
 
 /// Divides the items among threads and applies `work` to each part, all parts at the same time. The threads may wait
 /// for each other at the barrier. They are at most `threads`, and no more than come at once: a thread that is busy or
@@ -17,16 +18,15 @@ pub(crate) fn in_parts<I: Send, R: Send>(
         return Vec::new();
     }
     let threads = threads.min(items.len());
-    let Some(pool) = (threads > 1).then(pool).flatten() else {
+    let Some(pool) = pool(threads) else {
         return vec![work(items, &SpinBarrier::new(1))];
     };
     let threads = threads.min(pool.current_num_threads());
-    let (meeting, agreed, results) = (Meeting::default(), OnceLock::new(), Mutex::new(Vec::new()));
+    let (meeting, agreed, results) = (Meeting::default(), OnceLock::new(), Results::default());
     let take_part = |number: usize, (barrier, parts): &(SpinBarrier, Vec<Mutex<Vec<I>>>)| {
         let part = std::mem::take(&mut *parts[number].lock().expect("no thread panics while it takes a part"));
         let _participation = barrier.participate();
-        let result = work(part, barrier);
-        results.lock().expect("no thread panics while it adds a result").push((number, result));
+        results.add(number, work(part, barrier));
     };
     let help = || {
         let Some(number) = meeting.join() else { return };
@@ -44,9 +44,7 @@ pub(crate) fn in_parts<I: Send, R: Send>(
         take_part(0, agreed.get_or_init(|| (SpinBarrier::new(participants), parts)));
     };
     with_helpers(pool, threads - 1, help, lead);
-    let mut results = results.into_inner().expect("no thread panics while it adds a result");
-    results.sort_unstable_by_key(|(number, _)| *number);
-    results.into_iter().map(|(_, result)| result).collect()
+    results.in_order()
 }
 
 /// The threads that have come to work together.
@@ -71,12 +69,11 @@ impl Meeting {
     }
 }
 
-/// Splits the items into at most `parts` non-empty runs of about the same length.
+/// Splits the items into runs of about the same length. There are at least as many items as parts.
 fn split<I>(items: Vec<I>, parts: usize) -> Vec<Vec<I>> {
-    let (count, parts) = (items.len(), parts.clamp(1, items.len().max(1)));
-    let mut items = items.into_iter();
-    let run = |part: usize| items.by_ref().take((part + 1) * count / parts - part * count / parts).collect::<Vec<I>>();
-    (0..parts).map(run).filter(|run| !run.is_empty()).collect()
+    let (count, mut items) = (items.len(), items.into_iter());
+    let length = |part: usize| (part + 1) * count / parts - part * count / parts;
+    (0..parts).map(|part| items.by_ref().take(length(part)).collect()).collect()
 }
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 mod barrier;
 mod meeting;
 mod pool;
+mod results;
 
 use std::ops::Range;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon_core::ThreadPool;
 
@@ -14,12 +14,13 @@ pub(crate) use barrier::SpinBarrier;
 pub(crate) use meeting::in_parts;
 pub use pool::in_pool;
 use pool::{pool, spin_while, with_helpers};
+use results::Results;
 
 /// Applies `work` to every item on at most `threads` threads, including the calling one. Each thread takes one item
 /// after the other, so one that starts late takes fewer. Results are in the order of the items.
 pub fn for_each<I: Send, R: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
     let threads = threads.min(items.len());
-    match (threads > 1).then(pool).flatten() {
+    match pool(threads) {
         Some(pool) => shared(pool, threads, items, &work),
         None => items.into_iter().map(work).collect(),
     }
@@ -35,23 +36,19 @@ fn shared<I: Send, R: Send>(
 ) -> Vec<R> {
     let count = items.len();
     let waiting = Mutex::new(items.into_iter().enumerate());
-    let (done, number_done) = (Mutex::new(Vec::with_capacity(count)), AtomicUsize::new(0));
+    let results = Results::default();
     let next = || waiting.lock().expect("no thread panics while it takes an item").next();
     let until_none_waits = || {
         while let Some((number, item)) = next() {
-            let result = work(item);
-            done.lock().expect("no thread panics while it adds a result").push((number, result));
-            number_done.fetch_add(1, Ordering::Release);
+            results.add(number, work(item));
         }
     };
     let lead = || {
         until_none_waits();
-        spin_while(|| number_done.load(Ordering::Acquire) < count);
+        spin_while(|| results.count() < count);
     };
     with_helpers(pool, threads - 1, until_none_waits, lead);
-    let mut done = done.into_inner().expect("no thread panics while it adds a result");
-    done.sort_unstable_by_key(|(number, _)| *number);
-    done.into_iter().map(|(_, result)| result).collect()
+    results.in_order()
 }
 
 /// Collects what `work` makes of consecutive ranges of the numbers below `count`, of this length, on at most `threads`

@@ -12,10 +12,13 @@ const STACK: usize = 16 << 20;
 /// wake a thread.
 const PATIENCE: Duration = Duration::from_micros(200);
 
-/// The threads, one per core. To wake one takes a tenth of the time that it takes to start one. `None` if the system
-/// refuses to start them, or in a forked process, which inherits no threads.
-pub(super) fn pool() -> Option<&'static ThreadPool> {
+/// The threads, one per core, if work is for more than one. To wake one takes a tenth of the time that it takes to start
+/// one. `None` also if the system refuses to start them, or in a forked process, which inherits no threads.
+pub(super) fn pool(threads: usize) -> Option<&'static ThreadPool> {
     static POOL: OnceLock<(u32, Option<ThreadPool>)> = OnceLock::new();
+    if threads <= 1 {
+        return None;
+    }
     let start = || {
         let name = |number| format!("energy-solve {number}");
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -29,7 +32,7 @@ pub(super) fn pool() -> Option<&'static ThreadPool> {
 /// Runs `work` on a thread of the pool if it may use several threads. Within it, [`for_each`](super::for_each) does not
 /// wait for a thread that wakes too late to help.
 pub fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
-    match (threads > 1).then(pool).flatten() {
+    match pool(threads) {
         Some(pool) => pool.install(work),
         None => work(),
     }
@@ -37,8 +40,9 @@ pub fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
 
 /// Runs `lead`, while this many threads of the pool run `help` as soon as they can. Returns when all have returned.
 pub(super) fn with_helpers(pool: &ThreadPool, helpers: usize, help: impl Fn() + Sync, lead: impl FnOnce()) {
-    let was_busy = IS_BUSY.replace(true);
+    let _busy = Busy(IS_BUSY.replace(true));
     let help = || {
+        // First, because afterwards the waiting leader would take the job that it adds.
         stay_awake();
         help();
     };
@@ -46,12 +50,20 @@ pub(super) fn with_helpers(pool: &ThreadPool, helpers: usize, help: impl Fn() + 
         (0..helpers).for_each(|_| scope.spawn(|_| help()));
         lead();
     });
-    IS_BUSY.set(was_busy);
 }
 
 thread_local! {
     /// Whether this thread leads others or looks for work already.
     static IS_BUSY: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The time in which a thread leads others, and whether it was busy before.
+struct Busy(bool);
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        IS_BUSY.set(self.0);
+    }
 }
 
 /// Lets this thread of the pool look for more work for a while after its current one.

@@ -12,7 +12,7 @@ use crate::collision::{Closest, Measured, MeasuredPart, Pair};
 pub(super) struct Joined {
     pub pairs: Vec<Pair>,
     pub laws: Vec<Law>,
-    /// All pairs at the time when only those of some vertices were taken.
+    /// All pairs before those of some vertices were selected.
     unrestricted: Option<(Vec<Pair>, Vec<Law>)>,
     /// The pairs where they were last evaluated.
     measured: RefCell<Measured>,
@@ -55,7 +55,7 @@ impl Joined {
         self.measured.get_mut().clear();
     }
 
-    /// Leaves out the pairs that have none of these vertices, until [`Self::release`].
+    /// Keeps only the pairs with any of these vertices, until [`Self::release`].
     pub fn restrict(&mut self, vertices: &[bool]) {
         let (pairs, laws) = (std::mem::take(&mut self.pairs), std::mem::take(&mut self.laws));
         let chosen = pairs.iter().zip(&laws).filter(|(pair, _)| pair.has_any(vertices));
@@ -123,7 +123,7 @@ mod tests {
     use crate::barrier::spacing::Spacing;
     use crate::collision::PairKind;
 
-    /// Pairs of vertices with these numbers, each with a stiffness of its own.
+    /// Pairs of vertices with these numbers, which determine their stiffnesses.
     fn numbered(numbers: impl Iterator<Item = u32>) -> Vec<(Pair, Law)> {
         let pair = |number| Pair { kind: PairKind::EdgeEdge, features: [number, 0], vertices: [number; 4] };
         let law = |number| Law::new(Spacing { thickness: 1e-3, gap: 2e-3 }, f64::from(number));

@@ -47,14 +47,15 @@ impl Nearby {
     /// from x: boxes of tilted features meet long before the features do.
     pub fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>], farthest: &[f64]) {
         self.visit(search, x);
-        *self = self.filtered(search.threads, |Entry { pair, separation, .. }| {
+        let kept = self.filtered(search.threads, |Entry { pair, separation, .. }| {
             separation - pair.approach(farthest) <= search.reach(pair)
         });
+        *self = kept.at(std::mem::take(&mut self.separations.place));
     }
 
     /// Returns the pairs that have any of these vertices.
     pub fn with_any(&self, vertices: &[bool], threads: usize) -> Self {
-        self.filtered(threads, |entry| entry.pair.has_any(vertices))
+        self.filtered(threads, |entry| entry.pair.has_any(vertices)).at(self.separations.place.clone())
     }
 
     /// Returns the pairs of both. The distances of the others must be the same at both places of measurement.
@@ -65,8 +66,8 @@ impl Nearby {
         self.joined_with_some(others, |_| true, threads)
     }
 
-    /// Returns these pairs and the others that have none of some vertices. The distances of the others must be the same
-    /// at both places of measurement.
+    /// Returns these pairs, and those of the others without any of some vertices. The distances of the others must be
+    /// the same at both places of measurement.
     pub fn joined_with_others(self, others: &Self, vertices: &[bool], threads: usize) -> Self {
         self.joined_with_some(others, |entry| !entry.pair.has_any(vertices), threads)
     }
@@ -85,15 +86,15 @@ impl Nearby {
             });
             Self::collect(own.0 + other.0, merged(own.1, other.1.filter(&is_one)))
         });
-        Self::concatenated(self.separations.place, parts)
+        Self::concatenated(parts).at(self.separations.place)
     }
 
-    /// Returns some of the pairs.
+    /// Returns some of the pairs, without their place.
     fn filtered(&self, threads: usize, is_one: impl Fn(&Entry<'_>) -> bool + Sync) -> Self {
         let parts = for_each(threads, ranges(threads, self.pairs.len(), PART), |part| {
             Self::collect(part.len(), self.entries(part).filter(&is_one))
         });
-        Self::concatenated(self.separations.place.clone(), parts)
+        Self::concatenated(parts)
     }
 
     /// Collects pairs in order, without their place. `most` bounds their number.
@@ -107,8 +108,8 @@ impl Nearby {
         Self { pairs, separations: Separations { place: Vec::new(), all, near } }
     }
 
-    /// Concatenates parts that were measured at this place.
-    fn concatenated(place: Vec<Vector3<f64>>, parts: Vec<Self>) -> Self {
+    /// Concatenates parts, without their place.
+    fn concatenated(parts: Vec<Self>) -> Self {
         let mut parts = parts.into_iter();
         let mut whole = parts.next().unwrap_or_default();
         for Self { pairs, separations: Separations { all, near, .. } } in parts {
@@ -117,7 +118,7 @@ impl Nearby {
             whole.separations.all.extend(all);
             whole.pairs.extend(pairs);
         }
-        whole.at(place)
+        whole
     }
 
     /// Returns the pairs, measured at this place.

@@ -29,14 +29,14 @@ pub struct Neighbourhood {
     fixed: Option<Fixed>,
 }
 
-/// What was known before only some vertices moved.
+/// The neighbourhood of all vertices, while only some of them move.
 #[derive(Clone, Debug)]
 struct Fixed {
     /// The origin of all balls: those of other vertices must not move either.
     origin: Vector3<f64>,
     /// Whether each vertex moves.
     moving: Vec<bool>,
-    /// All pairs. Those of fixed vertices stay as they are.
+    /// The pairs before. Where no vertex moves, they stay as they are.
     nearby: Nearby,
 }
 
